@@ -15,6 +15,6 @@ mod tree;
 
 pub use error::ModelError;
 pub use inertial::{INERTIAL_NAMES, InertialParameters};
-pub use joint::{Joint, JointKind, JointLimits, Mimic};
+pub use joint::{Joint, JointKind, JointLimits, JointMap, Mimic};
 pub use spatial::{Mat3, Transform, Vec3};
 pub use tree::{Body, Link, Model, STANDARD_GRAVITY};
