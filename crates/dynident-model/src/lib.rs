@@ -10,6 +10,7 @@ mod error;
 mod inertial;
 mod joint;
 pub mod laws;
+pub mod sample;
 mod spatial;
 mod tree;
 
