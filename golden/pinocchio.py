@@ -36,7 +36,7 @@ TILTED_GRAVITY = np.array([3.0, -4.0, -8.0])  # a base that does not stand uprig
 OURS = np.array([0, 1, 2, 3, 4, 5, 7, 6, 8, 9])
 PARAMETERS = ["m", "m_rx", "m_ry", "m_rz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"]
 # A column is dependent when its part outside the span of earlier independent columns is below this share of it:
-# rounding leaves about 1e-14, and the least independent column of the robots here keeps more than 1e-4.
+# rounding leaves about 1e-15, and the least independent column of the robots here keeps more than half.
 DEPENDENT = 1e-9
 
 
