@@ -39,6 +39,7 @@ impl HasAvx512 {
     }
 
     /// AVX-512 processors here have AVX2 as well.
+    #[allow(clippy::unused_self, reason = "taken as the proof")]
     pub(crate) fn avx2(self) -> HasAvx2 {
         HasAvx2(())
     }
