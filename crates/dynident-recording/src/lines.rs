@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 pub const MAX_LINE_BYTES: usize = 1 << 20;
 
 /// The lines that matter of one file.
+#[derive(Debug)]
 pub(crate) struct Lines {
     path: PathBuf,
     reader: BufReader<File>,

@@ -42,6 +42,7 @@ pub struct LinesDropped {
     pub truncated: Option<String>,
 }
 
+#[derive(Debug)]
 struct Group {
     key: &'static str,
     file: usize,
@@ -50,12 +51,14 @@ struct Group {
     columns: Vec<Vec<f64>>,
 }
 
+#[derive(Debug)]
 struct Source {
     table: Table,
     values: Vec<f64>,
 }
 
 /// A log that is being read.
+#[derive(Debug)]
 pub struct LogReader {
     file: PathBuf,
     joints: Vec<String>,

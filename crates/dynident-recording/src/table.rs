@@ -17,11 +17,13 @@ pub(crate) enum Row {
 }
 
 /// A wanted column and the place its value goes to.
+#[derive(Debug)]
 struct Wanted {
     field: usize,
     slot: usize,
 }
 
+#[derive(Debug)]
 pub(crate) struct Table {
     lines: Lines,
     delimiter: u8,
