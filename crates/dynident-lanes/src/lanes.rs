@@ -33,10 +33,44 @@ pub trait Lane: Scalar {
 
     /// Sum over the lanes.
     fn sum(self) -> f64;
+
+    /// The lane type that holds several values of this one side by side: eight joints of a single sample, or just one value where
+    /// the lanes are samples already. What vectorises *inside* one sample is written over bundles.
+    type Bundle: Lane;
+
+    /// How many values of this type one [`Bundle`](Lane::Bundle) holds.
+    const PER_BUNDLE: usize = Self::Bundle::LANES / Self::LANES;
+
+    /// The bundle with this value in every place.
+    fn bundle(self) -> Self::Bundle;
+
+    /// Puts this value at place `index` of the bundle.
+    ///
+    /// # Panics
+    /// If `index` is not below [`PER_BUNDLE`](Lane::PER_BUNDLE).
+    fn put(self, bundle: &mut Self::Bundle, index: usize);
+}
+
+/// Samples are lanes already: a bundle is one value.
+macro_rules! bundle_of_itself {
+    () => {
+        type Bundle = Self;
+
+        #[inline(always)]
+        fn bundle(self) -> Self {
+            self
+        }
+
+        #[inline(always)]
+        fn put(self, bundle: &mut Self, index: usize) {
+            assert_eq!(index, 0);
+            *bundle = self;
+        }
+    };
 }
 
 macro_rules! lanes {
-    ($(#[$doc:meta])* $name:ident, $n:literal, $align:literal) => {
+    ($(#[$doc:meta])* $name:ident, $n:literal, $align:literal, $together:literal, { $($bundle:tt)* }) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, PartialEq)]
         #[repr(C, align($align))]
@@ -122,6 +156,27 @@ macro_rules! lanes {
             }
 
             #[inline(always)]
+            fn sin_cos_all(angles: &[Self], sines: &mut [Self], cosines: &mut [Self]) {
+                // Narrow lanes would leave most of a register empty: take several angles into one.
+                const WIDTH: usize = $n * $together;
+                let count = angles.len().min(sines.len()).min(cosines.len());
+                let mut start = 0;
+                while start < count {
+                    let end = (start + $together).min(count);
+                    let mut packed = [0.0; WIDTH];
+                    for (k, angle) in angles[start..end].iter().enumerate() {
+                        packed[k * $n..(k + 1) * $n].copy_from_slice(&angle.0);
+                    }
+                    let (s, c) = sin_cos_lanes::<WIDTH, FUSED>(packed);
+                    for k in 0..end - start {
+                        sines[start + k].0.copy_from_slice(&s[k * $n..(k + 1) * $n]);
+                        cosines[start + k].0.copy_from_slice(&c[k * $n..(k + 1) * $n]);
+                    }
+                    start = end;
+                }
+            }
+
+            #[inline(always)]
             fn recip(mut self) -> Self {
                 for i in 0..$n {
                     self.0[i] = 1.0 / self.0[i];
@@ -153,6 +208,8 @@ macro_rules! lanes {
             fn sum(self) -> f64 {
                 self.0.iter().sum()
             }
+
+            $($bundle)*
         }
     };
 }
@@ -161,17 +218,35 @@ lanes!(
     /// One sample.
     F64x1,
     1,
-    8
+    8,
+    8,
+    {
+        type Bundle = F64x8<FUSED>;
+
+        #[inline(always)]
+        fn bundle(self) -> F64x8<FUSED> {
+            F64x8([self.0[0]; 8])
+        }
+
+        #[inline(always)]
+        fn put(self, bundle: &mut F64x8<FUSED>, index: usize) {
+            bundle.0[index] = self.0[0];
+        }
+    }
 );
 lanes!(
     /// Four samples: one AVX2 register, two NEON registers.
     F64x4,
     4,
-    32
+    32,
+    2,
+    { bundle_of_itself!(); }
 );
 lanes!(
     /// Eight samples: one AVX-512 register.
     F64x8,
     8,
-    64
+    64,
+    1,
+    { bundle_of_itself!(); }
 );

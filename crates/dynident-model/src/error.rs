@@ -1,0 +1,52 @@
+//! What can be wrong with a model's parts.
+
+use thiserror::Error;
+
+/// Why a [`Model`](crate::Model) could not be built.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// Joints and bodies do not pair up.
+    #[error("{joints} joints but {bodies} bodies: every joint moves exactly one body")]
+    Counts {
+        /// Number of joints.
+        joints: usize,
+        /// Number of bodies.
+        bodies: usize,
+    },
+    /// Two joints with one name.
+    #[error("joint `{joint}` is named twice: joint names must be unique")]
+    DuplicateJoint {
+        /// The name.
+        joint: String,
+    },
+    /// A joint whose parent body comes after it.
+    #[error("joint `{joint}` comes before its parent: order joints from base to tip")]
+    ParentAfterChild {
+        /// The joint.
+        joint: String,
+    },
+    /// An axis that is not a unit vector.
+    #[error("the axis of joint `{joint}` is not a unit vector: normalise it")]
+    AxisNotUnit {
+        /// The joint.
+        joint: String,
+    },
+    /// A body with no link at all.
+    #[error("a body has no link: every body needs the link that its joint moves")]
+    BodyWithoutLink,
+    /// An infinite or undefined number.
+    #[error("{what} is not a finite number")]
+    NotFinite {
+        /// What it was.
+        what: String,
+    },
+    /// A joint that does not exist.
+    #[error("there is no joint `{joint}`; the joints are: {}", known.join(", "))]
+    UnknownJoint {
+        /// The name asked for.
+        joint: String,
+        /// The names that exist.
+        known: Vec<String>,
+    },
+}

@@ -1,0 +1,148 @@
+//! One joint: how a body may move against its parent.
+
+use crate::spatial::{Mat3, Transform, Vec3};
+
+/// The kinds of joint with a degree of freedom.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointKind {
+    /// Turns about its axis, between limits; position in radians.
+    Revolute,
+    /// Turns about its axis without limits; position in radians.
+    Continuous,
+    /// Slides along its axis; position in metres.
+    Prismatic,
+}
+
+impl JointKind {
+    /// The name that URDF uses.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Revolute => "revolute",
+            Self::Continuous => "continuous",
+            Self::Prismatic => "prismatic",
+        }
+    }
+}
+
+/// Limits of a joint, where the description gives them: radians or metres, per second, Nm or N.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JointLimits {
+    /// Lowest position, rad or m.
+    pub lower: Option<f64>,
+    /// Highest position, rad or m.
+    pub upper: Option<f64>,
+    /// Highest speed, rad/s or m/s.
+    pub velocity: Option<f64>,
+    /// Highest torque or force, Nm or N.
+    pub effort: Option<f64>,
+}
+
+/// A joint that follows another: `q = multiplier · q_source + offset`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mimic {
+    /// Name of the joint that is followed.
+    pub source: String,
+    /// Ratio of the two speeds.
+    pub multiplier: f64,
+    /// Position (rad or m) while the source stands at zero.
+    pub offset: f64,
+}
+
+/// A joint of the tree. Its child body's frame is the joint frame: at position zero it stands at `placement` in the parent body's
+/// frame, and it moves by `q` about (along) `axis`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// Unique name.
+    pub name: String,
+    /// Kind of motion.
+    pub kind: JointKind,
+    /// Index of the parent body, or `None` for the fixed base. Always below this joint's own index.
+    pub parent: Option<usize>,
+    /// `parent_from_child` at position zero.
+    pub placement: Transform,
+    /// Unit vector of the axis in the joint (child body) frame.
+    pub axis: Vec3,
+    /// Limits, where known.
+    pub limits: JointLimits,
+    /// Viscous friction of the description, Nm s/rad (N s/m).
+    pub damping: Option<f64>,
+    /// Coulomb friction of the description, Nm (N).
+    pub friction: Option<f64>,
+    /// The joint it follows, if the description says so. The dynamics treat it as a free joint; see
+    /// [`Model::locked`](crate::Model::locked).
+    pub mimic: Option<Mimic>,
+}
+
+/// The numbers of one joint in the form that algorithms use: `parent_from_child` of a turning joint is
+/// `R(q) = constant + cosine · cos q + sine · sin q` with a fixed translation; of a sliding joint `R = constant` and
+/// `translation + slide · q`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointMap {
+    /// Index of the parent body, or `None` for the base.
+    pub parent: Option<usize>,
+    /// True for revolute and continuous joints.
+    pub turns: bool,
+    /// Unit axis in the child frame.
+    pub axis: Vec3,
+    /// The part of the rotation that does not change with `q`.
+    pub constant: Mat3,
+    /// The part in proportion to `cos q` (zero for a sliding joint).
+    pub cosine: Mat3,
+    /// The part in proportion to `sin q` (zero for a sliding joint).
+    pub sine: Mat3,
+    /// Translation at `q = 0`, in metres.
+    pub translation: Vec3,
+    /// Axis in the parent frame for a sliding joint, zero for a turning one.
+    pub slide: Vec3,
+}
+
+impl Joint {
+    /// The joint's numbers, prepared for the algorithms.
+    pub fn map(&self) -> JointMap {
+        let placement = &self.placement.rotation;
+        let (parent, axis, translation) = (self.parent, self.axis, self.placement.translation);
+        if self.turns() {
+            // Rodrigues: R(q) = P (a aᵀ + cos q (1 - a aᵀ) + sin q [a]×).
+            let constant = placement.mul_mat(&Mat3::outer(axis, axis));
+            JointMap {
+                parent,
+                turns: true,
+                axis,
+                constant,
+                cosine: *placement - constant,
+                sine: placement.mul_mat(&Mat3::skew(axis)),
+                translation,
+                slide: Vec3::ZERO,
+            }
+        } else {
+            JointMap {
+                parent,
+                turns: false,
+                axis,
+                constant: *placement,
+                cosine: Mat3::ZERO,
+                sine: Mat3::ZERO,
+                translation,
+                slide: placement.mul_vec(axis),
+            }
+        }
+    }
+
+    /// `parent_from_child` at position `q` (rad or m).
+    pub fn transform(&self, q: f64) -> Transform {
+        match self.kind {
+            JointKind::Revolute | JointKind::Continuous => Transform {
+                rotation: self.placement.rotation.mul_mat(&Mat3::from_axis_angle(self.axis, q)),
+                translation: self.placement.translation,
+            },
+            JointKind::Prismatic => {
+                Transform { rotation: self.placement.rotation, translation: self.placement.point(self.axis.scale(q)) }
+            }
+        }
+    }
+
+    /// True for revolute and continuous joints.
+    pub fn turns(&self) -> bool {
+        self.kind != JointKind::Prismatic
+    }
+}

@@ -1,0 +1,75 @@
+//! A drive that turns with two joints, as in a coupled wrist: its speed is `w = k_1 q̇_1 + k_2 q̇_2`.
+//!
+//! Its own joint's laws already hold the part that only one joint feels, so a coupling holds the cross terms
+//! (Stäubli TX and RX wrists: Gautier, Janot, Vandanjon 2013; the DFKI pendulum's rotor seen through two joints):
+//! * inertia: `τ_1 += k_1 k_2 I q̈_2`, `τ_2 += k_1 k_2 I q̈_1`,
+//! * viscous friction: `τ_1 += k_1 k_2 F q̇_2`, `τ_2 += k_1 k_2 F q̇_1`,
+//! * Coulomb friction: `τ_1 += k_1 F s(w)`, `τ_2 += k_2 F s(w)`.
+
+use super::{CoulombShape, JointMotion};
+
+/// What the shared drive adds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CouplingEffect {
+    /// Cross inertia, kg m².
+    Inertia,
+    /// Cross viscous friction, Nm s/rad.
+    Viscous,
+    /// Coulomb friction on the drive's own speed, Nm.
+    Coulomb(CoulombShape),
+}
+
+/// One effect of one drive that turns with two joints.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coupling {
+    /// Name of the drive, used in the parameter's symbol.
+    pub name: String,
+    /// One joint.
+    pub first: usize,
+    /// The other joint.
+    pub second: usize,
+    /// Drive speed per speed of the first and of the second joint.
+    pub ratios: [f64; 2],
+    /// The effect.
+    pub effect: CouplingEffect,
+}
+
+impl Coupling {
+    pub(super) fn symbol(&self) -> String {
+        let prefix = match self.effect {
+            CouplingEffect::Inertia => "Ia",
+            CouplingEffect::Viscous => "fv",
+            CouplingEffect::Coulomb(_) => "fc",
+        };
+        format!("{prefix}_{}", self.name)
+    }
+
+    pub(super) fn column(&self, row: usize, motion: &JointMotion<'_>, out: &mut [f64]) {
+        let (other, own_ratio) =
+            if row == self.first { (self.second, self.ratios[0]) } else { (self.first, self.ratios[1]) };
+        let cross = self.ratios[0] * self.ratios[1];
+        match self.effect {
+            CouplingEffect::Inertia => {
+                for (to, &ddq) in out.iter_mut().zip(motion.ddq_of(other)) {
+                    *to = cross * ddq;
+                }
+            }
+            CouplingEffect::Viscous => {
+                for (to, &dq) in out.iter_mut().zip(motion.dq_of(other)) {
+                    *to = cross * dq;
+                }
+            }
+            CouplingEffect::Coulomb(shape) => {
+                let speeds = motion.dq_of(self.first).iter().zip(motion.dq_of(self.second));
+                for (to, (&first, &second)) in out.iter_mut().zip(speeds) {
+                    *to = own_ratio * shape.step(self.ratios[0] * first + self.ratios[1] * second);
+                }
+            }
+        }
+    }
+
+    pub(super) fn mass_matrix_entry(&self, row: usize, column: usize) -> f64 {
+        let crosses = (row, column) == (self.first, self.second) || (row, column) == (self.second, self.first);
+        if self.effect == CouplingEffect::Inertia && crosses { self.ratios[0] * self.ratios[1] } else { 0.0 }
+    }
+}
