@@ -128,8 +128,9 @@ pub(crate) fn quantisation_step(values: &[f64]) -> Option<f64> {
         return None;
     }
     steps.sort_by(f64::total_cmp);
-    // Not the smallest: the rounding of the printed text makes smaller ones.
-    let candidate = steps[steps.len() / 20];
+    // Not the smallest as such: the rounding of the printed text makes far smaller ones.
+    let least = 0.02 * steps[steps.len() / 20];
+    let candidate = *steps.iter().find(|step| **step >= least)?;
     let multiples = steps.iter().filter(|step| {
         let ratio = *step / candidate;
         (ratio - ratio.round()).abs() <= 0.02

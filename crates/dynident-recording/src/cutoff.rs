@@ -30,12 +30,15 @@ pub struct CutoffChoice {
 /// Chooses one cut-off for all joints from uniformly sampled positions `q` (one slice for each joint; at most the first
 /// [`CUTOFF_SAMPLES`] are used).
 ///
-/// Per joint: Welch spectrum of the second difference of q (Hann window, half overlap, about eight seconds a piece), divided by
-/// the response of the second difference, is the spectrum of q free of leakage from slow motion. Its median over the upper
-/// half of the band is the noise floor. The motion's band ends where the spectrum first stays below ten times
-/// the floor; within it, the cut-off is 1.4 times the frequency below which 99.9 % of the acceleration's power lies (so data that were filtered
-/// before, without any noise floor, get a cut-off by their content). The log's cut-off is the highest of its joints',
-/// at most 0.4 of the rate.
+/// Per joint, from the Welch spectrum of the second difference of q (Hann window, half overlap, about eight seconds a piece):
+/// * Noise in the position makes the spectrum of the acceleration rise with frequency. Behind the peak of the velocity's
+///   spectrum, the first frequency at which the acceleration's (smoothed over a quarter octave) comes within twice its minimum is the
+///   valley where motion has faded into noise.
+/// * Data that were filtered before have their valley far above the motion: there the frequency counts below which 99.9 % of the
+///   acceleration's power up to the valley lies.
+///
+/// The joint asks for 1.4 times the lower of the two; the log's cut-off is the highest of its joints', at most 0.4 of the rate.
+/// A joint whose spectrum nowhere stands above ten times its median over the upper half of the band does not count.
 pub fn cutoff<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> CutoffChoice {
     let joints: Vec<Option<Content>> = q.iter().map(|q| content(q.as_ref(), rate_hz)).collect();
     let highest = HIGHEST * rate_hz;
@@ -53,9 +56,9 @@ pub fn cutoff<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> CutoffChoice {
             cutoff_hz: asked(content),
             joints_hz,
             evidence: format!(
-                "joint {} (0-based) reaches highest: 99.9 % of its acceleration's power lies below {:.3} Hz, its motion stands above the noise \
-                 floor of {:.1e} per sample up to {:.3} Hz; with a margin of {MARGIN}, at most {HIGHEST} of the rate",
-                joint, content.power_hz, content.noise, content.motion_hz,
+                "joint {} (0-based) reaches highest: its acceleration fades into the noise ({:.1e} per sample of position) at {:.3} Hz, \
+                 and 99.9 % of its power below that lies below {:.3} Hz; times {MARGIN}, at most {HIGHEST} of the rate",
+                joint, content.noise, content.valley_hz, content.power_hz,
             ),
         },
     }
@@ -63,7 +66,7 @@ pub fn cutoff<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> CutoffChoice {
 
 struct Content {
     power_hz: f64,
-    motion_hz: f64,
+    valley_hz: f64,
     /// Standard deviation of the position noise of one sample.
     noise: f64,
 }
@@ -81,42 +84,47 @@ fn content(q: &[f64], rate_hz: f64) -> Option<Content> {
     let bins = spectrum.len();
     let response = |k: usize| (2.0 * (core::f64::consts::PI * k as f64 / length as f64).sin()).powi(4);
     let position: Vec<f64> = (1..bins).map(|k| spectrum[k] / response(k)).collect();
-    // Three bins together: the window spreads a line over as many.
-    let smooth: Vec<f64> = (0..position.len())
-        .map(|k| {
-            let near = &position[k.saturating_sub(1)..(k + 2).min(position.len())];
-            near.iter().sum::<f64>() / near.len() as f64
-        })
-        .collect();
     let mut upper = position[position.len() / 2..].to_vec();
     upper.sort_by(f64::total_cmp);
     let floor = upper[upper.len() / 2];
-    // The band ends where the spectrum stays down for a while: the longer of five bins and a tenth of the frequency.
-    let threshold = ABOVE_NOISE * floor;
-    let mut end = 0;
-    for k in 0..smooth.len() {
-        if smooth[k] > threshold {
-            end = k;
-        } else if k > end + 5.max(end / 2) {
-            break;
-        }
-    }
-    let acceleration = |k: usize| ((position[k] - floor) * response(k + 1)).max(0.0);
-    let total: f64 = (0..=end).map(acceleration).sum();
-    if smooth[0].max(smooth[end]) <= threshold || total <= 0.0 {
+    let acceleration: Vec<f64> = (1..bins).map(|k| spectrum[k]).collect();
+    let valley = valley(&acceleration);
+    let end = position.iter().rposition(|power| *power > ABOVE_NOISE * floor)?.min(valley);
+    let power: Vec<f64> = (0..=end).map(|k| ((position[k] - floor) * response(k + 1)).max(0.0)).collect();
+    let total: f64 = power.iter().sum();
+    if position[0] <= ABOVE_NOISE * floor || total <= 0.0 {
         return None;
     }
     let mut sum = 0.0;
-    let mut last = end;
-    for k in 0..=end {
-        sum += acceleration(k);
-        if sum >= POWER_SHARE * total {
-            last = k;
-            break;
-        }
-    }
+    let last = power.iter().position(|power| {
+        sum += power;
+        sum >= POWER_SHARE * total
+    });
     let hertz = |k: usize| (k + 1) as f64 * rate_hz / length as f64;
-    Some(Content { power_hz: hertz(last), motion_hz: hertz(end), noise: floor.sqrt() })
+    Some(Content { power_hz: hertz(last.unwrap_or(end)), valley_hz: hertz(valley), noise: floor.sqrt() })
+}
+
+/// Index (bin minus one) at which the acceleration's spectrum has come down to twice its minimum behind the main motion.
+fn valley(acceleration: &[f64]) -> usize {
+    let bins = acceleration.len();
+    let sums: Vec<f64> = core::iter::once(0.0)
+        .chain(acceleration.iter().scan(0.0, |sum, power| {
+            *sum += power;
+            Some(*sum)
+        }))
+        .collect();
+    let smooth: Vec<f64> = (0..bins)
+        .map(|k| {
+            let (from, to) =
+                (k.min(((k + 1) as f64 / 1.09) as usize), (((k + 1) as f64 * 1.09).ceil() as usize + 1).min(bins));
+            let from = from.saturating_sub(1);
+            (sums[to] - sums[from]) / (to - from) as f64
+        })
+        .collect();
+    let velocity = |k: usize| smooth[k] / ((k + 1) * (k + 1)) as f64;
+    let peak = (0..bins).max_by(|a, b| velocity(*a).total_cmp(&velocity(*b))).unwrap_or(0);
+    let least = smooth[peak..].iter().fold(f64::INFINITY, |least, power| least.min(*power));
+    peak + smooth[peak..].iter().position(|power| *power <= 2.0 * least).unwrap_or(0)
 }
 
 fn previous_power_of_two(n: usize) -> usize {

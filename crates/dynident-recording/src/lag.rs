@@ -11,10 +11,14 @@ pub struct Lag {
     pub samples: f64,
     /// Correlation there, -1 to 1: the one of largest magnitude; negative if the second signal is reversed.
     pub correlation: f64,
+    /// Correlation without a shift.
+    pub correlation_unshifted: f64,
+    /// Whether the largest correlation was found at the end of the search: the true lag may be longer, or there is none.
+    pub at_limit: bool,
 }
 
 /// The lag of `b` behind `a`, searched up to `max_lag_samples` either way: the shift `k` of largest `|corr(a[i], b[i + k])|`
-/// (Pearson's correlation over the overlapping samples), refined by a parabola. `None` for signals that are constant,
+/// (Pearson's correlation, the same samples of `a` for every shift), refined by a parabola. `None` for signals that are constant,
 /// not finite, or not at least three times as long as the largest lag. Filter both signals alike before.
 pub fn best_lag(a: &[f64], b: &[f64], max_lag_samples: usize, rate_hz: f64) -> Option<Lag> {
     let n = a.len().min(b.len());
@@ -24,9 +28,8 @@ pub fn best_lag(a: &[f64], b: &[f64], max_lag_samples: usize, rate_hz: f64) -> O
     let limit = max_lag_samples as isize;
     let correlations = (-limit..=limit)
         .map(|lag| {
-            let (from_a, from_b) = (lag.min(0).unsigned_abs(), lag.max(0).unsigned_abs());
-            let overlap = n - lag.unsigned_abs();
-            correlation(&a[from_a..from_a + overlap], &b[from_b..from_b + overlap])
+            let from = max_lag_samples.wrapping_add_signed(lag);
+            correlation(&a[max_lag_samples..n - max_lag_samples], &b[from..n - 2 * max_lag_samples + from])
         })
         .collect::<Option<Vec<f64>>>()?;
     let best = (0..correlations.len()).max_by(|x, y| correlations[*x].abs().total_cmp(&correlations[*y].abs()))?;
@@ -39,7 +42,22 @@ pub fn best_lag(a: &[f64], b: &[f64], max_lag_samples: usize, rate_hz: f64) -> O
             samples += (0.5 * (before - after) / curvature).clamp(-0.5, 0.5);
         }
     }
-    Some(Lag { seconds: samples / rate_hz, samples, correlation: peak })
+    Some(Lag {
+        seconds: samples / rate_hz,
+        samples,
+        correlation: peak,
+        correlation_unshifted: correlations[max_lag_samples],
+        at_limit: best == 0 || best + 1 == correlations.len(),
+    })
+}
+
+impl Lag {
+    /// Whether shifting explains at least half of what differs between the signals: slow signals match at any small
+    /// shift, and then the best one means nothing.
+    pub fn matters(&self) -> bool {
+        let unexplained = |correlation: f64| 1.0 - correlation * correlation;
+        !self.at_limit && unexplained(self.correlation) < 0.5 * unexplained(self.correlation_unshifted)
+    }
 }
 
 /// Pearson's correlation; `None` if a signal is constant or not finite.

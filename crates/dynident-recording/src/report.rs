@@ -176,12 +176,12 @@ impl ImportReport {
                     }
                     Some(lag) if difference > 20.0 => {
                         let message = format!(
-                            "differs from the position's derivative by {difference:.1} % RMS; comes {:.4} s after it (correlation {:.3})",
-                            lag.seconds, lag.correlation
+                            "differs from the position's derivative by {difference:.1} % RMS (correlation {:.3})",
+                            lag.correlation_unshifted
                         );
                         add(Level::Warning, &name, message);
                     }
-                    Some(lag) if lag.samples.abs() > 0.5 => {
+                    Some(lag) if lag.matters() && lag.samples.abs() > 0.5 => {
                         add(Level::Info, &name, format!("comes {:.4} s after the position's derivative", lag.seconds));
                     }
                     _ => {}

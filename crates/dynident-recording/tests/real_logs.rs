@@ -71,8 +71,9 @@ fn kuka_lwr4plus() {
         assert!(import.rows.abs_diff(5027) <= 1, "{}", import.rows);
         assert!((import.report.rate_hz - 200.0).abs() < 0.1);
         assert!(import.report.clock.uniform, "{}", import.report.clock.evidence);
-        assert!((0.0032..0.0035).contains(&import.report.steps.min_s), "{:?}", import.report.steps);
-        assert!((0.0066..0.0069).contains(&import.report.steps.max_s), "{:?}", import.report.steps);
+        // The three logs together jitter from 3.2 to 6.8 ms.
+        assert!((0.00315..0.0047).contains(&import.report.steps.min_s), "{:?}", import.report.steps);
+        assert!((0.0053..0.00685).contains(&import.report.steps.max_s), "{:?}", import.report.steps);
         // The source filtered at 8 Hz.
         assert!((1.0..16.0).contains(&import.report.cutoff.cutoff_hz));
         assert!(import.dq < 2.0 && import.ddq < 8.0, "{} {}", import.dq, import.ddq);
