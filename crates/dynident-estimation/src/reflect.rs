@@ -5,7 +5,7 @@
 //! Four reflectors are built, then applied together (compact WY form: Schreiber and Van Loan, SIAM J. Sci. Stat. Comput.
 //! 10 (1989) 53), two target columns at a time, so that each loaded number feeds several multiplications.
 
-use dynident_lanes::{F64x8, Kernel, Lane, Scalar};
+use dynident_lanes::{F64x8, Kernel, Lane};
 
 /// Eight rows of one column. The type's alignment keeps every load within one cache line.
 pub(crate) type Chunk = F64x8<false>;
@@ -120,7 +120,12 @@ fn step<T: Lane, const V: usize>(
 /// The first `N` columns of a block.
 #[inline(always)]
 fn columns<const N: usize>(block: &[Chunk], chunks: usize) -> [&[Chunk]; N] {
-    core::array::from_fn(|i| &block[i * chunks..(i + 1) * chunks])
+    // No `array::from_fn`: its closure would not be inlined into the processor level's function.
+    let mut columns: [&[Chunk]; N] = [&[]; N];
+    for (i, column) in columns.iter_mut().enumerate() {
+        *column = &block[i * chunks..(i + 1) * chunks];
+    }
+    columns
 }
 
 /// Applies the `P` reflectors made so far to the block's next column, then makes that column's own reflector.
@@ -146,7 +151,9 @@ fn reflect_column<T: Lane, const V: usize, const P: usize>(
         for l in 0..P {
             triangle[row_start(size, first + l) + index - first - l] -= reflectors.nu[l] * amounts[l];
         }
-        subtract::<T, P, 1>(&done, [&mut *column], [core::array::from_fn(|l| amounts[l])]);
+        let mut first_amounts = [[0.0; P]];
+        first_amounts[0].copy_from_slice(&amounts[..P]);
+        subtract::<T, P, 1>(&done, [&mut *column], &first_amounts);
     }
     let [[square]] = inner_products::<T, 1, 1>(&[&*column], &[&*column]);
     if square < NEGLIGIBLE_SQUARE {
@@ -184,7 +191,11 @@ fn apply<T: Lane, const V: usize, const X: usize>(
     targets: [&mut [Chunk]; X],
     reflectors: &Reflectors<V>,
 ) {
-    let dots = inner_products::<T, V, X>(columns, &core::array::from_fn(|x| &*targets[x]));
+    let mut shared: [&[Chunk]; X] = [&[]; X];
+    for (shared, target) in shared.iter_mut().zip(&targets) {
+        *shared = target;
+    }
+    let dots = inner_products::<T, V, X>(columns, &shared);
     let mut amounts = [[0.0; V]; X];
     for x in 0..X {
         let mut products = [0.0; V];
@@ -196,7 +207,7 @@ fn apply<T: Lane, const V: usize, const X: usize>(
             triangle[row_start(size, first + l) + index + x - first - l] -= reflectors.nu[l] * amounts[x][l];
         }
     }
-    subtract::<T, V, X>(columns, targets, amounts);
+    subtract::<T, V, X>(columns, targets, &amounts);
 }
 
 /// `targets[x]ᵀ columns[l]`.
@@ -206,13 +217,14 @@ fn inner_products<T: Lane, const V: usize, const X: usize>(
     targets: &[&[Chunk]; X],
 ) -> [[f64; V]; X] {
     let chunks = targets[0].len();
-    let columns: [&[Chunk]; V] = core::array::from_fn(|l| &columns[l][..chunks]);
-    let targets: [&[Chunk]; X] = core::array::from_fn(|x| &targets[x][..chunks]);
     let mut sums = [[T::ZERO; V]; X];
     for c in 0..chunks {
         for part in 0..CHUNK_ROWS / T::LANES {
             let at = part * T::LANES;
-            let v: [T; V] = core::array::from_fn(|l| T::load(&columns[l][c].0[at..]));
+            let mut v = [T::ZERO; V];
+            for l in 0..V {
+                v[l] = T::load(&columns[l][c].0[at..]);
+            }
             for x in 0..X {
                 let target = T::load(&targets[x][c].0[at..]);
                 for l in 0..V {
@@ -221,27 +233,43 @@ fn inner_products<T: Lane, const V: usize, const X: usize>(
             }
         }
     }
-    sums.map(|row| row.map(halving_sum))
+    // Through memory: seeing the loop and the sums over lanes together, the compiler picks a layout that suits the few sums and
+    // shuffles in every turn of the loop (half the speed).
+    let sums = core::hint::black_box(sums);
+    let mut products = [[0.0; V]; X];
+    for x in 0..X {
+        for l in 0..V {
+            products[x][l] = halving_sum(sums[x][l]);
+        }
+    }
+    products
 }
 
 /// `targets[x] -= Σ_l amounts[x][l] columns[l]`.
 #[inline(always)]
 fn subtract<T: Lane, const V: usize, const X: usize>(
     columns: &[&[Chunk]; V],
-    mut targets: [&mut [Chunk]; X],
-    amounts: [[f64; V]; X],
+    targets: [&mut [Chunk]; X],
+    amounts: &[[f64; V]; X],
 ) {
     let chunks = targets[0].len();
-    let columns: [&[Chunk]; V] = core::array::from_fn(|l| &columns[l][..chunks]);
-    let amounts: [[T; V]; X] = amounts.map(|row| row.map(|amount| T::splat(-amount)));
+    let mut factors = [[T::ZERO; V]; X];
+    for x in 0..X {
+        for l in 0..V {
+            factors[x][l] = T::splat(-amounts[x][l]);
+        }
+    }
     for c in 0..chunks {
         for part in 0..CHUNK_ROWS / T::LANES {
             let at = part * T::LANES;
-            let v: [T; V] = core::array::from_fn(|l| T::load(&columns[l][c].0[at..]));
+            let mut v = [T::ZERO; V];
+            for l in 0..V {
+                v[l] = T::load(&columns[l][c].0[at..]);
+            }
             for x in 0..X {
                 let mut target = T::load(&targets[x][c].0[at..]);
                 for l in 0..V {
-                    target = v[l].mul_add(amounts[x][l], target);
+                    target = v[l].mul_add(factors[x][l], target);
                 }
                 target.store(&mut targets[x][c].0[at..]);
             }
