@@ -166,7 +166,7 @@ impl TriangularFactor {
         self.rows += range.len();
     }
 
-    /// Absorbs one block given by its entries, (row, column) to value.
+    /// Absorbs one block given by its entries, (row, column) to value. The caller counts the rows.
     pub(crate) fn absorb_entries(
         &mut self,
         workspace: &mut FactorWorkspace,
@@ -186,6 +186,9 @@ impl TriangularFactor {
 
     fn reflect(&mut self, workspace: &mut FactorWorkspace, rows: usize) {
         let (size, chunks) = (self.columns + 1, rows.div_ceil(CHUNK_ROWS));
+        if chunks == 0 {
+            return;
+        }
         let panel = &mut workspace.panel[..size * chunks];
         dispatch(workspace.level, TriangleOnPanel { triangle: &mut self.triangle, size, panel, chunks });
     }
@@ -210,14 +213,26 @@ impl TriangularFactor {
                 found: other.columns,
             });
         }
+        self.absorb_factor(workspace, other);
+        Ok(())
+    }
+
+    /// [`merge`](Self::merge) of a factor with as many columns.
+    pub(crate) fn absorb_factor(&mut self, workspace: &mut FactorWorkspace, other: &Self) {
         if self.rows == 0 {
             self.clone_from(other);
         } else if other.rows > 0 {
-            let filled = other.filled_rows();
-            self.absorb_entries(workspace, filled, |row, column| other.entry(row, column));
+            self.absorb_entries(workspace, other.filled_rows(), |row, column| other.entry(row, column));
             self.rows += other.rows;
         }
-        Ok(())
+    }
+
+    /// Absorbs rows given one after another, `columns + 1` numbers each.
+    pub(crate) fn absorb_row_by_row(&mut self, workspace: &mut FactorWorkspace, values: &[f64]) {
+        let size = self.columns + 1;
+        let rows = values.len() / size;
+        self.absorb_entries(workspace, rows, |row, column| values[row * size + column]);
+        self.rows += rows;
     }
 
     /// The factor of the same rows multiplied by `weight` (finite, not negative): `weight · R`.

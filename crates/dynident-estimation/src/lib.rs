@@ -7,6 +7,8 @@
 mod error;
 mod factor;
 mod reflect;
+mod segments;
 
 pub use error::EstimationError;
 pub use factor::{BLOCK_ROWS, FactorWorkspace, TriangularFactor};
+pub use segments::{SegmentScore, SegmentSettings, SegmentedFactor};
