@@ -94,6 +94,12 @@ pub enum EstimationError {
     /// A prior was given to an estimator that has no noise level to weigh it against.
     #[error("ordinary least squares has no noise level to weigh a prior against; use weighted least squares")]
     PriorWithoutNoiseLevel,
+    /// Magnitudes lie so far apart that the result is not a number a computer holds.
+    #[error("the estimate of {name} overflows: columns and torque differ by too many powers of ten; check units and scales")]
+    Overflow {
+        /// The column.
+        name: String,
+    },
     /// The problem has no equations.
     #[error("no rows of any joint: absorb a log before estimating")]
     Empty,

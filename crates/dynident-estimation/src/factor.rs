@@ -184,6 +184,11 @@ impl TriangularFactor {
         self.reflect(workspace, rows);
     }
 
+    /// Counts rows whose entries were absorbed in another form.
+    pub(crate) fn count(&mut self, rows: usize) {
+        self.rows += rows;
+    }
+
     fn reflect(&mut self, workspace: &mut FactorWorkspace, rows: usize) {
         let (size, chunks) = (self.columns + 1, rows.div_ceil(CHUNK_ROWS));
         if chunks == 0 {

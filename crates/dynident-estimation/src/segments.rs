@@ -51,7 +51,12 @@ impl SegmentSettings {
     }
 }
 
-/// One segment: its rows while they are fewer than the factor's, then the factor.
+/// Rows that a segment keeps as they are: a factor made of fewer costs more time than it saves memory.
+const fn most_rows(columns: usize) -> usize {
+    2 * (columns + 1)
+}
+
+/// One segment: its rows while they are few, then their factor.
 #[derive(Clone, Debug, PartialEq)]
 enum Segment {
     /// Row by row, columns + 1 numbers each.
@@ -228,7 +233,7 @@ impl Segment {
         stride: usize,
         range: Range<usize>,
     ) {
-        if self.rows(columns) + range.len() > columns {
+        if self.rows(columns) + range.len() > most_rows(columns) {
             self.condense(columns, workspace);
         }
         match self {
@@ -242,7 +247,7 @@ impl Segment {
     }
 
     fn append(&mut self, columns: usize, workspace: &mut FactorWorkspace, next: &Self) {
-        if self.rows(columns) + next.rows(columns) > columns {
+        if self.rows(columns) + next.rows(columns) > most_rows(columns) {
             self.condense(columns, workspace);
         }
         match self {
