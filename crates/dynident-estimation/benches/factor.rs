@@ -65,6 +65,10 @@ fn main() {
     }
     for joint in 0..7 {
         let (ns, gflops) = all_joints(&[joint]);
-        println!("factor of 10000 samples, joint {} ({} columns): {ns:.0} ns ({gflops:.1} GFLOP/s)", joint + 1, COLUMNS[joint]);
+        println!(
+            "factor of 10000 samples, joint {} ({} columns): {ns:.0} ns ({gflops:.1} GFLOP/s)",
+            joint + 1,
+            COLUMNS[joint]
+        );
     }
 }

@@ -96,7 +96,12 @@ impl Fitted {
         let std: Vec<f64> = covariances.chosen.diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect();
         for (index, name) in problem.columns().iter().enumerate() {
             let finite = self.solution.values[index].is_finite()
-                && covariances.chosen.row(index).iter().chain(covariances.white.row(index).iter()).all(|c| c.is_finite());
+                && covariances
+                    .chosen
+                    .row(index)
+                    .iter()
+                    .chain(covariances.white.row(index).iter())
+                    .all(|c| c.is_finite());
             if !finite {
                 return Err(EstimationError::Overflow { name: name.clone() });
             }

@@ -5,10 +5,16 @@
 //! Four reflectors are built, then applied together (compact WY form: Schreiber and Van Loan, SIAM J. Sci. Stat. Comput.
 //! 10 (1989) 53), two target columns at a time, so that each loaded number feeds several multiplications.
 
-use dynident_lanes::{F64x8, Kernel, Lane};
+use dynident_lanes::{Kernel, Lane};
 
 /// Eight rows of one column. The type's alignment keeps every load within one cache line.
-pub(crate) type Chunk = F64x8<false>;
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C, align(64))]
+pub(crate) struct Chunk(pub(crate) [f64; CHUNK_ROWS]);
+
+impl Chunk {
+    pub(crate) const ZERO: Self = Self([0.0; CHUNK_ROWS]);
+}
 
 /// Rows in a [`Chunk`].
 pub(crate) const CHUNK_ROWS: usize = 8;
