@@ -95,7 +95,9 @@ pub enum EstimationError {
     #[error("ordinary least squares has no noise level to weigh a prior against; use weighted least squares")]
     PriorWithoutNoiseLevel,
     /// Magnitudes lie so far apart that the result is not a number a computer holds.
-    #[error("the estimate of {name} overflows: columns and torque differ by too many powers of ten; check units and scales")]
+    #[error(
+        "the estimate of {name} overflows: columns and torque differ by too many powers of ten; check units and scales"
+    )]
     Overflow {
         /// The column.
         name: String,

@@ -25,7 +25,7 @@ const LARGEST: f64 = 1.0e140;
 /// scaled columns and a stated tolerance (`rank.rs`), never from this diagonal.
 ///
 /// Golub and Van Loan, Matrix Computations, 4th ed., 5.2 and 6.5; Bierman, Factorization Methods for Discrete Sequential
-/// Estimation (1977), ch. IV.
+/// Estimation (1977), ch. IV and V.
 ///
 /// ```
 /// use dynident_estimation::TriangularFactor;
@@ -149,7 +149,8 @@ impl TriangularFactor {
         while start < range.end {
             let end = (start + BLOCK_ROWS).min(range.end);
             let block = workspace.block(end - start, self.columns + 1);
-            for (column, out) in panel.chunks_exact(stride).zip(block.chunks_exact_mut((end - start).div_ceil(CHUNK_ROWS)))
+            for (column, out) in
+                panel.chunks_exact(stride).zip(block.chunks_exact_mut((end - start).div_ceil(CHUNK_ROWS)))
             {
                 let (whole, rest) = column[start..end].as_chunks::<CHUNK_ROWS>();
                 for (values, chunk) in whole.iter().zip(&mut *out) {
@@ -320,7 +321,10 @@ impl TriangularFactor {
     /// Rows of the triangle that can hold something: later ones are still zero when few rows were absorbed.
     fn filled_rows(&self) -> usize {
         let size = self.columns + 1;
-        (0..size).rev().find(|&r| self.triangle[row_start(size, r)..row_start(size, r + 1)].iter().any(|&x| x != 0.0)).map_or(0, |r| r + 1)
+        (0..size)
+            .rev()
+            .find(|&r| self.triangle[row_start(size, r)..row_start(size, r + 1)].iter().any(|&x| x != 0.0))
+            .map_or(0, |r| r + 1)
     }
 }
 

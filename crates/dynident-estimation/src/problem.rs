@@ -254,11 +254,7 @@ impl Prior {
 }
 
 fn expect(what: &str, expected: usize, found: usize) -> Result<(), EstimationError> {
-    if expected == found {
-        Ok(())
-    } else {
-        Err(EstimationError::Mismatch { what: what.into(), expected, found })
-    }
+    if expected == found { Ok(()) } else { Err(EstimationError::Mismatch { what: what.into(), expected, found }) }
 }
 
 fn finite(setting: &'static str, values: &[f64]) -> Result<(), EstimationError> {

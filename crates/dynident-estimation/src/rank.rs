@@ -30,8 +30,7 @@ impl RankSettings {
     /// # Errors
     /// [`EstimationError::Setting`] unless both shares are at least 1e-14 (rounding) and below 1.
     pub fn validate(&self) -> Result<(), EstimationError> {
-        for (setting, value) in
-            [("rank.tolerance", self.tolerance), ("rank.negligible_column", self.negligible_column)]
+        for (setting, value) in [("rank.tolerance", self.tolerance), ("rank.negligible_column", self.negligible_column)]
         {
             if !(1.0e-14..1.0).contains(&value) {
                 return Err(EstimationError::Setting { setting, value, mend: "give a share from 1e-14 to below 1" });
@@ -121,12 +120,7 @@ pub(crate) fn split(triangle: &TriangularFactor, settings: &RankSettings) -> Spl
 }
 
 /// Solves for the free columns with the others at `fallback`: `min ‖r − R_fixed θ_fixed − R_free θ_free‖`.
-pub(crate) fn solve(
-    triangle: &TriangularFactor,
-    split: &Split,
-    settings: &RankSettings,
-    fallback: &[f64],
-) -> Solution {
+pub(crate) fn solve(triangle: &TriangularFactor, split: &Split, settings: &RankSettings, fallback: &[f64]) -> Solution {
     let size = triangle.columns();
     let free = split.free.len();
     let scales = scales(triangle, settings);

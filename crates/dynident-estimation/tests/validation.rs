@@ -49,10 +49,7 @@ fn nothing_and_silence_give_no_ratios() {
 fn bad_samples_are_refused_whole() {
     let mut validation = Validation::new(vec!["a".into(), "b".into()]);
     assert!(matches!(validation.add(&[1.0], &[1.0, 2.0]), Err(EstimationError::Mismatch { .. })));
-    assert!(matches!(
-        validation.add(&[1.0, 2.0], &[1.0, f64::NAN]),
-        Err(EstimationError::Unusable { column: 1, .. })
-    ));
+    assert!(matches!(validation.add(&[1.0, 2.0], &[1.0, f64::NAN]), Err(EstimationError::Unusable { column: 1, .. })));
     assert!(validation.add_joint(2, &[1.0], &[1.0]).is_err());
     assert!(validation.add_joint(0, &[1.0, 2.0], &[1.0]).is_err());
     assert!(matches!(
