@@ -167,7 +167,8 @@ fn reflect_column<T: Lane, const V: usize, const P: usize>(
     *diagonal = norm;
     // old - norm without cancellation (old is not negative): Parlett, SIAM Review 13 (1971) 197. It keeps the diagonal positive.
     reflectors.nu[P] = -square / (old + norm);
-    let beta = (old + norm) / (norm * square);
+    // At most 2/square, which is finite; norm · square may underflow.
+    let beta = (old + norm) / norm / square;
     let mut sums = [0.0; P];
     for l in 0..P {
         for m in l..P {

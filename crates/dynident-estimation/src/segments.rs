@@ -243,7 +243,8 @@ impl Segment {
                 let (size, start) = (columns + 1, values.len());
                 values.resize(start + range.len() * size, 0.0);
                 for (c, column) in panel.chunks_exact(stride).enumerate() {
-                    for (value, place) in column[range.clone()].iter().zip(values[start + c..].iter_mut().step_by(size)) {
+                    for (value, place) in column[range.clone()].iter().zip(values[start + c..].iter_mut().step_by(size))
+                    {
                         *place = *value;
                     }
                 }
