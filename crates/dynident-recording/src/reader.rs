@@ -202,7 +202,7 @@ impl LogReader {
         }
         self.delivered += block.row.len() as u64;
         if block.row.is_empty() && self.delivered == 0 {
-            return Err(if self.next_row == 0 {
+            return Err(if self.next_row == 0 && self.rows[1] > 0 {
                 RecordingError::NoRows { file: self.file.clone(), line: self.sources[0].table.line() }
             } else {
                 RecordingError::EmptySelection {

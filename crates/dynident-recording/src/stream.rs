@@ -253,7 +253,7 @@ impl MotionStream {
     }
 
     fn chunk(&self) -> usize {
-        CHUNK_ROWS.max(4 * self.context.unwrap_or(0))
+        CHUNK_ROWS.max(3 * self.context.unwrap_or(0))
     }
 
     /// Moves raw rows to the uniform clock until the raw block or the segment ends.

@@ -47,6 +47,9 @@ impl Table {
         if first.contains(&0) {
             return Err(RecordingError::Binary { file: path.to_owned(), line: lines.number() });
         }
+        if first.contains(&b'\r') {
+            return Err(RecordingError::CarriageReturns { file: path.to_owned(), line: lines.number() });
+        }
         let delimiter = format.delimiter.map_or_else(|| guessed_delimiter(first), |delimiter| delimiter as u8);
         let mut fields = Vec::new();
         split(first, delimiter, &mut fields);
@@ -324,7 +327,7 @@ fn existing_names(wanted: &str, names: &[String]) -> String {
     format!("did you mean `{}`? There are: {list}{more}{delimiter}", cut(nearest))
 }
 
-/// Levenshtein distance over the first 64 characters.
+/// Levenshtein distance over the first 64 characters; another digit counts three: `tau1` is no misspelling of `tau2`.
 fn edit_distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().take(64).collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();
@@ -332,7 +335,8 @@ fn edit_distance(a: &str, b: &str) -> usize {
         let mut diagonal = row[0];
         row[0] = i + 1;
         for (j, y) in b.iter().enumerate() {
-            let substituted = diagonal + usize::from(x != *y);
+            let cost = if x.is_ascii_digit() && y.is_ascii_digit() { 3 } else { 1 };
+            let substituted = diagonal + if x == *y { 0 } else { cost };
             diagonal = row[j + 1];
             row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
         }
@@ -362,5 +366,6 @@ mod tests {
         assert_eq!(edit_distance("kitten", "sitting"), 3);
         assert_eq!(edit_distance("", "abc"), 3);
         assert_eq!(edit_distance("q1_rad", "q1_rad"), 0);
+        assert_eq!(edit_distance("tau1", "tau2"), 2);
     }
 }

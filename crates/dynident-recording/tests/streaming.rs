@@ -59,7 +59,7 @@ fn pieces_give_what_the_whole_log_gives() {
             blocks += 1;
         }
         assert_eq!(at, n);
-        assert!(blocks > 2, "{settings:?} was not cut into pieces");
+        assert!(blocks > 1, "{settings:?} was not cut into pieces");
     }
 }
 
