@@ -94,12 +94,11 @@ impl LogReader {
         let mut groups = Vec::new();
         for (key, group, quantity) in format.groups() {
             let path = group.file.as_ref().map_or_else(|| file.to_owned(), |name| folder.join(name));
-            let source = match sources.iter().position(|table| table.path() == path) {
-                Some(known) => known,
-                None => {
-                    sources.push(Table::open(&path, format)?);
-                    sources.len() - 1
-                }
+            let source = if let Some(known) = sources.iter().position(|table| table.path() == path) {
+                known
+            } else {
+                sources.push(Table::open(&path, format)?);
+                sources.len() - 1
             };
             let list = group.column_list(key)?;
             let slots = list.iter().map(|column| sources[source].want(&format!("{key}.columns"), column));

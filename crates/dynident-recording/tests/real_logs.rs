@@ -1,4 +1,5 @@
 //! Every public recording that is at hand, from its description in TOML to motion and findings.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests; what was found is worth reading")]
 
 use dynident_recording::{ImportReport, Level, LogFormat, MotionBlock, MotionSettings, MotionStream};
 use std::path::PathBuf;
