@@ -137,8 +137,8 @@ pub enum RecordingError {
         /// The field.
         text: String,
     },
-    /// A channel that overflows when its unit, scale, matrix or offset is applied.
-    #[error("{}, row {row}: {group} of joint `{joint}` is not finite after scaling; check the factors of `{group}` and the raw value", file.display())]
+    /// A channel that is absurdly large once its unit, scale, matrix or offset is applied.
+    #[error("{}, row {row}: {group} of joint `{joint}` is beyond 1e60 or not finite after scaling; check the factors of `{group}` and the raw value", file.display())]
     Overflow {
         /// The log's main file.
         file: PathBuf,

@@ -6,6 +6,9 @@ use crate::mapping::Mapping;
 use crate::table::{Row, Table, row_count};
 use std::path::{Path, PathBuf};
 
+/// Largest position or torque: its squares and its second differences per second squared are finite.
+const LARGEST: f64 = 1e60;
+
 /// Rows of a [`RawBlock`] at most.
 pub const BLOCK_ROWS: usize = 4096;
 
@@ -189,7 +192,7 @@ impl LogReader {
             out.resize(self.joints.len(), Vec::new());
             group.mapping.apply(&group.columns, out);
             for (joint, values) in out.iter().enumerate() {
-                if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+                if let Some(at) = values.iter().position(|value| !(-LARGEST..=LARGEST).contains(value)) {
                     return Err(RecordingError::Overflow {
                         file: self.file.clone(),
                         row: block.row[at],

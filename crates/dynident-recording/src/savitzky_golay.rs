@@ -18,13 +18,13 @@ impl SavitzkyGolay {
     /// A filter over `window` samples.
     ///
     /// # Errors
-    /// If `window` is even or beyond 2001, or `degree` is not 2 to 8 and below `window`.
+    /// If `window` is even or beyond 501, or `degree` is not 2 to 8 and below `window`.
     pub fn new(window: usize, degree: usize) -> Result<Self, FilterError> {
-        if window.is_multiple_of(2) || !(3..=2001).contains(&window) {
+        if window.is_multiple_of(2) || !(3..=501).contains(&window) {
             return Err(FilterError::Setting {
                 name: "window",
                 value: window as f64,
-                mend: "give an odd number, 3 to 2001",
+                mend: "give an odd number, 3 to 501",
             });
         }
         if !(2..=8).contains(&degree) || degree >= window {

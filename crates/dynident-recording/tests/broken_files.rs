@@ -55,7 +55,7 @@ const BROKEN: &[(&str, &str)] = &[
     ("standing_clock.csv", "no sampling rate"),
     ("backward_clock.csv", "no sampling rate"),
     ("clock_of_infinitesimal_steps.csv", "no sampling rate"),
-    ("huge_positions.csv", "not finite after scaling"),
+    ("huge_positions.csv", "beyond 1e60 or not finite after scaling"),
     ("huge_time.csv", "no sampling rate"),
     ("gaps_everywhere.csv", "filter needs 16"),
     ("html.csv", "no column `t`"),
@@ -121,6 +121,33 @@ fn missing_files_folders_and_endless_lines_are_named() {
     file.write_all(&vec![b'1'; dynident_recording::MAX_LINE_BYTES + 10]).unwrap();
     let message = import(file.path(), FORMAT).unwrap_err().to_string();
     assert!(message.contains(":3: the line is longer than"), "{message}");
+}
+
+#[test]
+fn absurd_filters_and_values_are_refused_and_large_ones_stay_finite() {
+    let file = written(&rows(200));
+    let format: LogFormat = toml::from_str(FORMAT).unwrap();
+    for (settings, words) in [
+        ("trim_s = -1.0", "trim_s"),
+        ("trim_s = 30.0", "longest uninterrupted piece has 200 samples"),
+        ("differentiator = { method = \"butterworth\", cutoff_hz = 1e-9 }", "cutoff_hz"),
+        ("differentiator = { method = \"butterworth\", cutoff_hz = 80.0 }", "half the sampling rate"),
+        ("differentiator = { method = \"butterworth\", order = 99 }", "order"),
+        ("differentiator = { method = \"savitzky-golay\", window = 301 }", "needs 301"),
+        ("differentiator = { method = \"savitzky-golay\", window = 1000001 }", "window"),
+        ("differentiator = { method = \"central-differences\", order = 7 }", "order"),
+    ] {
+        let settings: MotionSettings = toml::from_str(settings).unwrap();
+        let mut block = MotionBlock::default();
+        let result =
+            MotionStream::open(&format, file.path(), &joints(), &settings).and_then(|mut s| s.next_block(&mut block));
+        let message = result.unwrap_err().to_string();
+        assert!(message.contains(words), "{message}");
+    }
+    let lines = (0..200).map(|i| format!("{},{}e59,-1e60,1e60,1e-300\n", f64::from(i) * 0.01, f64::from(i % 7)));
+    let large = written(&lines.fold("t,q1,q2,tau1,tau2\n".to_owned(), |text, line| text + &line));
+    let format = FORMAT.replace("rev", "rad");
+    assert!(import(large.path(), &format).is_ok());
 }
 
 fn written(text: &str) -> tempfile::NamedTempFile {
