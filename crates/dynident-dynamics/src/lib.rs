@@ -6,6 +6,7 @@
 
 #![forbid(unsafe_code)]
 
+mod base_parameters;
 mod composite;
 mod derivatives;
 mod energy;
@@ -19,6 +20,7 @@ mod regressor;
 mod regressor_panels;
 mod workspace;
 
+pub use base_parameters::{BaseParameterSettings, BaseParameters, NumericalRank, numerical_rank};
 pub use derivatives::{InverseDynamicsDerivatives, inverse_dynamics_derivatives};
 pub use energy::{kinetic_energy, potential_energy};
 pub use forward_dynamics::forward_dynamics;

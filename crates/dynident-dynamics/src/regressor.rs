@@ -47,23 +47,38 @@ impl Kernel for Single<'_> {
         take(&mut scratch.core.q, self.q);
         take(&mut scratch.core.dq, self.dq);
         take(&mut scratch.core.ddq, self.ddq);
-        let columns = 10 * self.model.dof();
         // Entries of joints that do not move a body are never written; they stay the zeros of the new workspace.
-        let out = self.out;
-        regressor_blocks(
-            self.model,
-            &mut scratch.core,
-            &mut scratch.axes,
-            |body, path, bundle, block: &[T::Bundle; 10]| {
-                let first = bundle * T::PER_BUNDLE;
-                for (place, &joint) in path[first..].iter().take(T::PER_BUNDLE).enumerate() {
-                    let row = &mut out[joint as usize * columns + 10 * body..][..10];
-                    for (to, column) in row.iter_mut().zip(block) {
-                        *to = column.lane(place * T::LANES);
-                    }
-                }
-            },
-        );
+        let mut sink = DenseRows { columns: 10 * self.model.dof(), out: self.out };
+        regressor_blocks(self.model, &mut scratch.core, &mut scratch.axes, &mut sink);
+    }
+}
+
+/// Where the blocks of the regressor go. A trait and not a closure, because only a method can be told to be inlined into the code of each
+/// processor level.
+pub(crate) trait BlockSink<T: Lane> {
+    /// Takes the ten entries of body `body` for the joints `path[bundle * PER_BUNDLE..]`, one joint to each lane group.
+    fn put(&mut self, body: usize, path: &[u32], bundle: usize, block: &[T::Bundle; 10]);
+}
+
+struct DenseRows<'a> {
+    columns: usize,
+    out: &'a mut [f64],
+}
+
+impl<T: Lane> BlockSink<T> for DenseRows<'_> {
+    #[inline(always)]
+    fn put(&mut self, body: usize, path: &[u32], bundle: usize, block: &[T::Bundle; 10]) {
+        let first = bundle * T::PER_BUNDLE;
+        let mut lanes = [[0.0; 8]; 10];
+        for (to, column) in lanes.iter_mut().zip(block) {
+            column.store(to);
+        }
+        for (place, &joint) in path[first..].iter().take(T::PER_BUNDLE).enumerate() {
+            let row = &mut self.out[joint as usize * self.columns + 10 * body..][..10];
+            for (to, column) in row.iter_mut().zip(&lanes) {
+                *to = column[place];
+            }
+        }
     }
 }
 
@@ -94,14 +109,13 @@ impl<T: Lane> AxisScratch<T> {
     }
 }
 
-/// Runs over all bodies and bundles of axes, and hands `sink(body, path, bundle, block)` the ten entries of each: lane group `p` of the block belongs to joint
-/// `path[bundle * PER_BUNDLE + p]`.
+/// Runs over all bodies and bundles of axes, and hands the ten entries of each to `sink`.
 #[inline(always)]
 pub(crate) fn regressor_blocks<T: Lane>(
     model: &Model,
     core: &mut CoreScratch<T>,
     axes: &mut AxisScratch<T>,
-    mut sink: impl FnMut(usize, &[u32], usize, &[T::Bundle; 10]),
+    sink: &mut impl BlockSink<T>,
 ) {
     let maps = model.maps();
     core.place(maps);
@@ -109,8 +123,9 @@ pub(crate) fn regressor_blocks<T: Lane>(
     for (index, map) in maps.iter().enumerate() {
         let body = &core.bodies[index];
         let Transform { rotation, translation } = &body.parent_from_body;
-        let rotation = Mat3(rotation.0.map(|row| row.map(T::bundle)));
-        let translation = Vec3(translation.0.map(T::bundle));
+        let r = &rotation.0;
+        let rotation = Mat3([bundles(r[0]), bundles(r[1]), bundles(r[2])]);
+        let translation = Vec3(bundles(translation.0));
         let path = &axes.path[axes.path_start[index]..axes.path_start[index + 1]];
         let start = axes.bundle_start[index];
         if let Some(parent) = map.parent {
@@ -130,14 +145,19 @@ pub(crate) fn regressor_blocks<T: Lane>(
         let axis = map.axis.splat::<T>();
         let own = if map.turns { &mut axes.angular } else { &mut axes.linear };
         for k in 0..3 {
-            axis[k].put(&mut own[start + bundle].0[k], place);
+            axis[k].add_at(&mut own[start + bundle].0[k], place);
         }
         let wrench = WrenchBasis::new(body.omega, body.alpha, body.acceleration);
         for k in 0..axes.bundle_start[index + 1] - start {
             let block = wrench.work_on(axes.angular[start + k], axes.linear[start + k]);
-            sink(index, path, k, &block);
+            sink.put(index, path, k, &block);
         }
     }
+}
+
+#[inline(always)]
+fn bundles<T: Lane>(values: [T; 3]) -> [T::Bundle; 3] {
+    [values[0].bundle(), values[1].bundle(), values[2].bundle()]
 }
 
 /// A body's wrench as a function of its ten parameters, at one motion.
@@ -146,8 +166,8 @@ struct WrenchBasis<B> {
     acceleration: Vec3<B>,
     /// `[α]× + [ω]× [ω]×`: force of a first moment.
     force_of_moment: Mat3<B>,
-    /// Moment of the six inertia entries xx, xy, xz, yy, yz, zz: 3 rows.
-    moment_of_inertia: [[B; 6]; 3],
+    /// Moment of the six inertia entries: 3 rows of (xx, xy, xz), (yy, yz, zz).
+    moment_of_inertia: [[[B; 3]; 2]; 3],
 }
 
 impl<B: Lane> WrenchBasis<B> {
@@ -156,18 +176,19 @@ impl<B: Lane> WrenchBasis<B> {
         let ([wx, wy, wz], [ax, ay, az]) = (omega.0, alpha.0);
         let (xx, yy, zz) = (wx * wx, wy * wy, wz * wz);
         let (xy, xz, yz) = (wx * wy, wx * wz, wy * wz);
-        let force_of_moment =
-            [[-(yy + zz), xy - az, xz + ay], [xy + az, -(xx + zz), yz - ax], [xz - ay, yz + ax, -(xx + yy)]];
-        // I α + ω × I ω, entry by entry of I.
-        let moment_of_inertia = [
-            [ax, ay - xz, az + xy, -yz, yy - zz, yz],
-            [xz, ax + yz, zz - xx, ay, az - xy, -xz],
-            [-xy, xx - yy, ax - yz, xy, ay + xz, az],
-        ];
         Self {
-            acceleration: Vec3(acceleration.0.map(T::bundle)),
-            force_of_moment: Mat3(force_of_moment.map(|row| row.map(T::bundle))),
-            moment_of_inertia: moment_of_inertia.map(|row| row.map(T::bundle)),
+            acceleration: Vec3(bundles(acceleration.0)),
+            force_of_moment: Mat3([
+                bundles([-(yy + zz), xy - az, xz + ay]),
+                bundles([xy + az, -(xx + zz), yz - ax]),
+                bundles([xz - ay, yz + ax, -(xx + yy)]),
+            ]),
+            // I α + ω × I ω, entry by entry of I: xx, xy, xz, then yy, yz, zz.
+            moment_of_inertia: [
+                [bundles([ax, ay - xz, az + xy]), bundles([-yz, yy - zz, yz])],
+                [bundles([xz, ax + yz, zz - xx]), bundles([ay, az - xy, -xz])],
+                [bundles([-xy, xx - yy, ax - yz]), bundles([xy, ay + xz, az])],
+            ],
         }
     }
 
@@ -181,19 +202,21 @@ impl<B: Lane> WrenchBasis<B> {
             force[2][k].mul_add(linear[2], force[1][k].mul_add(linear[1], force[0][k].mul_add(linear[0], turned[k])))
         };
         let moment = &self.moment_of_inertia;
-        let second =
-            |k: usize| moment[2][k].mul_add(angular[2], moment[1][k].mul_add(angular[1], moment[0][k] * angular[0]));
+        let second = |half: usize, k: usize| {
+            moment[2][half][k]
+                .mul_add(angular[2], moment[1][half][k].mul_add(angular[1], moment[0][half][k] * angular[0]))
+        };
         [
             self.acceleration.dot(linear),
             first(0),
             first(1),
             first(2),
-            second(0),
-            second(1),
-            second(2),
-            second(3),
-            second(4),
-            second(5),
+            second(0, 0),
+            second(0, 1),
+            second(0, 2),
+            second(1, 0),
+            second(1, 1),
+            second(1, 2),
         ]
     }
 }

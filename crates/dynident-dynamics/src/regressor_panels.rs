@@ -3,9 +3,9 @@
 //! A joint's row has entries only for the bodies that it moves and for the laws that it feels, so each joint has its own narrow panel: columns
 //! after one another, each with one value per sample. The whole regressor is never stored.
 
-use crate::regressor::regressor_blocks;
+use crate::regressor::{BlockSink, regressor_blocks};
 use crate::workspace::{AnyScratch, BatchWorkspace, put_lanes, take_lanes};
-use dynident_lanes::{Kernel, Lane, dispatch};
+use dynident_lanes::{AlignedBuffer, Kernel, Lane, dispatch};
 use dynident_model::laws::{JointMotion, Law};
 use dynident_model::{INERTIAL_NAMES, Model};
 
@@ -123,27 +123,40 @@ impl PanelLayout {
 
 /// The panels of one block of samples. Joint `j` has `joint_columns(j).len() + 1` columns of `samples` values, one column after the other; the last
 /// one is for the joint's torque and is left as it was.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Panels {
-    /// Samples in the block.
-    pub samples: usize,
-    /// One panel per joint.
-    pub joints: Vec<Vec<f64>>,
+    samples: usize,
+    joints: Vec<AlignedBuffer>,
 }
 
 impl Panels {
     /// Makes room for `samples` samples of `layout`; memory is kept from block to block.
     pub fn resize(&mut self, layout: &PanelLayout, samples: usize) {
         self.samples = samples;
-        self.joints.resize_with(layout.dof(), Vec::new);
+        self.joints.resize_with(layout.dof(), AlignedBuffer::new);
         for (panel, joint) in self.joints.iter_mut().zip(&layout.joints) {
-            panel.resize((joint.columns.len() + 1) * samples, 0.0);
+            panel.resize((joint.columns.len() + 1) * samples);
         }
+    }
+
+    /// Samples in the block.
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// The panel of one joint: regressor columns, then the torque column.
+    pub fn joint(&self, joint: usize) -> &[f64] {
+        self.joints[joint].as_slice()
+    }
+
+    /// The panel of one joint: regressor columns, then the torque column.
+    pub fn joint_mut(&mut self, joint: usize) -> &mut [f64] {
+        self.joints[joint].as_mut_slice()
     }
 
     /// The torque column of one joint.
     pub fn torque_mut(&mut self, joint: usize) -> &mut [f64] {
-        let panel = &mut self.joints[joint];
+        let panel = self.joints[joint].as_mut_slice();
         let start = panel.len() - self.samples;
         &mut panel[start..]
     }
@@ -171,7 +184,7 @@ pub fn regressor_panels(
         for &(place, global) in &panel.laws {
             if let Column::Law(law) = &layout.columns[global] {
                 let at = place * motion.samples;
-                law.column(joint, motion, &mut panels.joints[joint][at..at + motion.samples]);
+                law.column(joint, motion, &mut panels.joint_mut(joint)[at..at + motion.samples]);
             }
         }
     }
@@ -196,17 +209,38 @@ impl Kernel for Fill<'_> {
             take_lanes(&mut scratch.core.q, motion.q, samples, at);
             take_lanes(&mut scratch.core.dq, motion.dq, samples, at);
             take_lanes(&mut scratch.core.ddq, motion.ddq, samples, at);
-            regressor_blocks(model, &mut scratch.core, &mut scratch.axes, |body, path, bundle, block| {
-                // Lanes are samples here, so a bundle is one joint.
-                let panel = &mut panels.joints[path[bundle] as usize];
-                let places = &layout.places[layout.place_start[body] + 10 * bundle..][..10];
-                for (value, &place) in block.iter().zip(places) {
-                    if place != NOWHERE {
-                        let start = place as usize * samples;
-                        put_lanes(*value, &mut panel[start..start + samples], at);
-                    }
+            let mut sink = IntoPanels { layout, panels, at };
+            regressor_blocks(model, &mut scratch.core, &mut scratch.axes, &mut sink);
+        }
+    }
+}
+
+struct IntoPanels<'a> {
+    layout: &'a PanelLayout,
+    panels: &'a mut Panels,
+    at: usize,
+}
+
+impl<T: Lane> BlockSink<T> for IntoPanels<'_> {
+    #[inline(always)]
+    fn put(&mut self, body: usize, path: &[u32], bundle: usize, block: &[T::Bundle; 10]) {
+        // Lanes are samples here, so a bundle is one joint.
+        let samples = self.panels.samples;
+        let panel = self.panels.joint_mut(path[bundle] as usize);
+        let places = &self.layout.places[self.layout.place_start[body] + 10 * bundle..][..10];
+        if self.at + T::LANES <= samples {
+            for (value, &place) in block.iter().zip(places) {
+                // `NOWHERE` lies past the end of every panel, so one test covers the columns that the layout leaves out.
+                let start = place as usize * samples + self.at;
+                if let Some(slot) = panel.get_mut(start..start + T::LANES) {
+                    value.store(slot);
                 }
-            });
+            }
+        } else {
+            for (value, &place) in block.iter().zip(places).filter(|(_, place)| **place != NOWHERE) {
+                let start = place as usize * samples;
+                put_lanes(*value, &mut panel[start..start + samples], self.at);
+            }
         }
     }
 }

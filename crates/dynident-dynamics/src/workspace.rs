@@ -2,7 +2,7 @@
 
 use core::any::Any;
 use dynident_lanes::{Kernel, Lane, Level, Scalar, dispatch, dispatch_single};
-use dynident_model::{JointMap, Model, Transform, Vec3};
+use dynident_model::{JointMap, Mat3, Model, Transform, Vec3};
 
 /// What one body needs while an algorithm over scalars `T` runs.
 #[derive(Clone, Copy, Debug)]
@@ -88,19 +88,20 @@ impl<T: Scalar> CoreScratch<T> {
 /// `parent_from_child` of a joint at position `q` with its sine and cosine.
 #[inline(always)]
 pub(crate) fn joint_transform<T: Scalar>(map: &JointMap, q: T, sine: T, cosine: T) -> Transform<T> {
-    let mut rotation = map.constant.0.map(|row| row.map(T::splat));
-    let mut translation = map.translation.splat::<T>();
     if map.turns {
-        for i in 0..3 {
-            for j in 0..3 {
-                rotation[i][j] = sine
-                    .mul_add(T::splat(map.sine.0[i][j]), cosine.mul_add(T::splat(map.cosine.0[i][j]), rotation[i][j]));
-            }
-        }
+        let entry = |i: usize, j: usize| {
+            let steady = cosine.mul_add(T::splat(map.cosine.0[i][j]), T::splat(map.constant.0[i][j]));
+            sine.mul_add(T::splat(map.sine.0[i][j]), steady)
+        };
+        let row = |i: usize| [entry(i, 0), entry(i, 1), entry(i, 2)];
+        Transform { rotation: Mat3([row(0), row(1), row(2)]), translation: map.translation.splat() }
     } else {
-        translation = map.slide.splat().scale_add(q, translation);
+        let row = |i: usize| Vec3(map.constant.0[i]).splat().0;
+        Transform {
+            rotation: Mat3([row(0), row(1), row(2)]),
+            translation: map.slide.splat().scale_add(q, map.translation.splat()),
+        }
     }
-    Transform { rotation: dynident_model::Mat3(rotation), translation }
 }
 
 /// A scratch whose lane type was chosen at run time.

@@ -235,7 +235,7 @@ fn every_processor_level_and_the_batch_agree() {
                     let columns = layout.joint_columns(joint);
                     let mut row = vec![0.0; 10 * dof];
                     for (place, &column) in columns.iter().enumerate() {
-                        row[column] = panels.joints[joint][place * samples + s];
+                        row[column] = panels.joint(joint)[place * samples + s];
                     }
                     assert_close(&row, &regressor[joint * 10 * dof..(joint + 1) * 10 * dof], ROUNDING, level.name());
                 }

@@ -6,16 +6,29 @@
 
 #![forbid(unsafe_code)]
 
+pub mod audit;
+pub mod dh;
 mod error;
 mod inertial;
 mod joint;
 pub mod laws;
+mod place;
+mod read;
 pub mod sample;
 mod spatial;
 mod tree;
+pub mod urdf;
 
+pub use audit::{AuditFinding, AuditLevel, audit};
+pub use dh::{DhError, DhFault, read_dh};
 pub use error::ModelError;
 pub use inertial::{INERTIAL_NAMES, InertialParameters};
 pub use joint::{Joint, JointKind, JointLimits, JointMap, Mimic};
+pub use place::Located;
+pub use read::{DescriptionFormat, MAX_DESCRIPTION_BYTES, ReadError, Robot, load_robot};
 pub use spatial::{Mat3, Transform, Vec3};
 pub use tree::{Body, Link, Model, STANDARD_GRAVITY};
+pub use urdf::{
+    JointChange, LinkChange, UnreadElement, UrdfError, UrdfFault, UrdfRobot, UrdfWriteError, link_changes, read_urdf,
+    rewrite_urdf,
+};

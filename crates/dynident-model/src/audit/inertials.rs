@@ -1,0 +1,240 @@
+//! Inertials of the moving links: can such a body exist, and is it likely?
+
+use super::AuditLevel::{Info, Problem, Warning};
+use super::{Findings, Lengths};
+use crate::inertial::InertialParameters;
+use crate::spatial::{Mat3, Vec3};
+use crate::tree::{Link, Model};
+use nalgebra::Matrix3;
+
+/// Heavier single links are found on no common arm, kg.
+const LARGEST_MASS_KG: f64 = 1000.0;
+/// The densest metal, kg/m³: of all bodies with one mass, a ball of osmium has nearly the least inertia that matter allows.
+const OSMIUM_DENSITY_KG_M3: f64 = 22590.0;
+/// A violation of a physical inequality by less than this share of the largest moment is rounding in the file: 3 digits are usual there.
+const ROUNDING: f64 = 1e-2;
+/// Rounding in the last digit of a binary double and of the eigenvalues, relative to the largest moment.
+const NUMERICAL: f64 = 1e-9;
+/// How many body lengths the centre of mass may lie from the frame before it is doubtful, and before it must be a unit slip.
+const FAR: f64 = 3.0;
+const ABSURDLY_FAR: f64 = 50.0;
+
+pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
+    for (index, body) in model.bodies().iter().enumerate() {
+        for link in &body.links {
+            if let Some(inertial) = &link.inertial {
+                possible(&link.name, inertial, findings);
+                likely(&link.name, inertial, lengths.bodies[index], findings);
+            }
+        }
+        unknown(model, index, findings);
+    }
+    massless(model, findings);
+    equal(model, findings);
+}
+
+/// Mass and principal moments that a body can have.
+fn possible(link: &str, inertial: &InertialParameters, findings: &mut Findings) {
+    let place = || format!("link {link}");
+    let mass = inertial.mass_kg();
+    if *inertial == InertialParameters::ZERO {
+        findings.add(
+            Info,
+            "mass-not-positive",
+            place(),
+            "is given as massless; delete its <inertial> if it is not known".to_owned(),
+        );
+        return;
+    }
+    let Some(moments) = inertial.principal_moments().filter(|_| mass > 0.0) else {
+        let message = format!("has mass {mass} kg but moments: no body is like that, measure or weigh it");
+        findings.add(Problem, "mass-not-positive", place(), message);
+        return;
+    };
+    let [least, middle, most] = moments;
+    let size = least.abs().max(most.abs());
+    if least < -NUMERICAL * size {
+        findings.add(
+            Problem,
+            "inertia-not-positive",
+            place(),
+            format!(
+                "has principal moments of inertia {least:.4e}, {middle:.4e}, {most:.4e} kg m^2 about its centre of mass: none may be negative; \
+                 check signs, products of inertia, and the point that the inertia is about"
+            ),
+        );
+    } else if least + middle < most - NUMERICAL * size {
+        let excess = (most - least - middle) / most;
+        let level = if excess < ROUNDING { Warning } else { Problem };
+        findings.add(
+            level,
+            "triangle-inequality",
+            place(),
+            format!(
+                "has principal moments of inertia {least:.4e}, {middle:.4e}, {most:.4e} kg m^2: the largest may not exceed the sum of the others \
+                 (by {:.2} % here); no mass distribution has them, check the moments",
+                100.0 * excess
+            ),
+        );
+    }
+}
+
+/// Sizes that the machine's lengths make plausible.
+fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &mut Findings) {
+    let place = || format!("link {link}");
+    let mass = inertial.mass_kg();
+    let (Some(com), Some(inertia)) = (inertial.com_m(), inertial.inertia_at_com()) else { return };
+    if mass > LARGEST_MASS_KG {
+        let message = format!("has mass {mass} kg: if that is grams, divide by 1000");
+        findings.add(Warning, "mass-absurd", place(), message);
+    }
+    if mass <= 0.0 {
+        return;
+    }
+    let distance = com.norm();
+    if distance > FAR * length_m {
+        let absurd = distance > ABSURDLY_FAR * length_m;
+        let mend = if absurd { "; if that is millimetres, divide by 1000" } else { ": check its frame and unit" };
+        findings.add(
+            if absurd { Problem } else { Warning },
+            "centre-of-mass-outside",
+            place(),
+            format!("has its centre of mass {distance:.4} m from its frame, on a body of about {length_m:.3} m{mend}"),
+        );
+    }
+    // Mean square distance of the mass from its centre: half the trace of the inertia over the mass.
+    let square = 0.5 * trace(&inertia) / mass;
+    if square > (FAR * length_m).powi(2) {
+        findings.add(
+            Problem,
+            "inertia-too-large",
+            place(),
+            format!(
+                "has an inertia as if its {mass} kg lay {:.3} m from the centre of mass, on a body of about {length_m:.3} m: if the inertia is in \
+                 kg mm^2 divide by 1e6, in g mm^2 by 1e9",
+                square.sqrt()
+            ),
+        );
+    }
+    let ball_radius = (3.0 * mass / (4.0 * core::f64::consts::PI * OSMIUM_DENSITY_KG_M3)).cbrt();
+    if square >= 0.0 && square < 0.6 * ball_radius.powi(2) {
+        findings.add(
+            Warning,
+            "inertia-too-small",
+            place(),
+            format!(
+                "has less inertia than a ball of osmium of its {mass} kg ({:.2e} kg m^2): it is a point mass or a placeholder, or the unit slipped",
+                0.4 * mass * ball_radius.powi(2)
+            ),
+        );
+    }
+    about_origin(link, inertial, com, &inertia, findings);
+    let d = [inertia.0[0][0], inertia.0[1][1], inertia.0[2][2]];
+    let products = [inertia.0[0][1], inertia.0[0][2], inertia.0[1][2]];
+    let power_of_ten = |x: f64| x > 0.0 && (x.log10() - x.log10().round()).abs() < 1e-9;
+    if com == Vec3::ZERO && products == [0.0; 3] && d[0] == d[1] && d[1] == d[2] && power_of_ten(d[0]) {
+        findings.add(
+            Warning,
+            "placeholder",
+            place(),
+            format!("has the inertia {} kg m^2 about all axes and its centre of mass at the frame: that looks like a placeholder", d[0]),
+        );
+    }
+}
+
+/// An inertia that was computed about the link's origin but written as if about the centre of mass: without the parallel-axis term a possible body
+/// remains, and that term is most of the inertia given.
+fn about_origin(link: &str, inertial: &InertialParameters, com: Vec3, inertia: &Mat3, findings: &mut Findings) {
+    let mass = inertial.mass_kg();
+    let shift = (Mat3::IDENTITY.scale(com.dot(com)) - Mat3::outer(com, com)).scale(mass);
+    let share = trace(&shift) / trace(inertia);
+    if !(MOSTLY_SHIFT..1.0).contains(&share) {
+        return;
+    }
+    let rest = *inertia - shift;
+    let mut moments: [f64; 3] = Matrix3::from_fn(|a, b| rest.0[a][b]).symmetric_eigenvalues().into();
+    moments.sort_by(f64::total_cmp);
+    if moments[0] > 0.0 && moments[0] + moments[1] >= moments[2] {
+        findings.add(
+            Warning,
+            "inertia-at-origin",
+            format!("link {link}"),
+            format!(
+                "has an inertia of which {:.0} % could be the parallel-axis term m r^2 of its centre of mass: if it was computed about the link's \
+                 origin, move it to the centre of mass",
+                100.0 * share
+            ),
+        );
+    }
+}
+
+/// A uniform rod about its end has three quarters of its inertia from the parallel-axis term; ordinary bodies, given rightly, rarely more than this.
+const MOSTLY_SHIFT: f64 = 0.7;
+
+/// Bodies and links without any inertial.
+fn unknown(model: &Model, index: usize, findings: &mut Findings) {
+    let body = &model.bodies()[index];
+    let place = || format!("link {}", body.name());
+    if body.prior().is_none() {
+        findings.add(
+            Warning,
+            "inertial-unknown",
+            place(),
+            "moves but has no inertial (nor a link fixed to it): its prior is unknown and counts as zero in predictions".to_owned(),
+        );
+    } else {
+        let names: Vec<&str> =
+            body.links.iter().filter(|link| link.inertial.is_none()).map(|link| link.name.as_str()).collect();
+        if !names.is_empty() {
+            let message =
+                format!("has no inertial on {} (frames, or unknown parts): {}", count(names.len()), names.join(", "));
+            findings.add(Info, "inertial-unknown", place(), message);
+        }
+    }
+}
+
+/// Joints that move no mass at all.
+fn massless(model: &Model, findings: &mut Findings) {
+    let mut carries: Vec<bool> =
+        model.inertials().iter().map(|inertial| *inertial != InertialParameters::ZERO).collect();
+    for (index, joint) in model.joints().iter().enumerate().rev() {
+        match joint.parent {
+            Some(parent) if carries[index] => carries[parent] = true,
+            _ => {}
+        }
+    }
+    for (joint, _) in model.joints().iter().zip(carries).filter(|(_, carries)| !carries) {
+        findings.add(
+            Problem,
+            "massless-subtree",
+            format!("joint {}", joint.name),
+            "moves no mass that is known: the mass matrix is singular; give an inertial, or lock the joint".to_owned(),
+        );
+    }
+}
+
+/// Links that all have one inertial.
+fn equal(model: &Model, findings: &mut Findings) {
+    let known: Vec<(&Link, &InertialParameters)> = model
+        .bodies()
+        .iter()
+        .filter_map(|body| Some((&body.links[0], body.links[0].inertial.as_ref()?)))
+        .filter(|(_, inertial)| **inertial != InertialParameters::ZERO)
+        .collect();
+    if known.len() >= 3 && known.iter().all(|(_, inertial)| *inertial == known[0].1) {
+        findings.add(
+            Warning,
+            "equal-inertials",
+            "model".to_owned(),
+            format!("all {} inertials are the same: that looks like placeholders", known.len()),
+        );
+    }
+}
+
+fn count(links: usize) -> String {
+    if links == 1 { "one of its links".to_owned() } else { format!("{links} of its links") }
+}
+
+fn trace(m: &Mat3) -> f64 {
+    m.0[0][0] + m.0[1][1] + m.0[2][2]
+}

@@ -1,0 +1,160 @@
+//! Denavit-Hartenberg tables in TOML, standard and modified.
+//!
+//! ```
+//! let table = r#"
+//! name = "two-link"
+//! convention = "modified"            # or "standard"
+//! gravity_m_s2 = [0.0, -9.81, 0.0]   # in the base frame; default [0, 0, -9.81]
+//!
+//! [base]                             # all optional
+//! link = "base"                      # name of the fixed link
+//! xyz_m = [0.0, 0.0, 0.0]            # where D-H frame 0 stands in the base frame
+//! rpy_deg = [0.0, 0.0, 0.0]          # or rpy_rad; fixed axes, as in URDF
+//!
+//! [[joint]]
+//! name = "shoulder"
+//! link = "upper_arm"                 # default: name + "_link"
+//! limits = { lower_deg = -170, upper_deg = 170, velocity_deg_s = 120, effort_nm = 80 }
+//! dynamics = { damping = 0.5, friction = 1.2 }   # Nm s/rad and Nm (N s/m and N)
+//! inertial = { mass_kg = 3.0, com_m = [0.2, 0, 0], inertia_at_com = [0.01, 0, 0, 0.04, 0, 0.04] }
+//!
+//! [[joint]]
+//! name = "elbow"
+//! parent = "upper_arm"               # default: the link of the joint before; for the first, the base
+//! kind = "revolute"                  # default; or "continuous", "prismatic"
+//! a_m = 0.4                          # a, alpha, d, theta: default 0
+//! alpha_deg = 0                      # or alpha_rad
+//! d_m = 0.0
+//! theta_deg = 90                     # or theta_rad; of a revolute joint: its offset
+//! sign = -1                          # default 1: positive q turns (slides) along +z
+//! "#;
+//! let model = dynident_model::read_dh(table)?;
+//! assert_eq!(model.dof(), 2);
+//! assert_eq!(model.joints()[1].placement.translation.0, [0.4, 0.0, 0.0]);
+//! # Ok::<(), dynident_model::DhError>(())
+//! ```
+//!
+//! With `s` the sign, a revolute joint has `θ = theta + s q`, a prismatic one `d = d_m + s q`.
+//!
+//! | convention | frame i in frame i-1 | `a`, `alpha` of row i are |
+//! | --- | --- | --- |
+//! | `modified` (Craig 1986; Khalil and Kleinfinger 1986) | `Rx(α) Tx(a) Rz(θ) Tz(d)` | those before joint i: `a_{i-1}`, `α_{i-1}` |
+//! | `standard` (Denavit and Hartenberg 1955; Paul 1981) | `Rz(θ) Tz(d) Tx(a) Rx(α)` | those after joint i: `a_i`, `α_i` |
+//!
+//! **Frames.** In the modified convention the model's body frame i is D-H frame i: its z axis is the joint's axis. In the standard
+//! convention the axis of joint i is z of frame i-1, so that D-H frame i does not lie on it: there the body frame is frame i-1 turned by
+//! `Rz(θ)` (slid along z by `s q`), and D-H frame i stands in it at `Tz(d) Tx(a) Rx(α)`. Inertials in the table are always given in D-H
+//! frame i; the reader carries them into the body frame.
+//!
+//! **Inertials**, where known (otherwise the body is unknown, never zero), are one of
+//! - `mass_kg`, `com_m` and `inertia_at_com` (kg m², about the centre of mass) or `inertia_at_origin` (about the origin of D-H frame i),
+//!   both as `[Ixx, Ixy, Ixz, Iyy, Iyz, Izz]`;
+//! - `parameters`, all ten in the order [`INERTIAL_NAMES`](crate::INERTIAL_NAMES).
+
+mod build;
+mod table;
+
+use crate::error::ModelError;
+use crate::place::Located;
+use crate::tree::Model;
+use thiserror::Error;
+
+/// Why a D-H table could not be read, with line and column.
+pub type DhError = Located<DhFault>;
+
+/// What is wrong in a D-H table, and the mend.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum DhFault {
+    /// Not TOML, a key that does not exist, or a value of the wrong kind.
+    #[error("{reason}; mend this entry of the D-H table")]
+    Toml {
+        /// What the TOML parser says.
+        reason: String,
+    },
+    /// A number that is not finite, or beyond [`MAX_MAGNITUDE`](crate::urdf::MAX_MAGNITUDE).
+    #[error("`{key}` is {value}: write a finite number below 1e9")]
+    Number {
+        /// The key.
+        key: &'static str,
+        /// The number.
+        value: f64,
+    },
+    /// One quantity given twice, in two units.
+    #[error("`{first}` and `{second}` say the same thing: keep one")]
+    BothUnits {
+        /// One key.
+        first: &'static str,
+        /// The other.
+        second: &'static str,
+    },
+    /// A key that does not fit the kind of joint.
+    #[error("`{key}` does not fit a {kind} joint: use {mend}")]
+    WrongUnit {
+        /// The key.
+        key: &'static str,
+        /// Kind of the joint.
+        kind: &'static str,
+        /// The keys that fit.
+        mend: &'static str,
+    },
+    /// A sign that is neither 1 nor -1.
+    #[error("`sign` is {sign}: write 1 or -1")]
+    Sign {
+        /// The value.
+        sign: f64,
+    },
+    /// A name without a character.
+    #[error("a {what} has an empty name: give it one")]
+    EmptyName {
+        /// `joint` or `link`.
+        what: &'static str,
+    },
+    /// Two joints or two links with one name.
+    #[error("{what} `{name}` stands twice: rename one")]
+    DuplicateName {
+        /// `joint` or `link`.
+        what: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// A parent that no earlier joint moves.
+    #[error("there is no link `{parent}` above this joint: order joints from base to tip; known here: {}", known.join(", "))]
+    UnknownParent {
+        /// The name.
+        parent: String,
+        /// Links that are known at this place.
+        known: Vec<String>,
+    },
+    /// No joint.
+    #[error("the table has no joint: add [[joint]] entries")]
+    NoJoint,
+    /// More joints than [`MAX_MOVING_JOINTS`](crate::urdf::MAX_MOVING_JOINTS).
+    #[error("the table has more than {limit} joints: remove some")]
+    TooManyJoints {
+        /// The limit.
+        limit: usize,
+    },
+    /// An inertial that is neither complete nor absent.
+    #[error(
+        "the inertial is not complete or says things twice: give mass_kg, com_m and one of inertia_at_com and inertia_at_origin; or parameters alone; or no inertial (unknown)"
+    )]
+    Inertial,
+    /// The parts do not make a model.
+    #[error("{0}; mend the table")]
+    Model(#[from] ModelError),
+}
+
+/// Reads a D-H table (format: [module documentation](self)).
+///
+/// # Errors
+/// If the text is no TOML, holds unknown keys or unusable values, or describes no tree; with line and column.
+pub fn read_dh(text: &str) -> Result<Model, DhError> {
+    // A byte order mark is no part of the table; positions are counted after it, as editors do.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let table: table::Table = toml::from_str(text).map_err(|error| {
+        let reason = error.message().lines().next().unwrap_or_default().to_owned();
+        Located::at(text, error.span().map_or(0, |span| span.start), DhFault::Toml { reason })
+    })?;
+    build::model(text, &table)
+}

@@ -1,0 +1,144 @@
+//! From a file to a machine: URDF or D-H table, told apart by the file's name or its content.
+
+use crate::dh::{DhError, read_dh};
+use crate::place::line_and_column;
+use crate::tree::Model;
+use crate::urdf::{UnreadElement, UrdfError, read_urdf};
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Largest robot description that is read, bytes. The largest known humanoids stay below one megabyte.
+pub const MAX_DESCRIPTION_BYTES: u64 = 64 << 20;
+
+/// What a description is written in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DescriptionFormat {
+    /// URDF.
+    Urdf,
+    /// D-H table in TOML.
+    Dh,
+}
+
+/// A machine and where it came from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Robot {
+    /// The machine.
+    pub model: Model,
+    /// What the file is written in.
+    pub format: DescriptionFormat,
+    /// The file.
+    pub path: PathBuf,
+    /// Its text, into which [`rewrite_urdf`](crate::rewrite_urdf) writes.
+    pub text: String,
+    /// Elements of a URDF that were not read.
+    pub unread: Vec<UnreadElement>,
+}
+
+/// Why a file gave no machine. Every message begins with the file, and with line and column where there are any.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// The file cannot be opened or read.
+    #[error("{}: cannot be read: {source}; check the path and the permissions", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file is larger than [`MAX_DESCRIPTION_BYTES`].
+    #[error("{}: larger than {} MiB: this is no robot description, name the URDF or D-H file", path.display(), MAX_DESCRIPTION_BYTES >> 20)]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file is empty.
+    #[error("{}:1:1: the file is empty: name a URDF or a D-H table", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file is no UTF-8 text.
+    #[error("{}:{line}:{column}: not UTF-8 text{hint}: save the description as UTF-8", path.display())]
+    Encoding {
+        /// The file.
+        path: PathBuf,
+        /// Line of the first bad byte.
+        line: u32,
+        /// Column of the first bad byte.
+        column: u32,
+        /// What it may be.
+        hint: &'static str,
+    },
+    /// The URDF is faulty.
+    #[error("{}:{source}", path.display())]
+    Urdf {
+        /// The file.
+        path: PathBuf,
+        /// Place and fault.
+        source: UrdfError,
+    },
+    /// The D-H table is faulty.
+    #[error("{}:{source}", path.display())]
+    Dh {
+        /// The file.
+        path: PathBuf,
+        /// Place and fault.
+        source: DhError,
+    },
+}
+
+/// Reads a robot description: `.urdf` and `.xml` as URDF, `.toml` as D-H table, any other name by whether the text begins with `<`.
+///
+/// # Errors
+/// If the file cannot be read, is too large, empty, or no UTF-8, or if its content is faulty; every message names the file.
+pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
+    let path = path.as_ref();
+    let named = || path.to_owned();
+    let mut bytes = Vec::new();
+    // Bounded reading: the length that the system reports may be wrong (pipes, devices).
+    File::open(path)
+        .and_then(|file| file.take(MAX_DESCRIPTION_BYTES + 1).read_to_end(&mut bytes))
+        .map_err(|source| ReadError::File { path: named(), source })?;
+    if bytes.len() as u64 > MAX_DESCRIPTION_BYTES {
+        return Err(ReadError::TooLarge { path: named() });
+    }
+    let text = decode(bytes, path)?;
+    if text.trim_start_matches('\u{feff}').trim().is_empty() {
+        return Err(ReadError::Empty { path: named() });
+    }
+    let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
+    let format = match extension.as_deref() {
+        Some("urdf" | "xml" | "xacro") => DescriptionFormat::Urdf,
+        Some("toml") => DescriptionFormat::Dh,
+        _ if text.trim_start_matches('\u{feff}').trim_start().starts_with('<') => DescriptionFormat::Urdf,
+        _ => DescriptionFormat::Dh,
+    };
+    let (model, unread) = match format {
+        DescriptionFormat::Urdf => {
+            let robot = read_urdf(&text).map_err(|source| ReadError::Urdf { path: named(), source })?;
+            (robot.model, robot.unread)
+        }
+        DescriptionFormat::Dh => {
+            (read_dh(&text).map_err(|source| ReadError::Dh { path: named(), source })?, Vec::new())
+        }
+    };
+    Ok(Robot { model, format, path: named(), text, unread })
+}
+
+fn decode(bytes: Vec<u8>, path: &Path) -> Result<String, ReadError> {
+    String::from_utf8(bytes).map_err(|error| {
+        let bytes = error.as_bytes();
+        let good = error.utf8_error().valid_up_to();
+        let before = String::from_utf8_lossy(&bytes[..good]);
+        let (line, column) = line_and_column(&before, before.len());
+        let hint = match bytes {
+            [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => " (it looks like UTF-16)",
+            _ if bytes.contains(&0) => " (it looks like a binary file)",
+            _ => "",
+        };
+        ReadError::Encoding { path: path.to_owned(), line, column, hint }
+    })
+}

@@ -1,0 +1,116 @@
+//! From links and joints to the tree of moving bodies.
+
+use super::elements::{JointElement, LinkElement};
+use super::{UrdfError, UrdfFault, fault_at};
+use crate::joint::Joint;
+use crate::place::Located;
+use crate::spatial::Transform;
+use crate::tree::{Body, Link, Model};
+use std::collections::HashMap;
+
+/// The model: depth first from the one root, joints under a link in the order of the document, fixed joints lumped.
+pub(super) fn model(
+    name: &str,
+    links: &[LinkElement<'_, '_>],
+    joints: &[JointElement<'_, '_>],
+) -> Result<Model, UrdfError> {
+    let robot_fault = |fault| Located { line: 1, column: 1, fault };
+    let index_of: HashMap<&str, usize> = links.iter().enumerate().map(|(index, link)| (link.name, index)).collect();
+    let mut parent_joint: Vec<Option<usize>> = vec![None; links.len()];
+    let mut joints_under: Vec<Vec<usize>> = vec![Vec::new(); links.len()];
+    let mut child_of = Vec::with_capacity(joints.len());
+    for (index, joint) in joints.iter().enumerate() {
+        let find = |link: &str| {
+            index_of.get(link).copied().ok_or_else(|| {
+                fault_at(joint.node, UrdfFault::UnknownLink { joint: joint.name.to_owned(), link: link.to_owned() })
+            })
+        };
+        let (parent, child) = (find(joint.parent)?, find(joint.child)?);
+        if let Some(first) = parent_joint[child].replace(index) {
+            let fault = UrdfFault::TwoParents {
+                link: joint.child.to_owned(),
+                first: joints[first].name.to_owned(),
+                second: joint.name.to_owned(),
+            };
+            return Err(fault_at(joint.node, fault));
+        }
+        joints_under[parent].push(index);
+        child_of.push(child);
+    }
+    check_mimics(joints)?;
+
+    let mut roots = (0..links.len()).filter(|&link| parent_joint[link].is_none());
+    let root = match (roots.next(), roots.next()) {
+        (Some(root), None) => root,
+        (Some(first), Some(second)) => {
+            let fault =
+                UrdfFault::SeveralRoots { first: links[first].name.to_owned(), second: links[second].name.to_owned() };
+            return Err(fault_at(links[second].node, fault));
+        }
+        (None, _) => match links.first() {
+            Some(link) => return Err(fault_at(link.node, UrdfFault::Loop { link: link.name.to_owned() })),
+            None => return Err(robot_fault(UrdfFault::NoLinks)),
+        },
+    };
+
+    let link_at = |index: usize, placement| Link {
+        name: links[index].name.to_owned(),
+        placement,
+        inertial: links[index].inertial,
+    };
+    let mut base = Body { links: vec![link_at(root, Transform::IDENTITY)] };
+    let (mut tree_joints, mut bodies) = (Vec::new(), Vec::<Body>::new());
+    let mut reached = vec![false; links.len()];
+    reached[root] = true;
+    // Joints still to visit, with the body that carries their parent link and that link's place in it. A stack, not recursion: a chain
+    // may be as long as the file.
+    let mut ahead: Vec<(usize, Option<usize>, Transform)> = Vec::new();
+    let visit_later = |ahead: &mut Vec<_>, link: usize, body: Option<usize>, placement: Transform| {
+        ahead.extend(joints_under[link].iter().rev().map(|&joint| (joint, body, placement)));
+    };
+    visit_later(&mut ahead, root, None, Transform::IDENTITY);
+    while let Some((index, body, body_from_parent)) = ahead.pop() {
+        let (joint, child) = (&joints[index], child_of[index]);
+        reached[child] = true;
+        let placement = body_from_parent.then(&joint.origin);
+        if let Some(kind) = joint.kind {
+            tree_joints.push(Joint {
+                name: joint.name.to_owned(),
+                kind,
+                parent: body,
+                placement,
+                axis: joint.axis,
+                limits: joint.limits,
+                damping: joint.damping,
+                friction: joint.friction,
+                mimic: joint.mimic.clone(),
+            });
+            bodies.push(Body { links: vec![link_at(child, Transform::IDENTITY)] });
+            visit_later(&mut ahead, child, Some(bodies.len() - 1), Transform::IDENTITY);
+        } else {
+            body.map_or(&mut base, |body| &mut bodies[body]).links.push(link_at(child, placement));
+            visit_later(&mut ahead, child, body, placement);
+        }
+    }
+    if let Some(lost) = reached.iter().position(|&reached| !reached) {
+        return Err(fault_at(links[lost].node, UrdfFault::Loop { link: links[lost].name.to_owned() }));
+    }
+    if tree_joints.is_empty() {
+        return Err(robot_fault(UrdfFault::NoMovingJoint));
+    }
+    Model::new(name, base, tree_joints, bodies).map_err(|error| robot_fault(UrdfFault::Model(error)))
+}
+
+/// A joint may follow any other joint of the file; chains of followers do not matter, since each counts as free.
+fn check_mimics(joints: &[JointElement<'_, '_>]) -> Result<(), UrdfError> {
+    let names: std::collections::HashSet<&str> = joints.iter().map(|joint| joint.name).collect();
+    for joint in joints {
+        if let Some(mimic) = &joint.mimic
+            && (mimic.source == joint.name || !names.contains(mimic.source.as_str()))
+        {
+            let fault = UrdfFault::UnknownMimic { joint: joint.name.to_owned(), source_joint: mimic.source.clone() };
+            return Err(fault_at(joint.node, fault));
+        }
+    }
+    Ok(())
+}

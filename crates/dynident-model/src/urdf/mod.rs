@@ -1,0 +1,329 @@
+//! URDF, the Unified Robot Description Format: reading and writing back.
+//!
+//! Read are links with `<inertial>`, and joints of type revolute, continuous, prismatic and fixed on a fixed base. Fixed joints are
+//! lumped: [`Body::links`](crate::Body) keeps every link with its frame. A link without `<inertial>` is unknown, never zero. `mimic` is
+//! kept, and the joint counts as free. Joints stand depth first, in the order of the document under each link.
+//!
+//! ```
+//! let text = r#"<robot name="pendulum">
+//!   <link name="base"/>
+//!   <joint name="swing" type="continuous">
+//!     <parent link="base"/> <child link="rod"/> <axis xyz="0 1 0"/>
+//!   </joint>
+//!   <link name="rod"><inertial>
+//!     <origin xyz="0 0 -0.5"/> <mass value="2"/>
+//!     <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.001"/>
+//!   </inertial></link>
+//! </robot>"#;
+//! let model = dynident_model::read_urdf(text)?.model;
+//! assert_eq!(model.dof(), 1);
+//! // Inertia about the frame's origin: 0.1 + 2 · 0.5².
+//! assert!((model.inertials()[0].0[4] - 0.6).abs() < 1e-15);
+//! # Ok::<(), dynident_model::UrdfError>(())
+//! ```
+
+mod assemble;
+mod elements;
+mod values;
+mod write;
+
+pub use write::{JointChange, LinkChange, UrdfWriteError, link_changes, rewrite_urdf};
+
+use crate::error::ModelError;
+use crate::place::{Located, line_and_column};
+use crate::tree::Model;
+use roxmltree::{Document, Node};
+use thiserror::Error;
+
+/// Most moving joints that a description may have.
+pub const MAX_MOVING_JOINTS: usize = 1000;
+
+/// Largest length, angle, mass or inertia accepted in a description: beyond it a number is a slip of the pen, and products of such numbers
+/// would leave the range of `f64`.
+pub const MAX_MAGNITUDE: f64 = 1e9;
+
+/// What a URDF says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UrdfRobot {
+    /// The machine on a fixed base, gravity along -z.
+    pub model: Model,
+    /// Elements inside links, inertials and joints that URDF does not define and that were not read: often a misspelling. At most
+    /// [`UrdfRobot::MAX_UNREAD`] are kept.
+    pub unread: Vec<UnreadElement>,
+}
+
+impl UrdfRobot {
+    /// Most unread elements that are listed.
+    pub const MAX_UNREAD: usize = 20;
+}
+
+/// An element that was not read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnreadElement {
+    /// Line, from 1.
+    pub line: u32,
+    /// Column, from 1, in characters.
+    pub column: u32,
+    /// Name of the element.
+    pub element: String,
+    /// Name of the element around it.
+    pub parent: String,
+}
+
+/// Why a URDF could not be read, with line and column.
+pub type UrdfError = Located<UrdfFault>;
+
+/// What is wrong in a URDF, and the mend.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum UrdfFault {
+    /// The XML is malformed.
+    #[error("malformed XML: {reason}; mend the markup here (is the file complete?)")]
+    Xml {
+        /// What the XML parser says.
+        reason: String,
+    },
+    /// A document type declaration, by which entities could be defined.
+    #[error("a document type declaration is not accepted: delete the <!DOCTYPE ...> block")]
+    Doctype,
+    /// The root element is not `<robot>`.
+    #[error("the root element is <{root}>, not <robot>: give a URDF file{hint}")]
+    NotUrdf {
+        /// Name of the root element.
+        root: String,
+        /// What the file seems to be.
+        hint: &'static str,
+    },
+    /// Macros that were not expanded.
+    #[error("`{what}` is xacro: expand the file first (`xacro robot.urdf.xacro > robot.urdf`)")]
+    Xacro {
+        /// The macro.
+        what: String,
+    },
+    /// An element is missing.
+    #[error("<{parent}> of `{owner}` has no <{element}>: add it{hint}")]
+    MissingElement {
+        /// The element around.
+        parent: &'static str,
+        /// Name of the link or joint.
+        owner: String,
+        /// The element that is missing.
+        element: &'static str,
+        /// More on the mend.
+        hint: &'static str,
+    },
+    /// An element stands more than once.
+    #[error("`{owner}` has more than one <{element}>: keep one")]
+    RepeatedElement {
+        /// Name of the link or joint.
+        owner: String,
+        /// The element.
+        element: String,
+    },
+    /// An attribute is missing.
+    #[error("<{element}> has no attribute `{attribute}`: add it")]
+    MissingAttribute {
+        /// The element.
+        element: String,
+        /// The attribute.
+        attribute: &'static str,
+    },
+    /// A name without a character.
+    #[error("<{element}> has an empty `{attribute}`: give it a name")]
+    EmptyName {
+        /// The element.
+        element: String,
+        /// The attribute.
+        attribute: &'static str,
+    },
+    /// Something that is not a usable number.
+    #[error("`{attribute}` holds `{text}`, which is {fault}: write {mend}")]
+    Number {
+        /// The attribute.
+        attribute: String,
+        /// What stands there, shortened.
+        text: String,
+        /// What is wrong with it.
+        fault: &'static str,
+        /// What to write.
+        mend: &'static str,
+    },
+    /// Too many or too few numbers.
+    #[error("`{attribute}` holds {found} numbers: write {expected}, separated by spaces")]
+    Count {
+        /// The attribute.
+        attribute: String,
+        /// How many are needed.
+        expected: usize,
+        /// How many stand there.
+        found: usize,
+    },
+    /// Two links or two joints with one name.
+    #[error("{kind} `{name}` is defined a second time (first in line {first_line}): rename or delete one")]
+    DuplicateName {
+        /// `link` or `joint`.
+        kind: &'static str,
+        /// The name.
+        name: String,
+        /// Line of the first definition.
+        first_line: u32,
+    },
+    /// A joint names a link that does not exist.
+    #[error("joint `{joint}` names link `{link}`, which is not defined: add the link or mend the name")]
+    UnknownLink {
+        /// The joint.
+        joint: String,
+        /// The name of the link.
+        link: String,
+    },
+    /// A joint follows one that does not exist, or itself.
+    #[error(
+        "joint `{joint}` mimics `{source_joint}`, which is no other joint of this robot: mend the name or delete <mimic>"
+    )]
+    UnknownMimic {
+        /// The joint.
+        joint: String,
+        /// The joint it should follow.
+        source_joint: String,
+    },
+    /// A link that is the child of two joints.
+    #[error(
+        "link `{link}` is the child of joint `{first}` and of joint `{second}`: a link has one parent, delete one joint"
+    )]
+    TwoParents {
+        /// The link.
+        link: String,
+        /// The earlier joint.
+        first: String,
+        /// The later joint.
+        second: String,
+    },
+    /// A joint type that cannot be used.
+    #[error("joint `{joint}` is of type `{kind}`: use revolute, continuous, prismatic or fixed{hint}")]
+    JointType {
+        /// The joint.
+        joint: String,
+        /// The type.
+        kind: String,
+        /// More on the mend.
+        hint: &'static str,
+    },
+    /// An axis of length zero.
+    #[error("the axis of joint `{joint}` has length zero: give its direction, such as `0 0 1`")]
+    ZeroAxis {
+        /// The joint.
+        joint: String,
+    },
+    /// No link at all.
+    #[error("the robot has no <link>: add its links and joints")]
+    NoLinks,
+    /// Nothing moves.
+    #[error("the robot has no moving joint: give at least one of type revolute, continuous or prismatic")]
+    NoMovingJoint,
+    /// A closed chain of joints.
+    #[error("link `{link}` is its own ancestor: the joints form a loop; cut it at one joint")]
+    Loop {
+        /// A link of the loop.
+        link: String,
+    },
+    /// More than one link without a parent.
+    #[error("links `{first}` and `{second}` both have no parent: join them, a robot has one base")]
+    SeveralRoots {
+        /// The first root.
+        first: String,
+        /// The second root.
+        second: String,
+    },
+    /// More moving joints than [`MAX_MOVING_JOINTS`].
+    #[error("the robot has more than {limit} moving joints: fix those that the log does not hold")]
+    TooManyJoints {
+        /// The limit.
+        limit: usize,
+    },
+    /// The parts do not make a model.
+    #[error("{0}; mend the description")]
+    Model(#[from] ModelError),
+}
+
+/// Reads a URDF.
+///
+/// # Errors
+/// If the text is malformed XML, no URDF, or describes no tree of links on one fixed base; with line and column.
+pub fn read_urdf(text: &str) -> Result<UrdfRobot, UrdfError> {
+    let document = parse(text)?;
+    let root = document.root_element();
+    let mut unread = Vec::new();
+    let links = elements::links(root, &mut unread)?;
+    let joints = elements::joints(root, &mut unread)?;
+    let name = root.attribute("name").unwrap_or("robot");
+    let model = assemble::model(name, &links, &joints)?;
+    let unread = unread
+        .iter()
+        .map(|node| {
+            let at = document.text_pos_at(node.range().start);
+            let parent = node.parent_element().map_or("", |parent| parent.tag_name().name());
+            UnreadElement {
+                line: at.row,
+                column: at.col,
+                element: node.tag_name().name().to_owned(),
+                parent: parent.to_owned(),
+            }
+        })
+        .collect();
+    Ok(UrdfRobot { model, unread })
+}
+
+/// The XML tree of a URDF, if it is one.
+fn parse(text: &str) -> Result<Document<'_>, UrdfError> {
+    let document = Document::parse(text).map_err(|error| xml_error(text, &error))?;
+    let root = document.root_element();
+    if let Some(node) =
+        root.descendants().find(|node| node.tag_name().namespace().is_some_and(|ns| ns.contains("xacro")))
+    {
+        let what = format!("<xacro:{}>", node.tag_name().name());
+        return Err(fault_at(node, UrdfFault::Xacro { what }));
+    }
+    match root.tag_name().name() {
+        "robot" => Ok(document),
+        other => {
+            let hint = match other {
+                "sdf" => " (this is SDF: convert it)",
+                "mujoco" => " (this is MJCF: convert it)",
+                "COLLADA" => " (this is a mesh)",
+                _ => "",
+            };
+            Err(fault_at(root, UrdfFault::NotUrdf { root: other.to_owned(), hint }))
+        }
+    }
+}
+
+fn xml_error(text: &str, error: &roxmltree::Error) -> UrdfError {
+    use roxmltree::Error;
+    let reason = || {
+        // The parser appends its own position; ours leads the message.
+        let message = error.to_string();
+        message.split(" at ").next().unwrap_or_default().to_owned()
+    };
+    let at = error.pos();
+    let (line, column, fault) = match error {
+        Error::DtdDetected => {
+            let (line, column) = line_and_column(text, text.find("<!DOCTYPE").unwrap_or(0));
+            (line, column, UrdfFault::Doctype)
+        }
+        Error::UnknownNamespace(prefix, _) if prefix == "xacro" => {
+            (at.row, at.col, UrdfFault::Xacro { what: "xacro:".to_owned() })
+        }
+        Error::UnclosedRootNode | Error::UnexpectedEndOfStream => {
+            let (line, column) = line_and_column(text, text.len());
+            (line, column, UrdfFault::Xml { reason: "the document ends too early".to_owned() })
+        }
+        _ => (at.row, at.col, UrdfFault::Xml { reason: reason() }),
+    };
+    Located { line, column, fault }
+}
+
+/// `fault` at the start of an element.
+fn fault_at(node: Node<'_, '_>, fault: UrdfFault) -> UrdfError {
+    let at = node.document().text_pos_at(node.range().start);
+    Located { line: at.row, column: at.col, fault }
+}

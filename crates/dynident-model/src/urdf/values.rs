@@ -1,0 +1,132 @@
+//! Names and numbers in attributes.
+
+use super::{MAX_MAGNITUDE, UrdfError, UrdfFault, fault_at};
+use crate::place::Located;
+use roxmltree::{Attribute, Node};
+
+/// The element's children called `element`, of which at most one may stand.
+pub(super) fn child<'a, 'input>(
+    node: Node<'a, 'input>,
+    owner: &str,
+    element: &str,
+) -> Result<Option<Node<'a, 'input>>, UrdfError> {
+    let mut found = node.children().filter(|child| child.has_tag_name(element));
+    let first = found.next();
+    match found.next() {
+        Some(second) => {
+            let fault = UrdfFault::RepeatedElement { owner: owner.to_owned(), element: element.to_owned() };
+            Err(fault_at(second, fault))
+        }
+        None => Ok(first),
+    }
+}
+
+/// The child `element`, which must stand exactly once.
+pub(super) fn required_child<'a, 'input>(
+    node: Node<'a, 'input>,
+    owner: &str,
+    parent: &'static str,
+    element: &'static str,
+    hint: &'static str,
+) -> Result<Node<'a, 'input>, UrdfError> {
+    child(node, owner, element)?
+        .ok_or_else(|| fault_at(node, UrdfFault::MissingElement { parent, owner: owner.to_owned(), element, hint }))
+}
+
+/// A name, which must not be empty.
+pub(super) fn name<'a>(node: Node<'a, '_>, attribute: &'static str) -> Result<&'a str, UrdfError> {
+    let element = || node.tag_name().name().to_owned();
+    let found = node
+        .attribute_node(attribute)
+        .ok_or_else(|| fault_at(node, UrdfFault::MissingAttribute { element: element(), attribute }))?;
+    refuse_xacro(node, found)?;
+    if found.value().trim().is_empty() {
+        return Err(fault_in(node, found, UrdfFault::EmptyName { element: element(), attribute }));
+    }
+    Ok(found.value())
+}
+
+/// `N` numbers separated by spaces, each of at most [`MAX_MAGNITUDE`]; `None` without the attribute.
+pub(super) fn numbers<const N: usize>(node: Node<'_, '_>, attribute: &str) -> Result<Option<[f64; N]>, UrdfError> {
+    let Some(found) = node.attribute_node(attribute) else { return Ok(None) };
+    refuse_xacro(node, found)?;
+    let words = found.value().split_ascii_whitespace();
+    let count = words.clone().count();
+    let mut numbers = [0.0; N];
+    for (number, word) in numbers.iter_mut().zip(words) {
+        *number = parse(word).map_err(|(fault, mend)| number_fault(node, found, word, fault, mend))?;
+        if number.abs() > MAX_MAGNITUDE {
+            let mend = "a value below 1e9 in m, rad, kg or kg m^2";
+            return Err(number_fault(node, found, word, "too large for a machine", mend));
+        }
+    }
+    if count != N {
+        let fault = UrdfFault::Count { attribute: attribute.to_owned(), expected: N, found: count };
+        return Err(fault_in(node, found, fault));
+    }
+    Ok(Some(numbers))
+}
+
+/// One finite number of any size (limits such as `1e16` mean "none"); `None` without the attribute.
+pub(super) fn number(node: Node<'_, '_>, attribute: &str) -> Result<Option<f64>, UrdfError> {
+    let Some(found) = node.attribute_node(attribute) else { return Ok(None) };
+    refuse_xacro(node, found)?;
+    let word = found.value().trim();
+    parse(word).map(Some).map_err(|(fault, mend)| number_fault(node, found, word, fault, mend))
+}
+
+/// One number that must be there.
+pub(super) fn required_number(node: Node<'_, '_>, attribute: &'static str) -> Result<f64, UrdfError> {
+    numbers::<1>(node, attribute)?.map(|[number]| number).ok_or_else(|| {
+        fault_at(node, UrdfFault::MissingAttribute { element: node.tag_name().name().to_owned(), attribute })
+    })
+}
+
+/// A finite number in plain decimal or exponent notation; else what is wrong and what to write.
+fn parse(word: &str) -> Result<f64, (&'static str, &'static str)> {
+    const PLAIN: &str = "a plain number such as 0.25";
+    if word.contains(',') {
+        return Err(("not a number", "a dot for the decimal comma and spaces between numbers"));
+    }
+    // Rust also accepts `inf` and `nan`: only digits, signs, dots and exponents may pass.
+    let looks_numeric =
+        word.bytes().all(|byte| byte.is_ascii_digit() || matches!(byte, b'+' | b'-' | b'.' | b'e' | b'E'));
+    match word.parse::<f64>() {
+        Ok(number) if looks_numeric && number.is_finite() => Ok(number),
+        Ok(_) => Err(("not finite", "a finite number")),
+        Err(_) => Err(("not a number", PLAIN)),
+    }
+}
+
+fn refuse_xacro(node: Node<'_, '_>, attribute: Attribute<'_, '_>) -> Result<(), UrdfError> {
+    let value = attribute.value();
+    if value.contains("${") || value.contains("$(") {
+        return Err(fault_in(node, attribute, UrdfFault::Xacro { what: shortened(value) }));
+    }
+    Ok(())
+}
+
+fn number_fault(
+    node: Node<'_, '_>,
+    attribute: Attribute<'_, '_>,
+    word: &str,
+    fault: &'static str,
+    mend: &'static str,
+) -> UrdfError {
+    let attribute_name = attribute.name().to_owned();
+    fault_in(node, attribute, UrdfFault::Number { attribute: attribute_name, text: shortened(word), fault, mend })
+}
+
+fn fault_in(node: Node<'_, '_>, attribute: Attribute<'_, '_>, fault: UrdfFault) -> UrdfError {
+    let at = node.document().text_pos_at(attribute.range_value().start);
+    Located { line: at.row, column: at.col, fault }
+}
+
+/// At most forty characters of foreign text, so that a message stays a line.
+fn shortened(text: &str) -> String {
+    let mut short: String = text.chars().take(40).collect();
+    if short.len() < text.len() {
+        short.push('…');
+    }
+    short
+}
