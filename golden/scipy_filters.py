@@ -80,7 +80,8 @@ def main():
                     signal.savgol_filter(x, window, degree, deriv=d, delta=1 / 200.0, mode="interp") for d in range(3)
                 ],
             }
-            for window, degree in [(5, 2), (5, 3), (11, 4), (31, 5), (101, 8)]
+            # No degree 8 over long windows: savgol_coeffs solves with powers up to 50^8 and is off by 0.1 % there.
+            for window, degree in [(5, 2), (5, 3), (11, 4), (31, 5), (101, 4)]
         ],
         "gradient": np.gradient(x, 1 / 200.0, edge_order=2),
         "decimation": [kaiser_taps(*case) for case in [(2, 60.0, 1000.0), (10, 60.0, 1000.0), (5, 90.0, 500.0), (25, 40.0, 5000.0)]],
