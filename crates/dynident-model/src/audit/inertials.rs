@@ -13,7 +13,7 @@ const LARGEST_MASS_KG: f64 = 1000.0;
 const OSMIUM_DENSITY_KG_M3: f64 = 22590.0;
 /// A violation of a physical inequality by less than this share of the largest moment is rounding in the file: 3 digits are usual there.
 const ROUNDING: f64 = 1e-2;
-/// Rounding in the last digit of a binary double and of the eigenvalues, relative to the largest moment.
+/// Rounding in the last digit of a binary double and of the eigenvalues, relative to the inertia about the frame's origin.
 const NUMERICAL: f64 = 1e-9;
 /// How many body lengths the centre of mass may lie from the frame before it is doubtful, and before it must be a unit slip.
 const FAR: f64 = 3.0;
@@ -52,8 +52,9 @@ fn possible(link: &str, inertial: &InertialParameters, findings: &mut Findings) 
         return;
     };
     let [least, middle, most] = moments;
-    let size = least.abs().max(most.abs());
-    if least < -NUMERICAL * size {
+    // The moments are a difference from the inertia about the frame's origin, and carry its rounding.
+    let rounding = NUMERICAL * trace(&inertial.inertia_at_origin()).abs();
+    if least < -rounding {
         findings.add(
             Problem,
             "inertia-not-positive",
@@ -63,7 +64,7 @@ fn possible(link: &str, inertial: &InertialParameters, findings: &mut Findings) 
                  check signs, products of inertia, and the point that the inertia is about"
             ),
         );
-    } else if least + middle < most - NUMERICAL * size {
+    } else if least + middle < most - rounding {
         let excess = (most - least - middle) / most;
         let level = if excess < ROUNDING { Warning } else { Problem };
         findings.add(
@@ -106,12 +107,12 @@ fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &m
     let square = 0.5 * trace(&inertia) / mass;
     if square > (FAR * length_m).powi(2) {
         findings.add(
-            Problem,
+            if square > (ABSURDLY_FAR * length_m).powi(2) { Problem } else { Warning },
             "inertia-too-large",
             place(),
             format!(
-                "has an inertia as if its {mass} kg lay {:.3} m from the centre of mass, on a body of about {length_m:.3} m: if the inertia is in \
-                 kg mm^2 divide by 1e6, in g mm^2 by 1e9",
+                "has an inertia as if its {mass} kg lay {:.3} m from the centre of mass, on a body of about {length_m:.3} m: check \
+                 its unit (kg mm^2: divide by 1e6, g mm^2: by 1e9)",
                 square.sqrt()
             ),
         );

@@ -47,7 +47,8 @@ pub const MAX_MAGNITUDE: f64 = 1e9;
 pub struct UrdfRobot {
     /// The machine on a fixed base, gravity along -z.
     pub model: Model,
-    /// Elements inside links, inertials and joints that URDF does not define and that were not read: often a misspelling. At most
+    /// Elements inside links, inertials and joints that were not read, because URDF does not define them (often a misspelling) or because they
+    /// repeat an earlier one, which counts. At most
     /// [`UrdfRobot::MAX_UNREAD`] are kept.
     pub unread: Vec<UnreadElement>,
 }
@@ -112,13 +113,11 @@ pub enum UrdfFault {
         /// More on the mend.
         hint: &'static str,
     },
-    /// An element stands more than once.
-    #[error("`{owner}` has more than one <{element}>: keep one")]
-    RepeatedElement {
-        /// Name of the link or joint.
-        owner: String,
-        /// The element.
-        element: String,
+    /// A link with two inertials.
+    #[error("link `{link}` has a second <inertial>: keep one")]
+    RepeatedInertial {
+        /// The link.
+        link: String,
     },
     /// An attribute is missing.
     #[error("<{element}> has no attribute `{attribute}`: add it")]
