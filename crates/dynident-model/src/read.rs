@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// Largest robot description that is read, bytes. The largest known humanoids stay below one megabyte.
-pub const MAX_DESCRIPTION_BYTES: u64 = 64 << 20;
+pub const MAX_DESCRIPTION_BYTES: u64 = 16 << 20;
 
 /// What a description is written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

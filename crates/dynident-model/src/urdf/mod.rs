@@ -32,7 +32,7 @@ pub use write::{JointChange, LinkChange, UrdfWriteError, link_changes, rewrite_u
 use crate::error::ModelError;
 use crate::place::{Located, line_and_column};
 use crate::tree::Model;
-use roxmltree::{Document, Node};
+use roxmltree::{Document, Node, ParsingOptions};
 use thiserror::Error;
 
 /// Most moving joints that a description may have.
@@ -41,6 +41,9 @@ pub const MAX_MOVING_JOINTS: usize = 1000;
 /// Largest length, angle, mass or inertia accepted in a description: beyond it a number is a slip of the pen, and products of such numbers
 /// would leave the range of `f64`.
 pub const MAX_MAGNITUDE: f64 = 1e9;
+
+/// Most elements, texts and comments in a document: a hundred times the largest known, and little memory.
+const MAX_NODES: u32 = 2_000_000;
 
 /// What a URDF says.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,6 +86,12 @@ pub enum UrdfFault {
     Xml {
         /// What the XML parser says.
         reason: String,
+    },
+    /// More elements, texts and comments than a robot has.
+    #[error("the document has more than {limit} nodes: name the URDF of one robot")]
+    TooLarge {
+        /// The limit.
+        limit: u32,
     },
     /// A document type declaration, by which entities could be defined.
     #[error("a document type declaration is not accepted: delete the <!DOCTYPE ...> block")]
@@ -128,7 +137,7 @@ pub enum UrdfFault {
         attribute: &'static str,
     },
     /// A name without a character.
-    #[error("<{element}> has an empty `{attribute}`: give it a name")]
+    #[error("<{element}> has an empty `{attribute}`: fill it in")]
     EmptyName {
         /// The element.
         element: String,
@@ -136,8 +145,10 @@ pub enum UrdfFault {
         attribute: &'static str,
     },
     /// Something that is not a usable number.
-    #[error("`{attribute}` holds `{text}`, which is {fault}: write {mend}")]
+    #[error("`{attribute}` of <{element}> holds `{text}`, which is {fault}: write {mend}")]
     Number {
+        /// The element.
+        element: String,
         /// The attribute.
         attribute: String,
         /// What stands there, shortened.
@@ -148,8 +159,10 @@ pub enum UrdfFault {
         mend: &'static str,
     },
     /// Too many or too few numbers.
-    #[error("`{attribute}` holds {found} numbers: write {expected}, separated by spaces")]
+    #[error("`{attribute}` of <{element}> holds {found} numbers: write {expected}, separated by spaces")]
     Count {
+        /// The element.
+        element: String,
         /// The attribute.
         attribute: String,
         /// How many are needed.
@@ -274,7 +287,8 @@ pub fn read_urdf(text: &str) -> Result<UrdfRobot, UrdfError> {
 
 /// The XML tree of a URDF, if it is one.
 fn parse(text: &str) -> Result<Document<'_>, UrdfError> {
-    let document = Document::parse(text).map_err(|error| xml_error(text, &error))?;
+    let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
+    let document = Document::parse_with_options(text, options).map_err(|error| xml_error(text, &error))?;
     let root = document.root_element();
     if let Some(node) =
         root.descendants().find(|node| node.tag_name().namespace().is_some_and(|ns| ns.contains("xacro")))
@@ -298,12 +312,9 @@ fn parse(text: &str) -> Result<Document<'_>, UrdfError> {
 
 fn xml_error(text: &str, error: &roxmltree::Error) -> UrdfError {
     use roxmltree::Error;
-    let reason = || {
-        // The parser appends its own position; ours leads the message.
-        let message = error.to_string();
-        message.split(" at ").next().unwrap_or_default().to_owned()
-    };
     let at = error.pos();
+    // The parser's messages hold their position; ours lead with it.
+    let reason = || error.to_string().replacen(&format!(" at {at}"), "", 1);
     let (line, column, fault) = match error {
         Error::DtdDetected => {
             let (line, column) = line_and_column(text, text.find("<!DOCTYPE").unwrap_or(0));
@@ -316,6 +327,7 @@ fn xml_error(text: &str, error: &roxmltree::Error) -> UrdfError {
             let (line, column) = line_and_column(text, text.len());
             (line, column, UrdfFault::Xml { reason: "the document ends too early".to_owned() })
         }
+        Error::NodesLimitReached => (1, 1, UrdfFault::TooLarge { limit: MAX_NODES }),
         _ => (at.row, at.col, UrdfFault::Xml { reason: reason() }),
     };
     Located { line, column, fault }

@@ -49,7 +49,12 @@ pub(super) fn numbers<const N: usize>(node: Node<'_, '_>, attribute: &str) -> Re
         }
     }
     if count != N {
-        let fault = UrdfFault::Count { attribute: attribute.to_owned(), expected: N, found: count };
+        let fault = UrdfFault::Count {
+            element: node.tag_name().name().to_owned(),
+            attribute: attribute.to_owned(),
+            expected: N,
+            found: count,
+        };
         return Err(fault_in(node, found, fault));
     }
     Ok(Some(numbers))
@@ -101,8 +106,14 @@ fn number_fault(
     fault: &'static str,
     mend: &'static str,
 ) -> UrdfError {
-    let attribute_name = attribute.name().to_owned();
-    fault_in(node, attribute, UrdfFault::Number { attribute: attribute_name, text: shortened(word), fault, mend })
+    let fault = UrdfFault::Number {
+        element: node.tag_name().name().to_owned(),
+        attribute: attribute.name().to_owned(),
+        text: shortened(word),
+        fault,
+        mend,
+    };
+    fault_in(node, attribute, fault)
 }
 
 fn fault_in(node: Node<'_, '_>, attribute: Attribute<'_, '_>, fault: UrdfFault) -> UrdfError {
