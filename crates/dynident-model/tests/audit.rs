@@ -6,7 +6,7 @@ use common::{ARM, foreign_urdfs, robots_dir};
 use dynident_model::{AuditFinding, AuditLevel, audit, load_robot, read_urdf};
 
 fn findings(text: &str) -> Vec<AuditFinding> {
-    audit(&read_urdf(text).unwrap().model)
+    audit(&read_urdf(text).expect("a readable arm").model)
 }
 
 fn above_info(findings: &[AuditFinding]) -> Vec<&AuditFinding> {

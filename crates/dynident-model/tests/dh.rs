@@ -14,17 +14,18 @@ fn row() -> impl Strategy<Value = Row> {
 }
 
 fn table(convention: &str, rows: &[Row]) -> String {
-    let mut text =
-        format!("convention = \"{convention}\"\n[base]\nxyz_m = [0.1, -0.2, 0.3]\nrpy_rad = [0.4, 0.5, -0.6]\n");
-    for (i, (a, alpha, d, theta, slides, negative)) in rows.iter().enumerate() {
-        let kind = if *slides { "prismatic" } else { "revolute" };
-        let sign = if *negative { -1 } else { 1 };
-        text += &format!(
-            "[[joint]]\nname = \"j{i}\"\nkind = \"{kind}\"\na_m = {a:?}\nalpha_rad = {alpha:?}\nd_m = {d:?}\ntheta_rad = {theta:?}\nsign = {sign}\n\
-             inertial = {{ mass_kg = 1.5, com_m = [0.1, 0.2, -0.3], inertia_at_com = [0.02, 0.001, 0.002, 0.03, -0.003, 0.025] }}\n"
-        );
-    }
-    text
+    let head = format!("convention = \"{convention}\"\n[base]\nxyz_m = [0.1, -0.2, 0.3]\nrpy_rad = [0.4, 0.5, -0.6]\n");
+    let joint = |(i, &(a, alpha, d, theta, slides, negative)): (usize, &Row)| {
+        let kind = if slides { "prismatic" } else { "revolute" };
+        let sign = if negative { -1 } else { 1 };
+        format!(
+            "[[joint]]\nname = \"j{i}\"\nkind = \"{kind}\"\na_m = {a:?}\nalpha_rad = {alpha:?}\nd_m = {d:?}\ntheta_rad = {theta:?}\n\
+             sign = {sign}\ninertial = {{ mass_kg = 1.5, com_m = [0.1, 0.2, -0.3], \
+             inertia_at_com = [0.02, 0.001, 0.002, 0.03, -0.003, 0.025] }}\n"
+        )
+    };
+    let joints: Vec<String> = rows.iter().enumerate().map(joint).collect();
+    head + &joints.concat()
 }
 
 fn rot_x(t: f64) -> Matrix4<f64> {
@@ -65,10 +66,9 @@ fn base_from_body(model: &Model, q: &[f64]) -> Vec<Transform> {
     frames
 }
 
-/// In which body frame the second moment of the row's mass lies where the textbook puts it: compares mass, first moment and inertia of every body,
-/// carried to the base frame.
+/// Compares the axis, centre of mass and inertia of every body, carried to the base frame, with what the textbook's matrices say.
 fn assert_like_textbook(convention: &str, rows: &[Row], q: &[f64]) {
-    let model = read_dh(&table(convention, rows)).unwrap();
+    let model = read_dh(&table(convention, rows)).expect("a good table");
     let mut frame = shift(0.1, -0.2, 0.3) * rot_z(-0.6) * rot_y(0.5) * rot_x(0.4);
     let inertia = nalgebra::Matrix3::new(0.02, 0.001, 0.002, 0.001, 0.03, -0.003, 0.002, -0.003, 0.025);
     for (i, body) in base_from_body(&model, q).iter().enumerate() {
@@ -86,7 +86,7 @@ fn assert_like_textbook(convention: &str, rows: &[Row], q: &[f64]) {
         let com = frame * Vector4::new(0.1, 0.2, -0.3, 1.0);
         let rotation = frame.fixed_view::<3, 3>(0, 0);
         let at_com = rotation * inertia * rotation.transpose();
-        let (found_com, found_inertia) = (moved.com_m().unwrap(), moved.inertia_at_com().unwrap());
+        let (found_com, found_inertia) = (moved.com_m().expect("mass"), moved.inertia_at_com().expect("mass"));
         for k in 0..3 {
             assert!((found_com[k] - com[k]).abs() < 1e-13, "body {i}: {found_com:?} {com}");
             for l in 0..3 {

@@ -18,6 +18,9 @@ const NUMERICAL: f64 = 1e-9;
 /// How many body lengths the centre of mass may lie from the frame before it is doubtful, and before it must be a unit slip.
 const FAR: f64 = 3.0;
 const ABSURDLY_FAR: f64 = 50.0;
+/// A uniform rod about its end has three quarters of its inertia from the parallel-axis term; bodies given rightly rarely look as if
+/// more than this came from it.
+const MOSTLY_SHIFT: f64 = 0.7;
 
 pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
     for (index, body) in model.bodies().iter().enumerate() {
@@ -143,8 +146,8 @@ fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &m
     }
 }
 
-/// An inertia that was computed about the link's origin but written as if about the centre of mass: without the parallel-axis term a possible body
-/// remains, and that term is most of the inertia given.
+/// An inertia that was computed about the link's origin but written as if about the centre of mass: without the parallel-axis term
+/// a possible body remains, and that term is most of the inertia given.
 fn about_origin(link: &str, inertial: &InertialParameters, com: Vec3, inertia: &Mat3, findings: &mut Findings) {
     let mass = inertial.mass_kg();
     let shift = (Mat3::IDENTITY.scale(com.dot(com)) - Mat3::outer(com, com)).scale(mass);
@@ -168,9 +171,6 @@ fn about_origin(link: &str, inertial: &InertialParameters, com: Vec3, inertia: &
         );
     }
 }
-
-/// A uniform rod about its end has three quarters of its inertia from the parallel-axis term; ordinary bodies, given rightly, rarely more than this.
-const MOSTLY_SHIFT: f64 = 0.7;
 
 /// Bodies and links without any inertial.
 fn unknown(model: &Model, index: usize, findings: &mut Findings) {

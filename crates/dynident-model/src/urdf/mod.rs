@@ -24,6 +24,7 @@
 
 mod assemble;
 mod elements;
+mod flood;
 mod values;
 mod write;
 
@@ -50,9 +51,8 @@ const MAX_NODES: u32 = 2_000_000;
 pub struct UrdfRobot {
     /// The machine on a fixed base, gravity along -z.
     pub model: Model,
-    /// Elements inside links, inertials and joints that were not read, because URDF does not define them (often a misspelling) or because they
-    /// repeat an earlier one, which counts. At most
-    /// [`UrdfRobot::MAX_UNREAD`] are kept.
+    /// Elements inside links, inertials and joints that were not read, because URDF does not define them (often a misspelling) or
+    /// because they repeat an earlier one, which counts. At most [`UrdfRobot::MAX_UNREAD`] are kept.
     pub unread: Vec<UnreadElement>,
 }
 
@@ -93,6 +93,9 @@ pub enum UrdfFault {
         /// The limit.
         limit: u32,
     },
+    /// Thousands of attributes in one tag, or of namespaces.
+    #[error("more attributes in a tag, or namespaces in the document, than any robot has: name the URDF of one robot")]
+    Flood,
     /// A document type declaration, by which entities could be defined.
     #[error("a document type declaration is not accepted: delete the <!DOCTYPE ...> block")]
     Doctype,
@@ -287,6 +290,9 @@ pub fn read_urdf(text: &str) -> Result<UrdfRobot, UrdfError> {
 
 /// The XML tree of a URDF, if it is one.
 fn parse(text: &str) -> Result<Document<'_>, UrdfError> {
+    if let Some(at) = flood::flood(text) {
+        return Err(Located::at(text, at, UrdfFault::Flood));
+    }
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
     let document = Document::parse_with_options(text, options).map_err(|error| xml_error(text, &error))?;
     let root = document.root_element();
