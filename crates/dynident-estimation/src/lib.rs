@@ -1,1 +1,35 @@
-//! placeholder
+//! **What do the measurements say?** From rows `[W | τ]` of numbers to parameters with error bars.
+//!
+//! This crate never knows where samples came from: it sees columns, joints and numbers. The way through it:
+//!
+//! 1. Rows of one joint in one log go into a [`SegmentedFactor`]: at most K triangular factors of consecutive time segments. The
+//!    rows are then forgotten; memory does not grow with the log.
+//! 2. The factors of all joints and logs make a [`LinearProblem`] over named columns.
+//! 3. [`ordinary_least_squares`] or [`weighted_least_squares`] gives an [`Estimate`]: values, a covariance that accounts for
+//!    residuals correlated in time, the noise of every joint, and what was decided about columns that the data do not excite.
+//! 4. [`Validation`] compares predicted with measured torque, on data that were not used for the fit.
+
+#![forbid(unsafe_code)]
+
+mod covariance;
+mod error;
+mod estimate;
+mod factor;
+mod ordinary;
+mod problem;
+mod rank;
+mod reflect;
+mod segments;
+mod validation;
+mod weighted;
+
+pub use covariance::{CovarianceMethod, correlation};
+pub use error::EstimationError;
+pub use estimate::{Estimate, EstimateStatus};
+pub use factor::{BLOCK_ROWS, FactorWorkspace, TriangularFactor};
+pub use ordinary::{OrdinarySettings, ordinary_least_squares};
+pub use problem::{JointRows, LinearProblem, Prior};
+pub use rank::{FixedColumn, RankReport, RankSettings};
+pub use segments::{SegmentScore, SegmentSettings, SegmentedFactor};
+pub use validation::{JointValidation, Validation, ValidationReport};
+pub use weighted::{WeightedSettings, weighted_least_squares};

@@ -1,6 +1,9 @@
-//! The run-time choice of processor level: the one place with `unsafe`.
+//! The run-time choice of processor level.
 
-use crate::lanes::{F64x1, F64x4, F64x8, Lane};
+use crate::lanes::{Lane, Wide};
+use crate::portable::Portable;
+#[cfg(target_arch = "x86_64")]
+use crate::x86::{Avx2, Avx512, HasAvx2, HasAvx512, enter_avx2, enter_avx512};
 
 /// Work that can run over any lane type. Implementations mark `run`, and everything it calls in its hot path,
 /// `#[inline(always)]`, so that the whole body is compiled once for each processor level.
@@ -16,25 +19,23 @@ enum Instructions {
     /// Nothing beyond the build target.
     Portable,
     #[cfg(target_arch = "x86_64")]
-    Avx2,
+    Avx2(HasAvx2),
     #[cfg(target_arch = "x86_64")]
-    Avx512,
-    #[cfg(target_arch = "aarch64")]
-    Neon,
+    Avx512(HasAvx512),
 }
 
-/// What this processor can do. A value of this type is the proof that the instructions it names exist: it can only be had
-/// from [`Level::detect`], [`Level::available`] and [`Level::portable`].
+/// What this processor can do. A value of this type is the proof that the instructions it names exist: it can only be had from
+/// [`Level::detect`], [`Level::available`] and [`Level::portable`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Level(Instructions);
 
 impl Level {
     /// The best level of this processor.
     pub fn detect() -> Self {
-        *Self::available().last().unwrap_or(&Self::portable())
+        Self::available().last().copied().unwrap_or_else(Self::portable)
     }
 
-    /// The level that every processor of the build target has: no run-time check, no fused multiply-add.
+    /// The level that every processor of the build target has. On 64-bit ARM that includes NEON and the fused multiply-add.
     pub fn portable() -> Self {
         Self(Instructions::Portable)
     }
@@ -45,20 +46,9 @@ impl Level {
         let mut levels = vec![Self::portable()];
         #[cfg(target_arch = "x86_64")]
         {
-            let avx2 = std::is_x86_feature_detected!("avx2") && std::is_x86_feature_detected!("fma");
-            let avx512 = avx2
-                && std::is_x86_feature_detected!("avx512f")
-                && std::is_x86_feature_detected!("avx512dq")
-                && std::is_x86_feature_detected!("avx512vl");
-            if avx2 {
-                levels.push(Self(Instructions::Avx2));
-            }
-            if avx512 {
-                levels.push(Self(Instructions::Avx512));
-            }
+            levels.extend(HasAvx2::detect().map(|proof| Self(Instructions::Avx2(proof))));
+            levels.extend(HasAvx512::detect().map(|proof| Self(Instructions::Avx512(proof))));
         }
-        #[cfg(target_arch = "aarch64")]
-        levels.push(Self(Instructions::Neon));
         levels
     }
 
@@ -66,7 +56,7 @@ impl Level {
     pub fn lanes(self) -> usize {
         match self.0 {
             #[cfg(target_arch = "x86_64")]
-            Instructions::Avx512 => 8,
+            Instructions::Avx512(_) => 8,
             _ => 4,
         }
     }
@@ -76,67 +66,39 @@ impl Level {
         match self.0 {
             Instructions::Portable => "portable",
             #[cfg(target_arch = "x86_64")]
-            Instructions::Avx2 => "AVX2",
+            Instructions::Avx2(_) => "AVX2",
             #[cfg(target_arch = "x86_64")]
-            Instructions::Avx512 => "AVX-512",
-            #[cfg(target_arch = "aarch64")]
-            Instructions::Neon => "NEON",
+            Instructions::Avx512(_) => "AVX-512",
         }
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn with_avx2<K: Kernel, T: Lane>(kernel: K) -> K::Output {
-    kernel.run::<T>()
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
-fn with_avx512<K: Kernel, T: Lane>(kernel: K) -> K::Output {
-    kernel.run::<T>()
-}
+/// The fused multiply-add belongs to every 64-bit ARM processor.
+const FUSED: bool = cfg!(target_arch = "aarch64");
 
 /// Runs `kernel` on as many samples side by side as `level` offers.
 #[inline]
 pub fn dispatch<K: Kernel>(level: Level, kernel: K) -> K::Output {
     match level.0 {
-        Instructions::Portable => kernel.run::<F64x4<false>>(),
+        Instructions::Portable => kernel.run::<Wide<Portable<4, FUSED>>>(),
         #[cfg(target_arch = "x86_64")]
-        Instructions::Avx2 => enter_avx2::<K, F64x4<true>>(kernel),
+        Instructions::Avx2(proof) => enter_avx2::<K, Wide<Avx2>>(proof, kernel),
         #[cfg(target_arch = "x86_64")]
-        Instructions::Avx512 => enter_avx512::<K, F64x8<true>>(kernel),
-        #[cfg(target_arch = "aarch64")]
-        Instructions::Neon => kernel.run::<F64x4<true>>(),
+        Instructions::Avx512(proof) => enter_avx512::<K, Wide<Avx512>>(proof, kernel),
     }
 }
 
-/// Runs `kernel` on one sample at a time, with the instructions of `level` for what is left to vectorise inside a sample.
+/// Runs `kernel` on one sample at a time, with the instructions of `level` for what vectorises inside a sample.
 #[inline]
 pub fn dispatch_single<K: Kernel>(level: Level, kernel: K) -> K::Output {
     match level.0 {
-        Instructions::Portable => kernel.run::<F64x1<false>>(),
+        Instructions::Portable => kernel.run::<Wide<Portable<1, FUSED>, Portable<4, FUSED>>>(),
         #[cfg(target_arch = "x86_64")]
-        Instructions::Avx2 => enter_avx2::<K, F64x1<true>>(kernel),
+        Instructions::Avx2(proof) => enter_avx2::<K, Wide<Portable<1, true>, Avx2>>(proof, kernel),
         #[cfg(target_arch = "x86_64")]
-        Instructions::Avx512 => enter_avx512::<K, F64x1<true>>(kernel),
-        #[cfg(target_arch = "aarch64")]
-        Instructions::Neon => kernel.run::<F64x1<true>>(),
+        // Measured: inside one sample four lanes beat eight (half-empty registers, slower shuffles).
+        Instructions::Avx512(proof) => enter_avx2::<K, Wide<Portable<1, true>, Avx2>>(proof.avx2(), kernel),
     }
-}
-
-// Calling a `#[target_feature]` function is unsafe because the processor may lack the feature. A `Level` other than
-// portable exists only after `Level::available` saw the features at run time, so the two calls below are sound.
-#[cfg(target_arch = "x86_64")]
-#[inline]
-fn enter_avx2<K: Kernel, T: Lane>(kernel: K) -> K::Output {
-    unsafe { with_avx2::<K, T>(kernel) }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[inline]
-fn enter_avx512<K: Kernel, T: Lane>(kernel: K) -> K::Output {
-    unsafe { with_avx512::<K, T>(kernel) }
 }
 
 #[cfg(test)]

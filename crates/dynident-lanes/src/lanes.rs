@@ -1,11 +1,9 @@
 //! Lanes: one, four or eight `f64` that take every step together.
-//!
-//! Plain arrays with element-wise loops; inside a `#[target_feature]` function ([`crate::dispatch()`]) the compiler turns
-//! each loop into one vector instruction. `FUSED` says whether [`Scalar::mul_add`] may use the fused instruction,
-//! which must only be asked for where the processor has it: elsewhere it is a slow library call.
 
+use crate::register::Register;
 use crate::scalar::Scalar;
-use crate::sin_cos::sin_cos_lanes;
+use crate::sin_cos::sin_cos;
+use core::marker::PhantomData;
 use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
 /// A [`Scalar`] that is a row of samples.
@@ -29,149 +27,201 @@ pub trait Lane: Scalar {
     ///
     /// # Panics
     /// If `index` is not below [`LANES`](Lane::LANES).
-    fn lane(self, index: usize) -> f64;
+    #[inline(always)]
+    fn lane(self, index: usize) -> f64 {
+        let mut lanes = [0.0; 8];
+        self.store(&mut lanes);
+        assert!(index < Self::LANES);
+        lanes[index]
+    }
 
-    /// Sum over the lanes.
-    fn sum(self) -> f64;
+    /// Sum over the lanes, from first to last.
+    #[inline(always)]
+    fn sum(self) -> f64 {
+        let mut lanes = [0.0; 8];
+        self.store(&mut lanes);
+        lanes[..Self::LANES].iter().sum()
+    }
+
+    /// The lane type that holds several values of this one side by side: several joints of a single sample, or just one value where the
+    /// lanes are samples already. What vectorises *inside* one sample is written over bundles.
+    type Bundle: Lane;
+
+    /// How many values of this type one [`Bundle`](Lane::Bundle) holds: more than one only where a value is one sample.
+    const PER_BUNDLE: usize = Self::Bundle::LANES / Self::LANES;
+
+    /// The bundle with this value in every place.
+    fn bundle(self) -> Self::Bundle;
+
+    /// Adds this value at place `index` of the bundle.
+    ///
+    /// # Panics
+    /// If `index` is not below [`PER_BUNDLE`](Lane::PER_BUNDLE).
+    fn add_at(self, bundle: &mut Self::Bundle, index: usize);
 }
 
-macro_rules! lanes {
-    ($(#[$doc:meta])* $name:ident, $n:literal, $align:literal) => {
-        $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq)]
-        #[repr(C, align($align))]
-        pub struct $name<const FUSED: bool>(pub [f64; $n]);
+/// Lanes in the register `R`, with bundles in the register `B`.
+pub(crate) struct Wide<R, B = R>(R, PhantomData<B>);
 
-        impl<const FUSED: bool> Add for $name<FUSED> {
-            type Output = Self;
-            #[inline(always)]
-            fn add(mut self, other: Self) -> Self {
-                for i in 0..$n {
-                    self.0[i] += other.0[i];
-                }
-                self
-            }
-        }
-        impl<const FUSED: bool> Sub for $name<FUSED> {
-            type Output = Self;
-            #[inline(always)]
-            fn sub(mut self, other: Self) -> Self {
-                for i in 0..$n {
-                    self.0[i] -= other.0[i];
-                }
-                self
-            }
-        }
-        impl<const FUSED: bool> Mul for $name<FUSED> {
-            type Output = Self;
-            #[inline(always)]
-            fn mul(mut self, other: Self) -> Self {
-                for i in 0..$n {
-                    self.0[i] *= other.0[i];
-                }
-                self
-            }
-        }
-        impl<const FUSED: bool> Neg for $name<FUSED> {
-            type Output = Self;
-            #[inline(always)]
-            fn neg(mut self) -> Self {
-                for i in 0..$n {
-                    self.0[i] = -self.0[i];
-                }
-                self
-            }
-        }
-        impl<const FUSED: bool> AddAssign for $name<FUSED> {
-            #[inline(always)]
-            fn add_assign(&mut self, other: Self) {
-                *self = *self + other;
-            }
-        }
-        impl<const FUSED: bool> SubAssign for $name<FUSED> {
-            #[inline(always)]
-            fn sub_assign(&mut self, other: Self) {
-                *self = *self - other;
-            }
-        }
-        impl<const FUSED: bool> Scalar for $name<FUSED> {
-            const ZERO: Self = Self([0.0; $n]);
-            const ONE: Self = Self([1.0; $n]);
-
-            #[inline(always)]
-            fn splat(value: f64) -> Self {
-                Self([value; $n])
-            }
-
-            #[inline(always)]
-            fn mul_add(mut self, factor: Self, addend: Self) -> Self {
-                for i in 0..$n {
-                    self.0[i] = if FUSED {
-                        self.0[i].mul_add(factor.0[i], addend.0[i])
-                    } else {
-                        self.0[i] * factor.0[i] + addend.0[i]
-                    };
-                }
-                self
-            }
-
-            #[inline(always)]
-            fn sin_cos(self) -> (Self, Self) {
-                let (sin, cos) = sin_cos_lanes::<$n, FUSED>(self.0);
-                (Self(sin), Self(cos))
-            }
-
-            #[inline(always)]
-            fn recip(mut self) -> Self {
-                for i in 0..$n {
-                    self.0[i] = 1.0 / self.0[i];
-                }
-                self
-            }
-        }
-        impl<const FUSED: bool> Lane for $name<FUSED> {
-            const LANES: usize = $n;
-
-            #[inline(always)]
-            fn load(values: &[f64]) -> Self {
-                let mut lanes = [0.0; $n];
-                lanes.copy_from_slice(&values[..$n]);
-                Self(lanes)
-            }
-
-            #[inline(always)]
-            fn store(self, out: &mut [f64]) {
-                out[..$n].copy_from_slice(&self.0);
-            }
-
-            #[inline(always)]
-            fn lane(self, index: usize) -> f64 {
-                self.0[index]
-            }
-
-            #[inline(always)]
-            fn sum(self) -> f64 {
-                self.0.iter().sum()
-            }
-        }
-    };
+impl<R: Register, B> Wide<R, B> {
+    #[inline(always)]
+    const fn of(register: R) -> Self {
+        Self(register, PhantomData)
+    }
 }
 
-lanes!(
-    /// One sample.
-    F64x1,
-    1,
-    8
-);
-lanes!(
-    /// Four samples: one AVX2 register, two NEON registers.
-    F64x4,
-    4,
-    32
-);
-lanes!(
-    /// Eight samples: one AVX-512 register.
-    F64x8,
-    8,
-    64
-);
+impl<R: Copy, B> Clone for Wide<R, B> {
+    #[inline(always)]
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<R: Copy, B> Copy for Wide<R, B> {}
+
+impl<R: core::fmt::Debug, B> core::fmt::Debug for Wide<R, B> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl<R: Register, B> Add for Wide<R, B> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self::of(self.0.add(other.0))
+    }
+}
+impl<R: Register, B> Sub for Wide<R, B> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self::of(self.0.sub(other.0))
+    }
+}
+impl<R: Register, B> Mul for Wide<R, B> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self::of(self.0.mul(other.0))
+    }
+}
+impl<R: Register, B> Neg for Wide<R, B> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self::of(self.0.xor(R::splat(-0.0)))
+    }
+}
+impl<R: Register, B> AddAssign for Wide<R, B> {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+impl<R: Register, B> SubAssign for Wide<R, B> {
+    #[inline(always)]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}
+
+impl<R: Register, B: Register> Scalar for Wide<R, B> {
+    const ZERO: Self = Self::of(R::ZERO);
+    const ONE: Self = Self::of(R::ONE);
+
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        Self::of(R::splat(value))
+    }
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, addend: Self) -> Self {
+        Self::of(self.0.mul_add(factor.0, addend.0))
+    }
+
+    #[inline(always)]
+    fn neg_mul_add(self, factor: Self, addend: Self) -> Self {
+        Self::of(self.0.neg_mul_add(factor.0, addend.0))
+    }
+
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        let (sin, cos) = sin_cos(self.0);
+        (Self::of(sin), Self::of(cos))
+    }
+
+    #[inline(always)]
+    fn sin_cos_all(angles: &[Self], sines: &mut [Self], cosines: &mut [Self]) {
+        // A bundle takes several angles at once; where it holds one, this is the plain loop.
+        let count = angles.len().min(sines.len()).min(cosines.len());
+        let mut start = 0;
+        while start < count {
+            let end = (start + Self::PER_BUNDLE).min(count);
+            let mut packed = [0.0; 8];
+            for (k, angle) in angles[start..end].iter().enumerate() {
+                angle.store(&mut packed[k * R::LANES..]);
+            }
+            let (mut sine, mut cosine) = ([0.0; 8], [0.0; 8]);
+            let (s, c) = sin_cos(B::load(&packed));
+            s.store(&mut sine);
+            c.store(&mut cosine);
+            for k in 0..end - start {
+                sines[start + k] = Self::load(&sine[k * R::LANES..]);
+                cosines[start + k] = Self::load(&cosine[k * R::LANES..]);
+            }
+            start = end;
+        }
+    }
+
+    #[inline(always)]
+    fn recip(self) -> Self {
+        Self::of(R::ONE.div(self.0))
+    }
+}
+
+impl<R: Register, B: Register> Lane for Wide<R, B> {
+    const LANES: usize = R::LANES;
+    type Bundle = Wide<B>;
+
+    #[inline(always)]
+    fn load(values: &[f64]) -> Self {
+        Self::of(R::load(values))
+    }
+
+    #[inline(always)]
+    fn store(self, out: &mut [f64]) {
+        self.0.store(out);
+    }
+
+    #[inline(always)]
+    fn bundle(self) -> Wide<B> {
+        if R::LANES == 1 {
+            Wide::of(B::splat(self.0.first()))
+        } else {
+            let mut lanes = [0.0; 8];
+            self.0.store(&mut lanes);
+            Wide::of(B::load(&lanes))
+        }
+    }
+
+    #[inline(always)]
+    fn add_at(self, bundle: &mut Wide<B>, index: usize) {
+        if R::LANES == 1 {
+            bundle.0 = B::splat(self.0.first()).mul_add(B::load(&UNIT[index]), bundle.0);
+        } else {
+            assert_eq!(index, 0);
+            *bundle += self.bundle();
+        }
+    }
+}
+
+/// Row `k` has a one at place `k`. A product with it places a value without a detour over memory.
+const UNIT: [[f64; 8]; 8] = {
+    let mut rows = [[0.0; 8]; 8];
+    let mut k = 0;
+    while k < 8 {
+        rows[k][k] = 1.0;
+        k += 1;
+    }
+    rows
+};

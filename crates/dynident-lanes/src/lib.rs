@@ -2,20 +2,28 @@
 //! implement it, and the run-time choice between them.
 //!
 //! Every algorithm of the dynamics core is written once over [`Scalar`] and runs
-//! * on one sample ([`F64x1`]),
-//! * on four or eight samples side by side ([`F64x4`], [`F64x8`]: AVX2, AVX-512, NEON, chosen by [`dispatch`] at run time,
-//!   so that one portable binary is fast everywhere),
+//! * on one sample ([`dispatch_single`]),
+//! * on four or eight samples side by side ([`dispatch()`]: AVX2, AVX-512 or the build target's own instructions, chosen at run time, so that
+//!   one portable binary is fast everywhere),
 //! * on dual numbers ([`Dual`]: exact derivatives, and the oracle for hand-written ones).
 //!
-//! This is the only crate of the core that contains `unsafe`, in one place: [`dispatch`](mod@dispatch).
+//! This is the only crate of the core that contains `unsafe`, in one file: `x86.rs`.
 
+#![deny(unsafe_code)]
+
+mod aligned;
 mod dispatch;
 mod dual;
 mod lanes;
+mod portable;
+mod register;
 mod scalar;
 mod sin_cos;
+#[cfg(target_arch = "x86_64")]
+mod x86;
 
+pub use aligned::AlignedBuffer;
 pub use dispatch::{Kernel, Level, dispatch, dispatch_single};
 pub use dual::Dual;
-pub use lanes::{F64x1, F64x4, F64x8, Lane};
+pub use lanes::Lane;
 pub use scalar::Scalar;

@@ -39,6 +39,14 @@ pub trait Scalar:
     /// `1 / self`.
     fn recip(self) -> Self;
 
+    /// [`sin_cos`](Scalar::sin_cos) of every angle; the shorter of the three slices ends it.
+    #[inline(always)]
+    fn sin_cos_all(angles: &[Self], sines: &mut [Self], cosines: &mut [Self]) {
+        for ((angle, sine), cosine) in angles.iter().zip(sines).zip(cosines) {
+            (*sine, *cosine) = angle.sin_cos();
+        }
+    }
+
     /// `addend - self * factor`.
     #[inline(always)]
     fn neg_mul_add(self, factor: Self, addend: Self) -> Self {

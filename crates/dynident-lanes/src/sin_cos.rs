@@ -4,6 +4,8 @@
 //! that the standard mathematical libraries use (fdlibm's `__kernel_sin`, `__kernel_cos`: degrees 13 and 14, error below 2^-58).
 //! Branch-free but for the rare angle beyond [`LARGEST_ANGLE`], where the standard library takes over.
 
+use crate::register::Register;
+
 /// Beyond this the three-part reduction loses digits: `n` has to stay exact against 33-bit parts of π/2.
 const LARGEST_ANGLE: f64 = 1.0e5;
 
@@ -32,54 +34,59 @@ const COS: [f64; 6] = [
     -1.135_964_755_778_819_5e-11,
 ];
 
+/// Sine and cosine of every lane, angles in radians.
 #[inline(always)]
-fn mul_add<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
-    if FUSED { a.mul_add(b, c) } else { a * b + c }
+pub(crate) fn sin_cos<R: Register>(angle: R) -> (R, R) {
+    let rounded = angle.mul_add(R::splat(TWO_OVER_PI), R::splat(ROUND));
+    let n = rounded.sub(R::splat(ROUND));
+    let x = n.neg_mul_add(R::splat(HALF_PI_1), angle);
+    let x = n.neg_mul_add(R::splat(HALF_PI_2), x);
+    let x = n.neg_mul_add(R::splat(HALF_PI_3), x);
+    let z = x.mul(x);
+    let (mut s, mut c) = (R::splat(SIN[5]), R::splat(COS[5]));
+    for k in (0..5).rev() {
+        s = s.mul_add(z, R::splat(SIN[k]));
+        c = c.mul_add(z, R::splat(COS[k]));
+    }
+    let s = s.mul_add(z.mul(x), x);
+    let c = z.mul(z).mul_add(c, z.mul_add(R::splat(-0.5), R::ONE));
+    // Odd quadrants swap sine and cosine; the signs follow from the quadrant's two low bits.
+    let swap = s.xor(c).and(rounded.lowest_bit_mask());
+    let sign = R::splat(-0.0);
+    let sine = s.xor(swap).xor(half_turn(rounded).and(sign));
+    let cosine = c.xor(swap).xor(half_turn(rounded.bits_plus(1)).and(sign));
+    if angle.all_within(LARGEST_ANGLE) { (sine, cosine) } else { by_standard_library(angle) }
 }
 
-/// Sine and cosine of `N` angles in radians.
+/// The second lowest bit, moved to the sign's place (with the lowest bit below it, for the caller to mask).
 #[inline(always)]
-pub(crate) fn sin_cos_lanes<const N: usize, const FUSED: bool>(angle: [f64; N]) -> ([f64; N], [f64; N]) {
-    let (mut sin, mut cos) = ([0.0; N], [0.0; N]);
-    let mut all_small = true;
-    for i in 0..N {
-        all_small &= angle[i].abs() <= LARGEST_ANGLE;
+fn half_turn<R: Register>(bits: R) -> R {
+    bits.bits_shifted_by_62()
+}
+
+#[cold]
+fn by_standard_library<R: Register>(angle: R) -> (R, R) {
+    let (mut sine, mut cosine) = ([0.0; 8], [0.0; 8]);
+    angle.store(&mut sine);
+    for k in 0..R::LANES {
+        (sine[k], cosine[k]) = sine[k].sin_cos();
     }
-    for i in 0..N {
-        let rounded = mul_add::<FUSED>(angle[i], TWO_OVER_PI, ROUND);
-        let n = rounded - ROUND;
-        let bits = rounded.to_bits();
-        let x = mul_add::<FUSED>(-n, HALF_PI_1, angle[i]);
-        let x = mul_add::<FUSED>(-n, HALF_PI_2, x);
-        let x = mul_add::<FUSED>(-n, HALF_PI_3, x);
-        let z = x * x;
-        let mut s = SIN[5];
-        let mut c = COS[5];
-        for k in (0..5).rev() {
-            s = mul_add::<FUSED>(s, z, SIN[k]);
-            c = mul_add::<FUSED>(c, z, COS[k]);
-        }
-        let s = mul_add::<FUSED>(s, z * x, x);
-        let c = mul_add::<FUSED>(z * z, c, mul_add::<FUSED>(z, -0.5, 1.0));
-        // Odd quadrants swap sine and cosine; the signs follow from the quadrant's two low bits.
-        let odd = 0_u64.wrapping_sub(bits & 1);
-        let (s, c) = (s.to_bits(), c.to_bits());
-        let sine = (s & !odd) | (c & odd);
-        let cosine = (c & !odd) | (s & odd);
-        sin[i] = f64::from_bits(sine ^ ((bits & 2) << 62));
-        cos[i] = f64::from_bits(cosine ^ ((bits.wrapping_add(1) & 2) << 62));
-    }
-    if !all_small {
-        for i in 0..N {
-            (sin[i], cos[i]) = angle[i].sin_cos();
-        }
-    }
-    (sin, cos)
+    (R::load(&sine), R::load(&cosine))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::sin_cos_lanes;
+    use super::sin_cos;
+    use crate::portable::Portable;
+    use crate::register::Register;
+
+    fn sin_cos_lanes<const N: usize, const FUSED: bool>(angles: [f64; N]) -> ([f64; N], [f64; N]) {
+        let (s, c) = sin_cos(Portable::<N, FUSED>::load(&angles));
+        let (mut sine, mut cosine) = ([0.0; N], [0.0; N]);
+        s.store(&mut sine);
+        c.store(&mut cosine);
+        (sine, cosine)
+    }
 
     #[test]
     fn agrees_with_the_standard_library() {

@@ -73,7 +73,61 @@ pub struct Joint {
     pub mimic: Option<Mimic>,
 }
 
+/// The numbers of one joint in the form that algorithms use: `parent_from_child` of a turning joint is
+/// `R(q) = constant + cosine · cos q + sine · sin q` with a fixed translation; of a sliding joint `R = constant` and
+/// `translation + slide · q`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointMap {
+    /// Index of the parent body, or `None` for the base.
+    pub parent: Option<usize>,
+    /// True for revolute and continuous joints.
+    pub turns: bool,
+    /// Unit axis in the child frame.
+    pub axis: Vec3,
+    /// The part of the rotation that does not change with `q`.
+    pub constant: Mat3,
+    /// The part in proportion to `cos q` (zero for a sliding joint).
+    pub cosine: Mat3,
+    /// The part in proportion to `sin q` (zero for a sliding joint).
+    pub sine: Mat3,
+    /// Translation at `q = 0`, in metres.
+    pub translation: Vec3,
+    /// Axis in the parent frame for a sliding joint, zero for a turning one.
+    pub slide: Vec3,
+}
+
 impl Joint {
+    /// The joint's numbers, prepared for the algorithms.
+    pub fn map(&self) -> JointMap {
+        let placement = &self.placement.rotation;
+        let (parent, axis, translation) = (self.parent, self.axis, self.placement.translation);
+        if self.turns() {
+            // Rodrigues: R(q) = P (a aᵀ + cos q (1 - a aᵀ) + sin q [a]×).
+            let constant = placement.mul_mat(&Mat3::outer(axis, axis));
+            JointMap {
+                parent,
+                turns: true,
+                axis,
+                constant,
+                cosine: *placement - constant,
+                sine: placement.mul_mat(&Mat3::skew(axis)),
+                translation,
+                slide: Vec3::ZERO,
+            }
+        } else {
+            JointMap {
+                parent,
+                turns: false,
+                axis,
+                constant: *placement,
+                cosine: Mat3::ZERO,
+                sine: Mat3::ZERO,
+                translation,
+                slide: placement.mul_vec(axis),
+            }
+        }
+    }
+
     /// `parent_from_child` at position `q` (rad or m).
     pub fn transform(&self, q: f64) -> Transform {
         match self.kind {

@@ -72,7 +72,7 @@ impl Vec3<f64> {
     /// The same vector as constants of another scalar.
     #[inline(always)]
     pub fn splat<T: Scalar>(self) -> Vec3<T> {
-        Vec3(self.0.map(T::splat))
+        Vec3([T::splat(self.0[0]), T::splat(self.0[1]), T::splat(self.0[2])])
     }
 }
 
@@ -117,6 +117,18 @@ impl<T> IndexMut<usize> for Vec3<T> {
     }
 }
 
+/// All nine entries written out: the compiler keeps them in registers, which it does not with `array::from_fn` on wide lanes.
+macro_rules! by_entry {
+    ($entry:expr) => {{
+        let entry = $entry;
+        [
+            [entry(0, 0), entry(0, 1), entry(0, 2)],
+            [entry(1, 0), entry(1, 1), entry(1, 2)],
+            [entry(2, 0), entry(2, 1), entry(2, 2)],
+        ]
+    }};
+}
+
 /// A 3 × 3 matrix, by rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mat3<T = f64>(pub [[T; 3]; 3]);
@@ -140,9 +152,8 @@ impl<T: Scalar> Mat3<T> {
     #[inline(always)]
     pub fn mul_vec_add(&self, v: Vec3<T>, addend: Vec3<T>) -> Vec3<T> {
         let m = &self.0;
-        Vec3(core::array::from_fn(|i| {
-            m[i][2].mul_add(v.0[2], m[i][1].mul_add(v.0[1], m[i][0].mul_add(v.0[0], addend.0[i])))
-        }))
+        let entry = |i: usize| m[i][2].mul_add(v.0[2], m[i][1].mul_add(v.0[1], m[i][0].mul_add(v.0[0], addend.0[i])));
+        Vec3([entry(0), entry(1), entry(2)])
     }
 
     /// `Mᵀ v`.
@@ -156,16 +167,15 @@ impl<T: Scalar> Mat3<T> {
     #[inline(always)]
     pub fn mul_mat(&self, other: &Self) -> Self {
         let (a, b) = (&self.0, &other.0);
-        Self(core::array::from_fn(|i| {
-            core::array::from_fn(|j| a[i][2].mul_add(b[2][j], a[i][1].mul_add(b[1][j], a[i][0] * b[0][j])))
-        }))
+        let entry = |i: usize, j: usize| a[i][2].mul_add(b[2][j], a[i][1].mul_add(b[1][j], a[i][0] * b[0][j]));
+        Self(by_entry!(entry))
     }
 
     /// `Mᵀ`.
     #[inline(always)]
     pub fn transpose(&self) -> Self {
         let m = &self.0;
-        Self(core::array::from_fn(|i| core::array::from_fn(|j| m[j][i])))
+        Self(by_entry!(|i: usize, j: usize| m[j][i]))
     }
 
     /// `[v]×`, the matrix with `[v]× w = v × w`.
@@ -178,13 +188,13 @@ impl<T: Scalar> Mat3<T> {
     /// `v wᵀ`.
     #[inline(always)]
     pub fn outer(v: Vec3<T>, w: Vec3<T>) -> Self {
-        Self(core::array::from_fn(|i| core::array::from_fn(|j| v.0[i] * w.0[j])))
+        Self(by_entry!(|i: usize, j: usize| v.0[i] * w.0[j]))
     }
 
     /// `M · factor`.
     #[inline(always)]
     pub fn scale(&self, factor: T) -> Self {
-        Self(core::array::from_fn(|i| core::array::from_fn(|j| self.0[i][j] * factor)))
+        Self(by_entry!(|i: usize, j: usize| self.0[i][j] * factor))
     }
 }
 
@@ -192,14 +202,14 @@ impl<T: Scalar> Add for Mat3<T> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        Self(core::array::from_fn(|i| core::array::from_fn(|j| self.0[i][j] + other.0[i][j])))
+        Self(by_entry!(|i: usize, j: usize| self.0[i][j] + other.0[i][j]))
     }
 }
 impl<T: Scalar> Sub for Mat3<T> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        Self(core::array::from_fn(|i| core::array::from_fn(|j| self.0[i][j] - other.0[i][j])))
+        Self(by_entry!(|i: usize, j: usize| self.0[i][j] - other.0[i][j]))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::error::ModelError;
 use crate::inertial::InertialParameters;
-use crate::joint::Joint;
+use crate::joint::{Joint, JointMap};
 use crate::spatial::{Mat3, Transform, Vec3};
 
 /// Standard gravity of the tools of this field (Pinocchio, MuJoCo, URDF simulators), m/s², along -z of the base.
@@ -50,6 +50,7 @@ pub struct Model {
     joints: Vec<Joint>,
     bodies: Vec<Body>,
     base: Body,
+    maps: Vec<JointMap>,
     inertials: Vec<InertialParameters>,
 }
 
@@ -91,7 +92,8 @@ impl Model {
             }
         }
         let inertials = bodies.iter().map(|body| body.prior().unwrap_or(InertialParameters::ZERO)).collect();
-        Ok(Self { name: name.to_owned(), gravity: STANDARD_GRAVITY, joints, bodies, base, inertials })
+        let maps = joints.iter().map(Joint::map).collect();
+        Ok(Self { name: name.to_owned(), gravity: STANDARD_GRAVITY, joints, bodies, base, maps, inertials })
     }
 
     /// The machine's name.
@@ -107,6 +109,11 @@ impl Model {
     /// The joints, parents first.
     pub fn joints(&self) -> &[Joint] {
         &self.joints
+    }
+
+    /// The joints' numbers, prepared for the algorithms; same order as [`joints`](Model::joints).
+    pub fn maps(&self) -> &[JointMap] {
+        &self.maps
     }
 
     /// The moving bodies; body `i` moves with joint `i`.

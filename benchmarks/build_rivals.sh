@@ -1,0 +1,33 @@
+#!/bin/sh
+# build_rivals.sh VENV OUT: compiles the C++ and C rivals into OUT, what is already there stays (2 to 4 minutes and 1 to 2 GB
+# for each Pinocchio build). VENV holds the wheels of benchmarks/requirements.txt; Eigen headers: libeigen3-dev, or EIGEN=folder.
+#   native  Pinocchio header-only, -O3 -march=native
+#   base    the same without -march (SSE2)
+#   wheel   against the wheel's own compiled templates: what a C++ user of the wheel gets
+set -eu
+venv=$1 out=$2 here=$(cd "$(dirname "$0")" && pwd)
+eigen=${EIGEN:-/usr/include/eigen3}
+site=$(echo "$venv"/lib/python3*/site-packages)
+prefix=$site/cmeel.prefix mujoco=$site/mujoco
+[ -d "$prefix" ] || { echo "$venv: no Pinocchio wheel; run: $venv/bin/pip install -r $here/requirements.txt" >&2; exit 1; }
+[ -d "$eigen/Eigen" ] || { echo "$eigen: no Eigen headers; install libeigen3-dev or set EIGEN" >&2; exit 1; }
+mkdir -p "$out"
+"$venv/bin/python" "$here/dump_model.py" "$out"
+define="-DNDEBUG -std=c++17 -w -DBOOST_MPL_LIMIT_LIST_SIZE=30 -DBOOST_MPL_LIMIT_VECTOR_SIZE=30 \
+  -DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS -DBOOST_FUSION_INVOKE_MAX_ARITY=12"
+
+# Compiles under a second name first: a build that was cut short leaves no program behind.
+pinocchio() {
+  name=$1; shift
+  [ -x "$out/bench_$name" ] && return
+  echo "compiling Pinocchio, $name" >&2
+  # shellcheck disable=SC2086  # the defines are several words on purpose
+  g++ -O3 $define -I"$prefix/include" -I"$eigen" "$here/bench_pinocchio.cpp" -o "$out/bench_$name.part" "$@"
+  mv "$out/bench_$name.part" "$out/bench_$name"
+}
+pinocchio native -march=native
+pinocchio base
+# The wheel was compiled without -march: Eigen must align to 16 bytes on both sides.
+pinocchio wheel -DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION -L"$prefix/lib" -lpinocchio_default "-Wl,-rpath,$prefix/lib"
+gcc -O3 -march=native -I"$mujoco/include" "$here/bench_mujoco.c" -o "$out/bench_mujoco" "$mujoco"/libmujoco.so.* \
+  "-Wl,-rpath,$mujoco" -lm

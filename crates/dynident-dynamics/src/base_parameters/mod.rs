@@ -1,0 +1,111 @@
+//! Base parameters: the combinations of parameters that joint torques can tell apart.
+//!
+//! One choice for one machine: the columns of the regressor from base to tip in the order of [`all_columns`](crate::all_columns); a column
+//! that depends on earlier ones is regrouped into them (Gautier and Khalil 1990; Gautier 1991). The dependencies come from the machine's
+//! structure ([`structural`]); the rank of regressors at random states ([`numerical_rank`]) is the cross-check.
+
+mod expression;
+mod numerical;
+mod structural;
+
+pub use numerical::{NumericalRank, numerical_rank};
+
+use crate::independent_columns::{IndependentColumns, independent_columns};
+use crate::regressor_panels::{Column, all_columns};
+use dynident_model::Model;
+use dynident_model::laws::Law;
+use nalgebra::DMatrix;
+
+/// How finely dependence is told from independence.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BaseParameterSettings {
+    /// A direction counts as dependent below this share of its size. The default, 2e-5, lies above what rounded angles of a description do
+    /// (`1.5708` for π/2 leaves 4e-6) and below what an offset of a tenth of a millimetre does (1e-4).
+    pub tolerance: f64,
+}
+
+impl Default for BaseParameterSettings {
+    fn default() -> Self {
+        Self { tolerance: 2e-5 }
+    }
+}
+
+/// The base parameters of a machine with its laws.
+#[derive(Clone, Debug)]
+pub struct BaseParameters {
+    columns: Vec<Column>,
+    split: IndependentColumns,
+}
+
+impl BaseParameters {
+    /// Base parameters from the machine's structure: no data, no random numbers.
+    pub fn new(model: &Model, laws: &[Law], settings: &BaseParameterSettings) -> Self {
+        let columns = all_columns(model, laws);
+        let conditions = structural::identifiable_directions(model, laws, settings.tolerance);
+        let split = independent_columns(&conditions, settings.tolerance);
+        Self { columns, split }
+    }
+
+    /// Number of base parameters.
+    pub fn count(&self) -> usize {
+        self.split.independent.len()
+    }
+
+    /// All columns of the regressor, base or not, in global order.
+    pub fn all_columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// Global indices of the base columns, ascending.
+    pub fn independent(&self) -> &[usize] {
+        &self.split.independent
+    }
+
+    /// Global indices of the regrouped (or unidentifiable) columns, ascending.
+    pub fn dependent(&self) -> &[usize] {
+        &self.split.dependent
+    }
+
+    /// `K` of `W[dependent] = W[independent] K`, so that `θ = π[independent] + K π[dependent]`. Shape (independent, dependent).
+    pub fn regrouping(&self) -> &DMatrix<f64> {
+        &self.split.regrouping
+    }
+
+    /// The base columns themselves: what a [`PanelLayout`](crate::PanelLayout) needs for a full-rank regressor.
+    pub fn base_columns(&self) -> Vec<Column> {
+        self.split.independent.iter().map(|&index| self.columns[index].clone()).collect()
+    }
+
+    /// Values of the base parameters for values of all parameters: `θ = π[independent] + K π[dependent]`.
+    ///
+    /// # Panics
+    /// If `parameters` has not one value per column.
+    pub fn values(&self, parameters: &[f64]) -> Vec<f64> {
+        assert_eq!(parameters.len(), self.columns.len(), "one value per column");
+        let mut values: Vec<f64> = self.split.independent.iter().map(|&index| parameters[index]).collect();
+        for (d, &column) in self.split.dependent.iter().enumerate() {
+            for (b, value) in values.iter_mut().enumerate() {
+                *value += self.split.regrouping[(b, d)] * parameters[column];
+            }
+        }
+        values
+    }
+
+    /// The parameters that no motion can tell: they stand in no base parameter.
+    pub fn unidentifiable(&self) -> Vec<usize> {
+        let k = &self.split.regrouping;
+        let dependent = self.split.dependent.iter().enumerate();
+        dependent.filter(|(d, _)| k.column(*d).amax() < expression::NEGLIGIBLE).map(|(_, &column)| column).collect()
+    }
+
+    /// Readable sums, one per base parameter: `Izz1 + 0.49 m2`.
+    pub fn expressions(&self) -> Vec<String> {
+        expression::expressions(&self.columns, &self.split)
+    }
+
+    /// How clear the split was: the smallest share that still counted as independent, and the largest that counted as dependent. A wide gap
+    /// means that no tolerance in between would change the choice.
+    pub fn gap(&self) -> (f64, f64) {
+        (self.split.weakest_independent, self.split.strongest_dependent)
+    }
+}

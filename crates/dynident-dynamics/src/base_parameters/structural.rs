@@ -1,0 +1,269 @@
+//! Which parameters a machine's torques depend on, from its structure alone.
+//!
+//! Torques vanish for all motions exactly when every entry `M_jk(q)` of the mass matrix and every gravity torque vanishes for all `q` (velocity torques follow from the mass
+//! matrix). With `C_j(q)` the composite inertia that hangs on joint `j` and `w` a twist at its frame,
+//! `M_jk = Φ_jᵀ C_j w` for `w = X Φ_k`, and the gravity torque is the same with `w = X a_g`. Both are linear in the parameters. Three facts make this finite:
+//!
+//! 1. The twists `w` that can arrive at a joint span a space that one outward recursion builds: each joint turns it by
+//!    `X(q) = X_0 + X_1 cos q + X_2 sin q` (sliding: `X_0 + X_1 q`), and `cos`, `sin` and 1 are independent functions.
+//! 2. Ten parameters move from a child's frame to its parent's by a 10 × 10 matrix `T(q)` with harmonics up to `2 q` (sliding: up to `q²`). A condition on a composite splits into one on the
+//!    constant part, shared with everything outward, and one for every other harmonic, on the child alone.
+//! 3. So each body has a small space of functionals of its ten composite parameters, and each functional is one row of conditions on all parameters.
+//!
+//! The rows span what is identifiable. The idea of following such spaces outward is that of Wensing, Niemeyer and Slotine, *A geometric characterization of observability in
+//! inertial parameter identification* (2024); drive inertias, couplings and offsets join as constants in single entries.
+
+use crate::inverse_dynamics::inertial_wrench;
+use dynident_model::laws::{Coulomb, Coupling, CouplingEffect, Law};
+use dynident_model::{InertialParameters, Joint, Model, Transform, Vec3};
+use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, SVector};
+
+type Matrix10 = SMatrix<f64, 10, 10>;
+type Vector10 = SVector<f64, 10>;
+
+/// A matrix of independent rows over all columns (bodies, then laws) whose row space is what torques depend on.
+pub(super) fn identifiable_directions(model: &Model, laws: &[Law], tolerance: f64) -> DMatrix<f64> {
+    let (dof, columns) = (model.dof(), 10 * model.dof() + laws.len());
+    let mut rows: Vec<DVector<f64>> = Vec::new();
+    let mut twists: Vec<Vec<Arriving>> = Vec::with_capacity(dof);
+    let mut functionals: Vec<Vec<Vector10>> = Vec::with_capacity(dof);
+    let mut moves: Vec<Harmonics> = Vec::with_capacity(dof);
+    for (j, joint) in model.joints().iter().enumerate() {
+        let motion = Harmonics::of(joint);
+        let arriving = arriving_twists(model, j, joint, &motion, joint.parent.map(|p| &twists[p][..]), tolerance);
+        // Conditions on this body's composite by its own joint, with the constants of the laws beside them.
+        let own = arriving.iter().map(|w| (power(model, j, w), law_constants(laws, j, w, dof)));
+        // Conditions that come from further in: all but the constant harmonic bind this composite alone.
+        let inherited: &[Vector10] = joint.parent.map_or(&[], |p| &functionals[p]);
+        let through = inherited
+            .iter()
+            .flat_map(|f| motion.inertia[1..].iter().map(move |t| (t.transpose() * f, DVector::zeros(laws.len()))));
+        let stacked: Vec<DVector<f64>> = own
+            .chain(through)
+            .map(|(f, constants)| DVector::from_iterator(10 + laws.len(), f.iter().chain(constants.iter()).copied()))
+            .collect();
+        let bound = basis(&stacked, tolerance);
+        let carried = inherited.iter().map(|f| motion.inertia[0].transpose() * f);
+        let here = bound.iter().map(|v| Vector10::from_iterator(v.iter().copied().take(10)));
+        let all: Vec<DVector<f64>> = here.chain(carried).map(|f| DVector::from_column_slice(f.as_slice())).collect();
+        functionals.push(basis(&all, tolerance).iter().map(|v| Vector10::from_column_slice(v.as_slice())).collect());
+        twists.push(arriving);
+        moves.push(motion);
+        rows.extend(bound.iter().map(|v| scalar_condition(model, &moves, j, v, columns)));
+    }
+    // Outward bodies were not known yet when a row was made: carry each row's constant part on.
+    for (j, joint) in model.joints().iter().enumerate() {
+        let Some(parent) = joint.parent else { continue };
+        let constant = moves[j].inertia[0].transpose();
+        for row in &mut rows {
+            let outward = constant * Vector10::from_column_slice(&row.as_slice()[10 * parent..10 * parent + 10]);
+            // Rows made at this body or outward of it have nothing at the parent, so nothing is counted twice.
+            for k in 0..10 {
+                row[10 * j + k] += outward[k];
+            }
+        }
+    }
+    rows.extend(friction_conditions(laws, dof, columns));
+    if rows.is_empty() { DMatrix::zeros(0, columns) } else { DMatrix::from_columns(&rows).transpose() }
+}
+
+/// The row of one functional of body `j`'s composite before its outward part is added.
+fn scalar_condition(model: &Model, moves: &[Harmonics], j: usize, v: &DVector<f64>, columns: usize) -> DVector<f64> {
+    debug_assert!(moves.len() > j);
+    let mut row = DVector::zeros(columns);
+    row.rows_mut(10 * j, 10).copy_from(&v.rows(0, 10));
+    let laws = v.len() - 10;
+    row.rows_mut(10 * model.dof(), laws).copy_from(&v.rows(10, laws));
+    row
+}
+
+/// A twist that can arrive at a joint, and as which joint's axis (or as gravity, last) its constant part counts.
+struct Arriving {
+    twist: nalgebra::Vector6<f64>,
+    source: DVector<f64>,
+}
+
+/// What one joint does to twists and to inertial parameters, harmonic by harmonic; the constant one first.
+struct Harmonics {
+    twist: Vec<Matrix6<f64>>,
+    inertia: Vec<Matrix10>,
+}
+
+impl Harmonics {
+    fn of(joint: &Joint) -> Self {
+        if joint.turns() {
+            // Five equidistant angles resolve the harmonics 1, cos, sin, cos 2q, sin 2q exactly.
+            let angles: [f64; 5] = core::array::from_fn(|k| core::f64::consts::TAU * k as f64 / 5.0);
+            let twists = angles.map(|q| twist_to_child(&joint.transform(q)));
+            let inertias = angles.map(|q| inertia_to_parent(&joint.transform(q)));
+            let weight = |k: usize, harmonic: usize| {
+                let phase = angles[k] * harmonic.div_ceil(2) as f64;
+                match harmonic {
+                    0 => 0.2,
+                    _ if harmonic % 2 == 1 => 0.4 * phase.cos(),
+                    _ => 0.4 * phase.sin(),
+                }
+            };
+            Self {
+                twist: (0..3).map(|h| (0..5).map(|k| twists[k] * weight(k, h)).sum()).collect(),
+                inertia: (0..5).map(|h| (0..5).map(|k| inertias[k] * weight(k, h)).sum()).collect(),
+            }
+        } else {
+            let [back, rest, forth] = [-1.0, 0.0, 1.0].map(|q| joint.transform(q));
+            let (b, r, f) = (inertia_to_parent(&back), inertia_to_parent(&rest), inertia_to_parent(&forth));
+            Self {
+                twist: vec![twist_to_child(&rest), (twist_to_child(&forth) - twist_to_child(&back)) * 0.5],
+                inertia: vec![r, (f - b) * 0.5, (f + b) * 0.5 - r],
+            }
+        }
+    }
+}
+
+/// 6 × 6 matrix that takes a twist (angular, linear at the origin) from the parent's frame to the child's.
+fn twist_to_child(parent_from_child: &Transform) -> Matrix6<f64> {
+    let Transform { rotation, translation } = parent_from_child;
+    let mut matrix = Matrix6::zeros();
+    for k in 0..6 {
+        let unit = |offset: usize| Vec3(core::array::from_fn(|i| f64::from(i + offset == k)));
+        let (angular, linear) = (unit(0), unit(3));
+        let a = rotation.transpose_mul_vec(angular);
+        let l = rotation.transpose_mul_vec(linear + angular.cross(*translation));
+        matrix.column_mut(k).copy_from_slice(&[a[0], a[1], a[2], l[0], l[1], l[2]]);
+    }
+    matrix
+}
+
+/// 10 × 10 matrix that takes inertial parameters from the child's frame to the parent's.
+fn inertia_to_parent(parent_from_child: &Transform) -> Matrix10 {
+    Matrix10::from_columns(&core::array::from_fn::<_, 10, _>(|k| {
+        let unit = InertialParameters(core::array::from_fn(|i| f64::from(i == k)));
+        Vector10::from(unit.expressed_in(parent_from_child).0)
+    }))
+}
+
+/// A spanning set of the twists that arrive at joint `j`.
+fn arriving_twists(
+    model: &Model,
+    j: usize,
+    joint: &Joint,
+    motion: &Harmonics,
+    parent: Option<&[Arriving]>,
+    tolerance: f64,
+) -> Vec<Arriving> {
+    let dof = model.dof();
+    let mut stacked = Vec::new();
+    let mut push = |twist: &nalgebra::Vector6<f64>, source: DVector<f64>| {
+        stacked.push(DVector::from_iterator(7 + dof, twist.iter().copied().chain(source.iter().copied())));
+    };
+    let axis = joint.axis;
+    let own = if joint.turns() {
+        [axis[0], axis[1], axis[2], 0.0, 0.0, 0.0]
+    } else {
+        [0.0, 0.0, 0.0, axis[0], axis[1], axis[2]]
+    };
+    let mark = |place: usize| DVector::from_fn(dof + 1, |i, _| f64::from(i == place));
+    push(&own.into(), mark(j));
+    let gravity = model.gravity();
+    // In units of about one, as the axes are.
+    let size = gravity.norm().max(f64::MIN_POSITIVE);
+    let at_base = [Arriving {
+        twist: [0.0, 0.0, 0.0, -gravity[0] / size, -gravity[1] / size, -gravity[2] / size].into(),
+        source: mark(dof) / size,
+    }];
+    let from: &[Arriving] = match parent {
+        Some(parent) => parent,
+        None if gravity.norm() > 0.0 => &at_base,
+        None => &[],
+    };
+    for w in from {
+        push(&(motion.twist[0] * w.twist), w.source.clone());
+        for matrix in &motion.twist[1..] {
+            push(&(matrix * w.twist), DVector::zeros(dof + 1));
+        }
+    }
+    basis(&stacked, tolerance)
+        .iter()
+        .map(|v| Arriving {
+            twist: nalgebra::Vector6::from_column_slice(&v.as_slice()[..6]),
+            source: v.rows(6, dof + 1).into_owned(),
+        })
+        .collect()
+}
+
+/// `Φ_jᵀ I(π) w` as a functional of the ten parameters.
+fn power(model: &Model, j: usize, w: &Arriving) -> Vector10 {
+    let joint = &model.joints()[j];
+    let (alpha, acceleration) =
+        (Vec3([w.twist[0], w.twist[1], w.twist[2]]), Vec3([w.twist[3], w.twist[4], w.twist[5]]));
+    Vector10::from_fn(|k, _| {
+        let unit = InertialParameters(core::array::from_fn(|i| f64::from(i == k)));
+        let (force, moment) = inertial_wrench(&unit, Vec3::ZERO, alpha, acceleration);
+        joint.axis.dot(if joint.turns() { moment } else { force })
+    })
+}
+
+/// What the laws add to the entry of joint `j` that `w` stands for.
+fn law_constants(laws: &[Law], j: usize, w: &Arriving, dof: usize) -> DVector<f64> {
+    DVector::from_fn(laws.len(), |x, _| {
+        let inertia: f64 = (0..dof).map(|k| w.source[k] * laws[x].mass_matrix_entry(j, k)).sum();
+        inertia + w.source[dof] * laws[x].constant_torque(j)
+    })
+}
+
+/// Friction depends on speeds alone, so it mixes with nothing above. Each distinct function of speed in each joint's row is one condition; laws that say the same
+/// twice share it.
+fn friction_conditions(laws: &[Law], dof: usize, columns: usize) -> Vec<DVector<f64>> {
+    let mut functions: Vec<(String, DVector<f64>)> = Vec::new();
+    for (x, law) in laws.iter().enumerate() {
+        for (function, factor) in friction_functions(law) {
+            let place = functions.iter().position(|(name, _)| *name == function).unwrap_or_else(|| {
+                functions.push((function, DVector::zeros(columns)));
+                functions.len() - 1
+            });
+            functions[place].1[10 * dof + x] += factor;
+        }
+    }
+    functions.into_iter().map(|(_, row)| row).collect()
+}
+
+/// The functions of speed that a law adds: (row and function, factor).
+fn friction_functions(law: &Law) -> Vec<(String, f64)> {
+    let key = |row: usize, function: &dyn core::fmt::Debug| format!("row {row}: {function:?}");
+    match law {
+        Law::Viscous(law) => vec![(key(law.joint, &law.joint), 1.0)],
+        Law::Coulomb(Coulomb { joint, shape }) => vec![(key(*joint, &(joint, shape)), 1.0)],
+        Law::Coupling(Coupling { effect: CouplingEffect::Viscous, first, second, ratios, .. }) => {
+            let cross = ratios[0] * ratios[1];
+            vec![(key(*first, second), cross), (key(*second, first), cross)]
+        }
+        Law::Coupling(Coupling { effect: CouplingEffect::Coulomb(shape), first, second, ratios, .. }) => {
+            let function = (first, second, ratios, shape);
+            vec![(key(*first, &function), ratios[0]), (key(*second, &function), ratios[1])]
+        }
+        Law::Offset(_) | Law::DriveInertia(_) | Law::Coupling(_) => Vec::new(),
+    }
+}
+
+/// An orthonormal basis of the span, without directions below `tolerance` times the longest vector: Gram and Schmidt with pivoting, each vector
+/// cleaned twice. (An SVD would do; the one at hand returned 5e-5 for an exact zero on a matrix of rank three.)
+fn basis(vectors: &[DVector<f64>], tolerance: f64) -> Vec<DVector<f64>> {
+    let mut rest = vectors.to_vec();
+    let longest = rest.iter().map(DVector::norm).fold(0.0, f64::max);
+    let mut found: Vec<DVector<f64>> = Vec::new();
+    loop {
+        // The first of the longest, so that the choice is the same everywhere.
+        let norm = rest.iter().map(DVector::norm).fold(0.0, f64::max);
+        let Some(next) = rest.iter().find(|vector| vector.norm() == norm) else { return found };
+        if norm <= tolerance * longest {
+            return found;
+        }
+        let direction = next / norm;
+        for vector in &mut rest {
+            for _ in 0..2 {
+                let share = direction.dot(vector);
+                vector.axpy(-share, &direction, 1.0);
+            }
+        }
+        found.push(direction);
+    }
+}

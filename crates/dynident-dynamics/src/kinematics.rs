@@ -1,0 +1,18 @@
+//! Forward kinematics: where every body stands.
+
+use crate::workspace::Workspace;
+use dynident_model::{Model, Transform};
+
+/// `base_from_body` of every body at position `q`: rotation, and the origin of the body's frame in metres.
+///
+/// # Panics
+/// If `q` has not one entry per joint, or the workspace was made for another size.
+pub fn body_placements<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]) -> &'w [Transform] {
+    workspace.check(model, &[q]);
+    for (index, (map, &q)) in model.maps().iter().zip(q).enumerate() {
+        let (sine, cosine) = q.sin_cos();
+        let own = crate::workspace::joint_transform(map, q, sine, cosine);
+        workspace.placements[index] = map.parent.map_or(own, |parent| workspace.placements[parent].then(&own));
+    }
+    &workspace.placements
+}

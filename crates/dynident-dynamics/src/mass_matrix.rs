@@ -1,0 +1,78 @@
+//! The joint-space mass matrix: the composite-rigid-body algorithm.
+
+use crate::composite::Composite;
+use crate::workspace::{AnyScratch, CoreScratch, Workspace, take};
+use dynident_lanes::{Kernel, Lane, Scalar, dispatch_single};
+use dynident_model::{Model, Vec3};
+
+/// The mass matrix `M(q)`, row-major, symmetric, dof × dof: `∂τ/∂q̈` of the inverse dynamics.
+///
+/// Composite-rigid-body algorithm: Walker and Orin (1982); Featherstone (2008), section 6.2. Allocation-free.
+///
+/// # Panics
+/// If `q` has not one entry per joint, or the workspace was made for another size.
+pub fn mass_matrix<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]) -> &'w [f64] {
+    workspace.check(model, &[q]);
+    let Workspace { level, scratch, matrices, .. } = workspace;
+    dispatch_single(*level, Single { model, scratch, q, out: &mut matrices[0] });
+    &matrices[0]
+}
+
+struct Single<'a> {
+    model: &'a Model,
+    scratch: &'a mut AnyScratch,
+    q: &'a [f64],
+    out: &'a mut [f64],
+}
+
+impl Kernel for Single<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<T: Lane>(self) {
+        let scratch = &mut self.scratch.of::<T>().core;
+        take(&mut scratch.q, self.q);
+        composite_rigid_bodies(self.model, scratch);
+        for (to, from) in self.out.iter_mut().zip(&scratch.matrices[0]) {
+            *to = from.lane(0);
+        }
+    }
+}
+
+/// From `q` of the scratch to its first matrix.
+#[inline(always)]
+pub(crate) fn composite_rigid_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
+    let (maps, dof) = (model.maps(), model.dof());
+    scratch.place(maps);
+    for (composite, inertial) in scratch.composites.iter_mut().zip(model.inertials()) {
+        *composite = Composite::of(inertial);
+    }
+    let matrix = &mut scratch.matrices[0];
+    // Joints on different branches do not couple; every entry along a path is written below.
+    matrix.fill(T::ZERO);
+    for index in (0..dof).rev() {
+        let map = &maps[index];
+        let axis = map.axis.splat::<T>();
+        let composite = scratch.composites[index];
+        // Force and moment that accelerate the composite along its joint's axis.
+        let (mut force, mut moment) = if map.turns {
+            (axis.cross(composite.first_moment), composite.inertia_matrix().mul_vec(axis))
+        } else {
+            (axis.scale(composite.mass), composite.first_moment.cross(axis))
+        };
+        matrix[index * dof + index] = axis.dot(if map.turns { moment } else { force });
+        let mut at = index;
+        while let Some(parent) = maps[at].parent {
+            let frame = scratch.bodies[at].parent_from_body;
+            force = frame.rotation.mul_vec(force);
+            moment = frame.rotation.mul_vec_add(moment, frame.translation.cross(force));
+            let along: Vec3<T> = maps[parent].axis.splat();
+            let entry = along.dot(if maps[parent].turns { moment } else { force });
+            matrix[index * dof + parent] = entry;
+            matrix[parent * dof + index] = entry;
+            at = parent;
+        }
+        if let Some(parent) = map.parent {
+            scratch.composites[parent].add(&composite, &scratch.bodies[index].parent_from_body);
+        }
+    }
+}

@@ -1,0 +1,222 @@
+//! The torque regressor of the bodies: joint torques as a linear function of the inertial parameters.
+//!
+//! Row `j`, block of body `i` (a body that joint `j` moves): virtual work of the body's wrench on the joint's axis,
+//! `Y_ji = e_jᵀ N_i + l_jᵀ F_i`, where `(e_j, l_j)` is the axis as a twist at the frame of body `i` and `N_i`, `F_i` (3 × 10) are moment and force
+//! of the body as functions of its ten parameters. Axes travel outward from frame to frame with the bodies (Atkeson, An and Hollerbach 1986 in
+//! the form of Featherstone's spatial vectors), so a serial arm costs one small rotation and one 6 × 10 product per pair.
+
+use crate::inverse_dynamics::outward;
+use crate::workspace::{AnyScratch, CoreScratch, Workspace, take};
+use dynident_lanes::{Kernel, Lane, dispatch_single};
+use dynident_model::{Mat3, Model, Transform, Vec3};
+
+/// The regressor `Y(q, q̇, q̈)` with `Y π = τ`, row-major, dof rows × 10·dof columns: column `10 i + k` is parameter `k` of body `i` in the order of
+/// [`INERTIAL_NAMES`](dynident_model::INERTIAL_NAMES). Nm (N) per unit of the parameter. Does not depend on the model's own inertial parameters.
+///
+/// Allocation-free.
+///
+/// # Panics
+/// If a vector's length is not the number of joints, or the workspace was made for another size.
+pub fn torque_regressor<'w>(
+    model: &Model,
+    workspace: &'w mut Workspace,
+    q: &[f64],
+    dq: &[f64],
+    ddq: &[f64],
+) -> &'w [f64] {
+    workspace.check(model, &[q, dq, ddq]);
+    let Workspace { level, scratch, regressor, .. } = workspace;
+    dispatch_single(*level, Single { model, scratch, q, dq, ddq, out: regressor });
+    regressor
+}
+
+struct Single<'a> {
+    model: &'a Model,
+    scratch: &'a mut AnyScratch,
+    q: &'a [f64],
+    dq: &'a [f64],
+    ddq: &'a [f64],
+    out: &'a mut [f64],
+}
+
+impl Kernel for Single<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<T: Lane>(self) {
+        let scratch = self.scratch.of::<T>();
+        take(&mut scratch.core.q, self.q);
+        take(&mut scratch.core.dq, self.dq);
+        take(&mut scratch.core.ddq, self.ddq);
+        // Entries of joints that do not move a body are never written; they stay the zeros of the new workspace.
+        let mut sink = DenseRows { columns: 10 * self.model.dof(), out: self.out };
+        regressor_blocks(self.model, &mut scratch.core, &mut scratch.axes, &mut sink);
+    }
+}
+
+/// Where the blocks of the regressor go. A trait and not a closure, because only a method can be told to be inlined into the code of each
+/// processor level.
+pub(crate) trait BlockSink<T: Lane> {
+    /// Takes the ten entries of body `body` for the joints `path[bundle * PER_BUNDLE..]`, one joint to each lane group.
+    fn put(&mut self, body: usize, path: &[u32], bundle: usize, block: &[T::Bundle; 10]);
+}
+
+struct DenseRows<'a> {
+    columns: usize,
+    out: &'a mut [f64],
+}
+
+impl<T: Lane> BlockSink<T> for DenseRows<'_> {
+    #[inline(always)]
+    fn put(&mut self, body: usize, path: &[u32], bundle: usize, block: &[T::Bundle; 10]) {
+        let first = bundle * T::PER_BUNDLE;
+        let mut lanes = [[0.0; 8]; 10];
+        for (to, column) in lanes.iter_mut().zip(block) {
+            column.store(to);
+        }
+        for (place, &joint) in path[first..].iter().take(T::PER_BUNDLE).enumerate() {
+            let row = &mut self.out[joint as usize * self.columns + 10 * body..][..10];
+            for (to, column) in row.iter_mut().zip(&lanes) {
+                *to = column[place];
+            }
+        }
+    }
+}
+
+/// The axes of all joints on the way to each body, as twists at the body's frame, several to a bundle.
+#[derive(Debug)]
+pub(crate) struct AxisScratch<T: Lane> {
+    /// Joints from the base to each body, body after body.
+    path: Vec<u32>,
+    /// Where each body's path starts in `path`; one more than there are bodies.
+    path_start: Vec<usize>,
+    /// Where each body's bundles start.
+    bundle_start: Vec<usize>,
+    angular: Vec<Vec3<T::Bundle>>,
+    linear: Vec<Vec3<T::Bundle>>,
+}
+
+impl<T: Lane> AxisScratch<T> {
+    pub(crate) fn new(model: &Model) -> Self {
+        let (mut path, mut path_start, mut bundle_start) = (Vec::new(), vec![0], vec![0]);
+        for body in 0..model.dof() {
+            let joints = model.path(body);
+            bundle_start.push(bundle_start[body] + joints.len().div_ceil(T::PER_BUNDLE));
+            path.extend(joints.iter().map(|&joint| joint as u32));
+            path_start.push(path.len());
+        }
+        let bundles = bundle_start[model.dof()];
+        Self { path, path_start, bundle_start, angular: vec![Vec3::ZERO; bundles], linear: vec![Vec3::ZERO; bundles] }
+    }
+}
+
+/// Runs over all bodies and bundles of axes, and hands the ten entries of each to `sink`.
+#[inline(always)]
+pub(crate) fn regressor_blocks<T: Lane>(
+    model: &Model,
+    core: &mut CoreScratch<T>,
+    axes: &mut AxisScratch<T>,
+    sink: &mut impl BlockSink<T>,
+) {
+    let maps = model.maps();
+    core.place(maps);
+    outward(model, core);
+    for (index, map) in maps.iter().enumerate() {
+        let body = &core.bodies[index];
+        let Transform { rotation, translation } = &body.parent_from_body;
+        let r = &rotation.0;
+        let rotation = Mat3([bundles(r[0]), bundles(r[1]), bundles(r[2])]);
+        let translation = Vec3(bundles(translation.0));
+        let path = &axes.path[axes.path_start[index]..axes.path_start[index + 1]];
+        let start = axes.bundle_start[index];
+        if let Some(parent) = map.parent {
+            let from = axes.bundle_start[parent];
+            for k in 0..axes.bundle_start[parent + 1] - from {
+                let (angular, linear) = (axes.angular[from + k], axes.linear[from + k]);
+                axes.angular[start + k] = rotation.transpose_mul_vec(angular);
+                axes.linear[start + k] = rotation.transpose_mul_vec(angular.cross_add(translation, linear));
+            }
+        }
+        // The joint's own axis takes the last place of the path.
+        let (bundle, place) = ((path.len() - 1) / T::PER_BUNDLE, (path.len() - 1) % T::PER_BUNDLE);
+        if place == 0 {
+            axes.angular[start + bundle] = Vec3::ZERO;
+            axes.linear[start + bundle] = Vec3::ZERO;
+        }
+        let axis = map.axis.splat::<T>();
+        let own = if map.turns { &mut axes.angular } else { &mut axes.linear };
+        for k in 0..3 {
+            axis[k].add_at(&mut own[start + bundle].0[k], place);
+        }
+        let wrench = WrenchBasis::new(body.omega, body.alpha, body.acceleration);
+        for k in 0..axes.bundle_start[index + 1] - start {
+            let block = wrench.work_on(axes.angular[start + k], axes.linear[start + k]);
+            sink.put(index, path, k, &block);
+        }
+    }
+}
+
+#[inline(always)]
+fn bundles<T: Lane>(values: [T; 3]) -> [T::Bundle; 3] {
+    [values[0].bundle(), values[1].bundle(), values[2].bundle()]
+}
+
+/// A body's wrench as a function of its ten parameters, at one motion.
+struct WrenchBasis<B> {
+    /// Acceleration of the origin minus gravity: the force of a unit mass.
+    acceleration: Vec3<B>,
+    /// `[α]× + [ω]× [ω]×`: force of a first moment.
+    force_of_moment: Mat3<B>,
+    /// Moment of the six inertia entries: 3 rows of (xx, xy, xz), (yy, yz, zz).
+    moment_of_inertia: [[[B; 3]; 2]; 3],
+}
+
+impl<B: Lane> WrenchBasis<B> {
+    #[inline(always)]
+    fn new<T: Lane<Bundle = B>>(omega: Vec3<T>, alpha: Vec3<T>, acceleration: Vec3<T>) -> Self {
+        let ([wx, wy, wz], [ax, ay, az]) = (omega.0, alpha.0);
+        let (xx, yy, zz) = (wx * wx, wy * wy, wz * wz);
+        let (xy, xz, yz) = (wx * wy, wx * wz, wy * wz);
+        Self {
+            acceleration: Vec3(bundles(acceleration.0)),
+            force_of_moment: Mat3([
+                bundles([-(yy + zz), xy - az, xz + ay]),
+                bundles([xy + az, -(xx + zz), yz - ax]),
+                bundles([xz - ay, yz + ax, -(xx + yy)]),
+            ]),
+            // I α + ω × I ω, entry by entry of I: xx, xy, xz, then yy, yz, zz.
+            moment_of_inertia: [
+                [bundles([ax, ay - xz, az + xy]), bundles([-yz, yy - zz, yz])],
+                [bundles([xz, ax + yz, zz - xx]), bundles([ay, az - xy, -xz])],
+                [bundles([-xy, xx - yy, ax - yz]), bundles([xy, ay + xz, az])],
+            ],
+        }
+    }
+
+    /// Work of the wrench of each unit parameter on the twist `(angular, linear)`.
+    #[inline(always)]
+    fn work_on(&self, angular: Vec3<B>, linear: Vec3<B>) -> [B; 10] {
+        // h contributes force (α× + ω×ω×) h and moment h × a: e·(h × a) = h·(a × e).
+        let turned = self.acceleration.cross(angular);
+        let force = &self.force_of_moment.0;
+        let first = |k: usize| {
+            force[2][k].mul_add(linear[2], force[1][k].mul_add(linear[1], force[0][k].mul_add(linear[0], turned[k])))
+        };
+        let moment = &self.moment_of_inertia;
+        let second = |half: usize, k: usize| {
+            moment[2][half][k]
+                .mul_add(angular[2], moment[1][half][k].mul_add(angular[1], moment[0][half][k] * angular[0]))
+        };
+        [
+            self.acceleration.dot(linear),
+            first(0),
+            first(1),
+            first(2),
+            second(0, 0),
+            second(0, 1),
+            second(0, 2),
+            second(1, 0),
+            second(1, 1),
+            second(1, 2),
+        ]
+    }
+}

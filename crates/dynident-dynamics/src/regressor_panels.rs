@@ -1,0 +1,246 @@
+//! The regressor of blocks of samples, joint by joint: what the triangular factors take in.
+//!
+//! A joint's row has entries only for the bodies that it moves and for the laws that it feels, so each joint has its own narrow panel: columns
+//! after one another, each with one value per sample. The whole regressor is never stored.
+
+use crate::regressor::{BlockSink, regressor_blocks};
+use crate::workspace::{AnyScratch, BatchWorkspace, put_lanes, take_lanes};
+use dynident_lanes::{AlignedBuffer, Kernel, Lane, dispatch};
+use dynident_model::laws::{JointMotion, Law};
+use dynident_model::{INERTIAL_NAMES, Model};
+
+/// One column of the full regressor: a parameter of the machine.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Column {
+    /// Parameter `parameter` (index into [`INERTIAL_NAMES`]) of body `body`.
+    Body {
+        /// The body.
+        body: usize,
+        /// Which of its ten parameters.
+        parameter: usize,
+    },
+    /// The parameter of a law.
+    Law(Law),
+}
+
+impl Column {
+    /// The parameter's symbol with the body's or joint's number from 1: `m2`, `mx2`, `Izz1`, `fv3`.
+    pub fn symbol(&self) -> String {
+        match self {
+            Self::Body { body, parameter } => format!("{}{}", INERTIAL_NAMES[*parameter], body + 1),
+            Self::Law(law) => law.symbol(),
+        }
+    }
+
+    /// Unit of the parameter.
+    pub fn unit(&self) -> &'static str {
+        match self {
+            Self::Body { parameter: 0, .. } => "kg",
+            Self::Body { parameter: 1..=3, .. } => "kg m",
+            Self::Body { .. } => "kg m^2",
+            Self::Law(law) => law.unit(),
+        }
+    }
+}
+
+/// All columns of a machine: ten per body from base to tip, then the laws.
+pub fn all_columns(model: &Model, laws: &[Law]) -> Vec<Column> {
+    let bodies = (0..model.dof()).flat_map(|body| (0..10).map(move |parameter| Column::Body { body, parameter }));
+    bodies.chain(laws.iter().cloned().map(Column::Law)).collect()
+}
+
+/// Which columns every joint's panel has, and where.
+#[derive(Clone, Debug)]
+pub struct PanelLayout {
+    columns: Vec<Column>,
+    joints: Vec<JointPanel>,
+    /// For each body, each joint on its path, each of ten parameters: the column's place in that joint's panel, or `NOWHERE`.
+    places: Vec<u32>,
+    /// Where each body's places start.
+    place_start: Vec<usize>,
+}
+
+#[derive(Clone, Debug)]
+struct JointPanel {
+    /// Global column of every panel column.
+    columns: Vec<usize>,
+    /// The laws among them: place in the panel, and index into the global columns.
+    laws: Vec<(usize, usize)>,
+}
+
+const NOWHERE: u32 = u32::MAX;
+
+impl PanelLayout {
+    /// The layout for the given columns (any subset of [`all_columns`], in its order).
+    ///
+    /// # Panics
+    /// If a column names a body or joint that the model does not have.
+    pub fn new(model: &Model, columns: Vec<Column>) -> Self {
+        let dof = model.dof();
+        let mut joints: Vec<JointPanel> =
+            (0..dof).map(|_| JointPanel { columns: Vec::new(), laws: Vec::new() }).collect();
+        let paths: Vec<Vec<usize>> = (0..dof).map(|body| model.path(body)).collect();
+        let mut place_start = vec![0];
+        for path in &paths {
+            place_start.push(place_start[place_start.len() - 1] + 10 * path.len());
+        }
+        let mut places = vec![NOWHERE; place_start[dof]];
+        for (global, column) in columns.iter().enumerate() {
+            match column {
+                Column::Body { body, parameter } => {
+                    for (k, &joint) in paths[*body].iter().enumerate() {
+                        places[place_start[*body] + 10 * k + parameter] = joints[joint].columns.len() as u32;
+                        joints[joint].columns.push(global);
+                    }
+                }
+                Column::Law(law) => {
+                    for joint in law.joints() {
+                        let place = joints[joint].columns.len();
+                        joints[joint].laws.push((place, global));
+                        joints[joint].columns.push(global);
+                    }
+                }
+            }
+        }
+        Self { columns, joints, places, place_start }
+    }
+
+    /// All columns, in global order.
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// Global indices of the columns of one joint's panel.
+    pub fn joint_columns(&self, joint: usize) -> &[usize] {
+        &self.joints[joint].columns
+    }
+
+    /// Number of joints.
+    pub fn dof(&self) -> usize {
+        self.joints.len()
+    }
+}
+
+/// The panels of one block of samples. Joint `j` has `joint_columns(j).len() + 1` columns of `samples` values, one column after the other; the last
+/// one is for the joint's torque and is left as it was.
+#[derive(Debug, Default)]
+pub struct Panels {
+    samples: usize,
+    joints: Vec<AlignedBuffer>,
+}
+
+impl Panels {
+    /// Makes room for `samples` samples of `layout`; memory is kept from block to block.
+    pub fn resize(&mut self, layout: &PanelLayout, samples: usize) {
+        self.samples = samples;
+        self.joints.resize_with(layout.dof(), AlignedBuffer::new);
+        for (panel, joint) in self.joints.iter_mut().zip(&layout.joints) {
+            panel.resize((joint.columns.len() + 1) * samples);
+        }
+    }
+
+    /// Samples in the block.
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// The panel of one joint: regressor columns, then the torque column.
+    pub fn joint(&self, joint: usize) -> &[f64] {
+        self.joints[joint].as_slice()
+    }
+
+    /// The panel of one joint: regressor columns, then the torque column.
+    pub fn joint_mut(&mut self, joint: usize) -> &mut [f64] {
+        self.joints[joint].as_mut_slice()
+    }
+
+    /// The torque column of one joint.
+    pub fn torque_mut(&mut self, joint: usize) -> &mut [f64] {
+        let panel = self.joints[joint].as_mut_slice();
+        let start = panel.len() - self.samples;
+        &mut panel[start..]
+    }
+}
+
+/// Fills the regressor columns of all panels from the motion of a block of samples (joint-major). The torque columns are left alone.
+///
+/// Allocation-free once `panels` has grown to the block's size.
+///
+/// # Panics
+/// If an array's length is not joints × samples, or layout or workspace belong to a model of another size.
+pub fn regressor_panels(
+    model: &Model,
+    workspace: &mut BatchWorkspace,
+    layout: &PanelLayout,
+    motion: &JointMotion<'_>,
+    panels: &mut Panels,
+) {
+    workspace.check(model, motion.samples, &[motion.q, motion.dq, motion.ddq]);
+    assert_eq!(layout.dof(), model.dof(), "the panel layout was made for a model with another number of joints");
+    panels.resize(layout, motion.samples);
+    let BatchWorkspace { level, scratch, .. } = workspace;
+    dispatch(*level, Fill { model, scratch, layout, motion, panels });
+    for (joint, panel) in layout.joints.iter().enumerate() {
+        for &(place, global) in &panel.laws {
+            if let Column::Law(law) = &layout.columns[global] {
+                let at = place * motion.samples;
+                law.column(joint, motion, &mut panels.joint_mut(joint)[at..at + motion.samples]);
+            }
+        }
+    }
+}
+
+struct Fill<'a> {
+    model: &'a Model,
+    scratch: &'a mut AnyScratch,
+    layout: &'a PanelLayout,
+    motion: &'a JointMotion<'a>,
+    panels: &'a mut Panels,
+}
+
+impl Kernel for Fill<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<T: Lane>(self) {
+        let Self { model, scratch, layout, motion, panels } = self;
+        let scratch = scratch.of::<T>();
+        let samples = motion.samples;
+        for at in (0..samples).step_by(T::LANES) {
+            take_lanes(&mut scratch.core.q, motion.q, samples, at);
+            take_lanes(&mut scratch.core.dq, motion.dq, samples, at);
+            take_lanes(&mut scratch.core.ddq, motion.ddq, samples, at);
+            let mut sink = IntoPanels { layout, panels, at };
+            regressor_blocks(model, &mut scratch.core, &mut scratch.axes, &mut sink);
+        }
+    }
+}
+
+struct IntoPanels<'a> {
+    layout: &'a PanelLayout,
+    panels: &'a mut Panels,
+    at: usize,
+}
+
+impl<T: Lane> BlockSink<T> for IntoPanels<'_> {
+    #[inline(always)]
+    fn put(&mut self, body: usize, path: &[u32], bundle: usize, block: &[T::Bundle; 10]) {
+        // Lanes are samples here, so a bundle is one joint.
+        let samples = self.panels.samples;
+        let panel = self.panels.joint_mut(path[bundle] as usize);
+        let places = &self.layout.places[self.layout.place_start[body] + 10 * bundle..][..10];
+        if self.at + T::LANES <= samples {
+            for (value, &place) in block.iter().zip(places) {
+                // `NOWHERE` lies past the end of every panel, so one test covers the columns that the layout leaves out.
+                let start = place as usize * samples + self.at;
+                if let Some(slot) = panel.get_mut(start..start + T::LANES) {
+                    value.store(slot);
+                }
+            }
+        } else {
+            for (value, &place) in block.iter().zip(places).filter(|(_, place)| **place != NOWHERE) {
+                let start = place as usize * samples;
+                put_lanes(*value, &mut panel[start..start + samples], self.at);
+            }
+        }
+    }
+}

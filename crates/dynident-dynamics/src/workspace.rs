@@ -1,0 +1,252 @@
+//! Scratch memory of the algorithms: one per thread, allocated once.
+
+use core::any::Any;
+use dynident_lanes::{Kernel, Lane, Level, Scalar, dispatch, dispatch_single};
+use dynident_model::{JointMap, Mat3, Model, Transform, Vec3};
+
+/// What one body needs while an algorithm over scalars `T` runs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BodyState<T> {
+    /// `parent_from_body` at the current position.
+    pub(crate) parent_from_body: Transform<T>,
+    /// Angular velocity, body frame.
+    pub(crate) omega: Vec3<T>,
+    /// Angular acceleration, body frame.
+    pub(crate) alpha: Vec3<T>,
+    /// Acceleration of the body frame's origin minus gravity, body frame.
+    pub(crate) acceleration: Vec3<T>,
+    /// Force on the body (with everything that hangs on it), body frame.
+    pub(crate) force: Vec3<T>,
+    /// Moment on the body about its frame's origin, body frame.
+    pub(crate) moment: Vec3<T>,
+}
+
+impl<T: Scalar> BodyState<T> {
+    pub(crate) const REST: Self = Self {
+        parent_from_body: Transform::IDENTITY,
+        omega: Vec3::ZERO,
+        alpha: Vec3::ZERO,
+        acceleration: Vec3::ZERO,
+        force: Vec3::ZERO,
+        moment: Vec3::ZERO,
+    };
+}
+
+/// Scratch of all algorithms over one lane type.
+#[derive(Debug)]
+pub(crate) struct Scratch<T: Lane> {
+    pub(crate) core: CoreScratch<T>,
+    /// Ancestor axes of the torque regressor, in bundles.
+    pub(crate) axes: crate::regressor::AxisScratch<T>,
+}
+
+/// The part of the scratch that every [`Scalar`], duals too, can use.
+#[derive(Debug)]
+pub(crate) struct CoreScratch<T> {
+    pub(crate) q: Vec<T>,
+    pub(crate) dq: Vec<T>,
+    pub(crate) ddq: Vec<T>,
+    pub(crate) tau: Vec<T>,
+    pub(crate) sine: Vec<T>,
+    pub(crate) cosine: Vec<T>,
+    pub(crate) bodies: Vec<BodyState<T>>,
+    pub(crate) composites: Vec<crate::composite::Composite<T>>,
+    pub(crate) articulated: Vec<crate::forward_dynamics::Articulated<T>>,
+    pub(crate) derivative: Vec<crate::derivatives::BodyDerivative<T>>,
+    /// Square matrices (dof × dof), row-major.
+    pub(crate) matrices: [Vec<T>; 3],
+}
+
+impl<T: Scalar> CoreScratch<T> {
+    pub(crate) fn new(dof: usize) -> Self {
+        let zeros = || vec![T::ZERO; dof];
+        Self {
+            q: zeros(),
+            dq: zeros(),
+            ddq: zeros(),
+            tau: zeros(),
+            sine: zeros(),
+            cosine: zeros(),
+            bodies: vec![BodyState::REST; dof],
+            composites: vec![crate::composite::Composite::ZERO; dof],
+            articulated: vec![crate::forward_dynamics::Articulated::ZERO; dof],
+            derivative: vec![crate::derivatives::BodyDerivative::ZERO; dof],
+            matrices: core::array::from_fn(|_| vec![T::ZERO; dof * dof]),
+        }
+    }
+
+    /// Takes sines, cosines and all `parent_from_body` from the positions in `self.q`.
+    #[inline(always)]
+    pub(crate) fn place(&mut self, maps: &[JointMap]) {
+        T::sin_cos_all(&self.q, &mut self.sine, &mut self.cosine);
+        for (index, (map, body)) in maps.iter().zip(&mut self.bodies).enumerate() {
+            body.parent_from_body = joint_transform(map, self.q[index], self.sine[index], self.cosine[index]);
+        }
+    }
+}
+
+/// `parent_from_child` of a joint at position `q` with its sine and cosine.
+#[inline(always)]
+pub(crate) fn joint_transform<T: Scalar>(map: &JointMap, q: T, sine: T, cosine: T) -> Transform<T> {
+    if map.turns {
+        let entry = |i: usize, j: usize| {
+            let steady = cosine.mul_add(T::splat(map.cosine.0[i][j]), T::splat(map.constant.0[i][j]));
+            sine.mul_add(T::splat(map.sine.0[i][j]), steady)
+        };
+        let row = |i: usize| [entry(i, 0), entry(i, 1), entry(i, 2)];
+        Transform { rotation: Mat3([row(0), row(1), row(2)]), translation: map.translation.splat() }
+    } else {
+        let row = |i: usize| Vec3(map.constant.0[i]).splat().0;
+        Transform {
+            rotation: Mat3([row(0), row(1), row(2)]),
+            translation: map.slide.splat().scale_add(q, map.translation.splat()),
+        }
+    }
+}
+
+/// A scratch whose lane type was chosen at run time.
+pub(crate) struct AnyScratch(Box<dyn Any + Send>);
+
+impl AnyScratch {
+    /// The scratch of lane type `T`, which must be the type it was made for.
+    #[inline(always)]
+    pub(crate) fn of<T: Lane>(&mut self) -> &mut Scratch<T> {
+        self.0.downcast_mut().expect("a workspace keeps the processor level that it was made for")
+    }
+}
+
+struct MakeScratch<'a>(&'a Model);
+
+impl Kernel for MakeScratch<'_> {
+    type Output = AnyScratch;
+    #[inline(always)]
+    fn run<T: Lane>(self) -> AnyScratch {
+        AnyScratch(Box::new(Scratch::<T> {
+            core: CoreScratch::new(self.0.dof()),
+            axes: crate::regressor::AxisScratch::new(self.0),
+        }))
+    }
+}
+
+/// Scratch memory for one sample at a time. Every thread owns one; the [`Model`] is shared.
+///
+/// Functions that take a workspace allocate nothing and return slices into it.
+pub struct Workspace {
+    pub(crate) level: Level,
+    pub(crate) dof: usize,
+    pub(crate) scratch: AnyScratch,
+    pub(crate) vector: Vec<f64>,
+    pub(crate) matrices: [Vec<f64>; 3],
+    pub(crate) regressor: Vec<f64>,
+    pub(crate) placements: Vec<Transform>,
+}
+
+impl Workspace {
+    /// A workspace for models of this model's size, at the best level of this processor.
+    pub fn new(model: &Model) -> Self {
+        Self::with_level(model, Level::detect())
+    }
+
+    /// A workspace at a chosen processor level.
+    pub fn with_level(model: &Model, level: Level) -> Self {
+        let dof = model.dof();
+        Self {
+            level,
+            dof,
+            scratch: dispatch_single(level, MakeScratch(model)),
+            vector: vec![0.0; dof],
+            matrices: core::array::from_fn(|_| vec![0.0; dof * dof]),
+            regressor: vec![0.0; dof * dof * 10],
+            placements: vec![Transform::IDENTITY; dof],
+        }
+    }
+
+    /// The processor level in use.
+    pub fn level(&self) -> Level {
+        self.level
+    }
+
+    pub(crate) fn check(&self, model: &Model, vectors: &[&[f64]]) {
+        assert_eq!(self.dof, model.dof(), "the workspace was made for a model with another number of joints");
+        for vector in vectors {
+            assert_eq!(vector.len(), self.dof, "a joint vector has one entry per joint");
+        }
+    }
+}
+
+impl core::fmt::Debug for Workspace {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Workspace").field("dof", &self.dof).field("level", &self.level).finish_non_exhaustive()
+    }
+}
+
+/// Scratch memory for lanes of samples. Every thread owns one.
+pub struct BatchWorkspace {
+    pub(crate) level: Level,
+    pub(crate) dof: usize,
+    pub(crate) scratch: AnyScratch,
+}
+
+impl BatchWorkspace {
+    /// A workspace for models of this model's size, at the best level of this processor.
+    pub fn new(model: &Model) -> Self {
+        Self::with_level(model, Level::detect())
+    }
+
+    /// A workspace at a chosen processor level.
+    pub fn with_level(model: &Model, level: Level) -> Self {
+        Self { level, dof: model.dof(), scratch: dispatch(level, MakeScratch(model)) }
+    }
+
+    pub(crate) fn check(&self, model: &Model, samples: usize, arrays: &[&[f64]]) {
+        assert_eq!(self.dof, model.dof(), "the workspace was made for a model with another number of joints");
+        for array in arrays {
+            assert_eq!(array.len(), self.dof * samples, "a motion array has one entry per joint and sample");
+        }
+    }
+}
+
+impl core::fmt::Debug for BatchWorkspace {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("BatchWorkspace").field("dof", &self.dof).field("level", &self.level).finish_non_exhaustive()
+    }
+}
+
+/// Takes one joint vector into scratch scalars.
+#[inline(always)]
+pub(crate) fn take<T: Lane>(to: &mut [T], from: &[f64]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = T::splat(*from);
+    }
+}
+
+/// Takes samples `at..at + LANES` of a joint-major array into scratch lanes; past the end the last sample repeats.
+#[inline(always)]
+pub(crate) fn take_lanes<T: Lane>(to: &mut [T], from: &[f64], samples: usize, at: usize) {
+    if at + T::LANES <= samples {
+        for (joint, to) in to.iter_mut().enumerate() {
+            *to = T::load(&from[joint * samples + at..]);
+        }
+    } else {
+        for (joint, to) in to.iter_mut().enumerate() {
+            let row = &from[joint * samples..(joint + 1) * samples];
+            let mut padded = [0.0; 8];
+            for (k, value) in padded.iter_mut().enumerate() {
+                *value = row[(at + k).min(samples - 1)];
+            }
+            *to = T::load(&padded);
+        }
+    }
+}
+
+/// Writes the lanes that are samples `at..` of a row, and drops those past its end.
+#[inline(always)]
+pub(crate) fn put_lanes<T: Lane>(value: T, row: &mut [f64], at: usize) {
+    if at + T::LANES <= row.len() {
+        value.store(&mut row[at..]);
+    } else {
+        for (k, to) in row[at..].iter_mut().enumerate() {
+            *to = value.lane(k);
+        }
+    }
+}

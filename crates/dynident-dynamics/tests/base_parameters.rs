@@ -1,0 +1,107 @@
+//! Base parameters against the paper, against numerical ranks, and against full-parameter torques.
+
+use dynident_dynamics::{
+    BaseParameterSettings, BaseParameters, Workspace, inverse_dynamics, numerical_rank, torque_regressor,
+};
+use dynident_model::Model;
+use dynident_model::laws::{CoulombShape, Coupling, CouplingEffect, DriveChoice, Law, laws_per_joint};
+use dynident_model::sample::{Random, planar_2r, random_tree};
+
+fn all_laws(model: &Model) -> Vec<Law> {
+    laws_per_joint(model, |_| DriveChoice {
+        drive_inertia: true,
+        viscous: true,
+        coulomb: Some(CoulombShape::Sign { dead_band: 0.0 }),
+        offset: true,
+    })
+}
+
+#[test]
+fn the_planar_arm_has_exactly_the_papers_table_2() {
+    let mut random = Random::new(1);
+    // a1 = 0.7, so that a1 and its square can be told from 1: θ1 = Izz1 + a1² m2, θ2 = m1 r1x + a1 m2, θ3 = m1 r1y, θ4..6 = Izz2, m2 r2x, m2 r2y.
+    let model = planar_2r(0.7, random.body(), random.body());
+    let base = BaseParameters::new(&model, &[], &BaseParameterSettings::default());
+    let mut expressions = base.expressions();
+    expressions.sort();
+    let mut expected = ["Izz1 + 0.49 m2", "mx1 + 0.7 m2", "my1", "Izz2", "mx2", "my2"].map(str::to_owned);
+    expected.sort();
+    assert_eq!(expressions, expected);
+}
+
+#[test]
+fn structure_and_random_states_choose_the_same_columns() {
+    for seed in 0..40 {
+        let model = random_tree(seed, 1 + seed as usize % 7);
+        for laws in [Vec::new(), all_laws(&model)] {
+            let base = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
+            // Random geometry leaves no column closer than 1e-6 to dependence unless it is dependent (then rounding, about 1e-13).
+            let numerical = numerical_rank(&model, &laws, 77, 1e-8);
+            assert_eq!(base.independent(), numerical.independent, "seed {seed}, {} laws", laws.len());
+        }
+    }
+}
+
+#[test]
+fn base_parameters_give_the_full_torques() {
+    let mut random = Random::new(3);
+    for seed in 0..30 {
+        let dof = 1 + seed as usize % 8;
+        let model = random_tree(seed, dof);
+        let base = BaseParameters::new(&model, &[], &BaseParameterSettings::default());
+        let theta = base.values(&model.parameter_vector());
+        let mut ws = Workspace::new(&model);
+        let mut vector = || (0..dof).map(|_| random.uniform(-2.0, 2.0)).collect::<Vec<f64>>();
+        let (q, dq, ddq) = (vector(), vector(), vector());
+        let tau = inverse_dynamics(&model, &mut ws, &q, &dq, &ddq).to_vec();
+        let regressor = torque_regressor(&model, &mut ws, &q, &dq, &ddq);
+        for (joint, row) in regressor.chunks_exact(10 * dof).enumerate() {
+            let by_base: f64 = base.independent().iter().zip(&theta).map(|(&c, t)| row[c] * t).sum();
+            // The regrouping solves triangles of condition up to some thousand.
+            let scale = tau.iter().fold(1.0_f64, |m, t| m.max(t.abs()));
+            assert!((by_base - tau[joint]).abs() <= 1e-9 * scale, "seed {seed}: {by_base} against {}", tau[joint]);
+        }
+    }
+}
+
+#[test]
+fn drives_regroup_where_structure_says_so() {
+    let mut random = Random::new(9);
+    let model = planar_2r(1.0, random.body(), random.body());
+    let laws = all_laws(&model);
+    let base = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
+    // Joint 1's drive turns with link 1 alone: one more parameter for joint 2's drive only, and three of friction and offset a joint.
+    assert_eq!(base.count(), 6 + 1 + 6);
+    assert!(base.expressions().iter().any(|e| e == "Izz1 + m2 + Ia1"), "{:?}", base.expressions());
+    assert_eq!(base.independent(), numerical_rank(&model, &laws, 5, 1e-8).independent);
+}
+
+#[test]
+fn couplings_and_laws_said_twice_are_seen() {
+    let model = random_tree(4, 4);
+    let coupling =
+        |effect| Law::Coupling(Coupling { name: "m".into(), first: 2, second: 3, ratios: [1.0, -0.5], effect });
+    let mut laws = all_laws(&model);
+    laws.extend([
+        coupling(CouplingEffect::Inertia),
+        coupling(CouplingEffect::Viscous),
+        coupling(CouplingEffect::Coulomb(CoulombShape::Sign { dead_band: 0.0 })),
+    ]);
+    let base = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
+    assert_eq!(base.independent(), numerical_rank(&model, &laws, 5, 1e-8).independent);
+    let once = base.count();
+    laws.push(coupling(CouplingEffect::Viscous));
+    let twice = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
+    assert_eq!(twice.count(), once);
+    assert!(twice.expressions().iter().any(|e| e == "fv_m + fv_m"));
+}
+
+#[test]
+fn without_gravity_fewer_parameters_are_seen() {
+    let mut random = Random::new(2);
+    let model = planar_2r(1.0, random.body(), random.body());
+    let weightless = model.clone().with_gravity(dynident_model::Vec3([0.0; 3])).unwrap();
+    let base = BaseParameters::new(&weightless, &[], &BaseParameterSettings::default());
+    assert_eq!(base.independent(), numerical_rank(&weightless, &[], 5, 1e-8).independent);
+    assert_eq!(base.count(), 4);
+}

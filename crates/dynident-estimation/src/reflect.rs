@@ -1,0 +1,299 @@
+//! Householder reflections of a triangle stacked on a panel of rows: the hot loop of every fit.
+//!
+//! `[R; A] = Q·[R'; 0]` with R upper triangular (d×d) and A dense (m×d). Reflector k has the form `v = (ν e_k, a)` with `a` the
+//! k-th column of the panel as it then stands, so it touches one row of R and the panel, nothing else: 2·m·d² operations.
+//! Four reflectors are built, then applied together (compact WY form: Schreiber and Van Loan, SIAM J. Sci. Stat. Comput.
+//! 10 (1989) 53), two target columns at a time, so that each loaded number feeds several multiplications.
+
+use dynident_lanes::{Kernel, Lane};
+
+/// Eight rows of one column. The type's alignment keeps every load within one cache line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C, align(64))]
+pub(crate) struct Chunk(pub(crate) [f64; CHUNK_ROWS]);
+
+impl Chunk {
+    pub(crate) const ZERO: Self = Self([0.0; CHUNK_ROWS]);
+}
+
+/// Rows in a [`Chunk`].
+pub(crate) const CHUNK_ROWS: usize = 8;
+
+/// How many reflectors are applied together.
+const REFLECTORS: usize = 4;
+
+/// A column whose squared norm is below this counts as zero: its reciprocal would overflow. It is a column of numbers
+/// around 1e-145, far below any rounding error of a measured quantity.
+const NEGLIGIBLE_SQUARE: f64 = 1.0e-290;
+
+/// Where row `row` of a packed upper triangle of size `size` begins; entry (row, column) follows `column - row` places on.
+pub(crate) const fn row_start(size: usize, row: usize) -> usize {
+    // Row r holds size - r entries: the sum over the rows before it.
+    row * (2 * size + 1 - row) / 2
+}
+
+/// Absorbs a panel into a triangle. The panel's content is spent.
+pub(crate) struct TriangleOnPanel<'a> {
+    /// Packed upper triangle, row by row; its diagonal is not negative, before and after.
+    pub(crate) triangle: &'a mut [f64],
+    /// Rows and columns of the triangle.
+    pub(crate) size: usize,
+    /// Columns of the panel one after another, each `chunks` long, filled up with rows of zeros.
+    pub(crate) panel: &'a mut [Chunk],
+    /// Chunks per column.
+    pub(crate) chunks: usize,
+}
+
+impl Kernel for TriangleOnPanel<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Lane>(self) {
+        let Self { triangle, size, panel, chunks } = self;
+        let mut first = 0;
+        while first < size {
+            let width = (size - first).min(REFLECTORS);
+            let (head, targets) = panel.split_at_mut((first + width) * chunks);
+            let block = &mut head[first * chunks..];
+            match width {
+                4 => step::<T, 4>(triangle, size, first, block, targets, chunks),
+                3 => step::<T, 3>(triangle, size, first, block, targets, chunks),
+                2 => step::<T, 2>(triangle, size, first, block, targets, chunks),
+                _ => step::<T, 1>(triangle, size, first, block, targets, chunks),
+            }
+            first += width;
+        }
+    }
+}
+
+/// `V` reflectors `I - β v vᵀ` in the making. Their parts `ν` lie in different rows of the triangle, so the inner product of two
+/// reflectors is that of their panel columns.
+struct Reflectors<const V: usize> {
+    /// The part ν of each reflector in its row of the triangle.
+    nu: [f64; V],
+    /// The upper triangle of `I - V T Vᵀ`, `t[l][i]` for l ≤ i, with β on the diagonal.
+    t: [[f64; V]; V],
+}
+
+impl<const V: usize> Reflectors<V> {
+    /// How much of each of the first `count` reflectors is to be subtracted from a target with these inner products.
+    #[inline(always)]
+    fn amounts(&self, count: usize, products: [f64; V]) -> [f64; V] {
+        let mut amounts = [0.0; V];
+        for i in 0..count {
+            for l in 0..=i {
+                amounts[i] += self.t[l][i] * products[l];
+            }
+        }
+        amounts
+    }
+}
+
+#[inline(always)]
+fn step<T: Lane, const V: usize>(
+    triangle: &mut [f64],
+    size: usize,
+    first: usize,
+    block: &mut [Chunk],
+    targets: &mut [Chunk],
+    chunks: usize,
+) {
+    let mut reflectors = Reflectors::<V> { nu: [0.0; V], t: [[0.0; V]; V] };
+    for i in 0..V {
+        let (done, rest) = block.split_at_mut(i * chunks);
+        let column = &mut rest[..chunks];
+        match i {
+            0 => reflect_column::<T, V, 0>(triangle, size, first, done, column, &mut reflectors),
+            1 => reflect_column::<T, V, 1>(triangle, size, first, done, column, &mut reflectors),
+            2 => reflect_column::<T, V, 2>(triangle, size, first, done, column, &mut reflectors),
+            _ => reflect_column::<T, V, 3>(triangle, size, first, done, column, &mut reflectors),
+        }
+    }
+    let columns = columns::<V>(block, chunks);
+    let mut index = first + V;
+    let mut pairs = targets.chunks_exact_mut(2 * chunks);
+    for pair in &mut pairs {
+        let (left, right) = pair.split_at_mut(chunks);
+        apply::<T, V, 2>(triangle, size, first, index, &columns, [left, right], &reflectors);
+        index += 2;
+    }
+    let last = pairs.into_remainder();
+    if !last.is_empty() {
+        apply::<T, V, 1>(triangle, size, first, index, &columns, [last], &reflectors);
+    }
+}
+
+/// The first `N` columns of a block.
+#[inline(always)]
+fn columns<const N: usize>(block: &[Chunk], chunks: usize) -> [&[Chunk]; N] {
+    // No `array::from_fn`: its closure would not be inlined into the processor level's function.
+    let mut columns: [&[Chunk]; N] = [&[]; N];
+    for (i, column) in columns.iter_mut().enumerate() {
+        *column = &block[i * chunks..(i + 1) * chunks];
+    }
+    columns
+}
+
+/// Applies the `P` reflectors made so far to the block's next column, then makes that column's own reflector.
+#[inline(always)]
+fn reflect_column<T: Lane, const V: usize, const P: usize>(
+    triangle: &mut [f64],
+    size: usize,
+    first: usize,
+    done: &[Chunk],
+    column: &mut [Chunk],
+    reflectors: &mut Reflectors<V>,
+) {
+    let chunks = column.len();
+    let done = columns::<P>(done, chunks);
+    let index = first + P;
+    if P > 0 {
+        let [dots] = inner_products::<T, P, 1>(&done, &[&*column]);
+        let mut products = [0.0; V];
+        for l in 0..P {
+            products[l] = reflectors.nu[l] * triangle[row_start(size, first + l) + index - first - l] + dots[l];
+        }
+        let amounts = reflectors.amounts(P, products);
+        for l in 0..P {
+            triangle[row_start(size, first + l) + index - first - l] -= reflectors.nu[l] * amounts[l];
+        }
+        let mut first_amounts = [[0.0; P]];
+        first_amounts[0].copy_from_slice(&amounts[..P]);
+        subtract::<T, P, 1>(&done, [&mut *column], &first_amounts);
+    }
+    let [[square]] = inner_products::<T, 1, 1>(&[&*column], &[&*column]);
+    if square < NEGLIGIBLE_SQUARE {
+        // The identity: ν and its column of T stay zero.
+        return;
+    }
+    let [products] = inner_products::<T, P, 1>(&done, &[&*column]);
+    let diagonal = &mut triangle[row_start(size, index)];
+    let old = *diagonal;
+    let norm = (old * old + square).sqrt();
+    *diagonal = norm;
+    // old - norm without cancellation (old is not negative): Parlett, Math. Comp. 25 (1971) 505. It keeps the diagonal positive.
+    reflectors.nu[P] = -square / (old + norm);
+    let beta = (old + norm) / (norm * square);
+    let mut sums = [0.0; P];
+    for l in 0..P {
+        for m in l..P {
+            sums[l] += reflectors.t[l][m] * products[m];
+        }
+    }
+    for l in 0..P {
+        reflectors.t[l][P] = -beta * sums[l];
+    }
+    reflectors.t[P][P] = beta;
+}
+
+/// Applies the reflectors to target columns `index ..`.
+#[inline(always)]
+fn apply<T: Lane, const V: usize, const X: usize>(
+    triangle: &mut [f64],
+    size: usize,
+    first: usize,
+    index: usize,
+    columns: &[&[Chunk]; V],
+    targets: [&mut [Chunk]; X],
+    reflectors: &Reflectors<V>,
+) {
+    let mut shared: [&[Chunk]; X] = [&[]; X];
+    for (shared, target) in shared.iter_mut().zip(&targets) {
+        *shared = target;
+    }
+    let dots = inner_products::<T, V, X>(columns, &shared);
+    let mut amounts = [[0.0; V]; X];
+    for x in 0..X {
+        let mut products = [0.0; V];
+        for l in 0..V {
+            products[l] = reflectors.nu[l] * triangle[row_start(size, first + l) + index + x - first - l] + dots[x][l];
+        }
+        amounts[x] = reflectors.amounts(V, products);
+        for l in 0..V {
+            triangle[row_start(size, first + l) + index + x - first - l] -= reflectors.nu[l] * amounts[x][l];
+        }
+    }
+    subtract::<T, V, X>(columns, targets, &amounts);
+}
+
+/// `targets[x]ᵀ columns[l]`.
+#[inline(always)]
+fn inner_products<T: Lane, const V: usize, const X: usize>(
+    columns: &[&[Chunk]; V],
+    targets: &[&[Chunk]; X],
+) -> [[f64; V]; X] {
+    let chunks = targets[0].len();
+    let mut sums = [[T::ZERO; V]; X];
+    for c in 0..chunks {
+        for part in 0..CHUNK_ROWS / T::LANES {
+            let at = part * T::LANES;
+            let mut v = [T::ZERO; V];
+            for l in 0..V {
+                v[l] = T::load(&columns[l][c].0[at..]);
+            }
+            for x in 0..X {
+                let target = T::load(&targets[x][c].0[at..]);
+                for l in 0..V {
+                    sums[x][l] = v[l].mul_add(target, sums[x][l]);
+                }
+            }
+        }
+    }
+    // Through memory: seeing the loop and the sums over lanes together, the compiler picks a layout that suits the few sums and
+    // shuffles in every turn of the loop (half the speed).
+    let sums = core::hint::black_box(sums);
+    let mut products = [[0.0; V]; X];
+    for x in 0..X {
+        for l in 0..V {
+            products[x][l] = halving_sum(sums[x][l]);
+        }
+    }
+    products
+}
+
+/// `targets[x] -= Σ_l amounts[x][l] columns[l]`.
+#[inline(always)]
+fn subtract<T: Lane, const V: usize, const X: usize>(
+    columns: &[&[Chunk]; V],
+    targets: [&mut [Chunk]; X],
+    amounts: &[[f64; V]; X],
+) {
+    let chunks = targets[0].len();
+    let mut factors = [[T::ZERO; V]; X];
+    for x in 0..X {
+        for l in 0..V {
+            factors[x][l] = T::splat(-amounts[x][l]);
+        }
+    }
+    for c in 0..chunks {
+        for part in 0..CHUNK_ROWS / T::LANES {
+            let at = part * T::LANES;
+            let mut v = [T::ZERO; V];
+            for l in 0..V {
+                v[l] = T::load(&columns[l][c].0[at..]);
+            }
+            for x in 0..X {
+                let mut target = T::load(&targets[x][c].0[at..]);
+                for l in 0..V {
+                    target = v[l].mul_add(factors[x][l], target);
+                }
+                target.store(&mut targets[x][c].0[at..]);
+            }
+        }
+    }
+}
+
+/// Sum over the lanes by halving: three dependent additions for eight lanes instead of seven.
+#[inline(always)]
+fn halving_sum<T: Lane>(lanes: T) -> f64 {
+    let mut values = [0.0; CHUNK_ROWS];
+    lanes.store(&mut values);
+    let mut half = T::LANES / 2;
+    while half > 0 {
+        for i in 0..half {
+            values[i] += values[i + half];
+        }
+        half /= 2;
+    }
+    values[0]
+}

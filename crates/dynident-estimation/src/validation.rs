@@ -1,0 +1,184 @@
+//! How well a model predicts torque: streaming figures per joint and over all joints.
+
+use crate::error::EstimationError;
+use serde::{Deserialize, Serialize};
+
+/// Running sums over samples of measured and predicted torque.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Sums {
+    samples: usize,
+    error_square: f64,
+    torque_square: f64,
+    mean: f64,
+    /// Sum of squares about the mean (Welford, Technometrics 4 (1962) 419).
+    spread: f64,
+    max_error: f64,
+}
+
+/// Compares predicted with measured torque, sample after sample; memory does not grow.
+///
+/// ```
+/// use dynident_estimation::Validation;
+/// let mut validation = Validation::new(vec!["shoulder".into()]);
+/// validation.add(&[3.0], &[3.0])?;
+/// validation.add(&[4.0], &[3.5])?;
+/// let report = validation.report();
+/// assert!((report.joints[0].relative_error_percent.unwrap() - 10.0).abs() < 1e-12); // 100 · 0.5 / 5
+/// # Ok::<(), dynident_estimation::EstimationError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Validation {
+    names: Vec<String>,
+    sums: Vec<Sums>,
+}
+
+/// Figures of one joint. Torque in N m (force in N for a prismatic joint).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JointValidation {
+    /// The joint.
+    pub name: String,
+    /// Samples compared.
+    pub samples: usize,
+    /// `√(Σ(τ − τ̂)² / samples)`.
+    pub rmse_nm: f64,
+    /// `100 ‖τ − τ̂‖ / ‖τ‖`; none when the measured torque is zero throughout.
+    pub relative_error_percent: Option<f64>,
+    /// `max |τ − τ̂|`.
+    pub max_error_nm: f64,
+    /// `1 − Σ(τ − τ̂)² / Σ(τ − mean τ)²`; none when the measured torque is constant.
+    pub r_squared: Option<f64>,
+}
+
+/// Figures of all joints stacked into one vector (its own mean in R²), and of every joint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ValidationReport {
+    /// Samples of the joint that has most.
+    pub samples: usize,
+    /// As [`JointValidation::rmse_nm`], over all joints stacked.
+    pub rmse_nm: f64,
+    /// As [`JointValidation::relative_error_percent`], over all joints stacked.
+    pub relative_error_percent: Option<f64>,
+    /// As [`JointValidation::max_error_nm`], over all joints.
+    pub max_error_nm: f64,
+    /// As [`JointValidation::r_squared`], over all joints stacked.
+    pub r_squared: Option<f64>,
+    /// Every joint.
+    pub joints: Vec<JointValidation>,
+}
+
+impl Validation {
+    /// Nothing compared yet.
+    pub fn new(joints: Vec<String>) -> Self {
+        let sums = vec![Sums::default(); joints.len()];
+        Self { names: joints, sums }
+    }
+
+    /// One sample: measured and predicted torque of every joint.
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] unless both have one value per joint; [`EstimationError::Unusable`] for NaN or infinity (the column is
+    /// the joint). Nothing is counted then.
+    pub fn add(&mut self, measured: &[f64], predicted: &[f64]) -> Result<(), EstimationError> {
+        for (what, values) in [("measured torques", measured), ("predicted torques", predicted)] {
+            if values.len() != self.sums.len() {
+                let (expected, found) = (self.sums.len(), values.len());
+                return Err(EstimationError::Mismatch { what: what.into(), expected, found });
+            }
+            check(values, |joint| (0, joint))?;
+        }
+        for (joint, sums) in self.sums.iter_mut().enumerate() {
+            sums.add(measured[joint], predicted[joint]);
+        }
+        Ok(())
+    }
+
+    /// Consecutive samples of joint number `joint`.
+    ///
+    /// # Errors
+    /// As [`add`](Self::add), and [`EstimationError::Mismatch`] for a joint out of range.
+    pub fn add_joint(&mut self, joint: usize, measured: &[f64], predicted: &[f64]) -> Result<(), EstimationError> {
+        let joints = self.sums.len();
+        if measured.len() != predicted.len() {
+            let (expected, found) = (measured.len(), predicted.len());
+            return Err(EstimationError::Mismatch { what: "predicted torques".into(), expected, found });
+        }
+        let Some(sums) = self.sums.get_mut(joint) else {
+            let what = "a joint number below the number of joints".into();
+            return Err(EstimationError::Mismatch { what, expected: joints, found: joint });
+        };
+        check(measured, |row| (row, joint))?;
+        check(predicted, |row| (row, joint))?;
+        for (measured, predicted) in measured.iter().zip(predicted) {
+            sums.add(*measured, *predicted);
+        }
+        Ok(())
+    }
+
+    /// The figures so far. Without samples all errors are zero and the ratios none.
+    pub fn report(&self) -> ValidationReport {
+        let joints: Vec<JointValidation> =
+            self.names.iter().zip(&self.sums).map(|(name, sums)| sums.figures(name.clone())).collect();
+        let all = self.sums.iter().fold(Sums::default(), |all, sums| all.merged(sums)).figures(String::new());
+        ValidationReport {
+            samples: self.sums.iter().map(|sums| sums.samples).max().unwrap_or(0),
+            rmse_nm: all.rmse_nm,
+            relative_error_percent: all.relative_error_percent,
+            max_error_nm: all.max_error_nm,
+            r_squared: all.r_squared,
+            joints,
+        }
+    }
+}
+
+impl Sums {
+    fn add(&mut self, measured: f64, predicted: f64) {
+        let error = measured - predicted;
+        self.samples += 1;
+        self.error_square += error * error;
+        self.torque_square += measured * measured;
+        let before = measured - self.mean;
+        self.mean += before / self.samples as f64;
+        self.spread += before * (measured - self.mean);
+        self.max_error = self.max_error.max(error.abs());
+    }
+
+    /// Both stacked (Chan, Golub and LeVeque, The American Statistician 37 (1983) 242).
+    fn merged(&self, other: &Self) -> Self {
+        let samples = self.samples + other.samples;
+        let difference = other.mean - self.mean;
+        let share = if samples > 0 { other.samples as f64 / samples as f64 } else { 0.0 };
+        Self {
+            samples,
+            error_square: self.error_square + other.error_square,
+            torque_square: self.torque_square + other.torque_square,
+            mean: self.mean + difference * share,
+            spread: self.spread + other.spread + difference * difference * share * self.samples as f64,
+            max_error: self.max_error.max(other.max_error),
+        }
+    }
+
+    fn figures(&self, name: String) -> JointValidation {
+        let ratio = |part: f64, whole: f64| (whole > 0.0).then(|| part / whole);
+        JointValidation {
+            name,
+            samples: self.samples,
+            rmse_nm: ratio(self.error_square, self.samples as f64).unwrap_or(0.0).sqrt(),
+            relative_error_percent: ratio(self.error_square, self.torque_square).map(|share| 100.0 * share.sqrt()),
+            max_error_nm: self.max_error,
+            r_squared: ratio(self.error_square, self.spread).map(|share| 1.0 - share),
+        }
+    }
+}
+
+/// The largest torque whose square can be summed.
+const LARGEST: f64 = 1.0e140;
+
+fn check(values: &[f64], place: impl Fn(usize) -> (usize, usize)) -> Result<(), EstimationError> {
+    match values.iter().position(|value| value.is_nan() || value.abs() > LARGEST) {
+        Some(index) => {
+            let (row, column) = place(index);
+            Err(EstimationError::Unusable { row, column, value: values[index], limit: LARGEST })
+        }
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,52 @@
+//! `"q{1..7}_rad"`: many column names in one text.
+
+use crate::error::FormatError;
+
+/// More columns than any log has; keeps an absurd range from exhausting memory.
+const MAX_EXPANSION: u64 = 4096;
+
+/// The names that `pattern` stands for: `q{1..3}` gives `q1 q2 q3`, `{01..12}` keeps leading zeros, a text without a range
+/// stands for itself.
+pub(crate) fn expanded(key: &str, pattern: &str) -> Result<Vec<String>, FormatError> {
+    let range = pattern.find('{').and_then(|open| {
+        let close = open + pattern[open..].find('}')?;
+        let (first, last) = pattern[open + 1..close].split_once("..")?;
+        Some((open, close, first, last))
+    });
+    let Some((open, close, first, last)) = range else { return Ok(vec![pattern.to_owned()]) };
+    let number = |text: &str| {
+        text.parse::<u64>().map_err(|_| {
+            FormatError::new(key, format!("`{text}` in `{pattern}` is not a whole number"), "write a range as {1..7}")
+        })
+    };
+    let width = if first.starts_with('0') { first.len() } else { 0 };
+    let (first, last) = (number(first)?, number(last)?);
+    if last < first || last - first >= MAX_EXPANSION || width > 20 {
+        return Err(FormatError::new(
+            key,
+            format!("the range in `{pattern}` is empty or too long"),
+            format!("write {{first..last}} with at most {MAX_EXPANSION} columns"),
+        ));
+    }
+    Ok((first..=last).map(|i| format!("{}{i:0width$}{}", &pattern[..open], &pattern[close + 1..])).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_expand_in_order() {
+        assert_eq!(expanded("k", "q{1..3}_rad").unwrap(), ["q1_rad", "q2_rad", "q3_rad"]);
+        assert_eq!(expanded("k", "{09..10}").unwrap(), ["09", "10"]);
+        assert_eq!(expanded("k", "plain {x}").unwrap(), ["plain {x}"]);
+        assert_eq!(expanded("k", "a{b").unwrap(), ["a{b"]);
+    }
+
+    #[test]
+    fn absurd_ranges_are_refused() {
+        for pattern in ["q{7..1}", "q{1..9999999}", "q{a..b}", "q{1..99999999999999999999}", "q{-1..2}"] {
+            assert!(expanded("k", pattern).is_err(), "{pattern}");
+        }
+    }
+}

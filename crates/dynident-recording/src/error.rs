@@ -1,0 +1,223 @@
+//! What can go wrong between a log file and a motion: each message names the file, the place and the mend.
+
+use std::path::PathBuf;
+
+/// A [`LogFormat`](crate::LogFormat) that contradicts itself or the list of joints.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("log format, key `{key}`: {problem}; {mend}")]
+pub struct FormatError {
+    /// The key, dotted as in the study file: `torque.scale`.
+    pub key: String,
+    /// What is wrong with it.
+    pub problem: String,
+    /// What to write instead.
+    pub mend: String,
+}
+
+impl FormatError {
+    pub(crate) fn new(key: impl Into<String>, problem: impl Into<String>, mend: impl Into<String>) -> Self {
+        Self { key: key.into(), problem: problem.into(), mend: mend.into() }
+    }
+}
+
+/// A log that cannot be read or turned into a motion.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordingError {
+    /// The description of the log is wrong.
+    #[error(transparent)]
+    Format(#[from] FormatError),
+    /// The operating system refused the file.
+    #[error("{}: cannot be read ({source}); check the path and its permissions", file.display())]
+    Io {
+        /// The file.
+        file: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// No row of numbers in the file.
+    #[error("{}: no data rows after line {line}; the log needs at least one row of numbers", file.display())]
+    NoRows {
+        /// The file.
+        file: PathBuf,
+        /// Last line that was read, 1-based.
+        line: u64,
+    },
+    /// The file is not text.
+    #[error("{}:{line}: a NUL byte: this is not a text table; export the log as CSV", file.display())]
+    Binary {
+        /// The file.
+        file: PathBuf,
+        /// 1-based line.
+        line: u64,
+    },
+    /// A line beyond [`MAX_LINE_BYTES`](crate::MAX_LINE_BYTES).
+    #[error("{}:{line}: the line is longer than {limit} bytes; is this a CSV file with one sample per line?", file.display())]
+    LineTooLong {
+        /// The file.
+        file: PathBuf,
+        /// 1-based line.
+        line: u64,
+        /// The limit in bytes.
+        limit: usize,
+    },
+    /// Two columns of one name, one of which is asked for.
+    #[error("{}:{line}: column name `{name}` stands at columns {first} and {second}; address it by its 0-based index", file.display())]
+    DuplicateColumn {
+        /// The file.
+        file: PathBuf,
+        /// Line of the header, 1-based.
+        line: u64,
+        /// The name.
+        name: String,
+        /// 0-based index of its first place.
+        first: usize,
+        /// 0-based index of its second place.
+        second: usize,
+    },
+    /// A column that the file does not have.
+    #[error("{}:{line}: no column `{wanted}` (key `{key}`); {hint}", file.display())]
+    UnknownColumn {
+        /// The file.
+        file: PathBuf,
+        /// Line of the header (or of the first row), 1-based.
+        line: u64,
+        /// The key of the format that asks for it.
+        key: String,
+        /// What was asked for.
+        wanted: String,
+        /// What exists, and the nearest name.
+        hint: String,
+    },
+    /// A row with too few or too many fields.
+    #[error("{}:{line}: {found} fields where {expected} are expected; mend or delete the line{hint}", file.display())]
+    RaggedRow {
+        /// The file.
+        file: PathBuf,
+        /// 1-based line.
+        line: u64,
+        /// Number of fields in the header or the first row.
+        expected: usize,
+        /// Number of fields in this row.
+        found: usize,
+        /// A further hint, or nothing.
+        hint: &'static str,
+    },
+    /// A field that is no number.
+    #[error("{}:{line}, column {column}: `{text}` is not a number; {mend}", file.display())]
+    NotANumber {
+        /// The file.
+        file: PathBuf,
+        /// 1-based line.
+        line: u64,
+        /// Name or 0-based index of the column.
+        column: String,
+        /// The field, shortened and escaped.
+        text: String,
+        /// What to do.
+        mend: &'static str,
+    },
+    /// A field that is empty, NaN or infinite under `missing = "error"`.
+    #[error("{}:{line}, column {column}: `{text}` is not a finite number; set missing = \"drop\" to leave such rows out", file.display())]
+    Missing {
+        /// The file.
+        file: PathBuf,
+        /// 1-based line.
+        line: u64,
+        /// Name or 0-based index of the column.
+        column: String,
+        /// The field.
+        text: String,
+    },
+    /// A channel that overflows when its unit, scale, matrix or offset is applied.
+    #[error("{}, row {row}: {group} of joint `{joint}` is not finite after scaling; check the factors of `{group}` and the raw value", file.display())]
+    Overflow {
+        /// The log's main file.
+        file: PathBuf,
+        /// 0-based data row.
+        row: u64,
+        /// Key of the channel group.
+        group: &'static str,
+        /// The joint.
+        joint: String,
+    },
+    /// Files of one log that have different numbers of rows.
+    #[error("{} ends after {rows} rows but {} goes on; files of one log must hold the same samples", file.display(), other.display())]
+    UnequalFiles {
+        /// The shorter file.
+        file: PathBuf,
+        /// Its data rows.
+        rows: u64,
+        /// A longer file.
+        other: PathBuf,
+    },
+    /// The row or time range leaves nothing.
+    #[error("{}: the selection ({selection}) leaves no row of the {rows} in the file; widen it", file.display())]
+    EmptySelection {
+        /// The file.
+        file: PathBuf,
+        /// The keys in force.
+        selection: String,
+        /// Data rows in the file.
+        rows: u64,
+    },
+    /// Time stamps from which no rate follows.
+    #[error("{}: no sampling rate follows from column {column} ({reason}); check time.column and time.unit, or give rate_hz", file.display())]
+    NoRate {
+        /// The file.
+        file: PathBuf,
+        /// The time column.
+        column: String,
+        /// Why.
+        reason: String,
+    },
+    /// A setting of a filter that cannot be met.
+    #[error(transparent)]
+    Filter(#[from] FilterError),
+    /// No segment of the log is long enough for the filter.
+    #[error("{}: the longest uninterrupted piece has {found} samples, the {method} filter needs {needed}; widen the range or choose a shorter filter", file.display())]
+    TooShort {
+        /// The file.
+        file: PathBuf,
+        /// Samples in the longest segment.
+        found: usize,
+        /// Samples needed.
+        needed: usize,
+        /// The differentiator.
+        method: &'static str,
+    },
+}
+
+/// A filter that cannot be built, or a signal that it cannot be applied to.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FilterError {
+    /// A setting outside its range.
+    #[error("filter setting `{name}` = {value}: {mend}")]
+    Setting {
+        /// The setting.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The range.
+        mend: &'static str,
+    },
+    /// A cut-off at or above half the sampling rate.
+    #[error("cut-off {cutoff_hz} Hz is not below half the sampling rate of {rate_hz} Hz; lower it")]
+    AboveNyquist {
+        /// The cut-off.
+        cutoff_hz: f64,
+        /// The sampling rate.
+        rate_hz: f64,
+    },
+    /// A signal shorter than the filter's padding or window.
+    #[error("{found} samples are too few: the {method} filter needs {needed}")]
+    TooShort {
+        /// The filter.
+        method: &'static str,
+        /// Samples given.
+        found: usize,
+        /// Samples needed.
+        needed: usize,
+    },
+}

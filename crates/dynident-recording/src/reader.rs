@@ -1,0 +1,300 @@
+//! Logs as a stream of blocks: paired files, ranges, mapping to joints. Memory does not grow with the log.
+
+use crate::error::RecordingError;
+use crate::format::{LogFormat, Missing};
+use crate::mapping::Mapping;
+use crate::table::{Row, Table, row_count};
+use std::path::{Path, PathBuf};
+
+/// Rows of a [`RawBlock`] at most.
+pub const BLOCK_ROWS: usize = 4096;
+
+/// Some successive rows of a log in joint values (SI), as they were logged: no filter, no resampling.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RawBlock {
+    /// 0-based data row in the file of each sample; holes where rows were left out.
+    pub row: Vec<u64>,
+    /// Seconds after the first data row of the file.
+    pub time_s: Vec<f64>,
+    /// Positions, one vector for each joint (rad, m).
+    pub q: Vec<Vec<f64>>,
+    /// Logged velocities; empty without a `velocity` group.
+    pub dq: Vec<Vec<f64>>,
+    /// Logged accelerations; empty without an `acceleration` group.
+    pub ddq: Vec<Vec<f64>>,
+    /// Torques (N m, N).
+    pub tau: Vec<Vec<f64>>,
+}
+
+impl RawBlock {
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.row.len()
+    }
+}
+
+/// What the reader left out.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct LinesDropped {
+    /// Rows with an empty, NaN or infinite field, under `missing = "drop"`.
+    pub missing: u64,
+    /// File and line of a cut-off last row.
+    pub truncated: Option<String>,
+}
+
+#[derive(Debug)]
+struct Group {
+    key: &'static str,
+    file: usize,
+    slots: Vec<usize>,
+    mapping: Mapping,
+    columns: Vec<Vec<f64>>,
+}
+
+#[derive(Debug)]
+struct Source {
+    table: Table,
+    values: Vec<f64>,
+}
+
+/// A log that is being read.
+#[derive(Debug)]
+pub struct LogReader {
+    file: PathBuf,
+    joints: Vec<String>,
+    sources: Vec<Source>,
+    groups: Vec<Group>,
+    /// Slot of the time column in the main file and its factor to seconds.
+    time: Option<(usize, f64)>,
+    period_s: f64,
+    first_stamp_s: Option<f64>,
+    rows: [u64; 2],
+    time_range_s: [f64; 2],
+    selection: String,
+    missing: Missing,
+    next_row: u64,
+    delivered: u64,
+    finished: bool,
+    dropped: LinesDropped,
+}
+
+impl LogReader {
+    /// Opens the log whose main file is `file`; the `file` keys of channel groups are relative to its folder.
+    ///
+    /// # Errors
+    /// If the description is wrong, a file is missing or empty, or a column does not exist.
+    pub fn open(format: &LogFormat, file: &Path, joints: &[String]) -> Result<Self, RecordingError> {
+        format.validate(joints)?;
+        let folder = file.parent().unwrap_or(Path::new(""));
+        let mut sources = vec![Table::open(file, format)?];
+        let time = match &format.time {
+            Some(time) => Some((sources[0].want("time.column", &time.column)?, time.unit.seconds() * time.scale)),
+            None => None,
+        };
+        let mut groups = Vec::new();
+        for (key, group, quantity) in format.groups() {
+            let path = group.file.as_ref().map_or_else(|| file.to_owned(), |name| folder.join(name));
+            let source = match sources.iter().position(|table| table.path() == path) {
+                Some(known) => known,
+                None => {
+                    sources.push(Table::open(&path, format)?);
+                    sources.len() - 1
+                }
+            };
+            let list = group.column_list(key)?;
+            let slots = list.iter().map(|column| sources[source].want(&format!("{key}.columns"), column));
+            let slots = slots.collect::<Result<Vec<_>, _>>()?;
+            let mapping = Mapping::new(key, group, quantity, joints.len())?;
+            groups.push(Group { key, file: source, columns: vec![Vec::new(); slots.len()], slots, mapping });
+        }
+        let mut selection = Vec::new();
+        let rows = match (format.rows, format.fraction) {
+            (Some(rows), _) => {
+                selection.push(format!("rows = {rows:?}"));
+                rows
+            }
+            (None, Some([from, to])) => {
+                selection.push(format!("fraction = [{from}, {to}]"));
+                let count = row_count(file, format)? as f64;
+                [(from * count).round() as u64, (to * count).round() as u64]
+            }
+            (None, None) => [0, u64::MAX],
+        };
+        if let Some(range) = format.time_range_s {
+            selection.push(format!("time_range_s = {range:?}"));
+        }
+        let sources = sources.into_iter().map(|table| Source { values: vec![0.0; table.slots()], table }).collect();
+        Ok(Self {
+            file: file.to_owned(),
+            joints: joints.to_vec(),
+            sources,
+            groups,
+            time,
+            period_s: format.rate_hz.map_or(0.0, f64::recip),
+            first_stamp_s: None,
+            rows,
+            time_range_s: format.time_range_s.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
+            selection: selection.join(", "),
+            missing: format.missing,
+            next_row: 0,
+            delivered: 0,
+            finished: false,
+            dropped: LinesDropped::default(),
+        })
+    }
+
+    /// Rows and lines left out so far.
+    pub fn dropped(&self) -> &LinesDropped {
+        &self.dropped
+    }
+
+    /// Data rows of the file that were passed so far.
+    pub fn rows_passed(&self) -> u64 {
+        self.next_row
+    }
+
+    /// The main file.
+    pub fn file(&self) -> &Path {
+        &self.file
+    }
+
+    /// Name or index of the time column, for messages.
+    pub fn time_label(&self) -> String {
+        self.time.map_or_else(|| "none".to_owned(), |(slot, _)| self.sources[0].table.label_of_slot(slot))
+    }
+
+    /// Reads up to [`BLOCK_ROWS`] rows into `block`; false when the log has ended (and `block` is empty).
+    ///
+    /// # Errors
+    /// If a row cannot be read, files of one log differ in length, or the selection leaves no row at all.
+    pub fn next_block(&mut self, block: &mut RawBlock) -> Result<bool, RecordingError> {
+        block.row.clear();
+        block.time_s.clear();
+        for group in &mut self.groups {
+            group.columns.iter_mut().for_each(Vec::clear);
+        }
+        while !self.finished && block.row.len() < BLOCK_ROWS {
+            self.next_row_into(block)?;
+        }
+        for group in ["position", "velocity", "acceleration", "torque"] {
+            let (out, finite) = match group {
+                "position" => (&mut block.q, "position"),
+                "velocity" => (&mut block.dq, "velocity"),
+                "acceleration" => (&mut block.ddq, "acceleration"),
+                _ => (&mut block.tau, "torque"),
+            };
+            let Some(group) = self.groups.iter().find(|candidate| candidate.key == group) else {
+                out.clear();
+                continue;
+            };
+            out.resize(self.joints.len(), Vec::new());
+            group.mapping.apply(&group.columns, out);
+            for (joint, values) in out.iter().enumerate() {
+                if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+                    return Err(RecordingError::Overflow {
+                        file: self.file.clone(),
+                        row: block.row[at],
+                        group: finite,
+                        joint: self.joints[joint].clone(),
+                    });
+                }
+            }
+        }
+        self.delivered += block.row.len() as u64;
+        if block.row.is_empty() && self.delivered == 0 {
+            return Err(if self.next_row == 0 {
+                RecordingError::NoRows { file: self.file.clone(), line: self.sources[0].table.line() }
+            } else {
+                RecordingError::EmptySelection {
+                    file: self.file.clone(),
+                    selection: if self.selection.is_empty() {
+                        "missing = \"drop\"".to_owned()
+                    } else {
+                        self.selection.clone()
+                    },
+                    rows: self.next_row,
+                }
+            });
+        }
+        Ok(!block.row.is_empty())
+    }
+
+    fn next_row_into(&mut self, block: &mut RawBlock) -> Result<(), RecordingError> {
+        if self.next_row >= self.rows[1] {
+            self.finished = true;
+            return Ok(());
+        }
+        // The first row is always read: times count from it.
+        if self.next_row > 0 && self.next_row < self.rows[0] {
+            let mut ended = None;
+            for (index, source) in self.sources.iter_mut().enumerate() {
+                if !source.table.skip_row()? {
+                    ended = Some(index);
+                }
+            }
+            self.finished = ended.is_some();
+            self.next_row += u64::from(!self.finished);
+            return ended.map_or(Ok(()), |index| self.check_ends(index));
+        }
+        let (mut ended, mut missing) = (None, None);
+        for (index, source) in self.sources.iter_mut().enumerate() {
+            match source.table.next_row(&mut source.values)? {
+                Row::Values => {}
+                Row::Missing => missing = Some(index),
+                Row::End => ended = Some(index),
+            }
+        }
+        if let Some(index) = ended {
+            self.finished = true;
+            return self.check_ends(index);
+        }
+        let row = self.next_row;
+        self.next_row += 1;
+        if let Some(index) = missing {
+            if self.missing == Missing::Error {
+                let source = &self.sources[index];
+                return Err(source.table.missing_error(&source.values));
+            }
+            self.dropped.missing += u64::from(row >= self.rows[0]);
+            return Ok(());
+        }
+        let time_s = match self.time {
+            Some((slot, seconds)) => {
+                let stamp = self.sources[0].values[slot];
+                // The difference of the stamps first: nanoseconds since 1970 do not survive the multiplication.
+                (stamp - *self.first_stamp_s.get_or_insert(stamp)) * seconds
+            }
+            None => row as f64 * self.period_s,
+        };
+        if row < self.rows[0] || time_s < self.time_range_s[0] || time_s >= self.time_range_s[1] {
+            return Ok(());
+        }
+        block.row.push(row);
+        block.time_s.push(time_s);
+        for group in &mut self.groups {
+            let values = &self.sources[group.file].values;
+            for (column, slot) in group.columns.iter_mut().zip(&group.slots) {
+                column.push(values[*slot]);
+            }
+        }
+        Ok(())
+    }
+
+    /// The files of one log must end together; one cut-off last row is forgiven.
+    fn check_ends(&mut self, ended: usize) -> Result<(), RecordingError> {
+        for source in &mut self.sources {
+            if let Some(line) = source.table.truncated_line() {
+                self.dropped.truncated = Some(format!("{}:{line}", source.table.path().display()));
+            }
+        }
+        let (rows, file) = (self.sources[ended].table.rows(), self.sources[ended].table.path().to_owned());
+        let forgiven = u64::from(self.dropped.truncated.is_some());
+        for source in &mut self.sources {
+            let longer = source.table.rows() > rows;
+            if longer && (source.table.rows() > rows + forgiven || source.table.skip_row()?) {
+                return Err(RecordingError::UnequalFiles { file, rows, other: source.table.path().to_owned() });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,423 @@
+//! The whole way from a log file to q, dq, ddq and torque on a uniform clock, block by block.
+
+use crate::channel_checks::{ChannelCheck, quantisation_step};
+use crate::clock::{Clock, clock};
+use crate::comparison::Comparison;
+use crate::cutoff::{CUTOFF_SAMPLES, CutoffChoice, cutoff};
+use crate::differentiator::{Derivatives, Differentiator, DifferentiatorSettings};
+use crate::error::{FilterError, RecordingError};
+use crate::format::LogFormat;
+use crate::reader::{LogReader, RawBlock};
+use crate::report::ImportReport;
+use crate::segments::Segmenter;
+use crate::time_checks::TimeCheck;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Rows of a [`MotionBlock`] at least, but for the last of a segment.
+const CHUNK_ROWS: usize = 8192;
+
+/// How a log becomes a motion.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MotionSettings {
+    /// From q to dq and ddq.
+    pub differentiator: DifferentiatorSettings,
+    /// Also pass the torque through the differentiator's smoothing, as [`MotionBlock::tau_smooth`].
+    pub smooth_torque: bool,
+    /// Seconds left out at both ends of every uninterrupted piece, where a zero-phase filter has to invent
+    /// samples; 0 by default.
+    pub trim_s: f64,
+}
+
+impl MotionSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// A [`FilterError`] that names the setting.
+    pub fn validate(&self) -> Result<(), FilterError> {
+        if !(0.0..=1e6).contains(&self.trim_s) {
+            return Err(FilterError::Setting { name: "trim_s", value: self.trim_s, mend: "give seconds, 0 or more" });
+        }
+        self.differentiator.validate()
+    }
+}
+
+/// Successive samples of a motion on a uniform clock, joint-major: entry `joint * rows + row`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MotionBlock {
+    /// Samples per second.
+    pub rate_hz: f64,
+    /// Number of the uninterrupted piece: blocks of different pieces must not be filtered together.
+    pub segment: usize,
+    /// Time of the first row, in seconds after the first data row of the file.
+    pub first_time_s: f64,
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of joints.
+    pub joints: usize,
+    /// Filtered positions (rad, m).
+    pub q: Vec<f64>,
+    /// Velocities (rad/s, m/s).
+    pub dq: Vec<f64>,
+    /// Accelerations (rad/s², m/s²).
+    pub ddq: Vec<f64>,
+    /// Torques as logged, on the uniform clock, unfiltered (N m, N).
+    pub tau: Vec<f64>,
+    /// Torques smoothed like the positions; empty unless asked for.
+    pub tau_smooth: Vec<f64>,
+}
+
+impl MotionBlock {
+    /// One joint's part of `values` (one of this block's own fields).
+    pub fn joint<'a>(&self, values: &'a [f64], joint: usize) -> &'a [f64] {
+        &values[joint * self.rows..(joint + 1) * self.rows]
+    }
+}
+
+/// A log on its way to a motion; memory does not grow with the log's length, unless the differentiator needs
+/// the whole log.
+///
+/// Opening reads a bounded first part of the log to decide on clock, rate and cut-off; then the log is read once more from
+/// the start, as [`next_block`](Self::next_block) is called.
+#[derive(Debug)]
+pub struct MotionStream {
+    reader: LogReader,
+    raw: RawBlock,
+    raw_at: usize,
+    joints: Vec<String>,
+    clock: Clock,
+    cutoff: CutoffChoice,
+    differentiator: Box<dyn Differentiator>,
+    smooth_torque: bool,
+    trim: usize,
+    /// Samples on either side of a chunk that enter it; `None`: the whole segment.
+    context: Option<usize>,
+    segmenter: Segmenter,
+    /// Channels on the uniform clock: positions, torques, logged velocities, logged accelerations.
+    uniform: Vec<Vec<f64>>,
+    /// Samples of `uniform` that were given out and stay as context.
+    done: usize,
+    /// Samples of the segment before those in `uniform`.
+    passed: u64,
+    ended: bool,
+    segments: usize,
+    short_segments: [u64; 2],
+    longest_short: usize,
+    rows: u64,
+    time_check: TimeCheck,
+    checks: Vec<ChannelCheck>,
+    velocity: Vec<Comparison>,
+    acceleration: Vec<Comparison>,
+    window: [Vec<f64>; 4],
+}
+
+/// The first part of a log, as read for the decisions.
+struct Prefix {
+    row: Vec<u64>,
+    time_s: Vec<f64>,
+    q: Vec<Vec<f64>>,
+    tau: Vec<Vec<f64>>,
+}
+
+impl MotionStream {
+    /// Opens the log whose main file is `file` and decides on clock and cut-off.
+    ///
+    /// # Errors
+    /// If settings or description are wrong, the file cannot be read, or no rate follows from it.
+    pub fn open(
+        format: &LogFormat,
+        file: &Path,
+        joints: &[String],
+        settings: &MotionSettings,
+    ) -> Result<Self, RecordingError> {
+        settings.validate()?;
+        let (prefix, time_label) = prefix(format, file, joints)?;
+        let clock = match format.rate_hz {
+            Some(rate_hz) => Clock {
+                rate_hz,
+                uniform: true,
+                median_step_s: rate_hz.recip(),
+                misfit_uniform: None,
+                misfit_stamps: None,
+                evidence: "even spacing: the rate is given, there are no stamps".to_owned(),
+            },
+            None => clock(format.clock, &prefix.time_s, &prefix.row, &prefix.q, format.max_gap_steps)
+                .map_err(|reason| RecordingError::NoRate { file: file.to_owned(), column: time_label, reason })?,
+        };
+        let segmenter = Segmenter::new(&clock, format.max_gap_steps, 2 * joints.len());
+        let cutoff = cutoff(&longest_segment(segmenter, &prefix), clock.rate_hz);
+        let differentiator = settings.differentiator.build(cutoff.cutoff_hz)?;
+        let mut checks = Vec::new();
+        for (key, _, quantity) in format.groups() {
+            for (index, joint) in joints.iter().enumerate() {
+                let mut check = ChannelCheck::new(quantity, joint);
+                check.quantisation_step = match key {
+                    "position" => quantisation_step(&prefix.q[index]),
+                    "torque" => quantisation_step(&prefix.tau[index]),
+                    _ => None,
+                };
+                checks.push(check);
+            }
+        }
+        let comparisons = |group: bool| -> Vec<Comparison> {
+            joints.iter().filter(|_| group).map(|joint| Comparison::new(joint)).collect()
+        };
+        let (velocity, acceleration) =
+            (comparisons(format.velocity.is_some()), comparisons(format.acceleration.is_some()));
+        let channels = 2 * joints.len() + velocity.len() + acceleration.len();
+        Ok(Self {
+            reader: LogReader::open(format, file, joints)?,
+            raw: RawBlock::default(),
+            raw_at: 0,
+            joints: joints.to_vec(),
+            trim: (settings.trim_s * clock.rate_hz).round() as usize,
+            context: differentiator.context_samples(clock.rate_hz),
+            segmenter: Segmenter::new(&clock, format.max_gap_steps, channels),
+            time_check: TimeCheck::new(clock.median_step_s),
+            clock,
+            cutoff,
+            differentiator,
+            smooth_torque: settings.smooth_torque,
+            uniform: vec![Vec::new(); channels],
+            done: 0,
+            passed: 0,
+            ended: false,
+            segments: 0,
+            short_segments: [0; 2],
+            longest_short: 0,
+            rows: 0,
+            checks,
+            velocity,
+            acceleration,
+            window: Default::default(),
+        })
+    }
+
+    /// Samples per second of the motion.
+    pub fn rate_hz(&self) -> f64 {
+        self.clock.rate_hz
+    }
+
+    /// The cut-off that the data suggest; in force unless the settings name one.
+    pub fn cutoff(&self) -> &CutoffChoice {
+        &self.cutoff
+    }
+
+    /// Fills `block` with the next samples; false (and an empty block) at the end.
+    ///
+    /// # Errors
+    /// If the log cannot be read further, or no piece of it is long enough for the filter.
+    pub fn next_block(&mut self, block: &mut MotionBlock) -> Result<bool, RecordingError> {
+        loop {
+            let available = self.uniform[0].len();
+            if let Some(context) = self.context
+                && available >= self.done + self.chunk() + context.max(self.trim)
+            {
+                let end = self.done + self.chunk();
+                if self.give(block, end, false)? {
+                    return Ok(true);
+                }
+                continue;
+            }
+            if self.segmenter.closed() || self.ended {
+                let given = self.close_segment(block)?;
+                if given {
+                    return Ok(true);
+                }
+                if self.ended && self.raw_at >= self.raw.rows() {
+                    return self.finish(block);
+                }
+                continue;
+            }
+            self.feed()?;
+        }
+    }
+
+    fn finish(&self, block: &mut MotionBlock) -> Result<bool, RecordingError> {
+        *block = MotionBlock { rate_hz: self.clock.rate_hz, joints: self.joints.len(), ..MotionBlock::default() };
+        if self.segments == 0 {
+            return Err(RecordingError::TooShort {
+                file: self.reader.file().to_owned(),
+                found: self.longest_short,
+                needed: self.needed(),
+                method: self.differentiator.name(),
+            });
+        }
+        Ok(false)
+    }
+
+    /// Shortest piece that gives at least one sample.
+    fn needed(&self) -> usize {
+        self.differentiator.minimum_samples().max(2 * self.trim + 1)
+    }
+
+    fn chunk(&self) -> usize {
+        CHUNK_ROWS.max(4 * self.context.unwrap_or(0))
+    }
+
+    /// Moves raw rows to the uniform clock until the raw block or the segment ends.
+    fn feed(&mut self) -> Result<(), RecordingError> {
+        if self.raw_at >= self.raw.rows() {
+            self.raw_at = 0;
+            if !self.reader.next_block(&mut self.raw)? {
+                self.ended = true;
+                self.segmenter.close(&mut self.uniform);
+                return Ok(());
+            }
+            self.rows += self.raw.rows() as u64;
+            for (row, time_s) in self.raw.row.iter().zip(&self.raw.time_s) {
+                self.time_check.see(*row, *time_s);
+            }
+            // In the order of LogFormat::groups.
+            let logged = self.raw.q.iter().chain(&self.raw.dq).chain(&self.raw.ddq).chain(&self.raw.tau);
+            for (check, values) in self.checks.iter_mut().zip(logged) {
+                check.see(values);
+            }
+        }
+        let raw = &self.raw;
+        self.raw_at = self.segmenter.feed(&raw.row, &raw.time_s, self.raw_at, &mut self.uniform, || {
+            raw.q.iter().chain(&raw.tau).chain(&raw.dq).chain(&raw.ddq)
+        });
+        Ok(())
+    }
+
+    /// Gives out what remains of the segment and starts the next.
+    fn close_segment(&mut self, block: &mut MotionBlock) -> Result<bool, RecordingError> {
+        let available = self.uniform[0].len();
+        let total = self.passed + available as u64;
+        let mut given = false;
+        if available > 0 {
+            if total < self.needed() as u64 {
+                self.short_segments[0] += 1;
+                self.short_segments[1] += total;
+                self.longest_short = self.longest_short.max(total as usize);
+            } else {
+                let end = available.saturating_sub(self.trim);
+                given = self.give(block, end, true)?;
+                self.segments += 1;
+            }
+        }
+        self.uniform.iter_mut().for_each(Vec::clear);
+        self.done = 0;
+        self.passed = 0;
+        self.segmenter.reopen();
+        Ok(given)
+    }
+
+    /// Differentiates and gives out the samples from the first not yet given to `end`; false if trimming leaves none.
+    fn give(&mut self, block: &mut MotionBlock, end: usize, last: bool) -> Result<bool, RecordingError> {
+        let context = self.context.unwrap_or(usize::MAX);
+        let window_from = self.done.saturating_sub(context);
+        let window_to = if last { self.uniform[0].len() } else { end + context };
+        let from = self.done.max(self.trim.saturating_sub(self.passed as usize));
+        let (joints, rows) = (self.joints.len(), end.saturating_sub(from));
+        let rate = self.clock.rate_hz;
+        block.rate_hz = rate;
+        block.segment = self.segments;
+        block.first_time_s = self.segmenter.first_time_s() + (self.passed as f64 + from as f64) / rate;
+        block.rows = rows;
+        block.joints = joints;
+        for values in [&mut block.q, &mut block.dq, &mut block.ddq, &mut block.tau, &mut block.tau_smooth] {
+            values.clear();
+        }
+        if rows > 0 {
+            let inside = from - window_from..end - window_from;
+            let [q, dq, ddq, other] = &mut self.window;
+            for values in [&mut *q, &mut *dq, &mut *ddq, &mut *other] {
+                values.resize(window_to - window_from, 0.0);
+            }
+            for joint in 0..joints {
+                let signal = &self.uniform[joint][window_from..window_to];
+                self.differentiator.differentiate(rate, signal, Derivatives { q, dq, ddq })?;
+                block.q.extend_from_slice(&q[inside.clone()]);
+                block.dq.extend_from_slice(&dq[inside.clone()]);
+                block.ddq.extend_from_slice(&ddq[inside.clone()]);
+                let tau = &self.uniform[joints + joint];
+                block.tau.extend_from_slice(&tau[from..end]);
+                if self.smooth_torque {
+                    self.differentiator.smooth(rate, &tau[window_from..window_to], other)?;
+                    block.tau_smooth.extend_from_slice(&other[inside.clone()]);
+                }
+                let channel = 2 * joints + joint;
+                if let Some(comparison) = self.velocity.get_mut(joint) {
+                    self.differentiator.smooth(rate, &self.uniform[channel][window_from..window_to], other)?;
+                    comparison.see(&dq[inside.clone()], &other[inside.clone()]);
+                }
+                if let Some(comparison) = self.acceleration.get_mut(joint) {
+                    let channel = channel + self.velocity.len();
+                    self.differentiator.smooth(rate, &self.uniform[channel][window_from..window_to], other)?;
+                    comparison.see(&ddq[inside.clone()], &other[inside.clone()]);
+                }
+            }
+        }
+        self.done = end.max(self.done);
+        let unneeded = self.done.saturating_sub(context);
+        if unneeded > 0 {
+            self.uniform.iter_mut().for_each(|channel| drop(channel.drain(..unneeded)));
+            self.done -= unneeded;
+            self.passed += unneeded as u64;
+        }
+        Ok(rows > 0)
+    }
+
+    /// What was found so far; complete once [`next_block`](Self::next_block) has returned false.
+    pub fn report(&self) -> ImportReport {
+        let mut report = ImportReport {
+            file: self.reader.file().display().to_string(),
+            rows: self.rows,
+            rate_hz: self.clock.rate_hz,
+            clock: self.clock.clone(),
+            steps: self.time_check.steps(),
+            gap_count: self.time_check.gap_count,
+            gaps: self.time_check.gaps.clone(),
+            duplicate_stamps: self.time_check.duplicates,
+            backward_stamps: self.time_check.backward,
+            crowded_samples: self.segmenter.crowded(),
+            dropped: self.reader.dropped().clone(),
+            segments: self.segments,
+            short_segments: self.short_segments,
+            channels: self.checks.iter().map(ChannelCheck::report).collect(),
+            velocity: self.velocity.iter().map(|c| c.report(self.clock.rate_hz)).collect(),
+            acceleration: self.acceleration.iter().map(|c| c.report(self.clock.rate_hz)).collect(),
+            cutoff: self.cutoff.clone(),
+            findings: Vec::new(),
+        };
+        report.find();
+        report
+    }
+}
+
+/// Reads the first [`CUTOFF_SAMPLES`] rows.
+fn prefix(format: &LogFormat, file: &Path, joints: &[String]) -> Result<(Prefix, String), RecordingError> {
+    let mut reader = LogReader::open(format, file, joints)?;
+    let columns = || vec![Vec::new(); joints.len()];
+    let mut prefix = Prefix { row: Vec::new(), time_s: Vec::new(), q: columns(), tau: columns() };
+    let mut raw = RawBlock::default();
+    while prefix.row.len() < CUTOFF_SAMPLES && reader.next_block(&mut raw)? {
+        prefix.row.extend_from_slice(&raw.row);
+        prefix.time_s.extend_from_slice(&raw.time_s);
+        for (all, block) in prefix.q.iter_mut().zip(&raw.q).chain(prefix.tau.iter_mut().zip(&raw.tau)) {
+            all.extend_from_slice(block);
+        }
+    }
+    Ok((prefix, reader.time_label()))
+}
+
+/// Positions of the longest uninterrupted piece of the prefix, on the uniform clock.
+fn longest_segment(mut segmenter: Segmenter, prefix: &Prefix) -> Vec<Vec<f64>> {
+    let joints = prefix.q.len();
+    let mut longest = vec![Vec::new(); joints];
+    let mut at = 0;
+    while at < prefix.row.len() {
+        let mut piece = vec![Vec::new(); 2 * joints];
+        at = segmenter.feed(&prefix.row, &prefix.time_s, at, &mut piece, || prefix.q.iter().chain(&prefix.tau));
+        segmenter.close(&mut piece);
+        segmenter.reopen();
+        piece.truncate(joints);
+        if piece.first().map_or(0, Vec::len) > longest.first().map_or(0, Vec::len) {
+            longest = piece;
+        }
+    }
+    longest
+}

@@ -1,0 +1,66 @@
+//! Units at the edge: from what a log says to SI.
+
+/// What a channel measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Joint or motor position (rad, m).
+    Position,
+    /// Its first derivative (rad/s, m/s).
+    Velocity,
+    /// Its second derivative (rad/s², m/s²).
+    Acceleration,
+    /// Torque or force (N m, N), or a current that `scale` turns into one.
+    Torque,
+}
+
+/// Name, quantity, factor to SI.
+const UNITS: &[(&str, Quantity, f64)] = &[
+    ("rad", Quantity::Position, 1.0),
+    ("mrad", Quantity::Position, 1e-3),
+    ("deg", Quantity::Position, core::f64::consts::PI / 180.0),
+    ("rev", Quantity::Position, core::f64::consts::TAU),
+    ("m", Quantity::Position, 1.0),
+    ("mm", Quantity::Position, 1e-3),
+    ("count", Quantity::Position, 1.0),
+    ("rad/s", Quantity::Velocity, 1.0),
+    ("deg/s", Quantity::Velocity, core::f64::consts::PI / 180.0),
+    ("rpm", Quantity::Velocity, core::f64::consts::TAU / 60.0),
+    ("m/s", Quantity::Velocity, 1.0),
+    ("mm/s", Quantity::Velocity, 1e-3),
+    ("rad/s^2", Quantity::Acceleration, 1.0),
+    ("deg/s^2", Quantity::Acceleration, core::f64::consts::PI / 180.0),
+    ("m/s^2", Quantity::Acceleration, 1.0),
+    ("mm/s^2", Quantity::Acceleration, 1e-3),
+    ("N m", Quantity::Torque, 1.0),
+    ("Nm", Quantity::Torque, 1.0),
+    ("mN m", Quantity::Torque, 1e-3),
+    ("N", Quantity::Torque, 1.0),
+    ("A", Quantity::Torque, 1.0),
+    ("mA", Quantity::Torque, 1e-3),
+    ("%", Quantity::Torque, 1e-2),
+    ("raw", Quantity::Torque, 1.0),
+];
+
+/// The factor that turns a value in `unit` into SI: rad, m, their rates, N m, N, and A (times `scale` in N m/A).
+/// `None` if `unit` is no unit of `quantity`.
+pub fn si_factor(unit: &str, quantity: Quantity) -> Option<f64> {
+    UNITS.iter().find(|(name, of, _)| *name == unit && *of == quantity).map(|(_, _, factor)| *factor)
+}
+
+/// The units that exist for `quantity`, for messages.
+pub fn unit_names(quantity: Quantity) -> Vec<&'static str> {
+    UNITS.iter().filter(|(_, of, _)| *of == quantity).map(|(name, _, _)| *name).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn factors_are_those_of_the_si_brochure() {
+        assert_eq!(si_factor("deg", Quantity::Position).map(|f| f * 180.0), Some(core::f64::consts::PI));
+        assert_eq!(si_factor("rpm", Quantity::Velocity).map(|f| f * 60.0), Some(core::f64::consts::TAU));
+        assert_eq!(si_factor("deg", Quantity::Torque), None);
+        assert!(unit_names(Quantity::Torque).contains(&"A"));
+    }
+}

@@ -1,0 +1,104 @@
+"""Makes the golden files again and compares them with the committed ones: exit status 1 and one line a difference.
+
+    python golden/check.py [NAME ...]
+
+NAME picks generators of the table below (default: all). Text and structure must be equal, numbers to 1e-12 relative to
+the largest of their array: the generators are deterministic, and what remains between two machines is the last bit of
+sine and cosine (the C library picks its version by processor), which shows here as up to 2e-14 of an array's largest entry.
+"""
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+RELATIVE = 1e-12
+
+# name: (script, golden files it makes). Every script takes `--out DIR` (default: its own folder).
+GENERATORS = {
+    "pinocchio": ("pinocchio.py", "pinocchio/*.json"),
+    "mujoco": ("mujoco_inverse.py", "mujoco/*.json"),
+    "scipy": ("scipy_filters.py", "scipy_*.json"),
+    "statsmodels": ("statsmodels_estimators.py", "statsmodels_*.json"),
+}
+
+
+def numbers(x):
+    """The numbers of a nested list, or None where it holds anything else."""
+    if isinstance(x, bool) or not isinstance(x, (int, float, list)):
+        return None
+    if not isinstance(x, list):
+        return [float(x)]
+    parts = [numbers(v) for v in x]
+    return None if any(p is None for p in parts) else [v for p in parts for v in p]
+
+
+def shape(x):
+    return [shape(v) for v in x] if isinstance(x, list) else 0
+
+
+def differences(old, new, where):
+    if isinstance(old, dict) and isinstance(new, dict):
+        for key in sorted(old.keys() | new.keys()):
+            if key not in old or key not in new:
+                yield f"{where}.{key}: only in the {'committed' if key in old else 'new'} file"
+            else:
+                yield from differences(old[key], new[key], f"{where}.{key}")
+        return
+    a, b = numbers(old), numbers(new)
+    if a is None or b is None:
+        if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+            for i, (x, y) in enumerate(zip(old, new)):
+                yield from differences(x, y, f"{where}[{i}]")
+        elif old != new:
+            yield f"{where}: {old!r} became {new!r}"
+    elif shape(old) != shape(new):
+        yield f"{where}: the shape changed"
+    elif a:
+        error = max(abs(x - y) for x, y in zip(a, b))
+        # Quantities are in SI units of a human-sized arm: what is below 1e-3 in all its entries is judged absolutely.
+        scale = max(max(map(abs, a)), 1e-3)
+        if not error <= RELATIVE * scale:
+            yield f"{where}: differs by {error:.3g}, {error / scale:.3g} of its largest entry (limit {RELATIVE:g})"
+
+
+def check(name, folder):
+    """Differences between the committed files of one generator and those it makes now in `folder`."""
+    script, pattern = GENERATORS[name]
+    if not (HERE / script).exists():
+        return [f"golden/{script}: missing, though the table of golden/check.py lists it"]
+    made = subprocess.run([sys.executable, str(HERE / script), "--out", str(folder)], capture_output=True, text=True)
+    if made.returncode:
+        return [f"golden/{script}: exit status {made.returncode}\n{made.stderr.strip()}"]
+    old = {p.relative_to(HERE) for p in HERE.glob(pattern)}
+    new = {p.relative_to(folder) for p in folder.glob(pattern)}
+    found = [f"golden/{p}: only {'committed' if p in old else 'made now'}" for p in sorted(old ^ new)]
+    if not new:
+        found.append(f"golden/{script}: made no file {pattern}")
+    for path in sorted(old & new):
+        a, b = (json.loads((root / path).read_text(encoding="utf-8")) for root in (HERE, folder))
+        found += list(differences(a, b, f"golden/{path}"))
+    return found
+
+
+def main():
+    names = sys.argv[1:] or list(GENERATORS)
+    unknown = [n for n in names if n not in GENERATORS]
+    if unknown:
+        sys.exit(f"unknown: {', '.join(unknown)} (known: {', '.join(GENERATORS)})")
+    failed = False
+    for name in names:
+        with tempfile.TemporaryDirectory() as folder:
+            found = check(name, Path(folder))
+        failed |= bool(found)
+        for line in found[:20]:
+            print(line)
+        if len(found) > 20:
+            print(f"... and {len(found) - 20} more")
+        print(f"{name}: {'differs' if found else 'agrees'}")
+    sys.exit(1 if failed else 0)
+
+
+if __name__ == "__main__":
+    main()

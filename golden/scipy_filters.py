@@ -1,0 +1,92 @@
+"""Golden numbers for the filters of dynident-recording, made by SciPy and NumPy.
+
+    python3 golden/scipy_filters.py [--out DIR]
+
+Writes scipy_filters.json. Seeded; the versions that made it are in the file.
+"""
+import argparse
+import math
+import pathlib
+
+import numpy as np
+import scipy
+from scipy import signal
+from scipy.signal._arraytools import odd_ext
+
+from write_json import write
+
+SEED = 20261121
+
+
+def smooth_and_derivatives(x, order, cutoff_hz, rate_hz):
+    """sosfiltfilt of x, and central differences of sixth order of its output, the odd extension kept so that the
+    differences at the ends are central too."""
+    sos = signal.butter(order, cutoff_hz, fs=rate_hz, output="sos")
+    sections = len(sos)
+    pad = 3 * (2 * sections + 1 - min((sos[:, 2] == 0).sum(), (sos[:, 5] == 0).sum()))
+    extended = odd_ext(x, pad)
+    zi = signal.sosfilt_zi(sos)
+    y, _ = signal.sosfilt(sos, extended, zi=zi * extended[0])
+    y, _ = signal.sosfilt(sos, y[::-1], zi=zi * y[-1])
+    y = y[::-1]
+    reference = signal.sosfiltfilt(sos, x)
+    assert np.allclose(y[pad:-pad], reference, rtol=0, atol=1e-14 * np.abs(x).max())
+    at = np.arange(pad, pad + len(x))
+    dq = rate_hz * (45 * (y[at + 1] - y[at - 1]) - 9 * (y[at + 2] - y[at - 2]) + (y[at + 3] - y[at - 3])) / 60
+    ddq = rate_hz**2 * (
+        270 * (y[at + 1] + y[at - 1]) - 27 * (y[at + 2] + y[at - 2]) + 2 * (y[at + 3] + y[at - 3]) - 490 * y[at]
+    ) / 180
+    return {"order": order, "cutoff_hz": cutoff_hz, "rate_hz": rate_hz, "q": reference, "dq": dq, "ddq": ddq}
+
+
+def kaiser_taps(factor, stop_band_db, rate_hz):
+    """Kaiser-windowed sinc by scipy.signal.firwin, with the length and shape that DecimationSettings documents."""
+    reduced = rate_hz / factor
+    attenuation = stop_band_db + 2.0
+    width = 2 * math.pi * 0.4 * reduced / rate_hz
+    length = (attenuation - 7.95) / (2.285 * width) + 1
+    count = 2 * (math.ceil(length) // 2) + 1
+    window = ("kaiser", signal.kaiser_beta(attenuation))
+    return {
+        "factor": factor,
+        "stop_band_db": stop_band_db,
+        "rate_hz": rate_hz,
+        "taps": signal.firwin(count, 0.4 * reduced, window=window, fs=rate_hz, scale=True),
+    }
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path(__file__).resolve().parent)
+    out = parser.parse_args().out
+    random = np.random.default_rng(SEED)
+    # A motion with an offset, an end away from rest, and encoder noise.
+    t = np.arange(160) / 200.0
+    x = 1.3 + np.sin(4.0 * t + 0.3) + 0.4 * np.cos(11.0 * t) + 1e-3 * random.standard_normal(len(t))
+    golden = {
+        "versions": {"numpy": np.__version__, "scipy": scipy.__version__},
+        "seed": SEED,
+        "signal": x,
+        "butterworth": [
+            smooth_and_derivatives(x, order, cutoff_hz, 200.0)
+            for order, cutoff_hz in [(1, 20.0), (2, 5.0), (3, 12.0), (4, 8.0), (5, 30.0), (6, 15.0), (8, 40.0), (4, 90.0)]
+        ],
+        "savitzky_golay": [
+            {
+                "window": window,
+                "degree": degree,
+                "rate_hz": 200.0,
+                "derivatives": [
+                    signal.savgol_filter(x, window, degree, deriv=d, delta=1 / 200.0, mode="interp") for d in range(3)
+                ],
+            }
+            for window, degree in [(5, 2), (5, 3), (11, 4), (31, 5), (101, 8)]
+        ],
+        "gradient": np.gradient(x, 1 / 200.0, edge_order=2),
+        "decimation": [kaiser_taps(*case) for case in [(2, 60.0, 1000.0), (10, 60.0, 1000.0), (5, 90.0, 500.0), (25, 40.0, 5000.0)]],
+    }
+    write(out / "scipy_filters.json", golden)
+
+
+if __name__ == "__main__":
+    main()
