@@ -2,8 +2,9 @@
 
 use crate::error::Error;
 use crate::evidence::{Evidence, PriorAgreement, findings};
+use crate::lag::{self, LAG_SAMPLES, LagCheck};
 use crate::machine::{Machine, prior_parameters};
-use crate::progress::Progress;
+use crate::progress::{Progress, Silent};
 use crate::result::{
     BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, MethodSummary, PhysicalVerdict, RESULT_SCHEMA,
     ResultFile, RobotSummary, Timings, TrainingJoint, TrainingResult,
@@ -86,7 +87,14 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
     timings.estimation = started.elapsed().as_secs_f64();
 
     let started = Instant::now();
-    let mut logs: Vec<LogSummary> = fits.iter().map(|fit| fit.summary.clone()).collect();
+    let joints = joint_names(&machine);
+    let mut logs = Vec::new();
+    for fit in &fits {
+        let mut summary = fit.summary.clone();
+        summary.torque_lag_s = training_lags(study, &machine, &motion, fit.index, &files[fit.index], &estimate.values)?;
+        summary.model_findings.extend(lag::findings(&summary.torque_lag_s, &joints));
+        logs.push(summary);
+    }
     let mut validation = Vec::new();
     for index in of_role(study, Role::Validate) {
         let (summary, figures) =
@@ -158,10 +166,7 @@ impl RowSink for FitSink<'_> {
             .map_err(|source| Error::Estimation { path: PathBuf::from(&self.file), source })
     }
 
-    fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), Error> {
-        if let Some(evidence) = &mut self.evidence {
-            evidence.raw(samples, &mut self.buffer);
-        }
+    fn raw(&mut self, _samples: &RawSamples<'_>) -> Result<(), Error> {
         Ok(())
     }
 }
@@ -215,13 +220,30 @@ fn read_log(
         index,
         file,
         reader_thread: alone && options.threads > 1,
+        most_samples: None,
         progress: options.progress,
     };
     let passed = pass.run(&mut sink)?;
     let joints = joint_names(machine);
-    let agreement = sink.evidence.as_ref().map(|evidence| evidence.agreement(&joints, passed.motion_cutoff_hz));
-    let summary = log_summary(study, index, passed, agreement, &joints);
+    let agreement = sink.evidence.as_ref().map(|evidence| evidence.agreement(&joints));
+    let summary = log_summary(study, index, passed, agreement, Vec::new(), &joints);
     Ok(LogFit { index, factors: sink.factors, summary })
+}
+
+/// A second look at the first samples of a log, now that there is a model to predict them with.
+fn training_lags(
+    study: &Study,
+    machine: &Machine,
+    motion: &MotionSettings,
+    index: usize,
+    file: &Path,
+    theta: &[f64],
+) -> Result<Vec<Option<f64>>, Error> {
+    let mut check = LagCheck::new(machine, theta);
+    let most_samples = Some(LAG_SAMPLES as u64);
+    let pass = Pass { study, machine, motion, index, file, reader_thread: false, most_samples, progress: &Silent };
+    let passed = pass.run(&mut check)?;
+    Ok(check.lags(passed.motion_cutoff_hz))
 }
 
 pub(crate) fn joint_names(machine: &Machine) -> Vec<String> {
@@ -233,8 +255,11 @@ pub(crate) fn log_summary(
     index: usize,
     passed: Passed,
     prior_agreement: Option<PriorAgreement>,
+    torque_lag_s: Vec<Option<f64>>,
     joints: &[String],
 ) -> LogSummary {
+    let mut model_findings = prior_agreement.as_ref().map_or_else(Vec::new, findings);
+    model_findings.extend(lag::findings(&torque_lag_s, joints));
     LogSummary {
         log: study.log_name(index),
         role: match study.log[index].role {
@@ -245,7 +270,8 @@ pub(crate) fn log_summary(
         filter_cutoff_hz: passed.filter_cutoff_hz,
         filtered_rate_hz: passed.filtered_rate_hz,
         filtered_rows: passed.filtered_rows,
-        model_findings: prior_agreement.as_ref().map_or_else(Vec::new, |agreement| findings(agreement, joints)),
+        model_findings,
+        torque_lag_s,
         prior_agreement,
         import: passed.report,
     }

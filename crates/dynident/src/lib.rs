@@ -10,6 +10,7 @@ mod evaluate;
 mod evidence;
 mod identify;
 mod inspect;
+mod lag;
 mod machine;
 mod output;
 mod progress;

@@ -223,7 +223,9 @@ pub struct LogSummary {
     pub filtered_rows: u64,
     /// The log against the description's own inertials.
     pub prior_agreement: Option<PriorAgreement>,
-    /// What follows from that.
+    /// Lag of torque behind motion by joint, seconds, by the fitted model; none where the motion does not tell.
+    pub torque_lag_s: Vec<Option<f64>>,
+    /// What follows from both.
     pub model_findings: Vec<Finding>,
 }
 

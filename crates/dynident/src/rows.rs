@@ -67,6 +67,8 @@ pub(crate) struct Pass<'a> {
     pub(crate) index: usize,
     pub(crate) file: &'a Path,
     pub(crate) reader_thread: bool,
+    /// Stop after about so many samples.
+    pub(crate) most_samples: Option<u64>,
     pub(crate) progress: &'a dyn Progress,
 }
 
@@ -81,11 +83,12 @@ impl Pass<'_> {
         let motion_cutoff_hz = named_cutoff(self.motion);
         let settings = decimation(&self.study.parallel_filter, stream.rate_hz(), motion_cutoff_hz);
         let mut computer = Computer::new(self, &log, &stream, settings.as_ref())?;
-        if self.reader_thread {
+        if self.reader_thread && self.most_samples.is_none() {
             read_beside(&mut stream, |block| computer.take(block, sink)).map_err(|error| error.named(&log))?;
         } else {
             let mut block = MotionBlock::default();
-            while stream.next_block(&mut block).map_err(failed)? {
+            let most = self.most_samples.unwrap_or(u64::MAX);
+            while computer.samples < most && stream.next_block(&mut block).map_err(failed)? {
                 computer.take(&block, sink)?;
             }
         }

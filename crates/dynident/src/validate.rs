@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::evidence::{Evidence, predicted};
 use crate::identify::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
+use crate::lag::LagCheck;
 use crate::machine::Machine;
 use crate::result::{BaseParameterResult, LogSummary, LogValidation};
 use crate::rows::{JointRows, Pass, RawSamples, RowSink, estimated_rows, motion_in_force, named_cutoff};
@@ -118,6 +119,7 @@ struct TestSink<'a> {
     raw: Validation,
     prior: Option<(&'a [f64], Validation)>,
     evidence: Option<Evidence<'a>>,
+    lag: LagCheck<'a>,
     buffer: Vec<f64>,
 }
 
@@ -153,10 +155,7 @@ impl RowSink for TestSink<'_> {
             let added = self.raw.add_joint(joint, &panel[columns.len() * rows..], &self.buffer);
             added.map_err(|source| self.failed(source))?;
         }
-        if let Some(evidence) = &mut self.evidence {
-            evidence.raw(samples, &mut self.buffer);
-        }
-        Ok(())
+        self.lag.raw(samples)
     }
 }
 
@@ -180,20 +179,30 @@ pub(crate) fn validate_log(
         raw: Validation::new(joints.clone()),
         prior: machine.prior.as_deref().map(|prior| (prior, Validation::new(joints.clone()))),
         evidence: machine.prior.as_deref().map(|prior| Evidence::new(columns, prior)),
+        lag: LagCheck::new(machine, theta),
         buffer: Vec::new(),
     };
     options.progress.begin(&format!("testing on {}", study.log_name(index)), estimated_rows([file]));
-    let pass =
-        Pass { study, machine, motion, index, file, reader_thread: options.threads > 1, progress: options.progress };
+    let pass = Pass {
+        study,
+        machine,
+        motion,
+        index,
+        file,
+        reader_thread: options.threads > 1,
+        most_samples: None,
+        progress: options.progress,
+    };
     let passed = pass.run(&mut sink);
     options.progress.end();
     let passed = passed?;
-    let agreement = sink.evidence.as_ref().map(|evidence| evidence.agreement(&joints, passed.motion_cutoff_hz));
+    let agreement = sink.evidence.as_ref().map(|evidence| evidence.agreement(&joints));
+    let lags = sink.lag.lags(passed.motion_cutoff_hz);
     let figures = LogValidation {
         log: study.log_name(index),
         model: sink.model.report(),
         raw: sink.raw.report(),
         prior: sink.prior.map(|(_, validation)| validation.report()),
     };
-    Ok((log_summary(study, index, passed, agreement, &joints), figures))
+    Ok((log_summary(study, index, passed, agreement, lags, &joints), figures))
 }
