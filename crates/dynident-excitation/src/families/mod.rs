@@ -1,0 +1,1 @@
+//! The trajectory families, one file each.

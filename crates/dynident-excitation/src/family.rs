@@ -1,0 +1,40 @@
+//! What every trajectory family offers to criteria, limits and optimisers.
+
+use crate::motion::{Motion, MotionCotangent};
+use dynident_model::sample::Random;
+
+/// A family of trajectories of all joints over one duration, with a vector of free parameters.
+///
+/// Parameters are stored joint after joint unless the family says otherwise. Every family gives q, q̇, q̈ and jerk exactly (no differences), and pulls a cost's derivatives
+/// by the motion back to its parameters exactly.
+pub trait Family: core::fmt::Debug + Send + Sync {
+    /// The family's name in study files and results.
+    fn name(&self) -> &'static str;
+
+    /// Number of joints.
+    fn joints(&self) -> usize;
+
+    /// Duration in seconds.
+    fn duration_s(&self) -> f64;
+
+    /// Number of free parameters, all joints together.
+    fn parameters(&self) -> usize;
+
+    /// Lower and upper bound of each parameter that the family itself needs (not the robot's limits); infinite where there is none.
+    fn bounds(&self) -> Vec<[f64; 2]>;
+
+    /// A random start of sensible size for joints with the given position range `[lower, upper]` and speed limit; inside [`bounds`](Family::bounds).
+    fn random(&self, ranges: &[[f64; 2]], speeds: &[f64], random: &mut Random) -> Vec<f64>;
+
+    /// The motion at `times_s`, within the duration.
+    ///
+    /// # Panics
+    /// If `parameters` has not [`parameters`](Family::parameters) entries.
+    fn motion(&self, parameters: &[f64], times_s: &[f64], out: &mut Motion);
+
+    /// Adds to `gradient` the derivative of a cost by the parameters, given its derivatives by the motion at `times_s`.
+    ///
+    /// # Panics
+    /// If lengths differ.
+    fn pull_back(&self, parameters: &[f64], times_s: &[f64], cotangent: &MotionCotangent, gradient: &mut [f64]);
+}

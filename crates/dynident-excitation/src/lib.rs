@@ -1,0 +1,10 @@
+//! **How should it move?** Trajectory families, criteria, limits, optimisers and the forecast of every parameter's error bar.
+
+#![forbid(unsafe_code)]
+
+pub mod families;
+mod family;
+mod motion;
+
+pub use family::Family;
+pub use motion::{Motion, MotionCotangent};
