@@ -17,6 +17,7 @@ mod inverse_dynamics;
 mod kinematics;
 mod mass_matrix;
 mod regressor;
+mod regressor_adjoint;
 mod regressor_panels;
 mod workspace;
 
@@ -30,5 +31,6 @@ pub use inverse_dynamics::{inverse_dynamics, inverse_dynamics_batch};
 pub use kinematics::body_placements;
 pub use mass_matrix::mass_matrix;
 pub use regressor::torque_regressor;
+pub use regressor_adjoint::{MotionGradient, regressor_panels_pull_back};
 pub use regressor_panels::{Column, PanelLayout, Panels, all_columns, regressor_panels};
 pub use workspace::{BatchWorkspace, Workspace};

@@ -119,6 +119,12 @@ impl PanelLayout {
     pub fn dof(&self) -> usize {
         self.joints.len()
     }
+
+    /// For the `k`-th joint on the way to `body`: places of the body's ten columns in that joint's panel; past its end for columns left out.
+    #[inline(always)]
+    pub(crate) fn places(&self, body: usize, k: usize) -> &[u32] {
+        &self.places[self.place_start[body] + 10 * k..][..10]
+    }
 }
 
 /// The panels of one block of samples. Joint `j` has `joint_columns(j).len() + 1` columns of `samples` values, one column after the other; the last

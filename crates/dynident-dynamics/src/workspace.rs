@@ -38,6 +38,8 @@ pub(crate) struct Scratch<T: Lane> {
     pub(crate) core: CoreScratch<T>,
     /// Ancestor axes of the torque regressor, in bundles.
     pub(crate) axes: crate::regressor::AxisScratch<T>,
+    /// Of the regressor's reverse sweep.
+    pub(crate) adjoint: crate::regressor_adjoint::AdjointScratch<T>,
 }
 
 /// The part of the scratch that every [`Scalar`], duals too, can use.
@@ -124,6 +126,7 @@ impl Kernel for MakeScratch<'_> {
         AnyScratch(Box::new(Scratch::<T> {
             core: CoreScratch::new(self.0.dof()),
             axes: crate::regressor::AxisScratch::new(self.0),
+            adjoint: crate::regressor_adjoint::AdjointScratch::new(self.0),
         }))
     }
 }

@@ -27,6 +27,18 @@ impl CoulombShape {
             Self::Smooth { width } => (dq / width).tanh(),
         }
     }
+
+    /// The step's derivative by the speed; zero for the sign, which has none at the step.
+    #[inline]
+    pub fn slope(self, dq: f64) -> f64 {
+        match self {
+            Self::Sign { .. } => 0.0,
+            Self::Smooth { width } => {
+                let step = (dq / width).tanh();
+                (1.0 - step * step) / width
+            }
+        }
+    }
 }
 
 /// Coulomb friction of one joint, Nm (N).

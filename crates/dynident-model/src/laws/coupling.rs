@@ -68,6 +68,33 @@ impl Coupling {
         }
     }
 
+    pub(super) fn pull_back(
+        &self,
+        row: usize,
+        motion: &JointMotion<'_>,
+        weights: &[f64],
+        by_dq: &mut [f64],
+        by_ddq: &mut [f64],
+    ) {
+        let (other, own_ratio) =
+            if row == self.first { (self.second, self.ratios[0]) } else { (self.first, self.ratios[1]) };
+        let cross = self.ratios[0] * self.ratios[1];
+        let start = |joint: usize| joint * motion.samples;
+        for (s, w) in weights.iter().enumerate() {
+            match self.effect {
+                CouplingEffect::Inertia => by_ddq[start(other) + s] += cross * w,
+                CouplingEffect::Viscous => by_dq[start(other) + s] += cross * w,
+                CouplingEffect::Coulomb(shape) => {
+                    let speed =
+                        self.ratios[0] * motion.dq_of(self.first)[s] + self.ratios[1] * motion.dq_of(self.second)[s];
+                    let slope = own_ratio * shape.slope(speed) * w;
+                    by_dq[start(self.first) + s] += self.ratios[0] * slope;
+                    by_dq[start(self.second) + s] += self.ratios[1] * slope;
+                }
+            }
+        }
+    }
+
     pub(super) fn mass_matrix_entry(&self, row: usize, column: usize) -> f64 {
         let crosses = (row, column) == (self.first, self.second) || (row, column) == (self.second, self.first);
         if self.effect == CouplingEffect::Inertia && crosses { self.ratios[0] * self.ratios[1] } else { 0.0 }

@@ -105,6 +105,36 @@ impl Law {
         }
     }
 
+    /// Adds to `by_dq` and `by_ddq` (joint-major) the derivatives of `Σ weights[s] · column[s]` by the speeds and accelerations, where `column` is that of
+    /// [`column`](Law::column) in the row of joint `row`. The sign step counts as constant.
+    ///
+    /// # Panics
+    /// If lengths differ.
+    pub fn pull_back(
+        &self,
+        row: usize,
+        motion: &JointMotion<'_>,
+        weights: &[f64],
+        by_dq: &mut [f64],
+        by_ddq: &mut [f64],
+    ) {
+        assert_eq!(weights.len(), motion.samples);
+        let range = |joint: usize| joint * motion.samples..(joint + 1) * motion.samples;
+        let add = |to: &mut [f64], factor: f64| to.iter_mut().zip(weights).for_each(|(to, w)| *to += factor * w);
+        match self {
+            Self::Viscous(law) => add(&mut by_dq[range(law.joint)], 1.0),
+            Self::DriveInertia(law) => add(&mut by_ddq[range(law.joint)], 1.0),
+            Self::Offset(_) => {}
+            Self::Coulomb(law) => {
+                let speeds = motion.dq_of(law.joint);
+                for ((to, w), &dq) in by_dq[range(law.joint)].iter_mut().zip(weights).zip(speeds) {
+                    *to += w * law.shape.slope(dq);
+                }
+            }
+            Self::Coupling(law) => law.pull_back(row, motion, weights, by_dq, by_ddq),
+        }
+    }
+
     /// What this parameter adds to entry (`row`, `column`) of the mass matrix: a constant, zero for friction.
     pub fn mass_matrix_entry(&self, row: usize, column: usize) -> f64 {
         match self {
