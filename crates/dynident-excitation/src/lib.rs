@@ -2,9 +2,13 @@
 
 #![forbid(unsafe_code)]
 
+mod column_products;
+pub mod criteria;
 pub mod families;
 mod family;
+mod information;
 mod motion;
 
 pub use family::Family;
+pub use information::Information;
 pub use motion::{Motion, MotionCotangent};

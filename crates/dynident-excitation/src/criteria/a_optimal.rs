@@ -1,0 +1,24 @@
+//! A-optimality: the sum of the parameters' variances, `tr D⁻¹`.
+
+use super::{Criterion, Valued};
+use nalgebra::DMatrix;
+
+/// `log tr D⁻¹`, with derivative `-D⁻² / tr D⁻¹`: the logarithm keeps steps of one size from start to end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AOptimal;
+
+impl Criterion for AOptimal {
+    fn name(&self) -> &'static str {
+        "a-optimal"
+    }
+
+    fn value_and_derivative(&self, information: &DMatrix<f64>) -> Valued {
+        let inverse = information.clone().cholesky()?.inverse();
+        let trace = inverse.trace();
+        Some((trace.ln(), -(&inverse * &inverse) / trace))
+    }
+
+    fn figure(&self, information: &DMatrix<f64>) -> Option<f64> {
+        Some(information.clone().cholesky()?.inverse().trace())
+    }
+}

@@ -1,0 +1,28 @@
+//! What makes a motion good: functions of the information `D` with their derivatives. Smaller is better for all of them.
+
+mod a_optimal;
+mod condition_number;
+mod d_optimal;
+mod e_optimal;
+
+pub use a_optimal::AOptimal;
+pub use condition_number::ConditionNumber;
+pub use d_optimal::DOptimal;
+pub use e_optimal::EOptimal;
+
+use nalgebra::DMatrix;
+
+/// A value and its symmetric derivative by `D`; `None` where `D` is not positive definite (some parameter is not excited at all).
+pub type Valued = Option<(f64, DMatrix<f64>)>;
+
+/// A criterion on the information matrix.
+pub trait Criterion: core::fmt::Debug + Send + Sync {
+    /// The name in study files and results.
+    fn name(&self) -> &'static str;
+
+    /// Value and derivative of the smooth form that optimisers use.
+    fn value_and_derivative(&self, information: &DMatrix<f64>) -> Valued;
+
+    /// The figure to report: the criterion itself, without smoothing.
+    fn figure(&self, information: &DMatrix<f64>) -> Option<f64>;
+}

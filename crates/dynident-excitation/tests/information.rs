@@ -1,0 +1,66 @@
+//! Criteria and their derivatives by the motion, against central differences of the whole chain.
+
+use dynident_dynamics::{BaseParameterSettings, BaseParameters, PanelLayout};
+use dynident_excitation::criteria::{AOptimal, ConditionNumber, Criterion, DOptimal, EOptimal};
+use dynident_excitation::{Information, Motion};
+use dynident_model::laws::{CoulombShape, DriveChoice, laws_per_joint};
+use dynident_model::sample::{Random, random_tree};
+
+#[test]
+fn derivatives_by_the_motion_equal_differences() {
+    let criteria: [&dyn Criterion; 5] = [
+        &DOptimal,
+        &AOptimal,
+        &EOptimal { order: 6.0 },
+        &ConditionNumber { order: 6.0, scaled: false },
+        &ConditionNumber { order: 6.0, scaled: true },
+    ];
+    for seed in 0..6 {
+        let model = random_tree(seed, 3);
+        let laws = laws_per_joint(&model, |_| DriveChoice {
+            drive_inertia: true,
+            viscous: true,
+            coulomb: Some(CoulombShape::Smooth { width: 0.5 }),
+            offset: true,
+        });
+        let base = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
+        let layout = PanelLayout::new(&model, base.base_columns());
+        let mut information = Information::new(&model, &layout, &[0.5, 1.0, 2.0], None);
+        let mut random = Random::new(90 + seed);
+        let samples = 60;
+        let mut motion = Motion::default();
+        motion.reset(3, samples);
+        for values in [&mut motion.q, &mut motion.dq, &mut motion.ddq] {
+            for x in values.iter_mut() {
+                *x = random.uniform(-2.0, 2.0);
+            }
+        }
+        for criterion in criteria {
+            let d = information.of(&motion, 0.7);
+            let (_, by_information) = criterion.value_and_derivative(&d).unwrap();
+            let mut gradient = Motion::default();
+            gradient.reset(3, samples);
+            information.pull_back(&motion, 0.7, &by_information, &mut gradient);
+            let mut value = |motion: &Motion| criterion.value_and_derivative(&information.of(motion, 0.7)).unwrap().0;
+            for entry in [0, 17, 80, 179] {
+                for which in 0..3 {
+                    let mut at = |step: f64| {
+                        let mut moved = motion.clone();
+                        [&mut moved.q, &mut moved.dq, &mut moved.ddq][which][entry] += step;
+                        value(&moved)
+                    };
+                    // Fourth-order differences. The least eigenvalue of D is known to 1e-16 times D's condition (1e6 here), so its logarithm to 1e-10 and
+                    // its difference quotient to 1e-10 / h; the fifth derivatives (some hundreds) leave h^4 times as much.
+                    let h = 5e-3;
+                    let expected = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
+                    let found = [&gradient.q, &gradient.dq, &gradient.ddq][which][entry];
+                    assert!(
+                        (found - expected).abs() <= 1e-6 * (1.0 + expected.abs()),
+                        "{} seed {seed} ({which}, {entry}): {found} against {expected}",
+                        criterion.name()
+                    );
+                }
+            }
+        }
+    }
+}
