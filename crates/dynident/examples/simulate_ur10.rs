@@ -107,8 +107,8 @@ fn csv(truth: &Model, laws: &[Law], drives: &[f64], random: &mut Random) -> Stri
             noise = TORQUE_NOISE_CORRELATION * noise + fresh;
         }
     }
-    let name = |what: &str, unit: &str| (1..=dof).map(|j| format!(",{what}{j}_{unit}")).collect::<String>();
-    let mut text = format!("t_s{}{}\n", name("q", "rad"), name("tau", "Nm"));
+    let names = |what: &str, unit: &str| -> Vec<String> { (1..=dof).map(|j| format!("{what}{j}_{unit}")).collect() };
+    let mut text = format!("t_s,{},{}\n", names("q", "rad").join(","), names("tau", "Nm").join(","));
     for s in 0..samples {
         // Writing to a string cannot fail.
         let _ = write!(text, "{}", seven_digits(s as f64 / RATE_HZ));
