@@ -107,7 +107,7 @@ def main():
             for order, cutoff_hz in [(1, 20.0), (2, 5.0), (3, 12.0), (4, 8.0), (5, 30.0), (6, 15.0), (8, 40.0), (4, 90.0)]
         ],
         "savitzky_golay": [
-            savitzky_golay(x, window, degree, 200.0) for window, degree in [(5, 2), (5, 3), (11, 4), (31, 5), (101, 8)]
+            savitzky_golay(x, window, degree, 200.0) for window, degree in [(5, 2), (5, 3), (11, 4), (31, 5), (101, 4), (101, 8)]
         ],
         "gradient": np.gradient(x, 1 / 200.0, edge_order=2),
         "decimation": [kaiser_taps(*case) for case in [(2, 60.0, 1000.0), (10, 60.0, 1000.0), (5, 90.0, 500.0), (25, 40.0, 5000.0)]],

@@ -4,6 +4,7 @@
 #![allow(clippy::print_stdout, reason = "a benchmark prints")]
 
 use dynident_estimation::{BLOCK_ROWS, FactorWorkspace, SegmentSettings, SegmentedFactor, TriangularFactor};
+use dynident_lanes::Level;
 use std::time::Instant;
 
 /// Columns that joints 1 to 7 of a Panda arm see.
@@ -20,8 +21,8 @@ fn main() {
     };
     let panels: Vec<Vec<f64>> =
         COLUMNS.iter().map(|columns| (0..(columns + 1) * BLOCK_ROWS).map(|_| random()).collect()).collect();
-    let mut workspace = FactorWorkspace::default();
-    let mut all_joints = |which: &[usize]| {
+    let all_joints = |which: &[usize], level: Level| {
+        let mut workspace = FactorWorkspace::new(level);
         let mut operations = 0.0;
         let mut best = f64::INFINITY;
         for _ in 0..15 {
@@ -45,8 +46,10 @@ fn main() {
         }
         (best * 1.0e9, operations / best * 1.0e-9)
     };
-    let (ns, gflops) = all_joints(&[0, 1, 2, 3, 4, 5, 6]);
-    println!("factor of 10000 samples, 7 joints: {ns:.0} ns ({gflops:.1} GFLOP/s)");
+    for level in Level::available() {
+        let (ns, gflops) = all_joints(&[0, 1, 2, 3, 4, 5, 6], level);
+        println!("factor of 10000 samples, 7 joints, {}: {ns:.0} ns ({gflops:.1} GFLOP/s)", level.name());
+    }
     for (name, settings) in [("unknown", SegmentSettings::default()), ("known", SegmentSettings::for_rows(SAMPLES))] {
         let mut best = f64::INFINITY;
         for _ in 0..15 {
@@ -64,7 +67,7 @@ fn main() {
         println!("segmented factors of {samples} samples, 7 joints, length {name} at first: {:.0} ns", best * 1.0e9);
     }
     for joint in 0..7 {
-        let (ns, gflops) = all_joints(&[joint]);
+        let (ns, gflops) = all_joints(&[joint], Level::detect());
         println!(
             "factor of 10000 samples, joint {} ({} columns): {ns:.0} ns ({gflops:.1} GFLOP/s)",
             joint + 1,

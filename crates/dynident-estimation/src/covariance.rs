@@ -10,13 +10,14 @@
 //!
 //! sums the scores over each time segment g **before** squaring: whatever the correlation (and the changes of variance) within a
 //! segment, its effect is in s_g. It is right as long as segments last much longer than the correlation, so that their sums are
-//! nearly independent, and there are clearly more segments than parameters that each joint's rows pay for.
-//! Liang and Zeger, Biometrika 73 (1986) 13; Cameron and Miller, J. Human Resources 50 (2015) 317, eq. (11) for c.
+//! nearly independent, and there are clearly more segments than parameters that each joint's rows pay for. The first can be checked:
+//! [`Estimate::segment_correlation`](crate::Estimate::segment_correlation) is near zero then.
+//! Liang and Zeger, Biometrika 73 (1986) 13; Cameron and Miller, J. Human Resources 50 (2015) 317, who also give c.
 
 use crate::error::EstimationError;
 use crate::problem::StackedProblem;
 use crate::rank::{Solution, Split};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 /// Which covariance an estimate reports as its own.
@@ -43,6 +44,8 @@ pub(crate) struct Covariances {
     pub(crate) clusters: usize,
     /// For every joint the mean score variance over what white noise would give.
     pub(crate) inflation: Vec<f64>,
+    /// For every joint the correlation of the scores of neighbouring segments.
+    pub(crate) neighbours: Vec<f64>,
 }
 
 /// What [`covariances`] needs to know about the fit.
@@ -73,7 +76,7 @@ pub(crate) fn covariances(
     }
     // Scores and information in the coordinates of R⁻ᵀ, where the total information is the unit matrix.
     let joints = problem.joints().len();
-    let (mut found, mut expected) = (vec![0.0; joints], vec![0.0; joints]);
+    let (mut found, mut expected, mut spilled) = (vec![0.0; joints], vec![0.0; joints], vec![0.0; joints]);
     let mut clusters: Vec<Vec<f64>> = Vec::new();
     let mut log_clusters: Vec<Option<(usize, Vec<usize>)>> = vec![None; problem.logs().len()];
     for (equation, total) in problem.equations().iter().zip(&stacked.totals) {
@@ -87,29 +90,30 @@ pub(crate) fn covariances(
         let whitened = total.regressor_triangle() * &local_inverse * weight;
         expected[joint] += whitened.norm_squared() * (weight * fit.joint_sigma[joint]).powi(2);
         let segment_rows = equation.factor.segment_rows();
-        let start = match (method, &log_clusters[equation.log]) {
-            (CovarianceMethod::SegmentsAcrossJoints, Some((start, rows))) => {
-                if *rows != segment_rows {
-                    return Err(EstimationError::SegmentsDiffer {
-                        log: problem.logs()[equation.log].clone(),
-                        joint: problem.joints()[joint].clone(),
-                    });
-                }
-                *start
+        let shared = log_clusters[equation.log].as_ref().filter(|_| method == CovarianceMethod::SegmentsAcrossJoints);
+        let start = if let Some((start, rows)) = shared {
+            if *rows != segment_rows {
+                return Err(EstimationError::SegmentsDiffer {
+                    log: problem.logs()[equation.log].clone(),
+                    joint: problem.joints()[joint].clone(),
+                });
             }
-            _ => {
-                let start = clusters.len();
-                clusters.resize(start + segment_rows.len(), vec![0.0; free]);
-                log_clusters[equation.log] = Some((start, segment_rows));
-                start
-            }
+            *start
+        } else {
+            let start = clusters.len();
+            clusters.resize(start + segment_rows.len(), vec![0.0; free]);
+            log_clusters[equation.log] = Some((start, segment_rows));
+            start
         };
+        let mut previous: Option<DVector<f64>> = None;
         for (g, segment) in equation.factor.scores(&equation.local(&fit.solution.values))?.iter().enumerate() {
             let score = local_inverse.tr_mul(&segment.score) * (weight * weight);
             found[joint] += score.norm_squared();
+            spilled[joint] += previous.as_ref().map_or(0.0, |previous| previous.dot(&score));
             for (sum, value) in clusters[start + g].iter_mut().zip(score.iter()) {
                 *sum += value;
             }
+            previous = Some(score);
         }
     }
     let spread = |inner: &DMatrix<f64>| {
@@ -123,9 +127,10 @@ pub(crate) fn covariances(
         all
     };
     let white = spread(&(DMatrix::identity(free, free) * fit.weighted_variance));
+    let neighbours = spilled.iter().zip(&found).map(|(s, f)| if *f > 0.0 { s / f } else { 0.0 }).collect();
     let inflation = found.iter().zip(&expected).map(|(f, e)| if *e > 0.0 { f / e } else { 1.0 }).collect();
     if method == CovarianceMethod::White {
-        return Ok(Covariances { chosen: white.clone(), white, clusters: 0, inflation });
+        return Ok(Covariances { chosen: white.clone(), white, clusters: 0, inflation, neighbours });
     }
     let count = clusters.len();
     if count < 2 {
@@ -139,7 +144,7 @@ pub(crate) fn covariances(
         let rows = prior.sqrt_information().select_columns(&fit.split.free) * inverse;
         inner += rows.tr_mul(&rows);
     }
-    Ok(Covariances { chosen: spread(&inner), white, clusters: count, inflation })
+    Ok(Covariances { chosen: spread(&inner), white, clusters: count, inflation, neighbours })
 }
 
 /// The correlation matrix of a covariance matrix. A row and column of zero variance (a fixed column) become those of the unit matrix.

@@ -53,6 +53,9 @@ pub struct Estimate {
     /// The ρ for which `score_inflation` is (1+ρ)/(1−ρ): an effective lag-1 correlation, between −1 and 1. It is what matters for the
     /// error bars, and lower than the residual's own where the columns alternate fast.
     pub effective_lag1: Vec<f64>,
+    /// For every joint the correlation between the scores of neighbouring segments, Σ s_gᵀA⁻¹s_{g+1} / Σ s_gᵀA⁻¹s_g. Above 0.2 or so the
+    /// segments are too short for the correlation of the residuals, and error bars still too small: use fewer, longer segments.
+    pub segment_correlation: Vec<f64>,
     /// Rank decisions.
     pub rank: RankReport,
     /// N − p: all rows less the estimated columns.
@@ -128,6 +131,7 @@ impl Fitted {
             joint_sigma: self.joint_sigma,
             effective_lag1: covariances.inflation.iter().map(|v| (v - 1.0) / (v + 1.0)).collect(),
             score_inflation: covariances.inflation,
+            segment_correlation: covariances.neighbours,
             degrees_of_freedom: self.triangle.rows() - self.split.free.len(),
             condition_number_raw: rank.condition_number_raw,
             condition_number_scaled: rank.condition_number_scaled,

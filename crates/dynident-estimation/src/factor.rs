@@ -25,7 +25,7 @@ const LARGEST: f64 = 1.0e140;
 /// scaled columns and a stated tolerance (`rank.rs`), never from this diagonal.
 ///
 /// Golub and Van Loan, Matrix Computations, 4th ed., 5.2 and 6.5; Bierman, Factorization Methods for Discrete Sequential
-/// Estimation (1977), ch. IV.
+/// Estimation (1977), ch. IV and V.
 ///
 /// ```
 /// use dynident_estimation::TriangularFactor;
@@ -237,7 +237,18 @@ impl TriangularFactor {
     pub(crate) fn absorb_row_by_row(&mut self, workspace: &mut FactorWorkspace, values: &[f64]) {
         let size = self.columns + 1;
         let rows = values.len() / size;
-        self.absorb_entries(workspace, rows, |row, column| values[row * size + column]);
+        let chunks = rows.div_ceil(CHUNK_ROWS);
+        let block = workspace.block(rows, size);
+        for (c, rows) in values.chunks(CHUNK_ROWS * size).enumerate() {
+            for column in 0..size {
+                let chunk = &mut block[column * chunks + c];
+                *chunk = Chunk::ZERO;
+                for (place, value) in chunk.0.iter_mut().zip(rows[column..].iter().step_by(size)) {
+                    *place = *value;
+                }
+            }
+        }
+        self.reflect(workspace, rows);
         self.rows += rows;
     }
 

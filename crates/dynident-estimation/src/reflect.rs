@@ -159,7 +159,7 @@ fn reflect_column<T: Lane, const V: usize, const P: usize>(
         }
         let mut first_amounts = [[0.0; P]];
         first_amounts[0].copy_from_slice(&amounts[..P]);
-        subtract::<T, P, 1>(&done, [&mut *column], &first_amounts);
+        subtract::<T, P, 1>(&done, &mut [&mut *column], &first_amounts);
     }
     let [[square]] = inner_products::<T, 1, 1>(&[&*column], &[&*column]);
     if square < NEGLIGIBLE_SQUARE {
@@ -171,9 +171,10 @@ fn reflect_column<T: Lane, const V: usize, const P: usize>(
     let old = *diagonal;
     let norm = (old * old + square).sqrt();
     *diagonal = norm;
-    // old - norm without cancellation (old is not negative): Parlett, Math. Comp. 25 (1971) 505. It keeps the diagonal positive.
+    // old - norm without cancellation (old is not negative): Parlett, SIAM Review 13 (1971) 197. It keeps the diagonal positive.
     reflectors.nu[P] = -square / (old + norm);
-    let beta = (old + norm) / (norm * square);
+    // At most 2/square, which is finite; norm · square may underflow.
+    let beta = (old + norm) / norm / square;
     let mut sums = [0.0; P];
     for l in 0..P {
         for m in l..P {
@@ -194,7 +195,7 @@ fn apply<T: Lane, const V: usize, const X: usize>(
     first: usize,
     index: usize,
     columns: &[&[Chunk]; V],
-    targets: [&mut [Chunk]; X],
+    mut targets: [&mut [Chunk]; X],
     reflectors: &Reflectors<V>,
 ) {
     let mut shared: [&[Chunk]; X] = [&[]; X];
@@ -213,7 +214,7 @@ fn apply<T: Lane, const V: usize, const X: usize>(
             triangle[row_start(size, first + l) + index + x - first - l] -= reflectors.nu[l] * amounts[x][l];
         }
     }
-    subtract::<T, V, X>(columns, targets, &amounts);
+    subtract::<T, V, X>(columns, &mut targets, &amounts);
 }
 
 /// `targets[x]ᵀ columns[l]`.
@@ -255,7 +256,7 @@ fn inner_products<T: Lane, const V: usize, const X: usize>(
 #[inline(always)]
 fn subtract<T: Lane, const V: usize, const X: usize>(
     columns: &[&[Chunk]; V],
-    targets: [&mut [Chunk]; X],
+    targets: &mut [&mut [Chunk]; X],
     amounts: &[[f64; V]; X],
 ) {
     let chunks = targets[0].len();

@@ -51,9 +51,10 @@ impl SegmentSettings {
     }
 }
 
-/// Rows that a segment keeps as they are: a factor made of fewer costs more time than it saves memory.
+/// Rows that a segment keeps as they are: they wait for neighbours, since one large block is reduced faster than small ones
+/// and their triangles. Six times the memory of the factor.
 const fn most_rows(columns: usize) -> usize {
-    2 * (columns + 1)
+    3 * (columns + 1)
 }
 
 /// One segment: its rows while they are few, then their factor.
@@ -239,27 +240,31 @@ impl Segment {
         match self {
             Self::Factor(factor) => factor.absorb_range(workspace, panel, stride, range),
             Self::Rows(values) => {
-                for row in range {
-                    values.extend((0..=columns).map(|c| panel[c * stride + row]));
+                let (size, start) = (columns + 1, values.len());
+                values.resize(start + range.len() * size, 0.0);
+                for (c, column) in panel.chunks_exact(stride).enumerate() {
+                    for (value, place) in column[range.clone()].iter().zip(values[start + c..].iter_mut().step_by(size))
+                    {
+                        *place = *value;
+                    }
                 }
             }
         }
     }
 
     fn append(&mut self, columns: usize, workspace: &mut FactorWorkspace, next: &Self) {
-        if self.rows(columns) + next.rows(columns) > most_rows(columns) {
-            self.condense(columns, workspace);
+        if let (Self::Rows(values), Self::Rows(more)) = (&mut *self, next) {
+            values.extend_from_slice(more);
+            if self.rows(columns) > most_rows(columns) {
+                self.condense(columns, workspace);
+            }
+            return;
         }
-        match self {
-            Self::Factor(factor) => match next {
+        self.condense(columns, workspace);
+        if let Self::Factor(factor) = self {
+            match next {
                 Self::Rows(more) => factor.absorb_row_by_row(workspace, more),
                 Self::Factor(other) => factor.absorb_factor(workspace, other),
-            },
-            // Few rows in all, so `next` is rows as well.
-            Self::Rows(values) => {
-                if let Self::Rows(more) = next {
-                    values.extend_from_slice(more);
-                }
             }
         }
     }

@@ -1,5 +1,7 @@
 //! Columns that the data do not excite: named, fixed, never NaN.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
+
 mod common;
 
 use common::Random;
@@ -213,4 +215,20 @@ fn an_estimate_serialises_and_its_correlations_are_sound() {
         assert!((0..6).all(|j| correlation[(i, j)].abs() <= 1.0 + 1e-12));
     }
     assert_eq!(correlation[(0, 2)], 0.0);
+}
+
+#[test]
+fn clusters_across_joints_need_the_same_segments() {
+    let mut random = Random::new(11);
+    let mut problem = LinearProblem::new(names(1), vec!["joint1".into(), "joint2".into()]);
+    for (joint, rows) in [(0, 100), (1, 90)] {
+        let mut factor = SegmentedFactor::new(1, SegmentSettings::default()).unwrap();
+        let panel: Vec<f64> = (0..2 * rows).map(|_| random.normal()).collect();
+        factor.absorb(&panel, rows).unwrap();
+        problem.add("long run", joint, vec![0], factor).unwrap();
+    }
+    let across = OrdinarySettings { covariance: CovarianceMethod::SegmentsAcrossJoints, ..Default::default() };
+    let error = ordinary_least_squares(&problem, &across).unwrap_err();
+    assert_eq!(error, EstimationError::SegmentsDiffer { log: "long run".into(), joint: "joint2".into() });
+    assert!(ordinary_least_squares(&problem, &OrdinarySettings::default()).is_ok());
 }

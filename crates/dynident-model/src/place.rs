@@ -23,7 +23,7 @@ impl<F: Error> Located<F> {
 }
 
 /// Line and column (from 1, in characters) of byte `offset`; an offset beyond the text or inside a character counts as the place before.
-pub(crate) fn line_and_column(text: &str, offset: usize) -> (u32, u32) {
+pub fn line_and_column(text: &str, offset: usize) -> (u32, u32) {
     let mut end = offset.min(text.len());
     while !text.is_char_boundary(end) {
         end -= 1;

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// Largest robot description that is read, bytes. The largest known humanoids stay below one megabyte.
-pub const MAX_DESCRIPTION_BYTES: u64 = 64 << 20;
+pub const MAX_DESCRIPTION_BYTES: u64 = 16 << 20;
 
 /// What a description is written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,7 +78,7 @@ pub enum ReadError {
         /// The file.
         path: PathBuf,
         /// Place and fault.
-        source: UrdfError,
+        source: Box<UrdfError>,
     },
     /// The D-H table is faulty.
     #[error("{}:{source}", path.display())]
@@ -86,7 +86,7 @@ pub enum ReadError {
         /// The file.
         path: PathBuf,
         /// Place and fault.
-        source: DhError,
+        source: Box<DhError>,
     },
 }
 
@@ -118,11 +118,11 @@ pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
     };
     let (model, unread) = match format {
         DescriptionFormat::Urdf => {
-            let robot = read_urdf(&text).map_err(|source| ReadError::Urdf { path: named(), source })?;
+            let robot = read_urdf(&text).map_err(|error| ReadError::Urdf { path: named(), source: Box::new(error) })?;
             (robot.model, robot.unread)
         }
         DescriptionFormat::Dh => {
-            (read_dh(&text).map_err(|source| ReadError::Dh { path: named(), source })?, Vec::new())
+            (read_dh(&text).map_err(|error| ReadError::Dh { path: named(), source: Box::new(error) })?, Vec::new())
         }
     };
     Ok(Robot { model, format, path: named(), text, unread })

@@ -110,14 +110,14 @@ fn misspelt_elements_are_reported() {
 
 /// A chain of `links` links under joints of one type.
 fn chain(links: usize, kind: &str) -> String {
-    let mut text = String::from("<robot name=\"chain\"><link name=\"l0\"/>");
-    for i in 1..links {
+    let link = |i: usize| {
         let before = i - 1;
-        text += &format!(
+        format!(
             "<link name=\"l{i}\"/><joint name=\"j{i}\" type=\"{kind}\"><parent link=\"l{before}\"/><child link=\"l{i}\"/></joint>"
-        );
-    }
-    text + "</robot>"
+        )
+    };
+    let chain: Vec<String> = (1..links).map(link).collect();
+    format!("<robot name=\"chain\"><link name=\"l0\"/>{}</robot>", chain.concat())
 }
 
 #[test]

@@ -83,7 +83,7 @@ fn only_the_touched_elements_differ() {
     let set = LinkChange::Set {
         link: "upper".to_owned(),
         inertial: InertialParameters::from_centre_of_mass(2.0, Vec3([0.25, 0.0, 0.0]), &Mat3::IDENTITY.scale(0.5)),
-        note: Some("from a log -- and more".to_owned()),
+        note: Some("from a log --- and\tmore".to_owned()),
     };
     let friction = JointChange { joint: "lift".to_owned(), damping: Some(7.0), friction: None };
     let written = rewrite_urdf(ARM, &[set, LinkChange::Remove { link: "tool".to_owned() }], &[friction]).unwrap();
@@ -95,7 +95,7 @@ fn only_the_touched_elements_differ() {
       <inertia ixx="0.006" ixy="0.0" ixz="0.0003" iyy="0.05" iyz="0" izz="0.051"/>
     </inertial>"#,
             r#"<inertial>
-      <!-- from a log - - and more -->
+      <!-- from a log - - - and more -->
       <origin xyz="0.25 0.0 0.0" rpy="0 0 0"/>
       <mass value="2.0"/>
       <inertia ixx="0.5" ixy="0.0" ixz="0.0" iyy="0.5" iyz="0.0" izz="0.5"/>
@@ -181,7 +181,7 @@ proptest! {
     #[test]
     fn odd_spacing_survives(gaps in prop::collection::vec("[ \t\r\n]{0,3}(<!-- [a-z ]* -->)?[ \n]{0,2}", 80), seed in 0_u64..1000) {
         let mut gap = gaps.iter();
-        let text: String = ARM.split("\n").map(|line| format!("{}{}", line.trim(), gap.next().map_or("", |g| g.as_str()))).collect();
+        let text: String = ARM.lines().flat_map(|line| [line.trim(), gap.next().map_or("", |gap| gap.as_str())]).collect();
         let model = read_urdf(&text).unwrap().model;
         prop_assert_eq!(&rewrite_urdf(&text, &[], &[]).unwrap(), &text);
         let new = bodies(seed, model.dof());

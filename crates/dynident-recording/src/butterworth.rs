@@ -164,6 +164,10 @@ mod tests {
         assert!(filter.smooth(20.0, &[0.0; 100], &mut [0.0; 100]).is_err());
         assert!(ButterworthZeroPhase::new(4, f64::NAN).is_err());
         assert!(ButterworthZeroPhase::new(0, 1.0).is_err());
+        // A cut-off with which no digit would be left.
+        let slow = ButterworthZeroPhase::new(4, 1e-9).unwrap();
+        assert!(slow.smooth(1000.0, &[0.0; 100], &mut [0.0; 100]).is_err());
+        assert_eq!(slow.context_samples(1000.0), Some(0));
         assert!(ButterworthZeroPhase::new(4, -3.0).is_err());
     }
 }

@@ -152,7 +152,9 @@ fn welch(signal: &[f64], length: usize) -> Option<Vec<f64>> {
         pieces += 1.0;
         from += length / 2;
     }
-    power.iter_mut().for_each(|power| *power /= pieces);
+    for power in &mut power {
+        *power /= pieces;
+    }
     (pieces > 0.0).then_some(power)
 }
 

@@ -90,7 +90,9 @@ impl DecimationSettings {
             })
             .collect();
         let sum: f64 = taps.iter().sum();
-        taps.iter_mut().for_each(|tap| *tap /= sum);
+        for tap in &mut taps {
+            *tap /= sum;
+        }
         Ok(taps)
     }
 }
@@ -250,15 +252,14 @@ impl Kernel for Convolution<'_> {
         let mut chunks = self.out.chunks_exact_mut(4);
         let mut from = self.first;
         for out in &mut chunks {
-            let rows = [0, 1, 2, 3].map(|i| &self.signal[from + i * self.factor..][..taps.len()]);
+            let row = |i: usize| self.signal[from + i * self.factor..][..taps.len()].chunks_exact(T::LANES);
             let mut sums = [T::ZERO; 4];
-            let mut k = 0;
-            while k + T::LANES <= taps.len() {
-                let tap = T::load(&taps[k..k + T::LANES]);
-                for i in 0..4 {
-                    sums[i] = T::load(&rows[i][k..k + T::LANES]).mul_add(tap, sums[i]);
-                }
-                k += T::LANES;
+            for ((((tap, a), b), c), d) in taps.chunks_exact(T::LANES).zip(row(0)).zip(row(1)).zip(row(2)).zip(row(3)) {
+                let tap = T::load(tap);
+                sums[0] = T::load(a).mul_add(tap, sums[0]);
+                sums[1] = T::load(b).mul_add(tap, sums[1]);
+                sums[2] = T::load(c).mul_add(tap, sums[2]);
+                sums[3] = T::load(d).mul_add(tap, sums[3]);
             }
             for i in 0..4 {
                 out[i] = sums[i].sum();
@@ -266,12 +267,10 @@ impl Kernel for Convolution<'_> {
             from += 4 * self.factor;
         }
         for out in chunks.into_remainder() {
-            let row = &self.signal[from..][..taps.len()];
+            let row = self.signal[from..][..taps.len()].chunks_exact(T::LANES);
             let mut sum = T::ZERO;
-            let mut k = 0;
-            while k + T::LANES <= taps.len() {
-                sum = T::load(&row[k..k + T::LANES]).mul_add(T::load(&taps[k..k + T::LANES]), sum);
-                k += T::LANES;
+            for (tap, value) in taps.chunks_exact(T::LANES).zip(row) {
+                sum = T::load(value).mul_add(T::load(tap), sum);
             }
             *out = sum.sum();
             from += self.factor;
@@ -292,7 +291,7 @@ mod tests {
         let settings = DecimationSettings { factor: 7, ..DecimationSettings::default() };
         let taps = settings.taps(1000.0).unwrap();
         let n = 1203;
-        let plain: Vec<f64> = (0..)
+        let plain: Vec<f64> = (0..n)
             .map(|k| k * 7)
             .take_while(|from| from + taps.len() <= n)
             .map(|from| taps.iter().enumerate().map(|(j, tap)| tap * wave(from + j)).sum())

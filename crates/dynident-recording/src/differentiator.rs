@@ -60,7 +60,7 @@ pub trait Differentiator: core::fmt::Debug + Send + Sync {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "method", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum DifferentiatorSettings {
-    /// [`ButterworthZeroPhase`]; without `cutoff_hz` the cut-off is chosen from the data ([`cutoff`](crate::cutoff)).
+    /// [`ButterworthZeroPhase`]; without `cutoff_hz` the cut-off is chosen from the data ([`cutoff`](crate::cutoff())).
     Butterworth {
         /// Order of the one-way filter, 1 to 12; 4 by default.
         #[serde(default = "four")]

@@ -51,6 +51,14 @@ pub enum RecordingError {
         /// 1-based line.
         line: u64,
     },
+    /// Lines that end with a carriage return alone.
+    #[error("{}:{line}: carriage returns without newlines; convert the line ends, e.g. with tr '\\r' '\\n'", file.display())]
+    CarriageReturns {
+        /// The file.
+        file: PathBuf,
+        /// 1-based line.
+        line: u64,
+    },
     /// A line beyond [`MAX_LINE_BYTES`](crate::MAX_LINE_BYTES).
     #[error("{}:{line}: the line is longer than {limit} bytes; is this a CSV file with one sample per line?", file.display())]
     LineTooLong {
@@ -129,8 +137,8 @@ pub enum RecordingError {
         /// The field.
         text: String,
     },
-    /// A channel that overflows when its unit, scale, matrix or offset is applied.
-    #[error("{}, row {row}: {group} of joint `{joint}` is not finite after scaling; check the factors of `{group}` and the raw value", file.display())]
+    /// A channel that is absurdly large once its unit, scale, matrix or offset is applied.
+    #[error("{}, row {row}: {group} of joint `{joint}` is beyond 1e60 or not finite after scaling; check the factors of `{group}` and the raw value", file.display())]
     Overflow {
         /// The log's main file.
         file: PathBuf,
@@ -152,13 +160,13 @@ pub enum RecordingError {
         other: PathBuf,
     },
     /// The row or time range leaves nothing.
-    #[error("{}: the selection ({selection}) leaves no row of the {rows} in the file; widen it", file.display())]
+    #[error("{}: the selection ({selection}) leaves no row after {rows} rows were read; widen it", file.display())]
     EmptySelection {
         /// The file.
         file: PathBuf,
         /// The keys in force.
         selection: String,
-        /// Data rows in the file.
+        /// Data rows that were read.
         rows: u64,
     },
     /// Time stamps from which no rate follows.

@@ -276,7 +276,7 @@ pub struct LogFormat {
     /// How time stamps are understood.
     #[serde(default)]
     pub clock: ClockRule,
-    /// A step longer than this many median steps splits the log.
+    /// A step longer than this many median steps splits the log; 1.5 to 1000, 5 by default.
     #[serde(default = "default_max_gap_steps")]
     pub max_gap_steps: f64,
 }
@@ -360,11 +360,11 @@ impl LogFormat {
                 "write [from, to] in seconds with from < to",
             ));
         }
-        if !(self.max_gap_steps.is_finite() && self.max_gap_steps >= 1.5) {
+        if !(1.5..=1000.0).contains(&self.max_gap_steps) {
             return Err(FormatError::new(
                 "max_gap_steps",
-                format!("{} is too small", self.max_gap_steps),
-                "give at least 1.5 median steps",
+                format!("{} is out of range", self.max_gap_steps),
+                "give 1.5 to 1000 median steps",
             ));
         }
         for (key, group, quantity) in self.groups() {

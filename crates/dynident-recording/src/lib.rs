@@ -1,4 +1,34 @@
-//! **What was measured?** Log readers, units, clocks, filters, and every way from q to dq and ddq.
+//! **What was measured?** From log files to a motion: readers, column mapping, units, clock and gaps, filters, every way from q
+//! to dq and ddq, and the parallel filter that decimates regressor and torque alike.
+//!
+//! [`LogFormat`] describes a log (it is part of the study file), [`MotionStream`] turns it into blocks of q, dq, ddq and torque on a uniform
+//! clock with memory that does not grow with the log, and [`ImportReport`] tells what was found on the way. Joints are known
+//! by name only; what moves them is other rooms' business. All values are SI.
+//!
+//! ```
+//! use dynident_recording::{LogFormat, MotionBlock, MotionSettings, MotionStream};
+//! # let folder = tempfile::tempdir()?;
+//! # let file = folder.path().join("log.csv");
+//! # let rows = (0..200).map(|i| format!("{},{},{}\n", i, (f64::from(i) * 0.02).sin() * 57.3, 1.5));
+//! # std::fs::write(&file, "t_ms,elbow_deg,elbow_Nm\n".to_owned() + &rows.collect::<String>())?;
+//! let format: LogFormat = toml::from_str(
+//!     r#"
+//!     time = { column = "t_ms", unit = "ms" }
+//!     position = { columns = ["elbow_deg"], unit = "deg" }
+//!     torque = { columns = ["elbow_Nm"], unit = "N m" }
+//!     "#,
+//! )?;
+//! let mut stream = MotionStream::open(&format, &file, &["elbow".to_owned()], &MotionSettings::default())?;
+//! let mut block = MotionBlock::default();
+//! while stream.next_block(&mut block)? {
+//!     for (dq, tau) in block.joint(&block.dq, 0).iter().zip(block.joint(&block.tau, 0)) {
+//!         assert!(dq.is_finite() && (tau - 1.5).abs() < 1e-12);
+//!     }
+//! }
+//! let report = stream.report();
+//! assert_eq!((report.rows, report.rate_hz.round()), (200, 1000.0));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![forbid(unsafe_code)]
 
 mod butterworth;

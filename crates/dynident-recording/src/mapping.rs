@@ -60,7 +60,9 @@ impl Mapping {
                         }
                     }
                     if *offset != 0.0 {
-                        out.iter_mut().for_each(|out| *out += offset);
+                        for out in out.iter_mut() {
+                            *out += offset;
+                        }
                     }
                 }
             }

@@ -6,6 +6,9 @@ use crate::mapping::Mapping;
 use crate::table::{Row, Table, row_count};
 use std::path::{Path, PathBuf};
 
+/// Largest position or torque: its squares and its second differences per second squared are finite.
+const LARGEST: f64 = 1e60;
+
 /// Rows of a [`RawBlock`] at most.
 pub const BLOCK_ROWS: usize = 4096;
 
@@ -94,12 +97,11 @@ impl LogReader {
         let mut groups = Vec::new();
         for (key, group, quantity) in format.groups() {
             let path = group.file.as_ref().map_or_else(|| file.to_owned(), |name| folder.join(name));
-            let source = match sources.iter().position(|table| table.path() == path) {
-                Some(known) => known,
-                None => {
-                    sources.push(Table::open(&path, format)?);
-                    sources.len() - 1
-                }
+            let source = if let Some(known) = sources.iter().position(|table| table.path() == path) {
+                known
+            } else {
+                sources.push(Table::open(&path, format)?);
+                sources.len() - 1
             };
             let list = group.column_list(key)?;
             let slots = list.iter().map(|column| sources[source].want(&format!("{key}.columns"), column));
@@ -190,7 +192,7 @@ impl LogReader {
             out.resize(self.joints.len(), Vec::new());
             group.mapping.apply(&group.columns, out);
             for (joint, values) in out.iter().enumerate() {
-                if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+                if let Some(at) = values.iter().position(|value| !(-LARGEST..=LARGEST).contains(value)) {
                     return Err(RecordingError::Overflow {
                         file: self.file.clone(),
                         row: block.row[at],
@@ -202,7 +204,7 @@ impl LogReader {
         }
         self.delivered += block.row.len() as u64;
         if block.row.is_empty() && self.delivered == 0 {
-            return Err(if self.next_row == 0 {
+            return Err(if self.next_row == 0 && self.rows[1] > 0 {
                 RecordingError::NoRows { file: self.file.clone(), line: self.sources[0].table.line() }
             } else {
                 RecordingError::EmptySelection {

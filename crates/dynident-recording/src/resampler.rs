@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     fn resampled(stamps: &[f64], signal: impl Fn(f64) -> f64, piece: usize) -> Vec<f64> {
-        let values = vec![stamps.iter().map(|t| signal(*t)).collect::<Vec<f64>>()];
+        let values = [stamps.iter().map(|t| signal(*t)).collect::<Vec<f64>>()];
         let (mut resampler, mut out) = (Resampler::new(1), vec![Vec::new()]);
         for (index, stamp) in stamps.iter().enumerate() {
             resampler.push(*stamp, index, values.iter());

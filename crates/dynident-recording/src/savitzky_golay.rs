@@ -18,13 +18,13 @@ impl SavitzkyGolay {
     /// A filter over `window` samples.
     ///
     /// # Errors
-    /// If `window` is even or beyond 2001, or `degree` is not 2 to 8 and below `window`.
+    /// If `window` is even or beyond 501, or `degree` is not 2 to 8 and below `window`.
     pub fn new(window: usize, degree: usize) -> Result<Self, FilterError> {
-        if window % 2 == 0 || !(3..=2001).contains(&window) {
+        if window.is_multiple_of(2) || !(3..=501).contains(&window) {
             return Err(FilterError::Setting {
                 name: "window",
                 value: window as f64,
-                mend: "give an odd number, 3 to 2001",
+                mend: "give an odd number, 3 to 501",
             });
         }
         if !(2..=8).contains(&degree) || degree >= window {
@@ -50,9 +50,9 @@ fn polynomial_weights(window: usize, degree: usize) -> Vec<[Vec<f64>; 3]> {
             Some([p, dp, ddp]) => {
                 let at = |i: usize| (abscissa[i], p[i], dp[i], ddp[i]);
                 [
-                    (0..window).map(|i| at(i)).map(|(x, p, _, _)| x * p).collect(),
-                    (0..window).map(|i| at(i)).map(|(x, p, dp, _)| p + x * dp).collect(),
-                    (0..window).map(|i| at(i)).map(|(x, _, dp, ddp)| 2.0 * dp + x * ddp).collect(),
+                    (0..window).map(at).map(|(x, p, _, _)| x * p).collect(),
+                    (0..window).map(at).map(|(x, p, dp, _)| p + x * dp).collect(),
+                    (0..window).map(at).map(|(x, _, dp, ddp)| 2.0 * dp + x * ddp).collect(),
                 ]
             }
         };

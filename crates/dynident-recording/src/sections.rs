@@ -12,13 +12,16 @@ pub struct Section {
     pub a: [f64; 2],
 }
 
+/// Lowest cut-off as part of the sampling rate: there the gain at zero frequency still holds to seven digits.
+const LOWEST: f64 = 1e-5;
+
 /// The digital Butterworth low-pass of `order`: analogue prototype poles `exp(iπ(2k + n + 1) / 2n)`, cut-off pre-warped,
 /// bilinear transform; each section has unit gain at zero frequency. The cascade is that of `scipy.signal.butter(order,
 /// cutoff_hz, fs=rate_hz, output="sos")`, up to how the gain is spread over the sections.
 /// Source: Oppenheim and Schafer, Discrete-Time Signal Processing, section 7.1.2.
 ///
 /// # Errors
-/// If `order` is not 1 to 12, or the cut-off is not above 0 and below half the rate.
+/// If `order` is not 1 to 12, or the cut-off is not from 1e-5 of the rate to below half of it.
 pub fn butterworth_low_pass(order: usize, cutoff_hz: f64, rate_hz: f64) -> Result<Vec<Section>, FilterError> {
     if !(1..=12).contains(&order) {
         return Err(FilterError::Setting { name: "order", value: order as f64, mend: "give 1 to 12" });
@@ -28,6 +31,13 @@ pub fn butterworth_low_pass(order: usize, cutoff_hz: f64, rate_hz: f64) -> Resul
     }
     if cutoff_hz.partial_cmp(&(0.5 * rate_hz)) != Some(core::cmp::Ordering::Less) {
         return Err(FilterError::AboveNyquist { cutoff_hz, rate_hz });
+    }
+    if cutoff_hz < LOWEST * rate_hz {
+        return Err(FilterError::Setting {
+            name: "cutoff_hz",
+            value: cutoff_hz,
+            mend: "raise it: below 1e-5 of the sampling rate the recursion has no digits left",
+        });
     }
     let warped = (PI * cutoff_hz / rate_hz).tan();
     let mut sections: Vec<Section> = (0..order / 2)

@@ -26,7 +26,7 @@ pub struct MotionSettings {
     /// Also pass the torque through the differentiator's smoothing, as [`MotionBlock::tau_smooth`].
     pub smooth_torque: bool,
     /// Seconds left out at both ends of every uninterrupted piece, where a zero-phase filter has to invent
-    /// samples; 0 by default.
+    /// samples; 0 to 60, 0 by default.
     pub trim_s: f64,
 }
 
@@ -36,8 +36,8 @@ impl MotionSettings {
     /// # Errors
     /// A [`FilterError`] that names the setting.
     pub fn validate(&self) -> Result<(), FilterError> {
-        if !(0.0..=1e6).contains(&self.trim_s) {
-            return Err(FilterError::Setting { name: "trim_s", value: self.trim_s, mend: "give seconds, 0 or more" });
+        if !(0.0..=60.0).contains(&self.trim_s) {
+            return Err(FilterError::Setting { name: "trim_s", value: self.trim_s, mend: "give seconds, 0 to 60" });
         }
         self.differentiator.validate()
     }
@@ -253,7 +253,7 @@ impl MotionStream {
     }
 
     fn chunk(&self) -> usize {
-        CHUNK_ROWS.max(4 * self.context.unwrap_or(0))
+        CHUNK_ROWS.max(3 * self.context.unwrap_or(0))
     }
 
     /// Moves raw rows to the uniform clock until the raw block or the segment ends.

@@ -1,4 +1,5 @@
 //! Filters against SciPy and NumPy (`golden/scipy_filters.py`).
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use dynident_recording::{
     ButterworthZeroPhase, CentralDifferences, DecimationSettings, Derivatives, Differentiator, SavitzkyGolay,

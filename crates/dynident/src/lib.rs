@@ -1,1 +1,43 @@
-//! placeholder
+//! **The whole job**: a study file in, a dynamic model with error bars and its proof out.
+//!
+//! [`identify()`] fits a [`Study`]'s machine to its logs and tests it on the held-out ones; [`validate()`] tests a finished model; [`inspect()`] audits a robot
+//! description; [`evaluate()`] computes dynamics for a table of states. The rooms below are re-exported: [`model`], [`dynamics`], [`recording`], [`estimation`].
+
+#![forbid(unsafe_code)]
+
+mod error;
+mod evaluate;
+mod evidence;
+mod identify;
+mod inspect;
+mod machine;
+mod output;
+mod progress;
+mod result;
+mod rows;
+mod standard_parameters;
+mod study;
+mod validate;
+
+pub use dynident_dynamics as dynamics;
+pub use dynident_estimation as estimation;
+pub use dynident_model as model;
+pub use dynident_recording as recording;
+
+pub use error::Error;
+pub use evaluate::{Quantity, evaluate};
+pub use evidence::PriorAgreement;
+pub use identify::{Identification, RunOptions, identify};
+pub use inspect::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary, inspect};
+pub use machine::Machine;
+pub use output::write_whole;
+pub use progress::{Progress, Silent};
+pub use result::{
+    BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, LogValidation, MethodSummary, PhysicalVerdict,
+    RESULT_SCHEMA, ResultFile, RobotSummary, Timings, TrainingJoint, TrainingResult,
+};
+pub use study::{
+    CoulombChoice, CouplingSection, DriveSection, EstimatorMethod, EstimatorSection, Folders, JointDrive, LogSection,
+    ParallelFilterSection, RobotSection, Role, Study,
+};
+pub use validate::{VALIDATION_SCHEMA, ValidationFile, validate};

@@ -13,11 +13,14 @@ const LARGEST_MASS_KG: f64 = 1000.0;
 const OSMIUM_DENSITY_KG_M3: f64 = 22590.0;
 /// A violation of a physical inequality by less than this share of the largest moment is rounding in the file: 3 digits are usual there.
 const ROUNDING: f64 = 1e-2;
-/// Rounding in the last digit of a binary double and of the eigenvalues, relative to the largest moment.
+/// Rounding in the last digit of a binary double and of the eigenvalues, relative to the inertia about the frame's origin.
 const NUMERICAL: f64 = 1e-9;
 /// How many body lengths the centre of mass may lie from the frame before it is doubtful, and before it must be a unit slip.
 const FAR: f64 = 3.0;
 const ABSURDLY_FAR: f64 = 50.0;
+/// A uniform rod about its end has three quarters of its inertia from the parallel-axis term; bodies given rightly rarely look as if
+/// more than this came from it.
+const MOSTLY_SHIFT: f64 = 0.7;
 
 pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
     for (index, body) in model.bodies().iter().enumerate() {
@@ -52,8 +55,9 @@ fn possible(link: &str, inertial: &InertialParameters, findings: &mut Findings) 
         return;
     };
     let [least, middle, most] = moments;
-    let size = least.abs().max(most.abs());
-    if least < -NUMERICAL * size {
+    // The moments are a difference from the inertia about the frame's origin, and carry its rounding.
+    let rounding = NUMERICAL * trace(&inertial.inertia_at_origin()).abs();
+    if least < -rounding {
         findings.add(
             Problem,
             "inertia-not-positive",
@@ -63,7 +67,7 @@ fn possible(link: &str, inertial: &InertialParameters, findings: &mut Findings) 
                  check signs, products of inertia, and the point that the inertia is about"
             ),
         );
-    } else if least + middle < most - NUMERICAL * size {
+    } else if least + middle < most - rounding {
         let excess = (most - least - middle) / most;
         let level = if excess < ROUNDING { Warning } else { Problem };
         findings.add(
@@ -106,12 +110,12 @@ fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &m
     let square = 0.5 * trace(&inertia) / mass;
     if square > (FAR * length_m).powi(2) {
         findings.add(
-            Problem,
+            if square > (ABSURDLY_FAR * length_m).powi(2) { Problem } else { Warning },
             "inertia-too-large",
             place(),
             format!(
-                "has an inertia as if its {mass} kg lay {:.3} m from the centre of mass, on a body of about {length_m:.3} m: if the inertia is in \
-                 kg mm^2 divide by 1e6, in g mm^2 by 1e9",
+                "has an inertia as if its {mass} kg lay {:.3} m from the centre of mass, on a body of about {length_m:.3} m: check \
+                 its unit (kg mm^2: divide by 1e6, g mm^2: by 1e9)",
                 square.sqrt()
             ),
         );
@@ -142,8 +146,8 @@ fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &m
     }
 }
 
-/// An inertia that was computed about the link's origin but written as if about the centre of mass: without the parallel-axis term a possible body
-/// remains, and that term is most of the inertia given.
+/// An inertia that was computed about the link's origin but written as if about the centre of mass: without the parallel-axis term
+/// a possible body remains, and that term is most of the inertia given.
 fn about_origin(link: &str, inertial: &InertialParameters, com: Vec3, inertia: &Mat3, findings: &mut Findings) {
     let mass = inertial.mass_kg();
     let shift = (Mat3::IDENTITY.scale(com.dot(com)) - Mat3::outer(com, com)).scale(mass);
@@ -167,9 +171,6 @@ fn about_origin(link: &str, inertial: &InertialParameters, com: Vec3, inertia: &
         );
     }
 }
-
-/// A uniform rod about its end has three quarters of its inertia from the parallel-axis term; ordinary bodies, given rightly, rarely more than this.
-const MOSTLY_SHIFT: f64 = 0.7;
 
 /// Bodies and links without any inertial.
 fn unknown(model: &Model, index: usize, findings: &mut Findings) {

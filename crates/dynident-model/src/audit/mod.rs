@@ -77,8 +77,8 @@ impl Findings {
 struct Lengths {
     /// Largest sum of joint offsets from the base to a joint, m.
     reach: f64,
-    /// Of each body: the largest distance between its frame and a joint or link on it or its parent joint, at least a tenth of a metre (a wrist or
-    /// a finger often has all its joints in one point).
+    /// Of each body: the largest distance between its frame and a joint or link on it, or its parent joint; at least a tenth of a
+    /// metre (a wrist or a finger often has all its joints in one point).
     bodies: Vec<f64>,
 }
 

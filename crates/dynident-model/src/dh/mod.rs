@@ -73,7 +73,7 @@ pub enum DhFault {
         reason: String,
     },
     /// A number that is not finite, or beyond [`MAX_MAGNITUDE`](crate::urdf::MAX_MAGNITUDE).
-    #[error("`{key}` is {value}: write a finite number below 1e9")]
+    #[error("`{key}` is {value:e}: write a finite number below 1e9")]
     Number {
         /// The key.
         key: &'static str,

@@ -39,6 +39,9 @@ const IN_INERTIAL: [&str; 3] = ["origin", "mass", "inertia"];
 const IN_JOINT: [&str; 10] =
     ["origin", "parent", "child", "axis", "calibration", "dynamics", "limit", "mimic", "safety_controller", "gazebo"];
 
+/// Elements of which the first is read.
+const READ: [&str; 9] = ["origin", "mass", "inertia", "parent", "child", "axis", "limit", "dynamics", "mimic"];
+
 type Unread<'a, 'input> = Vec<Node<'a, 'input>>;
 
 /// All links, in the order of the document.
@@ -52,7 +55,7 @@ pub(super) fn links<'a, 'input>(
         let name = name(node, "name")?;
         refuse_duplicate(&mut seen, "link", name, node)?;
         note_unread(node, &IN_LINK, unread);
-        let inertial = match child(node, name, "inertial")? {
+        let inertial = match only_inertial(node, name)? {
             Some(element) => {
                 note_unread(element, &IN_INERTIAL, unread);
                 Some(inertial(element, name)?)
@@ -104,7 +107,7 @@ fn joint<'a, 'input>(node: Node<'a, 'input>) -> Result<JointElement<'a, 'input>,
     };
     let parent = name(required_child(node, joint, "joint", "parent", "")?, "link")?;
     let child_link = name(required_child(node, joint, "joint", "child", "")?, "link")?;
-    let origin = origin(node, joint)?;
+    let origin = origin(node)?;
     let mut element = JointElement {
         node,
         name: joint,
@@ -119,7 +122,7 @@ fn joint<'a, 'input>(node: Node<'a, 'input>) -> Result<JointElement<'a, 'input>,
         mimic: None,
     };
     let Some(kind) = kind else { return Ok(element) };
-    if let Some(axis) = child(node, joint, "axis")? {
+    if let Some(axis) = child(node, "axis") {
         let direction = Vec3(numbers(axis, "xyz")?.unwrap_or(element.axis.0));
         let norm = direction.norm();
         // Below 1e-9 a direction is the rounding of zero, not a direction.
@@ -129,7 +132,7 @@ fn joint<'a, 'input>(node: Node<'a, 'input>) -> Result<JointElement<'a, 'input>,
         // Dividing would touch axes that are exact already.
         element.axis = if norm == 1.0 { direction } else { Vec3(direction.0.map(|x| x / norm)) };
     }
-    if let Some(limit) = child(node, joint, "limit")? {
+    if let Some(limit) = child(node, "limit") {
         element.limits =
             JointLimits { velocity: number(limit, "velocity")?, effort: number(limit, "effort")?, ..element.limits };
         let (lower, upper) = (number(limit, "lower")?, number(limit, "upper")?);
@@ -137,11 +140,11 @@ fn joint<'a, 'input>(node: Node<'a, 'input>) -> Result<JointElement<'a, 'input>,
             element.limits = JointLimits { lower, upper, ..element.limits };
         }
     }
-    if let Some(dynamics) = child(node, joint, "dynamics")? {
+    if let Some(dynamics) = child(node, "dynamics") {
         element.damping = numbers::<1>(dynamics, "damping")?.map(|[x]| x);
         element.friction = numbers::<1>(dynamics, "friction")?.map(|[x]| x);
     }
-    if let Some(mimic) = child(node, joint, "mimic")? {
+    if let Some(mimic) = child(node, "mimic") {
         element.mimic = Some(Mimic {
             source: name(mimic, "joint")?.to_owned(),
             multiplier: numbers::<1>(mimic, "multiplier")?.map_or(1.0, |[x]| x),
@@ -154,7 +157,7 @@ fn joint<'a, 'input>(node: Node<'a, 'input>) -> Result<JointElement<'a, 'input>,
 /// `<inertial>`: mass, centre of mass, and inertia about it in axes turned by the origin's rpy.
 fn inertial(node: Node<'_, '_>, link: &str) -> Result<InertialParameters, UrdfError> {
     const HINT: &str = ", or delete <inertial> so that the link counts as unknown";
-    let link_from_com = origin(node, link)?;
+    let link_from_com = origin(node)?;
     let mass = required_number(required_child(node, link, "inertial", "mass", HINT)?, "value")?;
     let element = required_child(node, link, "inertial", "inertia", HINT)?;
     let mut moments = [0.0; 6];
@@ -170,8 +173,8 @@ fn inertial(node: Node<'_, '_>, link: &str) -> Result<InertialParameters, UrdfEr
 }
 
 /// `<origin xyz rpy>`; the identity where it is missing.
-fn origin(node: Node<'_, '_>, owner: &str) -> Result<Transform, UrdfError> {
-    let Some(origin) = child(node, owner, "origin")? else { return Ok(Transform::IDENTITY) };
+fn origin(node: Node<'_, '_>) -> Result<Transform, UrdfError> {
+    let Some(origin) = child(node, "origin") else { return Ok(Transform::IDENTITY) };
     let [roll, pitch, yaw] = numbers(origin, "rpy")?.unwrap_or_default();
     let translation = Vec3(numbers(origin, "xyz")?.unwrap_or_default());
     Ok(Transform { rotation: Mat3::from_roll_pitch_yaw(roll, pitch, yaw), translation })
@@ -192,10 +195,27 @@ fn refuse_duplicate<'a, 'input>(
     }
 }
 
+/// The `<inertial>` of a link. A second one would leave open which of them the link has.
+fn only_inertial<'a, 'input>(node: Node<'a, 'input>, link: &str) -> Result<Option<Node<'a, 'input>>, UrdfError> {
+    let mut found = node.children().filter(|child| child.has_tag_name("inertial"));
+    let first = found.next();
+    match found.next() {
+        Some(second) => Err(fault_at(second, UrdfFault::RepeatedInertial { link: link.to_owned() })),
+        None => Ok(first),
+    }
+}
+
+/// Notes children that are not `known`, or that repeat one of those that may stand once.
 fn note_unread<'a, 'input>(node: Node<'a, 'input>, known: &[&str], unread: &mut Unread<'a, 'input>) {
+    let mut once = Vec::new();
     for child in node.children().filter(Node::is_element) {
-        if unread.len() < UrdfRobot::MAX_UNREAD && !known.contains(&child.tag_name().name()) {
+        let element = child.tag_name().name();
+        let repeated = READ.contains(&element) && once.contains(&element);
+        if unread.len() < UrdfRobot::MAX_UNREAD && (repeated || !known.contains(&element)) {
             unread.push(child);
+        }
+        if READ.contains(&element) && !repeated {
+            once.push(element);
         }
     }
 }

@@ -24,6 +24,7 @@
 
 mod assemble;
 mod elements;
+mod flood;
 mod values;
 mod write;
 
@@ -32,7 +33,7 @@ pub use write::{JointChange, LinkChange, UrdfWriteError, link_changes, rewrite_u
 use crate::error::ModelError;
 use crate::place::{Located, line_and_column};
 use crate::tree::Model;
-use roxmltree::{Document, Node};
+use roxmltree::{Document, Node, ParsingOptions};
 use thiserror::Error;
 
 /// Most moving joints that a description may have.
@@ -42,13 +43,16 @@ pub const MAX_MOVING_JOINTS: usize = 1000;
 /// would leave the range of `f64`.
 pub const MAX_MAGNITUDE: f64 = 1e9;
 
+/// Most elements, texts and comments in a document: a hundred times the largest known, and little memory.
+const MAX_NODES: u32 = 2_000_000;
+
 /// What a URDF says.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UrdfRobot {
     /// The machine on a fixed base, gravity along -z.
     pub model: Model,
-    /// Elements inside links, inertials and joints that URDF does not define and that were not read: often a misspelling. At most
-    /// [`UrdfRobot::MAX_UNREAD`] are kept.
+    /// Elements inside links, inertials and joints that were not read, because URDF does not define them (often a misspelling) or
+    /// because they repeat an earlier one, which counts. At most [`UrdfRobot::MAX_UNREAD`] are kept.
     pub unread: Vec<UnreadElement>,
 }
 
@@ -83,6 +87,15 @@ pub enum UrdfFault {
         /// What the XML parser says.
         reason: String,
     },
+    /// More elements, texts and comments than a robot has.
+    #[error("the document has more than {limit} nodes: name the URDF of one robot")]
+    TooLarge {
+        /// The limit.
+        limit: u32,
+    },
+    /// Thousands of attributes in one tag, or of namespaces.
+    #[error("more attributes in a tag, or namespaces in the document, than any robot has: name the URDF of one robot")]
+    Flood,
     /// A document type declaration, by which entities could be defined.
     #[error("a document type declaration is not accepted: delete the <!DOCTYPE ...> block")]
     Doctype,
@@ -112,13 +125,11 @@ pub enum UrdfFault {
         /// More on the mend.
         hint: &'static str,
     },
-    /// An element stands more than once.
-    #[error("`{owner}` has more than one <{element}>: keep one")]
-    RepeatedElement {
-        /// Name of the link or joint.
-        owner: String,
-        /// The element.
-        element: String,
+    /// A link with two inertials.
+    #[error("link `{link}` has a second <inertial>: keep one")]
+    RepeatedInertial {
+        /// The link.
+        link: String,
     },
     /// An attribute is missing.
     #[error("<{element}> has no attribute `{attribute}`: add it")]
@@ -129,7 +140,7 @@ pub enum UrdfFault {
         attribute: &'static str,
     },
     /// A name without a character.
-    #[error("<{element}> has an empty `{attribute}`: give it a name")]
+    #[error("<{element}> has an empty `{attribute}`: fill it in")]
     EmptyName {
         /// The element.
         element: String,
@@ -137,8 +148,10 @@ pub enum UrdfFault {
         attribute: &'static str,
     },
     /// Something that is not a usable number.
-    #[error("`{attribute}` holds `{text}`, which is {fault}: write {mend}")]
+    #[error("`{attribute}` of <{element}> holds `{text}`, which is {fault}: write {mend}")]
     Number {
+        /// The element.
+        element: String,
         /// The attribute.
         attribute: String,
         /// What stands there, shortened.
@@ -149,8 +162,10 @@ pub enum UrdfFault {
         mend: &'static str,
     },
     /// Too many or too few numbers.
-    #[error("`{attribute}` holds {found} numbers: write {expected}, separated by spaces")]
+    #[error("`{attribute}` of <{element}> holds {found} numbers: write {expected}, separated by spaces")]
     Count {
+        /// The element.
+        element: String,
         /// The attribute.
         attribute: String,
         /// How many are needed.
@@ -275,7 +290,11 @@ pub fn read_urdf(text: &str) -> Result<UrdfRobot, UrdfError> {
 
 /// The XML tree of a URDF, if it is one.
 fn parse(text: &str) -> Result<Document<'_>, UrdfError> {
-    let document = Document::parse(text).map_err(|error| xml_error(text, &error))?;
+    if let Some(at) = flood::flood(text) {
+        return Err(Located::at(text, at, UrdfFault::Flood));
+    }
+    let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
+    let document = Document::parse_with_options(text, options).map_err(|error| xml_error(text, &error))?;
     let root = document.root_element();
     if let Some(node) =
         root.descendants().find(|node| node.tag_name().namespace().is_some_and(|ns| ns.contains("xacro")))
@@ -299,12 +318,9 @@ fn parse(text: &str) -> Result<Document<'_>, UrdfError> {
 
 fn xml_error(text: &str, error: &roxmltree::Error) -> UrdfError {
     use roxmltree::Error;
-    let reason = || {
-        // The parser appends its own position; ours leads the message.
-        let message = error.to_string();
-        message.split(" at ").next().unwrap_or_default().to_owned()
-    };
     let at = error.pos();
+    // The parser's messages hold their position; ours lead with it.
+    let reason = || error.to_string().replacen(&format!(" at {at}"), "", 1);
     let (line, column, fault) = match error {
         Error::DtdDetected => {
             let (line, column) = line_and_column(text, text.find("<!DOCTYPE").unwrap_or(0));
@@ -317,6 +333,7 @@ fn xml_error(text: &str, error: &roxmltree::Error) -> UrdfError {
             let (line, column) = line_and_column(text, text.len());
             (line, column, UrdfFault::Xml { reason: "the document ends too early".to_owned() })
         }
+        Error::NodesLimitReached => (1, 1, UrdfFault::TooLarge { limit: MAX_NODES }),
         _ => (at.row, at.col, UrdfFault::Xml { reason: reason() }),
     };
     Located { line, column, fault }

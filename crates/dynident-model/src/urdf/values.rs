@@ -4,24 +4,12 @@ use super::{MAX_MAGNITUDE, UrdfError, UrdfFault, fault_at};
 use crate::place::Located;
 use roxmltree::{Attribute, Node};
 
-/// The element's children called `element`, of which at most one may stand.
-pub(super) fn child<'a, 'input>(
-    node: Node<'a, 'input>,
-    owner: &str,
-    element: &str,
-) -> Result<Option<Node<'a, 'input>>, UrdfError> {
-    let mut found = node.children().filter(|child| child.has_tag_name(element));
-    let first = found.next();
-    match found.next() {
-        Some(second) => {
-            let fault = UrdfFault::RepeatedElement { owner: owner.to_owned(), element: element.to_owned() };
-            Err(fault_at(second, fault))
-        }
-        None => Ok(first),
-    }
+/// The first child called `element`; further ones are listed as unread, as the reference parser of URDF passes over them.
+pub(super) fn child<'a, 'input>(node: Node<'a, 'input>, element: &str) -> Option<Node<'a, 'input>> {
+    node.children().find(|child| child.has_tag_name(element))
 }
 
-/// The child `element`, which must stand exactly once.
+/// The child `element`, which must be there.
 pub(super) fn required_child<'a, 'input>(
     node: Node<'a, 'input>,
     owner: &str,
@@ -29,7 +17,7 @@ pub(super) fn required_child<'a, 'input>(
     element: &'static str,
     hint: &'static str,
 ) -> Result<Node<'a, 'input>, UrdfError> {
-    child(node, owner, element)?
+    child(node, element)
         .ok_or_else(|| fault_at(node, UrdfFault::MissingElement { parent, owner: owner.to_owned(), element, hint }))
 }
 
@@ -61,7 +49,12 @@ pub(super) fn numbers<const N: usize>(node: Node<'_, '_>, attribute: &str) -> Re
         }
     }
     if count != N {
-        let fault = UrdfFault::Count { attribute: attribute.to_owned(), expected: N, found: count };
+        let fault = UrdfFault::Count {
+            element: node.tag_name().name().to_owned(),
+            attribute: attribute.to_owned(),
+            expected: N,
+            found: count,
+        };
         return Err(fault_in(node, found, fault));
     }
     Ok(Some(numbers))
@@ -113,8 +106,14 @@ fn number_fault(
     fault: &'static str,
     mend: &'static str,
 ) -> UrdfError {
-    let attribute_name = attribute.name().to_owned();
-    fault_in(node, attribute, UrdfFault::Number { attribute: attribute_name, text: shortened(word), fault, mend })
+    let fault = UrdfFault::Number {
+        element: node.tag_name().name().to_owned(),
+        attribute: attribute.name().to_owned(),
+        text: shortened(word),
+        fault,
+        mend,
+    };
+    fault_in(node, attribute, fault)
 }
 
 fn fault_in(node: Node<'_, '_>, attribute: Attribute<'_, '_>, fault: UrdfFault) -> UrdfError {

@@ -8,7 +8,7 @@ use super::{UrdfError, parse};
 use crate::inertial::InertialParameters;
 use crate::tree::Model;
 use roxmltree::Node;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use thiserror::Error;
 
@@ -143,11 +143,14 @@ pub fn rewrite_urdf(original: &str, links: &[LinkChange], joints: &[JointChange]
     let document = parse(original)?;
     let robot = document.root_element();
     let source = Source { text: original, eol: if original.contains("\r\n") { "\r\n" } else { "\n" } };
+    let mut nodes = HashMap::new();
+    for node in robot.children().filter(Node::is_element) {
+        if let Some(name) = node.attribute("name") {
+            nodes.entry((node.tag_name().name(), name)).or_insert(node);
+        }
+    }
     let find = |kind: &'static str, name: &str| {
-        robot
-            .children()
-            .find(|node| node.has_tag_name(kind) && node.attribute("name") == Some(name))
-            .ok_or_else(|| UrdfWriteError::Unknown { kind, name: name.to_owned() })
+        nodes.get(&(kind, name)).copied().ok_or_else(|| UrdfWriteError::Unknown { kind, name: name.to_owned() })
     };
 
     let mut edits: Vec<(Range<usize>, String)> = Vec::new();
@@ -206,8 +209,7 @@ fn inertial_lines(link: &str, inertial: &InertialParameters, note: Option<&str>)
     }
     let ([x, y, z], i) = (com.0, inertia.0);
     let mut lines = vec![(0, "<inertial>".to_owned())];
-    // XML allows no double hyphen in a comment.
-    lines.extend(note.map(|note| (1, format!("<!-- {} -->", note.replace("--", "- -")))));
+    lines.extend(note.map(|note| (1, format!("<!-- {} -->", comment_text(note)))));
     lines.push((1, format!(r#"<origin xyz="{x:?} {y:?} {z:?}" rpy="0 0 0"/>"#)));
     lines.push((1, format!(r#"<mass value="{:?}"/>"#, inertial.mass_kg())));
     lines.push((
@@ -219,6 +221,18 @@ fn inertial_lines(link: &str, inertial: &InertialParameters, note: Option<&str>)
     ));
     lines.push((0, "</inertial>".to_owned()));
     Ok(lines)
+}
+
+/// XML allows neither two hyphens in a row nor control characters in a comment.
+fn comment_text(note: &str) -> String {
+    let mut text = String::with_capacity(note.len());
+    for c in note.chars() {
+        if c == '-' && text.ends_with('-') {
+            text.push(' ');
+        }
+        text.push(if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') { ' ' } else { c });
+    }
+    text
 }
 
 /// The original text and how it breaks lines.

@@ -1,6 +1,7 @@
 //! Where the tests find robots and recordings, and a small arm.
 
 #![allow(dead_code, reason = "every test program uses its own part of this")]
+#![allow(clippy::print_stdout, reason = "a skipped test says so")]
 
 use std::path::{Path, PathBuf};
 

@@ -1,0 +1,60 @@
+//! Guard against documents on which the XML parser's work or memory grows with the square of their length: very many attributes in one tag
+//! (each is compared with all others), and very many namespaces nested in each other (each element keeps all of them).
+
+/// Most attributes in one tag; the richest tags of real descriptions have a dozen.
+const MAX_ATTRIBUTES: usize = 1000;
+/// Most namespace declarations in a document.
+const MAX_NAMESPACES: usize = 5000;
+
+/// The byte at which a document becomes a flood, if it does. One pass, no memory; malformed markup is left to the parser.
+pub(super) fn flood(text: &str) -> Option<usize> {
+    if let Some((at, _)) = text.match_indices("xmlns").nth(MAX_NAMESPACES) {
+        return Some(at);
+    }
+    let mut at = 0;
+    while let Some(start) = text[at..].find('<').map(|next| at + next) {
+        let rest = &text[start..];
+        let skipped =
+            [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")].into_iter().find(|(open, _)| rest.starts_with(open));
+        if let Some((open, close)) = skipped {
+            at = start + open.len() + rest[open.len()..].find(close)? + close.len();
+            continue;
+        }
+        let (mut quote, mut attributes, mut length) = (None, 0, rest.len());
+        for (offset, byte) in rest.bytes().enumerate() {
+            match (quote, byte) {
+                (None, b'>') => {
+                    length = offset + 1;
+                    break;
+                }
+                (None, b'"' | b'\'') => quote = Some(byte),
+                (None, b'=') => attributes += 1,
+                (Some(open), byte) if open == byte => quote = None,
+                _ => {}
+            }
+            if attributes > MAX_ATTRIBUTES {
+                return Some(start);
+            }
+        }
+        at = start + length;
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::flood;
+
+    #[test]
+    fn a_flood_is_seen_behind_comments_and_quotes() {
+        let attributes = r#" a="x>'""#.repeat(1001);
+        for before in ["", "<!-- it's <a \" -->", "<?xml it's?>", "<![CDATA[ ' ]]>", "<a b='\"'>"] {
+            assert_eq!(flood(&format!("{before}<c{attributes}/>")), Some(before.len()), "{before}");
+            assert_eq!(flood(&format!("{before}<c{}/>", &attributes[8..])), None, "{before}");
+        }
+        assert_eq!(flood(&"<a xmlns:b='c'>".repeat(5001)), Some(5000 * 15 + 3));
+        // An end that never comes is the parser's business.
+        assert_eq!(flood("<!-- <"), None);
+        assert_eq!(flood("<a b='"), None);
+    }
+}

@@ -1,0 +1,127 @@
+//! Dynamics for a table of states.
+
+use crate::error::Error;
+use dynident_dynamics::{Workspace, forward_dynamics, gravity_torque, inverse_dynamics, mass_matrix, torque_regressor};
+use dynident_model::{INERTIAL_NAMES, Model};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// What is computed for every state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Torques from `q`, `dq`, `ddq`.
+    InverseDynamics,
+    /// Accelerations from `q`, `dq`, `tau`.
+    ForwardDynamics,
+    /// Mass matrix from `q`, row by row.
+    MassMatrix,
+    /// Gravity torque from `q`.
+    Gravity,
+    /// Torque regressor from `q`, `dq`, `ddq`, row by row.
+    Regressor,
+}
+
+impl Quantity {
+    /// Groups of columns that it needs.
+    fn groups(self) -> &'static [&'static str] {
+        match self {
+            Self::InverseDynamics | Self::Regressor => &["q", "dq", "ddq"],
+            Self::ForwardDynamics => &["q", "dq", "tau"],
+            Self::MassMatrix | Self::Gravity => &["q"],
+        }
+    }
+
+    fn header(self, dof: usize) -> Vec<String> {
+        let numbered = |name: &str| (1..=dof).map(|j| format!("{name}{j}")).collect();
+        match self {
+            Self::InverseDynamics => numbered("tau"),
+            Self::ForwardDynamics => numbered("ddq"),
+            Self::Gravity => numbered("g"),
+            Self::MassMatrix => (1..=dof).flat_map(|i| (1..=dof).map(move |j| format!("M{i}_{j}"))).collect(),
+            Self::Regressor => (1..=dof)
+                .flat_map(|row| {
+                    (1..=dof).flat_map(move |body| INERTIAL_NAMES.map(|name| format!("tau{row}_{name}{body}")))
+                })
+                .collect(),
+        }
+    }
+}
+
+/// Computes `quantity` for every row of the CSV table `states` (header `q1..`, `dq1..`, `ddq1..`, `tau1..` as far as needed, in any order, SI units) and writes CSV with 17
+/// significant digits to `out`. Returns the number of rows.
+///
+/// # Errors
+/// If the table cannot be read, lacks a column, or holds something that is not a finite number; if bodies without inertial make the quantity meaningless; or if `out` cannot be
+/// written. Rows before a faulty one have then been written to `out`.
+pub fn evaluate(model: &Model, states: &Path, quantity: Quantity, out: &mut dyn Write) -> Result<u64, Error> {
+    let dof = model.dof();
+    let unknown = model.bodies_without_prior();
+    if !unknown.is_empty() && quantity != Quantity::Regressor {
+        let message = format!(
+            "the robot's bodies {} have no inertial: their dynamics are unknown; add <inertial> or ask for the regressor",
+            unknown.join(", ")
+        );
+        return Err(Error::States { path: states.to_owned(), line: 1, message });
+    }
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .flexible(true)
+        .from_path(states)
+        .map_err(|error| table_error(states, &error))?;
+    let header = reader.headers().map_err(|error| table_error(states, &error))?.clone();
+    let mut places = Vec::new();
+    for group in quantity.groups() {
+        for joint in 1..=dof {
+            let name = format!("{group}{joint}");
+            let place = header.iter().position(|column| column == name).ok_or_else(|| Error::States {
+                path: states.to_owned(),
+                line: 1,
+                message: format!(
+                    "no column `{name}`: the quantity needs {} each with the numbers 1 to {dof}; the table has {}",
+                    quantity.groups().join(", "),
+                    header.iter().collect::<Vec<_>>().join(", ")
+                ),
+            })?;
+            places.push(place);
+        }
+    }
+    let cannot = |source| Error::Output { path: PathBuf::from("standard output"), source };
+    writeln!(out, "{}", quantity.header(dof).join(",")).map_err(cannot)?;
+    let mut workspace = Workspace::new(model);
+    let (mut record, mut rows, mut state) = (csv::StringRecord::new(), 0, vec![0.0; places.len()]);
+    while reader.read_record(&mut record).map_err(|error| table_error(states, &error))? {
+        let line = record.position().map_or(0, csv::Position::line);
+        for (value, &place) in state.iter_mut().zip(&places) {
+            let field = record.get(place).unwrap_or("");
+            *value = field.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| Error::States {
+                path: states.to_owned(),
+                line,
+                message: format!("column `{}`: `{field}` is not a finite number", &header[place]),
+            })?;
+        }
+        let (q, rest) = state.split_at(dof);
+        let result = match quantity {
+            Quantity::MassMatrix => mass_matrix(model, &mut workspace, q),
+            Quantity::Gravity => gravity_torque(model, &mut workspace, q),
+            Quantity::InverseDynamics => inverse_dynamics(model, &mut workspace, q, &rest[..dof], &rest[dof..]),
+            Quantity::ForwardDynamics => forward_dynamics(model, &mut workspace, q, &rest[..dof], &rest[dof..]),
+            Quantity::Regressor => torque_regressor(model, &mut workspace, q, &rest[..dof], &rest[dof..]),
+        };
+        if result.iter().any(|value| !value.is_finite()) {
+            let message = "the result is not finite: the state is too large, or a joint moves no inertia".to_owned();
+            return Err(Error::States { path: states.to_owned(), line, message });
+        }
+        for (k, value) in result.iter().enumerate() {
+            let comma = if k == 0 { "" } else { "," };
+            write!(out, "{comma}{value:.16e}").map_err(cannot)?;
+        }
+        writeln!(out).map_err(cannot)?;
+        rows += 1;
+    }
+    Ok(rows)
+}
+
+fn table_error(path: &Path, error: &csv::Error) -> Error {
+    let line = error.position().map_or(1, csv::Position::line);
+    Error::States { path: path.to_owned(), line, message: error.to_string() }
+}

@@ -1,0 +1,27 @@
+//! Files appear whole or not at all.
+
+use crate::error::Error;
+use std::io::Write;
+use std::path::Path;
+
+/// Writes `contents` to `path` by way of a temporary file in the same folder: a reader sees the old file or the new one, never a half of one, and an error
+/// leaves what was there.
+///
+/// # Errors
+/// [`Error::Output`] with the system's reason.
+pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Error> {
+    let cannot = |source| Error::Output { path: path.to_owned(), source };
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    std::fs::create_dir_all(folder).map_err(cannot)?;
+    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(cannot)?;
+    file.write_all(contents).map_err(cannot)?;
+    file.as_file().sync_all().map_err(cannot)?;
+    // A temporary file is private to its owner; a result is for everybody whom the folder lets in.
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644)).map_err(cannot)?;
+    }
+    file.persist(path).map_err(|error| cannot(error.error))?;
+    Ok(())
+}

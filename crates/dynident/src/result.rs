@@ -1,0 +1,241 @@
+//! What `identify` writes: the schema of `result.json`.
+
+use crate::evidence::PriorAgreement;
+use dynident_estimation::ValidationReport;
+use dynident_recording::{Finding, ImportReport};
+use serde::{Deserialize, Serialize};
+
+/// Name and version of the schema. Fields are added, never renamed, within a version.
+pub const RESULT_SCHEMA: &str = "dynident/result/1";
+
+/// A finished identification.
+#[derive(Clone, Debug, Serialize)]
+pub struct ResultFile {
+    /// [`RESULT_SCHEMA`].
+    pub schema: &'static str,
+    /// Name of the study.
+    pub name: String,
+    /// The machine.
+    pub robot: RobotSummary,
+    /// How the fit was made.
+    pub method: MethodSummary,
+    /// The base parameters, in the order of the tree.
+    pub base_parameters: Vec<BaseParameterResult>,
+    /// The bodies: one of the full sets that give these base parameters, the nearest to the prior.
+    pub bodies: Vec<BodyResult>,
+    /// Friction and drives.
+    pub joints: Vec<JointResult>,
+    /// Drives that turn with two joints.
+    pub couplings: Vec<LawResult>,
+    /// The fit on the logs that it was made from.
+    pub training: TrainingResult,
+    /// The test on logs that were not used.
+    pub validation: Vec<LogValidation>,
+    /// Whether the full set is physically possible.
+    pub physical: PhysicalVerdict,
+    /// What the importer found in each log.
+    pub logs: Vec<LogSummary>,
+    /// Where the time went.
+    pub timings_s: Timings,
+}
+
+/// The machine of a result.
+#[derive(Clone, Debug, Serialize)]
+pub struct RobotSummary {
+    /// Its name.
+    pub name: String,
+    /// The description.
+    pub file: String,
+    /// Degrees of freedom.
+    pub dof: usize,
+    /// Joint names in the order of all vectors.
+    pub joints: Vec<String>,
+    /// Gravity in the base frame, m/s².
+    pub gravity_m_s2: [f64; 3],
+    /// Order of the ten inertial parameters of a body.
+    pub parameter_order: [&'static str; 10],
+}
+
+/// How a fit was made.
+#[derive(Clone, Debug, Serialize)]
+pub struct MethodSummary {
+    /// `ordinary` or `weighted`.
+    pub estimator: String,
+    /// `complete`, `not-all-excited` or `iteration-limit`.
+    pub status: String,
+    /// Solutions made.
+    pub iterations: usize,
+    /// What the error bars account for.
+    pub covariance: String,
+    /// Time segments behind the covariance.
+    pub clusters: usize,
+    /// Condition number of the weighted regressor's base columns.
+    pub condition_number: f64,
+    /// The same after each column was divided by its norm.
+    pub condition_number_scaled: f64,
+    /// How the base columns were chosen.
+    pub base_columns: String,
+    /// Smallest share of a column that counted as independent, largest that counted as dependent.
+    pub base_gap: [f64; 2],
+    /// Base parameters that the data do not excite; they were held at the prior (or zero).
+    pub not_excited: Vec<String>,
+}
+
+/// One base parameter.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct BaseParameterResult {
+    /// Symbol of its own column: `Izz1`.
+    pub symbol: String,
+    /// What it sums: `Izz1 + 0.49 m2`.
+    pub expression: String,
+    /// Its unit at a turning joint.
+    pub unit: String,
+    /// The estimate.
+    pub value: f64,
+    /// Its standard deviation, by the method's covariance.
+    pub std: f64,
+    /// The same if residuals were white: what a naive tool would print.
+    pub std_white: f64,
+    /// `100 std / |value|`.
+    pub relative_std_percent: Option<f64>,
+    /// By the description's own numbers.
+    pub prior: Option<f64>,
+    /// False when the data do not excite it; value is then the prior's and std means nothing.
+    pub excited: bool,
+}
+
+/// One body of the full set.
+#[derive(Clone, Debug, Serialize)]
+pub struct BodyResult {
+    /// Name of its own link.
+    pub name: String,
+    /// All links lumped into it.
+    pub links: Vec<String>,
+    /// Mass.
+    pub mass_kg: f64,
+    /// Centre of mass in the body frame; none for a body without mass.
+    pub com_m: Option<[f64; 3]>,
+    /// Inertia about the body frame's origin: xx, xy, xz, yy, yz, zz.
+    pub inertia_at_origin_kgm2: [f64; 6],
+    /// All ten, in the project's order.
+    pub parameters: [f64; 10],
+    /// The description's own ten; none when unknown.
+    pub prior: Option<[f64; 10]>,
+    /// Smallest eigenvalue of the pseudo-inertia: positive for a possible body.
+    pub pseudo_inertia_min_eigenvalue: f64,
+}
+
+/// A parameter of a law.
+#[derive(Clone, Debug, Serialize)]
+pub struct LawResult {
+    /// Its symbol.
+    pub symbol: String,
+    /// Its unit at a turning joint.
+    pub unit: String,
+    /// The estimate; where it stands in a base parameter with others, its share in the full set.
+    pub value: f64,
+    /// Standard deviation; none where it is not a base parameter by itself.
+    pub std: Option<f64>,
+    /// The base parameter that it stands in.
+    pub base_parameter: Option<String>,
+}
+
+/// Friction and drive of one joint.
+#[derive(Clone, Debug, Serialize)]
+pub struct JointResult {
+    /// The joint.
+    pub name: String,
+    /// Its laws.
+    pub laws: Vec<LawResult>,
+    /// Standard deviation of its filtered residual, Nm (N).
+    pub residual_std_nm: f64,
+    /// How strongly its residual is correlated in time: the lag-1 correlation that matters for the error bars.
+    pub residual_correlation: Option<f64>,
+}
+
+/// Figures of the fit on its own data.
+#[derive(Clone, Debug, Serialize)]
+pub struct TrainingResult {
+    /// The logs.
+    pub logs: Vec<String>,
+    /// Filtered rows of each joint.
+    pub samples: usize,
+    /// `100 ‖τ - τ̂‖ / ‖τ‖`, filtered, all joints stacked.
+    pub relative_error_percent: Option<f64>,
+    /// Joint by joint.
+    pub joints: Vec<TrainingJoint>,
+}
+
+/// One joint of [`TrainingResult`].
+#[derive(Clone, Debug, Serialize)]
+pub struct TrainingJoint {
+    /// The joint.
+    pub name: String,
+    /// Root mean square residual, Nm (N).
+    pub rmse_nm: f64,
+    /// `100 ‖τ - τ̂‖ / ‖τ‖`.
+    pub relative_error_percent: Option<f64>,
+}
+
+/// Figures on one log that was not used for the fit.
+#[derive(Clone, Debug, Serialize)]
+pub struct LogValidation {
+    /// The log.
+    pub log: String,
+    /// The model against the torque as filtered for estimation.
+    #[serde(flatten)]
+    pub model: ValidationReport,
+    /// The model against the torque as logged: nothing is filtered but the motion.
+    pub raw: ValidationReport,
+    /// The description's own inertials, damping and friction on the filtered torque; none when unknown.
+    pub prior: Option<ValidationReport>,
+}
+
+/// Whether a full set is possible.
+#[derive(Clone, Debug, Serialize)]
+pub struct PhysicalVerdict {
+    /// All pseudo-inertias positive definite, no negative friction or drive inertia.
+    pub consistent: bool,
+    /// What is not.
+    pub violations: Vec<String>,
+    /// What the verdict is about.
+    pub note: &'static str,
+}
+
+/// What is known of a log.
+#[derive(Clone, Debug, Serialize)]
+pub struct LogSummary {
+    /// Its name.
+    pub log: String,
+    /// `identify` or `validate`.
+    pub role: &'static str,
+    /// The importer's report.
+    pub import: ImportReport,
+    /// Cut-off of the differentiator in force.
+    pub motion_cutoff_hz: Option<f64>,
+    /// Cut-off of the parallel filter.
+    pub filter_cutoff_hz: Option<f64>,
+    /// Rate of the filtered rows.
+    pub filtered_rate_hz: f64,
+    /// Filtered rows of each joint.
+    pub filtered_rows: u64,
+    /// The log against the description's own inertials.
+    pub prior_agreement: Option<PriorAgreement>,
+    /// What follows from that.
+    pub model_findings: Vec<Finding>,
+}
+
+/// Where the time went, in seconds.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Timings {
+    /// Reading the robot, base parameters.
+    pub machine: f64,
+    /// Logs to triangular factors.
+    pub logs: f64,
+    /// Factors to estimates.
+    pub estimation: f64,
+    /// Held-out logs.
+    pub validation: f64,
+    /// All of it.
+    pub total: f64,
+}

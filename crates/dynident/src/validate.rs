@@ -1,0 +1,188 @@
+//! A model against logs that were not used for its fit.
+
+use crate::error::Error;
+use crate::evidence::{Evidence, predicted};
+use crate::identify::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
+use crate::machine::Machine;
+use crate::result::{BaseParameterResult, LogSummary, LogValidation};
+use crate::rows::{JointRows, Pass, RawSamples, RowSink, estimated_rows};
+use crate::study::{Folders, Role, Study};
+use dynident_estimation::Validation;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Name and version of the schema of [`ValidationFile`].
+pub const VALIDATION_SCHEMA: &str = "dynident/validation/1";
+
+/// What `validate` prints as JSON.
+#[derive(Clone, Debug, Serialize)]
+pub struct ValidationFile {
+    /// [`VALIDATION_SCHEMA`].
+    pub schema: &'static str,
+    /// Name of the study.
+    pub name: String,
+    /// Figures by log.
+    pub validation: Vec<LogValidation>,
+    /// What the importer found.
+    pub logs: Vec<LogSummary>,
+}
+
+/// The part of `result.json` that a model is.
+#[derive(Deserialize)]
+struct StoredModel {
+    schema: String,
+    base_parameters: Vec<BaseParameterResult>,
+}
+
+/// Tests the model of a `result.json` on the logs of a study that have the role `validate`, or on all its logs if none has.
+///
+/// # Errors
+/// If the result does not belong to the study's machine, and everything that reading logs can give.
+pub fn validate(
+    result_path: &Path,
+    study: &Study,
+    study_path: &Path,
+    options: &RunOptions<'_>,
+) -> Result<ValidationFile, Error> {
+    let folders = Folders::new(study, study_path, options.data.as_deref());
+    let machine = Machine::new(study, study_path, &folders)?;
+    let theta = stored_values(result_path, &machine)?;
+    let files = log_files(study, &folders)?;
+    let mut chosen = of_role(study, Role::Validate);
+    if chosen.is_empty() {
+        chosen = (0..study.log.len()).collect();
+    }
+    let mut file = ValidationFile {
+        schema: VALIDATION_SCHEMA,
+        name: study_name(study, study_path),
+        validation: Vec::new(),
+        logs: Vec::new(),
+    };
+    for index in chosen {
+        let (summary, figures) = validate_log(study, &machine, index, &files[index], &theta, options)?;
+        file.logs.push(summary);
+        file.validation.push(figures);
+    }
+    Ok(file)
+}
+
+/// The base parameters of a stored result, in the machine's order.
+fn stored_values(path: &Path, machine: &Machine) -> Result<Vec<f64>, Error> {
+    let wrong = |message: String| Error::Result { path: path.to_owned(), message };
+    let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
+    let stored: StoredModel = serde_json::from_slice(&bytes).map_err(|error| {
+        wrong(format!("line {}, column {}: not a result of `identify`: {error}", error.line(), error.column()))
+    })?;
+    if stored.schema != crate::result::RESULT_SCHEMA {
+        let expected = crate::result::RESULT_SCHEMA;
+        return Err(wrong(format!("schema `{}`, not `{expected}`: identify again with this version", stored.schema)));
+    }
+    let expressions = machine.base.expressions();
+    if stored.base_parameters.len() != expressions.len() {
+        return Err(wrong(format!(
+            "{} base parameters, but the study's machine has {}: use the study that the result was made with",
+            stored.base_parameters.len(),
+            expressions.len()
+        )));
+    }
+    let mut values = Vec::with_capacity(expressions.len());
+    for (stored, expression) in stored.base_parameters.iter().zip(&expressions) {
+        if stored.expression != *expression {
+            return Err(wrong(format!(
+                "base parameter `{}` where the study's machine has `{expression}`: use the study that the result was made with",
+                stored.expression
+            )));
+        }
+        if !stored.value.is_finite() {
+            return Err(wrong(format!("the value of `{expression}` is not a finite number")));
+        }
+        values.push(stored.value);
+    }
+    Ok(values)
+}
+
+struct TestSink<'a> {
+    machine: &'a Machine,
+    file: PathBuf,
+    theta: &'a [f64],
+    model: Validation,
+    raw: Validation,
+    prior: Option<(&'a [f64], Validation)>,
+    evidence: Option<Evidence<'a>>,
+    buffer: Vec<f64>,
+}
+
+impl TestSink<'_> {
+    fn failed(&self, source: dynident_estimation::EstimationError) -> Error {
+        Error::Estimation { path: self.file.clone(), source }
+    }
+}
+
+impl RowSink for TestSink<'_> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), Error> {
+        let columns = self.machine.layout.joint_columns(rows.joint);
+        let measured = &rows.panel[columns.len() * rows.rows..];
+        predicted(rows.panel, rows.rows, columns, self.theta, &mut self.buffer);
+        self.model.add_joint(rows.joint, measured, &self.buffer).map_err(|source| self.failed(source))?;
+        if let Some((prior, validation)) = &mut self.prior {
+            predicted(rows.panel, rows.rows, columns, prior, &mut self.buffer);
+            let added = validation.add_joint(rows.joint, measured, &self.buffer);
+            added.map_err(|source| self.failed(source))?;
+        }
+        if let Some(evidence) = &mut self.evidence {
+            evidence.filtered(rows, &mut self.buffer);
+        }
+        Ok(())
+    }
+
+    fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), Error> {
+        let rows = samples.panels.samples();
+        for joint in 0..self.machine.model.dof() {
+            let columns = self.machine.layout.joint_columns(joint);
+            let panel = samples.panels.joint(joint);
+            predicted(panel, rows, columns, self.theta, &mut self.buffer);
+            let added = self.raw.add_joint(joint, &panel[columns.len() * rows..], &self.buffer);
+            added.map_err(|source| self.failed(source))?;
+        }
+        if let Some(evidence) = &mut self.evidence {
+            evidence.raw(samples, &mut self.buffer);
+        }
+        Ok(())
+    }
+}
+
+/// Tests base parameters on one log.
+pub(crate) fn validate_log(
+    study: &Study,
+    machine: &Machine,
+    index: usize,
+    file: &Path,
+    theta: &[f64],
+    options: &RunOptions<'_>,
+) -> Result<(LogSummary, LogValidation), Error> {
+    let joints = joint_names(machine);
+    let columns = (0..machine.model.dof()).map(|joint| machine.layout.joint_columns(joint)).collect();
+    let mut sink = TestSink {
+        machine,
+        file: file.to_owned(),
+        theta,
+        model: Validation::new(joints.clone()),
+        raw: Validation::new(joints.clone()),
+        prior: machine.prior.as_deref().map(|prior| (prior, Validation::new(joints.clone()))),
+        evidence: machine.prior.as_deref().map(|prior| Evidence::new(columns, prior)),
+        buffer: Vec::new(),
+    };
+    options.progress.begin(&format!("testing on {}", study.log_name(index)), estimated_rows([file]));
+    let pass = Pass { study, machine, index, file, reader_thread: options.threads > 1, progress: options.progress };
+    let passed = pass.run(&mut sink);
+    options.progress.end();
+    let passed = passed?;
+    let agreement = sink.evidence.as_ref().map(|evidence| evidence.agreement(&joints, passed.motion_cutoff_hz));
+    let figures = LogValidation {
+        log: study.log_name(index),
+        model: sink.model.report(),
+        raw: sink.raw.report(),
+        prior: sink.prior.map(|(_, validation)| validation.report()),
+    };
+    Ok((log_summary(study, index, passed, agreement, &joints), figures))
+}
