@@ -1,6 +1,8 @@
 //! The book: every code block has a kind that something checks, every TOML block is read by what it is meant for, every page is linked
 //! and every link leads somewhere. Rust blocks run as documentation tests (`src/book.rs`).
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
+
 use dynident::{EstimatorSection, Study};
 use dynident_recording::{DecimationSettings, DifferentiatorSettings, LogFormat, MotionSettings};
 use std::collections::BTreeSet;
@@ -137,7 +139,8 @@ fn every_page_is_in_the_summary_and_every_link_leads_somewhere() {
     for (page, text) in &pages {
         for link in links(text) {
             // An empty link in the summary is a chapter that is not written yet.
-            let outside = link.starts_with("https://") || link.starts_with('#') || (page == "SUMMARY.md" && link.is_empty());
+            let outside =
+                link.starts_with("https://") || link.starts_with('#') || (page == "SUMMARY.md" && link.is_empty());
             let file = link.split('#').next().unwrap_or(link);
             assert!(outside || source.join(file).is_file(), "{page}: `{link}` leads nowhere");
         }
@@ -154,7 +157,10 @@ fn every_decision_is_in_the_book() {
     let index = std::fs::read_to_string(docs().join("src/decisions.md")).unwrap();
     let decisions = pages(&docs().join("decisions"));
     for (file, text) in &decisions {
-        assert!(index.contains(&format!("{{{{#include ../decisions/{file}}}}}")), "decisions.md does not include {file}");
+        assert!(
+            index.contains(&format!("{{{{#include ../decisions/{file}}}}}")),
+            "decisions.md does not include {file}"
+        );
         assert!(text.starts_with("## "), "{file}: begin with a heading of the second level");
     }
     assert_eq!(index.matches("{{#include").count(), decisions.len(), "decisions.md includes a file that is not there");

@@ -1,9 +1,18 @@
 //! The example log that the repository holds is what its generator makes, and a motion that a UR10 may do.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
+
 #[path = "../examples/simulate_ur10.rs"]
-#[allow(dead_code, reason = "the example's main is not called")]
+#[allow(
+    dead_code,
+    unreachable_pub,
+    reason = "the example's main is not called, and its files are public for this test"
+)]
 mod simulate_ur10;
 
+use dynident::{RunOptions, Silent, Study, identify};
+use dynident_dynamics::{BaseParameterSettings, BaseParameters};
+use dynident_model::laws::{CoulombShape, DriveChoice, laws_per_joint};
 use dynident_model::read_urdf;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -22,7 +31,7 @@ fn rows(csv: &str) -> Vec<Vec<f64>> {
 #[test]
 fn the_generator_makes_the_committed_logs() {
     let files = simulate_ur10::files().unwrap();
-    for (name, made) in files.iter().filter(|(name, _)| name.ends_with(".csv")) {
+    for (name, made) in files.iter().filter(|(name, _)| *name != "truth.json") {
         let committed = committed(name);
         assert_eq!(made.lines().next(), committed.lines().next(), "{name}");
         let (made, committed) = (rows(made), rows(&committed));
@@ -81,4 +90,65 @@ fn the_motions_keep_the_robots_limits_and_start_and_end_at_rest() {
             assert!(moved > 0.5, "joint {joint} moves by {moved} rad only");
         }
     }
+}
+
+#[test]
+fn identification_finds_the_truth_within_its_error_bars() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let path = root.join("study.toml");
+    let study = r#"
+        data = "examples/ur10_simulated"
+        [robot]
+        file = "robots/ur10.urdf"
+        [drive]
+        drive_inertia = true
+        coulomb_width = 0.01
+        [motion]
+        differentiator = { method = "butterworth", cutoff_hz = 10.0 }
+        [parallel_filter]
+        factor = 5
+        [format]
+        time = { column = "t_s" }
+        position = { columns = "q{1..6}_rad" }
+        torque = { columns = "tau{1..6}_Nm" }
+        [[log]]
+        file = "train.csv"
+        [[log]]
+        file = "test.csv"
+        role = "validate"
+    "#;
+    let study = Study::parse(study, &path).unwrap();
+    let result = identify(&study, &path, &RunOptions { data: None, threads: 1, progress: &Silent }).unwrap().result;
+
+    let model = read_urdf(include_str!("../../../robots/ur10.urdf")).unwrap().model;
+    let laws = laws_per_joint(&model, |_| DriveChoice {
+        drive_inertia: true,
+        viscous: true,
+        coulomb: Some(CoulombShape::Smooth { width: 0.01 }),
+        offset: true,
+    });
+    let base = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
+    let truth: Value = serde_json::from_str(&committed("truth.json")).unwrap();
+    let truth: Vec<f64> =
+        truth["parameters"].as_array().unwrap().iter().map(|parameter| parameter["value"].as_f64().unwrap()).collect();
+    let truth = base.values(&truth);
+    let expressions: Vec<&String> = result.base_parameters.iter().map(|parameter| &parameter.expression).collect();
+    assert_eq!(expressions, base.expressions().iter().collect::<Vec<_>>());
+    for (parameter, truth) in result.base_parameters.iter().zip(&truth) {
+        // 64 segments for 58 parameters tell a standard deviation to a factor of 1.5 or so; beyond that, 3.3 of the true ones.
+        let error = (parameter.value - truth).abs() / parameter.std;
+        assert!(
+            error < 5.0,
+            "{}: {} for {truth}, {error:.1} standard deviations",
+            parameter.expression,
+            parameter.value
+        );
+    }
+    let held_out = &result.validation[0];
+    let error_percent = held_out.model.relative_error_percent.unwrap();
+    // The torque noise that passes the filter is some 2 % of the torque; errors of the parameters are well below it.
+    assert!(error_percent < 3.0, "{error_percent} %");
+    // Inertials off by a tenth, and no friction at all.
+    let prior_percent = held_out.prior.as_ref().unwrap().relative_error_percent.unwrap();
+    assert!(prior_percent > 10.0, "{prior_percent} %");
 }
