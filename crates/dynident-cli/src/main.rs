@@ -1,2 +1,95 @@
-//! placeholder
-fn main() {}
+//! The `dynident` command. One file per subcommand under `commands/`; this file reads the command line and turns the outcome into an exit status.
+
+mod commands;
+mod progress;
+mod summary;
+mod terminal;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Robot dynamic identification: logs to a dynamic model that can be trusted.
+#[derive(Parser)]
+#[command(
+    name = "dynident",
+    version,
+    about = "Robot dynamic identification: from a URDF and logs to a dynamic model with error bars.",
+    long_about = "Robot dynamic identification: from a URDF and logs to a dynamic model with error bars.\n\n\
+        The path:\n  \
+        1. dynident inspect arm.urdf             what the description says, and what is wrong with it\n  \
+        2. write study.toml                      robot, logs, columns (examples/, docs/src/study.md)\n  \
+        3. dynident identify study.toml --out R  fit, test on held-out logs, write R/result.json and R/identified.urdf\n  \
+        4. dynident validate R/result.json --study other.toml\n  \
+        5. load R/identified.urdf into your controller or simulator"
+)]
+struct Arguments {
+    #[command(flatten)]
+    common: Common,
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// Options of every command.
+#[derive(clap::Args)]
+struct Common {
+    /// One machine-readable object on standard output; messages go to standard error.
+    #[arg(long, global = true)]
+    json: bool,
+    /// Print results and errors only.
+    #[arg(long, short, global = true)]
+    quiet: bool,
+    /// Threads to use; results are the same for any number. By default as many as there are processors.
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Read and audit a robot description (URDF, or D-H table in TOML).
+    Inspect(commands::inspect::Options),
+    /// Dynamics of a robot for a table of states, as CSV with 17 digits.
+    Evaluate(commands::evaluate::Options),
+    /// Fit a study's model to its logs and test it on the held-out ones.
+    Identify(commands::identify::Options),
+    /// Test a finished model on other logs.
+    Validate(commands::validate::Options),
+}
+
+/// How a command ended when it did what it was asked to.
+enum Verdict {
+    /// All is well: exit status 0.
+    Good,
+    /// Done, but the verdict is negative: exit status 1.
+    Negative,
+}
+
+fn main() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            let asked = !error.use_stderr();
+            // Nothing is left to tell if the terminal has gone.
+            let _ = error.print();
+            return ExitCode::from(if asked { 0 } else { 2 });
+        }
+    };
+    let threads = arguments
+        .common
+        .threads
+        .map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from);
+    let context = commands::Context { json: arguments.common.json, quiet: arguments.common.quiet, threads };
+    let outcome = commands::with_threads(threads, || match arguments.command {
+        Command::Inspect(options) => commands::inspect::run(&options, &context),
+        Command::Evaluate(options) => commands::evaluate::run(&options),
+        Command::Identify(options) => commands::identify::run(&options, &context),
+        Command::Validate(options) => commands::validate::run(&options, &context),
+    });
+    match outcome {
+        Ok(Verdict::Good) => ExitCode::SUCCESS,
+        Ok(Verdict::Negative) => ExitCode::from(1),
+        Err(message) => {
+            terminal::complain(&message);
+            ExitCode::from(2)
+        }
+    }
+}

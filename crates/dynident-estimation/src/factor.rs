@@ -2,7 +2,7 @@
 
 use crate::error::EstimationError;
 use crate::reflect::{CHUNK_ROWS, Chunk, TriangleOnPanel, row_start};
-use dynident_lanes::{Level, Scalar, dispatch};
+use dynident_lanes::{Level, dispatch};
 use nalgebra::{DMatrix, DVector};
 
 /// Rows absorbed at once. A block of 256 rows and 44 columns (a seven-joint arm) is 90 kB, which a second-level cache holds while the

@@ -7,7 +7,7 @@ use serde::Serialize;
 pub const CUTOFF_SAMPLES: usize = 1 << 16;
 
 /// Part of the acceleration's power (noise subtracted) that the pass band has to hold.
-const POWER_SHARE: f64 = 0.999;
+const POWER_SHARE: f64 = 0.9999;
 /// Two-way Butterworth filters of order 4 pass 99.6 % of the amplitude at half their cut-off and 86 % at 0.8 of it; this margin
 /// keeps the last of the motion at 94 %.
 const MARGIN: f64 = 1.4;

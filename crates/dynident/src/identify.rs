@@ -8,7 +8,7 @@ use crate::result::{
     BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, MethodSummary, PhysicalVerdict, RESULT_SCHEMA,
     ResultFile, RobotSummary, Timings, TrainingJoint, TrainingResult,
 };
-use crate::rows::{JointRows, Pass, Passed, RawSamples, RowSink};
+use crate::rows::{JointRows, Pass, Passed, RawSamples, RowSink, motion_in_force};
 use crate::standard_parameters::{inertials, nearest_to_prior};
 use crate::study::{EstimatorMethod, Folders, Role, Study};
 use crate::validate::validate_log;
@@ -19,6 +19,7 @@ use dynident_estimation::{
 };
 use dynident_model::laws::Law;
 use dynident_model::{DescriptionFormat, INERTIAL_NAMES, InertialParameters, JointChange, link_changes, rewrite_urdf};
+use dynident_recording::MotionSettings;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -59,7 +60,8 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
 
     let started = Instant::now();
     let training: Vec<usize> = of_role(study, Role::Identify);
-    let fits = read_logs(study, &machine, &files, &training, options)?;
+    let motion = motion_in_force(study, &machine, &files, &training, None)?;
+    let fits = read_logs(study, &machine, &motion, &files, &training, options)?;
     timings.logs = started.elapsed().as_secs_f64();
 
     let started = Instant::now();
@@ -87,7 +89,8 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
     let mut logs: Vec<LogSummary> = fits.iter().map(|fit| fit.summary.clone()).collect();
     let mut validation = Vec::new();
     for index in of_role(study, Role::Validate) {
-        let (summary, figures) = validate_log(study, &machine, index, &files[index], &estimate.values, options)?;
+        let (summary, figures) =
+            validate_log(study, &machine, &motion, index, &files[index], &estimate.values, options)?;
         logs.push(summary);
         validation.push(figures);
     }
@@ -102,7 +105,7 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
         schema: RESULT_SCHEMA,
         name: study_name(study, study_path),
         robot: robot_summary(&machine),
-        method: method_summary(study, &machine, &estimate),
+        method: method_summary(study, &machine, &motion, &estimate),
         base_parameters: base_parameters(&machine, &estimate),
         bodies: bodies(&machine, &inertials),
         joints: joint_results(&machine, &estimate, &parameters),
@@ -139,7 +142,7 @@ struct LogFit {
 }
 
 struct FitSink<'a> {
-    study_path_log: String,
+    file: String,
     factors: Vec<SegmentedFactor>,
     evidence: Option<Evidence<'a>>,
     buffer: Vec<f64>,
@@ -152,7 +155,7 @@ impl RowSink for FitSink<'_> {
         }
         self.factors[rows.joint]
             .absorb(rows.panel, rows.rows)
-            .map_err(|source| Error::Estimation { path: PathBuf::from(&self.study_path_log), source })
+            .map_err(|source| Error::Estimation { path: PathBuf::from(&self.file), source })
     }
 
     fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), Error> {
@@ -166,13 +169,14 @@ impl RowSink for FitSink<'_> {
 fn read_logs(
     study: &Study,
     machine: &Machine,
+    motion: &MotionSettings,
     files: &[PathBuf],
     training: &[usize],
     options: &RunOptions<'_>,
 ) -> Result<Vec<LogFit>, Error> {
     options.progress.begin("logs to factors", crate::rows::estimated_rows(training.iter().map(|&i| &*files[i])));
     // Logs side by side, or one log with its reader on a second thread; results stand in the study's order either way.
-    let one = |index: &usize| read_log(study, machine, *index, &files[*index], training.len() == 1, options);
+    let one = |index: &usize| read_log(study, machine, motion, *index, &files[*index], training.len() == 1, options);
     let fits = if training.len() > 1 && options.threads > 1 {
         training.par_iter().map(one).collect::<Result<Vec<_>, _>>()
     } else {
@@ -185,6 +189,7 @@ fn read_logs(
 fn read_log(
     study: &Study,
     machine: &Machine,
+    motion: &MotionSettings,
     index: usize,
     file: &Path,
     alone: bool,
@@ -198,13 +203,20 @@ fn read_log(
         .collect::<Result<Vec<_>, _>>()
         .map_err(in_log)?;
     let mut sink = FitSink {
-        study_path_log: file.display().to_string(),
+        file: file.display().to_string(),
         factors,
         evidence: machine.prior.as_ref().map(|prior| Evidence::new(columns, prior)),
         buffer: Vec::new(),
     };
-    let pass =
-        Pass { study, machine, index, file, reader_thread: alone && options.threads > 1, progress: options.progress };
+    let pass = Pass {
+        study,
+        machine,
+        motion,
+        index,
+        file,
+        reader_thread: alone && options.threads > 1,
+        progress: options.progress,
+    };
     let passed = pass.run(&mut sink)?;
     let joints = joint_names(machine);
     let agreement = sink.evidence.as_ref().map(|evidence| evidence.agreement(&joints, passed.motion_cutoff_hz));
@@ -270,7 +282,7 @@ fn robot_summary(machine: &Machine) -> RobotSummary {
     }
 }
 
-fn method_summary(study: &Study, machine: &Machine, estimate: &Estimate) -> MethodSummary {
+fn method_summary(study: &Study, machine: &Machine, motion: &MotionSettings, estimate: &Estimate) -> MethodSummary {
     let (weakest, strongest) = machine.base.gap();
     MethodSummary {
         estimator: match study.estimator.method {
@@ -291,6 +303,7 @@ fn method_summary(study: &Study, machine: &Machine, estimate: &Estimate) -> Meth
             "white residuals".to_owned()
         },
         clusters: estimate.clusters,
+        motion: motion.clone(),
         condition_number: estimate.condition_number_raw,
         condition_number_scaled: estimate.condition_number_scaled,
         base_columns: "from the machine's structure: columns from base to tip, bodies then laws; a column that depends on earlier ones is regrouped into them"

@@ -140,7 +140,7 @@ pub fn inspect(path: &Path) -> Result<Inspection, Error> {
         level: "info",
         check: "not-read",
         place: format!("line {}", unread.line),
-        what: format!("<{}> was not read", unread.name),
+        what: format!("<{}> under <{}> was not read: misspelt, or given twice", unread.element, unread.parent),
     }));
     Ok(Inspection {
         schema: INSPECTION_SCHEMA,

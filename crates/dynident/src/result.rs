@@ -2,7 +2,7 @@
 
 use crate::evidence::PriorAgreement;
 use dynident_estimation::ValidationReport;
-use dynident_recording::{Finding, ImportReport};
+use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};
 
 /// Name and version of the schema. Fields are added, never renamed, within a version.
@@ -69,6 +69,8 @@ pub struct MethodSummary {
     pub covariance: String,
     /// Time segments behind the covariance.
     pub clusters: usize,
+    /// From positions to accelerations, with the cut-off in force for all logs.
+    pub motion: MotionSettings,
     /// Condition number of the weighted regressor's base columns.
     pub condition_number: f64,
     /// The same after each column was divided by its norm.

@@ -9,8 +9,10 @@ use crate::progress::Progress;
 use crate::study::{ParallelFilterSection, Study};
 use dynident_dynamics::{BatchWorkspace, Panels, regressor_panels};
 use dynident_model::laws::JointMotion;
-use dynident_recording::{DecimationSettings, Decimator, ImportReport, MotionBlock, MotionSettings, MotionStream};
-use std::path::Path;
+use dynident_recording::{
+    DecimationSettings, Decimator, DifferentiatorSettings, ImportReport, MotionBlock, MotionSettings, MotionStream,
+};
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 /// Samples that are made into panels at a time: small enough for the cache, large enough to spread the filter's overhead.
@@ -54,14 +56,14 @@ pub(crate) struct Passed {
     pub(crate) filter_cutoff_hz: Option<f64>,
     /// Filtered rows of each joint.
     pub(crate) filtered_rows: u64,
-    /// Samples of the motion.
-    pub(crate) samples: u64,
 }
 
 /// One log to be passed: everything but the sink.
 pub(crate) struct Pass<'a> {
     pub(crate) study: &'a Study,
     pub(crate) machine: &'a Machine,
+    /// The study's motion settings with the cut-off that is in force for all its logs.
+    pub(crate) motion: &'a MotionSettings,
     pub(crate) index: usize,
     pub(crate) file: &'a Path,
     pub(crate) reader_thread: bool,
@@ -75,8 +77,8 @@ impl Pass<'_> {
         let failed = |source| Error::Recording { log: log.clone(), source };
         let format = self.study.format_of(self.index);
         let mut stream =
-            MotionStream::open(&format, self.file, &self.machine.log_joints, &self.study.motion).map_err(failed)?;
-        let motion_cutoff_hz = cutoff_in_force(&self.study.motion, &stream);
+            MotionStream::open(&format, self.file, &self.machine.log_joints, self.motion).map_err(failed)?;
+        let motion_cutoff_hz = named_cutoff(self.motion);
         let settings = decimation(&self.study.parallel_filter, stream.rate_hz(), motion_cutoff_hz);
         let mut computer = Computer::new(self, &log, &stream, settings.as_ref())?;
         if self.reader_thread {
@@ -100,18 +102,43 @@ impl Pass<'_> {
             filtered_rate_hz: reduced,
             filter_cutoff_hz: settings.map(|settings| settings.cutoff_hz.unwrap_or(0.4 * reduced)),
             filtered_rows,
-            samples,
         })
     }
 }
 
-/// The differentiator's cut-off: the user's, or the data's, or none for methods without one.
-fn cutoff_in_force(motion: &MotionSettings, stream: &MotionStream) -> Option<f64> {
-    use dynident_recording::DifferentiatorSettings::Butterworth;
+/// The cut-off that motion settings name; none for methods without one.
+pub(crate) fn named_cutoff(motion: &MotionSettings) -> Option<f64> {
     match motion.differentiator {
-        Butterworth { cutoff_hz, .. } => Some(cutoff_hz.unwrap_or(stream.cutoff().cutoff_hz)),
+        DifferentiatorSettings::Butterworth { cutoff_hz, .. } => cutoff_hz,
         _ => None,
     }
+}
+
+/// The study's motion settings with one cut-off for all logs: the user's; or the one that a finished model was made with; or the highest that any of the training logs asks
+/// for. A model and its test must not differ in their filters.
+pub(crate) fn motion_in_force(
+    study: &Study,
+    machine: &Machine,
+    files: &[PathBuf],
+    training: &[usize],
+    of_model_hz: Option<f64>,
+) -> Result<MotionSettings, Error> {
+    let mut motion = study.motion.clone();
+    let DifferentiatorSettings::Butterworth { cutoff_hz, .. } = &mut motion.differentiator else { return Ok(motion) };
+    if cutoff_hz.is_none() {
+        *cutoff_hz = of_model_hz;
+    }
+    if cutoff_hz.is_some() {
+        return Ok(motion);
+    }
+    let mut highest = 0.0_f64;
+    for &index in training {
+        let stream = MotionStream::open(&study.format_of(index), &files[index], &machine.log_joints, &study.motion)
+            .map_err(|source| Error::Recording { log: study.log_name(index), source })?;
+        highest = highest.max(stream.cutoff().cutoff_hz);
+    }
+    *cutoff_hz = Some(highest);
+    Ok(motion)
 }
 
 /// The parallel filter in force at this rate.

@@ -5,9 +5,10 @@ use crate::evidence::{Evidence, predicted};
 use crate::identify::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
 use crate::machine::Machine;
 use crate::result::{BaseParameterResult, LogSummary, LogValidation};
-use crate::rows::{JointRows, Pass, RawSamples, RowSink, estimated_rows};
+use crate::rows::{JointRows, Pass, RawSamples, RowSink, estimated_rows, motion_in_force, named_cutoff};
 use crate::study::{Folders, Role, Study};
 use dynident_estimation::Validation;
+use dynident_recording::MotionSettings;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -31,7 +32,13 @@ pub struct ValidationFile {
 #[derive(Deserialize)]
 struct StoredModel {
     schema: String,
+    method: StoredMethod,
     base_parameters: Vec<BaseParameterResult>,
+}
+
+#[derive(Deserialize)]
+struct StoredMethod {
+    motion: MotionSettings,
 }
 
 /// Tests the model of a `result.json` on the logs of a study that have the role `validate`, or on all its logs if none has.
@@ -46,12 +53,14 @@ pub fn validate(
 ) -> Result<ValidationFile, Error> {
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let machine = Machine::new(study, study_path, &folders)?;
-    let theta = stored_values(result_path, &machine)?;
+    let (theta, made_with) = stored_model(result_path, &machine)?;
     let files = log_files(study, &folders)?;
     let mut chosen = of_role(study, Role::Validate);
     if chosen.is_empty() {
         chosen = (0..study.log.len()).collect();
     }
+    let of_model_hz = named_cutoff(&made_with);
+    let motion = motion_in_force(study, &machine, &files, &chosen, of_model_hz)?;
     let mut file = ValidationFile {
         schema: VALIDATION_SCHEMA,
         name: study_name(study, study_path),
@@ -59,15 +68,15 @@ pub fn validate(
         logs: Vec::new(),
     };
     for index in chosen {
-        let (summary, figures) = validate_log(study, &machine, index, &files[index], &theta, options)?;
+        let (summary, figures) = validate_log(study, &machine, &motion, index, &files[index], &theta, options)?;
         file.logs.push(summary);
         file.validation.push(figures);
     }
     Ok(file)
 }
 
-/// The base parameters of a stored result, in the machine's order.
-fn stored_values(path: &Path, machine: &Machine) -> Result<Vec<f64>, Error> {
+/// The base parameters of a stored result, in the machine's order, and the motion settings that they were found with.
+fn stored_model(path: &Path, machine: &Machine) -> Result<(Vec<f64>, MotionSettings), Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
     let stored: StoredModel = serde_json::from_slice(&bytes).map_err(|error| {
@@ -98,7 +107,7 @@ fn stored_values(path: &Path, machine: &Machine) -> Result<Vec<f64>, Error> {
         }
         values.push(stored.value);
     }
-    Ok(values)
+    Ok((values, stored.method.motion))
 }
 
 struct TestSink<'a> {
@@ -155,6 +164,7 @@ impl RowSink for TestSink<'_> {
 pub(crate) fn validate_log(
     study: &Study,
     machine: &Machine,
+    motion: &MotionSettings,
     index: usize,
     file: &Path,
     theta: &[f64],
@@ -173,7 +183,8 @@ pub(crate) fn validate_log(
         buffer: Vec::new(),
     };
     options.progress.begin(&format!("testing on {}", study.log_name(index)), estimated_rows([file]));
-    let pass = Pass { study, machine, index, file, reader_thread: options.threads > 1, progress: options.progress };
+    let pass =
+        Pass { study, machine, motion, index, file, reader_thread: options.threads > 1, progress: options.progress };
     let passed = pass.run(&mut sink);
     options.progress.end();
     let passed = passed?;

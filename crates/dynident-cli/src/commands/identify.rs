@@ -1,0 +1,48 @@
+//! `dynident identify STUDY.toml --out DIR`.
+
+use super::{Context, json, pretty_json, told};
+use crate::{Verdict, summary, terminal};
+use dynident::{RunOptions, Study, identify, write_whole};
+use std::path::PathBuf;
+
+/// Options of `identify`.
+#[derive(clap::Args)]
+pub(crate) struct Options {
+    /// The study file.
+    study: PathBuf,
+    /// Folder for result.json and identified.urdf.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Folder of the recordings, in place of the study's own.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Exit with status 1 if the relative error on any held-out log is larger.
+    #[arg(long, value_name = "PERCENT")]
+    max_validation_error: Option<f64>,
+}
+
+pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
+    let study = Study::load(&options.study).map_err(told)?;
+    let progress = context.progress();
+    let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
+    let identification = identify(&study, &options.study, &run).map_err(told)?;
+    let result = &identification.result;
+    if let Some(urdf) = &identification.urdf {
+        write_whole(&options.out.join("identified.urdf"), urdf.as_bytes()).map_err(told)?;
+    }
+    // The result last: where it stands, everything stands.
+    write_whole(&options.out.join("result.json"), &pretty_json(result)?).map_err(told)?;
+    if context.json {
+        terminal::print(&json(result)?);
+    } else if !context.quiet {
+        terminal::print(&summary::identification(result, &options.out, identification.urdf.is_some()));
+    }
+    let worst = result.validation.iter().filter_map(|log| log.model.relative_error_percent).fold(0.0, f64::max);
+    Ok(match options.max_validation_error {
+        Some(limit) if worst > limit => {
+            terminal::remark(&format!("the largest held-out error, {worst:.2} %, is above the {limit} % asked for"));
+            Verdict::Negative
+        }
+        _ => Verdict::Good,
+    })
+}

@@ -1,0 +1,35 @@
+//! `dynident validate DIR/result.json --study STUDY.toml`.
+
+use super::{Context, json, told};
+use crate::{Verdict, summary, terminal};
+use dynident::{RunOptions, Study, validate};
+use std::path::PathBuf;
+
+/// Options of `validate`.
+#[derive(clap::Args)]
+pub(crate) struct Options {
+    /// The result.json of an identification.
+    result: PathBuf,
+    /// A study with the same machine; its logs with the role "validate" are used, or all of them if none has it.
+    #[arg(long, value_name = "STUDY.toml")]
+    study: PathBuf,
+    /// Folder of the recordings, in place of the study's own.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Exit with status 1 if the relative error on any log is larger.
+    #[arg(long, value_name = "PERCENT")]
+    max_validation_error: Option<f64>,
+}
+
+pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
+    let study = Study::load(&options.study).map_err(told)?;
+    let progress = context.progress();
+    let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
+    let file = validate(&options.result, &study, &options.study, &run).map_err(told)?;
+    terminal::print(&if context.json { json(&file)? } else { summary::validation(&file.validation, &file.logs) });
+    let worst = file.validation.iter().filter_map(|log| log.model.relative_error_percent).fold(0.0, f64::max);
+    Ok(match options.max_validation_error {
+        Some(limit) if worst > limit => Verdict::Negative,
+        _ => Verdict::Good,
+    })
+}
