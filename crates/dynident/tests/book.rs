@@ -1,5 +1,6 @@
 //! The book: every code block has a kind that something checks, every TOML block is read by what it is meant for, every page is linked
-//! and every link leads somewhere. Rust blocks run as documentation tests (`src/book.rs`).
+//! and every link leads somewhere. Rust blocks run as documentation tests (`src/book.rs`). The studies and robots of `examples/` are
+//! read, too.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
@@ -164,4 +165,21 @@ fn every_decision_is_in_the_book() {
         assert!(text.starts_with("## "), "{file}: begin with a heading of the second level");
     }
     assert_eq!(index.matches("{{#include").count(), decisions.len(), "decisions.md includes a file that is not there");
+}
+
+#[test]
+fn every_example_study_and_robot_is_read() {
+    let folder = docs().join("../examples");
+    let tomls = |folder: &Path| -> Vec<PathBuf> {
+        let paths = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+        paths.filter(|path| path.extension().is_some_and(|extension| extension == "toml")).collect()
+    };
+    let (studies, robots) = (tomls(&folder), tomls(&folder.join("robots")));
+    assert!(!studies.is_empty() && !robots.is_empty());
+    for path in studies {
+        Study::load(&path).unwrap_or_else(|error| panic!("{error}"));
+    }
+    for path in robots {
+        dynident_model::load_robot(&path).unwrap_or_else(|error| panic!("{error}"));
+    }
 }
