@@ -134,6 +134,15 @@ fn links(text: &str) -> Vec<&str> {
 }
 
 #[test]
+fn the_readmes_studies_are_read() {
+    let readme = std::fs::read_to_string(docs().join("../README.md")).unwrap();
+    for block in blocks("README.md", &readme).iter().filter(|block| block.info.starts_with("toml")) {
+        // Indented under a list: TOML does not mind.
+        read("study", &[], &block.text).unwrap_or_else(|error| panic!("{}: {error}", block.place));
+    }
+}
+
+#[test]
 fn every_page_is_in_the_summary_and_every_link_leads_somewhere() {
     let source = docs().join("src");
     let pages = pages(&source);
