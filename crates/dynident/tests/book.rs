@@ -63,8 +63,8 @@ fn read(kind: &str, rest: &[&str], text: &str) -> Result<(), String> {
         "study" => Study::parse(text, Path::new("study.toml")).map(|_| ()).map_err(|e| error(&e)),
         "dh" => dynident_model::read_dh(text).map(|_| ()).map_err(|e| error(&e)),
         "log-format" => {
-            let count = rest.iter().find_map(|word| word.strip_prefix("joints=")).and_then(|n| n.parse().ok());
-            let count: usize = count.ok_or("say the number of joints, as in toml,log-format,joints=6")?;
+            let count = rest.iter().find_map(|word| word.strip_prefix("joints-")).and_then(|n| n.parse().ok());
+            let count: usize = count.ok_or("say the number of joints, as in toml,log-format,joints-6")?;
             let joints: Vec<String> = (1..=count).map(|joint| format!("joint{joint}")).collect();
             let format: LogFormat = toml::from_str(text).map_err(|e| error(&e))?;
             format.validate(&joints).map_err(|e| error(&e))
