@@ -114,7 +114,7 @@ fn structure_agrees_with_random_states_and_the_split_is_clear() {
                 numerical.strongest_dependent,
                 numerical.weakest_independent
             );
-            if ours.independent() != numerical.independent { println!("DIFFER"); continue; }
+            assert_eq!(ours.independent(), numerical.independent, "{name}");
             // The tolerance stands in a gap that no factor of ten closes on either side.
             let tolerance = BaseParameterSettings::default().tolerance;
             assert!(
@@ -210,7 +210,7 @@ fn published_sum(expression: &str) -> BTreeMap<String, f64> {
     sum
 }
 
-/// Stäubli TX40 with drive inertias, friction, offsets and the coupled wrist: the 61 base parameters that figaroh-plus publishes.
+/// Stäubli TX40 with drive inertias, friction, offsets and the coupled wrist: 61 base parameters, as figaroh-plus counts.
 #[test]
 fn the_tx40_has_the_published_base_parameters() {
     let Some(folder) = recordings().map(|folder| folder.join("staubli_tx40")).filter(|folder| folder.is_dir()) else {
@@ -224,12 +224,8 @@ fn the_tx40_has_the_published_base_parameters() {
     }));
     let ours = base(&model, &laws);
     println!("TX40: structural gap {:?}", ours.gap());
-    for e in ours.expressions() { println!("{e}"); }
-    let numerical = numerical_rank(&model, &laws, 5, 1e-9);
-    println!("num {} {:?}", numerical.independent.len(), (numerical.weakest_independent, numerical.strongest_dependent));
     assert_eq!(ours.count(), 61);
-    // Rounded right angles (1.5708) leave 4e-6 of columns that the structure regroups, so the ranks are compared at the same tolerance.
-    let numerical = numerical_rank(&model, &laws, 5, BaseParameterSettings::default().tolerance);
+    let numerical = numerical_rank(&model, &laws, 5, 1e-9);
     assert_eq!(ours.independent(), numerical.independent);
 
     let table = std::fs::read_to_string(folder.join("published_base_parameters.csv")).unwrap();
@@ -238,8 +234,8 @@ fn the_tx40_has_the_published_base_parameters() {
         .filter(|line| !line.is_empty())
         .map(|line| published_sum(line.split(',').next().unwrap()))
         .collect();
-    assert_eq!(published.len(), 61);
     let symbols: Vec<String> = ours.all_columns().iter().map(Column::symbol).collect();
+    let mut unpublished = Vec::new();
     for (b, &column) in ours.independent().iter().enumerate() {
         let mut sum = BTreeMap::from([(symbols[column].clone(), 1.0)]);
         for (d, &dependent) in ours.dependent().iter().enumerate() {
@@ -251,6 +247,11 @@ fn the_tx40_has_the_published_base_parameters() {
         let same = |theirs: &&BTreeMap<String, f64>| {
             theirs.keys().eq(sum.keys()) && theirs.values().zip(sum.values()).all(|(a, b)| (a - b).abs() <= 2e-5)
         };
-        assert!(published.iter().any(|theirs| same(&theirs)), "not published: {sum:?}");
+        if !published.iter().any(|theirs| same(&theirs)) {
+            unpublished.push(sum);
+        }
     }
+    // Their table leaves out the drive inertia of joint 6, though their count of 61 holds it.
+    assert_eq!(unpublished, [BTreeMap::from([("Ia6".to_owned(), 1.0)])]);
+    assert_eq!(published.len(), 60);
 }
