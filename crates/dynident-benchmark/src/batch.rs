@@ -6,15 +6,12 @@ use dynident_dynamics::{BatchWorkspace, PanelLayout, Panels, all_columns, invers
 use dynident_model::Model;
 use std::hint::black_box;
 
-/// Samples in a block. An odd number of cache lines a column, so that the columns of a panel do not fall on the same few cache sets.
-pub(crate) const BLOCK: usize = 72;
-
 /// Times inverse dynamics and the whole regressor (ten columns for every body of every joint) in batches.
-pub(crate) fn time_all(model: &Model, report: &Report<'_>) {
-    let blocks = Motion::random(model, STATES / BLOCK * BLOCK).blocks(BLOCK);
-    let samples = blocks.len() * BLOCK;
+pub(crate) fn time_all(model: &Model, report: &Report<'_>, block: usize) {
+    let blocks = Motion::random(model, STATES / block * block).blocks(block);
+    let samples = blocks.len() * block;
     let mut workspace = BatchWorkspace::with_level(model, report.level);
-    let mut tau = vec![0.0; model.dof() * BLOCK];
+    let mut tau = vec![0.0; model.dof() * block];
     report.time("rnea_batch", samples, || {
         for block in &blocks {
             inverse_dynamics_batch(model, &mut workspace, &block.view(), &mut tau);

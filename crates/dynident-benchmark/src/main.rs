@@ -26,6 +26,9 @@ struct Options {
     /// Only this processor level (portable, AVX2, AVX-512); all that this processor has unless given.
     #[arg(long)]
     level: Option<String>,
+    /// Samples in a batch. Best is an odd multiple of eight: the columns of a panel then do not fall on the same few cache sets.
+    #[arg(long, default_value_t = 72, value_parser = clap::value_parser!(u16).range(1..=512))]
+    block: u16,
     /// Only these quantities.
     #[arg(long, value_delimiter = ',')]
     only: Vec<String>,
@@ -59,7 +62,7 @@ fn main() -> ExitCode {
         for &level in &levels {
             let report = Report { robot: name, dof: model.dof(), level, only: &options.only };
             single::time_all(&model, &report);
-            batch::time_all(&model, &report);
+            batch::time_all(&model, &report, usize::from(options.block));
             if name == "panda_arm7"
                 && let Err(error) = identification::time_all(&model, &report)
             {

@@ -150,9 +150,9 @@ pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScr
         let Transform { rotation: r, translation: t } = &body.parent_from_body;
         let t = *t;
         let column_force = r.mul_vec(column.1);
-        let column_moment = r.mul_vec_add(column.0, t.cross(column_force));
+        let column_moment = t.cross_add(column_force, r.mul_vec(column.0));
         let force = r.mul_vec(body.force);
-        let moment = r.mul_vec_add(body.moment, t.cross(force));
+        let moment = t.cross_add(force, r.mul_vec(body.moment));
         // To the parent's axes, then to its origin: with T = [t]× the blocks become
         // M' = M, H' = H + T M, J' = J + T Hᵀ + H Tᵀ + T M Tᵀ = J + T Hᵀ - H' T (T is skew).
         let j = rotated(r, &own.rotation);

@@ -127,7 +127,7 @@ pub(crate) fn newton_euler<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T
             let parent = &mut inner[parent];
             let force = rotation.mul_vec(body.force);
             parent.force += force;
-            parent.moment = rotation.mul_vec_add(body.moment, translation.cross_add(force, parent.moment));
+            parent.moment = translation.cross_add(force, rotation.mul_vec_add(body.moment, parent.moment));
         }
     }
 }
