@@ -1,5 +1,7 @@
 //! Base parameters of real robots: against Pinocchio's regressors, against random states, and against a published study.
 
+#![allow(clippy::unwrap_used, reason = "part of tests: what cannot be read stops the test")]
+
 mod golden;
 
 use dynident_dynamics::{

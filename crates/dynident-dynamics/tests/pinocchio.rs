@@ -3,6 +3,8 @@
 //! Deviations count against the largest entry of an array. The project promises 1e-10. What two careful programs in double precision leave is
 //! less: some hundred roundings of 1e-16 along a chain of at most twenty joints, so 1e-13, and ten times that where larger terms cancel.
 
+#![allow(clippy::unwrap_used, reason = "part of tests: what cannot be read stops the test")]
+
 mod golden;
 
 use dynident_dynamics::{

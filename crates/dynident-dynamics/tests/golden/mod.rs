@@ -1,5 +1,8 @@
 //! The golden files of other people's programs, in the order of Dynident's model. `golden/README.md` says what every key means.
 
+#![allow(dead_code, reason = "each test program uses its part")]
+#![allow(clippy::unwrap_used, reason = "part of tests: a golden file that cannot be read stops the test")]
+
 use dynident_model::{Model, load_robot};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
