@@ -8,11 +8,14 @@ use dynident_dynamics::{
 use dynident_model::Model;
 use std::hint::black_box;
 
+/// One call at `q`, `dq` and `ddq` (or torque), and one number of its result.
+type Call<'a> = dyn FnMut(&mut Workspace, &[f64], &[f64], &[f64]) -> f64 + 'a;
+
 /// Times every algorithm over random states.
 pub(crate) fn time_all(model: &Model, report: &Report<'_>) {
     let states = Motion::random(model, STATES).by_sample();
     let mut workspace = Workspace::with_level(model, report.level);
-    let mut time = |quantity: &str, call: &mut dyn FnMut(&mut Workspace, &[f64], &[f64], &[f64]) -> f64| {
+    let mut time = |quantity: &str, call: &mut Call<'_>| {
         report.time(quantity, STATES, || {
             for [q, dq, ddq] in &states {
                 black_box(call(&mut workspace, q, dq, ddq));
