@@ -155,7 +155,8 @@ fn decimation(
     }
     // The motion's cut-off is twice the motion's highest frequency; with seven eighths of it per Nyquist band the filter's gain of one half lies at 0.7 of the cut-off, above all
     // motion. It takes the same from torque and regressor, so it costs no bias.
-    let automatic = motion_cutoff_hz.map_or(1, |cutoff| (rate_hz / (1.75 * cutoff)).floor().clamp(1.0, 1000.0) as usize);
+    let automatic =
+        motion_cutoff_hz.map_or(1, |cutoff| (rate_hz / (1.75 * cutoff)).floor().clamp(1.0, 1000.0) as usize);
     let factor = section.factor.unwrap_or(automatic);
     (factor > 1 || section.cutoff_hz.is_some()).then(|| DecimationSettings {
         factor,
