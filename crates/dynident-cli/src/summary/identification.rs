@@ -59,7 +59,7 @@ fn headline(r: &ResultFile) -> String {
     if r.validation.is_empty() {
         return wrapped(
             &format!(
-                "No log was held out: the fit's own error of {fit} % says how well the model fits, not how well it predicts. \
+                "No log was held out: the fit's own error of {fit}\u{a0}% says how well the model fits, not how well it predicts. \
                  Give a log (or a part of one) the role \"validate\"."
             ),
             0,
@@ -68,10 +68,10 @@ fn headline(r: &ResultFile) -> String {
     let mut text = String::new();
     for (number, log) in r.validation.iter().enumerate() {
         let prior =
-            prior_of(log, None).map_or(String::new(), |p| format!("; description's own {} %", percent(Some(p))));
+            prior_of(log, None).map_or(String::new(), |p| format!("; description's own {}\u{a0}%", percent(Some(p))));
         let error = percent(log.model.relative_error_percent);
         text += &wrapped(
-            &format!("held-out torque error {error} % on [{}] {} (fit {fit} %{prior})", number + 1, log.log),
+            &format!("held-out torque error {error}\u{a0}% on [{}] {} (fit {fit}\u{a0}%{prior})", number + 1, log.log),
             2,
         );
     }
@@ -184,11 +184,9 @@ fn physics(r: &ResultFile) -> String {
 
 /// How a log was used.
 fn data(log: &LogSummary) -> String {
-    let filter = log.filter_cutoff_hz.map_or(String::new(), |cutoff| format!(", torque too below {cutoff:.1} Hz"));
-    let motion =
-        log.motion_cutoff_hz.map_or(", no low-pass".to_owned(), |cutoff| format!(", motion below {cutoff:.1} Hz"));
+    let motion = log.motion_cutoff_hz.map_or(String::new(), |cutoff| format!(", motion below {cutoff:.1}\u{a0}Hz"));
     format!(
-        "{} ({}): {} rows at {:.1} Hz{motion}{filter}; {} rows a joint counted",
+        "{} ({}): {} rows at {:.1}\u{a0}Hz{motion}, {} filtered",
         log.log, log.role, log.import.rows, log.import.rate_hz, log.filtered_rows
     )
 }

@@ -8,13 +8,14 @@ pub(super) const WIDTH: usize = 80;
 /// Longest name of a joint or body in a table.
 const NAME: usize = 24;
 
-/// `words` in lines of at most [`WIDTH`] columns; all lines but the first begin with `indent` blanks. A longer word stays whole.
+/// `words` in lines of at most [`WIDTH`] columns; all lines but the first begin with `indent` blanks. A longer word stays whole, and so
+/// does what a no-break space holds together, which becomes a plain one.
 pub(super) fn wrapped(words: &str, indent: usize) -> String {
     let (mut text, mut column) = (String::new(), 0);
     let lead = words.len() - words.trim_start().len();
     text.push_str(&words[..lead]);
     column += lead;
-    for (index, word) in words.split_whitespace().enumerate() {
+    for (index, word) in words.split([' ', '\n']).filter(|word| !word.is_empty()).enumerate() {
         let length = word.chars().count();
         if index > 0 && column + 1 + length > WIDTH {
             text.push('\n');
@@ -28,7 +29,7 @@ pub(super) fn wrapped(words: &str, indent: usize) -> String {
         column += length;
     }
     text.push('\n');
-    text
+    text.replace('\u{a0}', " ")
 }
 
 /// A table without lines: names to the left, numbers to the right, and no blanks at the ends of lines.
