@@ -15,12 +15,12 @@ use std::path::{Path, PathBuf};
 const WIDTH: f64 = 0.02;
 
 /// A file of the repository.
-pub fn repository(path: &str) -> PathBuf {
+pub(crate) fn repository(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path)
 }
 
 /// The folder of the public recordings, or none with a plain word about it.
-pub fn recordings() -> Option<PathBuf> {
+pub(crate) fn recordings() -> Option<PathBuf> {
     let folder = std::env::var_os("DYNIDENT_DATA").map_or_else(|| repository("../shared/data"), PathBuf::from);
     if folder.is_dir() {
         return Some(folder);
@@ -33,29 +33,29 @@ pub fn recordings() -> Option<PathBuf> {
 }
 
 /// Pseudo-random numbers in [-1, 1): a linear congruential generator (Knuth's MMIX constants).
-pub struct Random(pub u64);
+pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
-    pub fn next(&mut self) -> f64 {
+    pub(crate) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 
     /// A sum of twelve uniform numbers of variance one: near enough to a normal one.
-    pub fn normal(&mut self) -> f64 {
+    pub(crate) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.next()).sum::<f64>() / 2.0
     }
 }
 
 /// Bodies, and per joint drive inertia, viscous friction, Coulomb friction, offset.
-pub struct Truth {
-    pub model: Model,
-    pub drive: Vec<[f64; 4]>,
+pub(crate) struct Truth {
+    pub(crate) model: Model,
+    pub(crate) drive: Vec<[f64; 4]>,
 }
 
 impl Truth {
     /// The description's own bodies, each made other by `change` of its mass and size, and drives with friction.
-    pub fn near(description: &Path, change: f64, drive_inertia: bool) -> Self {
+    pub(crate) fn near(description: &Path, change: f64, drive_inertia: bool) -> Self {
         let model = load_robot(description).unwrap().model;
         let mut random = Random(7);
         let inertials: Vec<InertialParameters> = model
@@ -77,7 +77,7 @@ impl Truth {
         Self { model: model.with_inertials(&inertials).unwrap(), drive }
     }
 
-    pub fn torque(&self, workspace: &mut Workspace, q: &[f64], dq: &[f64], ddq: &[f64]) -> Vec<f64> {
+    pub(crate) fn torque(&self, workspace: &mut Workspace, q: &[f64], dq: &[f64], ddq: &[f64]) -> Vec<f64> {
         let bodies = inverse_dynamics(&self.model, workspace, q, dq, ddq);
         let drives = self.drive.iter().enumerate().map(|(j, [inertia, viscous, coulomb, offset])| {
             inertia * ddq[j] + viscous * dq[j] + coulomb * (dq[j] / WIDTH).tanh() + offset
@@ -86,7 +86,7 @@ impl Truth {
     }
 
     /// What a perfect fit finds: the truth in the machine's base parameters.
-    pub fn base_values(&self, machine: &Machine) -> Vec<f64> {
+    pub(crate) fn base_values(&self, machine: &Machine) -> Vec<f64> {
         use dynident::model::laws::Law;
         let mut all = self.model.parameter_vector();
         all.extend(machine.laws.iter().map(|law| match law {
@@ -101,7 +101,7 @@ impl Truth {
 }
 
 /// Sums of sines, different for every seed.
-pub struct Motion {
+pub(crate) struct Motion {
     amplitude: Vec<[f64; 5]>,
     phase: Vec<[f64; 5]>,
 }
@@ -110,7 +110,7 @@ impl Motion {
     /// Slowest frequency, Hz; the fastest is five times as high.
     const SLOWEST_HZ: f64 = 0.13;
 
-    pub fn new(dof: usize, seed: u64) -> Self {
+    pub(crate) fn new(dof: usize, seed: u64) -> Self {
         let mut random = Random(seed);
         let mut numbers = |scale: f64| -> Vec<[f64; 5]> {
             (0..dof).map(|_| core::array::from_fn(|_| scale * random.next())).collect()
@@ -118,7 +118,7 @@ impl Motion {
         Self { amplitude: numbers(0.5), phase: numbers(3.1) }
     }
 
-    pub fn at(&self, t: f64) -> [Vec<f64>; 3] {
+    pub(crate) fn at(&self, t: f64) -> [Vec<f64>; 3] {
         let sum = |order: u32| {
             let joint = |(amplitude, phase): (&[f64; 5], &[f64; 5])| {
                 (0..5)
@@ -136,7 +136,7 @@ impl Motion {
 }
 
 /// A log: what `row` makes of time, position and torque, line by line.
-pub fn write_log(
+pub(crate) fn write_log(
     path: &Path,
     truth: &Truth,
     motion: &Motion,
@@ -160,18 +160,18 @@ pub fn write_log(
 }
 
 /// `t,q1,..,tau1,..`.
-pub fn header(dof: usize) -> String {
+pub(crate) fn header(dof: usize) -> String {
     let numbered = |name: &str| (1..=dof).map(|j| format!(",{name}{j}")).collect::<String>();
     format!("t{}{}", numbered("q"), numbered("tau"))
 }
 
 /// Positions and torques as they are.
-pub fn plain(q: &[f64], tau: &[f64]) -> Vec<f64> {
+pub(crate) fn plain(q: &[f64], tau: &[f64]) -> Vec<f64> {
     [q, tau].concat()
 }
 
 /// Columns, differences exact enough for 1e-6, and nothing else.
-pub fn format(dof: usize) -> String {
+pub(crate) fn format(dof: usize) -> String {
     format!(
         r#"
         [motion]
@@ -184,35 +184,35 @@ pub fn format(dof: usize) -> String {
     )
 }
 
-pub struct Job {
-    pub study: Study,
-    pub path: PathBuf,
+pub(crate) struct Job {
+    pub(crate) study: Study,
+    pub(crate) path: PathBuf,
 }
 
 impl Job {
     /// A study file in `folder`.
-    pub fn new(folder: &Path, text: &str) -> Self {
+    pub(crate) fn new(folder: &Path, text: &str) -> Self {
         let path = folder.join("study.toml");
         std::fs::write(&path, text).unwrap();
         Self { study: Study::load(&path).unwrap_or_else(|error| panic!("{error}\n{text}")), path }
     }
 
-    pub fn options(threads: usize) -> RunOptions<'static> {
+    pub(crate) fn options(threads: usize) -> RunOptions<'static> {
         RunOptions { data: None, threads, progress: &Silent }
     }
 
-    pub fn identify(&self) -> Identification {
+    pub(crate) fn identify(&self) -> Identification {
         identify(&self.study, &self.path, &Self::options(1)).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    pub fn machine(&self) -> Machine {
+    pub(crate) fn machine(&self) -> Machine {
         let folders = dynident::Folders::new(&self.study, &self.path, None);
         Machine::new(&self.study, &self.path, &folders).unwrap()
     }
 }
 
 /// Every base parameter within `tolerance` of the truth, relative to itself or to a hundredth of its unit.
-pub fn assert_recovered(found: &Identification, expected: &[f64], tolerance: f64) {
+pub(crate) fn assert_recovered(found: &Identification, expected: &[f64], tolerance: f64) {
     assert_eq!(found.result.base_parameters.len(), expected.len());
     for (parameter, truth) in found.result.base_parameters.iter().zip(expected) {
         let error = (parameter.value - truth).abs() / truth.abs().max(0.01);
