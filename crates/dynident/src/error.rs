@@ -1,7 +1,7 @@
 //! Everything that can stop a job, each with the file, the place and the mend in its message.
 
 use dynident_estimation::EstimationError;
-use dynident_model::{ModelError, ReadError, UrdfWriteError};
+use dynident_model::{ModelError, ReadError};
 use dynident_recording::{FilterError, RecordingError};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -113,14 +113,6 @@ pub enum Error {
         line: u64,
         /// What is wrong, and the mend.
         message: String,
-    },
-    /// A URDF that cannot be written.
-    #[error("{}: {source}", path.display())]
-    Urdf {
-        /// The original.
-        path: PathBuf,
-        /// What is wrong.
-        source: UrdfWriteError,
     },
     /// An output that cannot be written. What was there before is untouched.
     #[error("{}: cannot be written: {source}; nothing that was there has changed", path.display())]

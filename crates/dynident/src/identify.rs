@@ -19,7 +19,9 @@ use dynident_estimation::{
     ordinary_least_squares, weighted_least_squares,
 };
 use dynident_model::laws::Law;
-use dynident_model::{DescriptionFormat, INERTIAL_NAMES, InertialParameters, JointChange, link_changes, rewrite_urdf};
+use dynident_model::{
+    DescriptionFormat, INERTIAL_NAMES, InertialParameters, JointChange, LinkChange, link_changes, rewrite_urdf,
+};
 use dynident_recording::MotionSettings;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -44,7 +46,7 @@ pub struct Identification {
     pub estimate: Estimate,
     /// Inertial parameters of the bodies, as in `result.bodies`.
     pub inertials: Vec<InertialParameters>,
-    /// The user's own URDF with the new values, if the robot came from one.
+    /// The user's own URDF with the new values; without it, [`ResultFile::no_urdf`] says why.
     pub urdf: Option<String>,
 }
 
@@ -108,7 +110,11 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
     let prior = prior_parameters(&machine.model, &machine.laws);
     let parameters = nearest_to_prior(&machine.model, &machine.base, &estimate.values, &prior);
     let inertials = inertials(&machine.model, &parameters);
-    let urdf = written_urdf(&machine, &inertials, &parameters)?;
+    // Parameters that URDF cannot express leave a result without one; it is no reason to lose the result.
+    let (urdf, no_urdf) = match written_urdf(&machine, &inertials, &parameters) {
+        Ok(urdf) => (Some(urdf), None),
+        Err(reason) => (None, Some(reason)),
+    };
     let result = ResultFile {
         schema: RESULT_SCHEMA,
         name: study_name(study, study_path),
@@ -122,6 +128,7 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
         validation,
         physical: verdict(&machine, &inertials, &parameters),
         logs,
+        no_urdf,
         timings_s: timings,
     };
     Ok(Identification { result, estimate, inertials, urdf })
@@ -480,17 +487,13 @@ fn verdict(machine: &Machine, inertials: &[InertialParameters], parameters: &[f6
     }
 }
 
-/// The user's URDF with the new values; joints that were locked keep theirs.
-fn written_urdf(
-    machine: &Machine,
-    inertials: &[InertialParameters],
-    parameters: &[f64],
-) -> Result<Option<String>, Error> {
+/// The user's URDF with the new values; joints that were locked keep theirs. Otherwise the reason why there is none.
+fn written_urdf(machine: &Machine, inertials: &[InertialParameters], parameters: &[f64]) -> Result<String, String> {
     if machine.robot.format != DescriptionFormat::Urdf {
-        return Ok(None);
+        return Err("the robot's description is no URDF".to_owned());
     }
-    let failed = |source| Error::Urdf { path: machine.robot.path.clone(), source };
-    let links = link_changes(&machine.model, inertials).map_err(failed)?;
+    let mut links = link_changes(&machine.model, inertials).map_err(|error| error.to_string())?;
+    note_locked(machine, &mut links);
     let mut joints: Vec<JointChange> = Vec::new();
     let laws = machine.laws.iter().zip(&parameters[10 * machine.model.dof()..]);
     for (law, &value) in laws {
@@ -507,5 +510,26 @@ fn written_urdf(
         joints[place].damping = damping.or(joints[place].damping);
         joints[place].friction = friction.or(joints[place].friction);
     }
-    rewrite_urdf(&machine.robot.text, &links, &joints).map(Some).map_err(failed)
+    rewrite_urdf(&machine.robot.text, &links, &joints).map_err(|error| error.to_string())
+}
+
+/// Says in a body's comment which of its links are not fixed but stood behind locked joints: its values hold while those stay where they were.
+fn note_locked(machine: &Machine, changes: &mut [LinkChange]) {
+    for body in machine.model.bodies() {
+        let own = machine.robot.model.bodies().iter().find(|original| original.name() == body.name());
+        let behind: Vec<&str> = body
+            .links
+            .iter()
+            .map(|link| &link.name[..])
+            .filter(|&name| own.is_some_and(|own| own.links.iter().all(|link| link.name != name)))
+            .collect();
+        let set = changes.iter_mut().find_map(|change| match change {
+            LinkChange::Set { link, note, .. } if link == body.name() => Some(note),
+            _ => None,
+        });
+        if let (Some(note), false) = (set, behind.is_empty()) {
+            let locked = format!("holds with the joints locked behind which stand: {}", behind.join(", "));
+            *note = Some(note.take().map_or(locked.clone(), |note| format!("{note}; {locked}")));
+        }
+    }
 }

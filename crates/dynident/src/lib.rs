@@ -31,7 +31,7 @@ pub use evidence::PriorAgreement;
 pub use identify::{Identification, RunOptions, identify};
 pub use inspect::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary, inspect};
 pub use machine::Machine;
-pub use output::write_whole;
+pub use output::{check_writable, write_whole};
 pub use progress::{Progress, Silent};
 pub use result::{
     BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, LogValidation, MethodSummary, PhysicalVerdict,
