@@ -26,12 +26,12 @@ fn rows(random: &mut Random, count: usize, correlation: f64) -> Vec<Vec<f64>> {
 fn fit(rows: &[Vec<f64>], length: usize, covariance: CovarianceMethod) -> Estimate {
     let panel: Vec<f64> = (0..=COLUMNS).flat_map(|c| rows.iter().map(move |row| row[c])).collect();
     let settings = SegmentSettings { max_segments: 1024, first_length_rows: length };
-    let mut factor = SegmentedFactor::new(COLUMNS, settings).unwrap();
-    factor.absorb(&panel, rows.len()).unwrap();
+    let mut factor = SegmentedFactor::new(COLUMNS, settings).expect("settings are valid");
+    factor.absorb(&panel, rows.len()).expect("rows are finite");
     let names = (0..COLUMNS).map(|c| format!("p{c}")).collect();
     let mut problem = LinearProblem::new(names, vec!["joint".into()]);
-    problem.add("log", 0, (0..COLUMNS).collect(), factor).unwrap();
-    ordinary_least_squares(&problem, &OrdinarySettings { covariance, ..Default::default() }).unwrap()
+    problem.add("log", 0, (0..COLUMNS).collect(), factor).expect("one joint, all columns");
+    ordinary_least_squares(&problem, &OrdinarySettings { covariance, ..Default::default() }).expect("full rank")
 }
 
 #[test]
