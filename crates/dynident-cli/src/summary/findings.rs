@@ -40,8 +40,8 @@ pub(super) fn findings(logs: &[LogSummary]) -> String {
 fn add(groups: &mut Vec<Group>, log: usize, finding: &dynident::recording::Finding) {
     let (quantity, joint) = finding.channel.split_once(' ').unwrap_or((&finding.channel, ""));
     let (words, numbers) = parted(&finding.message);
-    let same = |group: &&mut Group| group.level == finding.level && group.quantity == quantity && group.words == words;
-    let group = if let Some(at) = groups.iter_mut().position(|mut group| same(&&mut *group)) {
+    let same = |group: &Group| group.level == finding.level && group.quantity == quantity && group.words == words;
+    let group = if let Some(at) = groups.iter().position(same) {
         &mut groups[at]
     } else {
         groups.push(Group {
