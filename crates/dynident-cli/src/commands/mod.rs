@@ -83,11 +83,13 @@ pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
     verdict
 }
 
-/// The message of an error that a study led to. Where it speaks of a log, the study that describes the log is named as well.
+/// The message of an error that a study led to. Where it speaks of another file, the study that names that file is named as well.
 pub(crate) fn told_in(study: &Path) -> impl Fn(dynident::Error) -> String {
-    use dynident::Error::{Filter, NothingLeft, Recording};
+    use dynident::Error::{Filter, Missing, NothingLeft, Recording, Robot};
     move |error| match error {
-        Recording { .. } | Filter { .. } | NothingLeft { .. } => format!("{}: {error}", study.display()),
+        Recording { .. } | Filter { .. } | NothingLeft { .. } | Missing { .. } | Robot(_) => {
+            format!("{}: {error}", study.display())
+        }
         _ => error.to_string(),
     }
 }

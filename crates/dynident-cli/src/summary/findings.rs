@@ -105,10 +105,11 @@ fn sentence(group: &Group, logs: &[LogSummary]) -> String {
 fn parted(message: &str) -> (Vec<String>, Vec<(f64, String)>) {
     let (mut words, mut numbers, mut rest) = (vec![String::new()], Vec::new(), message);
     while let Some(first) = rest.chars().next() {
-        let starts = first.is_ascii_digit() || (first == '-' && rest[1..].starts_with(|c: char| c.is_ascii_digit()));
+        let unsigned = rest.strip_prefix('-').unwrap_or(rest);
+        let starts = unsigned.starts_with(|c: char| c.is_ascii_digit());
         let after_word = words.last().is_some_and(|w| w.ends_with(|c: char| c.is_alphanumeric() || c == '_'));
-        let end =
-            rest[1.min(rest.len())..].find(|c: char| !(c.is_ascii_digit() || c == '.')).map_or(rest.len(), |at| at + 1);
+        let digits = unsigned.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(unsigned.len());
+        let end = rest.len() - unsigned.len() + digits;
         let number = if starts && !after_word { rest[..end].trim_end_matches('.') } else { "" };
         if let Ok(value) = number.parse::<f64>() {
             numbers.push((value, number.to_owned()));
