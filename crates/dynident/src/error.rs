@@ -51,7 +51,7 @@ pub enum Error {
     },
     /// A robot description that cannot be read.
     #[error(transparent)]
-    Robot(#[from] ReadError),
+    Robot(Box<ReadError>),
     /// A machine that does not fit together.
     #[error("{}: {source}", path.display())]
     Model {
@@ -66,7 +66,7 @@ pub enum Error {
         /// The log.
         log: String,
         /// What is wrong.
-        source: RecordingError,
+        source: Box<RecordingError>,
     },
     /// A parallel filter that does not exist at the log's rate.
     #[error("log `{log}`, [parallel_filter]: {source}")]
@@ -124,7 +124,18 @@ pub enum Error {
     },
 }
 
+impl From<ReadError> for Error {
+    fn from(error: ReadError) -> Self {
+        Self::Robot(Box::new(error))
+    }
+}
+
 impl Error {
+    /// A log that cannot be read.
+    pub(crate) fn recording(log: &str, source: RecordingError) -> Self {
+        Self::Recording { log: log.to_owned(), source: Box::new(source) }
+    }
+
     pub(crate) fn study(path: &Path, message: String) -> Self {
         Self::Study { path: path.to_owned(), message }
     }

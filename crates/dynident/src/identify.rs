@@ -72,13 +72,12 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
     let problem = problem(study, &machine, &fits).map_err(in_study)?;
     let estimate = match study.estimator.method {
         EstimatorMethod::Ordinary => {
-            let settings =
-                OrdinarySettings { rank: study.estimator.rank.clone(), covariance: study.estimator.covariance };
+            let settings = OrdinarySettings { rank: study.estimator.rank, covariance: study.estimator.covariance };
             ordinary_least_squares(&problem, &settings)
         }
         EstimatorMethod::Weighted => {
             let settings = WeightedSettings {
-                rank: study.estimator.rank.clone(),
+                rank: study.estimator.rank,
                 covariance: study.estimator.covariance,
                 ..WeightedSettings::default()
             };

@@ -211,7 +211,7 @@ fn exactly<'de, T: Deserialize<'de>, const N: usize, D: serde::Deserializer<'de>
 pub struct ParallelFilterSection {
     /// Off: every sample counts as it is. On by default.
     pub enabled: bool,
-    /// Every how many samples one is kept. By default so many that what remains is two and a half times the motion's cut-off.
+    /// Every how many samples one is kept. By default so many that the filter's cut-off lies at 0.7 of the motion's.
     pub factor: Option<usize>,
     /// Frequency at which the filter's gain is one half; by default 0.4 of the rate that remains.
     pub cutoff_hz: Option<f64>,
