@@ -39,7 +39,7 @@ pub enum Error {
         message: String,
     },
     /// A file of the study that is in none of its folders.
-    #[error("{} is in none of the study's folders (tried {}); name its folder with --data{}",
+    #[error("{} is in none of the study's folders (tried {}); mend its path, or name its folder with --data{}",
         file.display(), list(tried), source_of_data.as_ref().map_or(String::new(), |s| format!(". The recordings are public: {s}")))]
     Missing {
         /// The file.

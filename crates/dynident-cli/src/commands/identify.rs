@@ -1,6 +1,6 @@
 //! `dynident identify STUDY.toml --out DIR`.
 
-use super::{Context, json, judged, pretty_json, told};
+use super::{Context, json, judged, pretty_json, told, told_in};
 use crate::{Verdict, summary, terminal};
 use dynident::{RunOptions, Study, check_writable, identify, write_whole};
 use std::path::PathBuf;
@@ -29,7 +29,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     check_writable(&options.out).map_err(told)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
-    let identification = identify(&study, &options.study, &run).map_err(told)?;
+    let identification = identify(&study, &options.study, &run).map_err(told_in(&options.study))?;
     let result = &identification.result;
     if let Some(urdf) = &identification.urdf {
         write_whole(&options.out.join(URDF), urdf.as_bytes()).map_err(told)?;

@@ -9,6 +9,7 @@ use crate::progress::Bar;
 use crate::{Verdict, terminal};
 use dynident::{LogValidation, Progress, Silent};
 use serde::Serialize;
+use std::path::Path;
 
 /// What every command knows of how it was called.
 pub(crate) struct Context {
@@ -80,4 +81,15 @@ pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
         verdict = Verdict::Negative;
     }
     verdict
+}
+
+/// The message of an error that a study led to. Where it speaks of another file, the study that names that file is named as well.
+pub(crate) fn told_in(study: &Path) -> impl Fn(dynident::Error) -> String {
+    use dynident::Error::{Filter, Missing, NothingLeft, Recording, Robot};
+    move |error| match error {
+        Recording { .. } | Filter { .. } | NothingLeft { .. } | Missing { .. } | Robot(_) => {
+            format!("{}: {error}", study.display())
+        }
+        _ => error.to_string(),
+    }
 }

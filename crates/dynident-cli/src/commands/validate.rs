@@ -1,6 +1,6 @@
 //! `dynident validate DIR/result.json --study STUDY.toml`.
 
-use super::{Context, json, judged, told};
+use super::{Context, json, judged, told, told_in};
 use crate::{Verdict, summary, terminal};
 use dynident::{RunOptions, Study, validate};
 use std::path::PathBuf;
@@ -25,7 +25,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let study = Study::load(&options.study).map_err(told)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
-    let file = validate(&options.result, &study, &options.study, &run).map_err(told)?;
+    let file = validate(&options.result, &study, &options.study, &run).map_err(told_in(&options.study))?;
     terminal::print(&if context.json { json(&file)? } else { summary::validation(&file.validation, &file.logs) });
     Ok(judged(&file.validation, options.max_validation_error))
 }

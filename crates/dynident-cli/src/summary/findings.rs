@@ -40,8 +40,8 @@ pub(super) fn findings(logs: &[LogSummary]) -> String {
 fn add(groups: &mut Vec<Group>, log: usize, finding: &dynident::recording::Finding) {
     let (quantity, joint) = finding.channel.split_once(' ').unwrap_or((&finding.channel, ""));
     let (words, numbers) = parted(&finding.message);
-    let same = |group: &&mut Group| group.level == finding.level && group.quantity == quantity && group.words == words;
-    let group = if let Some(at) = groups.iter_mut().position(|mut group| same(&&mut *group)) {
+    let same = |group: &Group| group.level == finding.level && group.quantity == quantity && group.words == words;
+    let group = if let Some(at) = groups.iter().position(same) {
         &mut groups[at]
     } else {
         groups.push(Group {
@@ -105,10 +105,11 @@ fn sentence(group: &Group, logs: &[LogSummary]) -> String {
 fn parted(message: &str) -> (Vec<String>, Vec<(f64, String)>) {
     let (mut words, mut numbers, mut rest) = (vec![String::new()], Vec::new(), message);
     while let Some(first) = rest.chars().next() {
-        let starts = first.is_ascii_digit() || (first == '-' && rest[1..].starts_with(|c: char| c.is_ascii_digit()));
+        let unsigned = rest.strip_prefix('-').unwrap_or(rest);
+        let starts = unsigned.starts_with(|c: char| c.is_ascii_digit());
         let after_word = words.last().is_some_and(|w| w.ends_with(|c: char| c.is_alphanumeric() || c == '_'));
-        let end =
-            rest[1.min(rest.len())..].find(|c: char| !(c.is_ascii_digit() || c == '.')).map_or(rest.len(), |at| at + 1);
+        let digits = unsigned.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(unsigned.len());
+        let end = rest.len() - unsigned.len() + digits;
         let number = if starts && !after_word { rest[..end].trim_end_matches('.') } else { "" };
         if let Ok(value) = number.parse::<f64>() {
             numbers.push((value, number.to_owned()));

@@ -87,8 +87,9 @@ pub(super) fn shortened(expression: &str, longest: usize) -> String {
     let terms = expression.matches(" + ").count() + expression.matches(" - ").count() + 1;
     let tail = format!(" .. ({terms} terms)");
     let room = longest.saturating_sub(tail.len());
-    let cut = expression.match_indices([' ']).map(|(at, _)| at).take_while(|&at| at <= room).last().unwrap_or(0);
-    format!("{}{tail}", expression[..cut].trim_end_matches([' ', '+', '-']))
+    let ends = expression.match_indices(" + ").chain(expression.match_indices(" - ")).map(|(at, _)| at);
+    let cut = ends.filter(|&at| at <= room).max().unwrap_or(0);
+    format!("{}{tail}", &expression[..cut])
 }
 
 /// `a, b, c and 4 more`.
@@ -119,7 +120,7 @@ mod tests {
     #[test]
     fn long_sums_are_cut_between_terms() {
         assert_eq!(shortened("Izz1 + m2", 20), "Izz1 + m2");
-        assert_eq!(shortened("Izz1 + 0.5 m2 + 0.5 m3 + 0.5 m4", 30), "Izz1 + 0.5 .. (4 terms)");
+        assert_eq!(shortened("Izz1 + 0.5 m2 + 0.5 m3 + 0.5 m4", 30), "Izz1 + 0.5 m2 .. (4 terms)");
         assert!(shortened(&"abc + ".repeat(40), 44).len() <= 44);
     }
 }
