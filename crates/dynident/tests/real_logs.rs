@@ -97,7 +97,8 @@ fn the_double_pendulum_has_a_rotor_between_its_joints() {
     // Steps of up to 8 ms at 500 Hz.
     let longest = found.result.logs.iter().map(|log| log.import.steps.max_s).fold(0.0, f64::max);
     assert!((0.006..0.009).contains(&longest), "{longest}");
-    // m2 r2 by least squares at a cut-off of 6 Hz, as the data set's own notes give it: 0.168 (about axis y, hanging along -z).
+    // Published: m2 r2 = 0.56394 kg * 0.32127 m = 0.1812 kg m (axis y, hanging along -z). Least squares is biased towards zero here: 7 % at a cut-off of 6 Hz by
+    // the data set's own notes, 39 % at 12 Hz. Within 10 % the low cut-off does what it is there for.
     let gravity = found.result.base_parameters.iter().find(|p| p.expression == "mz2").unwrap();
-    assert!((-gravity.value - 0.168).abs() < 0.005, "{}", gravity.value);
+    assert!((-gravity.value / 0.1812 - 1.0).abs() < 0.1, "{}", gravity.value);
 }

@@ -75,7 +75,7 @@ pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
                 terminal::remark(&format!("{}: the error of {error:.2} % is above the {limit} % asked for", log.log));
             }
             None => {
-                terminal::remark(&format!("{}: the torque is zero throughout, so it has no relative error", log.log))
+                terminal::remark(&format!("{}: the torque is zero throughout, so it has no relative error", log.log));
             }
         }
         verdict = Verdict::Negative;

@@ -161,8 +161,8 @@ pub(crate) fn write_log(
 
 /// `t,q1,..,tau1,..`.
 pub(crate) fn header(dof: usize) -> String {
-    let numbered = |name: &str| (1..=dof).map(|j| format!(",{name}{j}")).collect::<String>();
-    format!("t{}{}", numbered("q"), numbered("tau"))
+    let numbered = |name: &str| (1..=dof).map(|j| format!("{name}{j}")).collect::<Vec<_>>().join(",");
+    format!("t,{},{}", numbered("q"), numbered("tau"))
 }
 
 /// Positions and torques as they are.
