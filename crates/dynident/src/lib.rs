@@ -5,6 +5,8 @@
 
 #![forbid(unsafe_code)]
 
+#[cfg(doctest)]
+pub mod book;
 mod error;
 mod evaluate;
 mod evidence;
