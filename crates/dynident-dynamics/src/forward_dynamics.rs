@@ -50,32 +50,6 @@ impl Kernel for Single<'_> {
     }
 }
 
-/// Articulated-body inertia of a subtree about its root's frame: `moment = rotation α + coupling a`, `force = couplingᵀ α + mass a`; and what
-/// its joint needs of it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Articulated<T> {
-    /// Symmetric; upper triangle by rows.
-    rotation: [T; 6],
-    coupling: Mat3<T>,
-    /// Symmetric; upper triangle by rows.
-    mass: [T; 6],
-    /// Column of the articulated inertia along the joint, in the parent's frame: (moment, force). Not set at the base.
-    column: (Vec3<T>, Vec3<T>),
-    inverse_inertia: T,
-    rest_torque: T,
-}
-
-impl<T: Scalar> Articulated<T> {
-    pub(crate) const ZERO: Self = Self {
-        rotation: [T::ZERO; 6],
-        coupling: Mat3::ZERO,
-        mass: [T::ZERO; 6],
-        column: (Vec3::ZERO, Vec3::ZERO),
-        inverse_inertia: T::ZERO,
-        rest_torque: T::ZERO,
-    };
-}
-
 #[inline(always)]
 fn full<T: Scalar>(s: &[T; 6]) -> Mat3<T> {
     Mat3([[s[0], s[1], s[2]], [s[1], s[3], s[4]], [s[2], s[4], s[5]]])

@@ -18,6 +18,7 @@ mod kinematics;
 mod mass_matrix;
 mod regressor;
 mod regressor_panels;
+mod states;
 mod workspace;
 
 pub use base_parameters::{BaseParameterSettings, BaseParameters, NumericalRank, numerical_rank};

@@ -6,6 +6,7 @@
 //! the form of Featherstone's spatial vectors), so a serial arm costs one small rotation and one 6 × 10 product per pair.
 
 use crate::inverse_dynamics::outward;
+use crate::states::AxisScratch;
 use crate::workspace::{AnyScratch, CoreScratch, Workspace, take};
 use dynident_lanes::{Kernel, Lane, dispatch_single};
 use dynident_model::{Mat3, Model, Transform, Vec3};
@@ -91,33 +92,6 @@ impl<T: Lane> BlockSink<T> for DenseRows<'_> {
                 *to = column[place];
             }
         }
-    }
-}
-
-/// The axes of all joints on the way to each body, as twists at the body's frame, several to a bundle.
-#[derive(Debug)]
-pub(crate) struct AxisScratch<T: Lane> {
-    /// Joints from the base to each body, body after body.
-    path: Vec<u32>,
-    /// Where each body's path starts in `path`; one more than there are bodies.
-    path_start: Vec<usize>,
-    /// Where each body's bundles start.
-    bundle_start: Vec<usize>,
-    angular: Vec<Vec3<T::Bundle>>,
-    linear: Vec<Vec3<T::Bundle>>,
-}
-
-impl<T: Lane> AxisScratch<T> {
-    pub(crate) fn new(model: &Model) -> Self {
-        let (mut path, mut path_start, mut bundle_start) = (Vec::new(), vec![0], vec![0]);
-        for body in 0..model.dof() {
-            let joints = model.path(body);
-            bundle_start.push(bundle_start[body] + joints.len().div_ceil(T::PER_BUNDLE));
-            path.extend(joints.iter().map(|&joint| joint as u32));
-            path_start.push(path.len());
-        }
-        let bundles = bundle_start[model.dof()];
-        Self { path, path_start, bundle_start, angular: vec![Vec3::ZERO; bundles], linear: vec![Vec3::ZERO; bundles] }
     }
 }
 
