@@ -4,7 +4,8 @@
 
 NAME picks generators of the table below (default: all). Text and structure must be equal, numbers to 1e-12 relative to
 the largest of their array: the generators are deterministic, and what remains between two machines is the last bit of
-sine and cosine (the C library picks its version by processor), which shows here as up to 2e-14 of an array's largest entry.
+sine and cosine (the C library picks its version by processor), which shows here as up to 2e-14 of an array's largest entry,
+and the linear algebra library's choice of kernel, which shows as up to 2e-13 in the estimators' covariances.
 """
 import json
 import subprocess

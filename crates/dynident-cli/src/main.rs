@@ -80,7 +80,7 @@ fn main() -> ExitCode {
     let context = commands::Context { json: arguments.common.json, quiet: arguments.common.quiet, threads };
     let outcome = commands::with_threads(threads, || match arguments.command {
         Command::Inspect(options) => commands::inspect::run(&options, &context),
-        Command::Evaluate(options) => commands::evaluate::run(&options),
+        Command::Evaluate(options) => commands::evaluate::run(&options, &context),
         Command::Identify(options) => commands::identify::run(&options, &context),
         Command::Validate(options) => commands::validate::run(&options, &context),
     });

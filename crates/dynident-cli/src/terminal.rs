@@ -11,16 +11,16 @@ pub(crate) fn print(text: &str) {
     }
 }
 
-/// An error, on standard error.
+/// An error, on standard error, as clap words its own.
 pub(crate) fn complain(message: &str) {
     let mut out = io::stderr().lock();
-    let _ = writeln!(out, "dynident: {message}");
+    let _ = writeln!(out, "error: {message}");
 }
 
 /// A remark, on standard error.
 pub(crate) fn remark(message: &str) {
     let mut out = io::stderr().lock();
-    let _ = writeln!(out, "{message}");
+    let _ = writeln!(out, "note: {message}");
 }
 
 /// Whether a person watches standard error.

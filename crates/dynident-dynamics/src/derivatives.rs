@@ -1,6 +1,7 @@
 //! Analytic derivatives of the inverse dynamics.
 
 use crate::composite::Composite;
+use crate::states::{BodyDerivative, BodyState};
 use crate::workspace::{AnyScratch, CoreScratch, Workspace, take};
 use dynident_lanes::{Kernel, Lane, Scalar, dispatch_single};
 use dynident_model::{InertialParameters, Model, Transform, Vec3};
@@ -63,21 +64,6 @@ impl Kernel for Single<'_> {
             }
         }
     }
-}
-
-/// Variation of a body's motion and wrench by one joint variable.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct BodyDerivative<T> {
-    omega: Vec3<T>,
-    alpha: Vec3<T>,
-    acceleration: Vec3<T>,
-    force: Vec3<T>,
-    moment: Vec3<T>,
-}
-
-impl<T: Scalar> BodyDerivative<T> {
-    pub(crate) const ZERO: Self =
-        Self { omega: Vec3::ZERO, alpha: Vec3::ZERO, acceleration: Vec3::ZERO, force: Vec3::ZERO, moment: Vec3::ZERO };
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -209,7 +195,7 @@ fn is_below(model: &Model, joint: usize, index: usize) -> bool {
 #[inline(always)]
 fn own_variation<T: Scalar>(
     model: &Model,
-    bodies: &[crate::workspace::BodyState<T>],
+    bodies: &[BodyState<T>],
     index: usize,
     axis: Vec3<T>,
     own: Vec3<T>,

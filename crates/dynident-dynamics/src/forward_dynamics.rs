@@ -50,49 +50,30 @@ impl Kernel for Single<'_> {
     }
 }
 
-/// Articulated-body inertia of a subtree about its root's frame: `moment = rotation α + coupling a`, `force = couplingᵀ α + mass a`; and what
-/// its joint needs of it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Articulated<T> {
-    /// Symmetric; upper triangle by rows.
-    rotation: [T; 6],
-    coupling: Mat3<T>,
-    /// Symmetric; upper triangle by rows.
-    mass: [T; 6],
-    /// Column of the articulated inertia along the joint: (moment, force).
-    column: (Vec3<T>, Vec3<T>),
-    inverse_inertia: T,
-    rest_torque: T,
-}
-
-impl<T: Scalar> Articulated<T> {
-    pub(crate) const ZERO: Self = Self {
-        rotation: [T::ZERO; 6],
-        coupling: Mat3::ZERO,
-        mass: [T::ZERO; 6],
-        column: (Vec3::ZERO, Vec3::ZERO),
-        inverse_inertia: T::ZERO,
-        rest_torque: T::ZERO,
-    };
-}
-
 #[inline(always)]
 fn full<T: Scalar>(s: &[T; 6]) -> Mat3<T> {
     Mat3([[s[0], s[1], s[2]], [s[1], s[3], s[4]], [s[2], s[4], s[5]]])
 }
 
-/// Upper triangle of `M - v vᵀ · factor`.
+/// Takes `v wᵀ` (symmetric: w is v times a factor) off a symmetric matrix.
 #[inline(always)]
-fn less_outer<T: Scalar>(m: &[T; 6], v: Vec3<T>, factor: T) -> [T; 6] {
-    let w = v.scale(factor);
-    [
-        v[0].neg_mul_add(w[0], m[0]),
-        v[0].neg_mul_add(w[1], m[1]),
-        v[0].neg_mul_add(w[2], m[2]),
-        v[1].neg_mul_add(w[1], m[3]),
-        v[1].neg_mul_add(w[2], m[4]),
-        v[2].neg_mul_add(w[2], m[5]),
-    ]
+fn subtract_outer<T: Scalar>(m: &mut [T; 6], v: Vec3<T>, w: Vec3<T>) {
+    m[0] = v[0].neg_mul_add(w[0], m[0]);
+    m[1] = v[0].neg_mul_add(w[1], m[1]);
+    m[2] = v[0].neg_mul_add(w[2], m[2]);
+    m[3] = v[1].neg_mul_add(w[1], m[3]);
+    m[4] = v[1].neg_mul_add(w[2], m[4]);
+    m[5] = v[2].neg_mul_add(w[2], m[5]);
+}
+
+/// `[t]× M`: t × every column of M.
+#[inline(always)]
+fn cross_columns<T: Scalar>(t: Vec3<T>, m: &Mat3<T>) -> Mat3<T> {
+    let m = &m.0;
+    let a = t.cross(Vec3([m[0][0], m[1][0], m[2][0]]));
+    let b = t.cross(Vec3([m[0][1], m[1][1], m[2][1]]));
+    let c = t.cross(Vec3([m[0][2], m[1][2], m[2][2]]));
+    Mat3([[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]])
 }
 
 /// Upper triangle of `R S Rᵀ`, S symmetric.
@@ -125,75 +106,80 @@ pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScr
     for index in (0..maps.len()).rev() {
         let map = &maps[index];
         let axis = map.axis.splat::<T>();
-        let body = scratch.bodies[index];
-        let own = &mut scratch.articulated[index];
+        let (inner, outer) = scratch.bodies.split_at_mut(index);
+        let body = &outer[0];
+        let (inner_inertias, outer_inertias) = scratch.articulated.split_at_mut(index);
+        let own = &mut outer_inertias[0];
         let column = if map.turns {
             (full(&own.rotation).mul_vec(axis), own.coupling.transpose_mul_vec(axis))
         } else {
             (own.coupling.mul_vec(axis), full(&own.mass).mul_vec(axis))
         };
         let along = |moment: Vec3<T>, force: Vec3<T>| axis.dot(if map.turns { moment } else { force });
-        own.column = column;
         own.inverse_inertia = along(column.0, column.1).recip();
         own.rest_torque = scratch.tau[index] - along(body.moment, body.force);
         let Some(parent) = map.parent else { continue };
-        // What the parent feels: the inertia that the joint cannot follow freely, and the bias with the joint torque's share.
-        let share = own.rest_torque * own.inverse_inertia;
-        let moment = column.0.scale_add(share, body.moment);
-        let force = column.1.scale_add(share, body.force);
-        let rotation = less_outer(&own.rotation, column.0, own.inverse_inertia);
-        let mass = less_outer(&own.mass, column.1, own.inverse_inertia);
-        let scaled = column.0.scale(own.inverse_inertia);
-        let coupling = Mat3(core::array::from_fn(|i| {
-            core::array::from_fn(|j| scaled[i].neg_mul_add(column.1[j], own.coupling.0[i][j]))
-        }));
-        let Transform { rotation: r, translation: t } = body.parent_from_body;
-        let force = r.mul_vec(force);
-        let parent_body = &mut scratch.bodies[parent];
-        parent_body.force += force;
-        parent_body.moment = r.mul_vec_add(moment, t.cross_add(force, parent_body.moment));
-        // Move to the parent's axes, then to its origin: with T = [t]× the blocks become
+        // The parent feels the whole inertia and bias, less what the joint gives way. Both are moved to the parent's frame before the one is
+        // taken from the other, so that the division above has time: one body's chain of dependent steps is what limits this algorithm.
+        let Transform { rotation: r, translation: t } = &body.parent_from_body;
+        let t = *t;
+        let column_force = r.mul_vec(column.1);
+        let column_moment = t.cross_add(column_force, r.mul_vec(column.0));
+        let force = r.mul_vec(body.force);
+        let moment = t.cross_add(force, r.mul_vec(body.moment));
+        // To the parent's axes, then to its origin: with T = [t]× the blocks become
         // M' = M, H' = H + T M, J' = J + T Hᵀ + H Tᵀ + T M Tᵀ = J + T Hᵀ - H' T (T is skew).
-        let j = rotated(&r, &rotation);
-        let m = rotated(&r, &mass);
-        let h = r.mul_mat(&coupling).mul_mat(&r.transpose());
-        let m_full = full(&m);
-        let cross_rows = |matrix: &Mat3<T>| {
-            // T M column by column: t × column.
-            let columns: [Vec3<T>; 3] =
-                core::array::from_fn(|c| t.cross(Vec3([matrix.0[0][c], matrix.0[1][c], matrix.0[2][c]])));
-            Mat3(core::array::from_fn(|i| core::array::from_fn(|c| columns[c][i])))
-        };
-        let h_new = h + cross_rows(&m_full);
-        let left = cross_rows(&h.transpose());
+        let j = rotated(r, &own.rotation);
+        let m = rotated(r, &own.mass);
+        let h = r.mul_mat(&own.coupling).mul_mat(&r.transpose());
+        let h_new = h + cross_columns(t, &full(&m));
+        let left = cross_columns(t, &h.transpose());
         // H' T row by row: (row)ᵀ T = -(t × row)ᵀ, so - H' T has rows t × row.
-        let right: [Vec3<T>; 3] = core::array::from_fn(|i| t.cross(Vec3(h_new.0[i])));
-        let parent_inertia = &mut scratch.articulated[parent];
-        let pairs = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
-        for (k, (a, b)) in pairs.into_iter().enumerate() {
-            parent_inertia.rotation[k] += j[k] + left.0[a][b] + right[a][b];
-            parent_inertia.mass[k] += m[k];
+        let right = [t.cross(Vec3(h_new.0[0])), t.cross(Vec3(h_new.0[1])), t.cross(Vec3(h_new.0[2]))];
+        let entry = |k: usize, a: usize, b: usize| j[k] + left.0[a][b] + right[a][b];
+        let moved = [entry(0, 0, 0), entry(1, 0, 1), entry(2, 0, 2), entry(3, 1, 1), entry(4, 1, 2), entry(5, 2, 2)];
+
+        own.column = (column_moment, column_force);
+        let share = own.rest_torque * own.inverse_inertia;
+        let parent_body = &mut inner[parent];
+        parent_body.force += column_force.scale_add(share, force);
+        parent_body.moment += column_moment.scale_add(share, moment);
+        let (moment, force) = (column_moment.scale(own.inverse_inertia), column_force.scale(own.inverse_inertia));
+        let parent = &mut inner_inertias[parent];
+        for k in 0..6 {
+            parent.rotation[k] += moved[k];
+            parent.mass[k] += m[k];
         }
-        parent_inertia.coupling = parent_inertia.coupling + h_new;
+        subtract_outer(&mut parent.rotation, column_moment, moment);
+        subtract_outer(&mut parent.mass, column_force, force);
+        for i in 0..3 {
+            for k in 0..3 {
+                let entry = &mut parent.coupling.0[i][k];
+                *entry = moment[i].neg_mul_add(column_force[k], *entry + h_new.0[i][k]);
+            }
+        }
     }
     // Outward again, with what the joint accelerations add to each body's acceleration.
     for index in 0..maps.len() {
         let map = &maps[index];
         let axis = map.axis.splat::<T>();
-        let Transform { rotation, translation } = scratch.bodies[index].parent_from_body;
-        let (alpha, acceleration) = map.parent.map_or((Vec3::ZERO, Vec3::ZERO), |parent| {
-            let parent = &scratch.bodies[parent];
+        let own = &scratch.articulated[index];
+        let (inner, outer) = scratch.bodies.split_at_mut(index);
+        let body = &mut outer[0];
+        let Transform { rotation, translation } = &body.parent_from_body;
+        let (alpha, acceleration, pull) = if let Some(parent) = map.parent {
+            let parent = &inner[parent];
             (
                 rotation.transpose_mul_vec(parent.alpha),
-                rotation.transpose_mul_vec(parent.alpha.cross_add(translation, parent.acceleration)),
+                rotation.transpose_mul_vec(parent.alpha.cross_add(*translation, parent.acceleration)),
+                own.column.0.dot(parent.alpha) + own.column.1.dot(parent.acceleration),
             )
-        });
-        let own = &scratch.articulated[index];
-        let pull = own.column.0.dot(alpha) + own.column.1.dot(acceleration);
+        } else {
+            (Vec3::ZERO, Vec3::ZERO, T::ZERO)
+        };
         let ddq = (own.rest_torque - pull) * own.inverse_inertia;
         scratch.ddq[index] = ddq;
         // From here on alpha and acceleration of the bodies hold only what the joint accelerations cause.
-        let body = &mut scratch.bodies[index];
         if map.turns {
             body.alpha = axis.scale_add(ddq, alpha);
             body.acceleration = acceleration;

@@ -2,6 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+/// What sums of some hundred products in double precision leave of an exact zero, with room.
+const ROUNDING: f64 = 1e-12;
+
 /// The split of a matrix's columns into independent ones and ones that are sums of earlier independent ones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IndependentColumns {
@@ -19,8 +22,8 @@ pub struct IndependentColumns {
 }
 
 /// Splits the columns of `matrix` from left to right: a column is dependent when the part of it that is orthogonal to all
-/// independent columns before it is at most `tolerance` times its own norm (or times the largest column norm for a column
-/// that is itself that small).
+/// independent columns before it is at most `tolerance` times its own norm, or when the whole column is rounding noise beside the
+/// largest column: below 1e-12 or the square of `tolerance` of it.
 ///
 /// Householder reflections that **skip a dependent column without spending a row**: the textbook rule
 /// "dependent ⇔ small diagonal entry of R" leans on rounding noise in the spent row and calls whole tails of columns
@@ -36,8 +39,9 @@ pub fn independent_columns(matrix: &DMatrix<f64>, tolerance: f64) -> Independent
     for c in 0..columns {
         let row = independent.len();
         let rest = if row < rows { r.view((row, c), (rows - row, 1)).norm() } else { 0.0 };
-        let scale = norms[c].max(tolerance * largest);
-        let share = if scale > 0.0 { rest / scale } else { 0.0 };
+        // A column that is nothing but rounding beside the others would be independent of everything if measured by itself.
+        let noise = norms[c] <= ROUNDING.max(tolerance * tolerance) * largest;
+        let share = if noise { 0.0 } else { rest / norms[c] };
         if share <= tolerance {
             strongest_dependent = strongest_dependent.max(share);
             dependent.push(c);
@@ -91,6 +95,20 @@ mod tests {
         assert_eq!(split.dependent, [2, 4]);
         assert!((split.regrouping[(0, 0)] - 2.0).abs() < 1e-12 && (split.regrouping[(1, 0)] + 1.0).abs() < 1e-12);
         assert!((split.regrouping[(2, 1)] - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_column_of_rounding_noise_is_no_direction() {
+        let a = DMatrix::from_fn(8, 3, |i, j| {
+            if j == 1 {
+                1e-13 * ((i * 5 % 7) as f64 - 3.0)
+            } else {
+                ((i * 7 + j * 5 + i * i * (j + 1)) % 11) as f64 - 5.0
+            }
+        });
+        let split = independent_columns(&a, 1e-9);
+        assert_eq!(split.independent, [0, 2]);
+        assert!(split.strongest_dependent < 1e-12 && split.weakest_independent > 0.1);
     }
 
     proptest! {

@@ -118,15 +118,16 @@ pub(crate) fn newton_euler<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T
         body.moment = wrench.1;
     }
     for index in (0..maps.len()).rev() {
-        let body = scratch.bodies[index];
+        let (inner, outer) = scratch.bodies.split_at_mut(index);
+        let body = &outer[0];
         let map = &maps[index];
         scratch.tau[index] = map.axis.splat().dot(if map.turns { body.moment } else { body.force });
         if let Some(parent) = map.parent {
-            let Transform { rotation, translation } = body.parent_from_body;
-            let parent = &mut scratch.bodies[parent];
+            let Transform { rotation, translation } = &body.parent_from_body;
+            let parent = &mut inner[parent];
             let force = rotation.mul_vec(body.force);
             parent.force += force;
-            parent.moment = rotation.mul_vec_add(body.moment, translation.cross_add(force, parent.moment));
+            parent.moment = translation.cross_add(force, rotation.mul_vec_add(body.moment, parent.moment));
         }
     }
 }
@@ -138,10 +139,13 @@ pub(crate) fn outward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     let gravity = -model.gravity();
     for (index, map) in model.maps().iter().enumerate() {
         let (dq, ddq) = (scratch.dq[index], scratch.ddq[index]);
-        let Transform { rotation, translation } = scratch.bodies[index].parent_from_body;
+        let (inner, outer) = scratch.bodies.split_at_mut(index);
+        let body = &mut outer[0];
+        let Transform { rotation, translation } = &body.parent_from_body;
+        let translation = *translation;
         let axis = map.axis.splat::<T>();
         let (omega, alpha, acceleration) = if let Some(parent) = map.parent {
-            let parent = &scratch.bodies[parent];
+            let parent = &inner[parent];
             let swing = parent
                 .omega
                 .cross_add(parent.omega.cross(translation), parent.alpha.cross_add(translation, parent.acceleration));
@@ -153,7 +157,6 @@ pub(crate) fn outward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
         } else {
             (Vec3::ZERO, Vec3::ZERO, rotation.transpose_mul_vec(gravity.splat()))
         };
-        let body = &mut scratch.bodies[index];
         let own = axis.scale(dq);
         if map.turns {
             body.omega = omega + own;

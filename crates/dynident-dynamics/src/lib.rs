@@ -19,6 +19,7 @@ mod mass_matrix;
 mod regressor;
 mod regressor_adjoint;
 mod regressor_panels;
+mod states;
 mod workspace;
 
 pub use base_parameters::{BaseParameterSettings, BaseParameters, NumericalRank, numerical_rank};

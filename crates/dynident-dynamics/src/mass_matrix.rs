@@ -52,7 +52,8 @@ pub(crate) fn composite_rigid_bodies<T: Scalar>(model: &Model, scratch: &mut Cor
     for index in (0..dof).rev() {
         let map = &maps[index];
         let axis = map.axis.splat::<T>();
-        let composite = scratch.composites[index];
+        let (inner, outer) = scratch.composites.split_at_mut(index);
+        let composite = &outer[0];
         // Force and moment that accelerate the composite along its joint's axis.
         let (mut force, mut moment) = if map.turns {
             (axis.cross(composite.first_moment), composite.inertia_matrix().mul_vec(axis))
@@ -60,19 +61,20 @@ pub(crate) fn composite_rigid_bodies<T: Scalar>(model: &Model, scratch: &mut Cor
             (axis.scale(composite.mass), composite.first_moment.cross(axis))
         };
         matrix[index * dof + index] = axis.dot(if map.turns { moment } else { force });
-        let mut at = index;
-        while let Some(parent) = maps[at].parent {
-            let frame = scratch.bodies[at].parent_from_body;
+        let (mut at, mut link) = (index, map.parent);
+        while let Some(parent) = link {
+            let frame = &scratch.bodies[at].parent_from_body;
+            let map = &maps[parent];
             force = frame.rotation.mul_vec(force);
-            moment = frame.rotation.mul_vec_add(moment, frame.translation.cross(force));
-            let along: Vec3<T> = maps[parent].axis.splat();
-            let entry = along.dot(if maps[parent].turns { moment } else { force });
+            moment = frame.translation.cross_add(force, frame.rotation.mul_vec(moment));
+            let along: Vec3<T> = map.axis.splat();
+            let entry = along.dot(if map.turns { moment } else { force });
             matrix[index * dof + parent] = entry;
             matrix[parent * dof + index] = entry;
-            at = parent;
+            (at, link) = (parent, map.parent);
         }
         if let Some(parent) = map.parent {
-            scratch.composites[parent].add(&composite, &scratch.bodies[index].parent_from_body);
+            inner[parent].add(composite, &scratch.bodies[index].parent_from_body);
         }
     }
 }

@@ -6,6 +6,7 @@
 //! the form of Featherstone's spatial vectors), so a serial arm costs one small rotation and one 6 × 10 product per pair.
 
 use crate::inverse_dynamics::outward;
+use crate::states::AxisScratch;
 use crate::workspace::{AnyScratch, CoreScratch, Workspace, take};
 use dynident_lanes::{Kernel, Lane, dispatch_single};
 use dynident_model::{Mat3, Model, Transform, Vec3};
@@ -57,7 +58,13 @@ impl Kernel for Single<'_> {
 /// processor level.
 pub(crate) trait BlockSink<T: Lane> {
     /// Takes the ten entries of body `body` for the joints `path[bundle * PER_BUNDLE..]`, one joint to each lane group.
-    fn put(&mut self, body: usize, path: &[u32], bundle: usize, block: &[T::Bundle; 10]);
+    fn put<const TURNING: bool>(
+        &mut self,
+        body: usize,
+        path: &[u32],
+        bundle: usize,
+        work: &Work<'_, T::Bundle, TURNING>,
+    );
 }
 
 struct DenseRows<'a> {
@@ -67,10 +74,16 @@ struct DenseRows<'a> {
 
 impl<T: Lane> BlockSink<T> for DenseRows<'_> {
     #[inline(always)]
-    fn put(&mut self, body: usize, path: &[u32], bundle: usize, block: &[T::Bundle; 10]) {
+    fn put<const TURNING: bool>(
+        &mut self,
+        body: usize,
+        path: &[u32],
+        bundle: usize,
+        work: &Work<'_, T::Bundle, TURNING>,
+    ) {
         let first = bundle * T::PER_BUNDLE;
         let mut lanes = [[0.0; 8]; 10];
-        for (to, column) in lanes.iter_mut().zip(block) {
+        for (to, column) in lanes.iter_mut().zip(work.all()) {
             column.store(to);
         }
         for (place, &joint) in path[first..].iter().take(T::PER_BUNDLE).enumerate() {
@@ -79,33 +92,6 @@ impl<T: Lane> BlockSink<T> for DenseRows<'_> {
                 *to = column[place];
             }
         }
-    }
-}
-
-/// The axes of all joints on the way to each body, as twists at the body's frame, several to a bundle.
-#[derive(Debug)]
-pub(crate) struct AxisScratch<T: Lane> {
-    /// Joints from the base to each body, body after body.
-    path: Vec<u32>,
-    /// Where each body's path starts in `path`; one more than there are bodies.
-    path_start: Vec<usize>,
-    /// Where each body's bundles start.
-    bundle_start: Vec<usize>,
-    angular: Vec<Vec3<T::Bundle>>,
-    linear: Vec<Vec3<T::Bundle>>,
-}
-
-impl<T: Lane> AxisScratch<T> {
-    pub(crate) fn new(model: &Model) -> Self {
-        let (mut path, mut path_start, mut bundle_start) = (Vec::new(), vec![0], vec![0]);
-        for body in 0..model.dof() {
-            let joints = model.path(body);
-            bundle_start.push(bundle_start[body] + joints.len().div_ceil(T::PER_BUNDLE));
-            path.extend(joints.iter().map(|&joint| joint as u32));
-            path_start.push(path.len());
-        }
-        let bundles = bundle_start[model.dof()];
-        Self { path, path_start, bundle_start, angular: vec![Vec3::ZERO; bundles], linear: vec![Vec3::ZERO; bundles] }
     }
 }
 
@@ -148,9 +134,15 @@ pub(crate) fn regressor_blocks<T: Lane>(
             axis[k].add_at(&mut own[start + bundle].0[k], place);
         }
         let wrench = WrenchBasis::new(body.omega, body.alpha, body.acceleration);
-        for k in 0..axes.bundle_start[index + 1] - start {
-            let block = wrench.work_on(axes.angular[start + k], axes.linear[start + k]);
-            sink.put(index, path, k, &block);
+        let mut rest = axes.bundle_start[index + 1] - start;
+        if T::PER_BUNDLE == 1 && map.turns {
+            // The joint's own axis goes through the frame's origin: no linear part.
+            rest -= 1;
+            sink.put(index, path, rest, &Work::<_, true>::new(&wrench, axes.angular[start + rest], Vec3::ZERO));
+        }
+        for k in 0..rest {
+            let (angular, linear) = (axes.angular[start + k], axes.linear[start + k]);
+            sink.put(index, path, k, &Work::<_, false>::new(&wrench, angular, linear));
         }
     }
 }
@@ -191,32 +183,58 @@ impl<B: Lane> WrenchBasis<B> {
             ],
         }
     }
+}
 
-    /// Work of the wrench of each unit parameter on the twist `(angular, linear)`.
+/// The work of a body's wrench on a twist, parameter by parameter. `TURNING` says that the twist has no linear part.
+pub(crate) struct Work<'a, B, const TURNING: bool> {
+    wrench: &'a WrenchBasis<B>,
+    angular: Vec3<B>,
+    linear: Vec3<B>,
+    /// h contributes force (α× + ω×ω×) h and moment h × a: e·(h × a) = h·(a × e), and this is a × e.
+    turned: Vec3<B>,
+}
+
+impl<'a, B: Lane, const TURNING: bool> Work<'a, B, TURNING> {
     #[inline(always)]
-    fn work_on(&self, angular: Vec3<B>, linear: Vec3<B>) -> [B; 10] {
-        // h contributes force (α× + ω×ω×) h and moment h × a: e·(h × a) = h·(a × e).
-        let turned = self.acceleration.cross(angular);
-        let force = &self.force_of_moment.0;
-        let first = |k: usize| {
-            force[2][k].mul_add(linear[2], force[1][k].mul_add(linear[1], force[0][k].mul_add(linear[0], turned[k])))
-        };
-        let moment = &self.moment_of_inertia;
-        let second = |half: usize, k: usize| {
-            moment[2][half][k]
-                .mul_add(angular[2], moment[1][half][k].mul_add(angular[1], moment[0][half][k] * angular[0]))
-        };
+    fn new(wrench: &'a WrenchBasis<B>, angular: Vec3<B>, linear: Vec3<B>) -> Self {
+        Self { wrench, angular, linear, turned: wrench.acceleration.cross(angular) }
+    }
+
+    /// The work that one unit of parameter `PARAMETER` does.
+    #[inline(always)]
+    pub(crate) fn of<const PARAMETER: usize>(&self) -> B {
+        let Self { wrench, angular, linear, turned } = self;
+        match PARAMETER {
+            0 if TURNING => B::ZERO,
+            0 => wrench.acceleration.dot(*linear),
+            1..=3 if TURNING => turned[PARAMETER - 1],
+            1..=3 => {
+                let (k, force) = (PARAMETER - 1, &wrench.force_of_moment.0);
+                let addend = force[0][k].mul_add(linear[0], turned[k]);
+                force[2][k].mul_add(linear[2], force[1][k].mul_add(linear[1], addend))
+            }
+            _ => {
+                let (half, k, moment) = ((PARAMETER - 4) / 3, (PARAMETER - 4) % 3, &wrench.moment_of_inertia);
+                let first = moment[1][half][k].mul_add(angular[1], moment[0][half][k] * angular[0]);
+                moment[2][half][k].mul_add(angular[2], first)
+            }
+        }
+    }
+
+    /// The work of every parameter.
+    #[inline(always)]
+    fn all(&self) -> [B; 10] {
         [
-            self.acceleration.dot(linear),
-            first(0),
-            first(1),
-            first(2),
-            second(0, 0),
-            second(0, 1),
-            second(0, 2),
-            second(1, 0),
-            second(1, 1),
-            second(1, 2),
+            self.of::<0>(),
+            self.of::<1>(),
+            self.of::<2>(),
+            self.of::<3>(),
+            self.of::<4>(),
+            self.of::<5>(),
+            self.of::<6>(),
+            self.of::<7>(),
+            self.of::<8>(),
+            self.of::<9>(),
         ]
     }
 }

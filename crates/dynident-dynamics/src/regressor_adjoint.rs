@@ -6,6 +6,7 @@
 
 use crate::inverse_dynamics::outward;
 use crate::regressor_panels::{Column, PanelLayout, Panels};
+use crate::states::{AdjointScratch, BodyCotangent};
 use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, put_lanes, take_lanes};
 use dynident_lanes::{Kernel, Lane, Scalar, dispatch};
 use dynident_model::laws::JointMotion;
@@ -128,53 +129,6 @@ impl Source<'_> {
             }
         }
         block
-    }
-}
-
-/// Scratch of the reverse sweep.
-#[derive(Debug)]
-pub(crate) struct AdjointScratch<T> {
-    path: Vec<u32>,
-    path_start: Vec<usize>,
-    /// Axes of the joints on the way to each body, as twists at the body's frame: angular, linear.
-    axes: Vec<(Vec3<T>, Vec3<T>)>,
-    /// The cost's derivatives by them.
-    by_axes: Vec<(Vec3<T>, Vec3<T>)>,
-    by_motion: Vec<BodyCotangent<T>>,
-    joints: Vec<JointCotangent<T>>,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct BodyCotangent<T> {
-    omega: Vec3<T>,
-    alpha: Vec3<T>,
-    acceleration: Vec3<T>,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct JointCotangent<T> {
-    q: T,
-    dq: T,
-    ddq: T,
-}
-
-impl<T: Scalar> AdjointScratch<T> {
-    pub(crate) fn new(model: &Model) -> Self {
-        let (mut path, mut path_start) = (Vec::new(), vec![0]);
-        for body in 0..model.dof() {
-            path.extend(model.path(body).iter().map(|&joint| joint as u32));
-            path_start.push(path.len());
-        }
-        let (pairs, dof) = (path.len(), model.dof());
-        let still = BodyCotangent { omega: Vec3::ZERO, alpha: Vec3::ZERO, acceleration: Vec3::ZERO };
-        Self {
-            path,
-            path_start,
-            axes: vec![(Vec3::ZERO, Vec3::ZERO); pairs],
-            by_axes: vec![(Vec3::ZERO, Vec3::ZERO); pairs],
-            by_motion: vec![still; dof],
-            joints: vec![JointCotangent { q: T::ZERO, dq: T::ZERO, ddq: T::ZERO }; dof],
-        }
     }
 }
 

@@ -3,7 +3,7 @@
 //! A joint's row has entries only for the bodies that it moves and for the laws that it feels, so each joint has its own narrow panel: columns
 //! after one another, each with one value per sample. The whole regressor is never stored.
 
-use crate::regressor::{BlockSink, regressor_blocks};
+use crate::regressor::{BlockSink, Work, regressor_blocks};
 use crate::workspace::{AnyScratch, BatchWorkspace, put_lanes, take_lanes};
 use dynident_lanes::{AlignedBuffer, Kernel, Lane, dispatch};
 use dynident_model::laws::{JointMotion, Law};
@@ -54,8 +54,10 @@ pub fn all_columns(model: &Model, laws: &[Law]) -> Vec<Column> {
 pub struct PanelLayout {
     columns: Vec<Column>,
     joints: Vec<JointPanel>,
-    /// For each body, each joint on its path, each of ten parameters: the column's place in that joint's panel, or `NOWHERE`.
-    places: Vec<u32>,
+    /// For each body, bit `k` says whether the layout has its parameter `k`.
+    parameters: Vec<u16>,
+    /// For each body, each joint on its path: the place of the body's first column in that joint's panel. Its others follow.
+    places: Vec<usize>,
     /// Where each body's places start.
     place_start: Vec<usize>,
 }
@@ -68,13 +70,11 @@ struct JointPanel {
     laws: Vec<(usize, usize)>,
 }
 
-const NOWHERE: u32 = u32::MAX;
-
 impl PanelLayout {
     /// The layout for the given columns (any subset of [`all_columns`], in its order).
     ///
     /// # Panics
-    /// If a column names a body or joint that the model does not have.
+    /// If a column names a body or joint that the model does not have, or the bodies' columns are not in ascending order.
     pub fn new(model: &Model, columns: Vec<Column>) -> Self {
         let dof = model.dof();
         let mut joints: Vec<JointPanel> =
@@ -82,16 +82,24 @@ impl PanelLayout {
         let paths: Vec<Vec<usize>> = (0..dof).map(|body| model.path(body)).collect();
         let mut place_start = vec![0];
         for path in &paths {
-            place_start.push(place_start[place_start.len() - 1] + 10 * path.len());
+            place_start.push(place_start[place_start.len() - 1] + path.len());
         }
-        let mut places = vec![NOWHERE; place_start[dof]];
+        let mut parameters = vec![0_u16; dof];
+        let mut places = vec![0; place_start[dof]];
+        let mut last = None;
         for (global, column) in columns.iter().enumerate() {
             match column {
                 Column::Body { body, parameter } => {
+                    // A body's columns then stand together in every panel, and the hot loop needs to know only where they begin.
+                    assert!(last < Some((*body, *parameter)), "the columns of bodies ascend");
+                    last = Some((*body, *parameter));
                     for (k, &joint) in paths[*body].iter().enumerate() {
-                        places[place_start[*body] + 10 * k + parameter] = joints[joint].columns.len() as u32;
+                        if parameters[*body] == 0 {
+                            places[place_start[*body] + k] = joints[joint].columns.len();
+                        }
                         joints[joint].columns.push(global);
                     }
+                    parameters[*body] |= 1 << parameter;
                 }
                 Column::Law(law) => {
                     for joint in law.joints() {
@@ -102,7 +110,7 @@ impl PanelLayout {
                 }
             }
         }
-        Self { columns, joints, places, place_start }
+        Self { columns, joints, parameters, places, place_start }
     }
 
     /// All columns, in global order.
@@ -211,7 +219,9 @@ impl Kernel for Fill<'_> {
         let Self { model, scratch, layout, motion, panels } = self;
         let scratch = scratch.of::<T>();
         let samples = motion.samples;
-        for at in (0..samples).step_by(T::LANES) {
+        for group in (0..samples).step_by(T::LANES) {
+            // The last group of a block reaches back over samples that are done: they come out the same again, and all groups are full.
+            let at = group.min(samples.saturating_sub(T::LANES));
             take_lanes(&mut scratch.core.q, motion.q, samples, at);
             take_lanes(&mut scratch.core.dq, motion.dq, samples, at);
             take_lanes(&mut scratch.core.ddq, motion.ddq, samples, at);
@@ -229,24 +239,35 @@ struct IntoPanels<'a> {
 
 impl<T: Lane> BlockSink<T> for IntoPanels<'_> {
     #[inline(always)]
-    fn put(&mut self, body: usize, path: &[u32], bundle: usize, block: &[T::Bundle; 10]) {
+    fn put<const TURNING: bool>(
+        &mut self,
+        body: usize,
+        path: &[u32],
+        bundle: usize,
+        work: &Work<'_, T::Bundle, TURNING>,
+    ) {
         // Lanes are samples here, so a bundle is one joint.
         let samples = self.panels.samples;
-        let panel = self.panels.joint_mut(path[bundle] as usize);
-        let places = &self.layout.places[self.layout.place_start[body] + 10 * bundle..][..10];
-        if self.at + T::LANES <= samples {
-            for (value, &place) in block.iter().zip(places) {
-                // `NOWHERE` lies past the end of every panel, so one test covers the columns that the layout leaves out.
-                let start = place as usize * samples + self.at;
-                if let Some(slot) = panel.get_mut(start..start + T::LANES) {
-                    value.store(slot);
-                }
-            }
-        } else {
-            for (value, &place) in block.iter().zip(places).filter(|(_, place)| **place != NOWHERE) {
-                let start = place as usize * samples;
-                put_lanes(*value, &mut panel[start..start + samples], self.at);
-            }
+        let present = self.layout.parameters[body];
+        let start = self.layout.places[self.layout.place_start[body] + bundle] * samples;
+        let panel = &mut self.panels.joint_mut(path[bundle] as usize)[start..];
+        let mut at = self.at;
+        let full = samples >= T::LANES;
+        // Written out, because a loop over the entries would first put all of them into memory.
+        macro_rules! store {
+            ($($parameter:literal)*) => {
+                $(if present & (1 << $parameter) != 0 {
+                    let value = work.of::<$parameter>();
+                    if full {
+                        value.store(&mut panel[at..at + T::LANES]);
+                    } else {
+                        put_lanes(value, &mut panel[at..at + samples], 0);
+                    }
+                    at += samples;
+                })*
+            };
         }
+        store!(0 1 2 3 4 5 6 7 8 9);
+        debug_assert_eq!(at, self.at + present.count_ones() as usize * samples);
     }
 }

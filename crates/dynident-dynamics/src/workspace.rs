@@ -1,45 +1,19 @@
 //! Scratch memory of the algorithms: one per thread, allocated once.
 
+use crate::composite::Composite;
+use crate::states::{AdjointScratch, Articulated, AxisScratch, BodyDerivative, BodyState};
 use core::any::Any;
 use dynident_lanes::{Kernel, Lane, Level, Scalar, dispatch, dispatch_single};
 use dynident_model::{JointMap, Mat3, Model, Transform, Vec3};
-
-/// What one body needs while an algorithm over scalars `T` runs.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct BodyState<T> {
-    /// `parent_from_body` at the current position.
-    pub(crate) parent_from_body: Transform<T>,
-    /// Angular velocity, body frame.
-    pub(crate) omega: Vec3<T>,
-    /// Angular acceleration, body frame.
-    pub(crate) alpha: Vec3<T>,
-    /// Acceleration of the body frame's origin minus gravity, body frame.
-    pub(crate) acceleration: Vec3<T>,
-    /// Force on the body (with everything that hangs on it), body frame.
-    pub(crate) force: Vec3<T>,
-    /// Moment on the body about its frame's origin, body frame.
-    pub(crate) moment: Vec3<T>,
-}
-
-impl<T: Scalar> BodyState<T> {
-    pub(crate) const REST: Self = Self {
-        parent_from_body: Transform::IDENTITY,
-        omega: Vec3::ZERO,
-        alpha: Vec3::ZERO,
-        acceleration: Vec3::ZERO,
-        force: Vec3::ZERO,
-        moment: Vec3::ZERO,
-    };
-}
 
 /// Scratch of all algorithms over one lane type.
 #[derive(Debug)]
 pub(crate) struct Scratch<T: Lane> {
     pub(crate) core: CoreScratch<T>,
     /// Ancestor axes of the torque regressor, in bundles.
-    pub(crate) axes: crate::regressor::AxisScratch<T>,
+    pub(crate) axes: AxisScratch<T>,
     /// Of the regressor's reverse sweep.
-    pub(crate) adjoint: crate::regressor_adjoint::AdjointScratch<T>,
+    pub(crate) adjoint: AdjointScratch<T>,
 }
 
 /// The part of the scratch that every [`Scalar`], duals too, can use.
@@ -52,9 +26,9 @@ pub(crate) struct CoreScratch<T> {
     pub(crate) sine: Vec<T>,
     pub(crate) cosine: Vec<T>,
     pub(crate) bodies: Vec<BodyState<T>>,
-    pub(crate) composites: Vec<crate::composite::Composite<T>>,
-    pub(crate) articulated: Vec<crate::forward_dynamics::Articulated<T>>,
-    pub(crate) derivative: Vec<crate::derivatives::BodyDerivative<T>>,
+    pub(crate) composites: Vec<Composite<T>>,
+    pub(crate) articulated: Vec<Articulated<T>>,
+    pub(crate) derivative: Vec<BodyDerivative<T>>,
     /// Square matrices (dof × dof), row-major.
     pub(crate) matrices: [Vec<T>; 3],
 }
@@ -70,9 +44,9 @@ impl<T: Scalar> CoreScratch<T> {
             sine: zeros(),
             cosine: zeros(),
             bodies: vec![BodyState::REST; dof],
-            composites: vec![crate::composite::Composite::ZERO; dof],
-            articulated: vec![crate::forward_dynamics::Articulated::ZERO; dof],
-            derivative: vec![crate::derivatives::BodyDerivative::ZERO; dof],
+            composites: vec![Composite::ZERO; dof],
+            articulated: vec![Articulated::ZERO; dof],
+            derivative: vec![BodyDerivative::ZERO; dof],
             matrices: core::array::from_fn(|_| vec![T::ZERO; dof * dof]),
         }
     }
@@ -125,8 +99,8 @@ impl Kernel for MakeScratch<'_> {
     fn run<T: Lane>(self) -> AnyScratch {
         AnyScratch(Box::new(Scratch::<T> {
             core: CoreScratch::new(self.0.dof()),
-            axes: crate::regressor::AxisScratch::new(self.0),
-            adjoint: crate::regressor_adjoint::AdjointScratch::new(self.0),
+            axes: AxisScratch::new(self.0),
+            adjoint: AdjointScratch::new(self.0),
         }))
     }
 }

@@ -79,7 +79,8 @@ fn ordinary_least_squares_agrees_with_statsmodels() {
     let golden = golden();
     let expected = &golden["ordinary"];
     let problem = problem(&golden);
-    let estimate = ordinary_least_squares(&problem, &OrdinarySettings::default()).unwrap();
+    let settings = OrdinarySettings { covariance: CovarianceMethod::Segments, ..Default::default() };
+    let estimate = ordinary_least_squares(&problem, &settings).unwrap();
     assert_eq!(estimate.status, EstimateStatus::Complete);
     assert_eq!(estimate.degrees_of_freedom, 2 * (310 + 215) - 5);
     assert_vector("values", &estimate.values, &numbers(&expected["values"]));
@@ -102,7 +103,8 @@ fn weighted_least_squares_agrees_with_statsmodels() {
     let golden = golden();
     let expected = &golden["weighted"];
     let problem = problem(&golden);
-    let settings = WeightedSettings { tolerance: 1.0e-12, ..Default::default() };
+    let settings =
+        WeightedSettings { covariance: CovarianceMethod::Segments, tolerance: 1.0e-12, ..Default::default() };
     let estimate = weighted_least_squares(&problem, &settings).unwrap();
     assert_eq!(estimate.status, EstimateStatus::Complete);
     assert!(estimate.iterations < 20, "{} iterations", estimate.iterations);

@@ -8,9 +8,9 @@ pub const CUTOFF_SAMPLES: usize = 1 << 16;
 
 /// Part of the acceleration's power (noise subtracted) that the pass band has to hold.
 const POWER_SHARE: f64 = 0.9999;
-/// Two-way Butterworth filters of order 4 pass 99.6 % of the amplitude at half their cut-off and 86 % at 0.8 of it; this margin
-/// keeps the last of the motion at 94 %.
-const MARGIN: f64 = 1.4;
+/// Two-way Butterworth filters of order 4 pass 99.6 % of the amplitude at half their cut-off and 86 % at 0.8 of it. What the filter takes from
+/// positions alone, and not from torque, biases the fit; this margin keeps it to 0.4 % at the motion's highest frequency.
+const MARGIN: f64 = 2.0;
 /// A spectrum this far above the noise floor counts as motion.
 const ABOVE_NOISE: f64 = 10.0;
 /// No cut-off comes closer to the sampling rate than this part of it.
@@ -34,10 +34,10 @@ pub struct CutoffChoice {
 /// * Noise in the position makes the spectrum of the acceleration rise with frequency. Behind the peak of the velocity's
 ///   spectrum, the first frequency at which the acceleration's (smoothed over a quarter octave) comes within twice its minimum is the
 ///   valley where motion has faded into noise.
-/// * Data that were filtered before have their valley far above the motion: there the frequency counts below which 99.9 % of the
+/// * Data that were filtered before have their valley far above the motion: there the frequency counts below which 99.99 % of the
 ///   acceleration's power up to the valley lies.
 ///
-/// The joint asks for 1.4 times the lower of the two; the log's cut-off is the highest of its joints', at most 0.4 of the rate.
+/// The joint asks for twice the lower of the two; the log's cut-off is the highest of its joints', at most 0.4 of the rate.
 /// A joint whose spectrum nowhere stands above ten times its median over the upper half of the band does not count.
 pub fn cutoff<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> CutoffChoice {
     let joints: Vec<Option<Content>> = q.iter().map(|q| content(q.as_ref(), rate_hz)).collect();
@@ -57,7 +57,7 @@ pub fn cutoff<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> CutoffChoice {
             joints_hz,
             evidence: format!(
                 "joint {} (0-based) reaches highest: its acceleration fades into the noise ({:.1e} per sample of position) at {:.3} Hz, \
-                 and 99.9 % of its power below that lies below {:.3} Hz; times {MARGIN}, at most {HIGHEST} of the rate",
+                 and 99.99 % of its power below that lies below {:.3} Hz; times {MARGIN}, at most {HIGHEST} of the rate",
                 joint, content.noise, content.valley_hz, content.power_hz,
             ),
         },

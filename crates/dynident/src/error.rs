@@ -1,7 +1,7 @@
 //! Everything that can stop a job, each with the file, the place and the mend in its message.
 
 use dynident_estimation::EstimationError;
-use dynident_model::{ModelError, ReadError, UrdfWriteError};
+use dynident_model::{ModelError, ReadError};
 use dynident_recording::{FilterError, RecordingError};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -39,7 +39,7 @@ pub enum Error {
         message: String,
     },
     /// A file of the study that is in none of its folders.
-    #[error("{} is in none of the study's folders (tried {}); name its folder with --data{}",
+    #[error("{} is in none of the study's folders (tried {}); mend its path, or name its folder with --data{}",
         file.display(), list(tried), source_of_data.as_ref().map_or(String::new(), |s| format!(". The recordings are public: {s}")))]
     Missing {
         /// The file.
@@ -51,7 +51,7 @@ pub enum Error {
     },
     /// A robot description that cannot be read.
     #[error(transparent)]
-    Robot(#[from] ReadError),
+    Robot(Box<ReadError>),
     /// A machine that does not fit together.
     #[error("{}: {source}", path.display())]
     Model {
@@ -66,7 +66,7 @@ pub enum Error {
         /// The log.
         log: String,
         /// What is wrong.
-        source: RecordingError,
+        source: Box<RecordingError>,
     },
     /// A parallel filter that does not exist at the log's rate.
     #[error("log `{log}`, [parallel_filter]: {source}")]
@@ -114,14 +114,6 @@ pub enum Error {
         /// What is wrong, and the mend.
         message: String,
     },
-    /// A URDF that cannot be written.
-    #[error("{}: {source}", path.display())]
-    Urdf {
-        /// The original.
-        path: PathBuf,
-        /// What is wrong.
-        source: UrdfWriteError,
-    },
     /// An output that cannot be written. What was there before is untouched.
     #[error("{}: cannot be written: {source}; nothing that was there has changed", path.display())]
     Output {
@@ -132,7 +124,18 @@ pub enum Error {
     },
 }
 
+impl From<ReadError> for Error {
+    fn from(error: ReadError) -> Self {
+        Self::Robot(Box::new(error))
+    }
+}
+
 impl Error {
+    /// A log that cannot be read.
+    pub(crate) fn recording(log: &str, source: RecordingError) -> Self {
+        Self::Recording { log: log.to_owned(), source: Box::new(source) }
+    }
+
     pub(crate) fn study(path: &Path, message: String) -> Self {
         Self::Study { path: path.to_owned(), message }
     }

@@ -1,39 +1,31 @@
 //! Logs to a model: the main job.
 
 use crate::error::Error;
-use crate::evidence::{Evidence, PriorAgreement, findings};
+use crate::evidence::Evidence;
+use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
 use crate::lag::{self, LAG_SAMPLES, LagCheck};
 use crate::machine::{Machine, prior_parameters};
-use crate::progress::{Progress, Silent};
-use crate::result::{
-    BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, MethodSummary, PhysicalVerdict, RESULT_SCHEMA,
-    ResultFile, RobotSummary, Timings, TrainingJoint, TrainingResult,
+use crate::progress::Silent;
+use crate::result::{LogSummary, RESULT_SCHEMA, ResultFile, Timings};
+use crate::result_sections::{
+    base_parameters, bodies, joint_results, law_results, method_summary, robot_summary, training_result, verdict,
 };
-use crate::rows::{JointRows, Pass, Passed, RawSamples, RowSink, motion_in_force};
+use crate::rows::{JointRows, Pass, RawSamples, RowSink, motion_in_force};
 use crate::standard_parameters::{inertials, nearest_to_prior};
 use crate::study::{EstimatorMethod, Folders, Role, Study};
 use crate::validate::validate_log;
+use crate::written_urdf::written_urdf;
 use dynident_dynamics::Column;
 use dynident_estimation::{
-    Estimate, EstimateStatus, LinearProblem, OrdinarySettings, SegmentedFactor, WeightedSettings,
-    ordinary_least_squares, weighted_least_squares,
+    Estimate, LinearProblem, OrdinarySettings, SegmentedFactor, WeightedSettings, ordinary_least_squares,
+    weighted_least_squares,
 };
+use dynident_model::InertialParameters;
 use dynident_model::laws::Law;
-use dynident_model::{DescriptionFormat, INERTIAL_NAMES, InertialParameters, JointChange, link_changes, rewrite_urdf};
 use dynident_recording::MotionSettings;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-
-/// How a job runs; not what it computes.
-pub struct RunOptions<'a> {
-    /// Folder of the recordings, in place of the study's own.
-    pub data: Option<PathBuf>,
-    /// Threads; the result is the same for any number.
-    pub threads: usize,
-    /// Hears how far the job has come.
-    pub progress: &'a dyn Progress,
-}
 
 /// A finished identification.
 #[derive(Debug)]
@@ -44,7 +36,7 @@ pub struct Identification {
     pub estimate: Estimate,
     /// Inertial parameters of the bodies, as in `result.bodies`.
     pub inertials: Vec<InertialParameters>,
-    /// The user's own URDF with the new values, if the robot came from one.
+    /// The user's own URDF with the new values; without it, [`ResultFile::no_urdf`] says why.
     pub urdf: Option<String>,
 }
 
@@ -70,13 +62,12 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
     let problem = problem(study, &machine, &fits).map_err(in_study)?;
     let estimate = match study.estimator.method {
         EstimatorMethod::Ordinary => {
-            let settings =
-                OrdinarySettings { rank: study.estimator.rank.clone(), covariance: study.estimator.covariance };
+            let settings = OrdinarySettings { rank: study.estimator.rank, covariance: study.estimator.covariance };
             ordinary_least_squares(&problem, &settings)
         }
         EstimatorMethod::Weighted => {
             let settings = WeightedSettings {
-                rank: study.estimator.rank.clone(),
+                rank: study.estimator.rank,
                 covariance: study.estimator.covariance,
                 ..WeightedSettings::default()
             };
@@ -108,7 +99,11 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
     let prior = prior_parameters(&machine.model, &machine.laws);
     let parameters = nearest_to_prior(&machine.model, &machine.base, &estimate.values, &prior);
     let inertials = inertials(&machine.model, &parameters);
-    let urdf = written_urdf(&machine, &inertials, &parameters)?;
+    // Parameters that URDF cannot express leave a result without one; it is no reason to lose the result.
+    let (urdf, no_urdf) = match written_urdf(&machine, &inertials, &parameters) {
+        Ok(urdf) => (Some(urdf), None),
+        Err(reason) => (None, Some(reason)),
+    };
     let result = ResultFile {
         schema: RESULT_SCHEMA,
         name: study_name(study, study_path),
@@ -122,24 +117,10 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
         validation,
         physical: verdict(&machine, &inertials, &parameters),
         logs,
+        no_urdf,
         timings_s: timings,
     };
     Ok(Identification { result, estimate, inertials, urdf })
-}
-
-/// What a study is called.
-pub(crate) fn study_name(study: &Study, path: &Path) -> String {
-    let stem = || path.file_stem().map_or_else(|| "study".to_owned(), |stem| stem.to_string_lossy().into_owned());
-    study.name.clone().unwrap_or_else(stem)
-}
-
-/// All logs' files, found before any work starts.
-pub(crate) fn log_files(study: &Study, folders: &Folders) -> Result<Vec<PathBuf>, Error> {
-    study.log.iter().map(|log| folders.find(&log.file, study.source.as_deref())).collect()
-}
-
-pub(crate) fn of_role(study: &Study, role: Role) -> Vec<usize> {
-    (0..study.log.len()).filter(|&index| study.log[index].role == role).collect()
 }
 
 /// What is left of one log for fitting.
@@ -246,37 +227,6 @@ fn training_lags(
     Ok(check.lags(passed.motion_cutoff_hz))
 }
 
-pub(crate) fn joint_names(machine: &Machine) -> Vec<String> {
-    machine.model.joints().iter().map(|joint| joint.name.clone()).collect()
-}
-
-pub(crate) fn log_summary(
-    study: &Study,
-    index: usize,
-    passed: Passed,
-    prior_agreement: Option<PriorAgreement>,
-    torque_lag_s: Vec<Option<f64>>,
-    joints: &[String],
-) -> LogSummary {
-    let mut model_findings = prior_agreement.as_ref().map_or_else(Vec::new, findings);
-    model_findings.extend(lag::findings(&torque_lag_s, joints));
-    LogSummary {
-        log: study.log_name(index),
-        role: match study.log[index].role {
-            Role::Identify => "identify",
-            Role::Validate => "validate",
-        },
-        motion_cutoff_hz: passed.motion_cutoff_hz,
-        filter_cutoff_hz: passed.filter_cutoff_hz,
-        filtered_rate_hz: passed.filtered_rate_hz,
-        filtered_rows: passed.filtered_rows,
-        model_findings,
-        torque_lag_s,
-        prior_agreement,
-        import: passed.report,
-    }
-}
-
 fn problem(
     study: &Study,
     machine: &Machine,
@@ -295,217 +245,4 @@ fn problem(
         Some(prior) => problem.with_fallback(prior.clone()),
         None => Ok(problem),
     }
-}
-
-fn robot_summary(machine: &Machine) -> RobotSummary {
-    RobotSummary {
-        name: machine.model.name().to_owned(),
-        file: machine.robot.path.display().to_string(),
-        dof: machine.model.dof(),
-        joints: joint_names(machine),
-        gravity_m_s2: machine.model.gravity().0,
-        parameter_order: INERTIAL_NAMES,
-    }
-}
-
-fn method_summary(study: &Study, machine: &Machine, motion: &MotionSettings, estimate: &Estimate) -> MethodSummary {
-    let (weakest, strongest) = machine.base.gap();
-    MethodSummary {
-        estimator: match study.estimator.method {
-            EstimatorMethod::Ordinary => "ordinary",
-            EstimatorMethod::Weighted => "weighted",
-        }
-        .to_owned(),
-        status: match estimate.status {
-            EstimateStatus::Complete => "complete",
-            EstimateStatus::NotAllExcited => "not-all-excited",
-            EstimateStatus::IterationLimit => "iteration-limit",
-        }
-        .to_owned(),
-        iterations: estimate.iterations,
-        covariance: if estimate.clusters > 0 {
-            "time segments: accounts for residuals correlated in time".to_owned()
-        } else {
-            "white residuals".to_owned()
-        },
-        clusters: estimate.clusters,
-        motion: motion.clone(),
-        condition_number: estimate.condition_number_raw,
-        condition_number_scaled: estimate.condition_number_scaled,
-        base_columns: "from the machine's structure: columns from base to tip, bodies then laws; a column that depends on earlier ones is regrouped into them"
-            .to_owned(),
-        base_gap: [weakest, strongest],
-        not_excited: estimate.rank.fixed.iter().map(|fixed| fixed.name.clone()).collect(),
-    }
-}
-
-fn base_parameters(machine: &Machine, estimate: &Estimate) -> Vec<BaseParameterResult> {
-    let expressions = machine.base.expressions();
-    let columns = machine.layout.columns();
-    (0..columns.len())
-        .map(|index| BaseParameterResult {
-            symbol: columns[index].symbol(),
-            expression: expressions[index].clone(),
-            unit: columns[index].unit().to_owned(),
-            value: estimate.values[index],
-            std: estimate.std[index],
-            std_white: estimate.covariance_white[(index, index)].max(0.0).sqrt(),
-            relative_std_percent: estimate.relative_std_percent[index],
-            prior: machine.prior.as_ref().map(|prior| prior[index]),
-            excited: !estimate.rank.fixed.iter().any(|fixed| fixed.column == index),
-        })
-        .collect()
-}
-
-fn bodies(machine: &Machine, inertials: &[InertialParameters]) -> Vec<BodyResult> {
-    machine
-        .model
-        .bodies()
-        .iter()
-        .zip(inertials)
-        .map(|(body, inertial)| BodyResult {
-            name: body.name().to_owned(),
-            links: body.links.iter().map(|link| link.name.clone()).collect(),
-            mass_kg: inertial.mass_kg(),
-            com_m: inertial.com_m().map(|com| com.0),
-            inertia_at_origin_kgm2: core::array::from_fn(|k| inertial.0[4 + k]),
-            parameters: inertial.0,
-            prior: body.prior().map(|prior| prior.0),
-            pseudo_inertia_min_eigenvalue: inertial.pseudo_inertia().symmetric_eigenvalues().min(),
-        })
-        .collect()
-}
-
-fn law_results(
-    machine: &Machine,
-    estimate: &Estimate,
-    parameters: &[f64],
-    wanted: impl Fn(&Law) -> bool,
-) -> Vec<LawResult> {
-    let first_law = 10 * machine.model.dof();
-    let expressions = machine.base.expressions();
-    let of_law = |(x, law): (usize, &Law)| {
-        let column = first_law + x;
-        let place = machine.base.independent().iter().position(|&index| index == column);
-        // A law that other parameters were regrouped into has no value of its own either.
-        let alone = place.filter(|&place| expressions[place] == law.symbol());
-        let home = place.or_else(|| {
-            let d = machine.base.dependent().iter().position(|&index| index == column)?;
-            let column = machine.base.regrouping().column(d);
-            (0..column.len()).find(|&b| column[b].abs() > 1e-9)
-        });
-        LawResult {
-            symbol: law.symbol(),
-            unit: law.unit().to_owned(),
-            value: alone.map_or(parameters[column], |place| estimate.values[place]),
-            std: alone.map(|place| estimate.std[place]),
-            base_parameter: home.map(|place| expressions[place].clone()),
-        }
-    };
-    machine.laws.iter().enumerate().filter(|(_, law)| wanted(law)).map(of_law).collect()
-}
-
-fn joint_results(machine: &Machine, estimate: &Estimate, parameters: &[f64]) -> Vec<JointResult> {
-    machine
-        .model
-        .joints()
-        .iter()
-        .enumerate()
-        .map(|(index, joint)| JointResult {
-            name: joint.name.clone(),
-            laws: law_results(machine, estimate, parameters, |law| {
-                !matches!(law, Law::Coupling(_)) && law.joints() == [index]
-            }),
-            residual_std_nm: estimate.joint_sigma[index],
-            residual_correlation: estimate.effective_lag1.get(index).copied().filter(|rho| rho.is_finite()),
-        })
-        .collect()
-}
-
-fn training_result(
-    study: &Study,
-    machine: &Machine,
-    problem: &LinearProblem,
-    training: &[usize],
-    estimate: &Estimate,
-) -> Result<TrainingResult, dynident_estimation::EstimationError> {
-    let names = joint_names(machine);
-    let mut sums = vec![(0_usize, 0.0, 0.0); names.len()];
-    for equation in problem.equations() {
-        let theta: Vec<f64> = equation.columns.iter().map(|&column| estimate.values[column]).collect();
-        let factor = equation.factor.total();
-        let sum = &mut sums[equation.joint];
-        sum.0 += factor.rows();
-        sum.1 += factor.residual_sum_of_squares(&theta)?;
-        sum.2 += factor.torque_norm().powi(2);
-    }
-    let percent = |error: f64, torque: f64| (torque > 0.0).then(|| 100.0 * (error / torque).sqrt());
-    let (error, torque) = sums.iter().fold((0.0, 0.0), |(e, t), sum| (e + sum.1, t + sum.2));
-    Ok(TrainingResult {
-        logs: training.iter().map(|&index| study.log_name(index)).collect(),
-        samples: sums.iter().map(|sum| sum.0).max().unwrap_or(0),
-        relative_error_percent: percent(error, torque),
-        joints: names
-            .into_iter()
-            .zip(sums)
-            .map(|(name, (rows, error, torque))| TrainingJoint {
-                name,
-                rmse_nm: (error / rows.max(1) as f64).sqrt(),
-                relative_error_percent: percent(error, torque),
-            })
-            .collect(),
-    })
-}
-
-fn verdict(machine: &Machine, inertials: &[InertialParameters], parameters: &[f64]) -> PhysicalVerdict {
-    let mut violations = Vec::new();
-    for (body, inertial) in machine.model.bodies().iter().zip(inertials) {
-        let least = inertial.pseudo_inertia().symmetric_eigenvalues().min();
-        if inertial.mass_kg() <= 0.0 {
-            violations.push(format!("{}: mass {:.4} kg", body.name(), inertial.mass_kg()));
-        } else if least <= 0.0 {
-            violations
-                .push(format!("{}: pseudo-inertia not positive definite (least eigenvalue {least:.2e})", body.name()));
-        }
-    }
-    for (law, value) in machine.laws.iter().zip(&parameters[10 * machine.model.dof()..]) {
-        if *value < 0.0 && matches!(law, Law::Viscous(_) | Law::Coulomb(_) | Law::DriveInertia(_)) {
-            violations.push(format!("{} = {value:.4} {}", law.symbol(), law.unit()));
-        }
-    }
-    PhysicalVerdict {
-        consistent: violations.is_empty(),
-        violations,
-        note: "of the full set nearest to the prior; plain least squares does not enforce it, and another set with the same torques may pass",
-    }
-}
-
-/// The user's URDF with the new values; joints that were locked keep theirs.
-fn written_urdf(
-    machine: &Machine,
-    inertials: &[InertialParameters],
-    parameters: &[f64],
-) -> Result<Option<String>, Error> {
-    if machine.robot.format != DescriptionFormat::Urdf {
-        return Ok(None);
-    }
-    let failed = |source| Error::Urdf { path: machine.robot.path.clone(), source };
-    let links = link_changes(&machine.model, inertials).map_err(failed)?;
-    let mut joints: Vec<JointChange> = Vec::new();
-    let laws = machine.laws.iter().zip(&parameters[10 * machine.model.dof()..]);
-    for (law, &value) in laws {
-        let (joint, damping, friction) = match law {
-            Law::Viscous(law) => (law.joint, Some(value), None),
-            Law::Coulomb(law) => (law.joint, None, Some(value)),
-            _ => continue,
-        };
-        let name = &machine.model.joints()[joint].name;
-        let place = joints.iter().position(|change| change.joint == *name).unwrap_or_else(|| {
-            joints.push(JointChange { joint: name.clone(), damping: None, friction: None });
-            joints.len() - 1
-        });
-        joints[place].damping = damping.or(joints[place].damping);
-        joints[place].friction = friction.or(joints[place].friction);
-    }
-    rewrite_urdf(&machine.robot.text, &links, &joints).map(Some).map_err(failed)
 }

@@ -5,20 +5,25 @@
 
 #![forbid(unsafe_code)]
 
+#[cfg(doctest)]
+pub mod book;
 mod error;
 mod evaluate;
 mod evidence;
 mod identify;
 mod inspect;
+mod job;
 mod lag;
 mod machine;
 mod output;
 mod progress;
 mod result;
+mod result_sections;
 mod rows;
 mod standard_parameters;
 mod study;
 mod validate;
+mod written_urdf;
 
 pub use dynident_dynamics as dynamics;
 pub use dynident_estimation as estimation;
@@ -28,10 +33,11 @@ pub use dynident_recording as recording;
 pub use error::Error;
 pub use evaluate::{Quantity, evaluate};
 pub use evidence::PriorAgreement;
-pub use identify::{Identification, RunOptions, identify};
+pub use identify::{Identification, identify};
 pub use inspect::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary, inspect};
+pub use job::RunOptions;
 pub use machine::Machine;
-pub use output::write_whole;
+pub use output::{check_writable, write_whole};
 pub use progress::{Progress, Silent};
 pub use result::{
     BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, LogValidation, MethodSummary, PhysicalVerdict,

@@ -25,3 +25,14 @@ pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Error> {
     file.persist(path).map_err(|error| cannot(error.error))?;
     Ok(())
 }
+
+/// Finds out before a long job whether [`write_whole`] will be able to write into `folder`, which need not exist yet. Leaves nothing behind.
+///
+/// # Errors
+/// [`Error::Output`] with the system's reason.
+pub fn check_writable(folder: &Path) -> Result<(), Error> {
+    let cannot = |source| Error::Output { path: folder.to_owned(), source };
+    let nearest = folder.ancestors().find(|ancestor| ancestor.exists() || ancestor.as_os_str().is_empty());
+    let nearest = nearest.filter(|ancestor| !ancestor.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    tempfile::NamedTempFile::new_in(nearest).map(drop).map_err(cannot)
+}

@@ -35,6 +35,8 @@ pub struct ResultFile {
     pub physical: PhysicalVerdict,
     /// What the importer found in each log.
     pub logs: Vec<LogSummary>,
+    /// Why there is no identified.urdf; none when there is one.
+    pub no_urdf: Option<String>,
     /// Where the time went.
     pub timings_s: Timings,
 }

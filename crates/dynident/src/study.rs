@@ -84,13 +84,13 @@ pub struct RobotSection {
     #[serde(default)]
     pub lock: BTreeMap<String, f64>,
     /// Gravitational acceleration in the world, m/s²; (0, 0, -9.81), or the D-H table's own, by default.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "exactly")]
     pub gravity_m_s2: Option<[f64; 3]>,
     /// How the base is mounted in the world: roll, pitch, yaw about fixed axes, rad.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "exactly")]
     pub base_rpy_rad: Option<[f64; 3]>,
     /// The same in degrees; give one of the two.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "exactly")]
     pub base_rpy_deg: Option<[f64; 3]>,
 }
 
@@ -165,9 +165,10 @@ pub struct CouplingSection {
     /// Name of the drive in the parameters' symbols.
     pub name: String,
     /// The two joints.
+    #[serde(deserialize_with = "two")]
     pub joints: [String; 2],
     /// Drive speed per joint speed; 1 and 1 by default.
-    #[serde(default = "one_one")]
+    #[serde(default = "one_one", deserialize_with = "two")]
     pub ratios: [f64; 2],
     /// Cross inertia. On by default.
     #[serde(default = "yes")]
@@ -188,13 +189,29 @@ fn yes() -> bool {
     true
 }
 
+/// An array of `N` values and no more: serde by itself ignores what follows.
+fn counted<T, const N: usize, E: serde::de::Error>(values: Vec<T>) -> Result<[T; N], E> {
+    let found = values.len();
+    values.try_into().map_err(|_| E::custom(format!("{found} values where {N} are expected")))
+}
+
+fn two<'de, T: Deserialize<'de>, D: serde::Deserializer<'de>>(deserializer: D) -> Result<[T; 2], D::Error> {
+    counted(Vec::deserialize(deserializer)?)
+}
+
+fn exactly<'de, T: Deserialize<'de>, const N: usize, D: serde::Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<[T; N]>, D::Error> {
+    counted(Vec::deserialize(deserializer)?).map(Some)
+}
+
 /// `[parallel_filter]`: torque and every regressor column pass the same zero-phase low-pass, then every n-th row is kept.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ParallelFilterSection {
     /// Off: every sample counts as it is. On by default.
     pub enabled: bool,
-    /// Every how many samples one is kept. By default so many that what remains is two and a half times the motion's cut-off.
+    /// Every how many samples one is kept. By default so many that the filter's cut-off lies at 0.7 of the motion's.
     pub factor: Option<usize>,
     /// Frequency at which the filter's gain is one half; by default 0.4 of the rate that remains.
     pub cutoff_hz: Option<f64>,
@@ -260,15 +277,18 @@ pub struct LogSection {
     #[serde(default)]
     pub format: Option<LogFormat>,
     /// In place of the format's `rows`.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "exactly")]
     pub rows: Option<[u64; 2]>,
     /// In place of the format's `fraction`.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "exactly")]
     pub fraction: Option<[f64; 2]>,
     /// In place of the format's `time_range_s`.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "exactly")]
     pub time_range_s: Option<[f64; 2]>,
 }
+
+/// Largest component of gravity: beyond it the unit must be wrong, and numbers run away.
+const MAX_GRAVITY_M_S2: f64 = 1000.0;
 
 /// Largest study file, bytes.
 const MAX_STUDY_BYTES: u64 = 4 << 20;
@@ -359,13 +379,23 @@ impl Study {
                 not_negative(band, &format!("drive.joints.{joint}.coulomb_dead_band"))?;
             }
         }
-        for coupling in &self.coupling {
+        for (index, coupling) in self.coupling.iter().enumerate() {
+            if self.coupling[..index].iter().any(|other| other.name == coupling.name) {
+                return Err(format!("coupling `{}` stands twice: give each drive a name of its own", coupling.name));
+            }
             if coupling.ratios.iter().any(|ratio| !ratio.is_finite() || *ratio == 0.0) {
                 return Err(format!("coupling `{}`: ratios must be finite and not zero", coupling.name));
             }
             if coupling.joints[0] == coupling.joints[1] {
                 return Err(format!("coupling `{}`: name two different joints", coupling.name));
             }
+        }
+        if let Some(gravity) = self.robot.gravity_m_s2
+            && gravity.iter().any(|g| g.abs().is_nan() || g.abs() > MAX_GRAVITY_M_S2)
+        {
+            return Err(format!(
+                "robot.gravity_m_s2 = {gravity:?}: give finite numbers in m/s^2, at most {MAX_GRAVITY_M_S2} in size"
+            ));
         }
         if self.robot.base_rpy_rad.is_some() && self.robot.base_rpy_deg.is_some() {
             return Err("robot.base_rpy_rad and robot.base_rpy_deg are both given: keep one".to_owned());

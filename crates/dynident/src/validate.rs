@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::evidence::{Evidence, predicted};
-use crate::identify::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
+use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
 use crate::lag::LagCheck;
 use crate::machine::Machine;
 use crate::result::{BaseParameterResult, LogSummary, LogValidation};

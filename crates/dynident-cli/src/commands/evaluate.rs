@@ -1,11 +1,11 @@
 //! `dynident evaluate ROBOT --states S.csv --quantity Q`.
 
-use super::told;
-use crate::Verdict;
+use super::{Context, json, told};
+use crate::{Verdict, terminal};
 use clap::ValueEnum;
 use dynident::Quantity;
 use std::io::{self, BufWriter, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Options of `evaluate`.
 #[derive(clap::Args)]
@@ -32,7 +32,10 @@ enum Chosen {
     Regressor,
 }
 
-pub(crate) fn run(options: &Options) -> Result<Verdict, String> {
+/// Name and version of the schema of what `--json` prints.
+const SCHEMA: &str = "dynident/evaluation/1";
+
+pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     let quantity = match options.quantity {
         Chosen::InverseDynamics => Quantity::InverseDynamics,
         Chosen::ForwardDynamics => Quantity::ForwardDynamics,
@@ -41,19 +44,42 @@ pub(crate) fn run(options: &Options) -> Result<Verdict, String> {
         Chosen::Regressor => Quantity::Regressor,
     };
     let robot = dynident::model::load_robot(&options.robot).map_err(|error| error.to_string())?;
-    if let Some(path) = &options.out {
+    if context.json || options.out.is_some() {
         let mut table = Vec::new();
-        dynident::evaluate(&robot.model, &options.states, quantity, &mut table).map_err(told)?;
-        dynident::write_whole(path, &table).map_err(told)?;
-    } else {
-        let mut out = BufWriter::new(io::stdout().lock());
-        let done = dynident::evaluate(&robot.model, &options.states, quantity, &mut out);
-        match done.map(|_| out.flush()) {
-            Ok(_) => {}
-            // A reader that has gone (`| head`) has seen what it wanted.
-            Err(dynident::Error::Output { source, .. }) if source.kind() == io::ErrorKind::BrokenPipe => {}
-            Err(error) => return Err(told(error)),
+        let rows = dynident::evaluate(&robot.model, &options.states, quantity, &mut table).map_err(told)?;
+        if let Some(path) = &options.out {
+            dynident::write_whole(path, &table).map_err(told)?;
         }
+        if context.json {
+            let table = String::from_utf8_lossy(&table);
+            let name = options.quantity.to_possible_value().map_or(String::new(), |value| value.get_name().to_owned());
+            terminal::print(&object(&name, robot.model.dof(), rows, options.out.as_deref(), &table)?);
+        }
+        return Ok(Verdict::Good);
     }
-    Ok(Verdict::Good)
+    let mut out = BufWriter::new(io::stdout().lock());
+    let done = dynident::evaluate(&robot.model, &options.states, quantity, &mut out);
+    let flushed = done.and_then(|_| {
+        out.flush().map_err(|source| dynident::Error::Output { path: PathBuf::from("standard output"), source })
+    });
+    match flushed {
+        // A reader that has gone (`| head`) has seen what it wanted.
+        Err(dynident::Error::Output { source, .. }) if source.kind() == io::ErrorKind::BrokenPipe => Ok(Verdict::Good),
+        done => done.map(|()| Verdict::Good).map_err(told),
+    }
+}
+
+/// The table as a JSON object, its numbers digit by digit; without them if they went to a file.
+fn object(quantity: &str, dof: usize, rows: u64, out: Option<&Path>, table: &str) -> Result<String, String> {
+    let mut lines = table.lines();
+    let columns: Vec<&str> = lines.next().unwrap_or("").split(',').collect();
+    let (columns, file) = (json(&columns)?, json(&out)?);
+    let head = format!(
+        r#"{{"schema":"{SCHEMA}","quantity":"{quantity}","dof":{dof},"rows":{rows},"columns":{columns},"file":{file}"#
+    );
+    if out.is_some() {
+        return Ok(format!("{head}}}"));
+    }
+    let values: Vec<String> = lines.map(|line| format!("[{line}]")).collect();
+    Ok(format!(r#"{head},"values":[{}]}}"#, values.join(",")))
 }

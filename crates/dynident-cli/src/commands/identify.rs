@@ -1,9 +1,12 @@
 //! `dynident identify STUDY.toml --out DIR`.
 
-use super::{Context, json, pretty_json, told};
+use super::{Context, json, judged, pretty_json, told, told_in};
 use crate::{Verdict, summary, terminal};
-use dynident::{RunOptions, Study, identify, write_whole};
+use dynident::{RunOptions, Study, check_writable, identify, write_whole};
 use std::path::PathBuf;
+
+/// The user's description with the new values.
+const URDF: &str = "identified.urdf";
 
 /// Options of `identify`.
 #[derive(clap::Args)]
@@ -16,19 +19,23 @@ pub(crate) struct Options {
     /// Folder of the recordings, in place of the study's own.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Exit with status 1 if the relative error on any held-out log is larger.
-    #[arg(long, value_name = "PERCENT")]
+    /// Exit with status 1 if the relative error on any held-out log is larger, or if none is held out.
+    #[arg(long, value_name = "PERCENT", value_parser = super::percentage)]
     max_validation_error: Option<f64>,
 }
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     let study = Study::load(&options.study).map_err(told)?;
+    check_writable(&options.out).map_err(told)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
-    let identification = identify(&study, &options.study, &run).map_err(told)?;
+    let identification = identify(&study, &options.study, &run).map_err(told_in(&options.study))?;
     let result = &identification.result;
     if let Some(urdf) = &identification.urdf {
-        write_whole(&options.out.join("identified.urdf"), urdf.as_bytes()).map_err(told)?;
+        write_whole(&options.out.join(URDF), urdf.as_bytes()).map_err(told)?;
+    } else if options.out.join(URDF).exists() {
+        let old = options.out.join(URDF);
+        terminal::remark(&format!("{} is of an earlier run and does not belong to this result", old.display()));
     }
     // The result last: where it stands, everything stands.
     write_whole(&options.out.join("result.json"), &pretty_json(result)?).map_err(told)?;
@@ -37,12 +44,5 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     } else if !context.quiet {
         terminal::print(&summary::identification(result, &options.out, identification.urdf.is_some()));
     }
-    let worst = result.validation.iter().filter_map(|log| log.model.relative_error_percent).fold(0.0, f64::max);
-    Ok(match options.max_validation_error {
-        Some(limit) if worst > limit => {
-            terminal::remark(&format!("the largest held-out error, {worst:.2} %, is above the {limit} % asked for"));
-            Verdict::Negative
-        }
-        _ => Verdict::Good,
-    })
+    Ok(judged(&result.validation, options.max_validation_error))
 }

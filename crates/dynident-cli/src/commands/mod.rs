@@ -6,9 +6,10 @@ pub(crate) mod inspect;
 pub(crate) mod validate;
 
 use crate::progress::Bar;
-use crate::terminal;
-use dynident::{Progress, Silent};
+use crate::{Verdict, terminal};
+use dynident::{LogValidation, Progress, Silent};
 use serde::Serialize;
+use std::path::Path;
 
 /// What every command knows of how it was called.
 pub(crate) struct Context {
@@ -47,6 +48,48 @@ pub(crate) fn pretty_json<T: Serialize>(value: &T) -> Result<Vec<u8>, String> {
 }
 
 /// An error's message.
+#[allow(clippy::needless_pass_by_value, reason = "the shape that map_err wants")]
 pub(crate) fn told(error: dynident::Error) -> String {
     error.to_string()
+}
+
+/// A limit for the relative error, in percent.
+pub(crate) fn percentage(text: &str) -> Result<f64, String> {
+    let value =
+        text.trim_end_matches('%').parse::<f64>().map_err(|error| format!("{error}: give a number of percent"))?;
+    if value.is_finite() && value >= 0.0 { Ok(value) } else { Err("give 0 or more percent".to_owned()) }
+}
+
+/// Whether every log stays below the error that was asked for, if one was.
+pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
+    let Some(limit) = limit else { return Verdict::Good };
+    if logs.is_empty() {
+        terminal::remark("no log was held out, so no error could be tested");
+        return Verdict::Negative;
+    }
+    let mut verdict = Verdict::Good;
+    for log in logs {
+        match log.model.relative_error_percent {
+            Some(error) if error <= limit => continue,
+            Some(error) => {
+                terminal::remark(&format!("{}: the error of {error:.2} % is above the {limit} % asked for", log.log));
+            }
+            None => {
+                terminal::remark(&format!("{}: the torque is zero throughout, so it has no relative error", log.log));
+            }
+        }
+        verdict = Verdict::Negative;
+    }
+    verdict
+}
+
+/// The message of an error that a study led to. Where it speaks of another file, the study that names that file is named as well.
+pub(crate) fn told_in(study: &Path) -> impl Fn(dynident::Error) -> String {
+    use dynident::Error::{Filter, Missing, NothingLeft, Recording, Robot};
+    move |error| match error {
+        Recording { .. } | Filter { .. } | NothingLeft { .. } | Missing { .. } | Robot(_) => {
+            format!("{}: {error}", study.display())
+        }
+        _ => error.to_string(),
+    }
 }

@@ -1,6 +1,6 @@
 //! `dynident validate DIR/result.json --study STUDY.toml`.
 
-use super::{Context, json, told};
+use super::{Context, json, judged, told, told_in};
 use crate::{Verdict, summary, terminal};
 use dynident::{RunOptions, Study, validate};
 use std::path::PathBuf;
@@ -17,7 +17,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Exit with status 1 if the relative error on any log is larger.
-    #[arg(long, value_name = "PERCENT")]
+    #[arg(long, value_name = "PERCENT", value_parser = super::percentage)]
     max_validation_error: Option<f64>,
 }
 
@@ -25,11 +25,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let study = Study::load(&options.study).map_err(told)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
-    let file = validate(&options.result, &study, &options.study, &run).map_err(told)?;
+    let file = validate(&options.result, &study, &options.study, &run).map_err(told_in(&options.study))?;
     terminal::print(&if context.json { json(&file)? } else { summary::validation(&file.validation, &file.logs) });
-    let worst = file.validation.iter().filter_map(|log| log.model.relative_error_percent).fold(0.0, f64::max);
-    Ok(match options.max_validation_error {
-        Some(limit) if worst > limit => Verdict::Negative,
-        _ => Verdict::Good,
-    })
+    Ok(judged(&file.validation, options.max_validation_error))
 }

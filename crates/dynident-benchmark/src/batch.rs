@@ -1,0 +1,29 @@
+//! Lanes of samples: nanoseconds a sample.
+
+use crate::clock::Report;
+use crate::motion::{Motion, STATES};
+use dynident_dynamics::{BatchWorkspace, PanelLayout, Panels, all_columns, inverse_dynamics_batch, regressor_panels};
+use dynident_model::Model;
+use std::hint::black_box;
+
+/// Times inverse dynamics and the whole regressor (ten columns for every body of every joint) in batches.
+pub(crate) fn time_all(model: &Model, report: &Report<'_>, block: usize) {
+    let blocks = Motion::random(model, STATES / block * block).blocks(block);
+    let samples = blocks.len() * block;
+    let mut workspace = BatchWorkspace::with_level(model, report.level);
+    let mut tau = vec![0.0; model.dof() * block];
+    report.time("rnea_batch", samples, || {
+        for block in &blocks {
+            inverse_dynamics_batch(model, &mut workspace, &block.view(), &mut tau);
+            black_box(&tau);
+        }
+    });
+    let layout = PanelLayout::new(model, all_columns(model, &[]));
+    let mut panels = Panels::default();
+    report.time("regressor_batch", samples, || {
+        for block in &blocks {
+            regressor_panels(model, &mut workspace, &layout, &block.view(), &mut panels);
+            black_box(&panels);
+        }
+    });
+}

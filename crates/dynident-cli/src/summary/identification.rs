@@ -1,0 +1,194 @@
+//! The summary of `identify`.
+
+use super::findings::findings;
+use super::text::{WIDTH, listed, name, percent, shortened, table, with_deviation, wrapped};
+use core::fmt::Write;
+use dynident::{LogSummary, LogValidation, ResultFile};
+use std::path::Path;
+
+/// Base parameters shown with their error bars; the rest stand in the file.
+const SHOWN: usize = 6;
+/// Held-out logs up to which the table shows their root mean squares and priors.
+const WITH_DETAILS: usize = 2;
+/// Held-out logs that have a column.
+const COLUMNS: usize = 5;
+/// Columns that are left for an expression.
+const EXPRESSION: usize = 44;
+
+/// What was found, proved and written.
+pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
+    let mut text = wrapped(&r.name, 2);
+    let _ = writeln!(
+        text,
+        "{} joints, {} base parameters, {} least squares\n",
+        r.robot.dof,
+        r.base_parameters.len(),
+        r.method.estimator
+    );
+    text += &headline(r);
+    text.push('\n');
+    let found = findings(&r.logs);
+    if !found.is_empty() {
+        let _ = writeln!(text, "{found}");
+    }
+    text += &joints(r);
+    text.push('\n');
+    text += &parameters(r);
+    text.push('\n');
+    text += &physics(r);
+    text.push('\n');
+    for log in &r.logs {
+        text += &wrapped(&data(log), 4);
+    }
+    let _ = writeln!(
+        text,
+        "\nwrote {}{} in {:.2} s",
+        out.join("result.json").display(),
+        if urdf { " and identified.urdf" } else { "" },
+        r.timings_s.total
+    );
+    if let Some(reason) = &r.no_urdf {
+        text += &wrapped(&format!("no identified.urdf: {reason}"), 2);
+    }
+    text
+}
+
+/// The figures that count, first.
+fn headline(r: &ResultFile) -> String {
+    let fit = percent(r.training.relative_error_percent);
+    if r.validation.is_empty() {
+        return wrapped(
+            &format!(
+                "No log was held out: the fit's own error of {fit}\u{a0}% says how well the model fits, not how well it predicts. \
+                 Give a log (or a part of one) the role \"validate\"."
+            ),
+            0,
+        );
+    }
+    let mut text = String::new();
+    for (number, log) in r.validation.iter().enumerate() {
+        let prior =
+            prior_of(log, None).map_or(String::new(), |p| format!("; description's own {}\u{a0}%", percent(Some(p))));
+        let error = percent(log.model.relative_error_percent);
+        text += &wrapped(
+            &format!("held-out torque error {error}\u{a0}% on [{}] {} (fit {fit}\u{a0}%{prior})", number + 1, log.log),
+            2,
+        );
+    }
+    text
+}
+
+fn prior_of(log: &LogValidation, joint: Option<usize>) -> Option<f64> {
+    let prior = log.prior.as_ref()?;
+    joint.map_or(prior.relative_error_percent, |j| prior.joints[j].relative_error_percent)
+}
+
+/// Errors joint by joint.
+fn joints(r: &ResultFile) -> String {
+    let logs = &r.validation[..r.validation.len().min(COLUMNS)];
+    let detailed = logs.len() <= WITH_DETAILS;
+    let mut header = vec!["torque error".to_owned(), "fit %".to_owned()];
+    for number in 1..=logs.len() {
+        header.push(format!("[{number}] %"));
+        if detailed {
+            header.extend([format!("[{number}] Nm"), "prior %".to_owned()]);
+        }
+    }
+    let row = |joint: Option<usize>| {
+        let (title, fit) = joint.map_or(("all joints", r.training.relative_error_percent), |j| {
+            let joint = &r.training.joints[j];
+            (&joint.name[..], joint.relative_error_percent)
+        });
+        let mut row = vec![name(title), percent(fit)];
+        for log in logs {
+            let (relative, rms) = joint.map_or((log.model.relative_error_percent, log.model.rmse_nm), |j| {
+                let joint = &log.model.joints[j];
+                (joint.relative_error_percent, joint.rmse_nm)
+            });
+            row.push(percent(relative));
+            if detailed {
+                row.extend([format!("{rms:.3}"), percent(prior_of(log, joint))]);
+            }
+        }
+        row
+    };
+    let rows = (0..r.training.joints.len()).map(|joint| row(Some(joint))).chain([row(None)]).collect();
+    let mut text = table(&header, 1..header.len(), rows);
+    if r.validation.len() > COLUMNS {
+        let _ = writeln!(text, "  {} more held-out logs in result.json", r.validation.len() - COLUMNS);
+    }
+    text
+}
+
+/// The best known base parameters, and how many are hardly known.
+fn parameters(r: &ResultFile) -> String {
+    let mut order: Vec<usize> = (0..r.base_parameters.len()).filter(|&i| r.base_parameters[i].excited).collect();
+    let error = |index: usize| r.base_parameters[index].relative_std_percent.unwrap_or(f64::INFINITY);
+    order.sort_by(|a, b| error(*a).total_cmp(&error(*b)));
+    let counted = |limit: f64| order.iter().filter(|index| error(**index) <= limit).count();
+    let mut text = wrapped(
+        &format!(
+            "error bars: {} of {} base parameters known to 10 %, {} to 30 %. The best:",
+            counted(10.0),
+            r.base_parameters.len(),
+            counted(30.0)
+        ),
+        2,
+    );
+    let rows = order.iter().take(SHOWN).map(|&index| {
+        let p = &r.base_parameters[index];
+        let [value, std] = with_deviation(p.value, p.std);
+        vec![value, std, p.unit.clone(), shortened(&p.expression, EXPRESSION)]
+    });
+    let header = ["value", "+-", "unit", "base parameter"].map(str::to_owned);
+    text += &table(&header, 0..2, rows.collect());
+    let vague: Vec<&str> = order
+        .iter()
+        .rev()
+        .filter(|index| error(**index) > 100.0)
+        .map(|&index| &r.base_parameters[index].symbol[..])
+        .collect();
+    if !vague.is_empty() {
+        text += &wrapped(
+            &format!(
+                "hardly known (error bar above the value): {} of them, worst first {}; other motion would tell more",
+                vague.len(),
+                listed(&vague, SHOWN)
+            ),
+            2,
+        );
+    }
+    if !r.method.not_excited.is_empty() {
+        let names: Vec<&str> = r.method.not_excited.iter().map(String::as_str).collect();
+        let held = format!("not excited by these logs, held at the prior: {}", listed(&names, 2 * SHOWN));
+        text += &wrapped(&held, 2);
+    }
+    text
+}
+
+/// Whether the full set is possible, in two lines.
+fn physics(r: &ResultFile) -> String {
+    let bodies = r.physical.violations.len();
+    wrapped(
+        &if r.physical.consistent {
+            "physics: bodies and friction are physically possible".to_owned()
+        } else {
+            format!(
+                "physics: NOT possible as it stands ({bodies} violations, listed in result.json under `physical`). Torques are predicted as \
+                 well as shown above; masses and inertias of single bodies are not measured values, and a simulator may refuse them."
+            )
+        },
+        2,
+    )
+}
+
+/// How a log was used.
+fn data(log: &LogSummary) -> String {
+    let motion = log.motion_cutoff_hz.map_or(String::new(), |cutoff| format!(", motion below {cutoff:.1}\u{a0}Hz"));
+    format!(
+        "{} ({}): {} rows at {:.1}\u{a0}Hz{motion}, {} filtered",
+        log.log, log.role, log.import.rows, log.import.rate_hz, log.filtered_rows
+    )
+}
+
+const _: () = assert!(EXPRESSION + 34 <= WIDTH, "value, deviation, unit and their gaps take 34 columns");

@@ -1,0 +1,11 @@
+//! Results as a person likes to read them: the important first, at most [`WIDTH`](text::WIDTH) columns.
+
+mod findings;
+mod identification;
+mod inspection;
+mod text;
+mod validation;
+
+pub(crate) use identification::identification;
+pub(crate) use inspection::inspection;
+pub(crate) use validation::validation;

@@ -1,0 +1,126 @@
+//! Words and numbers in a given width.
+
+use comfy_table::{CellAlignment, Table, presets};
+
+/// Columns that a summary fills at most: every terminal has them.
+pub(super) const WIDTH: usize = 80;
+
+/// Longest name of a joint or body in a table.
+const NAME: usize = 24;
+
+/// `words` in lines of at most [`WIDTH`] columns; all lines but the first begin with `indent` blanks. A longer word stays whole, and so
+/// does what a no-break space holds together, which becomes a plain one.
+pub(super) fn wrapped(words: &str, indent: usize) -> String {
+    let (mut text, mut column) = (String::new(), 0);
+    let lead = words.len() - words.trim_start().len();
+    text.push_str(&words[..lead]);
+    column += lead;
+    for (index, word) in words.split([' ', '\n']).filter(|word| !word.is_empty()).enumerate() {
+        let length = word.chars().count();
+        if index > 0 && column + 1 + length > WIDTH {
+            text.push('\n');
+            text.push_str(&" ".repeat(indent));
+            column = indent;
+        } else if index > 0 {
+            text.push(' ');
+            column += 1;
+        }
+        text.push_str(word);
+        column += length;
+    }
+    text.push('\n');
+    text.replace('\u{a0}', " ")
+}
+
+/// A table without lines: names to the left, numbers to the right, and no blanks at the ends of lines.
+pub(super) fn table(header: &[String], numbers: core::ops::Range<usize>, rows: Vec<Vec<String>>) -> String {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING).set_header(header);
+    table.add_rows(rows);
+    for index in 0..header.len() {
+        let Some(column) = table.column_mut(index) else { continue };
+        column.set_padding((0, 2));
+        if numbers.contains(&index) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    let lines: Vec<String> = table.to_string().lines().map(|line| format!("  {}", line.trim_end())).collect();
+    lines.join("\n") + "\n"
+}
+
+/// A name that fits its column: the end is kept, as it tells joints apart.
+pub(super) fn name(name: &str) -> String {
+    let length = name.chars().count();
+    if length <= NAME {
+        return name.to_owned();
+    }
+    format!("..{}", name.chars().skip(length - NAME + 2).collect::<String>())
+}
+
+/// A percentage without its sign.
+pub(super) fn percent(value: Option<f64>) -> String {
+    match value {
+        Some(value) if value >= 1000.0 => format!("{value:.0}"),
+        Some(value) => format!("{value:.2}"),
+        None => "-".to_owned(),
+    }
+}
+
+/// A value and its standard deviation, both to the second digit of the deviation.
+pub(super) fn with_deviation(value: f64, std: f64) -> [String; 2] {
+    if !(std.is_finite() && std > 0.0) {
+        return [format!("{value:.5}"), "-".to_owned()];
+    }
+    let decimals = 1.0 - std.log10().floor();
+    if decimals > 7.0 {
+        return [format!("{value:.3e}"), format!("{std:.1e}")];
+    }
+    let decimals = decimals.max(0.0) as usize;
+    [format!("{value:.decimals$}"), format!("{std:.decimals$}")]
+}
+
+/// A sum that fits `longest` columns: its first terms, and how many there are.
+pub(super) fn shortened(expression: &str, longest: usize) -> String {
+    if expression.len() <= longest {
+        return expression.to_owned();
+    }
+    let terms = expression.matches(" + ").count() + expression.matches(" - ").count() + 1;
+    let tail = format!(" .. ({terms} terms)");
+    let room = longest.saturating_sub(tail.len());
+    let ends = expression.match_indices(" + ").chain(expression.match_indices(" - ")).map(|(at, _)| at);
+    let cut = ends.filter(|&at| at <= room).max().unwrap_or(0);
+    format!("{}{tail}", &expression[..cut])
+}
+
+/// `a, b, c and 4 more`.
+pub(super) fn listed(names: &[&str], most: usize) -> String {
+    let shown = names[..names.len().min(most)].join(", ");
+    if names.len() > most { format!("{shown} and {} more", names.len() - most) } else { shown }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_stay_within_the_width() {
+        let text = wrapped(&format!("  {}", "several words of a sentence ".repeat(12)), 4);
+        assert!(text.lines().count() > 3 && text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
+        assert!(text.starts_with("  several") && text.lines().skip(1).all(|line| line.starts_with("    ")), "{text}");
+    }
+
+    #[test]
+    fn values_have_the_digits_that_are_known() {
+        assert_eq!(with_deviation(3.48444, 0.0078), ["3.4844", "0.0078"]);
+        assert_eq!(with_deviation(1234.5, 120.0), ["1234", "120"]);
+        assert_eq!(with_deviation(1.0, 0.0), ["1.00000", "-"]);
+        assert_eq!(with_deviation(1.5e-9, 2e-10), ["1.500e-9", "2.0e-10"]);
+    }
+
+    #[test]
+    fn long_sums_are_cut_between_terms() {
+        assert_eq!(shortened("Izz1 + m2", 20), "Izz1 + m2");
+        assert_eq!(shortened("Izz1 + 0.5 m2 + 0.5 m3 + 0.5 m4", 30), "Izz1 + 0.5 m2 .. (4 terms)");
+        assert!(shortened(&"abc + ".repeat(40), 44).len() <= 44);
+    }
+}

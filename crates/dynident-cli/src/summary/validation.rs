@@ -1,0 +1,47 @@
+//! The summary of `validate`.
+
+use super::findings::findings;
+use super::text::{name, percent, table, wrapped};
+use dynident::estimation::ValidationReport;
+use dynident::{LogSummary, LogValidation};
+
+/// A model's errors on every log.
+pub(crate) fn validation(logs: &[LogValidation], summaries: &[LogSummary]) -> String {
+    let mut text = String::new();
+    for log in logs {
+        let headline = format!(
+            "{}: torque error {} % (description's own parameters {} %), {} samples",
+            log.log,
+            percent(log.model.relative_error_percent),
+            percent(log.prior.as_ref().and_then(|prior| prior.relative_error_percent)),
+            log.model.samples
+        );
+        text += &wrapped(&headline, 4);
+        let mut rows: Vec<Vec<String>> = (0..log.model.joints.len()).map(|joint| row(log, Some(joint))).collect();
+        rows.push(row(log, None));
+        let header = ["joint", "error %", "rms Nm", "max Nm", "R2", "unfiltered %", "prior %"].map(str::to_owned);
+        text += &table(&header, 1..7, rows);
+        text.push('\n');
+    }
+    text += &findings(summaries);
+    text
+}
+
+fn row(log: &LogValidation, joint: Option<usize>) -> Vec<String> {
+    let relative = |report: &ValidationReport| {
+        joint.map_or(report.relative_error_percent, |j| report.joints[j].relative_error_percent)
+    };
+    let (rms, max, r_squared) = joint.map_or((log.model.rmse_nm, log.model.max_error_nm, log.model.r_squared), |j| {
+        let joint = &log.model.joints[j];
+        (joint.rmse_nm, joint.max_error_nm, joint.r_squared)
+    });
+    vec![
+        joint.map_or("all joints".to_owned(), |j| name(&log.model.joints[j].name)),
+        percent(relative(&log.model)),
+        format!("{rms:.4}"),
+        format!("{max:.4}"),
+        r_squared.map_or("-".to_owned(), |r| format!("{r:.4}")),
+        percent(relative(&log.raw)),
+        percent(log.prior.as_ref().and_then(relative)),
+    ]
+}

@@ -1,0 +1,147 @@
+//! What each algorithm keeps for each body while it runs: plain numbers, no rules. The rules are in the algorithms' own files.
+
+use dynident_lanes::{Lane, Scalar};
+use dynident_model::{Mat3, Model, Transform, Vec3};
+
+/// What one body needs while an algorithm over scalars `T` runs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BodyState<T> {
+    /// `parent_from_body` at the current position.
+    pub(crate) parent_from_body: Transform<T>,
+    /// Angular velocity, body frame.
+    pub(crate) omega: Vec3<T>,
+    /// Angular acceleration, body frame.
+    pub(crate) alpha: Vec3<T>,
+    /// Acceleration of the body frame's origin minus gravity, body frame.
+    pub(crate) acceleration: Vec3<T>,
+    /// Force on the body (with everything that hangs on it), body frame.
+    pub(crate) force: Vec3<T>,
+    /// Moment on the body about its frame's origin, body frame.
+    pub(crate) moment: Vec3<T>,
+}
+
+impl<T: Scalar> BodyState<T> {
+    pub(crate) const REST: Self = Self {
+        parent_from_body: Transform::IDENTITY,
+        omega: Vec3::ZERO,
+        alpha: Vec3::ZERO,
+        acceleration: Vec3::ZERO,
+        force: Vec3::ZERO,
+        moment: Vec3::ZERO,
+    };
+}
+
+/// Articulated-body inertia of a subtree about its root's frame: `moment = rotation α + coupling a`, `force = couplingᵀ α + mass a`; and what
+/// its joint needs of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Articulated<T> {
+    /// Symmetric; upper triangle by rows.
+    pub(crate) rotation: [T; 6],
+    pub(crate) coupling: Mat3<T>,
+    /// Symmetric; upper triangle by rows.
+    pub(crate) mass: [T; 6],
+    /// Column of the articulated inertia along the joint, in the parent's frame: (moment, force). Not set at the base.
+    pub(crate) column: (Vec3<T>, Vec3<T>),
+    pub(crate) inverse_inertia: T,
+    pub(crate) rest_torque: T,
+}
+
+impl<T: Scalar> Articulated<T> {
+    pub(crate) const ZERO: Self = Self {
+        rotation: [T::ZERO; 6],
+        coupling: Mat3::ZERO,
+        mass: [T::ZERO; 6],
+        column: (Vec3::ZERO, Vec3::ZERO),
+        inverse_inertia: T::ZERO,
+        rest_torque: T::ZERO,
+    };
+}
+
+/// Variation of a body's motion and wrench by one joint variable.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BodyDerivative<T> {
+    pub(crate) omega: Vec3<T>,
+    pub(crate) alpha: Vec3<T>,
+    pub(crate) acceleration: Vec3<T>,
+    pub(crate) force: Vec3<T>,
+    pub(crate) moment: Vec3<T>,
+}
+
+impl<T: Scalar> BodyDerivative<T> {
+    pub(crate) const ZERO: Self =
+        Self { omega: Vec3::ZERO, alpha: Vec3::ZERO, acceleration: Vec3::ZERO, force: Vec3::ZERO, moment: Vec3::ZERO };
+}
+
+/// The axes of all joints on the way to each body, as twists at the body's frame, several to a bundle.
+#[derive(Debug)]
+pub(crate) struct AxisScratch<T: Lane> {
+    /// Joints from the base to each body, body after body.
+    pub(crate) path: Vec<u32>,
+    /// Where each body's path starts in `path`; one more than there are bodies.
+    pub(crate) path_start: Vec<usize>,
+    /// Where each body's bundles start.
+    pub(crate) bundle_start: Vec<usize>,
+    pub(crate) angular: Vec<Vec3<T::Bundle>>,
+    pub(crate) linear: Vec<Vec3<T::Bundle>>,
+}
+
+impl<T: Lane> AxisScratch<T> {
+    pub(crate) fn new(model: &Model) -> Self {
+        let (mut path, mut path_start, mut bundle_start) = (Vec::new(), vec![0], vec![0]);
+        for body in 0..model.dof() {
+            let joints = model.path(body);
+            bundle_start.push(bundle_start[body] + joints.len().div_ceil(T::PER_BUNDLE));
+            path.extend(joints.iter().map(|&joint| joint as u32));
+            path_start.push(path.len());
+        }
+        let bundles = bundle_start[model.dof()];
+        Self { path, path_start, bundle_start, angular: vec![Vec3::ZERO; bundles], linear: vec![Vec3::ZERO; bundles] }
+    }
+}
+
+/// Scratch of the reverse sweep.
+#[derive(Debug)]
+pub(crate) struct AdjointScratch<T> {
+    pub(crate) path: Vec<u32>,
+    pub(crate) path_start: Vec<usize>,
+    /// Axes of the joints on the way to each body, as twists at the body's frame: angular, linear.
+    pub(crate) axes: Vec<(Vec3<T>, Vec3<T>)>,
+    /// The cost's derivatives by them.
+    pub(crate) by_axes: Vec<(Vec3<T>, Vec3<T>)>,
+    pub(crate) by_motion: Vec<BodyCotangent<T>>,
+    pub(crate) joints: Vec<JointCotangent<T>>,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BodyCotangent<T> {
+    pub(crate) omega: Vec3<T>,
+    pub(crate) alpha: Vec3<T>,
+    pub(crate) acceleration: Vec3<T>,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct JointCotangent<T> {
+    pub(crate) q: T,
+    pub(crate) dq: T,
+    pub(crate) ddq: T,
+}
+
+impl<T: Scalar> AdjointScratch<T> {
+    pub(crate) fn new(model: &Model) -> Self {
+        let (mut path, mut path_start) = (Vec::new(), vec![0]);
+        for body in 0..model.dof() {
+            path.extend(model.path(body).iter().map(|&joint| joint as u32));
+            path_start.push(path.len());
+        }
+        let (pairs, dof) = (path.len(), model.dof());
+        let still = BodyCotangent { omega: Vec3::ZERO, alpha: Vec3::ZERO, acceleration: Vec3::ZERO };
+        Self {
+            path,
+            path_start,
+            axes: vec![(Vec3::ZERO, Vec3::ZERO); pairs],
+            by_axes: vec![(Vec3::ZERO, Vec3::ZERO); pairs],
+            by_motion: vec![still; dof],
+            joints: vec![JointCotangent { q: T::ZERO, dq: T::ZERO, ddq: T::ZERO }; dof],
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! From an estimate to the sections of `result.json`.
+
+use crate::job::joint_names;
+use crate::machine::Machine;
+use crate::result::{
+    BaseParameterResult, BodyResult, JointResult, LawResult, MethodSummary, PhysicalVerdict, RobotSummary,
+    TrainingJoint, TrainingResult,
+};
+use crate::study::{EstimatorMethod, Study};
+use dynident_estimation::{Estimate, EstimateStatus, LinearProblem};
+use dynident_model::laws::Law;
+use dynident_model::{INERTIAL_NAMES, InertialParameters};
+use dynident_recording::MotionSettings;
+
+pub(crate) fn robot_summary(machine: &Machine) -> RobotSummary {
+    RobotSummary {
+        name: machine.model.name().to_owned(),
+        file: machine.robot.path.display().to_string(),
+        dof: machine.model.dof(),
+        joints: joint_names(machine),
+        gravity_m_s2: machine.model.gravity().0,
+        parameter_order: INERTIAL_NAMES,
+    }
+}
+
+pub(crate) fn method_summary(
+    study: &Study,
+    machine: &Machine,
+    motion: &MotionSettings,
+    estimate: &Estimate,
+) -> MethodSummary {
+    let (weakest, strongest) = machine.base.gap();
+    MethodSummary {
+        estimator: match study.estimator.method {
+            EstimatorMethod::Ordinary => "ordinary",
+            EstimatorMethod::Weighted => "weighted",
+        }
+        .to_owned(),
+        status: match estimate.status {
+            EstimateStatus::Complete => "complete",
+            EstimateStatus::NotAllExcited => "not-all-excited",
+            EstimateStatus::IterationLimit => "iteration-limit",
+        }
+        .to_owned(),
+        iterations: estimate.iterations,
+        covariance: if estimate.clusters > 0 {
+            "time segments: accounts for residuals correlated in time".to_owned()
+        } else {
+            "white residuals".to_owned()
+        },
+        clusters: estimate.clusters,
+        motion: motion.clone(),
+        condition_number: estimate.condition_number_raw,
+        condition_number_scaled: estimate.condition_number_scaled,
+        base_columns: "from the machine's structure: columns from base to tip, bodies then laws; a column that depends on earlier ones is regrouped into them"
+            .to_owned(),
+        base_gap: [weakest, strongest],
+        not_excited: estimate.rank.fixed.iter().map(|fixed| fixed.name.clone()).collect(),
+    }
+}
+
+pub(crate) fn base_parameters(machine: &Machine, estimate: &Estimate) -> Vec<BaseParameterResult> {
+    let expressions = machine.base.expressions();
+    let columns = machine.layout.columns();
+    (0..columns.len())
+        .map(|index| BaseParameterResult {
+            symbol: columns[index].symbol(),
+            expression: expressions[index].clone(),
+            unit: columns[index].unit().to_owned(),
+            value: estimate.values[index],
+            std: estimate.std[index],
+            std_white: estimate.covariance_white[(index, index)].max(0.0).sqrt(),
+            relative_std_percent: estimate.relative_std_percent[index],
+            prior: machine.prior.as_ref().map(|prior| prior[index]),
+            excited: !estimate.rank.fixed.iter().any(|fixed| fixed.column == index),
+        })
+        .collect()
+}
+
+pub(crate) fn bodies(machine: &Machine, inertials: &[InertialParameters]) -> Vec<BodyResult> {
+    machine
+        .model
+        .bodies()
+        .iter()
+        .zip(inertials)
+        .map(|(body, inertial)| BodyResult {
+            name: body.name().to_owned(),
+            links: body.links.iter().map(|link| link.name.clone()).collect(),
+            mass_kg: inertial.mass_kg(),
+            com_m: inertial.com_m().map(|com| com.0),
+            inertia_at_origin_kgm2: core::array::from_fn(|k| inertial.0[4 + k]),
+            parameters: inertial.0,
+            prior: body.prior().map(|prior| prior.0),
+            pseudo_inertia_min_eigenvalue: inertial.pseudo_inertia().symmetric_eigenvalues().min(),
+        })
+        .collect()
+}
+
+pub(crate) fn law_results(
+    machine: &Machine,
+    estimate: &Estimate,
+    parameters: &[f64],
+    wanted: impl Fn(&Law) -> bool,
+) -> Vec<LawResult> {
+    let first_law = 10 * machine.model.dof();
+    let expressions = machine.base.expressions();
+    let of_law = |(x, law): (usize, &Law)| {
+        let column = first_law + x;
+        let place = machine.base.independent().iter().position(|&index| index == column);
+        // A law that other parameters were regrouped into has no value of its own either.
+        let alone = place.filter(|&place| expressions[place] == law.symbol());
+        let home = place.or_else(|| {
+            let d = machine.base.dependent().iter().position(|&index| index == column)?;
+            let column = machine.base.regrouping().column(d);
+            (0..column.len()).find(|&b| column[b].abs() > 1e-9)
+        });
+        LawResult {
+            symbol: law.symbol(),
+            unit: law.unit().to_owned(),
+            value: alone.map_or(parameters[column], |place| estimate.values[place]),
+            std: alone.map(|place| estimate.std[place]),
+            base_parameter: home.map(|place| expressions[place].clone()),
+        }
+    };
+    machine.laws.iter().enumerate().filter(|(_, law)| wanted(law)).map(of_law).collect()
+}
+
+pub(crate) fn joint_results(machine: &Machine, estimate: &Estimate, parameters: &[f64]) -> Vec<JointResult> {
+    machine
+        .model
+        .joints()
+        .iter()
+        .enumerate()
+        .map(|(index, joint)| JointResult {
+            name: joint.name.clone(),
+            laws: law_results(machine, estimate, parameters, |law| {
+                !matches!(law, Law::Coupling(_)) && law.joints() == [index]
+            }),
+            residual_std_nm: estimate.joint_sigma[index],
+            residual_correlation: estimate.effective_lag1.get(index).copied().filter(|rho| rho.is_finite()),
+        })
+        .collect()
+}
+
+pub(crate) fn training_result(
+    study: &Study,
+    machine: &Machine,
+    problem: &LinearProblem,
+    training: &[usize],
+    estimate: &Estimate,
+) -> Result<TrainingResult, dynident_estimation::EstimationError> {
+    let names = joint_names(machine);
+    let mut sums = vec![(0_usize, 0.0, 0.0); names.len()];
+    for equation in problem.equations() {
+        let theta: Vec<f64> = equation.columns.iter().map(|&column| estimate.values[column]).collect();
+        let factor = equation.factor.total();
+        let sum = &mut sums[equation.joint];
+        sum.0 += factor.rows();
+        sum.1 += factor.residual_sum_of_squares(&theta)?;
+        sum.2 += factor.torque_norm().powi(2);
+    }
+    let percent = |error: f64, torque: f64| (torque > 0.0).then(|| 100.0 * (error / torque).sqrt());
+    let (error, torque) = sums.iter().fold((0.0, 0.0), |(e, t), sum| (e + sum.1, t + sum.2));
+    Ok(TrainingResult {
+        logs: training.iter().map(|&index| study.log_name(index)).collect(),
+        samples: sums.iter().map(|sum| sum.0).max().unwrap_or(0),
+        relative_error_percent: percent(error, torque),
+        joints: names
+            .into_iter()
+            .zip(sums)
+            .map(|(name, (rows, error, torque))| TrainingJoint {
+                name,
+                rmse_nm: (error / rows.max(1) as f64).sqrt(),
+                relative_error_percent: percent(error, torque),
+            })
+            .collect(),
+    })
+}
+
+pub(crate) fn verdict(machine: &Machine, inertials: &[InertialParameters], parameters: &[f64]) -> PhysicalVerdict {
+    let mut violations = Vec::new();
+    for (body, inertial) in machine.model.bodies().iter().zip(inertials) {
+        let least = inertial.pseudo_inertia().symmetric_eigenvalues().min();
+        if inertial.mass_kg() <= 0.0 {
+            violations.push(format!("{}: mass {:.4} kg", body.name(), inertial.mass_kg()));
+        } else if least <= 0.0 {
+            violations
+                .push(format!("{}: pseudo-inertia not positive definite (least eigenvalue {least:.2e})", body.name()));
+        }
+    }
+    for (law, value) in machine.laws.iter().zip(&parameters[10 * machine.model.dof()..]) {
+        if *value < 0.0 && matches!(law, Law::Viscous(_) | Law::Coulomb(_) | Law::DriveInertia(_)) {
+            violations.push(format!("{} = {value:.4} {}", law.symbol(), law.unit()));
+        }
+    }
+    PhysicalVerdict {
+        consistent: violations.is_empty(),
+        violations,
+        note: "of the full set nearest to the prior; plain least squares does not enforce it, and another set with the same torques may pass",
+    }
+}

@@ -1,0 +1,104 @@
+//! The studies in `examples/` on the public recordings, where these are at hand.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod common;
+
+use common::{recordings, repository};
+use dynident::recording::Level;
+use dynident::{Identification, RunOptions, Silent, Study, identify};
+use std::path::Path;
+
+fn run(study: &Study, path: &Path, data: &Path) -> Identification {
+    let options = RunOptions { data: Some(data.to_owned()), threads: 2, progress: &Silent };
+    identify(study, path, &options).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn example(name: &str) -> Option<Identification> {
+    let data = recordings()?;
+    let path = repository("examples").join(name);
+    Some(run(&Study::load(&path).unwrap(), &path, &data))
+}
+
+/// The held-out error is no worse than that of plain least squares on the same split.
+fn held_out(name: &str, limit_percent: f64) -> Option<Identification> {
+    let found = example(name)?;
+    let error = found.result.validation[0].model.relative_error_percent.unwrap();
+    assert!(error <= limit_percent, "{name}: {error:.3} % instead of at most {limit_percent} %");
+    Some(found)
+}
+
+#[test]
+fn lwr4plus_fitted_to_two_runs() {
+    held_out("lwr4plus_23_to_1.toml", 2.58);
+}
+
+#[test]
+fn lwr4plus_fitted_to_one_run() {
+    held_out("lwr4plus_1_to_2.toml", 2.12);
+}
+
+#[test]
+fn ur10_has_54_base_parameters() {
+    let Some(found) = held_out("ur10.toml", 7.25) else { return };
+    assert_eq!(found.result.base_parameters.len(), 54);
+}
+
+#[test]
+fn tx40_has_61_base_parameters() {
+    let Some(found) = held_out("tx40.toml", 13.4) else { return };
+    assert_eq!(found.result.base_parameters.len(), 61);
+}
+
+#[test]
+fn panda_has_64_base_parameters() {
+    let Some(found) = held_out("panda.toml", 2.45) else { return };
+    assert_eq!(found.result.base_parameters.len(), 64);
+    let urdf = found.urdf.unwrap();
+    assert!(urdf.contains("holds with the joints locked behind which stand: panda_leftfinger, panda_rightfinger"));
+}
+
+#[test]
+fn the_lbr_med_torque_is_reversed() {
+    let Some(data) = recordings() else { return };
+    let path = repository("examples/lbr_med7.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let as_logged = text.replace(", sign = -1.0", "");
+    assert_ne!(text, as_logged);
+    for (text, reversed) in [(as_logged, true), (text, false)] {
+        let found = run(&Study::parse(&text, &path).unwrap(), &path, &data);
+        for log in &found.result.logs {
+            let seen =
+                log.model_findings.iter().any(|f| f.level == Level::Problem && f.message.contains("opposite sign"));
+            assert_eq!(seen, reversed, "{:?}", log.model_findings);
+        }
+    }
+}
+
+#[test]
+fn tiago_reports_its_dead_channels_and_its_jitter() {
+    let Some(found) = example("tiago.toml") else { return };
+    let import = &found.result.logs[0].import;
+    let dead: Vec<&str> =
+        import.findings.iter().filter(|f| f.message.contains("dead")).map(|f| &f.channel[..]).collect();
+    assert_eq!(dead, ["torque arm_5_joint", "torque arm_6_joint", "torque arm_7_joint"]);
+    // 7.7 to 12.3 ms by the publishers' own account of the whole log.
+    assert!(import.steps.min_s > 0.0076 && import.steps.min_s < 0.0095, "{:?}", import.steps);
+    assert!(import.steps.max_s > 0.0105 && import.steps.max_s < 0.0124, "{:?}", import.steps);
+    assert!((import.rate_hz - 100.0).abs() < 0.5);
+    assert_eq!(found.result.robot.joints.len(), 8);
+}
+
+#[test]
+fn the_double_pendulum_has_a_rotor_between_its_joints() {
+    let Some(found) = example("dfki_pendulum.toml") else { return };
+    let symbol = "Ia_rotor";
+    assert!(found.result.couplings.iter().any(|law| law.symbol == symbol));
+    assert!(found.result.base_parameters.iter().any(|p| p.expression.contains(symbol)));
+    // Steps of up to 8 ms at 500 Hz.
+    let longest = found.result.logs.iter().map(|log| log.import.steps.max_s).fold(0.0, f64::max);
+    assert!((0.006..0.009).contains(&longest), "{longest}");
+    // Published: m2 r2 = 0.56394 kg * 0.32127 m = 0.1812 kg m (axis y, hanging along -z). Least squares is biased towards zero here: 7 % at a cut-off of 6 Hz by
+    // the data set's own notes, 39 % at 12 Hz. Within 10 % the low cut-off does what it is there for.
+    let gravity = found.result.base_parameters.iter().find(|p| p.expression == "mz2").unwrap();
+    assert!((-gravity.value / 0.1812 - 1.0).abs() < 0.1, "{}", gravity.value);
+}
