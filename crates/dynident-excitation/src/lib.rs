@@ -2,8 +2,10 @@
 
 #![forbid(unsafe_code)]
 
+pub mod check;
 pub mod families;
 mod family;
+pub mod limits;
 mod motion;
 
 pub use family::Family;
