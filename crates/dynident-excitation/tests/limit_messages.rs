@@ -187,7 +187,7 @@ fn a_stretch_leaves_gravity() {
     };
     assert!(worst(factor) <= 1.0 + 2e-6, "{}", worst(factor));
     assert!(worst(factor * 0.999) > 1.0 + 1e-6);
-    // Held out level, gravity alone (15 · 9.8 / 10 · ... = 19.6 Nm) breaks 10 Nm at any speed.
+    // Held out level, gravity alone (1 kg at 0.5 m and 1 kg at 1.5 m: 19.6 Nm) breaks 10 Nm at any speed.
     let (model, times, motion) = swing(0.2, 8.0, 0.0);
     let limits = first_joint(&JointLimit { torque: Some(10.0), position: Some([-0.1, 0.1]), ..JointLimit::default() });
     let diagnosis = diagnose(&LimitSet::new(&limits, &model).unwrap(), &times, &motion);

@@ -19,7 +19,7 @@ pub struct SegmentDistance {
 ///
 /// Squared distance is convex in the two fractions, so its minimum over the unit square is the stationary point, where that lies inside, or on one of the four edges, each
 /// of which is the distance of an end point from the other segment (compare Ericson, *Real-Time Collision Detection* (2005), section 5.1.9). All five are
-/// looked at, so that no case depends on a parallelism threshold; equal candidates are averaged, which puts the points of parallel segments in the middle of their overlap.
+/// looked at, so that no case depends on a parallelism threshold; of equal candidates the middle is taken, for parallel segments the middle of their overlap.
 /// By the envelope theorem the distance changes with the motion of the two nearest points along [`direction`](SegmentDistance::direction) only.
 pub fn segment_distance(first: [Vec3; 2], second: [Vec3; 2]) -> SegmentDistance {
     let (u, v, w) = (first[1] - first[0], second[1] - second[0], first[0] - second[0]);
@@ -29,31 +29,33 @@ pub fn segment_distance(first: [Vec3; 2], second: [Vec3; 2]) -> SegmentDistance 
         |numerator: f64, length2: f64| if length2 > 0.0 { (numerator / length2).clamp(0.0, 1.0) } else { 0.0 };
     let on_second = |s: f64| fraction(uv * s + vw, vv);
     let on_first = |t: f64| fraction(uv * t - uw, uu);
-    let mut candidates =
-        [(0.0, on_second(0.0)), (1.0, on_second(1.0)), (on_first(0.0), 0.0), (on_first(1.0), 1.0), (0.0, 0.0)];
-    candidates[4] = candidates[0];
     let determinant = uu * vv - uv * uv;
-    if determinant > 0.0 {
-        let s = ((uv * vw - vv * uw) / determinant).clamp(0.0, 1.0);
-        candidates[4] = (on_first(on_second(s)), on_second(s));
-    }
+    // Parallel segments have no stationary point of their own: an end stands in for it.
+    let s = if determinant > 0.0 { ((uv * vw - vv * uw) / determinant).clamp(0.0, 1.0) } else { 0.0 };
+    let candidates = [
+        (on_first(on_second(s)), on_second(s)),
+        (0.0, on_second(0.0)),
+        (1.0, on_second(1.0)),
+        (on_first(0.0), 0.0),
+        (on_first(1.0), 1.0),
+    ];
     let apart = |(s, t): (f64, f64)| u.scale(s) - v.scale(t) + w;
     let squares = candidates.map(|candidate| {
         let apart = apart(candidate);
         apart.dot(apart)
     });
     let least = squares.iter().copied().fold(f64::INFINITY, f64::min);
-    // Rounding of five roads to the same point; the convexity of the square bounds what averaging them can add by the same.
+    // Rounding of five roads to the same point; the convexity of the square bounds what averaging adds by the same.
     let tied = least * (1.0 + 1e-12);
-    let (mut along_first, mut along_second, mut count) = (0.0, 0.0, 0.0);
-    for (&(s, t), &square) in candidates.iter().zip(&squares) {
+    // The minimisers of parallel segments are a line in the square, from its lowest to its highest fraction.
+    let (mut low, mut high) = (None, None);
+    for (&candidate, &square) in candidates.iter().zip(&squares) {
         if square <= tied {
-            along_first += s;
-            along_second += t;
-            count += 1.0;
+            low = low.filter(|low: &(f64, f64)| low.0 <= candidate.0).or(Some(candidate));
+            high = high.filter(|high: &(f64, f64)| high.0 >= candidate.0).or(Some(candidate));
         }
     }
-    let at = if count > 0.0 { (along_first / count, along_second / count) } else { candidates[0] };
+    let at = low.zip(high).map_or(candidates[0], |(low, high)| (0.5 * (low.0 + high.0), 0.5 * (low.1 + high.1)));
     let apart = apart(at);
     let distance_m = apart.norm();
     // Below this the difference of the points is rounding and has no direction.
