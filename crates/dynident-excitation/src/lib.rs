@@ -7,6 +7,10 @@ pub mod criteria;
 pub mod families;
 mod family;
 mod information;
+pub mod check;
+pub mod families;
+mod family;
+pub mod limits;
 mod motion;
 
 pub use family::Family;

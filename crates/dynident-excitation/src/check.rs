@@ -1,0 +1,268 @@
+//! The last word on limits: every limit looked at again, sample by sample, by code that shares nothing with the optimiser's.
+//!
+//! Plain loops over the description: names are looked up here, torques come from single-sample inverse dynamics, distances of capsules from a search that knows no
+//! closed form. Only the choice of fitted capsules and their pairs, which is part of what the limit *is*, comes from
+//! [`SelfCollision::resolve`](crate::limits::SelfCollision::resolve).
+
+use crate::limits::{JointLimit, LimitError, LimitKind, Limits, LinkPoint};
+use crate::motion::Motion;
+use dynident_dynamics::{Workspace, body_placements, inverse_dynamics};
+use dynident_model::{Body, Model, Transform, Vec3};
+use serde::Serialize;
+
+/// A ratio above 1 by more than this is a violation.
+pub const VIOLATION: f64 = 1e-6;
+
+/// The rate that the project checks at.
+pub const CHECK_RATE_HZ: f64 = 10_000.0;
+
+/// Most samples that a check looks at: a bound on its time (some minutes), not on memory.
+const MOST_SAMPLES: f64 = 1e8;
+
+/// Samples asked from the motion at once.
+const BLOCK: usize = 1000;
+
+/// How near a motion comes to one limit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LimitReport {
+    /// What is limited.
+    pub kind: LimitKind,
+    /// The joint; for places the point, for self-collision the pair of links.
+    pub joint: String,
+    /// 1 on the limit, above it in violation: `|x - middle| / half range`, `|x| / limit`; for distances `2 - distance / least`, for the floor 1 plus the metres below it. Infinite if the motion is not finite.
+    pub worst_ratio: f64,
+    /// When the ratio is worst, s.
+    pub at_s: f64,
+    /// True if the limit is broken by more than [`VIOLATION`].
+    pub violated: bool,
+}
+
+/// What is checked at each sample.
+enum Probe {
+    Band { array: usize, joint: usize, lower: f64, upper: f64 },
+    Torque { joint: usize, limit: f64 },
+    Power { joint: usize, limit: f64 },
+    Axis { point: Point, axis: usize, lower: f64, upper: f64 },
+    Floor { point: Point, height_m: f64 },
+    Column { point: Point, x: f64, y: f64, radius_m: f64 },
+    Pair { first: Rod, second: Rod, least_m: f64 },
+}
+
+struct Point {
+    body: Option<usize>,
+    at: Vec3,
+    radius_m: f64,
+}
+
+struct Rod {
+    body: Option<usize>,
+    ends: [Vec3; 2],
+}
+
+/// Checks all limits from 0 to `duration_s` at `rate_hz` ([`CHECK_RATE_HZ`]), the end included. `motion` gives the exact motion at a list of times.
+///
+/// # Errors
+/// As [`Limits::validate`]; a duration or rate that is not positive and finite, or more than 10⁸ samples.
+pub fn check_limits(
+    limits: &Limits,
+    model: &Model,
+    duration_s: f64,
+    rate_hz: f64,
+    mut motion: impl FnMut(&[f64], &mut Motion),
+) -> Result<Vec<LimitReport>, LimitError> {
+    limits.validate(model)?;
+    for (what, value) in [("duration", duration_s), ("rate", rate_hz)] {
+        if !value.is_finite() || value <= 0.0 {
+            return Err(LimitError::NotPositive { what: format!("{what} of the check"), value });
+        }
+    }
+    let steps = (duration_s * rate_hz).ceil();
+    if steps >= MOST_SAMPLES {
+        let what = "number of samples of the check".to_owned();
+        return Err(LimitError::OutOfRange { what, value: steps, at_least: 1.0, below: MOST_SAMPLES });
+    }
+    let steps = steps as usize;
+    let mut probes = probes(limits, model)?;
+    let (mut workspace, mut kinematics) = (Workspace::new(model), Workspace::new(model));
+    let (mut block, mut times) = (Motion::default(), Vec::with_capacity(BLOCK));
+    let dof = model.dof();
+    let mut state = vec![vec![0.0; dof]; 4];
+    let mut start = 0;
+    while start <= steps {
+        times.clear();
+        times.extend((start..(start + BLOCK).min(steps + 1)).map(|step| (step as f64 / rate_hz).min(duration_s)));
+        motion(&times, &mut block);
+        for (sample, &at_s) in times.iter().enumerate() {
+            for (state, from) in state.iter_mut().zip([&block.q, &block.dq, &block.ddq, &block.dddq]) {
+                for (joint, to) in state.iter_mut().enumerate() {
+                    *to = from[joint * times.len() + sample];
+                }
+            }
+            let tau = inverse_dynamics(model, &mut workspace, &state[0], &state[1], &state[2]);
+            let placements = body_placements(model, &mut kinematics, &state[0]);
+            for (probe, report) in &mut probes {
+                let ratio = probe.ratio(&state, tau, placements, report.worst_ratio);
+                let ratio = if ratio.is_nan() { f64::INFINITY } else { ratio };
+                if ratio > report.worst_ratio {
+                    (report.worst_ratio, report.at_s) = (ratio, at_s);
+                }
+            }
+        }
+        start += BLOCK;
+    }
+    let finish = |(_, mut report): (Probe, LimitReport)| {
+        report.violated = report.worst_ratio > 1.0 + VIOLATION;
+        report
+    };
+    Ok(probes.into_iter().map(finish).collect())
+}
+
+fn probes(limits: &Limits, model: &Model) -> Result<Vec<(Probe, LimitReport)>, LimitError> {
+    let mut probes = Vec::new();
+    let mut add = |kind: LimitKind, joint: String, probe: Probe| {
+        let report = LimitReport { kind, joint, worst_ratio: f64::NEG_INFINITY, at_s: 0.0, violated: false };
+        probes.push((probe, report));
+    };
+    for limit in &limits.joints {
+        let Some(joint) = model.joints().iter().position(|joint| joint.name == limit.joint) else { continue };
+        let JointLimit { position, speed, acceleration, jerk, torque, torque_margin, power_w, .. } = limit;
+        let name = || limit.joint.clone();
+        if let Some([lower, upper]) = *position {
+            add(LimitKind::Position, name(), Probe::Band { array: 0, joint, lower, upper });
+        }
+        let rates = [(LimitKind::Speed, speed), (LimitKind::Acceleration, acceleration), (LimitKind::Jerk, jerk)];
+        for (array, (kind, limit)) in rates.into_iter().enumerate() {
+            if let Some(limit) = *limit {
+                add(kind, name(), Probe::Band { array: array + 1, joint, lower: -limit, upper: limit });
+            }
+        }
+        if let Some(torque) = torque {
+            add(LimitKind::Torque, name(), Probe::Torque { joint, limit: torque - torque * torque_margin });
+        }
+        if let Some(limit) = *power_w {
+            add(LimitKind::Power, name(), Probe::Power { joint, limit });
+        }
+    }
+    for limit in &limits.boxes {
+        for (name, point) in points(model, &limit.points) {
+            for (axis, (letter, ends)) in [("x", limit.x_m), ("y", limit.y_m), ("z", limit.z_m)].into_iter().enumerate()
+            {
+                if let Some([lower, upper]) = ends {
+                    let point = Point { ..point };
+                    add(LimitKind::Box, format!("{name}, {letter}"), Probe::Axis { point, axis, lower, upper });
+                }
+            }
+        }
+    }
+    if let Some(floor) = &limits.floor {
+        for (name, point) in points(model, &floor.points) {
+            add(LimitKind::Floor, name, Probe::Floor { point, height_m: floor.height_m });
+        }
+    }
+    if let Some(column) = &limits.column {
+        let [x, y] = column.axis_xy_m;
+        for (name, point) in points(model, &column.points) {
+            add(LimitKind::Column, name, Probe::Column { point, x, y, radius_m: column.radius_m });
+        }
+    }
+    if let Some(limit) = &limits.self_collision {
+        let resolved = limit.resolve(model)?;
+        for [first, second] in resolved.pairs {
+            let (a, b) = (&resolved.capsules[first], &resolved.capsules[second]);
+            let [first, second] = [a, b].map(|capsule| Rod { body: capsule.body, ends: capsule.ends });
+            let least_m = limit.clearance_m + a.radius_m + b.radius_m;
+            let name = format!("{} / {}", a.link, b.link);
+            add(LimitKind::SelfCollision, name, Probe::Pair { first, second, least_m });
+        }
+    }
+    Ok(probes)
+}
+
+/// Points and their names; of an empty list the origins of the moving bodies.
+fn points(model: &Model, points: &[LinkPoint]) -> Vec<(String, Point)> {
+    let mut found = Vec::new();
+    let bodies = |body: usize| -> (Option<usize>, &Body) {
+        body.checked_sub(1).map_or((None, model.base()), |index| (Some(index), &model.bodies()[index]))
+    };
+    for body in 0..=model.dof() {
+        let (index, body) = bodies(body);
+        if points.is_empty() && index.is_some() {
+            let name = body.links[0].name.clone();
+            found.push((name, Point { body: index, at: Vec3([0.0; 3]), radius_m: 0.0 }));
+        }
+        for point in points {
+            for link in body.links.iter().filter(|link| link.name == point.link) {
+                let at = link.placement.rotation.mul_vec(Vec3(point.at_m)) + link.placement.translation;
+                let [x, y, z] = point.at_m;
+                let name = if point.at_m == [0.0; 3] {
+                    link.name.clone()
+                } else {
+                    format!("{} at ({x}, {y}, {z})", link.name)
+                };
+                found.push((name, Point { body: index, at, radius_m: point.radius_m }));
+            }
+        }
+    }
+    found
+}
+
+/// Where a point of a body stands in the base frame.
+fn place(placements: &[Transform], body: Option<usize>, at: Vec3) -> Vec3 {
+    body.map_or(at, |body| placements[body].rotation.mul_vec(at) + placements[body].translation)
+}
+
+/// How far `x` goes from the middle of its range, in halves of the range.
+fn band(x: f64, lower: f64, upper: f64) -> f64 {
+    let half = upper / 2.0 - lower / 2.0;
+    ((x - lower) / half - 1.0).max((upper - x) / half - 1.0)
+}
+
+impl Probe {
+    /// The ratio at one sample. A pair that cannot reach the `worst` ratio so far gives that one.
+    fn ratio(&self, state: &[Vec<f64>], tau: &[f64], placements: &[Transform], worst: f64) -> f64 {
+        let at = |point: &Point| place(placements, point.body, point.at);
+        match self {
+            Self::Band { array, joint, lower, upper } => band(state[*array][*joint], *lower, *upper),
+            Self::Torque { joint, limit } => tau[*joint].abs() / limit,
+            Self::Power { joint, limit } => (tau[*joint] * state[1][*joint]).abs() / limit,
+            Self::Axis { point, axis, lower, upper } => {
+                band(at(point)[*axis], lower + point.radius_m, upper - point.radius_m)
+            }
+            Self::Floor { point, height_m } => 1.0 + (height_m - (at(point)[2] - point.radius_m)),
+            Self::Column { point, x, y, radius_m } => {
+                let at = at(point);
+                let distance = ((at[0] - x) * (at[0] - x) + (at[1] - y) * (at[1] - y)).sqrt();
+                2.0 - distance / (radius_m + point.radius_m)
+            }
+            Self::Pair { first, second, least_m } => {
+                let a = first.ends.map(|end| place(placements, first.body, end));
+                let b = second.ends.map(|end| place(placements, second.body, end));
+                // Spheres around both rods are at least this far apart.
+                let centre = |ends: [Vec3; 2]| (ends[0] + ends[1]).scale(0.5);
+                let apart = (centre(a) - centre(b)).norm() - (a[1] - a[0]).norm() / 2.0 - (b[1] - b[0]).norm() / 2.0;
+                if 2.0 - apart / least_m <= worst { worst } else { 2.0 - rods_apart(a, b) / least_m }
+            }
+        }
+    }
+}
+
+/// Distance of two rods: the distance of a point from the second is convex along the first, so thirds of an interval close in on it.
+fn rods_apart(a: [Vec3; 2], b: [Vec3; 2]) -> f64 {
+    let from_second = |s: f64| {
+        let p = a[0] + (a[1] - a[0]).scale(s);
+        let along = b[1] - b[0];
+        let length2 = along.dot(along);
+        let t = if length2 > 0.0 { ((p - b[0]).dot(along) / length2).clamp(0.0, 1.0) } else { 0.0 };
+        (p - (b[0] + along.scale(t))).norm()
+    };
+    let (mut from, mut to) = (0.0, 1.0);
+    let mut least = from_second(0.0).min(from_second(1.0));
+    // (2/3)^45 = 1e-8 of the rod; the distance is flat there, or its slope is at most 1 per metre.
+    for _ in 0..45 {
+        let (left, right) = (from + (to - from) / 3.0, to - (to - from) / 3.0);
+        let (at_left, at_right) = (from_second(left), from_second(right));
+        least = least.min(at_left).min(at_right);
+        if at_left <= at_right { to = right } else { from = left }
+    }
+    least
+}

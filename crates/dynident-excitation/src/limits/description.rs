@@ -1,0 +1,165 @@
+//! What a user says about limits: plain numbers by joint and link name.
+
+use super::capsules::SelfCollision;
+use dynident_model::Model;
+use serde::{Deserialize, Serialize};
+
+/// Every limit of an experiment. What is absent does not limit.
+///
+/// In a study file:
+///
+/// ```
+/// # use dynident_excitation::limits::Limits;
+/// let limits: Limits = toml::from_str(
+///     r#"
+///     joints = [{ joint = "elbow", position = [-2.0, 2.0], acceleration = 10.0, torque = 150.0, torque_margin = 0.1 }]
+///     floor = { height_m = 0.1, points = [{ link = "tool0" }] }
+///     column = { radius_m = 0.2, points = [{ link = "tool0" }] }
+///     self_collision = { radius_m = 0.05 }
+///     "#,
+/// )?;
+/// assert_eq!(limits.joints[0].acceleration, Some(10.0));
+/// # Ok::<(), toml::de::Error>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Limits {
+    /// Limits of single joints, at most one entry a joint.
+    pub joints: Vec<JointLimit>,
+    /// Boxes that points of the arm must not leave (the paper's workspace S).
+    pub boxes: Vec<BoxLimit>,
+    /// A floor that points of the arm must stay above.
+    pub floor: Option<FloorLimit>,
+    /// A vertical column, such as the robot's own pedestal, that points of the arm must stay out of.
+    pub column: Option<ColumnLimit>,
+    /// Distances between the arm's own links.
+    pub self_collision: Option<SelfCollision>,
+}
+
+/// Limits of one joint; rad (m), seconds, Nm (N), W. Rates and torques are largest magnitudes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointLimit {
+    /// Name of the joint.
+    pub joint: String,
+    /// Lowest and highest position, rad or m.
+    #[serde(default)]
+    pub position: Option<[f64; 2]>,
+    /// Highest speed, rad/s or m/s.
+    #[serde(default)]
+    pub speed: Option<f64>,
+    /// Highest acceleration, rad/s² or m/s².
+    #[serde(default)]
+    pub acceleration: Option<f64>,
+    /// Highest jerk, rad/s³ or m/s³.
+    #[serde(default)]
+    pub jerk: Option<f64>,
+    /// Highest torque by the model's prior inertial parameters, Nm or N.
+    #[serde(default)]
+    pub torque: Option<f64>,
+    /// Part of the torque limit kept free for what the prior does not know, 0 (nothing) to below 1.
+    #[serde(default)]
+    pub torque_margin: f64,
+    /// Highest mechanical power `|τ q̇|`, W.
+    #[serde(default)]
+    pub power_w: Option<f64>,
+}
+
+/// A sphere fixed to a link, in most cases of radius zero: the point whose place is limited.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LinkPoint {
+    /// Name of the link.
+    pub link: String,
+    /// Place in the link's frame, m.
+    #[serde(default)]
+    pub at_m: [f64; 3],
+    /// Radius, m.
+    #[serde(default)]
+    pub radius_m: f64,
+}
+
+/// A box in the base frame that points (with their radius) must not leave.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoxLimit {
+    /// Range along the base frame's x, m; absent: free.
+    #[serde(default)]
+    pub x_m: Option<[f64; 2]>,
+    /// Range along y, m.
+    #[serde(default)]
+    pub y_m: Option<[f64; 2]>,
+    /// Range along z, m.
+    #[serde(default)]
+    pub z_m: Option<[f64; 2]>,
+    /// The points; none: the origins of all moving bodies.
+    #[serde(default)]
+    pub points: Vec<LinkPoint>,
+}
+
+/// The plane `z = height_m` of the base frame that points (with their radius) must stay above.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FloorLimit {
+    /// Height of the floor in the base frame, m.
+    pub height_m: f64,
+    /// The points; none: the origins of all moving bodies.
+    #[serde(default)]
+    pub points: Vec<LinkPoint>,
+}
+
+/// An endless cylinder about a line parallel to the base frame's z that points (with their radius) must stay out of.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ColumnLimit {
+    /// Radius of the cylinder, m.
+    pub radius_m: f64,
+    /// Where its axis stands: x and y in the base frame, m.
+    #[serde(default)]
+    pub axis_xy_m: [f64; 2],
+    /// The points that must stay out. To be chosen: points near the base are inside by construction.
+    pub points: Vec<LinkPoint>,
+}
+
+impl Limits {
+    /// The description's own limits: position where both ends are given, speed, torque from `effort`. Acceleration, jerk, power and space stay free.
+    pub fn from_model(model: &Model) -> Self {
+        let joints = model.joints().iter().map(|joint| JointLimit {
+            joint: joint.name.clone(),
+            position: joint.limits.lower.zip(joint.limits.upper).map(|(lower, upper)| [lower, upper]),
+            speed: joint.limits.velocity,
+            torque: joint.limits.effort,
+            ..JointLimit::default()
+        });
+        Self { joints: joints.collect(), ..Self::default() }
+    }
+
+    /// These limits with `other` laid over them: what `other` says wins, joint by joint and value by value; its boxes are added.
+    pub fn overlaid(mut self, other: &Self) -> Self {
+        for over in &other.joints {
+            let Some(under) = self.joints.iter_mut().find(|under| under.joint == over.joint) else {
+                self.joints.push(over.clone());
+                continue;
+            };
+            under.position = over.position.or(under.position);
+            under.speed = over.speed.or(under.speed);
+            under.acceleration = over.acceleration.or(under.acceleration);
+            under.jerk = over.jerk.or(under.jerk);
+            under.torque = over.torque.or(under.torque);
+            under.power_w = over.power_w.or(under.power_w);
+            if over.torque_margin != 0.0 {
+                under.torque_margin = over.torque_margin;
+            }
+        }
+        self.boxes.extend(other.boxes.iter().cloned());
+        self.floor = other.floor.clone().or(self.floor);
+        self.column = other.column.clone().or(self.column);
+        self.self_collision = other.self_collision.clone().or(self.self_collision);
+        self
+    }
+
+    /// The entry of one joint, if there is one.
+    pub fn of(&self, joint: &str) -> Option<&JointLimit> {
+        self.joints.iter().find(|limit| limit.joint == joint)
+    }
+}

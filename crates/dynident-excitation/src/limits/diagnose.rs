@@ -1,0 +1,186 @@
+//! Why nothing feasible was found: which limits bind, where, and the smallest relaxation that would do.
+
+use super::kind::{Constraint, LimitKind};
+use super::set::LimitSet;
+use crate::motion::Motion;
+
+/// Values above this count as broken, as in the re-check.
+const TOLERANCE: f64 = 1e-6;
+
+/// The slowest run that is considered, as a multiple of the duration.
+const LARGEST_STRETCH: f64 = 1000.0;
+
+/// A limit that the best motion found still breaks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BrokenLimit {
+    /// The limit.
+    pub constraint: Constraint,
+    /// Its largest value, above 0.
+    pub value: f64,
+    /// When, s.
+    pub at_s: f64,
+}
+
+/// One change that would make the motion feasible as it is.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Relaxation {
+    /// The same path run slower: `q(t / factor)`.
+    Stretch {
+        /// Factor on the duration, above 1.
+        factor: f64,
+        /// The longer duration, s.
+        duration_s: f64,
+    },
+    /// Other values of the limits of one kind, each as `(subject, limit now, limit needed, unit)`. Ranges count from their middle.
+    Limits {
+        /// The kind.
+        kind: LimitKind,
+        /// What to change.
+        changes: Vec<(String, f64, f64, &'static str)>,
+    },
+}
+
+/// What stands between a motion and its limits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Diagnosis {
+    /// Broken limits, worst first; empty for a feasible motion.
+    pub broken: Vec<BrokenLimit>,
+    /// Single changes that would do, the smallest first (by relative change); empty if limits of several kinds are broken that no slower run mends.
+    pub relaxations: Vec<Relaxation>,
+}
+
+/// Looks at a motion on a dense grid of times (1 kHz or so) that includes both ends.
+///
+/// Running the same path slower by a factor s divides speed by s, acceleration by s² and jerk by s³, and leaves of the torque gravity as it is; the smallest s is found by bisection on
+/// the constraint values themselves. Gravity alone above a torque limit, or a broken position, place or distance, cannot be mended so.
+///
+/// # Panics
+/// If there is not one time per sample.
+pub fn diagnose(set: &LimitSet, times_s: &[f64], motion: &Motion) -> Diagnosis {
+    assert_eq!(times_s.len(), motion.samples, "one time per sample");
+    let mut workspace = set.workspace();
+    let mut values = Vec::new();
+    set.values(&mut workspace, motion, &mut values);
+    let mut broken = Vec::new();
+    for (constraint, values) in set.constraints().iter().zip(values.chunks_exact(motion.samples.max(1))) {
+        let worst = values.iter().map(|c| if c.is_nan() { f64::INFINITY } else { *c }).zip(times_s);
+        if let Some((value, at_s)) = worst.max_by(|a, b| a.0.total_cmp(&b.0))
+            && value > TOLERANCE
+        {
+            broken.push(BrokenLimit { constraint: constraint.clone(), value, at_s: *at_s });
+        }
+    }
+    broken.sort_by(|a, b| b.value.total_cmp(&a.value));
+    let mut sized = Vec::new();
+    if let Some(first) = broken.first().map(|first| first.constraint.kind) {
+        if broken.iter().all(|broken| broken.constraint.kind == first && broken.value.is_finite()) {
+            let changes = broken.iter().map(change).collect();
+            sized.push((broken[0].value, Relaxation::Limits { kind: first, changes }));
+        }
+        let duration_s = times_s.last().zip(times_s.first()).map_or(0.0, |(last, first)| last - first);
+        if let Some(factor) = smallest_stretch(set, motion) {
+            sized.push((factor - 1.0, Relaxation::Stretch { factor, duration_s: duration_s * factor }));
+        }
+    }
+    sized.sort_by(|a, b| a.0.total_cmp(&b.0));
+    Diagnosis { broken, relaxations: sized.into_iter().map(|(_, relaxation)| relaxation).collect() }
+}
+
+/// The change of one limit that makes room for the motion.
+fn change(broken: &BrokenLimit) -> (String, f64, f64, &'static str) {
+    let Constraint { kind, subject, middle, size, unit } = &broken.constraint;
+    let needed = broken.constraint.quantity(broken.value);
+    let now = if *kind == LimitKind::Floor { *middle } else { *size };
+    (subject.clone(), now, needed, unit)
+}
+
+/// The motion of `q(t / factor)` at the stretched times.
+fn stretched(motion: &Motion, factor: f64) -> Motion {
+    let scaled = |values: &[f64], by: f64| values.iter().map(|x| x * by).collect();
+    let inverse = 1.0 / factor;
+    Motion {
+        dq: scaled(&motion.dq, inverse),
+        ddq: scaled(&motion.ddq, inverse * inverse),
+        dddq: scaled(&motion.dddq, inverse * inverse * inverse),
+        ..motion.clone()
+    }
+}
+
+/// The smallest factor at which the stretched motion keeps every limit, rounded up in its ninth digit; `None` if none up to 1000 does.
+fn smallest_stretch(set: &LimitSet, motion: &Motion) -> Option<f64> {
+    let mut workspace = set.workspace();
+    let mut values = Vec::new();
+    let mut holds = |factor: f64| {
+        set.values(&mut workspace, &stretched(motion, factor), &mut values);
+        values.iter().all(|c| *c <= TOLERANCE)
+    };
+    if !holds(LARGEST_STRETCH) {
+        return None;
+    }
+    let (mut broken, mut kept) = (1.0, LARGEST_STRETCH);
+    while kept - broken > 1e-9 * kept {
+        // Geometric steps: factors near 1 are the common case.
+        let middle = f64::sqrt(broken * kept);
+        if holds(middle) { kept = middle } else { broken = middle }
+    }
+    Some(kept)
+}
+
+/// How far a value is over its limit, in words.
+pub(super) fn amount(constraint: &Constraint, c: f64) -> String {
+    let Constraint { kind, middle, size, unit, .. } = constraint;
+    let found = constraint.quantity(c);
+    match kind {
+        LimitKind::Position | LimitKind::Box => {
+            format!("{found:.4} {unit} from the middle {middle:.4} of a range that allows {size:.4}")
+        }
+        LimitKind::Floor => format!("{found:.4} {unit} high where at least {middle:.4} is asked for"),
+        LimitKind::Column | LimitKind::SelfCollision => {
+            format!("{found:.4} {unit} apart where at least {size:.4} is asked for")
+        }
+        _ => format!("{found:.4} {unit} where {size:.4} is allowed"),
+    }
+}
+
+impl Diagnosis {
+    /// The diagnosis in sentences: one per broken limit, then the relaxations, or that there is no single one.
+    pub fn sentences(&self) -> Vec<String> {
+        let mut sentences: Vec<String> = self
+            .broken
+            .iter()
+            .map(|BrokenLimit { constraint, value, at_s }| {
+                let Constraint { kind, subject, .. } = constraint;
+                format!("The {kind} limit of `{subject}` is broken at {at_s:.3} s: {}.", amount(constraint, *value))
+            })
+            .collect();
+        for relaxation in &self.relaxations {
+            sentences.push(match relaxation {
+                Relaxation::Stretch { factor, duration_s } => {
+                    format!("The same path would do if run {factor:.4} times as long, in {duration_s:.3} s.")
+                }
+                Relaxation::Limits { kind, changes } => {
+                    let changes: Vec<String> = changes
+                        .iter()
+                        .map(|(subject, now, needed, unit)| {
+                            let what = match kind {
+                                LimitKind::Position | LimitKind::Box => "half range",
+                                LimitKind::Floor => "height",
+                                LimitKind::Column | LimitKind::SelfCollision => "distance",
+                                _ => "limit",
+                            };
+                            format!("`{subject}` {what} {needed:.4} {unit} instead of {now:.4}")
+                        })
+                        .collect();
+                    format!("It would do to relax {kind} alone: {}.", changes.join(", "))
+                }
+            });
+        }
+        if !self.broken.is_empty() && self.relaxations.is_empty() {
+            sentences.push(
+                "No single change would do: limits of several kinds are broken, and a slower run does not mend them."
+                    .to_owned(),
+            );
+        }
+        sentences
+    }
+}

@@ -1,0 +1,88 @@
+//! Position, speed, acceleration and jerk of single joints: bands on the motion itself.
+
+use super::description::JointLimit;
+use super::kind::{Constraint, LimitKind};
+use super::term::{Inputs, Pull, Term};
+use super::validate::middle_and_half;
+use crate::motion::Motion;
+use dynident_model::Model;
+
+/// `|x - middle| / half - 1` of one of the four arrays of a motion.
+#[derive(Clone, Debug)]
+struct Band {
+    joint: usize,
+    kind: LimitKind,
+    middle: f64,
+    half: f64,
+    constraint: Constraint,
+}
+
+/// All bands.
+#[derive(Clone, Debug)]
+pub(crate) struct JointMotionLimits(Vec<Band>);
+
+impl JointMotionLimits {
+    pub(crate) fn new(model: &Model, limits: &[JointLimit]) -> Self {
+        let mut bands = Vec::new();
+        for (index, joint) in model.joints().iter().enumerate() {
+            let Some(limit) = limits.iter().find(|limit| limit.joint == joint.name) else { continue };
+            let units =
+                if joint.turns() { ["rad", "rad/s", "rad/s^2", "rad/s^3"] } else { ["m", "m/s", "m/s^2", "m/s^3"] };
+            let magnitude = |size: Option<f64>| size.map(|size| (0.0, size));
+            let ranges = [
+                (LimitKind::Position, limit.position.map(middle_and_half)),
+                (LimitKind::Speed, magnitude(limit.speed)),
+                (LimitKind::Acceleration, magnitude(limit.acceleration)),
+                (LimitKind::Jerk, magnitude(limit.jerk)),
+            ];
+            for ((kind, range), unit) in ranges.into_iter().zip(units) {
+                if let Some((middle, half)) = range {
+                    let constraint = Constraint { kind, subject: joint.name.clone(), middle, size: half, unit };
+                    bands.push(Band { joint: index, kind, middle, half, constraint });
+                }
+            }
+        }
+        Self(bands)
+    }
+}
+
+fn array(motion: &Motion, kind: LimitKind) -> &[f64] {
+    match kind {
+        LimitKind::Position => &motion.q,
+        LimitKind::Speed => &motion.dq,
+        LimitKind::Acceleration => &motion.ddq,
+        _ => &motion.dddq,
+    }
+}
+
+impl Term for JointMotionLimits {
+    fn constraints(&self) -> Vec<Constraint> {
+        self.0.iter().map(|band| band.constraint.clone()).collect()
+    }
+
+    fn values(&self, inputs: &Inputs<'_>, out: &mut [f64]) {
+        let motion = inputs.motion;
+        for (band, row) in self.0.iter().zip(out.chunks_exact_mut(motion.samples)) {
+            let scale = 1.0 / band.half;
+            for (c, x) in row.iter_mut().zip(&array(motion, band.kind)[motion.of(band.joint)]) {
+                *c = (x - band.middle).abs() * scale - 1.0;
+            }
+        }
+    }
+
+    fn pull_back(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
+        let motion = inputs.motion;
+        for (band, row) in self.0.iter().zip(weights.chunks_exact(motion.samples)) {
+            let (scale, range) = (1.0 / band.half, motion.of(band.joint));
+            let to = match band.kind {
+                LimitKind::Position => &mut pull.motion.q,
+                LimitKind::Speed => &mut pull.motion.dq,
+                LimitKind::Acceleration => &mut pull.motion.ddq,
+                _ => &mut pull.motion.dddq,
+            };
+            for ((to, weight), x) in to[range.clone()].iter_mut().zip(row).zip(&array(motion, band.kind)[range]) {
+                *to += weight * scale * (x - band.middle).signum();
+            }
+        }
+    }
+}

@@ -1,0 +1,36 @@
+//! **Where may it move?** Limits as a user states them, as values and derivatives for optimisers, and in words when they cannot be kept.
+//!
+//! [`Limits`] is the description. [`LimitSet`] prepares it for a robot: normalised values `c <= 0` over a block of samples and the way back from multipliers to
+//! the motion. [`peaks()`] finds the true extremes between samples, [`diagnose()`] says what binds and what would help. The final word has
+//! [`check`](crate::check), which shares none of this.
+
+mod between_samples;
+mod capsules;
+mod description;
+mod diagnose;
+mod error;
+mod feasibility;
+mod joint_motion;
+mod kind;
+mod link_points;
+mod peaks;
+mod place;
+mod power;
+mod segments;
+mod self_collision;
+mod set;
+mod term;
+mod torque;
+mod validate;
+mod wrench;
+
+pub use capsules::{BodyCapsule, CapsulePairs, LinkCapsule, SelfCollision};
+pub use description::{BoxLimit, ColumnLimit, FloorLimit, JointLimit, Limits, LinkPoint};
+pub use diagnose::{BrokenLimit, Diagnosis, Relaxation, diagnose};
+pub use error::LimitError;
+pub use feasibility::shortest_duration_s;
+pub use kind::{Constraint, LimitKind};
+pub use peaks::{Peak, PeakSettings, peaks};
+pub use segments::{SegmentDistance, segment_distance};
+pub use set::{LimitSet, LimitWorkspace};
+pub use torque::torque_pull_back;

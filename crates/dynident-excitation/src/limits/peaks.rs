@@ -1,0 +1,138 @@
+//! The true extremes of every limit along a motion, not only at samples.
+
+use super::set::{LimitSet, LimitWorkspace};
+use crate::motion::Motion;
+
+/// Where a row is largest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Peak {
+    /// The row of the set.
+    pub row: usize,
+    /// Largest value, with the set's tightening in it; infinite if the motion is not finite.
+    pub value: f64,
+    /// Largest value at the given times.
+    pub sampled: f64,
+    /// When, s.
+    pub at_s: f64,
+}
+
+/// How peaks are found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PeakSettings {
+    /// Sampled maxima further than this below the row's largest sample are not refined.
+    pub band: f64,
+    /// Golden-section steps; each narrows the place of a peak by 0.618.
+    pub steps: usize,
+}
+
+impl Default for PeakSettings {
+    /// A band of 0.1, and 32 steps: two sampling steps shrink to 4e-7 of one.
+    fn default() -> Self {
+        Self { band: 0.1, steps: 32 }
+    }
+}
+
+/// A local maximum that is being narrowed.
+struct Bracket {
+    row: usize,
+    from: f64,
+    to: f64,
+    /// The two inner places and the values there.
+    inner: [(f64, f64); 2],
+    best: (f64, f64),
+}
+
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// The largest value of every row over all time from the first to the last of `times_s` (ascending), refined from the samples by golden section around every sampled maximum that comes
+/// near the row's largest. `motion` gives the exact motion at any list of times, as [`Family::motion`](crate::Family::motion) does.
+///
+/// Finds every extreme that the samples see as a local maximum; of a jump (in jerk) it finds the side on which samples stand higher. All brackets advance together, so the cost is `steps` blocks
+/// of as many samples as there are maxima.
+pub fn peaks(
+    set: &LimitSet,
+    workspace: &mut LimitWorkspace,
+    times_s: &[f64],
+    settings: PeakSettings,
+    mut motion: impl FnMut(&[f64], &mut Motion),
+) -> Vec<Peak> {
+    let (mut block, mut values) = (Motion::default(), Vec::new());
+    motion(times_s, &mut block);
+    set.values(workspace, &block, &mut values);
+    let samples = times_s.len();
+    if samples == 0 {
+        return Vec::new();
+    }
+    let mut found = Vec::new();
+    let mut brackets = Vec::new();
+    for (row, values) in values.chunks_exact(samples).enumerate() {
+        let mut peak = Peak { row, value: f64::NEG_INFINITY, sampled: f64::NEG_INFINITY, at_s: times_s[0] };
+        for (&value, &at_s) in values.iter().zip(times_s) {
+            let value = if value.is_nan() { f64::INFINITY } else { value };
+            if value > peak.value {
+                peak = Peak { value, sampled: value, at_s, ..peak };
+            }
+        }
+        found.push(peak);
+        let worth = peak.value - settings.band;
+        for (sample, &value) in values.iter().enumerate() {
+            let before = sample.saturating_sub(1);
+            let after = (sample + 1).min(samples - 1);
+            if value.is_finite() && value >= worth && value >= values[before] && value >= values[after] {
+                let (from, to) = (times_s[before], times_s[after]);
+                let inner = [(to - GOLDEN * (to - from), f64::NAN), (from + GOLDEN * (to - from), f64::NAN)];
+                brackets.push(Bracket { row, from, to, inner, best: (value, times_s[sample]) });
+            }
+        }
+    }
+    let mut times = Vec::with_capacity(brackets.len() * 2);
+    for step in 0..settings.steps {
+        // The first step needs both inner values of a bracket, later ones only the new one.
+        times.clear();
+        for bracket in &brackets {
+            times.extend(bracket.inner.iter().filter(|(_, value)| value.is_nan()).map(|(at, _)| *at));
+        }
+        if times.is_empty() {
+            break;
+        }
+        motion(&times, &mut block);
+        set.values(workspace, &block, &mut values);
+        let mut next = 0;
+        for bracket in &mut brackets {
+            for (at, value) in &mut bracket.inner {
+                if value.is_nan() {
+                    let sampled = values[bracket.row * times.len() + next];
+                    next += 1;
+                    *value = if sampled.is_nan() { f64::INFINITY } else { sampled };
+                    if *value > bracket.best.0 {
+                        bracket.best = (*value, *at);
+                    }
+                }
+            }
+            if step + 1 < settings.steps {
+                bracket.narrow();
+            }
+        }
+    }
+    for bracket in &brackets {
+        let peak = &mut found[bracket.row];
+        if bracket.best.0 > peak.value {
+            (peak.value, peak.at_s) = bracket.best;
+        }
+    }
+    found
+}
+
+impl Bracket {
+    /// Drops the outer part beside the lower inner value.
+    fn narrow(&mut self) {
+        let [left, right] = self.inner;
+        if left.1 >= right.1 {
+            self.to = right.0;
+            self.inner = [(self.to - GOLDEN * (self.to - self.from), f64::NAN), left];
+        } else {
+            self.from = left.0;
+            self.inner = [right, (self.from + GOLDEN * (self.to - self.from), f64::NAN)];
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! Box, floor and column: limits on where points of the arm may be, in the base frame.
+
+use super::description::{BoxLimit, ColumnLimit, FloorLimit};
+use super::error::LimitError;
+use super::kind::{Constraint, LimitKind};
+use super::link_points::{BodyPoint, body_points};
+use super::term::{Inputs, Pull, Term};
+use super::validate::middle_and_half;
+use dynident_model::{Model, Vec3};
+
+/// Where one point may be.
+#[derive(Clone, Debug)]
+enum Room {
+    /// `|p[axis] - middle| / half - 1`.
+    Slab { axis: usize, middle: f64, half: f64 },
+    /// `lowest - p_z`, per metre.
+    Above { lowest: f64 },
+    /// `1 - |p_xy - axis| / least`.
+    Outside { axis: [f64; 2], least: f64 },
+}
+
+impl Room {
+    /// The constraint's value at a place, and its gradient.
+    fn value(&self, place: Vec3) -> (f64, Vec3) {
+        let mut gradient = Vec3::ZERO;
+        let value = match *self {
+            Self::Slab { axis, middle, half } => {
+                gradient[axis] = (place[axis] - middle).signum() / half;
+                (place[axis] - middle).abs() / half - 1.0
+            }
+            Self::Above { lowest } => {
+                gradient[2] = -1.0;
+                lowest - place[2]
+            }
+            Self::Outside { axis, least } => {
+                let (x, y) = (place[0] - axis[0], place[1] - axis[1]);
+                let distance = x.hypot(y);
+                // On the axis itself every way out is as good: take x.
+                let (nx, ny) = if distance > 0.0 { (x / distance, y / distance) } else { (1.0, 0.0) };
+                gradient = Vec3([-nx / least, -ny / least, 0.0]);
+                1.0 - distance / least
+            }
+        };
+        (value, gradient)
+    }
+}
+
+/// Rows of points and the room that each must keep to.
+#[derive(Clone, Debug)]
+pub(crate) struct PlaceLimits(Vec<(BodyPoint, Room, Constraint)>);
+
+impl PlaceLimits {
+    /// A box: one row per point and limited axis.
+    pub(crate) fn boxed(model: &Model, limit: &BoxLimit) -> Result<Self, LimitError> {
+        let mut rows = Vec::new();
+        for point in body_points(model, &limit.points, "a box")? {
+            for (axis, ends) in [limit.x_m, limit.y_m, limit.z_m].into_iter().enumerate() {
+                let Some(ends) = ends else { continue };
+                let (middle, half) = middle_and_half(ends);
+                let half = half - point.radius_m;
+                let subject = format!("{}, {}", point.name, ["x", "y", "z"][axis]);
+                let constraint = Constraint { kind: LimitKind::Box, subject, middle, size: half, unit: "m" };
+                rows.push((point.clone(), Room::Slab { axis, middle, half }, constraint));
+            }
+        }
+        Ok(Self(rows))
+    }
+
+    /// A floor: one row per point.
+    pub(crate) fn floor(model: &Model, limit: &FloorLimit) -> Result<Self, LimitError> {
+        let row = |point: BodyPoint| {
+            let lowest = limit.height_m + point.radius_m;
+            let subject = point.name.clone();
+            let constraint = Constraint { kind: LimitKind::Floor, subject, middle: lowest, size: 1.0, unit: "m" };
+            (point, Room::Above { lowest }, constraint)
+        };
+        Ok(Self(body_points(model, &limit.points, "the floor")?.into_iter().map(row).collect()))
+    }
+
+    /// A column: one row per point.
+    pub(crate) fn column(model: &Model, limit: &ColumnLimit) -> Result<Self, LimitError> {
+        let row = |point: BodyPoint| {
+            let least = limit.radius_m + point.radius_m;
+            let subject = point.name.clone();
+            let constraint = Constraint { kind: LimitKind::Column, subject, middle: 0.0, size: least, unit: "m" };
+            (point, Room::Outside { axis: limit.axis_xy_m, least }, constraint)
+        };
+        Ok(Self(body_points(model, &limit.points, "the column")?.into_iter().map(row).collect()))
+    }
+}
+
+impl Term for PlaceLimits {
+    fn constraints(&self) -> Vec<Constraint> {
+        self.0.iter().map(|(_, _, constraint)| constraint.clone()).collect()
+    }
+
+    fn values(&self, inputs: &Inputs<'_>, out: &mut [f64]) {
+        for ((point, room, _), row) in self.0.iter().zip(out.chunks_exact_mut(inputs.motion.samples)) {
+            for (sample, c) in row.iter_mut().enumerate() {
+                *c = room.value(inputs.placement(point.body, sample).point(point.at)).0;
+            }
+        }
+    }
+
+    fn pull_back(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
+        for ((point, room, _), row) in self.0.iter().zip(weights.chunks_exact(inputs.motion.samples)) {
+            for (sample, &weight) in row.iter().enumerate() {
+                if weight != 0.0 {
+                    let place = inputs.placement(point.body, sample).point(point.at);
+                    let gradient = room.value(place).1.scale(weight);
+                    pull.point(point.body, inputs.motion.joints, sample, place, gradient);
+                }
+            }
+        }
+    }
+
+    fn needs_placements(&self) -> bool {
+        true
+    }
+}

@@ -1,0 +1,54 @@
+//! Mechanical power of a joint.
+
+use super::description::JointLimit;
+use super::kind::{Constraint, LimitKind};
+use super::term::{Inputs, Pull, Term};
+use dynident_model::Model;
+
+/// `|τ q̇| / limit - 1`.
+#[derive(Clone, Debug)]
+pub(crate) struct PowerLimits(Vec<(usize, Constraint)>);
+
+impl PowerLimits {
+    pub(crate) fn new(model: &Model, limits: &[JointLimit]) -> Self {
+        let row = |index: usize, name: &str| {
+            let size = limits.iter().find(|limit| limit.joint == name)?.power_w?;
+            let subject = name.to_owned();
+            Some((index, Constraint { kind: LimitKind::Power, subject, middle: 0.0, size, unit: "W" }))
+        };
+        Self(model.joints().iter().enumerate().filter_map(|(index, joint)| row(index, &joint.name)).collect())
+    }
+}
+
+impl Term for PowerLimits {
+    fn constraints(&self) -> Vec<Constraint> {
+        self.0.iter().map(|(_, constraint)| constraint.clone()).collect()
+    }
+
+    fn values(&self, inputs: &Inputs<'_>, out: &mut [f64]) {
+        let motion = inputs.motion;
+        for ((joint, constraint), row) in self.0.iter().zip(out.chunks_exact_mut(motion.samples)) {
+            let (scale, range) = (1.0 / constraint.size, motion.of(*joint));
+            for ((c, tau), dq) in row.iter_mut().zip(&inputs.tau[range.clone()]).zip(&motion.dq[range]) {
+                *c = (tau * dq).abs() * scale - 1.0;
+            }
+        }
+    }
+
+    fn pull_back(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
+        let motion = inputs.motion;
+        for ((joint, constraint), row) in self.0.iter().zip(weights.chunks_exact(motion.samples)) {
+            let scale = 1.0 / constraint.size;
+            for (at, weight) in motion.of(*joint).zip(row) {
+                let (tau, dq) = (inputs.tau[at], motion.dq[at]);
+                let signed = weight * scale * (tau * dq).signum();
+                pull.tau[at] += signed * dq;
+                pull.motion.dq[at] += signed * tau;
+            }
+        }
+    }
+
+    fn needs_torque(&self) -> bool {
+        true
+    }
+}

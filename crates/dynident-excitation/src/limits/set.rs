@@ -1,0 +1,224 @@
+//! All limits of an experiment as rows of constraint values over a motion, and the way back to the motion.
+
+use super::description::Limits;
+use super::error::LimitError;
+use super::joint_motion::JointMotionLimits;
+use super::kind::Constraint;
+use super::place::PlaceLimits;
+use super::power::PowerLimits;
+use super::self_collision::SelfCollisionLimits;
+use super::term::{Inputs, Pull, Term};
+use super::torque::{TorqueLimits, torque_pull_back};
+use super::wrench::{Wrench, pull_wrenches};
+use crate::motion::{Motion, MotionCotangent};
+use dynident_dynamics::{BatchWorkspace, Workspace, body_placements, inverse_dynamics_batch};
+use dynident_model::{Model, Transform};
+
+/// Limits prepared for an optimiser. Row `r` at sample `s` stands at `r * samples + s`; a value `c <= 0` keeps the limit (see [`Constraint`]).
+#[derive(Debug)]
+pub struct LimitSet {
+    model: Model,
+    terms: Vec<Box<dyn Term>>,
+    rows_of: Vec<usize>,
+    constraints: Vec<Constraint>,
+    tightening: Vec<f64>,
+    torque: bool,
+    placements: bool,
+}
+
+/// Scratch of one thread for one [`LimitSet`]; torques and placements of the last motion stay in it, so that [`pull_back`](LimitSet::pull_back) after
+/// [`values`](LimitSet::values) does not repeat them.
+#[derive(Debug)]
+pub struct LimitWorkspace {
+    batch: BatchWorkspace,
+    single: Workspace,
+    /// The motion that torques and placements belong to.
+    motion: Motion,
+    tau: Vec<f64>,
+    placements: Vec<Transform>,
+    by_torque: Vec<f64>,
+    wrenches: Vec<Wrench>,
+    q: Vec<f64>,
+    by_position: Vec<f64>,
+}
+
+impl LimitSet {
+    /// The limits on this robot.
+    ///
+    /// # Errors
+    /// As [`Limits::validate`].
+    pub fn new(limits: &Limits, model: &Model) -> Result<Self, LimitError> {
+        limits.validate(model)?;
+        let mut terms: Vec<Box<dyn Term>> = vec![
+            Box::new(JointMotionLimits::new(model, &limits.joints)),
+            Box::new(TorqueLimits::new(model, &limits.joints)),
+            Box::new(PowerLimits::new(model, &limits.joints)),
+        ];
+        for limit in &limits.boxes {
+            terms.push(Box::new(PlaceLimits::boxed(model, limit)?));
+        }
+        if let Some(limit) = &limits.floor {
+            terms.push(Box::new(PlaceLimits::floor(model, limit)?));
+        }
+        if let Some(limit) = &limits.column {
+            terms.push(Box::new(PlaceLimits::column(model, limit)?));
+        }
+        if let Some(limit) = &limits.self_collision {
+            terms.push(Box::new(SelfCollisionLimits::new(model, limit)?));
+        }
+        terms.retain(|term| !term.constraints().is_empty());
+        let rows_of = terms.iter().map(|term| term.constraints().len()).collect();
+        let constraints: Vec<Constraint> = terms.iter().flat_map(|term| term.constraints()).collect();
+        Ok(Self {
+            model: model.clone(),
+            torque: terms.iter().any(|term| term.needs_torque()),
+            placements: terms.iter().any(|term| term.needs_placements()),
+            tightening: vec![0.0; constraints.len()],
+            terms,
+            rows_of,
+            constraints,
+        })
+    }
+
+    /// The rows.
+    pub fn constraints(&self) -> &[Constraint] {
+        &self.constraints
+    }
+
+    /// The robot.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Scratch for this set.
+    pub fn workspace(&self) -> LimitWorkspace {
+        LimitWorkspace {
+            batch: BatchWorkspace::new(&self.model),
+            single: Workspace::new(&self.model),
+            motion: Motion::default(),
+            tau: Vec::new(),
+            placements: Vec::new(),
+            by_torque: Vec::new(),
+            wrenches: Vec::new(),
+            q: vec![0.0; self.model.dof()],
+            by_position: Vec::new(),
+        }
+    }
+
+    /// Adds a constant to every value of each row from now on, so that a motion kept at 0 on samples keeps the true limit between them. Zero to begin with.
+    ///
+    /// # Panics
+    /// If there is not one number a row.
+    pub fn tighten(&mut self, margins: &[f64]) {
+        assert_eq!(margins.len(), self.constraints.len(), "one margin per row");
+        self.tightening.copy_from_slice(margins);
+    }
+
+    /// The margins in force, one a row.
+    pub fn tightening(&self) -> &[f64] {
+        &self.tightening
+    }
+
+    /// Constraint values of all rows at all samples.
+    ///
+    /// # Panics
+    /// If the motion has another number of joints.
+    pub fn values(&self, workspace: &mut LimitWorkspace, motion: &Motion, out: &mut Vec<f64>) {
+        let samples = motion.samples;
+        self.prepare(workspace, motion);
+        out.clear();
+        out.resize(self.constraints.len() * samples, 0.0);
+        if samples == 0 {
+            return;
+        }
+        let inputs = Inputs { motion, tau: &workspace.tau, placements: &workspace.placements };
+        let mut rest = out.as_mut_slice();
+        for (term, rows) in self.terms.iter().zip(&self.rows_of) {
+            let (own, others) = rest.split_at_mut(rows * samples);
+            term.values(&inputs, own);
+            rest = others;
+        }
+        for (row, margin) in out.chunks_exact_mut(samples).zip(&self.tightening) {
+            if *margin != 0.0 {
+                for c in row {
+                    *c += margin;
+                }
+            }
+        }
+    }
+
+    /// Adds to `cotangent` what a cost with derivatives `weights` by the [`values`](LimitSet::values) pulls on the motion. Exact, but for the corners of `|x|` at zero and of
+    /// distances between parallel segments, where it is one of the one-sided derivatives.
+    ///
+    /// # Panics
+    /// If sizes differ.
+    pub fn pull_back(
+        &self,
+        workspace: &mut LimitWorkspace,
+        motion: &Motion,
+        weights: &[f64],
+        cotangent: &mut MotionCotangent,
+    ) {
+        let (samples, dof) = (motion.samples, self.model.dof());
+        assert_eq!(weights.len(), self.constraints.len() * samples, "one weight per value");
+        assert_eq!((cotangent.joints, cotangent.samples), (dof, samples), "the cotangent has the motion's shape");
+        if samples == 0 {
+            return;
+        }
+        self.prepare(workspace, motion);
+        let LimitWorkspace { single, tau, placements, by_torque, wrenches, by_position, .. } = workspace;
+        by_torque.clear();
+        by_torque.resize(if self.torque { dof * samples } else { 0 }, 0.0);
+        wrenches.clear();
+        wrenches.resize(if self.placements { dof * samples } else { 0 }, Wrench::ZERO);
+        let inputs = Inputs { motion, tau, placements };
+        let mut rest = weights;
+        for (term, rows) in self.terms.iter().zip(&self.rows_of) {
+            let (own, others) = rest.split_at(rows * samples);
+            let mut pull = Pull { motion: &mut *cotangent, tau: by_torque, wrenches };
+            term.pull_back(&inputs, own, &mut pull);
+            rest = others;
+        }
+        if self.torque {
+            torque_pull_back(&self.model, single, motion, by_torque, cotangent);
+        }
+        if self.placements {
+            by_position.resize(dof, 0.0);
+            for sample in 0..samples {
+                let of = sample * dof..(sample + 1) * dof;
+                if wrenches[of.clone()].iter().all(|wrench| *wrench == Wrench::ZERO) {
+                    continue;
+                }
+                by_position.fill(0.0);
+                pull_wrenches(&self.model, &placements[of.clone()], &mut wrenches[of], by_position);
+                for (joint, pulled) in by_position.iter().enumerate() {
+                    cotangent.q[joint * samples + sample] += pulled;
+                }
+            }
+        }
+    }
+
+    /// Torques and placements of the motion, unless the workspace has them.
+    fn prepare(&self, workspace: &mut LimitWorkspace, motion: &Motion) {
+        let (dof, samples) = (self.model.dof(), motion.samples);
+        assert_eq!(motion.joints, dof, "the motion has another number of joints than the robot");
+        if !(self.torque || self.placements) || workspace.motion == *motion {
+            return;
+        }
+        workspace.motion.clone_from(motion);
+        if self.torque {
+            workspace.tau.resize(dof * samples, 0.0);
+            inverse_dynamics_batch(&self.model, &mut workspace.batch, &motion.view(), &mut workspace.tau);
+        }
+        if self.placements {
+            workspace.placements.resize(dof * samples, Transform::IDENTITY);
+            let LimitWorkspace { single, placements, q, .. } = workspace;
+            for (sample, placements) in placements.chunks_exact_mut(dof.max(1)).enumerate() {
+                for (joint, q) in q.iter_mut().enumerate() {
+                    *q = motion.q[joint * samples + sample];
+                }
+                placements.copy_from_slice(body_placements(&self.model, single, q));
+            }
+        }
+    }
+}

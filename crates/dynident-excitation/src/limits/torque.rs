@@ -1,0 +1,101 @@
+//! Joint torque by the prior model, less the margin kept free for what the prior does not know.
+
+use super::description::JointLimit;
+use super::kind::{Constraint, LimitKind};
+use super::term::{Inputs, Pull, Term};
+use crate::motion::{Motion, MotionCotangent};
+use dynident_dynamics::{Workspace, inverse_dynamics_derivatives};
+use dynident_model::Model;
+
+/// `|τ| / ((1 - margin) limit) - 1`.
+#[derive(Clone, Debug)]
+pub(crate) struct TorqueLimits(Vec<(usize, Constraint)>);
+
+impl TorqueLimits {
+    pub(crate) fn new(model: &Model, limits: &[JointLimit]) -> Self {
+        let mut rows = Vec::new();
+        for (index, joint) in model.joints().iter().enumerate() {
+            let limit = limits.iter().find(|limit| limit.joint == joint.name);
+            let Some((limit, torque)) = limit.and_then(|limit| Some((limit, limit.torque?))) else { continue };
+            let constraint = Constraint {
+                kind: LimitKind::Torque,
+                subject: joint.name.clone(),
+                middle: 0.0,
+                size: torque * (1.0 - limit.torque_margin),
+                unit: if joint.turns() { "Nm" } else { "N" },
+            };
+            rows.push((index, constraint));
+        }
+        Self(rows)
+    }
+}
+
+impl Term for TorqueLimits {
+    fn constraints(&self) -> Vec<Constraint> {
+        self.0.iter().map(|(_, constraint)| constraint.clone()).collect()
+    }
+
+    fn values(&self, inputs: &Inputs<'_>, out: &mut [f64]) {
+        for ((joint, constraint), row) in self.0.iter().zip(out.chunks_exact_mut(inputs.motion.samples)) {
+            let scale = 1.0 / constraint.size;
+            for (c, tau) in row.iter_mut().zip(&inputs.tau[inputs.motion.of(*joint)]) {
+                *c = tau.abs() * scale - 1.0;
+            }
+        }
+    }
+
+    fn pull_back(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
+        for ((joint, constraint), row) in self.0.iter().zip(weights.chunks_exact(inputs.motion.samples)) {
+            let (scale, range) = (1.0 / constraint.size, inputs.motion.of(*joint));
+            for ((to, weight), tau) in pull.tau[range.clone()].iter_mut().zip(row).zip(&inputs.tau[range]) {
+                *to += weight * scale * tau.signum();
+            }
+        }
+    }
+
+    fn needs_torque(&self) -> bool {
+        true
+    }
+}
+
+/// Adds to `cotangent` what a cost with derivatives `by_torque` (joint-major) by the rigid-body torques pulls: `(∂τ/∂q)ᵀ w`, `(∂τ/∂q̇)ᵀ w`, `Mᵀ w` at every
+/// sample where a weight is not zero.
+///
+/// # Panics
+/// If sizes differ.
+pub fn torque_pull_back(
+    model: &Model,
+    workspace: &mut Workspace,
+    motion: &Motion,
+    by_torque: &[f64],
+    cotangent: &mut MotionCotangent,
+) {
+    let (dof, samples) = (motion.joints, motion.samples);
+    assert_eq!(by_torque.len(), dof * samples, "one weight per torque");
+    let mut state = [vec![0.0; dof], vec![0.0; dof], vec![0.0; dof]];
+    for sample in 0..samples {
+        if (0..dof).all(|joint| by_torque[joint * samples + sample] == 0.0) {
+            continue;
+        }
+        for (to, from) in state.iter_mut().zip([&motion.q, &motion.dq, &motion.ddq]) {
+            for (joint, to) in to.iter_mut().enumerate() {
+                *to = from[joint * samples + sample];
+            }
+        }
+        let [q, dq, ddq] = &state;
+        let derivatives = inverse_dynamics_derivatives(model, workspace, q, dq, ddq);
+        for row in 0..dof {
+            let weight = by_torque[row * samples + sample];
+            if weight == 0.0 {
+                continue;
+            }
+            let row = row * dof..(row + 1) * dof;
+            for column in 0..dof {
+                let to = column * samples + sample;
+                cotangent.q[to] += weight * derivatives.by_position[row.clone()][column];
+                cotangent.dq[to] += weight * derivatives.by_velocity[row.clone()][column];
+                cotangent.ddq[to] += weight * derivatives.by_acceleration[row.clone()][column];
+            }
+        }
+    }
+}
