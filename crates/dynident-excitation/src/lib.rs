@@ -5,6 +5,7 @@
 pub mod families;
 mod family;
 mod motion;
+pub mod optimisers;
 
 pub use family::Family;
 pub use motion::{Motion, MotionCotangent};
