@@ -6,6 +6,7 @@ pub mod families;
 mod family;
 mod motion;
 pub mod optimisers;
+pub mod paper_problem;
 
 pub use family::Family;
 pub use motion::{Motion, MotionCotangent};
