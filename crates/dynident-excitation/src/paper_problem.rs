@@ -31,7 +31,8 @@ impl Stroke {
         Self { amplitude_rad: x[0], steepness_per_s: x[1], window_s: x[2] }
     }
 
-    /// Position and acceleration at `t_s` after the mid-point of the rising stroke: q = A f(ωt), q̈ = A ω² f''(ωt), f = 1/(1 + e⁻ᶻ) (equations 14 and 16). rad, rad/s².
+    /// Position and acceleration at `t_s` after the mid-point of the rising stroke: q = A f(ωt), q̈ = A ω² f''(ωt), f = 1/(1 + e⁻ᶻ) (equations 14 and
+    /// 16). rad, rad/s².
     pub fn position_and_acceleration(&self, t_s: f64) -> (f64, f64) {
         let f = 1.0 / (1.0 + (-self.steepness_per_s * t_s).exp());
         let amplitude = self.amplitude_rad;
@@ -61,7 +62,8 @@ pub enum PaperQuantity {
     RestSpeed,
     /// Acceleration at start, splice and end, in rad/s².
     RestAcceleration,
-    /// How far the arm's end dips below the ground while the other joint rests at 0, as the sine of the angle (times the lengths that turn, in m): the paper's workspace S.
+    /// How far the arm's end dips below the ground while the other joint rests at 0, as the sine of the angle (times the lengths that turn, in m):
+    /// the paper's workspace S.
     Ground,
 }
 
@@ -190,10 +192,12 @@ impl PaperProblem {
         0.25 * self.period_times_steepness / stroke.steepness_per_s
     }
 
-    /// Condition number of the observation matrix of one joint while the other rests at 0: M and Q of equations 7 to 10 are then the same function of the moving joint, with the rows
+    /// Condition number of the observation matrix of one joint while the other rests at 0: M and Q of equations 7 to 10 are then the same function of
+    /// the moving joint, with the rows
     /// [q̈, g cos q, -g sin q] (φ11 to φ13; φ24 to φ26), whatever a1.
     ///
-    /// Rows are the samples k/rate from a mid-point with |k|/rate <= δ. Falling strokes and further periods repeat the same rows, which changes no condition number, so one rising stroke is enough.
+    /// Rows are the samples k/rate from a mid-point with |k|/rate <= δ. Falling strokes and further periods repeat the same rows, which changes no
+    /// condition number, so one rising stroke is enough.
     /// Infinite for a matrix without full rank.
     pub fn condition_number(&self, stroke: &Stroke) -> f64 {
         let reach = stroke.window_s.min(self.longest_window_s(stroke));
@@ -246,8 +250,10 @@ impl PaperProblem {
         conditions + if kept { 0.0 } else { self.penalty }
     }
 
-    /// H with a penalty that grows with the violation: cond(M) + cond(Q) + penalty · Σ max(0, value/limit - 1). Inside the limits it is H, and its lowest point is the same, because the penalty outweighs what
-    /// a violation gains (about 80 per unit at the optimum, against 1000). The step of equation 19 hides from a search on which side of a limit to go, and lets evolution strategies die at the wall: their
+    /// H with a penalty that grows with the violation: cond(M) + cond(Q) + penalty · Σ max(0, value/limit - 1). Inside the limits it is H, and its
+    /// lowest point is the same, because the penalty outweighs what
+    /// a violation gains (about 80 per unit at the optimum, against 1000). The step of equation 19 hides from a search on which side of a limit to
+    /// go, and lets evolution strategies die at the wall: their
     /// covariance collapses before they have slid along it.
     ///
     /// # Panics
@@ -274,7 +280,8 @@ impl PaperProblem {
         [stroke(2.313, 1.523, 367.0), stroke(2.094, 0.996, 246.0)]
     }
 
-    /// Solves [`SmoothPaperProblem`] by the augmented Lagrangian from `starts` random points of the ranges. The best point keeps every limit of (18); judge it by [`fitness`](PaperProblem::fitness).
+    /// Solves [`SmoothPaperProblem`] by the augmented Lagrangian from `starts` random points of the ranges. The best point keeps every limit of (18);
+    /// judge it by [`fitness`](PaperProblem::fitness).
     ///
     /// # Errors
     /// A constant out of range; no start.
@@ -287,9 +294,14 @@ impl PaperProblem {
         self.validate()?;
         let mut random = Random::new(seed);
         let bounds = self.bounds();
-        let points: Vec<Vec<f64>> =
-            (0..starts).map(|_| bounds.iter().map(|[lower, upper]| random.uniform(*lower, *upper)).collect()).collect();
-        multi_start(|| SmoothPaperProblem::new(self), &points, &AugmentedLagrangianSettings::default(), watch)
+        let smooth = SmoothPaperProblem::new(self);
+        let points: Vec<Vec<f64>> = (0..starts)
+            .map(|_| {
+                let x: Vec<f64> = bounds.iter().map(|[lower, upper]| random.uniform(*lower, *upper)).collect();
+                smooth.with_bounds_of_conditions(&x)
+            })
+            .collect();
+        multi_start(|| smooth.clone(), &points, &AugmentedLagrangianSettings::default(), watch)
     }
 }
 

@@ -4,7 +4,8 @@ use super::projected_lbfgs::{Effort, End, Smooth, projected_lbfgs};
 use super::{OptimiserError, Progress, Watch, check_bounds, check_length, setting};
 use serde::{Deserialize, Serialize};
 
-/// minimise f(x) subject to c_i(x) = 0 for the first [`equalities`](ConstrainedProblem::equalities) constraints, c_i(x) <= 0 for the others, and lower <= x <= upper.
+/// minimise f(x) subject to c_i(x) = 0 for the first [`equalities`](ConstrainedProblem::equalities) constraints, c_i(x) <= 0 for the others, and
+/// lower <= x <= upper.
 ///
 /// Evaluation is split in two so that one adjoint sweep gives the gradient of f and of any number of constraints together, reusing what the values needed.
 /// Constraints work best when scaled to order one (limit reached = 0, limit exceeded by its own size = 1).
@@ -25,7 +26,7 @@ pub trait ConstrainedProblem {
     fn gradient(&mut self, weights: &[f64], gradient: &mut [f64]);
 }
 
-/// Settings of [`augmented_lagrangian`].
+/// Settings of [`augmented_lagrangian()`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AugmentedLagrangianSettings {
@@ -101,7 +102,7 @@ pub enum AugmentedLagrangianStatus {
     Stopped,
 }
 
-/// What [`augmented_lagrangian`] found.
+/// What [`augmented_lagrangian()`] found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AugmentedLagrangianResult {
     /// How it ended.
@@ -124,8 +125,10 @@ pub struct AugmentedLagrangianResult {
 
 /// Minimises a [`ConstrainedProblem`] from `start`, which is first moved into the bounds.
 ///
-/// Powell, Hestenes and Rockafellar's function L = f + Σ_eq (λ c + ρ c²/2) + Σ_ineq [max(0, λ + ρ c)² - λ²] / 2ρ is minimised inside the bounds by L-BFGS with projected steps; then λ ← λ + ρ c (not below 0 for
-/// inequalities), and ρ grows when the violation was not halved (Birgin and Martínez, *Practical Augmented Lagrangian Methods*, 2014, algorithm 4.1). Finds a local solution.
+/// Powell, Hestenes and Rockafellar's function L = f + Σ_eq (λ c + ρ c²/2) + Σ_ineq [max(0, λ + ρ c)² - λ²] / 2ρ is minimised inside the bounds by
+/// L-BFGS with projected steps; then λ ← λ + ρ c (not below 0 for
+/// inequalities), and ρ grows when the violation was not halved (Birgin and Martínez, *Practical Augmented Lagrangian Methods*, 2014, algorithm 4.1).
+/// Finds a local solution.
 ///
 /// Deterministic. `watch` hears the best point so far after every evaluation.
 ///

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-/// Settings of [`cma_es`]. Strategy constants are the defaults of Hansen, *The CMA Evolution Strategy: A Tutorial* (2016), table 1.
+/// Settings of [`cma_es()`]. Strategy constants are the defaults of Hansen, *The CMA Evolution Strategy: A Tutorial* (2016), table 1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CmaEsSettings {
@@ -63,7 +63,7 @@ impl CmaEsSettings {
     }
 }
 
-/// How a run of [`cma_es`] ended.
+/// How a run of [`cma_es()`] ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CmaEsStatus {
@@ -96,7 +96,7 @@ pub struct CmaEsRun {
     pub status: CmaEsStatus,
 }
 
-/// What [`cma_es`] found.
+/// What [`cma_es()`] found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CmaEsResult {
     /// The best point of all runs, inside the bounds.
@@ -113,7 +113,8 @@ pub struct CmaEsResult {
 
 /// Minimises `objective` from `start` with first steps of standard deviation `steps` (one per variable), inside `bounds`.
 ///
-/// (μ/μ_w, λ)-CMA-ES with cumulative step-size adaptation, rank-one and rank-μ update (Hansen 2016, fig. 6). A candidate outside the bounds is evaluated at the nearest point inside, and ranked with the
+/// (μ/μ_w, λ)-CMA-ES with cumulative step-size adaptation, rank-one and rank-μ update (Hansen 2016, fig. 6). A candidate outside the bounds is
+/// evaluated at the nearest point inside, and ranked with the
 /// square of its distance (in the search's own scale) times the spread of the generation's values added (Hansen 2016, appendix B.5).
 ///
 /// Candidates are evaluated in parallel; the result depends on the seed alone.

@@ -1,4 +1,5 @@
-//! Optimisers, one file each: without derivatives ([`binary_genetic`], [`cma_es`]) and with exact gradients ([`augmented_lagrangian`], [`multi_start`]).
+//! Optimisers, one file each: without derivatives ([`binary_genetic()`], [`cma_es()`]) and with exact gradients ([`augmented_lagrangian()`],
+//! [`multi_start()`]).
 //!
 //! All are deterministic by their seed or start, on any number of threads, and anytime: a callback hears the best point so far and can stop them.
 

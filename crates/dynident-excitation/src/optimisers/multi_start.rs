@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::sync::{Mutex, PoisonError};
 
-/// What [`multi_start`] found.
+/// What [`multi_start()`] found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MultiStartResult {
     /// The number of the best start: of the lowest objective among the feasible ones, else of the smallest violation.
@@ -31,9 +31,10 @@ impl MultiStartResult {
     }
 }
 
-/// Runs [`augmented_lagrangian`] from every start, in parallel, each on its own problem from `problem`.
+/// Runs [`augmented_lagrangian()`] from every start, in parallel, each on its own problem from `problem`.
 ///
-/// `watch` hears the best over all starts whenever it improves, and is asked after every evaluation whether to go on; `iteration` and `evaluations` are those of the start that speaks.
+/// `watch` hears the best over all starts whenever it improves, and is asked after every evaluation whether to go on; `iteration` and `evaluations`
+/// are those of the start that speaks.
 /// Unless it stops the search, the result does not depend on the number of threads: among equals the first start is best.
 ///
 /// # Errors

@@ -1,16 +1,12 @@
 //! Singular values of a tall matrix with three columns.
 
-/// Singular values and right singular vectors.
+/// The singular values, largest first.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Singular3 {
-    /// Largest first.
-    pub(super) values: [f64; 3],
-    /// `vectors[k]` belongs to `values[k]`.
-    pub(super) vectors: [[f64; 3]; 3],
-}
+pub(super) struct Singular3([f64; 3]);
 
 impl Singular3 {
-    /// Of the matrix with these rows: triangular factor by Givens rotations, row by row, then one-sided Jacobi rotations of its columns (Golub and Van Loan, *Matrix Computations*,
+    /// Of the matrix with these rows: triangular factor by Givens rotations, row by row, then one-sided Jacobi rotations of its columns (Golub and
+    /// Van Loan, *Matrix Computations*,
     /// 2013, sections 5.2 and 8.6). No product of the matrix with itself is formed, so condition numbers are good up to about 1e15.
     pub(super) fn of_rows(rows: impl IntoIterator<Item = [f64; 3]>) -> Self {
         let mut r = [[0.0; 3]; 3];
@@ -33,7 +29,6 @@ impl Singular3 {
     }
 
     fn of_triangle(mut r: [[f64; 3]; 3]) -> Self {
-        let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let product = |r: &[[f64; 3]; 3], a: usize, b: usize| -> f64 { r.iter().map(|row| row[a] * row[b]).sum() };
         // Converges quadratically; six sweeps are usual.
         for _ in 0..30 {
@@ -48,7 +43,7 @@ impl Singular3 {
                 let tan = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
                 let cos = 1.0 / (1.0 + tan * tan).sqrt();
                 let sin = cos * tan;
-                for row in r.iter_mut().chain(&mut v) {
+                for row in &mut r {
                     (row[a], row[b]) = (cos * row[a] - sin * row[b], sin * row[a] + cos * row[b]);
                 }
             }
@@ -56,14 +51,13 @@ impl Singular3 {
                 break;
             }
         }
-        let mut order = [0, 1, 2];
-        let lengths = [0, 1, 2].map(|k| product(&r, k, k).sqrt());
-        order.sort_by(|&a, &b| lengths[b].total_cmp(&lengths[a]));
-        Self { values: order.map(|k| lengths[k]), vectors: order.map(|k| [v[0][k], v[1][k], v[2][k]]) }
+        let mut values = [0, 1, 2].map(|k| product(&r, k, k).sqrt());
+        values.sort_by(|a, b| b.total_cmp(a));
+        Self(values)
     }
 
     /// Largest over smallest singular value; infinite without full rank.
     pub(super) fn condition_number(&self) -> f64 {
-        if self.values[2] > 0.0 { self.values[0] / self.values[2] } else { f64::INFINITY }
+        if self.0[2] > 0.0 { self.0[0] / self.0[2] } else { f64::INFINITY }
     }
 }

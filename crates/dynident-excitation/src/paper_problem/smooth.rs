@@ -1,13 +1,21 @@
-//! The paper's problem without steps: windows sampled at a fixed number of points, limits as constraints, exact gradients.
+//! The paper's problem without steps and kinks: windows sampled at a fixed number of points, condition numbers and limits as constraints, exact gradients.
 
-use super::condition::Singular3;
 use super::{PEAK_OF_SECOND, PaperProblem, Stroke, strokes};
 use crate::optimisers::ConstrainedProblem;
+use core::f64::consts::PI;
 
-/// ln(cond(M) + cond(Q)) as a smooth function of A1, ω1, δ1, A2, ω2, δ2, and the limits (17), (18) as constraints value/limit - 1 <= 0.
+/// Minimise ln(e^s1 + e^s2) over A1, ω1, δ1, A2, ω2, δ2, s1, s2, where s is an upper bound of the logarithm of each joint's condition number, under
+/// the limits (17), (18) as constraints value/limit - 1 <= 0.
 ///
-/// [`PaperProblem::fitness`] jumps where δ takes in one sample more and where a limit is met. Here every window holds the same number of samples, spread evenly from -δ to δ (the middles of equal parts), which has the same
-/// condition number up to the width of a sample; δ <= T/4 is a constraint. Limits are tightened by one part in a million, so that a solution within the optimiser's tolerance keeps them strictly.
+/// [`PaperProblem::fitness`] jumps where δ takes in one sample more and where a limit is met. Here every window holds the same number of samples,
+/// spread evenly from -δ to δ (the middles of equal parts), which has the same
+/// condition number up to the width of a sample; δ <= T/4 is a constraint. Limits are tightened by one part in a million, so that a solution within
+/// the optimiser's tolerance keeps them strictly.
+///
+/// The condition number itself has a kink, and the optimum lies on it: turned by A/2, the rows are [q̈, -g sin p | g cos p] with p = q - A/2, odd and
+/// even in time from the mid-point, so W splits into two blocks, and at the
+/// optimum the largest singular values of both are equal. Each block's singular values are smooth; so is the problem with one constraint ln σ_large -
+/// ln σ_small - s <= 0 for every pair that may be extreme.
 #[derive(Clone, Debug)]
 pub struct SmoothPaperProblem {
     problem: PaperProblem,
@@ -15,72 +23,114 @@ pub struct SmoothPaperProblem {
     x: Vec<f64>,
 }
 
-/// Speed, acceleration, both at rest, window.
-const CONSTRAINTS_PER_JOINT: usize = 5;
+/// Three pairs of singular values; speed, acceleration, both at rest, window.
+const PAIRS: usize = 3;
+const CONSTRAINTS_PER_JOINT: usize = PAIRS + 5;
 const MARGIN: f64 = 1e-6;
+
+/// A number and its gradient by A, ω, δ.
+type Slope = (f64, [f64; 3]);
+
+/// ln of the singular values of the odd block, large and small, and of the even one.
+struct LogSingular {
+    odd: [Slope; 2],
+    even: Slope,
+}
+
+impl LogSingular {
+    /// The pairs whose ratio may be the condition number, as differences of logarithms.
+    fn pairs(&self) -> [Slope; PAIRS] {
+        let [large, small] = self.odd;
+        [(self.even, small), (large, small), (large, self.even)]
+            .map(|(over, under)| (over.0 - under.0, core::array::from_fn(|i| over.1[i] - under.1[i])))
+    }
+}
 
 impl SmoothPaperProblem {
     /// With 256 points a window: error of the condition number below 1e-4 of itself.
     pub fn new(problem: &PaperProblem) -> Self {
-        Self { problem: problem.clone(), points: 256, x: vec![0.0; 6] }
+        Self { problem: problem.clone(), points: 256, x: vec![0.0; 8] }
     }
 
-    /// cond(M) + cond(Q) at `x`.
+    /// cond(M) + cond(Q) at `x` (its first six entries).
     ///
     /// # Panics
     /// If `x` has fewer than six entries.
     pub fn condition_sum(&self, x: &[f64]) -> f64 {
-        strokes(x).iter().map(|stroke| self.singular(stroke).condition_number()).sum()
+        self.log_conditions(x).iter().map(|log| log.exp()).sum()
     }
 
-    /// Where in the window point `k` lies, from -1 to 1.
-    fn place(&self, k: usize) -> f64 {
-        (2 * k + 1) as f64 / self.points as f64 - 1.0
+    /// A full point: the given A1 .. δ2 with the smallest s1, s2 that fit.
+    ///
+    /// # Panics
+    /// If `x` has fewer than six entries.
+    pub fn with_bounds_of_conditions(&self, x: &[f64]) -> Vec<f64> {
+        let mut full = x[..6].to_vec();
+        full.extend(self.log_conditions(x));
+        full
     }
 
-    fn singular(&self, stroke: &Stroke) -> Singular3 {
-        let gravity = self.problem.gravity;
-        Singular3::of_rows((0..self.points).map(|k| {
-            let (q, ddq) = stroke.position_and_acceleration(self.place(k) * stroke.window_s);
-            let (sin, cos) = q.sin_cos();
-            [ddq, gravity * cos, -gravity * sin]
-        }))
+    fn log_conditions(&self, x: &[f64]) -> [f64; 2] {
+        strokes(x).map(|stroke| {
+            let pairs = self.log_singular(&stroke).pairs();
+            pairs.iter().fold(0.0, |largest: f64, pair| largest.max(pair.0))
+        })
     }
 
-    /// Condition number κ and its gradient by A, ω, δ: dσ = uᵀ dW v with u = W v/σ, so d ln κ = v₁ᵀWᵀdW v₁/σ₁² - v₃ᵀWᵀdW v₃/σ₃².
-    fn condition_gradient(&self, stroke: &Stroke) -> (f64, [f64; 3]) {
-        let singular = self.singular(stroke);
-        let gravity = self.problem.gravity;
+    /// Sums over the later half of the window; the earlier one repeats them.
+    fn log_singular(&self, stroke: &Stroke) -> LogSingular {
         let Stroke { amplitude_rad: a, steepness_per_s: w, window_s } = *stroke;
-        let mut by_log = [0.0; 3];
-        for k in 0..self.points {
-            let place = self.place(k);
-            let t = place * window_s;
-            let f = 1.0 / (1.0 + (-w * t).exp());
-            let first = f * (1.0 - f);
-            let second = first * (1.0 - 2.0 * f);
-            let third = first * (1.0 - 6.0 * first);
-            let (sin, cos) = (a * f).sin_cos();
-            let (jerk, speed) = (a * w.powi(3) * third, a * w * first);
-            let dq = [f, a * first * t, speed * place];
-            let dddq = [w * w * second, 2.0 * a * w * second + a * w * w * third * t, jerk * place];
-            let row = [a * w * w * second, gravity * cos, -gravity * sin];
-            for (index, sign) in [(0, 1.0), (2, -1.0)] {
-                let v = singular.vectors[index];
-                let u = row[0] * v[0] + row[1] * v[1] + row[2] * v[2];
-                let weight = sign * u / singular.values[index].powi(2);
-                let by_q = -gravity * (sin * v[1] + cos * v[2]);
-                for i in 0..3 {
-                    by_log[i] += weight * (dddq[i] * v[0] + dq[i] * by_q);
-                }
+        let gravity = self.problem.gravity;
+        // Columns q̈, g sin p, g cos p with their gradients.
+        let rows: Vec<[Slope; 3]> = (0..self.points / 2)
+            .map(|k| {
+                let place = (2 * k + 1) as f64 / self.points as f64;
+                let t = place * window_s;
+                let f = 1.0 / (1.0 + (-w * t).exp());
+                let first = f * (1.0 - f);
+                let second = first * (1.0 - 2.0 * f);
+                let third = first * (1.0 - 6.0 * first);
+                let (sin, cos) = (a * (f - 0.5)).sin_cos();
+                let dp = [f - 0.5, a * first * t, a * w * first * place];
+                let dddq =
+                    [w * w * second, 2.0 * a * w * second + a * w * w * third * t, a * w.powi(3) * third * place];
+                [
+                    (a * w * w * second, dddq),
+                    (gravity * sin, dp.map(|d| gravity * cos * d)),
+                    (gravity * cos, dp.map(|d| -gravity * sin * d)),
+                ]
+            })
+            .collect();
+        let product = |i: usize, j: usize| -> f64 { rows.iter().map(|row| row[i].0 * row[j].0).sum() };
+        let (aa, ab, bb, cc) = (product(0, 0), product(0, 1), product(1, 1), product(2, 2));
+        // The small eigenvalue of the odd block from its determinant aa·‖b - (ab/aa) a‖², where nothing cancels.
+        let share = ab / aa;
+        let rest: f64 = rows.iter().map(|row| (row[1].0 - share * row[0].0).powi(2)).sum();
+        let half = 0.5 * (aa - bb);
+        let radius = half.hypot(ab);
+        let large = 0.5 * (aa + bb) + radius;
+        // Angle of the large eigenvector: tan 2θ = 2 ab/(aa - bb).
+        let (sin, cos) = (0.5 * ab.atan2(half)).sin_cos();
+        let (mut d_aa, mut d_rest, mut d_large, mut d_cc) = ([0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]);
+        for [acceleration, odd, even] in &rows {
+            let along = cos * acceleration.0 + sin * odd.0;
+            let residual = odd.0 - share * acceleration.0;
+            for i in 0..3 {
+                d_aa[i] += 2.0 * acceleration.0 * acceleration.1[i];
+                d_rest[i] += 2.0 * residual * (odd.1[i] - share * acceleration.1[i]);
+                d_large[i] += 2.0 * along * (cos * acceleration.1[i] + sin * odd.1[i]);
+                d_cc[i] += 2.0 * even.0 * even.1[i];
             }
         }
-        let condition = singular.condition_number();
-        (condition, by_log.map(|g| condition * g))
+        // ln σ = ½ ln λ.
+        let log = |value: f64, slope: [f64; 3]| (0.5 * value.ln(), slope.map(|d| 0.5 * d / value));
+        let (first, determinant, second) = (log(large, d_large), log(aa, d_aa), log(rest, d_rest));
+        let small = core::array::from_fn(|i| determinant.1[i] + second.1[i] - first.1[i]);
+        LogSingular { odd: [first, (determinant.0 + second.0 - first.0, small)], even: log(cc, d_cc) }
     }
 
-    /// Value and gradient by A, ω, δ of every constraint of one joint. All are products of powers: c = s Aᵃ ωʷ δᵈ - 1.
-    fn constraints_of(&self, stroke: &Stroke) -> [(f64, [f64; 3]); CONSTRAINTS_PER_JOINT] {
+    /// Value and gradient by A, ω, δ of every limit of one joint. All are products of powers: c = s Aᵃ ωʷ δᵈ - 1.
+    fn limits_of(&self, stroke: &Stroke) -> [Slope; CONSTRAINTS_PER_JOINT - PAIRS] {
         let problem = &self.problem;
         let quarter = 0.25 * problem.period_times_steepness;
         let rest = 1.0 / (1.0 + quarter.exp());
@@ -107,16 +157,18 @@ impl SmoothPaperProblem {
 
 impl ConstrainedProblem for SmoothPaperProblem {
     fn variables(&self) -> usize {
-        6
+        8
     }
 
     fn bounds(&self) -> Vec<[f64; 2]> {
         let mut bounds = self.problem.bounds();
         // Position and ground: the stroke ends below A.
-        let highest = self.problem.position_limit_rad.min(core::f64::consts::PI) * (1.0 - MARGIN);
+        let highest = self.problem.position_limit_rad.min(PI) * (1.0 - MARGIN);
         for joint in 0..2 {
             bounds[3 * joint][1] = bounds[3 * joint][1].min(highest);
         }
+        // Condition numbers are at least 1; beyond e⁴⁰ there are no digits left.
+        bounds.extend([[0.0, 40.0]; 2]);
         bounds
     }
 
@@ -126,29 +178,31 @@ impl ConstrainedProblem for SmoothPaperProblem {
 
     fn values(&mut self, x: &[f64], constraints: &mut [f64]) -> f64 {
         self.x.copy_from_slice(x);
-        for (stroke, out) in strokes(x).iter().zip(constraints.chunks_exact_mut(CONSTRAINTS_PER_JOINT)) {
-            for (c, (value, _)) in out.iter_mut().zip(self.constraints_of(stroke)) {
-                *c = value;
+        let joints = strokes(x).into_iter().zip(&x[6..]);
+        for ((stroke, bound), out) in joints.zip(constraints.chunks_exact_mut(CONSTRAINTS_PER_JOINT)) {
+            for (c, pair) in out.iter_mut().zip(self.log_singular(&stroke).pairs()) {
+                *c = pair.0 - bound;
+            }
+            for (c, limit) in out[PAIRS..].iter_mut().zip(self.limits_of(&stroke)) {
+                *c = limit.0;
             }
         }
-        self.condition_sum(x).ln()
+        (x[6].exp() + x[7].exp()).ln()
     }
 
     fn gradient(&mut self, weights: &[f64], gradient: &mut [f64]) {
-        let strokes = strokes(&self.x);
-        let parts = strokes.map(|stroke| self.condition_gradient(&stroke));
-        let sum = parts[0].0 + parts[1].0;
-        for joint in 0..2 {
-            let out = &mut gradient[3 * joint..3 * joint + 3];
-            for i in 0..3 {
-                out[i] = parts[joint].1[i] / sum;
-            }
+        gradient.fill(0.0);
+        let conditions = [self.x[6].exp(), self.x[7].exp()];
+        for (joint, stroke) in strokes(&self.x).iter().enumerate() {
             let weights = &weights[CONSTRAINTS_PER_JOINT * joint..];
-            for (weight, (_, row)) in weights.iter().zip(self.constraints_of(&strokes[joint])) {
+            let pairs = self.log_singular(stroke).pairs();
+            for (weight, (_, slope)) in weights.iter().zip(pairs.iter().chain(&self.limits_of(stroke))) {
                 for i in 0..3 {
-                    out[i] += weight * row[i];
+                    gradient[3 * joint + i] += weight * slope[i];
                 }
             }
+            let held: f64 = weights[..PAIRS].iter().sum();
+            gradient[6 + joint] = conditions[joint] / (conditions[0] + conditions[1]) - held;
         }
     }
 }
