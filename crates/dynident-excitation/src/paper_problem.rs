@@ -1,6 +1,18 @@
 //! The paper's design problem: one logistic stroke for each joint of the planar 2R arm, chosen for the smallest cond(M) + cond(Q).
 //!
 //! *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*, equations 7 to 10 and 14 to 19, Fig. 6, Table 3.
+//!
+//! ```
+//! use core::ops::ControlFlow;
+//! use dynident_excitation::paper_problem::{PaperLimit, PaperProblem, strokes};
+//!
+//! let problem = PaperProblem::default();
+//! let solution = problem.gradient_solution(0, 2, |_| ControlFlow::Continue(()))?;
+//! let x = &solution.best().expect("defined at every start").best;
+//! assert!(problem.fitness(x) < 161.4);
+//! assert!(problem.limits(&strokes(x)).iter().all(PaperLimit::kept));
+//! # Ok::<(), dynident_excitation::optimisers::OptimiserError>(())
+//! ```
 
 mod condition;
 mod smooth;

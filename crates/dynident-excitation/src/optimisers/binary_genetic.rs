@@ -39,9 +39,10 @@ impl BinaryGeneticSettings {
     /// [`OptimiserError::Setting`] names the first that is not.
     pub fn validate(&self) -> Result<(), OptimiserError> {
         setting("bits", self.bits as f64, (1..=52).contains(&self.bits), "between 1 and 52")?;
-        let even = self.population >= 2 && self.population.is_multiple_of(2);
-        setting("population", self.population as f64, even, "an even number of at least 2")?;
-        setting("generations", self.generations as f64, self.generations >= 1, "at least 1")?;
+        let even = (2..=1_000_000).contains(&self.population) && self.population.is_multiple_of(2);
+        setting("population", self.population as f64, even, "an even number from 2 to 1,000,000")?;
+        let generations = (1..=10_000_000).contains(&self.generations);
+        setting("generations", self.generations as f64, generations, "between 1 and 10,000,000")?;
         setting("crossover", self.crossover, (0.0..=1.0).contains(&self.crossover), "between 0 and 1")?;
         setting("mutation", self.mutation, (0.0..=1.0).contains(&self.mutation), "between 0 and 1")
     }
@@ -272,7 +273,7 @@ mod tests {
             binary_genetic(bowl, bounds, settings, &mut |_| ControlFlow::Continue(())).unwrap_err().to_string()
         };
         let odd = BinaryGeneticSettings { population: 7, ..Default::default() };
-        assert_eq!(go(&BOX, &odd), "setting `population` is 7; it must be an even number of at least 2");
+        assert_eq!(go(&BOX, &odd), "setting `population` is 7; it must be an even number from 2 to 1,000,000");
         let error = go(&[[0.0, 1.0], [2.0, f64::NAN]], &BinaryGeneticSettings::default());
         assert!(error.starts_with("variable 1: range 2 to NaN"), "{error}");
     }

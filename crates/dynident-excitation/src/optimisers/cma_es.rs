@@ -15,7 +15,7 @@ pub struct CmaEsSettings {
     pub population: Option<usize>,
     /// Restarts after a run has ended by itself, each from a random place with twice the candidates (IPOP, Auger and Hansen 2005). Default 0.
     pub restarts: usize,
-    /// Evaluations at most, all runs together. Default 100,000.
+    /// No generation is begun after this many evaluations, all runs together. Default 100,000.
     pub max_evaluations: usize,
     /// The search ends at an objective this low. Default none.
     pub target: Option<f64>,
@@ -48,7 +48,8 @@ impl CmaEsSettings {
     /// [`OptimiserError::Setting`] names the first that is not.
     pub fn validate(&self) -> Result<(), OptimiserError> {
         let population = self.population.unwrap_or(4);
-        setting("population", population as f64, population >= 4, "at least 4")?;
+        let usable = population >= 4 && (self.population.is_none() || population <= self.max_evaluations);
+        setting("population", population as f64, usable, "at least 4 and at most `max_evaluations`")?;
         setting(
             "restarts",
             self.restarts as f64,
@@ -153,6 +154,11 @@ pub fn cma_es(
     let smallest = settings.population.unwrap_or(4 + (3.0 * (start.len() as f64).ln()) as usize);
     let mut generations = 0;
     for run in 0..=settings.restarts {
+        if run > 0 && smallest << run > settings.max_evaluations.saturating_sub(result.evaluations) {
+            // Not one generation more: nothing to start for.
+            result.status = CmaEsStatus::EvaluationLimit;
+            break;
+        }
         let mut strategy = Strategy::new(&from, steps, smallest << run);
         let before = result.evaluations;
         let mut lowest_of_run = f64::INFINITY;
@@ -235,7 +241,7 @@ impl Strategy {
         let n = start.len();
         let parents = population / 2;
         let raw: Vec<f64> =
-            (1..=parents).map(|rank| ((population as f64 + 1.0) / 2.0).ln() - (rank as f64).ln()).collect();
+            (1..=parents).map(|rank| f64::midpoint(population as f64, 1.0).ln() - (rank as f64).ln()).collect();
         let sum: f64 = raw.iter().sum();
         let weights: Vec<f64> = raw.iter().map(|w| w / sum).collect();
         Self {

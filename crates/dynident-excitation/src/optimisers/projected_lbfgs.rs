@@ -183,7 +183,9 @@ fn quasi_newton(pairs: &VecDeque<Pair>, gradient: &[f64], free: &[bool]) -> Vec<
     }
     if let Some((pair, sy)) = useful.last() {
         let scale = sy / masked(&pair.y, &pair.y);
-        direction.iter_mut().for_each(|d| *d *= scale);
+        for d in &mut direction {
+            *d *= scale;
+        }
     }
     for ((pair, sy), weight) in useful.iter().zip(weights.iter().rev()) {
         let correction = masked(&pair.y, &direction) / sy;
