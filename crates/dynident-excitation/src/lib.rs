@@ -12,6 +12,8 @@ pub mod families;
 mod family;
 pub mod limits;
 mod motion;
+pub mod optimisers;
+pub mod paper_problem;
 
 pub use family::Family;
 pub use information::Information;

@@ -1,0 +1,331 @@
+//! Minimisation under smooth constraints with exact gradients: augmented Lagrangian over a projected L-BFGS.
+
+use super::projected_lbfgs::{Effort, End, Smooth, projected_lbfgs};
+use super::{OptimiserError, Progress, Watch, check_bounds, check_length, setting};
+use serde::{Deserialize, Serialize};
+
+/// minimise f(x) subject to c_i(x) = 0 for the first [`equalities`](ConstrainedProblem::equalities) constraints, c_i(x) <= 0 for the others, and
+/// lower <= x <= upper.
+///
+/// Evaluation is split in two so that one adjoint sweep gives the gradient of f and of any number of constraints together, reusing what the values needed.
+/// Constraints work best when scaled to order one (limit reached = 0, limit exceeded by its own size = 1).
+pub trait ConstrainedProblem {
+    /// Number of variables.
+    fn variables(&self) -> usize;
+    /// Lower and upper bound of each variable; infinite where there is none.
+    fn bounds(&self) -> Vec<[f64; 2]>;
+    /// Number of constraints.
+    fn constraints(&self) -> usize;
+    /// How many of them, the first ones, are equalities.
+    fn equalities(&self) -> usize {
+        0
+    }
+    /// Writes c(x) and returns f(x), at an `x` inside the bounds. Not finite where they are not defined; the search then takes a shorter step.
+    fn values(&mut self, x: &[f64], constraints: &mut [f64]) -> f64;
+    /// Writes the gradient of `f + Σ weights_i c_i` at the `x` of the last [`values`](ConstrainedProblem::values). Most weights are zero.
+    fn gradient(&mut self, weights: &[f64], gradient: &mut [f64]);
+}
+
+/// Settings of [`augmented_lagrangian()`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AugmentedLagrangianSettings {
+    /// A point is feasible if no constraint is violated by more. Default 1e-8.
+    pub feasibility_tolerance: f64,
+    /// Converged if the projected gradient of the Lagrangian has no entry above this times max(1, |f|). Default 1e-6.
+    pub optimality_tolerance: f64,
+    /// Evaluations at most. Default 20,000.
+    pub max_evaluations: usize,
+    /// Updates of the multipliers at most. Default 100.
+    pub max_outer_iterations: usize,
+    /// Descent steps between two updates of the multipliers at most. Default 200.
+    pub max_inner_iterations: usize,
+    /// Differences that L-BFGS remembers. Default 12.
+    pub memory: usize,
+    /// First penalty; none: from the sizes of f and c at the start, between 1e-6 and 10. Default none.
+    pub initial_penalty: Option<f64>,
+    /// Factor of the penalty when an update did not halve the violation. Default 10.
+    pub penalty_growth: f64,
+    /// The problem is declared infeasible when the penalty would go beyond. Default 1e12.
+    pub max_penalty: f64,
+}
+
+impl Default for AugmentedLagrangianSettings {
+    fn default() -> Self {
+        Self {
+            feasibility_tolerance: 1e-8,
+            optimality_tolerance: 1e-6,
+            max_evaluations: 20_000,
+            max_outer_iterations: 100,
+            max_inner_iterations: 200,
+            memory: 12,
+            initial_penalty: None,
+            penalty_growth: 10.0,
+            max_penalty: 1e12,
+        }
+    }
+}
+
+impl AugmentedLagrangianSettings {
+    /// Whether every setting is in its range.
+    ///
+    /// # Errors
+    /// [`OptimiserError::Setting`] names the first that is not.
+    pub fn validate(&self) -> Result<(), OptimiserError> {
+        let positive = |name, value: f64| setting(name, value, value > 0.0 && value.is_finite(), "positive and finite");
+        positive("feasibility_tolerance", self.feasibility_tolerance)?;
+        positive("optimality_tolerance", self.optimality_tolerance)?;
+        positive("max_evaluations", self.max_evaluations as f64)?;
+        positive("max_outer_iterations", self.max_outer_iterations as f64)?;
+        positive("max_inner_iterations", self.max_inner_iterations as f64)?;
+        positive("memory", self.memory as f64)?;
+        positive("initial_penalty", self.initial_penalty.unwrap_or(1.0))?;
+        positive("max_penalty", self.max_penalty)?;
+        let growth = self.penalty_growth;
+        setting("penalty_growth", growth, growth > 1.0 && growth.is_finite(), "finite and above 1")
+    }
+}
+
+/// How a search ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AugmentedLagrangianStatus {
+    /// Feasible and stationary within the tolerances.
+    Converged,
+    /// Feasible, and no lower value can be found in double precision, though the gradient is above its tolerance.
+    PrecisionLimit,
+    /// Outer iterations or evaluations used up.
+    IterationLimit,
+    /// The penalty reached its end and constraints are still violated: no feasible point near.
+    Infeasible,
+    /// The callback ended it.
+    Stopped,
+}
+
+/// What [`augmented_lagrangian()`] found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AugmentedLagrangianResult {
+    /// How it ended.
+    pub status: AugmentedLagrangianStatus,
+    /// The feasible point of the lowest objective among all that were evaluated; if none was feasible, the one with the smallest violation.
+    pub best: Vec<f64>,
+    /// Objective there.
+    pub value: f64,
+    /// Largest violation of a constraint there, max(c_i, 0) or |c_i|.
+    pub violation: f64,
+    /// Whether that is within the tolerance.
+    pub feasible: bool,
+    /// Multipliers of the constraints at the end: what the objective would gain per unit of relaxation.
+    pub multipliers: Vec<f64>,
+    /// Updates of the multipliers.
+    pub outer_iterations: usize,
+    /// Evaluations of objective and constraints.
+    pub evaluations: usize,
+}
+
+/// Minimises a [`ConstrainedProblem`] from `start`, which is first moved into the bounds.
+///
+/// Powell, Hestenes and Rockafellar's function L = f + Σ_eq (λ c + ρ c²/2) + Σ_ineq [max(0, λ + ρ c)² - λ²] / 2ρ is minimised inside the bounds by
+/// L-BFGS with projected steps; then λ ← λ + ρ c (not below 0 for
+/// inequalities), and ρ grows when the violation was not halved (Birgin and Martínez, *Practical Augmented Lagrangian Methods*, 2014, algorithm 4.1).
+/// Finds a local solution.
+///
+/// Deterministic. `watch` hears the best point so far after every evaluation.
+///
+/// # Errors
+/// A setting out of range, a start of the wrong length or where the problem is not defined, empty bounds.
+pub fn augmented_lagrangian(
+    problem: &mut impl ConstrainedProblem,
+    start: &[f64],
+    settings: &AugmentedLagrangianSettings,
+    watch: &mut Watch<'_>,
+) -> Result<AugmentedLagrangianResult, OptimiserError> {
+    settings.validate()?;
+    let bounds = problem.bounds();
+    check_length("start", problem.variables(), start.len())?;
+    check_length("bounds", problem.variables(), bounds.len())?;
+    check_bounds(&bounds, false)?;
+    if start.iter().any(|x| x.is_nan()) {
+        return Err(OptimiserError::Start);
+    }
+    let mut x: Vec<f64> = start.iter().zip(&bounds).map(|(x, &[lower, upper])| x.clamp(lower, upper)).collect();
+    let mut search = Search::new(problem, settings, watch);
+    let first = search.value(&x);
+    if !first.is_finite() {
+        return Err(OptimiserError::Start);
+    }
+    search.penalty = settings.initial_penalty.unwrap_or_else(|| {
+        let squares: f64 = (0..search.c.len()).map(|i| search.violation_of(i).powi(2)).sum();
+        (2.0 * search.objective.abs() / squares.max(1e-12)).clamp(1e-6, 10.0)
+    });
+    let mut tolerance: f64 = 0.1;
+    let mut last_measure = f64::INFINITY;
+    let mut status = AugmentedLagrangianStatus::IterationLimit;
+    while search.outer < settings.max_outer_iterations {
+        let scale = search.objective.abs().max(1.0);
+        let wanted = tolerance.max(settings.optimality_tolerance) * scale;
+        let effort = Effort { tolerance: wanted, iterations: settings.max_inner_iterations, memory: settings.memory };
+        let (end, stationarity) = projected_lbfgs(&mut search, &bounds, &mut x, &effort);
+        if search.halted() {
+            break;
+        }
+        // Values and constraints at the point where the descent ended; the last evaluation may have been a rejected trial.
+        search.value(&x);
+        search.outer += 1;
+        let measure = search.update_multipliers();
+        let scale = search.objective.abs().max(1.0);
+        let within = measure <= settings.feasibility_tolerance;
+        if within && stationarity <= settings.optimality_tolerance * scale {
+            status = AugmentedLagrangianStatus::Converged;
+            break;
+        }
+        if within && end == End::NoDescent && tolerance <= settings.optimality_tolerance {
+            status = AugmentedLagrangianStatus::PrecisionLimit;
+            break;
+        }
+        if !within && measure > 0.5 * last_measure {
+            search.penalty *= settings.penalty_growth;
+            if search.penalty > settings.max_penalty {
+                status = AugmentedLagrangianStatus::Infeasible;
+                break;
+            }
+        }
+        last_measure = measure;
+        tolerance *= 0.1;
+    }
+    if search.stopped {
+        status = AugmentedLagrangianStatus::Stopped;
+    }
+    let feasible = search.best_violation <= settings.feasibility_tolerance;
+    if feasible && status == AugmentedLagrangianStatus::Infeasible {
+        status = AugmentedLagrangianStatus::PrecisionLimit;
+    }
+    Ok(AugmentedLagrangianResult {
+        status,
+        value: search.best_value,
+        violation: search.best_violation,
+        feasible,
+        outer_iterations: search.outer,
+        evaluations: search.evaluations,
+        best: search.best,
+        multipliers: search.multipliers,
+    })
+}
+
+/// The augmented Lagrangian as a function, and the record of what was seen.
+struct Search<'a, 'w, P: ConstrainedProblem> {
+    problem: &'a mut P,
+    settings: &'a AugmentedLagrangianSettings,
+    watch: &'a mut Watch<'w>,
+    equalities: usize,
+    multipliers: Vec<f64>,
+    penalty: f64,
+    objective: f64,
+    c: Vec<f64>,
+    weights: Vec<f64>,
+    best: Vec<f64>,
+    best_value: f64,
+    best_violation: f64,
+    outer: usize,
+    evaluations: usize,
+    stopped: bool,
+}
+
+impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
+    fn new(problem: &'a mut P, settings: &'a AugmentedLagrangianSettings, watch: &'a mut Watch<'w>) -> Self {
+        let constraints = problem.constraints();
+        Self {
+            equalities: problem.equalities().min(constraints),
+            problem,
+            settings,
+            watch,
+            multipliers: vec![0.0; constraints],
+            penalty: 1.0,
+            objective: f64::NAN,
+            c: vec![0.0; constraints],
+            weights: vec![0.0; constraints],
+            best: Vec::new(),
+            best_value: f64::INFINITY,
+            best_violation: f64::INFINITY,
+            outer: 0,
+            evaluations: 0,
+            stopped: false,
+        }
+    }
+
+    fn violation_of(&self, i: usize) -> f64 {
+        if i < self.equalities { self.c[i].abs() } else { self.c[i].max(0.0) }
+    }
+
+    /// Keeps the point if it is better: feasible before infeasible, then by value or violation.
+    fn record(&mut self, x: &[f64]) {
+        let violation = (0..self.c.len()).fold(0.0, |worst: f64, i| worst.max(self.violation_of(i)));
+        let tolerance = self.settings.feasibility_tolerance;
+        let better = if violation <= tolerance {
+            self.best_violation > tolerance || self.objective < self.best_value
+        } else {
+            violation < self.best_violation
+        };
+        if better {
+            self.best = x.to_vec();
+            self.best_value = self.objective;
+            self.best_violation = violation;
+        }
+    }
+
+    /// First-order update at the current c. Returns how far feasibility and complementarity are missed.
+    fn update_multipliers(&mut self) -> f64 {
+        let mut measure: f64 = 0.0;
+        for i in 0..self.c.len() {
+            let (c, multiplier) = (self.c[i], self.multipliers[i]);
+            if i < self.equalities {
+                measure = measure.max(c.abs());
+                self.multipliers[i] = (multiplier + self.penalty * c).clamp(-1e12, 1e12);
+            } else {
+                measure = measure.max(c.max(-multiplier / self.penalty).abs());
+                self.multipliers[i] = (multiplier + self.penalty * c).clamp(0.0, 1e12);
+            }
+        }
+        measure
+    }
+}
+
+impl<P: ConstrainedProblem> Smooth for Search<'_, '_, P> {
+    fn value(&mut self, x: &[f64]) -> f64 {
+        self.objective = self.problem.values(x, &mut self.c);
+        self.evaluations += 1;
+        let mut value = self.objective;
+        for i in 0..self.c.len() {
+            let (c, multiplier) = (self.c[i], self.multipliers[i]);
+            let force = multiplier + self.penalty * c;
+            self.weights[i] = if i < self.equalities { force } else { force.max(0.0) };
+            value += (self.weights[i] * self.weights[i] - multiplier * multiplier) / (2.0 * self.penalty);
+        }
+        // NaN vanishes in `max`, so every constraint is asked.
+        if !value.is_finite() || self.c.iter().any(|c| !c.is_finite()) {
+            return f64::NAN;
+        }
+        self.record(x);
+        let progress = Progress {
+            best: &self.best,
+            value: self.best_value,
+            violation: self.best_violation,
+            iteration: self.outer,
+            evaluations: self.evaluations,
+        };
+        self.stopped |= (self.watch)(&progress).is_break();
+        value
+    }
+
+    fn gradient(&mut self, gradient: &mut [f64]) {
+        self.problem.gradient(&self.weights, gradient);
+    }
+
+    fn halted(&self) -> bool {
+        self.stopped || self.evaluations >= self.settings.max_evaluations
+    }
+}
+
+#[cfg(test)]
+#[path = "augmented_lagrangian_tests.rs"]
+mod tests;

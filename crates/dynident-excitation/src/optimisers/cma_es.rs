@@ -1,0 +1,385 @@
+//! CMA-ES: evolution strategy with covariance matrix adaptation, for objectives without derivatives.
+
+use super::{OptimiserError, Progress, Watch, check_bounds, check_length, evaluate_all, setting};
+use core::ops::ControlFlow;
+use dynident_model::sample::Random;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+
+/// Settings of [`cma_es()`]. Strategy constants are the defaults of Hansen, *The CMA Evolution Strategy: A Tutorial* (2016), table 1.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CmaEsSettings {
+    /// Candidates of a generation, at least 4; none: 4 + ⌊3 ln n⌋. Default none.
+    pub population: Option<usize>,
+    /// Restarts after a run has ended by itself, each from a random place with twice the candidates (IPOP, Auger and Hansen 2005). Default 0.
+    pub restarts: usize,
+    /// No generation is begun after this many evaluations, all runs together. Default 100,000.
+    pub max_evaluations: usize,
+    /// The search ends at an objective this low. Default none.
+    pub target: Option<f64>,
+    /// A run ends when the best values of the last 10 + ⌈30 n/λ⌉ generations and all of the present one differ by less. Default 1e-12.
+    pub function_tolerance: f64,
+    /// A run ends when its steps are this small, as a share of the first ones. Default 1e-12.
+    pub step_tolerance: f64,
+    /// Seed of all chance. Default 0.
+    pub seed: u64,
+}
+
+impl Default for CmaEsSettings {
+    fn default() -> Self {
+        Self {
+            population: None,
+            restarts: 0,
+            max_evaluations: 100_000,
+            target: None,
+            function_tolerance: 1e-12,
+            step_tolerance: 1e-12,
+            seed: 0,
+        }
+    }
+}
+
+impl CmaEsSettings {
+    /// Whether every setting is in its range.
+    ///
+    /// # Errors
+    /// [`OptimiserError::Setting`] names the first that is not.
+    pub fn validate(&self) -> Result<(), OptimiserError> {
+        let population = self.population.unwrap_or(4);
+        let usable = population >= 4 && (self.population.is_none() || population <= self.max_evaluations);
+        setting("population", population as f64, usable, "at least 4 and at most `max_evaluations`")?;
+        setting(
+            "restarts",
+            self.restarts as f64,
+            self.restarts <= 20,
+            "at most 20 (the population doubles each time)",
+        )?;
+        setting("max_evaluations", self.max_evaluations as f64, self.max_evaluations >= 1, "at least 1")?;
+        setting("target", self.target.unwrap_or(0.0), !self.target.is_some_and(f64::is_nan), "a number")?;
+        let (function, step) = (self.function_tolerance, self.step_tolerance);
+        setting("function_tolerance", function, (0.0..f64::INFINITY).contains(&function), "finite and not negative")?;
+        setting("step_tolerance", step, (0.0..1.0).contains(&step), "between 0 and 1")
+    }
+}
+
+/// How a run of [`cma_es()`] ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CmaEsStatus {
+    /// The objective is at the target.
+    TargetReached,
+    /// The objective no longer changes.
+    FunctionTolerance,
+    /// The steps are too small to matter, or to change the mean in double precision.
+    StepTolerance,
+    /// The covariance has a condition number beyond 1e14.
+    IllConditioned,
+    /// Steps grew 10,000-fold: the start was far away or the objective has no lowest point.
+    Diverged,
+    /// Evaluations used up.
+    EvaluationLimit,
+    /// The callback ended it.
+    Stopped,
+}
+
+/// One run, from a start to its end.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CmaEsRun {
+    /// Candidates of a generation.
+    pub population: usize,
+    /// Evaluations in this run.
+    pub evaluations: usize,
+    /// The lowest objective of this run.
+    pub value: f64,
+    /// How it ended.
+    pub status: CmaEsStatus,
+}
+
+/// What [`cma_es()`] found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CmaEsResult {
+    /// The best point of all runs, inside the bounds.
+    pub best: Vec<f64>,
+    /// Its objective; infinite if it was never a finite number.
+    pub value: f64,
+    /// Evaluations, all runs together.
+    pub evaluations: usize,
+    /// How the last run ended.
+    pub status: CmaEsStatus,
+    /// Every run, in order.
+    pub runs: Vec<CmaEsRun>,
+}
+
+/// Minimises `objective` from `start` with first steps of standard deviation `steps` (one per variable), inside `bounds`.
+///
+/// (μ/μ_w, λ)-CMA-ES with cumulative step-size adaptation, rank-one and rank-μ update (Hansen 2016, fig. 6). A candidate outside the bounds is
+/// evaluated at the nearest point inside, and ranked with the
+/// square of its distance (in the search's own scale) times the spread of the generation's values added (Hansen 2016, appendix B.5).
+///
+/// Candidates are evaluated in parallel; the result depends on the seed alone.
+///
+/// # Errors
+/// A setting out of range, vectors of different lengths, empty bounds, a step that is not positive, no variable.
+pub fn cma_es(
+    objective: impl Fn(&[f64]) -> f64 + Sync,
+    start: &[f64],
+    steps: &[f64],
+    bounds: &[[f64; 2]],
+    settings: &CmaEsSettings,
+    watch: &mut Watch<'_>,
+) -> Result<CmaEsResult, OptimiserError> {
+    settings.validate()?;
+    setting("variables", start.len() as f64, !start.is_empty(), "at least 1")?;
+    check_length("steps", start.len(), steps.len())?;
+    check_length("bounds", start.len(), bounds.len())?;
+    check_bounds(bounds, false)?;
+    for &step in steps {
+        setting("steps", step, step > 0.0 && step.is_finite(), "positive and finite")?;
+    }
+    if start.iter().any(|x| !x.is_finite()) {
+        return Err(OptimiserError::Start);
+    }
+    let mut random = Random::new(settings.seed);
+    let clamped = |x: &[f64]| -> Vec<f64> { x.iter().zip(bounds).map(|(x, b)| x.clamp(b[0], b[1])).collect() };
+    let mut from = clamped(start);
+    let mut result = CmaEsResult {
+        best: from.clone(),
+        value: f64::INFINITY,
+        evaluations: 0,
+        status: CmaEsStatus::EvaluationLimit,
+        runs: Vec::new(),
+    };
+    let smallest = settings.population.unwrap_or(4 + (3.0 * (start.len() as f64).ln()) as usize);
+    let mut generations = 0;
+    for run in 0..=settings.restarts {
+        if run > 0 && smallest << run > settings.max_evaluations.saturating_sub(result.evaluations) {
+            // Not one generation more: nothing to start for.
+            result.status = CmaEsStatus::EvaluationLimit;
+            break;
+        }
+        let mut strategy = Strategy::new(&from, steps, smallest << run);
+        let before = result.evaluations;
+        let mut lowest_of_run = f64::INFINITY;
+        let status = loop {
+            let candidates = strategy.sample(&mut random);
+            let inside: Vec<Vec<f64>> = candidates.iter().map(|y| clamped(&strategy.unscaled(y))).collect();
+            let values = evaluate_all(&objective, &inside);
+            result.evaluations += values.len();
+            generations += 1;
+            let lowest = (0..values.len()).min_by(|&a, &b| values[a].total_cmp(&values[b])).unwrap_or(0);
+            lowest_of_run = lowest_of_run.min(values[lowest]);
+            if values[lowest] < result.value {
+                result.value = values[lowest];
+                result.best.clone_from(&inside[lowest]);
+            }
+            let progress = Progress {
+                best: &result.best,
+                value: result.value,
+                violation: 0.0,
+                iteration: generations,
+                evaluations: result.evaluations,
+            };
+            if let ControlFlow::Break(()) = watch(&progress) {
+                break CmaEsStatus::Stopped;
+            }
+            if settings.target.is_some_and(|target| result.value <= target) {
+                break CmaEsStatus::TargetReached;
+            }
+            let ranked = strategy.penalised(&candidates, &inside, &values);
+            strategy.update(&candidates, &ranked);
+            if let Some(status) = strategy.end(&values, settings) {
+                break status;
+            }
+            if result.evaluations >= settings.max_evaluations {
+                break CmaEsStatus::EvaluationLimit;
+            }
+        };
+        let evaluations = result.evaluations - before;
+        result.runs.push(CmaEsRun { population: smallest << run, evaluations, value: lowest_of_run, status });
+        result.status = status;
+        if matches!(status, CmaEsStatus::Stopped | CmaEsStatus::TargetReached | CmaEsStatus::EvaluationLimit) {
+            break;
+        }
+        from = (0..start.len())
+            .map(|i| {
+                let [lower, upper] = bounds[i];
+                let anywhere = if (upper - lower).is_finite() {
+                    random.uniform(lower, upper)
+                } else {
+                    start[i] + steps[i] * random.normal()
+                };
+                anywhere.clamp(lower, upper)
+            })
+            .collect();
+    }
+    Ok(result)
+}
+
+/// The distribution N(mean, σ² C) and its evolution paths, in variables divided by the first steps.
+struct Strategy {
+    steps: Vec<f64>,
+    population: usize,
+    weights: Vec<f64>,
+    mu_eff: f64,
+    mean: DVector<f64>,
+    sigma: f64,
+    covariance: DMatrix<f64>,
+    /// Eigenvectors of the covariance and the roots of its eigenvalues.
+    axes: DMatrix<f64>,
+    lengths: DVector<f64>,
+    path_sigma: DVector<f64>,
+    path_c: DVector<f64>,
+    generation: usize,
+    decomposed_at: usize,
+    recent: VecDeque<f64>,
+}
+
+impl Strategy {
+    fn new(start: &[f64], steps: &[f64], population: usize) -> Self {
+        let n = start.len();
+        let parents = population / 2;
+        let raw: Vec<f64> =
+            (1..=parents).map(|rank| f64::midpoint(population as f64, 1.0).ln() - (rank as f64).ln()).collect();
+        let sum: f64 = raw.iter().sum();
+        let weights: Vec<f64> = raw.iter().map(|w| w / sum).collect();
+        Self {
+            mu_eff: 1.0 / weights.iter().map(|w| w * w).sum::<f64>(),
+            weights,
+            population,
+            mean: DVector::from_iterator(n, start.iter().zip(steps).map(|(x, step)| x / step)),
+            steps: steps.to_vec(),
+            sigma: 1.0,
+            covariance: DMatrix::identity(n, n),
+            axes: DMatrix::identity(n, n),
+            lengths: DVector::from_element(n, 1.0),
+            path_sigma: DVector::zeros(n),
+            path_c: DVector::zeros(n),
+            generation: 0,
+            decomposed_at: 0,
+            recent: VecDeque::new(),
+        }
+    }
+
+    fn sample(&self, random: &mut Random) -> Vec<DVector<f64>> {
+        (0..self.population)
+            .map(|_| {
+                let z = DVector::from_fn(self.mean.len(), |_, _| random.normal());
+                &self.mean + &self.axes * z.component_mul(&self.lengths) * self.sigma
+            })
+            .collect()
+    }
+
+    fn unscaled(&self, y: &DVector<f64>) -> Vec<f64> {
+        y.iter().zip(&self.steps).map(|(y, step)| y * step).collect()
+    }
+
+    /// The values by which candidates are ranked.
+    fn penalised(&self, candidates: &[DVector<f64>], inside: &[Vec<f64>], values: &[f64]) -> Vec<f64> {
+        let mut finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+        finite.sort_by(f64::total_cmp);
+        let quartiles = finite.get(3 * finite.len() / 4).zip(finite.get(finite.len() / 4));
+        let spread = quartiles.map_or(1.0, |(high, low)| (high - low).max(f64::MIN_POSITIVE));
+        let variance = self.sigma * self.sigma * self.covariance.trace() / self.mean.len() as f64;
+        (0..values.len())
+            .map(|k| {
+                let distance: f64 = (0..self.mean.len())
+                    .map(|i| (candidates[k][i] - inside[k][i] / self.steps[i]).powi(2))
+                    // The division back leaves rounding where nothing was moved.
+                    .filter(|d| *d > 1e-28 * variance)
+                    .sum();
+                values[k] + spread * distance / variance
+            })
+            .collect()
+    }
+
+    /// Moves mean, paths, covariance and step size (Hansen 2016, equations 39 to 47 with positive weights).
+    fn update(&mut self, candidates: &[DVector<f64>], ranked: &[f64]) {
+        let n = self.mean.len() as f64;
+        let mu_eff = self.mu_eff;
+        let c_sigma = (mu_eff + 2.0) / (n + mu_eff + 5.0);
+        let d_sigma = 1.0 + 2.0 * (((mu_eff - 1.0) / (n + 1.0)).sqrt() - 1.0).max(0.0) + c_sigma;
+        let c_c = (4.0 + mu_eff / n) / (n + 4.0 + 2.0 * mu_eff / n);
+        let c_1 = 2.0 / ((n + 1.3).powi(2) + mu_eff);
+        let c_mu = (1.0 - c_1).min(2.0 * (mu_eff - 2.0 + 1.0 / mu_eff) / ((n + 2.0).powi(2) + mu_eff));
+        let expected_length = n.sqrt() * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n));
+
+        let mut order: Vec<usize> = (0..ranked.len()).collect();
+        order.sort_by(|&a, &b| ranked[a].total_cmp(&ranked[b]).then(a.cmp(&b)));
+        let offsets: Vec<DVector<f64>> =
+            order.iter().take(self.weights.len()).map(|&k| (&candidates[k] - &self.mean) / self.sigma).collect();
+        let mut shift = DVector::zeros(self.mean.len());
+        for (offset, weight) in offsets.iter().zip(&self.weights) {
+            shift.axpy(*weight, offset, 1.0);
+        }
+        self.mean.axpy(self.sigma, &shift, 1.0);
+        self.generation += 1;
+
+        let whitened = &self.axes * (self.axes.tr_mul(&shift)).component_div(&self.lengths);
+        self.path_sigma *= 1.0 - c_sigma;
+        self.path_sigma.axpy((c_sigma * (2.0 - c_sigma) * mu_eff).sqrt(), &whitened, 1.0);
+        let length = self.path_sigma.norm();
+        let settled = (1.0 - (1.0 - c_sigma).powi(2 * self.generation as i32)).sqrt();
+        // The path stands still while the step size catches up.
+        let steady = length / settled < (1.4 + 2.0 / (n + 1.0)) * expected_length;
+        self.path_c *= 1.0 - c_c;
+        if steady {
+            self.path_c.axpy((c_c * (2.0 - c_c) * mu_eff).sqrt(), &shift, 1.0);
+        }
+        let lost = if steady { 0.0 } else { c_c * (2.0 - c_c) };
+        self.covariance *= 1.0 + c_1 * lost - c_1 - c_mu;
+        self.covariance.ger(c_1, &self.path_c, &self.path_c, 1.0);
+        for (offset, weight) in offsets.iter().zip(&self.weights) {
+            self.covariance.ger(c_mu * weight, offset, offset, 1.0);
+        }
+        self.sigma *= ((c_sigma / d_sigma) * (length / expected_length - 1.0)).exp();
+        // Decomposed only as often as the matrix changes much (Hansen 2016, appendix B.2).
+        let pause = 1.0 / (10.0 * n * (c_1 + c_mu));
+        if (self.generation - self.decomposed_at) as f64 > pause {
+            self.decompose();
+        }
+    }
+
+    fn decompose(&mut self) {
+        self.decomposed_at = self.generation;
+        self.covariance = 0.5 * (&self.covariance + self.covariance.transpose());
+        let eigen = SymmetricEigen::new(self.covariance.clone());
+        self.axes = eigen.eigenvectors;
+        self.lengths = eigen.eigenvalues.map(|value| value.max(f64::MIN_POSITIVE).sqrt());
+    }
+
+    /// Whether this run is over (Hansen 2016, appendix B.3).
+    fn end(&mut self, values: &[f64], settings: &CmaEsSettings) -> Option<CmaEsStatus> {
+        let n = self.mean.len();
+        let lowest = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let window = 10 + (30 * n).div_ceil(self.population);
+        self.recent.push_back(lowest);
+        if self.recent.len() > window {
+            self.recent.pop_front();
+        }
+        let deviations: Vec<f64> = (0..n).map(|i| self.covariance[(i, i)].max(0.0).sqrt()).collect();
+        let reach = (0..n).map(|i| self.sigma * deviations[i].max(self.path_c[i].abs())).fold(0.0, f64::max);
+        if !self.sigma.is_finite() || self.sigma * self.lengths.max() > 1e4 {
+            return Some(CmaEsStatus::Diverged);
+        }
+        if self.lengths.max() > 1e7 * self.lengths.min() {
+            return Some(CmaEsStatus::IllConditioned);
+        }
+        let stuck = (0..n).all(|i| self.mean[i] == self.mean[i] + 0.2 * self.sigma * deviations[i]);
+        if reach < settings.step_tolerance || stuck {
+            return Some(CmaEsStatus::StepTolerance);
+        }
+        let oldest = self.recent.iter().copied().fold(f64::INFINITY, f64::min);
+        let newest = self.recent.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        // Infinite everywhere is flat too, though the difference is no number.
+        let flat = |low: f64, high: f64| low == high || high - low <= settings.function_tolerance;
+        (self.recent.len() == window && flat(oldest, newest) && flat(lowest, highest))
+            .then_some(CmaEsStatus::FunctionTolerance)
+    }
+}
+
+#[cfg(test)]
+#[path = "cma_es_tests.rs"]
+mod tests;

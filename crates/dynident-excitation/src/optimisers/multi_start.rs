@@ -1,0 +1,87 @@
+//! Many starts of the augmented Lagrangian side by side; the best of them.
+
+use super::{
+    AugmentedLagrangianResult, AugmentedLagrangianSettings, ConstrainedProblem, OptimiserError, Progress,
+    augmented_lagrangian,
+};
+use core::ops::ControlFlow;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::sync::{Mutex, PoisonError};
+
+/// What [`multi_start()`] found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MultiStartResult {
+    /// The number of the best start: of the lowest objective among the feasible ones, else of the smallest violation.
+    pub best_start: usize,
+    /// The results of all starts, in order; an error where the problem is not defined at the start.
+    #[serde(skip)]
+    pub runs: Vec<Result<AugmentedLagrangianResult, OptimiserError>>,
+}
+
+impl MultiStartResult {
+    /// The result of the best start; none if the problem was defined at no start.
+    pub fn best(&self) -> Option<&AugmentedLagrangianResult> {
+        self.runs.get(self.best_start)?.as_ref().ok()
+    }
+
+    /// Evaluations of all starts together.
+    pub fn evaluations(&self) -> usize {
+        self.runs.iter().flatten().map(|run| run.evaluations).sum()
+    }
+}
+
+/// Runs [`augmented_lagrangian()`] from every start, in parallel, each on its own problem from `problem`.
+///
+/// `watch` hears the best over all starts whenever it improves, and is asked after every evaluation whether to go on; `iteration` and `evaluations`
+/// are those of the start that speaks.
+/// Unless it stops the search, the result does not depend on the number of threads: among equals the first start is best.
+///
+/// # Errors
+/// No start; settings or bounds out of range.
+pub fn multi_start<P: ConstrainedProblem>(
+    problem: impl Fn() -> P + Sync,
+    starts: &[Vec<f64>],
+    settings: &AugmentedLagrangianSettings,
+    watch: impl Fn(&Progress<'_>) -> ControlFlow<()> + Sync,
+) -> Result<MultiStartResult, OptimiserError> {
+    if starts.is_empty() {
+        return Err(OptimiserError::Length { what: "starts", expected: 1, found: 0 });
+    }
+    settings.validate()?;
+    super::check_bounds(&problem().bounds(), false)?;
+    let best: Mutex<(Vec<f64>, f64, f64)> = Mutex::new((Vec::new(), f64::INFINITY, f64::INFINITY));
+    let tolerance = settings.feasibility_tolerance;
+    let runs: Vec<_> = starts
+        .par_iter()
+        .map(|start| {
+            let mut hear = |progress: &Progress<'_>| {
+                let mut best = best.lock().unwrap_or_else(PoisonError::into_inner);
+                if before((progress.value, progress.violation), (best.1, best.2), tolerance) {
+                    *best = (progress.best.to_vec(), progress.value, progress.violation);
+                }
+                watch(&Progress { best: &best.0, value: best.1, violation: best.2, ..*progress })
+            };
+            augmented_lagrangian(&mut problem(), start, settings, &mut hear)
+        })
+        .collect();
+    let rank = |run: &Result<AugmentedLagrangianResult, OptimiserError>| {
+        run.as_ref().map_or((f64::INFINITY, f64::INFINITY), |run| (run.value, run.violation))
+    };
+    let mut best_start = 0;
+    for index in 1..runs.len() {
+        if before(rank(&runs[index]), rank(&runs[best_start]), tolerance) {
+            best_start = index;
+        }
+    }
+    Ok(MultiStartResult { best_start, runs })
+}
+
+/// Whether a point of this value and violation is better than another: feasible before infeasible, then by value or violation.
+fn before(one: (f64, f64), other: (f64, f64), tolerance: f64) -> bool {
+    match (one.1 <= tolerance, other.1 <= tolerance) {
+        (true, true) => one.0 < other.0,
+        (false, false) => one.1 < other.1,
+        (feasible, _) => feasible,
+    }
+}

@@ -1,0 +1,271 @@
+//! Minimisation of a smooth function inside a box: limited-memory BFGS on the free variables, steps projected onto the box.
+
+use std::collections::VecDeque;
+
+/// A smooth function that is asked for its gradient only where it was just evaluated, so that it can keep its intermediate values.
+pub(crate) trait Smooth {
+    /// The value at `x`; not a finite number where the function is not defined.
+    fn value(&mut self, x: &[f64]) -> f64;
+    /// The gradient at the point of the last [`value`](Smooth::value).
+    fn gradient(&mut self, gradient: &mut [f64]);
+    /// Whether the search must end now.
+    fn halted(&self) -> bool;
+}
+
+/// Why the search ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum End {
+    /// The projected gradient is below the tolerance.
+    Stationary,
+    /// The iterations are used up.
+    IterationLimit,
+    /// No lower value along the steepest descent: the end of double precision.
+    NoDescent,
+    /// The function asked for it.
+    Halted,
+}
+
+/// When to end, and how much to remember.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Effort {
+    pub(crate) tolerance: f64,
+    pub(crate) iterations: usize,
+    pub(crate) memory: usize,
+}
+
+/// One difference of points and of gradients.
+struct Pair {
+    s: Vec<f64>,
+    y: Vec<f64>,
+}
+
+/// Armijo's share of the predicted decrease and Wolfe's share of the slope (Nocedal and Wright, *Numerical Optimization*, 2006, section 3.1).
+const DECREASE: f64 = 1e-4;
+const SLOPE: f64 = 0.9;
+const TRIALS: usize = 40;
+
+/// Minimises from `x`, which must lie in the box and ends at the lowest point found. Returns why it ended and the largest entry of the projected gradient
+/// `P(x - g) - x`.
+///
+/// Two-loop recursion (Nocedal and Wright 2006, algorithm 7.4) over the variables that are not held at a bound by the gradient (two-metric projection,
+/// Bertsekas 1982); line search for the weak Wolfe conditions by bisection and doubling (Lewis and Overton 2013) along the projected path.
+pub(crate) fn projected_lbfgs(
+    function: &mut impl Smooth,
+    bounds: &[[f64; 2]],
+    x: &mut [f64],
+    effort: &Effort,
+) -> (End, f64) {
+    let n = x.len();
+    let value = function.value(x);
+    let mut at = Point { x: x.to_vec(), value, gradient: vec![0.0; n] };
+    function.gradient(&mut at.gradient);
+    let mut pairs: VecDeque<Pair> = VecDeque::with_capacity(effort.memory);
+    let mut end = End::IterationLimit;
+    for _ in 0..effort.iterations {
+        if function.halted() {
+            end = End::Halted;
+            break;
+        }
+        if projected_gradient(&at.x, &at.gradient, bounds) <= effort.tolerance {
+            end = End::Stationary;
+            break;
+        }
+        let held = |i: usize| {
+            (at.x[i] <= bounds[i][0] && at.gradient[i] > 0.0) || (at.x[i] >= bounds[i][1] && at.gradient[i] < 0.0)
+        };
+        let free: Vec<bool> = (0..n).map(|i| !held(i)).collect();
+        let mut direction = quasi_newton(&pairs, &at.gradient, &free);
+        let steep = dot(&direction, &at.gradient) < -1e-10 * norm(&direction) * norm(&at.gradient);
+        if !pairs.is_empty() && !steep {
+            // Curvature that does not lead down (or not to numbers) is forgotten.
+            pairs.clear();
+            direction = quasi_newton(&pairs, &at.gradient, &free);
+        }
+        let first = if pairs.is_empty() { cautious_step(&direction, bounds) } else { 1.0 };
+        let Some(next) = line_search(function, bounds, &at, &direction, first) else {
+            if function.halted() {
+                end = End::Halted;
+                break;
+            }
+            if pairs.is_empty() {
+                end = End::NoDescent;
+                break;
+            }
+            pairs.clear();
+            continue;
+        };
+        let s: Vec<f64> = next.x.iter().zip(&at.x).map(|(a, b)| a - b).collect();
+        let y: Vec<f64> = next.gradient.iter().zip(&at.gradient).map(|(a, b)| a - b).collect();
+        if dot(&s, &y) > 1e-12 * norm(&s) * norm(&y) {
+            if pairs.len() == effort.memory {
+                pairs.pop_front();
+            }
+            pairs.push_back(Pair { s, y });
+        }
+        at = next;
+    }
+    x.copy_from_slice(&at.x);
+    (end, projected_gradient(x, &at.gradient, bounds))
+}
+
+/// A point with its value and gradient.
+#[derive(Clone)]
+struct Point {
+    x: Vec<f64>,
+    value: f64,
+    gradient: Vec<f64>,
+}
+
+/// Looks along `P(from + step·direction)` for a point that is lower enough and has a flatter slope. The last point that was lower enough, if any.
+fn line_search(
+    function: &mut impl Smooth,
+    bounds: &[[f64; 2]],
+    from: &Point,
+    direction: &[f64],
+    first_step: f64,
+) -> Option<Point> {
+    let slope = dot(direction, &from.gradient);
+    let (mut low, mut high, mut step) = (0.0, f64::INFINITY, first_step);
+    let mut found: Option<Point> = None;
+    for _ in 0..TRIALS {
+        let straight: Vec<f64> = from.x.iter().zip(direction).map(|(x, d)| x + step * d).collect();
+        let x: Vec<f64> = straight.iter().zip(bounds).map(|(x, &[lower, upper])| x.clamp(lower, upper)).collect();
+        if x == from.x {
+            break;
+        }
+        let value = function.value(&x);
+        let predicted: f64 = (0..x.len()).map(|i| from.gradient[i] * (x[i] - from.x[i])).sum();
+        let lower_enough = value.is_finite() && predicted < 0.0 && value <= from.value + DECREASE * predicted;
+        if lower_enough {
+            let mut gradient = vec![0.0; x.len()];
+            function.gradient(&mut gradient);
+            // A variable that stands at its bound goes no further along this path.
+            let ahead: f64 = (0..x.len()).filter(|&i| x[i] == straight[i]).map(|i| gradient[i] * direction[i]).sum();
+            found = Some(Point { x, value, gradient });
+            if ahead >= SLOPE * slope {
+                break;
+            }
+            low = step;
+        } else {
+            high = step;
+        }
+        if function.halted() {
+            break;
+        }
+        step = if high.is_infinite() {
+            2.0 * step
+        } else if low == 0.0 && value.is_finite() {
+            // The lowest point of the parabola through what is known.
+            let parabola = -0.5 * slope * step * step / (value - from.value - slope * step);
+            if parabola.is_finite() { parabola.clamp(0.1 * step, 0.5 * step) } else { 0.5 * step }
+        } else {
+            0.5 * (low + high)
+        };
+    }
+    found
+}
+
+/// `-H g` on the free variables by the two-loop recursion, zero on the others.
+fn quasi_newton(pairs: &VecDeque<Pair>, gradient: &[f64], free: &[bool]) -> Vec<f64> {
+    let masked = |v: &[f64], w: &[f64]| -> f64 { (0..v.len()).filter(|&i| free[i]).map(|i| v[i] * w[i]).sum() };
+    let mut direction: Vec<f64> = gradient.iter().zip(free).map(|(&g, &free)| if free { -g } else { 0.0 }).collect();
+    // Pairs that lose their curvature when bound variables are left out say nothing here.
+    let useful: Vec<(&Pair, f64)> = pairs
+        .iter()
+        .map(|pair| (pair, masked(&pair.s, &pair.y)))
+        .filter(|(pair, sy)| *sy > 1e-12 * (masked(&pair.s, &pair.s) * masked(&pair.y, &pair.y)).sqrt())
+        .collect();
+    let mut weights = Vec::with_capacity(useful.len());
+    for (pair, sy) in useful.iter().rev() {
+        let weight = masked(&pair.s, &direction) / sy;
+        weights.push(weight);
+        add(&mut direction, -weight, &pair.y, free);
+    }
+    if let Some((pair, sy)) = useful.last() {
+        let scale = sy / masked(&pair.y, &pair.y);
+        for d in &mut direction {
+            *d *= scale;
+        }
+    }
+    for ((pair, sy), weight) in useful.iter().zip(weights.iter().rev()) {
+        let correction = masked(&pair.y, &direction) / sy;
+        add(&mut direction, weight - correction, &pair.s, free);
+    }
+    direction
+}
+
+fn add(to: &mut [f64], factor: f64, v: &[f64], free: &[bool]) {
+    for i in 0..to.len() {
+        if free[i] {
+            to[i] += factor * v[i];
+        }
+    }
+}
+
+/// The largest step, at most one, that moves no variable by more than one unit or a tenth of its range.
+fn cautious_step(direction: &[f64], bounds: &[[f64; 2]]) -> f64 {
+    direction.iter().zip(bounds).fold(1.0, |step: f64, (d, &[lower, upper])| {
+        let reach = (0.1 * (upper - lower)).min(1.0);
+        if *d == 0.0 { step } else { step.min(reach / d.abs()) }
+    })
+}
+
+/// Largest entry of `P(x - g) - x`: zero exactly where no step inside the box descends.
+fn projected_gradient(x: &[f64], gradient: &[f64], bounds: &[[f64; 2]]) -> f64 {
+    (0..x.len())
+        .fold(0.0, |largest: f64, i| largest.max(((x[i] - gradient[i]).clamp(bounds[i][0], bounds[i][1]) - x[i]).abs()))
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn norm(a: &[f64]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The chained Rosenbrock function, lowest at (1, ..., 1).
+    struct Rosenbrock(Vec<f64>);
+    impl Smooth for Rosenbrock {
+        fn value(&mut self, x: &[f64]) -> f64 {
+            self.0 = x.to_vec();
+            x.windows(2).map(|w| 100.0 * (w[1] - w[0] * w[0]).powi(2) + (1.0 - w[0]).powi(2)).sum()
+        }
+        fn gradient(&mut self, gradient: &mut [f64]) {
+            gradient.fill(0.0);
+            for (i, w) in self.0.windows(2).enumerate() {
+                let bend = w[1] - w[0] * w[0];
+                gradient[i] += -400.0 * w[0] * bend - 2.0 * (1.0 - w[0]);
+                gradient[i + 1] += 200.0 * bend;
+            }
+        }
+        fn halted(&self) -> bool {
+            false
+        }
+    }
+    const EFFORT: Effort = Effort { tolerance: 1e-9, iterations: 2000, memory: 10 };
+
+    #[test]
+    fn rosenbrocks_valley_has_its_end() {
+        let mut x = vec![-1.2; 20];
+        let bounds = vec![[f64::NEG_INFINITY, f64::INFINITY]; 20];
+        let (end, _) = projected_lbfgs(&mut Rosenbrock(Vec::new()), &bounds, &mut x, &EFFORT);
+        assert_eq!(end, End::Stationary);
+        // Gradient 1e-9 over the smallest curvature, about 0.1 at the solution.
+        assert!(x.iter().all(|x| (x - 1.0).abs() < 1e-7), "{x:?}");
+    }
+
+    #[test]
+    fn bounds_hold_and_may_bind() {
+        // With x1 <= 0.5 the lowest point is (0.5, 0.25) exactly (x2 = x1², slope in x1 is -1).
+        let mut x = [-1.0, 2.0];
+        let (end, _) = projected_lbfgs(&mut Rosenbrock(Vec::new()), &[[-2.0, 0.5], [-3.0, 3.0]], &mut x, &EFFORT);
+        assert_eq!(end, End::Stationary);
+        assert_eq!(x[0], 0.5);
+        assert!((x[1] - 0.25).abs() < 1e-10, "{x:?}");
+    }
+}
