@@ -54,7 +54,7 @@ impl FrictionLadderSettings {
             self.slowest_part,
             "give a part above 0 and at most 1",
         )?;
-        require(self.ramp_s.is_finite() && self.ramp_s > 0.0, NAME, "ramp_s", self.ramp_s, "give a positive time")?;
+        require(self.ramp_s >= 1e-3, NAME, "ramp_s", self.ramp_s, "give a millisecond or more")?;
         require(
             self.cruising_s(joints, duration_s) > 0.0,
             NAME,

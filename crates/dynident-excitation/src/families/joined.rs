@@ -62,7 +62,7 @@ impl Joined {
     /// No members, members or postures of unequal numbers of joints, a posture that is not finite, or a move without time.
     pub fn new(members: Vec<Box<dyn Family>>, settings: &JoinedSettings) -> Result<Self, FamilyError> {
         let move_s = settings.move_s;
-        require(move_s.is_finite() && move_s > 0.0, NAME, "move_s", move_s, "give a positive time")?;
+        require((1e-3..=1e7).contains(&move_s), NAME, "move_s", move_s, "give between a millisecond and 1e7 seconds")?;
         let Some(first) = members.first() else {
             return Err(FamilyError::Length { family: NAME, what: "members", expected: 1, found: 0 });
         };
@@ -228,7 +228,9 @@ impl Family for Joined {
         let arrays = [&cotangent.q, &cotangent.dq, &cotangent.ddq, &cotangent.dddq];
         // What the moves pull on both ends of each member.
         let mut ends = vec![Motion::default(); self.members.len()];
-        ends.iter_mut().for_each(|end| end.reset(self.joints, 2));
+        for end in &mut ends {
+            end.reset(self.joints, 2);
+        }
         let mut part = Motion::default();
         for (piece, samples, times) in self.split(times_s) {
             match piece {

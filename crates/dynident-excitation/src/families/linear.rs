@@ -53,9 +53,13 @@ impl<B: Basis> LinearFamily<B> {
         &self.basis
     }
 
+    /// Sets of functions that differ.
+    fn sets(&self) -> usize {
+        if self.basis.differs_by_joint() { self.joints } else { 1 }
+    }
+
     fn sample(&self, times_s: &[f64]) -> SampledBasis {
-        let sets = if self.basis.differs_by_joint() { self.joints } else { 1 };
-        SampledBasis::new(self.basis.columns(), sets, times_s, |joint, time, out| {
+        SampledBasis::new(self.basis.columns(), self.sets(), times_s, |joint, time, out| {
             self.basis.row(joint, time.clamp(0.0, self.duration_s), out);
         })
     }
@@ -101,13 +105,25 @@ impl<B: Basis> Family for LinearFamily<B> {
     fn motion(&self, parameters: &[f64], times_s: &[f64], out: &mut Motion) {
         assert_eq!(parameters.len(), self.parameters(), "parameters of {}", B::NAME);
         out.reset(self.joints, times_s.len());
-        self.grids.each(times_s, |times| self.sample(times), |basis, from| basis.motion(parameters, from, out));
+        let functions = self.sets() * self.basis.columns();
+        self.grids.each(
+            functions,
+            times_s,
+            |times| self.sample(times),
+            |basis, from| basis.motion(parameters, from, out),
+        );
     }
 
     fn pull_back(&self, parameters: &[f64], times_s: &[f64], cotangent: &MotionCotangent, gradient: &mut [f64]) {
         assert_eq!(parameters.len(), self.parameters(), "parameters of {}", B::NAME);
         assert_eq!(gradient.len(), self.parameters(), "gradient of {}", B::NAME);
         assert_eq!((cotangent.joints, cotangent.samples), (self.joints, times_s.len()), "cotangent of {}", B::NAME);
-        self.grids.each(times_s, |times| self.sample(times), |basis, from| basis.pull_back(from, cotangent, gradient));
+        let functions = self.sets() * self.basis.columns();
+        self.grids.each(
+            functions,
+            times_s,
+            |times| self.sample(times),
+            |basis, from| basis.pull_back(from, cotangent, gradient),
+        );
     }
 }

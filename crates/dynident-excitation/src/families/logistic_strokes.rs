@@ -174,7 +174,9 @@ impl LogisticStrokes {
         let mut lengths: Vec<f64> = logarithms.iter().map(|x| x.exp()).collect();
         lengths.resize(self.settings.strokes, 1.0);
         let scale = self.duration_s / lengths.iter().sum::<f64>();
-        lengths.iter_mut().for_each(|length| *length *= scale);
+        for length in &mut lengths {
+            *length *= scale;
+        }
         lengths
     }
 

@@ -37,11 +37,11 @@ impl MultisineSettings {
             require((1..=MOST).contains(&value), NAME, setting, value as f64, "give 1 to 1000")?;
         }
         require(
-            self.ramp_s >= 0.0 && 2.0 * self.ramp_s < duration_s,
+            (self.ramp_s == 0.0 || self.ramp_s >= 1e-3) && 2.0 * self.ramp_s < duration_s,
             NAME,
             "ramp_s",
             self.ramp_s,
-            "give 0 or more seconds, less than half of the duration",
+            "give 0, or a millisecond or more and less than half of the duration",
         )
     }
 }

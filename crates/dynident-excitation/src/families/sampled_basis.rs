@@ -10,6 +10,8 @@ const BLOCK: usize = 8;
 const CELL: usize = 4 * BLOCK;
 /// Samples above which a grid is worked through in pieces that are not kept.
 const LARGEST_KEPT: usize = 4096;
+/// Functions times samples, at most, of a grid or piece: 32 MiB.
+const LARGEST_TABLE: usize = 1 << 20;
 /// Grids kept per family: search, polish and check grids, and a spare.
 const GRIDS_KEPT: usize = 4;
 
@@ -225,16 +227,18 @@ impl Clone for GridCache {
 }
 
 impl GridCache {
-    /// Calls `with(basis, from)` for the whole grid if it is short (sampled once, then kept), else piece by piece.
+    /// Calls `with(basis, from)` for the whole grid if its table of so many functions is small (sampled once, then kept), else piece by piece.
     pub(crate) fn each(
         &self,
+        functions: usize,
         times_s: &[f64],
         sample: impl Fn(&[f64]) -> SampledBasis,
         mut with: impl FnMut(&SampledBasis, usize),
     ) {
-        if times_s.len() > LARGEST_KEPT {
-            for (piece, times) in times_s.chunks(LARGEST_KEPT).enumerate() {
-                with(&sample(times), piece * LARGEST_KEPT);
+        let most = (LARGEST_TABLE / functions.max(1)).clamp(BLOCK, LARGEST_KEPT);
+        if times_s.len() > most {
+            for (piece, times) in times_s.chunks(most).enumerate() {
+                with(&sample(times), piece * most);
             }
             return;
         }
@@ -249,5 +253,90 @@ impl GridCache {
             made
         });
         with(&basis, 0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynident_model::sample::Random;
+
+    /// Four unlike functions a set, the third only in the first half: (t + set)^n with derivatives.
+    fn row(set: usize, time: f64, out: &mut [[f64; 4]]) {
+        let x = time + set as f64;
+        *out.first_mut().unwrap() = [1.0, 0.0, 0.0, 0.0];
+        out[1] = [x, 1.0, 0.0, 0.0];
+        if time < 0.5 {
+            out[2] = [x * x * x, 3.0 * x * x, 6.0 * x, 6.0];
+        }
+        out[3] = [x.sin(), x.cos(), -x.sin(), -x.cos()];
+    }
+
+    /// Against the plain sums, for joints in pairs and alone, shared and own functions, and every remainder of a block; 1e-13 for sums of four terms below 5.
+    #[test]
+    fn both_products_are_the_plain_sums() {
+        let mut random = Random::new(4);
+        for (joints, sets, samples) in [(1, 1, 1), (2, 1, 8), (3, 1, 13), (7, 1, 37), (3, 3, 20), (2, 2, 7)] {
+            let times: Vec<f64> = (0..samples).map(|_| random.uniform(0.0, 1.0)).collect();
+            let parameters: Vec<f64> = (0..4 * joints).map(|_| random.normal()).collect();
+            let basis = SampledBasis::new(4, sets, &times, row);
+            let (mut motion, mut cotangent) = (Motion::default(), Motion::default());
+            motion.reset(joints, samples);
+            cotangent.reset(joints, samples);
+            for values in [&mut cotangent.q, &mut cotangent.dq, &mut cotangent.ddq, &mut cotangent.dddq] {
+                for value in values.iter_mut() {
+                    *value = random.normal();
+                }
+            }
+            basis.motion(&parameters, 0, &mut motion);
+            let mut gradient = vec![0.5; parameters.len()];
+            basis.pull_back(0, &cotangent, &mut gradient);
+            let mut expected = vec![0.5; parameters.len()];
+            for joint in 0..joints {
+                for (sample, &time) in times.iter().enumerate() {
+                    let mut functions = [[0.0; 4]; 4];
+                    row(if sets == 1 { 0 } else { joint }, time, &mut functions);
+                    let at = joint * samples + sample;
+                    let got = [motion.q[at], motion.dq[at], motion.ddq[at], motion.dddq[at]];
+                    let pull = [cotangent.q[at], cotangent.dq[at], cotangent.ddq[at], cotangent.dddq[at]];
+                    for order in 0..4 {
+                        let sum: f64 = (0..4).map(|c| parameters[4 * joint + c] * functions[c][order]).sum();
+                        assert!((sum - got[order]).abs() < 1e-13);
+                        for column in 0..4 {
+                            expected[4 * joint + column] += pull[order] * functions[column][order];
+                        }
+                    }
+                }
+            }
+            for (got, expected) in gradient.iter().zip(&expected) {
+                assert!((got - expected).abs() < 1e-12, "{joints} {sets} {samples}");
+            }
+        }
+    }
+
+    /// A grid too long to keep is worked through in pieces with the same result, and a kept one is found again.
+    #[test]
+    fn pieces_join_and_grids_are_kept() {
+        let times: Vec<f64> = (0..LARGEST_KEPT + 5).map(|s| s as f64 / 5000.0).collect();
+        let parameters = [0.3, -1.0, 2.0, 0.7];
+        let sampled = std::cell::Cell::new(0);
+        let sample = |times: &[f64]| {
+            sampled.set(sampled.get() + 1);
+            SampledBasis::new(4, 1, times, row)
+        };
+        let cache = GridCache::default();
+        let motion = |times: &[f64]| {
+            let mut out = Motion::default();
+            out.reset(1, times.len());
+            cache.each(4, times, sample, |basis, from| basis.motion(&parameters, from, &mut out));
+            out
+        };
+        let (long, short) = (motion(&times), motion(&times[LARGEST_KEPT..]));
+        assert_eq!(sampled.get(), 3);
+        assert_eq!(long.q[LARGEST_KEPT..], short.q[..]);
+        assert_eq!(motion(&times[LARGEST_KEPT..]), short);
+        assert_eq!(sampled.get(), 3);
+        assert_eq!(motion(&times[..7]).q[..], long.q[..7]);
+        assert_eq!(sampled.get(), 4);
     }
 }

@@ -34,10 +34,10 @@ impl SplicedLogisticSettings {
     /// Checks the settings for so many joints and seconds.
     ///
     /// # Errors
-    /// ω T not positive, no repetitions, lists that do not name each joint once, numbers that are not finite, or periods that do not fit into the duration.
+    /// ω T not positive or above 1e4, no repetitions, lists that do not name each joint once, numbers that are not finite, or periods that do not fit into the duration.
     pub fn validate(&self, joints: usize, duration_s: f64) -> Result<(), FamilyError> {
         let product = self.period_times_omega;
-        require(product.is_finite() && product > 0.0, NAME, "period_times_omega", product, "give a positive number")?;
+        require(product > 0.0 && product <= 1e4, NAME, "period_times_omega", product, "give more than 0, at most 1e4")?;
         let repetitions = self.repetitions as f64;
         require((1..=MOST).contains(&self.repetitions), NAME, "repetitions", repetitions, "give 1 to 1000")?;
         for (what, list) in [("periods_s", &self.periods_s), ("offsets", &self.offsets)] {
@@ -48,11 +48,11 @@ impl SplicedLogisticSettings {
         }
         for &period in self.periods_s.iter().flatten() {
             require(
-                period > 0.0 && repetitions * period <= duration_s * (1.0 + 1e-12),
+                period >= 1e-3 && repetitions * period <= duration_s * (1.0 + 1e-12),
                 NAME,
                 "periods_s",
                 period,
-                "give positive periods of which the repetitions fit into the duration",
+                "give periods of a millisecond or more, of which the repetitions fit into the duration",
             )?;
         }
         for &offset in self.offsets.iter().flatten() {
