@@ -1,7 +1,7 @@
 //! A basis of functions of time, sampled once on a grid, and the two products with it that a linear family needs.
 
 use crate::motion::{Motion, MotionCotangent};
-use dynident_lanes::{Kernel, Lane, Level, dispatch};
+use dynident_lanes::{AlignedBuffer, Kernel, Lane, Level, dispatch};
 use std::sync::{Arc, PoisonError, RwLock};
 
 /// Samples in a block: the widest lanes.
@@ -19,7 +19,15 @@ const GRIDS_KEPT: usize = 4;
 #[derive(Debug)]
 struct Columns {
     supports: Vec<[usize; 2]>,
-    values: Vec<f64>,
+    values: AlignedBuffer,
+}
+
+impl Columns {
+    /// The values of one block.
+    #[inline(always)]
+    fn cells(&self, columns: usize, block: usize) -> &[f64] {
+        &self.values.as_slice()[block * columns * CELL..(block + 1) * columns * CELL]
+    }
 }
 
 /// The basis functions of a family and their first three derivatives at given times.
@@ -38,7 +46,10 @@ impl SampledBasis {
         let mut buffer = vec![[0.0; 4]; columns];
         let sets = (0..sets)
             .map(|set| {
-                let mut values = vec![0.0; blocks * columns * CELL];
+                let mut values = AlignedBuffer::new();
+                values.resize(blocks * columns * CELL);
+                let cells = values.as_mut_slice();
+                cells.fill(0.0);
                 let mut supports = vec![[columns, 0]; blocks];
                 for (sample, &time) in times_s.iter().enumerate() {
                     buffer.fill([0.0; 4]);
@@ -51,7 +62,7 @@ impl SampledBasis {
                             *end = (*end).max(column + 1);
                         }
                         for (order, &value) in cell.iter().enumerate() {
-                            values[(block * columns + column) * CELL + order * BLOCK + lane] = value;
+                            cells[(block * columns + column) * CELL + order * BLOCK + lane] = value;
                         }
                     }
                 }
@@ -71,6 +82,7 @@ impl SampledBasis {
         dispatch(Level::detect(), Backward { basis: self, from, cotangent, gradient });
     }
 
+    #[inline(always)]
     fn set(&self, joint: usize) -> &Columns {
         &self.sets[if self.sets.len() == 1 { 0 } else { joint }]
     }
@@ -91,22 +103,22 @@ impl Kernel for Forward<'_> {
         let joints = out.joints;
         // Pairs share every load of a common basis: eight independent chains hide the multiply-add's latency.
         let paired = if basis.sets.len() == 1 { joints / 2 * 2 } else { 0 };
-        let mut joint = 0;
-        while joint < joints {
-            let width = if joint < paired { 2 } else { 1 };
-            let columns = basis.set(joint);
-            for block in 0..columns.supports.len() {
+        let blocks = basis.times_s.len().div_ceil(BLOCK);
+        for joint in (0..paired).step_by(2) {
+            for block in 0..blocks {
                 for start in (0..BLOCK).step_by(T::LANES) {
-                    if width == 2 {
-                        let sums = combine::<T, 2>(basis, columns, parameters, joint, block, start);
-                        place(&sums, out, joint, from, block * BLOCK + start, basis.times_s.len());
-                    } else {
-                        let sums = combine::<T, 1>(basis, columns, parameters, joint, block, start);
-                        place(&sums, out, joint, from, block * BLOCK + start, basis.times_s.len());
-                    }
+                    let sums = combine::<T, 2>(basis, basis.set(joint), parameters, joint, block, start);
+                    place(&sums, out, joint, from, block * BLOCK + start, basis.times_s.len());
                 }
             }
-            joint += width;
+        }
+        for joint in paired..joints {
+            for block in 0..blocks {
+                for start in (0..BLOCK).step_by(T::LANES) {
+                    let sums = combine::<T, 1>(basis, basis.set(joint), parameters, joint, block, start);
+                    place(&sums, out, joint, from, block * BLOCK + start, basis.times_s.len());
+                }
+            }
         }
     }
 }
@@ -122,13 +134,18 @@ fn combine<T: Lane, const J: usize>(
 ) -> [[T; 4]; J] {
     let mut sums = [[T::ZERO; 4]; J];
     let [first, end] = columns.supports[block];
+    let cells = columns.cells(basis.columns, block);
+    let weights: [&[f64]; J] = core::array::from_fn(|ahead| &parameters[(joint + ahead) * basis.columns..][..end]);
     for column in first..end {
-        let cell = &columns.values[(block * basis.columns + column) * CELL..][..CELL];
-        let functions: [T; 4] = core::array::from_fn(|order| T::load(&cell[order * BLOCK + start..]));
-        for (ahead, sum) in sums.iter_mut().enumerate() {
-            let weight = T::splat(parameters[(joint + ahead) * basis.columns + column]);
-            for (value, function) in sum.iter_mut().zip(functions) {
-                *value = function.mul_add(weight, *value);
+        let cell = &cells[column * CELL..(column + 1) * CELL];
+        let mut splats = [T::ZERO; J];
+        for ahead in 0..J {
+            splats[ahead] = T::splat(weights[ahead][column]);
+        }
+        for order in 0..4 {
+            let function = T::load(&cell[order * BLOCK + start..order * BLOCK + start + T::LANES]);
+            for ahead in 0..J {
+                sums[ahead][order] = function.mul_add(splats[ahead], sums[ahead][order]);
             }
         }
     }
@@ -145,18 +162,24 @@ fn place<T: Lane, const J: usize>(
     samples: usize,
 ) {
     let count = T::LANES.min(samples.saturating_sub(sample));
-    let arrays = [&mut out.q, &mut out.dq, &mut out.ddq, &mut out.dddq];
-    for (order, array) in arrays.into_iter().enumerate() {
-        for (ahead, sum) in sums.iter().enumerate() {
-            let at = (joint + ahead) * out.samples + from + sample;
-            if count == T::LANES {
-                sum[order].store(&mut array[at..at + T::LANES]);
-            } else {
-                let mut values = [0.0; BLOCK];
-                sum[order].store(&mut values);
-                array[at..at + count].copy_from_slice(&values[..count]);
-            }
-        }
+    for ahead in 0..J {
+        let at = (joint + ahead) * out.samples + from + sample;
+        let sum = sums[ahead];
+        store_some(sum[0], &mut out.q, at, count);
+        store_some(sum[1], &mut out.dq, at, count);
+        store_some(sum[2], &mut out.ddq, at, count);
+        store_some(sum[3], &mut out.dddq, at, count);
+    }
+}
+
+#[inline(always)]
+fn store_some<T: Lane>(value: T, array: &mut [f64], at: usize, count: usize) {
+    if count == T::LANES {
+        value.store(&mut array[at..at + T::LANES]);
+    } else {
+        let mut values = [0.0; BLOCK];
+        value.store(&mut values);
+        array[at..at + count].copy_from_slice(&values[..count]);
     }
 }
 
@@ -173,30 +196,37 @@ impl Kernel for Backward<'_> {
     fn run<T: Lane>(self) {
         let Self { basis, from, cotangent, gradient } = self;
         let samples = basis.times_s.len();
-        let mut sums = vec![T::ZERO; basis.columns];
-        for joint in 0..cotangent.joints {
-            sums.fill(T::ZERO);
-            let columns = basis.set(joint);
-            for (block, &[first, end]) in columns.supports.iter().enumerate() {
-                for start in (0..BLOCK).step_by(T::LANES) {
-                    let sample = block * BLOCK + start;
-                    let count = T::LANES.min(samples.saturating_sub(sample));
+        let each = basis.columns;
+        let mut sums = vec![T::ZERO; each * cotangent.joints];
+        for block in 0..samples.div_ceil(BLOCK) {
+            for start in (0..BLOCK).step_by(T::LANES) {
+                let sample = block * BLOCK + start;
+                let count = T::LANES.min(samples.saturating_sub(sample));
+                for (joint, sums) in sums.chunks_mut(each).enumerate() {
+                    let columns = basis.set(joint);
+                    let [first, end] = columns.supports[block];
+                    let cells = columns.cells(each, block);
                     let at = joint * cotangent.samples + from + sample;
-                    let arrays = [&cotangent.q, &cotangent.dq, &cotangent.ddq, &cotangent.dddq];
-                    let pulls: [T; 4] = arrays.map(|array| load_some(array, at, count));
+                    let pulls: [T; 4] = [
+                        load_some(&cotangent.q, at, count),
+                        load_some(&cotangent.dq, at, count),
+                        load_some(&cotangent.ddq, at, count),
+                        load_some(&cotangent.dddq, at, count),
+                    ];
                     for column in first..end {
-                        let cell = &columns.values[(block * basis.columns + column) * CELL..][..CELL];
+                        let cell = &cells[column * CELL..(column + 1) * CELL];
                         let mut sum = sums[column];
-                        for (order, pull) in pulls.into_iter().enumerate() {
-                            sum = T::load(&cell[order * BLOCK + start..]).mul_add(pull, sum);
+                        for order in 0..4 {
+                            let lanes = order * BLOCK + start..order * BLOCK + start + T::LANES;
+                            sum = T::load(&cell[lanes]).mul_add(pulls[order], sum);
                         }
                         sums[column] = sum;
                     }
                 }
             }
-            for (out, sum) in gradient[joint * basis.columns..].iter_mut().zip(&sums) {
-                *out += sum.sum();
-            }
+        }
+        for (out, sum) in gradient.iter_mut().zip(&sums) {
+            *out += sum.sum();
         }
     }
 }
