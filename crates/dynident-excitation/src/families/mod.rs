@@ -1,1 +1,46 @@
 //! The trajectory families, one file each.
+//!
+//! | family | free numbers a joint | at rest at the ends |
+//! | --- | --- | --- |
+//! | [`SplicedLogistic`]: the paper's Eqs. 12 to 14 | 2 or 3 | nearly (e^-10) |
+//! | [`LogisticStrokes`]: strokes with overlap, or one after another | 3 K or 3 K - 1 | exactly |
+//! | [`Fourier`]: H harmonics | 2 H + 1, at rest 2 H - 1 | by choice |
+//! | [`Quintic`]: piecewise through M way-points | M - 1, free rates 3 M - 5 | exactly |
+//! | [`BSpline`]: degree 5, n control points | n - 5 | exactly |
+//! | [`Multisine`]: Schroeder phases | 2 | with ramps |
+//! | [`FrictionLadder`]: constant-speed sweeps | 2 | exactly |
+//! | [`StaticPostures`]: K postures held | K | exactly |
+//! | [`Joined`]: families one after another | sum | as its members |
+
+mod b_spline;
+#[cfg(test)]
+mod check;
+mod error;
+mod fourier;
+mod friction_ladder;
+mod joined;
+mod linear;
+mod logistic_map;
+mod logistic_stroke;
+mod logistic_strokes;
+mod multisine;
+mod polynomials;
+mod quintic;
+mod random_start;
+mod sampled_basis;
+mod spliced_logistic;
+mod static_postures;
+
+pub use b_spline::{BSpline, BSplineBasis, BSplineSettings};
+pub use error::FamilyError;
+pub use fourier::{Fourier, FourierBasis, FourierSettings};
+pub use friction_ladder::{FrictionLadder, FrictionLadderBasis, FrictionLadderSettings, LadderPace};
+pub use joined::{Joined, JoinedSettings};
+pub use linear::{Basis, LinearFamily};
+pub use logistic_map::{Branch, LogisticMap, PathRates};
+pub use logistic_stroke::LogisticStroke;
+pub use logistic_strokes::{LogisticStrokes, LogisticStrokesSettings, StrokeOrder};
+pub use multisine::{Multisine, MultisineBasis, MultisineSettings};
+pub use quintic::{Quintic, QuinticBasis, QuinticSettings};
+pub use spliced_logistic::{SplicedLogistic, SplicedLogisticSettings};
+pub use static_postures::{StaticPostures, StaticPosturesBasis, StaticPosturesSettings};

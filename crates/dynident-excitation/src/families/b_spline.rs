@@ -1,0 +1,214 @@
+//! Quintic B-splines, exactly at rest at both ends.
+
+use super::error::{FamilyError, MOST, require, require_frame};
+use super::linear::{Basis, LinearFamily};
+use serde::{Deserialize, Serialize};
+
+const NAME: &str = "b_spline";
+const DEGREE: usize = 5;
+
+/// What a [`BSpline`] family is made of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct BSplineSettings {
+    /// Number of control points n, those at the ends included. Default 14.
+    pub control_points: usize,
+    /// The motion ends where it began. Default true.
+    pub returns: bool,
+}
+
+impl Default for BSplineSettings {
+    fn default() -> Self {
+        Self { control_points: 14, returns: true }
+    }
+}
+
+impl BSplineSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// Fewer than 7 control points (with 6 nothing moves if the motion returns), or more than 1000.
+    pub fn validate(&self) -> Result<(), FamilyError> {
+        require(
+            (7..=MOST).contains(&self.control_points),
+            NAME,
+            "control_points",
+            self.control_points as f64,
+            "give 7 to 1000",
+        )
+    }
+}
+
+/// q(t) = Σ_i P_i N_i(t) with B-splines of degree 5 on equally spaced knots, the end knots six-fold.
+///
+/// The first three control points are equal, and so are the last three, which makes q̇ = q̈ = 0 at both ends exact. With q(T) = q(0) all six are one number and
+/// n - 5 numbers a joint are free: the end posture, then P_3 .. P_(n-4), all in rad (m). Otherwise n - 4: start, end, then the inner ones. Every control point acts on six
+/// spans only, so richer splines cost no more per sample. Position, being an average of control points, stays between the smallest and the largest.
+///
+/// # Source
+/// de Boor, A Practical Guide to Splines (2001), chapters IX and X; The NURBS Book (Piegl and Tiller 1997), Eqs. 2.5 and 2.7.
+pub type BSpline = LinearFamily<BSplineBasis>;
+
+/// The functions of a [`BSpline`] family.
+#[derive(Clone, Debug)]
+pub struct BSplineBasis {
+    settings: BSplineSettings,
+    duration_s: f64,
+}
+
+impl BSpline {
+    /// The family for so many joints and seconds.
+    ///
+    /// # Errors
+    /// Settings without meaning; see [`BSplineSettings::validate`].
+    pub fn new(joints: usize, duration_s: f64, settings: &BSplineSettings) -> Result<Self, FamilyError> {
+        require_frame(NAME, joints, duration_s)?;
+        settings.validate()?;
+        Ok(Self::of(BSplineBasis { settings: settings.clone(), duration_s }, joints, duration_s))
+    }
+}
+
+impl BSplineBasis {
+    fn ends(&self) -> usize {
+        if self.settings.returns { 1 } else { 2 }
+    }
+
+    /// Knot `index` in units of a span, of the clamped vector.
+    fn knot(&self, index: usize) -> f64 {
+        index.saturating_sub(DEGREE).min(self.settings.control_points - DEGREE) as f64
+    }
+
+    /// First of the six control points that act at `x` (in spans), and their functions with three derivatives by x.
+    fn functions(&self, x: f64) -> (usize, [[f64; 4]; DEGREE + 1]) {
+        let spans = self.settings.control_points - DEGREE;
+        let span = (x as usize).min(spans - 1) + DEGREE;
+        // Row `degree` of Cox and de Boor's triangle: functions span - degree ..= span.
+        let mut triangle = [[0.0; DEGREE + 1]; DEGREE + 1];
+        triangle[0][0] = 1.0;
+        for degree in 1..=DEGREE {
+            for position in 0..degree {
+                // The function of one degree less that begins at knot `first`.
+                let first = span + 1 + position - degree;
+                let (from, to) = (self.knot(first), self.knot(first + degree));
+                let part = triangle[degree - 1][position] / (to - from);
+                triangle[degree][position] += (to - x) * part;
+                triangle[degree][position + 1] += (x - from) * part;
+            }
+        }
+        let mut out = [[0.0; 4]; DEGREE + 1];
+        for order in 0..4 {
+            // Differentiating once raises the degree by one and takes differences (Eq. 2.7).
+            let mut values = triangle[DEGREE - order];
+            for degree in DEGREE - order + 1..=DEGREE {
+                let mut raised = [0.0; DEGREE + 1];
+                for position in 0..degree {
+                    let first = span + 1 + position - degree;
+                    let slope = degree as f64 * values[position] / (self.knot(first + degree) - self.knot(first));
+                    raised[position] -= slope;
+                    raised[position + 1] += slope;
+                }
+                values = raised;
+            }
+            for (function, value) in out.iter_mut().zip(values) {
+                function[order] = value;
+            }
+        }
+        (span - DEGREE, out)
+    }
+}
+
+impl Basis for BSplineBasis {
+    const NAME: &'static str = NAME;
+
+    fn columns(&self) -> usize {
+        self.settings.control_points - 6 + self.ends()
+    }
+
+    fn row(&self, _joint: usize, time_s: f64, out: &mut [[f64; 4]]) {
+        let (points, ends) = (self.settings.control_points, self.ends());
+        let per_span = (points - DEGREE) as f64 / self.duration_s;
+        let (first, functions) = self.functions(time_s * per_span);
+        let scales = [1.0, per_span, per_span.powi(2), per_span.powi(3)];
+        // All functions add up to 1: with one number for both ends its function is what the others leave, exactly at rest where they are.
+        if ends == 1 {
+            out[0][0] = 1.0;
+        }
+        for (offset, function) in functions.iter().enumerate() {
+            let point = first + offset;
+            for order in 0..4 {
+                let value = function[order] * scales[order];
+                if (3..points - 3).contains(&point) {
+                    out[point - 3 + ends][order] += value;
+                    if ends == 1 {
+                        out[0][order] -= value;
+                    }
+                } else if ends == 2 {
+                    out[usize::from(point >= 3)][order] += value;
+                }
+            }
+        }
+    }
+
+    fn standing(&self) -> Vec<f64> {
+        vec![1.0; self.columns()]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Motion;
+    use crate::families::check;
+    use crate::family::Family;
+    use proptest::prelude::*;
+
+    #[test]
+    fn free_numbers() {
+        for (control_points, returns, numbers) in [(14, true, 9), (40, true, 35), (14, false, 10)] {
+            let settings = BSplineSettings { control_points, returns };
+            assert_eq!(BSpline::new(1, 10.0, &settings).unwrap().parameters(), numbers);
+        }
+    }
+
+    /// In the middle of a long spline the functions are cardinal B-splines: N(k) = 1, 26, 66, 26, 1 over 120 at the knots, (Schoenberg), slopes 5, 50, 0, -50, -5 over 120.
+    #[test]
+    fn cardinal_values() {
+        let settings = BSplineSettings { control_points: 25, returns: true };
+        let family = BSpline::new(1, 20.0, &settings).unwrap();
+        let mut parameters = vec![0.0; family.parameters()];
+        // Control point 12 acts from knot 7 to knot 13 (in seconds here).
+        parameters[12 - 2] = 120.0;
+        let mut motion = Motion::default();
+        family.motion(&parameters, &[7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0], &mut motion);
+        for (sample, (value, slope)) in
+            [(0.0, 0.0), (1.0, 5.0), (26.0, 50.0), (66.0, 0.0), (26.0, -50.0), (1.0, -5.0), (0.0, 0.0)]
+                .iter()
+                .enumerate()
+        {
+            // Rounding of numbers up to 120.
+            assert!((motion.q[sample] - value).abs() < 1e-12 && (motion.dq[sample] - slope).abs() < 1e-12);
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn exact(seed in any::<u64>(), control_points in 7_usize..30, returns in any::<bool>()) {
+            let family = BSpline::new(2, 4.0, &BSplineSettings { control_points, returns }).unwrap();
+            check::derivatives(&family, seed);
+            check::gradient(&family, seed);
+            check::rest(&family, seed);
+        }
+
+        #[test]
+        fn stays_between_its_control_points(seed in any::<u64>(), control_points in 7_usize..30) {
+            let family = BSpline::new(1, 4.0, &BSplineSettings { control_points, returns: false }).unwrap();
+            let parameters = check::start(&family, seed);
+            let [low, high] = parameters.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], p| [l.min(*p), h.max(*p)]);
+            let times: Vec<f64> = (0..=200).map(|s| f64::from(s) * 0.02).collect();
+            let mut motion = Motion::default();
+            family.motion(&parameters, &times, &mut motion);
+            prop_assert!(motion.q.iter().all(|q| (low - 1e-12..=high + 1e-12).contains(q)));
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Families whose motion is linear in their parameters.
+
+use super::random_start::{grid, scale_and_shift};
+use super::sampled_basis::{GridCache, SampledBasis};
+use crate::family::Family;
+use crate::motion::{Motion, MotionCotangent};
+use dynident_model::sample::Random;
+
+/// The functions of time B_c(t) of one joint, q(t) = Σ_c p_c B_c(t), of a [`LinearFamily`].
+pub trait Basis: core::fmt::Debug + Send + Sync {
+    /// The family's name.
+    const NAME: &'static str;
+
+    /// Number of functions: free numbers a joint.
+    fn columns(&self) -> usize;
+
+    /// Whether joints have different functions (else all share those of joint 0).
+    fn differs_by_joint(&self) -> bool {
+        false
+    }
+
+    /// Value, first, second and third derivative of every function at `time_s` for a joint; `out` comes zeroed.
+    fn row(&self, joint: usize, time_s: f64, out: &mut [[f64; 4]]);
+
+    /// The parameters of the motion that stands still at 1.
+    fn standing(&self) -> Vec<f64>;
+
+    /// A random shape, of any size.
+    fn shape(&self, random: &mut Random) -> Vec<f64> {
+        (0..self.columns()).map(|_| random.normal()).collect()
+    }
+}
+
+/// A family linear in its parameters: joint after joint, the weights of its [`Basis`].
+///
+/// The functions are sampled once per grid of times and kept, so that motion and gradient are two small matrix products. A grid is recognised by its times, so optimisers
+/// should ask again for the same ones.
+#[derive(Clone, Debug)]
+pub struct LinearFamily<B> {
+    basis: B,
+    joints: usize,
+    duration_s: f64,
+    grids: GridCache,
+}
+
+impl<B: Basis> LinearFamily<B> {
+    pub(crate) fn of(basis: B, joints: usize, duration_s: f64) -> Self {
+        Self { basis, joints, duration_s, grids: GridCache::default() }
+    }
+
+    /// The functions of time.
+    pub fn basis(&self) -> &B {
+        &self.basis
+    }
+
+    /// Sets of functions that differ.
+    fn sets(&self) -> usize {
+        if self.basis.differs_by_joint() { self.joints } else { 1 }
+    }
+
+    fn sample(&self, times_s: &[f64]) -> SampledBasis {
+        SampledBasis::new(self.basis.columns(), self.sets(), times_s, |joint, time, out| {
+            self.basis.row(joint, time.clamp(0.0, self.duration_s), out);
+        })
+    }
+}
+
+impl<B: Basis> Family for LinearFamily<B> {
+    fn name(&self) -> &'static str {
+        B::NAME
+    }
+
+    fn joints(&self) -> usize {
+        self.joints
+    }
+
+    fn duration_s(&self) -> f64 {
+        self.duration_s
+    }
+
+    fn parameters(&self) -> usize {
+        self.joints * self.basis.columns()
+    }
+
+    fn bounds(&self) -> Vec<[f64; 2]> {
+        vec![[f64::NEG_INFINITY, f64::INFINITY]; self.parameters()]
+    }
+
+    fn random(&self, ranges: &[[f64; 2]], speeds: &[f64], random: &mut Random) -> Vec<f64> {
+        let mut parameters: Vec<f64> = (0..self.joints).flat_map(|_| self.basis.shape(random)).collect();
+        let mut motion = Motion::default();
+        self.motion(&parameters, &grid(self.duration_s), &mut motion);
+        let standing = self.basis.standing();
+        for (joint, own) in parameters.chunks_mut(standing.len()).enumerate() {
+            let span = motion.of(joint);
+            let [scale, shift] =
+                scale_and_shift(&motion.q[span.clone()], &motion.dq[span], ranges[joint], speeds[joint], random);
+            for (value, one) in own.iter_mut().zip(&standing) {
+                *value = scale * *value + shift * one;
+            }
+        }
+        parameters
+    }
+
+    fn motion(&self, parameters: &[f64], times_s: &[f64], out: &mut Motion) {
+        assert_eq!(parameters.len(), self.parameters(), "parameters of {}", B::NAME);
+        out.reset(self.joints, times_s.len());
+        let functions = self.sets() * self.basis.columns();
+        self.grids.each(
+            functions,
+            times_s,
+            |times| self.sample(times),
+            |basis, from| basis.motion(parameters, from, out),
+        );
+    }
+
+    fn pull_back(&self, parameters: &[f64], times_s: &[f64], cotangent: &MotionCotangent, gradient: &mut [f64]) {
+        assert_eq!(parameters.len(), self.parameters(), "parameters of {}", B::NAME);
+        assert_eq!(gradient.len(), self.parameters(), "gradient of {}", B::NAME);
+        assert_eq!((cotangent.joints, cotangent.samples), (self.joints, times_s.len()), "cotangent of {}", B::NAME);
+        let functions = self.sets() * self.basis.columns();
+        self.grids.each(
+            functions,
+            times_s,
+            |times| self.sample(times),
+            |basis, from| basis.pull_back(from, cotangent, gradient),
+        );
+    }
+}

@@ -1,0 +1,201 @@
+//! One logistic stroke that is exactly at rest outside its window.
+
+use super::logistic_map::PathRates;
+use dynident_lanes::Scalar;
+
+/// A stroke: the logistic function of a warped time,
+///
+/// s(t) = 1/(1 + e^-φ), φ = κ u/(1 - u²), u = (t - c)/w,
+///
+/// times an amplitude, from 0 at t = c - w to 1 at t = c + w. φ runs to ±∞ at the window's ends, so that s reaches 0 and 1 there with **all** derivatives zero: the exact soft start
+/// and stop that Eq. 11 of the paper asks for. Around the middle φ = ω (t - c) with ω = κ/w: the paper's stroke of that steepness (peak speed Aω/4), which it becomes everywhere as
+/// κ grows. κ = 2√3 has the flattest speed at the middle; κ near 4 resembles a minimum-jerk move.
+///
+/// φ(u) can be inverted in closed form, so position still tells speed and acceleration: [`LogisticStroke::rates`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LogisticStroke {
+    /// Way from start to end, rad (m).
+    pub amplitude: f64,
+    /// Middle of the window, s.
+    pub centre_s: f64,
+    /// Half the window's length w, s.
+    pub half_duration_s: f64,
+    /// κ.
+    pub sharpness: f64,
+}
+
+/// Beyond this |u| every κ >= 2√3 has φ > 3500, where e^-φ is zero in double precision: s and all its derivatives are exact there.
+pub(super) const LAST: f64 = 1.0 - 1.0 / 2048.0;
+
+impl LogisticStroke {
+    /// The least κ: the speed has its one peak at the middle.
+    pub const LEAST_SHARPNESS: f64 = 3.464_101_615_137_755;
+
+    /// The steepness ω = κ/w in 1/s, the paper's ω.
+    pub fn omega(&self) -> f64 {
+        self.sharpness / self.half_duration_s
+    }
+
+    /// u, held inside the part where anything happens.
+    pub(super) fn warped(&self, time_s: f64) -> f64 {
+        ((time_s - self.centre_s) / self.half_duration_s).clamp(-LAST, LAST)
+    }
+
+    /// Speed and acceleration on this stroke where the joint has gone `gone` rad (m) of it.
+    ///
+    /// With y = φ/κ = ln(s/(1-s))/κ and r = √(1 + 4y²): u = 2y/(1+r), 1/(1-u²) = (1+r)/2, φ' = κ r(1+r)/2,
+    /// φ'' = 2κ u (3+u²)/(1-u²)³, and q̇ = A s(1-s) φ'/w, q̈ = A s(1-s)((1-2s) φ'² + φ'')/w². For large κ these are Eqs. 15 and 16 of the paper.
+    ///
+    /// `None` outside the stroke, where `gone` is not strictly between 0 and A.
+    pub fn rates(&self, gone: f64) -> Option<PathRates> {
+        let (done, left) = (gone / self.amplitude, (self.amplitude - gone) / self.amplitude);
+        if !(done > 0.0 && left > 0.0) {
+            return None;
+        }
+        let y = (done / left).ln() / self.sharpness;
+        let r = (1.0 + 4.0 * y * y).sqrt();
+        let (u, widening) = (2.0 * y / (1.0 + r), 0.5 * (1.0 + r));
+        let first = self.sharpness * r * widening;
+        let second = 2.0 * self.sharpness * u * (3.0 + u * u) * widening.powi(3);
+        let bell = done * left;
+        let w = self.half_duration_s;
+        Some(PathRates {
+            dq: self.amplitude * bell * first / w,
+            ddq: self.amplitude * bell * ((left - done) * first * first + second) / (w * w),
+        })
+    }
+}
+
+/// Derivatives by u of the unit stroke, orders 0 to 4, and of its derivative by κ, orders 0 to 3.
+pub(super) struct StrokeDerivatives<T> {
+    pub(super) value: [T; 5],
+    pub(super) by_sharpness: [T; 4],
+}
+
+/// The unit stroke at `u` by Taylor arithmetic: each array holds the coefficients of 1, x, .. x⁴ around `u`.
+///
+/// `logistic` gives 1/(1 + e^-φ) and its derivative.
+#[inline(always)]
+pub(super) fn unit_stroke<T: Scalar>(u: T, sharpness: T, logistic: impl Fn(T) -> (T, T)) -> StrokeDerivatives<T> {
+    let two = T::splat(2.0);
+    // 1/(1 - u²), from (1 - u²) r = 1.
+    let inverse = u.neg_mul_add(u, T::ONE).recip();
+    let mut r = [inverse, T::ZERO, T::ZERO, T::ZERO, T::ZERO];
+    r[1] = two * u * r[0] * inverse;
+    for n in 2..5 {
+        r[n] = (two * u * r[n - 1] + r[n - 2]) * inverse;
+    }
+    // ψ = u r, φ = κ ψ.
+    let mut psi = [u * r[0]; 5];
+    for n in 1..5 {
+        psi[n] = u.mul_add(r[n], r[n - 1]);
+    }
+    let (value, bell) = logistic(sharpness * psi[0]);
+    let mut s = [value, T::ZERO, T::ZERO, T::ZERO, T::ZERO];
+    let mut p = [bell, T::ZERO, T::ZERO, T::ZERO];
+    let slope = T::ONE - two * value;
+    for n in 1..5 {
+        // s' = p φ'.
+        let mut sum = T::ZERO;
+        for i in 1..=n {
+            sum = (T::splat(i as f64) * psi[i]).mul_add(p[n - i], sum);
+        }
+        s[n] = sum * sharpness * T::splat(1.0 / n as f64);
+        if n < 4 {
+            // p = s - s².
+            let mut sum = slope * s[n];
+            for i in 1..n {
+                sum = s[i].neg_mul_add(s[n - i], sum);
+            }
+            p[n] = sum;
+        }
+    }
+    // ∂s/∂κ = p ψ.
+    let mut k = [T::ZERO; 4];
+    for n in 0..4 {
+        for i in 0..=n {
+            k[n] = p[i].mul_add(psi[n - i], k[n]);
+        }
+    }
+    let factorials = [1.0, 1.0, 2.0, 6.0, 24.0];
+    StrokeDerivatives {
+        value: core::array::from_fn(|n| s[n] * T::splat(factorials[n])),
+        by_sharpness: core::array::from_fn(|n| k[n] * T::splat(factorials[n])),
+    }
+}
+
+/// 1/(1 + e^-φ) and its derivative, neither losing digits far from the middle.
+#[inline(always)]
+pub(super) fn logistic_and_bell(phi: f64) -> (f64, f64) {
+    let e = (-phi.abs()).exp();
+    let d = 1.0 / (1.0 + e);
+    (if phi >= 0.0 { d } else { e * d }, e * d * d)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynident_lanes::Dual;
+    use proptest::prelude::*;
+
+    fn dual_logistic(phi: Dual) -> (Dual, Dual) {
+        let (s, p) = logistic_and_bell(phi.value);
+        (
+            Dual { value: s, derivative: p * phi.derivative },
+            Dual { value: p, derivative: p * (1.0 - 2.0 * s) * phi.derivative },
+        )
+    }
+
+    #[test]
+    fn nothing_moves_outside_the_window() {
+        for sharpness in [LogisticStroke::LEAST_SHARPNESS, 4.0, 40.0] {
+            for (u, end) in [(-LAST, 0.0), (LAST, 1.0)] {
+                let stroke = unit_stroke(u, sharpness, logistic_and_bell);
+                assert_eq!(stroke.value, [end, 0.0, 0.0, 0.0, 0.0]);
+                assert_eq!(stroke.by_sharpness, [0.0; 4]);
+            }
+        }
+    }
+
+    /// A sharp stroke is the paper's: around the middle φ = ωt (1 + u² + ..), and ωt = 8 lies at u = 8/κ, so the relative change of φ is (8/κ)².
+    #[test]
+    fn large_sharpness_is_the_papers_stroke() {
+        let stroke = LogisticStroke { amplitude: 2.0, centre_s: 0.0, half_duration_s: 1e5, sharpness: 1e5 };
+        for time in [-8.0_f64, -2.0, 0.0, 1.0, 5.0] {
+            let gone = 2.0 / (1.0 + (-time).exp());
+            let rates = stroke.rates(gone).unwrap();
+            assert!((rates.dq - 0.5 * gone * (2.0 - gone)).abs() < 1e-7);
+            assert!((rates.ddq - 0.25 * gone * (2.0 - gone) * (2.0 - 2.0 * gone)).abs() < 1e-7);
+        }
+    }
+
+    proptest! {
+        /// Dual numbers through the same arithmetic: each order's derivative is the next order, and the one by κ is ∂/∂κ. 1e-11 of the sizes that Taylor
+        /// coefficients reach near the window's ends.
+        #[test]
+        fn orders_derive_each_other(u in -0.97_f64..0.97, sharpness in 3.4642_f64..30.0) {
+            let plain = unit_stroke(u, sharpness, logistic_and_bell);
+            let by_u = unit_stroke(Dual::variable(u), Dual::constant(sharpness), dual_logistic);
+            let by_k = unit_stroke(Dual::constant(u), Dual::variable(sharpness), dual_logistic);
+            let size = |order: usize| sharpness.max(4.0).powi(order as i32) * 1e3;
+            for order in 0..4 {
+                prop_assert!((by_u.value[order].derivative - plain.value[order + 1]).abs() < 1e-12 * size(order + 1));
+                prop_assert!((by_k.value[order].derivative - plain.by_sharpness[order]).abs() < 1e-12 * size(order));
+            }
+        }
+
+        /// The closed-form map against the Taylor arithmetic. Rounding of q is the map's only error: it enters the acceleration with at most κ² times 1e-16.
+        #[test]
+        fn map_is_exact_on_the_stroke(u in -0.8_f64..0.8, sharpness in 3.4642_f64..30.0, amplitude in -3.0_f64..3.0) {
+            prop_assume!(amplitude.abs() > 0.01);
+            let stroke = LogisticStroke { amplitude, centre_s: 1.0, half_duration_s: 0.7, sharpness };
+            let unit = unit_stroke(u, sharpness, logistic_and_bell);
+            prop_assume!(unit.value[0] > 1e-12 && unit.value[0] < 1.0 - 1e-12);
+            let rates = stroke.rates(amplitude * unit.value[0]).unwrap();
+            let [dq, ddq] = [unit.value[1] / 0.7, unit.value[2] / 0.49].map(|x| amplitude * x);
+            let peak = amplitude.abs() * stroke.omega();
+            prop_assert!((rates.dq - dq).abs() < 1e-12 * peak.max(1.0));
+            prop_assert!((rates.ddq - ddq).abs() < 1e-12 * (peak * stroke.omega()).max(1.0));
+        }
+    }
+}

@@ -1,0 +1,529 @@
+//! Any number of logistic strokes a joint, all joints at once, exactly at rest at both ends.
+
+use super::error::{FamilyError, MOST, require, require_frame};
+use super::logistic_map::PathRates;
+use super::logistic_stroke::{LAST, LogisticStroke, StrokeDerivatives, logistic_and_bell, unit_stroke};
+use super::random_start::{grid, scale_and_shift};
+use super::sampled_basis::load_some;
+use crate::family::Family;
+use crate::motion::{Motion, MotionCotangent};
+use dynident_lanes::{Kernel, Lane, Level, dispatch};
+use dynident_model::sample::Random;
+use serde::{Deserialize, Serialize};
+
+const NAME: &str = "logistic_strokes";
+/// The sharpest spliced stroke.
+const MOST_SHARPNESS: f64 = 40.0;
+/// Bound of the logarithm of a slot's length against the last slot's.
+const MOST_LOG_SLOT: f64 = 3.0;
+
+/// How the strokes of one joint lie in time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StrokeOrder {
+    /// A sum of strokes anywhere within the duration: more information, no map from position to speed.
+    Overlapping,
+    /// One after another in slots of free length that fill the duration: the map holds on every stroke.
+    Spliced,
+}
+
+/// What a [`LogisticStrokes`] family is made of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LogisticStrokesSettings {
+    /// Strokes a joint, K. Default 6.
+    pub strokes: usize,
+    /// How they lie in time. Default overlapping.
+    pub order: StrokeOrder,
+    /// The motion ends where it began. Default true.
+    pub returns: bool,
+    /// κ of overlapping strokes, from 2√3 to 40; see [`LogisticStroke`]. Default 4. Spliced strokes have it free.
+    pub sharpness: f64,
+    /// Largest steepness ω of overlapping strokes in 1/s. Default 15.
+    pub omega_max: f64,
+}
+
+impl Default for LogisticStrokesSettings {
+    fn default() -> Self {
+        Self { strokes: 6, order: StrokeOrder::Overlapping, returns: true, sharpness: 4.0, omega_max: 15.0 }
+    }
+}
+
+impl LogisticStrokesSettings {
+    /// Checks the settings for a duration.
+    ///
+    /// # Errors
+    /// Too few strokes (1, or 2 if the motion returns) or more than 1000, κ outside its range, or a largest ω too small for one stroke to fit into the duration.
+    pub fn validate(&self, duration_s: f64) -> Result<(), FamilyError> {
+        let least = if self.returns { 2 } else { 1 };
+        require(
+            (least..=MOST).contains(&self.strokes),
+            NAME,
+            "strokes",
+            self.strokes as f64,
+            "give 1 to 1000, and at least 2 if the motion returns to its start",
+        )?;
+        require(
+            (LogisticStroke::LEAST_SHARPNESS..=MOST_SHARPNESS).contains(&self.sharpness),
+            NAME,
+            "sharpness",
+            self.sharpness,
+            "give 3.4642 to 40",
+        )?;
+        require(
+            self.omega_max.is_finite() && self.omega_max > 2.0 * self.sharpness / duration_s,
+            NAME,
+            "omega_max",
+            self.omega_max,
+            "give more than 2 sharpness / duration, or no stroke fits into the duration",
+        )
+    }
+}
+
+/// q(t) = h + Σ_k A_k s_k(t) with [`LogisticStroke`]s: the generalisation of the paper's Eq. 14 to strokes of unequal amplitude, steepness and time, all joints moving at once.
+///
+/// Free numbers a joint, in this order:
+/// * overlapping: h, A_1..A_K (without A_K, which closes the sum, if the motion returns), ω_1..ω_K in 1/s, places τ_1..τ_K from 0 (stroke begins with the motion) to 1
+///   (ends with it). 3 K numbers if it returns.
+/// * spliced: h, A_1..A_K (ditto), κ_1..κ_K, logarithms of the lengths of slots 1..K-1 against the last slot's. 3 K - 1 numbers if it returns.
+///
+/// Every value within [`bounds`](Family::bounds) keeps all strokes within the duration, so both ends are exactly at rest, with all derivatives zero.
+#[derive(Clone, Debug)]
+pub struct LogisticStrokes {
+    settings: LogisticStrokesSettings,
+    joints: usize,
+    duration_s: f64,
+}
+
+impl LogisticStrokes {
+    /// The family for so many joints and seconds.
+    ///
+    /// # Errors
+    /// Settings without meaning; see [`LogisticStrokesSettings::validate`].
+    pub fn new(joints: usize, duration_s: f64, settings: &LogisticStrokesSettings) -> Result<Self, FamilyError> {
+        require_frame(NAME, joints, duration_s)?;
+        settings.validate(duration_s)?;
+        Ok(Self { settings: settings.clone(), joints, duration_s })
+    }
+
+    /// The strokes of one joint, in the order of the parameters; the motion starts at the returned position.
+    ///
+    /// # Panics
+    /// If the joint or the parameters do not exist.
+    pub fn strokes(&self, parameters: &[f64], joint: usize) -> (f64, Vec<LogisticStroke>) {
+        let own = &parameters[joint * self.each()..(joint + 1) * self.each()];
+        let (count, free) = (self.settings.strokes, self.free_amplitudes());
+        let amplitudes = &own[1..=free];
+        let (third, fourth) = own[1 + free..].split_at(count);
+        let duration = self.duration_s;
+        let lengths = self.slots(fourth);
+        let mut from = 0.0;
+        let strokes = (0..count)
+            .map(|k| {
+                let amplitude = amplitudes.get(k).copied().unwrap_or_else(|| -amplitudes.iter().sum::<f64>());
+                let (centre_s, half_duration_s, sharpness) = match self.settings.order {
+                    StrokeOrder::Overlapping => {
+                        let half = self.settings.sharpness / third[k];
+                        (half + fourth[k] * (duration - 2.0 * half), half, self.settings.sharpness)
+                    }
+                    StrokeOrder::Spliced => {
+                        let half = 0.5 * lengths[k];
+                        from += lengths[k];
+                        (from - half, half, third[k])
+                    }
+                };
+                LogisticStroke { amplitude, centre_s, half_duration_s, sharpness }
+            })
+            .collect();
+        (own[0], strokes)
+    }
+
+    /// Speed and acceleration of a joint that is at `q` at `time_s`, by the stroke whose slot it is: Eqs. 15 and 16 for these strokes.
+    ///
+    /// `None` if q is outside the stroke, or strokes may overlap, so that position does not tell speed. A robot that lags is still on the stroke of an earlier time: subtract the lag from
+    /// `time_s`.
+    ///
+    /// # Panics
+    /// If the joint or the parameters do not exist.
+    pub fn rates(&self, parameters: &[f64], joint: usize, time_s: f64, q: f64) -> Option<PathRates> {
+        if self.settings.order == StrokeOrder::Overlapping {
+            return None;
+        }
+        let (mut from, strokes) = self.strokes(parameters, joint);
+        for stroke in strokes {
+            if (time_s - stroke.centre_s).abs() <= stroke.half_duration_s {
+                return stroke.rates(q - from);
+            }
+            from += stroke.amplitude;
+        }
+        None
+    }
+
+    fn free_amplitudes(&self) -> usize {
+        self.settings.strokes - usize::from(self.settings.returns)
+    }
+
+    /// Free numbers a joint.
+    fn each(&self) -> usize {
+        let slots = self.settings.strokes - usize::from(self.settings.order == StrokeOrder::Spliced);
+        1 + self.free_amplitudes() + self.settings.strokes + slots
+    }
+
+    /// Lengths of the slots from their logarithms, the last one's being zero.
+    fn slots(&self, logarithms: &[f64]) -> Vec<f64> {
+        let mut lengths: Vec<f64> = logarithms.iter().map(|x| x.exp()).collect();
+        lengths.resize(self.settings.strokes, 1.0);
+        let scale = self.duration_s / lengths.iter().sum::<f64>();
+        for length in &mut lengths {
+            *length *= scale;
+        }
+        lengths
+    }
+
+    /// From derivatives by (A, c, w, κ) of each stroke to derivatives by the joint's free numbers after h.
+    fn chain(&self, own: &[f64], raw: &[[f64; 4]], gradient: &mut [f64]) {
+        let (count, free) = (self.settings.strokes, self.free_amplitudes());
+        let closing = if free < count { raw[free][0] } else { 0.0 };
+        for (out, stroke) in gradient[1..=free].iter_mut().zip(raw) {
+            *out += stroke[0] - closing;
+        }
+        let (third, fourth) = own[1 + free..].split_at(count);
+        let (third_out, fourth_out) = gradient[1 + free..].split_at_mut(count);
+        match self.settings.order {
+            StrokeOrder::Overlapping => {
+                for k in 0..count {
+                    let half = self.settings.sharpness / third[k];
+                    let half_by_omega = -half / third[k];
+                    third_out[k] += (raw[k][2] + (1.0 - 2.0 * fourth[k]) * raw[k][1]) * half_by_omega;
+                    fourth_out[k] += (self.duration_s - 2.0 * half) * raw[k][1];
+                }
+            }
+            StrokeOrder::Spliced => {
+                let lengths = self.slots(fourth);
+                // A slot's length moves its own middle by half, and every later one.
+                let mut later = 0.0;
+                let mut by_length = vec![0.0; count];
+                for k in (0..count).rev() {
+                    by_length[k] = 0.5 * (raw[k][1] + raw[k][2]) + later;
+                    later += raw[k][1];
+                    third_out[k] += raw[k][3];
+                }
+                let mean = by_length.iter().zip(&lengths).map(|(g, d)| g * d).sum::<f64>() / self.duration_s;
+                for (k, out) in fourth_out.iter_mut().enumerate() {
+                    *out += lengths[k] * (by_length[k] - mean);
+                }
+            }
+        }
+    }
+}
+
+/// Whether a chunk of samples lies before a stroke, after it, or sees it move.
+enum Chunk<T> {
+    Before,
+    After,
+    Within(T),
+}
+
+#[inline(always)]
+fn chunk_of<T: Lane>(stroke: &LogisticStroke, times: &[f64]) -> Chunk<T> {
+    let mut warped = [LAST; 8];
+    for (u, &time) in warped.iter_mut().zip(times) {
+        *u = stroke.warped(time);
+    }
+    let seen = &warped[..times.len()];
+    if seen.iter().all(|&u| u >= LAST) {
+        Chunk::After
+    } else if seen.iter().all(|&u| u <= -LAST) {
+        Chunk::Before
+    } else {
+        Chunk::Within(T::load(&warped))
+    }
+}
+
+#[inline(always)]
+fn lanes_stroke<T: Lane>(u: T, sharpness: f64) -> StrokeDerivatives<T> {
+    unit_stroke(u, T::splat(sharpness), |phi| {
+        let (mut angles, mut bells) = ([0.0; 8], [0.0; 8]);
+        phi.store(&mut angles);
+        for (phi, bell) in angles.iter_mut().zip(&mut bells).take(T::LANES) {
+            (*phi, *bell) = logistic_and_bell(*phi);
+        }
+        (T::load(&angles), T::load(&bells))
+    })
+}
+
+struct Forward<'a> {
+    strokes: &'a [LogisticStroke],
+    times_s: &'a [f64],
+    joint: usize,
+    out: &'a mut Motion,
+}
+
+impl Kernel for Forward<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<T: Lane>(self) {
+        let Self { strokes, times_s, joint, out } = self;
+        let start = out.of(joint).start;
+        for (index, times) in times_s.chunks(T::LANES).enumerate() {
+            let at = start + index * T::LANES;
+            let arrays = [&mut out.q, &mut out.dq, &mut out.ddq, &mut out.dddq];
+            let mut sums = [T::ZERO; 4];
+            for stroke in strokes {
+                match chunk_of::<T>(stroke, times) {
+                    Chunk::Before => {}
+                    Chunk::After => sums[0] += T::splat(stroke.amplitude),
+                    Chunk::Within(u) => {
+                        let unit = lanes_stroke(u, stroke.sharpness);
+                        let mut scale = stroke.amplitude;
+                        for (sum, value) in sums.iter_mut().zip(unit.value) {
+                            *sum = value.mul_add(T::splat(scale), *sum);
+                            scale /= stroke.half_duration_s;
+                        }
+                    }
+                }
+            }
+            for (array, sum) in arrays.into_iter().zip(sums) {
+                let mut values = [0.0; 8];
+                sum.store(&mut values);
+                for (out, value) in array[at..at + times.len()].iter_mut().zip(values) {
+                    *out += value;
+                }
+            }
+        }
+    }
+}
+
+struct Backward<'a> {
+    strokes: &'a [LogisticStroke],
+    times_s: &'a [f64],
+    joint: usize,
+    cotangent: &'a MotionCotangent,
+}
+
+impl Kernel for Backward<'_> {
+    /// Derivatives by (A, c, w, κ) of each stroke.
+    type Output = Vec<[f64; 4]>;
+    #[inline(always)]
+    fn run<T: Lane>(self) -> Vec<[f64; 4]> {
+        let Self { strokes, times_s, joint, cotangent } = self;
+        let start = cotangent.of(joint).start;
+        let mut sums = vec![[T::ZERO; 4]; strokes.len()];
+        for (index, times) in times_s.chunks(T::LANES).enumerate() {
+            let at = start + index * T::LANES;
+            let arrays = [&cotangent.q, &cotangent.dq, &cotangent.ddq, &cotangent.dddq];
+            let pulls: [T; 4] = arrays.map(|array| load_some(array, at, times.len()));
+            for (stroke, sum) in strokes.iter().zip(&mut sums) {
+                match chunk_of::<T>(stroke, times) {
+                    Chunk::Before => {}
+                    Chunk::After => sum[0] += pulls[0],
+                    Chunk::Within(u) => {
+                        let unit = lanes_stroke(u, stroke.sharpness);
+                        let inverse = T::splat(1.0 / stroke.half_duration_s);
+                        let mut scale = T::ONE;
+                        // Moving the middle by dc is -du·w; stretching by dw scales u: order n gains -(u S_{n+1} + n S_n)/w.
+                        let mut local = [T::ZERO; 4];
+                        for order in 0..4 {
+                            let pull = pulls[order] * scale;
+                            let stretched =
+                                u.mul_add(unit.value[order + 1], T::splat(order as f64) * unit.value[order]);
+                            local[0] = pull.mul_add(unit.value[order], local[0]);
+                            local[1] = pull.neg_mul_add(unit.value[order + 1], local[1]);
+                            local[2] = pull.neg_mul_add(stretched, local[2]);
+                            local[3] = pull.mul_add(unit.by_sharpness[order], local[3]);
+                            scale = scale * inverse;
+                        }
+                        let amplitude = T::splat(stroke.amplitude);
+                        sum[0] += local[0];
+                        sum[1] += local[1] * amplitude * inverse;
+                        sum[2] += local[2] * amplitude * inverse;
+                        sum[3] += local[3] * amplitude;
+                    }
+                }
+            }
+        }
+        sums.iter().map(|sum| sum.map(Lane::sum)).collect()
+    }
+}
+
+impl Family for LogisticStrokes {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn joints(&self) -> usize {
+        self.joints
+    }
+
+    fn duration_s(&self) -> f64 {
+        self.duration_s
+    }
+
+    fn parameters(&self) -> usize {
+        self.joints * self.each()
+    }
+
+    /// Overlapping: ω from the one stroke that fills the duration to the largest, places from 0 to 1. Spliced: κ from 2√3 to 40, slots up to e³ times as long as the last or as short.
+    fn bounds(&self) -> Vec<[f64; 2]> {
+        let count = self.settings.strokes;
+        let (third, fourth) = match self.settings.order {
+            StrokeOrder::Overlapping => {
+                ([2.0 * self.settings.sharpness / self.duration_s, self.settings.omega_max], [0.0, 1.0])
+            }
+            StrokeOrder::Spliced => {
+                ([LogisticStroke::LEAST_SHARPNESS, MOST_SHARPNESS], [-MOST_LOG_SLOT, MOST_LOG_SLOT])
+            }
+        };
+        let mut own = vec![[f64::NEG_INFINITY, f64::INFINITY]; 1 + self.free_amplitudes()];
+        own.resize(own.len() + count, third);
+        own.resize(self.each(), fourth);
+        own.repeat(self.joints)
+    }
+
+    fn random(&self, ranges: &[[f64; 2]], speeds: &[f64], random: &mut Random) -> Vec<f64> {
+        let (count, free) = (self.settings.strokes, self.free_amplitudes());
+        let bounds = self.bounds();
+        let mut parameters = Vec::with_capacity(self.parameters());
+        for own in bounds.chunks(self.each()) {
+            parameters.push(0.0);
+            parameters.extend((0..free).map(|_| random.normal()));
+            let [least, most] = own[1 + free];
+            // Slow strokes first of all: their size is what the limits allow.
+            let most = most.min(6.0 * least);
+            parameters.extend((0..count).map(|_| least * (most / least).powf(random.uniform(0.0, 1.0))));
+            let [low, high] = match self.settings.order {
+                StrokeOrder::Overlapping => [0.0, 1.0],
+                StrokeOrder::Spliced => [-0.5, 0.5],
+            };
+            parameters.extend((1 + free + count..self.each()).map(|_| random.uniform(low, high)));
+        }
+        // Finely enough that no stroke hides between the times.
+        let coarse = grid(self.duration_s);
+        let times: Vec<f64> = coarse
+            .windows(2)
+            .flat_map(|pair| (0..4).map(|part| pair[0] + 0.25 * f64::from(part) * (pair[1] - pair[0])))
+            .collect();
+        let mut motion = Motion::default();
+        self.motion(&parameters, &times, &mut motion);
+        for (joint, own) in parameters.chunks_mut(self.each()).enumerate() {
+            let span = motion.of(joint);
+            let [scale, shift] =
+                scale_and_shift(&motion.q[span.clone()], &motion.dq[span], ranges[joint], speeds[joint], random);
+            own[0] = shift;
+            own[1..=free].iter_mut().for_each(|amplitude| *amplitude *= scale);
+        }
+        parameters
+    }
+
+    fn motion(&self, parameters: &[f64], times_s: &[f64], out: &mut Motion) {
+        assert_eq!(parameters.len(), self.parameters(), "parameters of {NAME}");
+        out.reset(self.joints, times_s.len());
+        for joint in 0..self.joints {
+            let (start, strokes) = self.strokes(parameters, joint);
+            let span = out.of(joint);
+            out.q[span].fill(start);
+            dispatch(Level::detect(), Forward { strokes: &strokes, times_s, joint, out });
+        }
+    }
+
+    fn pull_back(&self, parameters: &[f64], times_s: &[f64], cotangent: &MotionCotangent, gradient: &mut [f64]) {
+        assert_eq!(parameters.len(), self.parameters(), "parameters of {NAME}");
+        assert_eq!(gradient.len(), self.parameters(), "gradient of {NAME}");
+        assert_eq!((cotangent.joints, cotangent.samples), (self.joints, times_s.len()), "cotangent of {NAME}");
+        let each = self.each();
+        for (joint, own) in gradient.chunks_mut(each).enumerate() {
+            let (_, strokes) = self.strokes(parameters, joint);
+            let raw = dispatch(Level::detect(), Backward { strokes: &strokes, times_s, joint, cotangent });
+            own[0] += cotangent.q[cotangent.of(joint)].iter().sum::<f64>();
+            self.chain(&parameters[joint * each..(joint + 1) * each], &raw, own);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::families::check;
+    use proptest::prelude::*;
+
+    fn family(strokes: usize, order: StrokeOrder, returns: bool) -> LogisticStrokes {
+        let settings = LogisticStrokesSettings { strokes, order, returns, ..Default::default() };
+        LogisticStrokes::new(2, 10.0, &settings).unwrap()
+    }
+
+    fn orders() -> impl Strategy<Value = StrokeOrder> {
+        prop_oneof![Just(StrokeOrder::Overlapping), Just(StrokeOrder::Spliced)]
+    }
+
+    #[test]
+    fn free_numbers() {
+        assert_eq!(family(6, StrokeOrder::Overlapping, true).parameters(), 2 * 18);
+        assert_eq!(family(6, StrokeOrder::Overlapping, false).parameters(), 2 * 19);
+        assert_eq!(family(4, StrokeOrder::Spliced, true).parameters(), 2 * 11);
+    }
+
+    #[test]
+    fn bad_settings_are_named() {
+        let make = |settings: LogisticStrokesSettings| LogisticStrokes::new(1, 2.0, &settings);
+        let default = LogisticStrokesSettings::default();
+        assert!(make(LogisticStrokesSettings { strokes: 1, ..default.clone() }).is_err());
+        assert!(make(LogisticStrokesSettings { sharpness: 1.0, ..default.clone() }).is_err());
+        assert!(make(LogisticStrokesSettings { omega_max: 3.9, ..default.clone() }).is_err());
+        assert!(make(LogisticStrokesSettings { omega_max: f64::NAN, ..default }).is_err());
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn exact(seed in any::<u64>(), strokes in 2_usize..7, order in orders(), returns in any::<bool>()) {
+            let family = family(strokes, order, returns);
+            check::derivatives(&family, seed);
+            check::gradient(&family, seed);
+        }
+
+        /// Not nearly at rest but exactly, jerk included; and back at the start up to rounding of the sum.
+        #[test]
+        fn rests_exactly(seed in any::<u64>(), strokes in 2_usize..7, order in orders()) {
+            let family = family(strokes, order, true);
+            let parameters = check::start(&family, seed);
+            let mut motion = Motion::default();
+            family.motion(&parameters, &[0.0, 10.0], &mut motion);
+            for joint in 0..2 {
+                let [start, end] = [motion.of(joint).start, motion.of(joint).start + 1];
+                for values in [&motion.dq, &motion.ddq, &motion.dddq] {
+                    prop_assert_eq!([values[start], values[end]], [0.0, 0.0]);
+                }
+                prop_assert!((motion.q[start] - motion.q[end]).abs() < 1e-13);
+            }
+        }
+
+        /// The map on spliced strokes gives the family's own rates back wherever a stroke is neither just begun nor nearly done; 1e-12 of the stroke's Aω and Aω² plus
+        /// what rounding of q, up to 3 rad, is amplified to.
+        #[test]
+        fn map_is_exact_on_every_stroke(seed in any::<u64>(), strokes in 2_usize..6) {
+            let family = family(strokes, StrokeOrder::Spliced, true);
+            let parameters = check::start(&family, seed);
+            let times: Vec<f64> = (1..500).map(|s| 0.02 * f64::from(s)).collect();
+            let mut motion = Motion::default();
+            family.motion(&parameters, &times, &mut motion);
+            let mut mapped = 0;
+            for joint in 0..2 {
+                let (_, list) = family.strokes(&parameters, joint);
+                let omega = list.iter().fold(1.0_f64, |most, stroke| most.max(stroke.omega()));
+                for (at, &time) in motion.of(joint).zip(&times) {
+                    let inside = list.iter().any(|s| ((time - s.centre_s) / s.half_duration_s).abs() < 0.5);
+                    if !inside { continue; }
+                    let rates = family.rates(&parameters, joint, time, motion.q[at]);
+                    let Some(rates) = rates else { continue };
+                    mapped += 1;
+                    prop_assert!((rates.dq - motion.dq[at]).abs() < 1e-12 * omega * 3.0);
+                    prop_assert!((rates.ddq - motion.ddq[at]).abs() < 1e-12 * omega * omega * 3.0);
+                }
+            }
+            prop_assert!(mapped > 200, "{mapped}");
+            let overlapping = LogisticStrokes { settings: LogisticStrokesSettings::default(), ..family };
+            let parameters = check::start(&overlapping, seed);
+            prop_assert_eq!(overlapping.rates(&parameters, 0, 5.0, 0.0), None);
+        }
+    }
+}

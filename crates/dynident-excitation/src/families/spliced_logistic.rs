@@ -1,0 +1,366 @@
+//! The paper's excitation trajectory: logistic functions spliced there and back.
+
+use super::error::{FamilyError, MOST, require, require_frame};
+use super::logistic_map::LogisticMap;
+use super::random_start::{grid, scale_and_shift};
+use crate::family::Family;
+use crate::motion::{Motion, MotionCotangent};
+use dynident_model::sample::Random;
+use serde::{Deserialize, Serialize};
+
+const NAME: &str = "spliced_logistic";
+
+/// What a [`SplicedLogistic`] family is made of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SplicedLogisticSettings {
+    /// ω T. Default 40 (the paper gives no T; |q̇(0)| < 1e-4 rad/s asks for about this). Where T is given, its least allowed value.
+    pub period_times_omega: f64,
+    /// The period T of each joint in seconds. Default none: T = `period_times_omega` / ω, changing with ω.
+    pub periods_s: Option<Vec<f64>>,
+    /// The offset h of each joint in rad (m). Default none: free.
+    pub offsets: Option<Vec<f64>>,
+    /// Number of periods; afterwards the joint stands still at its start. Default 1.
+    pub repetitions: usize,
+}
+
+impl Default for SplicedLogisticSettings {
+    fn default() -> Self {
+        Self { period_times_omega: 40.0, periods_s: None, offsets: None, repetitions: 1 }
+    }
+}
+
+impl SplicedLogisticSettings {
+    /// Checks the settings for so many joints and seconds.
+    ///
+    /// # Errors
+    /// ω T not positive or above 1e4, no repetitions, lists that do not name each joint once, numbers that are not finite, or periods that do not fit into the duration.
+    pub fn validate(&self, joints: usize, duration_s: f64) -> Result<(), FamilyError> {
+        let product = self.period_times_omega;
+        require(product > 0.0 && product <= 1e4, NAME, "period_times_omega", product, "give more than 0, at most 1e4")?;
+        let repetitions = self.repetitions as f64;
+        require((1..=MOST).contains(&self.repetitions), NAME, "repetitions", repetitions, "give 1 to 1000")?;
+        for (what, list) in [("periods_s", &self.periods_s), ("offsets", &self.offsets)] {
+            let found = list.as_ref().map_or(joints, Vec::len);
+            if found != joints {
+                return Err(FamilyError::Length { family: NAME, what, expected: joints, found });
+            }
+        }
+        for &period in self.periods_s.iter().flatten() {
+            require(
+                period >= 1e-3 && repetitions * period <= duration_s * (1.0 + 1e-12),
+                NAME,
+                "periods_s",
+                period,
+                "give periods of a millisecond or more, of which the repetitions fit into the duration",
+            )?;
+        }
+        for &offset in self.offsets.iter().flatten() {
+            require(offset.is_finite(), NAME, "offsets", offset, "give finite positions")?;
+        }
+        Ok(())
+    }
+}
+
+/// The spliced logistic function, Eqs. 12 to 14 of the paper:
+///
+/// q(t) = h + A/(1 + e^-(ω rem(t, T) - ωT/4)) in the first half of each period, h + A/(1 + e^(ω rem(t, T) - 3ωT/4)) in the second.
+///
+/// Free numbers a joint: A in rad (m), ω in 1/s, and h in rad (m) unless given. Peak speed Aω/4, peak acceleration Aω²/(6√3).
+///
+/// At the splices the joint is at rest only nearly: it is A/(1 + e^(ωT/4)) away from its asymptote (4.5e-5 A for ωT = 40) with a speed of about that times ω, which changes sign there.
+/// [`LogisticStrokes`](super::LogisticStrokes) are exactly at rest.
+///
+/// Position tells speed and acceleration: [`SplicedLogistic::map`].
+#[derive(Clone, Debug)]
+pub struct SplicedLogistic {
+    settings: SplicedLogisticSettings,
+    joints: usize,
+    duration_s: f64,
+}
+
+/// Where a joint is on its logistic function.
+struct Phase {
+    argument: f64,
+    by_omega: f64,
+    sign: f64,
+    frozen: bool,
+}
+
+impl SplicedLogistic {
+    /// The family for so many joints and seconds.
+    ///
+    /// # Errors
+    /// Settings without meaning; see [`SplicedLogisticSettings::validate`].
+    pub fn new(joints: usize, duration_s: f64, settings: &SplicedLogisticSettings) -> Result<Self, FamilyError> {
+        require_frame(NAME, joints, duration_s)?;
+        settings.validate(joints, duration_s)?;
+        Ok(Self { settings: settings.clone(), joints, duration_s })
+    }
+
+    /// The period T of a joint in seconds.
+    ///
+    /// # Panics
+    /// If the joint or the parameters do not exist.
+    pub fn period_s(&self, parameters: &[f64], joint: usize) -> f64 {
+        self.period(joint, parameters[joint * self.each() + 1])
+    }
+
+    /// The map from position to speed and acceleration of a joint, Eqs. 15 and 16; the branch is [`Branch::at`](super::Branch::at) with [`period_s`](Self::period_s).
+    ///
+    /// # Panics
+    /// If the joint or the parameters do not exist.
+    pub fn map(&self, parameters: &[f64], joint: usize) -> LogisticMap {
+        let own = &parameters[joint * self.each()..(joint + 1) * self.each()];
+        LogisticMap { amplitude: own[0], omega: own[1], offset: self.offset(joint, own) }
+    }
+
+    /// Free numbers a joint.
+    fn each(&self) -> usize {
+        if self.settings.offsets.is_some() { 2 } else { 3 }
+    }
+
+    fn offset(&self, joint: usize, own: &[f64]) -> f64 {
+        self.settings.offsets.as_ref().map_or_else(|| own[2], |offsets| offsets[joint])
+    }
+
+    fn period(&self, joint: usize, omega: f64) -> f64 {
+        self.settings.periods_s.as_ref().map_or(self.settings.period_times_omega / omega, |periods| periods[joint])
+    }
+
+    /// Argument of the logistic function, its derivative by ω, and the sign of the branch.
+    fn phase(&self, joint: usize, omega: f64, time_s: f64) -> Phase {
+        let period = self.period(joint, omega);
+        let given = self.settings.periods_s.is_some();
+        let whole = (time_s / period).floor();
+        if whole >= self.settings.repetitions as f64 {
+            let by_omega = if given { -0.25 * period } else { 0.0 };
+            return Phase { argument: -0.25 * omega * period, by_omega, sign: 1.0, frozen: true };
+        }
+        let rest = time_s - whole * period;
+        let (sign, centre) = if rest < 0.5 * period { (1.0, 0.25) } else { (-1.0, 0.75) };
+        let from_centre = rest - centre * period;
+        // With T = c/ω the argument is ωt less a constant.
+        let by_omega = sign * if given { from_centre } else { time_s };
+        Phase { argument: sign * omega * from_centre, by_omega, sign, frozen: false }
+    }
+}
+
+/// f = 1/(1 + e^-x) and its first four derivatives, from f' = f(1 - f) without cancellation.
+fn logistic(x: f64) -> [f64; 5] {
+    let e = (-x.abs()).exp();
+    let d = 1.0 / (1.0 + e);
+    let (value, first) = (if x >= 0.0 { d } else { e * d }, e * d * d);
+    // 1 - 2f, also for f near 1/2.
+    let slope = if x >= 0.0 { (e - 1.0) * d } else { (1.0 - e) * d };
+    [value, first, first * slope, first * (1.0 - 6.0 * first), first * slope * (1.0 - 12.0 * first)]
+}
+
+impl Family for SplicedLogistic {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn joints(&self) -> usize {
+        self.joints
+    }
+
+    fn duration_s(&self) -> f64 {
+        self.duration_s
+    }
+
+    fn parameters(&self) -> usize {
+        self.joints * self.each()
+    }
+
+    /// ω is so large that all periods fit into the duration, or that a given period keeps ωT.
+    fn bounds(&self) -> Vec<[f64; 2]> {
+        let free = [f64::NEG_INFINITY, f64::INFINITY];
+        (0..self.joints)
+            .flat_map(|joint| {
+                let period = self
+                    .settings
+                    .periods_s
+                    .as_ref()
+                    .map_or(self.duration_s / self.settings.repetitions as f64, |periods| periods[joint]);
+                let omega = [self.settings.period_times_omega / period, f64::INFINITY];
+                [free, omega, free].into_iter().take(self.each())
+            })
+            .collect()
+    }
+
+    fn random(&self, ranges: &[[f64; 2]], speeds: &[f64], random: &mut Random) -> Vec<f64> {
+        let times = grid(self.duration_s);
+        let mut parameters: Vec<f64> = self
+            .bounds()
+            .chunks(self.each())
+            .flat_map(|own| {
+                let amplitude = if random.bits() & 1 == 0 { 1.0 } else { -1.0 };
+                let omega = own[1][0] * random.uniform(0.0, 1.2).exp();
+                [amplitude, omega, 0.0].into_iter().take(self.each())
+            })
+            .collect();
+        let mut motion = Motion::default();
+        self.motion(&parameters, &times, &mut motion);
+        for (joint, own) in parameters.chunks_mut(self.each()).enumerate() {
+            let range = ranges[joint];
+            if let Some(offsets) = &self.settings.offsets {
+                // The offset stands: go to the side with more room.
+                let room = [range[0] - offsets[joint], range[1] - offsets[joint]];
+                let most = if room[1] >= -room[0] { room[1] } else { room[0] };
+                let most = if most.is_finite() { most } else { core::f64::consts::PI };
+                let fast = if speeds[joint] > 0.0 { 4.0 * speeds[joint] / own[1] } else { f64::INFINITY };
+                own[0] = random.uniform(0.3, 0.9) * most.signum() * most.abs().min(fast);
+            } else {
+                let span = motion.of(joint);
+                // The grid may miss the middle of a stroke: its speed is known to be ω/4.
+                let peak = [0.25 * own[1]];
+                let [scale, shift] = scale_and_shift(&motion.q[span], &peak, range, speeds[joint], random);
+                own[0] *= scale;
+                own[2] = shift;
+            }
+        }
+        parameters
+    }
+
+    fn motion(&self, parameters: &[f64], times_s: &[f64], out: &mut Motion) {
+        assert_eq!(parameters.len(), self.parameters(), "parameters of {NAME}");
+        out.reset(self.joints, times_s.len());
+        for (joint, own) in parameters.chunks(self.each()).enumerate() {
+            let (amplitude, omega, offset) = (own[0], own[1], self.offset(joint, own));
+            for (at, &time) in out.of(joint).zip(times_s) {
+                let phase = self.phase(joint, omega, time);
+                let f = logistic(phase.argument);
+                out.q[at] = offset + amplitude * f[0];
+                if !phase.frozen {
+                    let rate = phase.sign * omega;
+                    out.dq[at] = amplitude * rate * f[1];
+                    out.ddq[at] = amplitude * rate * rate * f[2];
+                    out.dddq[at] = amplitude * rate * rate * rate * f[3];
+                }
+            }
+        }
+    }
+
+    fn pull_back(&self, parameters: &[f64], times_s: &[f64], cotangent: &MotionCotangent, gradient: &mut [f64]) {
+        assert_eq!(parameters.len(), self.parameters(), "parameters of {NAME}");
+        assert_eq!(gradient.len(), self.parameters(), "gradient of {NAME}");
+        assert_eq!((cotangent.joints, cotangent.samples), (self.joints, times_s.len()), "cotangent of {NAME}");
+        for (joint, own) in parameters.chunks(self.each()).enumerate() {
+            let (amplitude, omega) = (own[0], own[1]);
+            let mut sum = [0.0; 3];
+            for (at, &time) in cotangent.of(joint).zip(times_s) {
+                let phase = self.phase(joint, omega, time);
+                let f = logistic(phase.argument);
+                let pulls = [cotangent.q[at], cotangent.dq[at], cotangent.ddq[at], cotangent.dddq[at]];
+                let orders = if phase.frozen { 1 } else { 4 };
+                let mut power = 1.0;
+                for (order, pull) in pulls.into_iter().enumerate().take(orders) {
+                    // d/dω of ω^n f_n(argument).
+                    let by_omega = order as f64 / omega * f[order] + f[order + 1] * phase.by_omega;
+                    sum[0] += pull * power * f[order];
+                    sum[1] += pull * power * amplitude * by_omega;
+                    power *= phase.sign * omega;
+                }
+                sum[2] += pulls[0];
+            }
+            for (out, value) in gradient[joint * self.each()..].iter_mut().zip(sum.iter().take(self.each())) {
+                *out += value;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::families::{Branch, check};
+    use proptest::prelude::*;
+
+    fn family(joints: usize, duration_s: f64, settings: &SplicedLogisticSettings) -> SplicedLogistic {
+        SplicedLogistic::new(joints, duration_s, settings).unwrap()
+    }
+
+    /// Figs. 4 and 5: for T = 80 all ω pass A/2 at T/4 and 3T/4 with slope ±Aω/4 and reach A at T/2; for ω = 0.6 the same stroke moves with T. Peak acceleration Aω²/(6√3) where
+    /// e^x = 2 + √3. Rounding only.
+    #[test]
+    fn features_of_figures_4_and_5() {
+        for (omega, period) in [(0.5, 80.0), (1.0, 80.0), (2.0, 80.0), (0.6, 70.0), (0.6, 80.0), (0.6, 100.0)] {
+            let settings = SplicedLogisticSettings {
+                periods_s: Some(vec![period]),
+                offsets: Some(vec![0.25]),
+                repetitions: 3,
+                ..Default::default()
+            };
+            let family = family(1, 3.0 * period, &settings);
+            let steepest = (2.0 + 3.0_f64.sqrt()).ln() / omega;
+            let late = 2.0 * period;
+            let times =
+                [0.25 * period, 0.75 * period, 0.5 * period, 0.0, late + 0.25 * period, 0.25 * period - steepest];
+            let mut motion = Motion::default();
+            family.motion(&[2.0, omega], &times, &mut motion);
+            for sample in [0, 1, 4] {
+                assert!((motion.q[sample] - 1.25).abs() < 1e-12);
+                assert!((motion.dq[sample].abs() - 0.5 * omega).abs() < 1e-12);
+            }
+            assert!(motion.dq[0] > 0.0 && motion.dq[1] < 0.0);
+            let far = 2.0 / (1.0 + (0.25 * omega * period).exp());
+            assert!((motion.q[2] - 2.25 + far).abs() < 1e-13 && (motion.q[3] - 0.25 - far).abs() < 1e-13);
+            assert!((motion.ddq[5] - 2.0 * omega * omega / (6.0 * 3.0_f64.sqrt())).abs() < 1e-12);
+            assert!(motion.dddq[5].abs() < 1e-12);
+            // Below 1e-4 at the splices as the paper asks, once ωT >= 40.
+            if omega * period >= 44.0 {
+                assert!([2, 3].iter().all(|&s| motion.dq[s].abs() < 1e-4 && motion.ddq[s].abs() < 1e-4));
+            }
+        }
+    }
+
+    #[test]
+    fn bad_settings_are_named() {
+        let make = |settings: &SplicedLogisticSettings| SplicedLogistic::new(2, 40.0, settings);
+        let default = SplicedLogisticSettings::default();
+        assert!(make(&SplicedLogisticSettings { periods_s: Some(vec![10.0]), ..default.clone() }).is_err());
+        assert!(make(&SplicedLogisticSettings { periods_s: Some(vec![10.0, 41.0]), ..default.clone() }).is_err());
+        assert!(make(&SplicedLogisticSettings { period_times_omega: f64::NAN, ..default.clone() }).is_err());
+        assert!(make(&SplicedLogisticSettings { repetitions: 0, ..default }).is_err());
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn exact(seed in any::<u64>(), repetitions in 1_usize..4, fixed in any::<bool>(), given in any::<bool>()) {
+            let settings = SplicedLogisticSettings {
+                repetitions,
+                offsets: fixed.then(|| vec![0.1, -0.2]),
+                periods_s: given.then(|| vec![20.0, 15.0]),
+                ..Default::default()
+            };
+            let family = family(2, 60.0, &settings);
+            check::derivatives(&family, seed);
+            check::gradient(&family, seed);
+        }
+
+        /// The map gives the family's own speed and acceleration back. Its error is the rounding of q, at most ω and ω² times 1e-16 |q|, so 1e-12 of the peaks is ample.
+        #[test]
+        fn map_is_exact_on_the_stroke(seed in any::<u64>()) {
+            let family = family(2, 60.0, &SplicedLogisticSettings::default());
+            let parameters = check::start(&family, seed);
+            let times: Vec<f64> = (0..600).map(|s| 0.1 * f64::from(s)).collect();
+            let mut motion = Motion::default();
+            family.motion(&parameters, &times, &mut motion);
+            for joint in 0..2 {
+                let (map, period) = (family.map(&parameters, joint), family.period_s(&parameters, joint));
+                let [speed, acceleration] =
+                    [map.amplitude * map.omega, map.amplitude * map.omega * map.omega].map(|x| x.abs().max(1.0));
+                for (at, &time) in motion.of(joint).zip(&times).filter(|(_, time)| **time < period) {
+                    let rates = map.rates(motion.q[at], Branch::at(time, period)).unwrap();
+                    prop_assert!((rates.dq - motion.dq[at]).abs() < 1e-12 * speed);
+                    prop_assert!((rates.ddq - motion.ddq[at]).abs() < 1e-12 * acceleration);
+                }
+                for outside in [-1e-6, 1.0 + 1e-6, f64::NAN] {
+                    prop_assert_eq!(map.rates(map.offset + outside * map.amplitude, Branch::There), None);
+                }
+            }
+        }
+    }
+}
