@@ -113,20 +113,23 @@ impl Source<'_> {
     #[inline(always)]
     fn block<T: Lane>(&self, body: usize, k: usize, joint: usize) -> [T; 10] {
         let samples = self.cotangent.samples();
+        let (present, place) = self.layout.body_columns(body, k);
         let panel = self.cotangent.joint(joint);
-        let places = self.layout.places(body, k);
+        let mut start = place * samples + self.at;
         let mut block = [T::ZERO; 10];
-        for (to, &place) in block.iter_mut().zip(places) {
-            let start = place as usize * samples + self.at;
+        for (parameter, to) in block.iter_mut().enumerate() {
+            if present & (1 << parameter) == 0 {
+                continue;
+            }
             if self.at + T::LANES <= samples {
-                if let Some(values) = panel.get(start..start + T::LANES) {
-                    *to = T::load(values);
-                }
-            } else if let Some(values) = panel.get(start..start + samples - self.at) {
+                *to = T::load(&panel[start..start + T::LANES]);
+            } else {
+                let values = &panel[start..start + samples - self.at];
                 let mut lanes = [0.0; 8];
                 lanes[..values.len()].copy_from_slice(values);
                 *to = T::load(&lanes);
             }
+            start += samples;
         }
         block
     }

@@ -128,10 +128,10 @@ impl PanelLayout {
         self.joints.len()
     }
 
-    /// For the `k`-th joint on the way to `body`: places of the body's ten columns in that joint's panel; past its end for columns left out.
+    /// Which of the ten parameters of `body` have columns, as bits, and where these begin in the panel of the `k`-th joint on the way to it; they follow one another.
     #[inline(always)]
-    pub(crate) fn places(&self, body: usize, k: usize) -> &[u32] {
-        &self.places[self.place_start[body] + 10 * k..][..10]
+    pub(crate) fn body_columns(&self, body: usize, k: usize) -> (u16, usize) {
+        (self.parameters[body], self.places[self.place_start[body] + k])
     }
 }
 

@@ -2,14 +2,12 @@
 
 #![forbid(unsafe_code)]
 
+pub mod check;
 mod column_products;
 pub mod criteria;
 pub mod families;
 mod family;
 mod information;
-pub mod check;
-pub mod families;
-mod family;
 pub mod limits;
 mod motion;
 pub mod optimisers;
