@@ -85,8 +85,12 @@ pub(crate) fn gradient(family: &dyn Family, seed: u64) {
 
 /// As [`gradient`], at given parameters.
 pub(crate) fn gradient_at(family: &dyn Family, parameters: &[f64], seed: u64) {
-    let mut random = Random::new(seed ^ 0xaa);
-    let times = times(family, &mut random);
+    gradient_on(family, parameters, &times(family, &mut Random::new(seed ^ 0xaa)), seed);
+}
+
+/// As [`gradient`], at given parameters and times.
+pub(crate) fn gradient_on(family: &dyn Family, parameters: &[f64], times: &[f64], seed: u64) {
+    let mut random = Random::new(seed ^ 0x77);
     let mut cotangent = Motion::default();
     cotangent.reset(family.joints(), times.len());
     for values in [&mut cotangent.q, &mut cotangent.dq, &mut cotangent.ddq, &mut cotangent.dddq] {
@@ -96,7 +100,7 @@ pub(crate) fn gradient_at(family: &dyn Family, parameters: &[f64], seed: u64) {
     }
     let mut motion = Motion::default();
     let mut cost = |parameters: &[f64]| -> f64 {
-        family.motion(parameters, &times, &mut motion);
+        family.motion(parameters, times, &mut motion);
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         dot(&motion.q, &cotangent.q)
             + dot(&motion.dq, &cotangent.dq)
@@ -104,7 +108,7 @@ pub(crate) fn gradient_at(family: &dyn Family, parameters: &[f64], seed: u64) {
             + dot(&motion.dddq, &cotangent.dddq)
     };
     let mut gradient = vec![1.0; parameters.len()];
-    family.pull_back(parameters, &times, &cotangent, &mut gradient);
+    family.pull_back(parameters, times, &cotangent, &mut gradient);
     let scale = gradient.iter().fold(1.0_f64, |peak, value| peak.max(value.abs()));
     for index in 0..parameters.len() {
         let mut moved = parameters.to_vec();

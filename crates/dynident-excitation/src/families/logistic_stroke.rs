@@ -72,25 +72,28 @@ pub(super) struct StrokeDerivatives<T> {
     pub(super) by_sharpness: [T; 4],
 }
 
-/// The unit stroke at `u` by Taylor arithmetic: each array holds the coefficients of 1, x, .. x⁴ around `u`.
-///
-/// `logistic` gives 1/(1 + e^-φ) and its derivative.
+/// Taylor coefficients (of 1, x, .. x⁴ around `u`) of the warp ψ = u/(1 - u²).
 #[inline(always)]
-pub(super) fn unit_stroke<T: Scalar>(u: T, sharpness: T, logistic: impl Fn(T) -> (T, T)) -> StrokeDerivatives<T> {
-    let two = T::splat(2.0);
+pub(super) fn warp<T: Scalar>(u: T) -> [T; 5] {
     // 1/(1 - u²), from (1 - u²) r = 1.
     let inverse = u.neg_mul_add(u, T::ONE).recip();
+    let twice = u + u;
     let mut r = [inverse, T::ZERO, T::ZERO, T::ZERO, T::ZERO];
-    r[1] = two * u * r[0] * inverse;
+    r[1] = twice * r[0] * inverse;
     for n in 2..5 {
-        r[n] = (two * u * r[n - 1] + r[n - 2]) * inverse;
+        r[n] = twice.mul_add(r[n - 1], r[n - 2]) * inverse;
     }
-    // ψ = u r, φ = κ ψ.
     let mut psi = [u * r[0]; 5];
     for n in 1..5 {
         psi[n] = u.mul_add(r[n], r[n - 1]);
     }
-    let (value, bell) = logistic(sharpness * psi[0]);
+    psi
+}
+
+/// The unit stroke by Taylor arithmetic from its [`warp`], given the logistic function's value at κψ and its derivative there.
+#[inline(always)]
+pub(super) fn unit_stroke<T: Scalar>(psi: &[T; 5], sharpness: T, value: T, bell: T) -> StrokeDerivatives<T> {
+    let two = T::splat(2.0);
     let mut s = [value, T::ZERO, T::ZERO, T::ZERO, T::ZERO];
     let mut p = [bell, T::ZERO, T::ZERO, T::ZERO];
     let slope = T::ONE - two * value;
@@ -117,11 +120,15 @@ pub(super) fn unit_stroke<T: Scalar>(u: T, sharpness: T, logistic: impl Fn(T) ->
             k[n] = p[i].mul_add(psi[n - i], k[n]);
         }
     }
+    // No closures here: they would not be compiled for the wide registers.
     let factorials = [1.0, 1.0, 2.0, 6.0, 24.0];
-    StrokeDerivatives {
-        value: core::array::from_fn(|n| s[n] * T::splat(factorials[n])),
-        by_sharpness: core::array::from_fn(|n| k[n] * T::splat(factorials[n])),
+    for n in 2..5 {
+        s[n] = s[n] * T::splat(factorials[n]);
+        if n < 4 {
+            k[n] = k[n] * T::splat(factorials[n]);
+        }
     }
+    StrokeDerivatives { value: s, by_sharpness: k }
 }
 
 /// 1/(1 + e^-φ) and its derivative, neither losing digits far from the middle.
@@ -138,6 +145,18 @@ mod tests {
     use dynident_lanes::Dual;
     use proptest::prelude::*;
 
+    fn plain_stroke(u: f64, sharpness: f64) -> StrokeDerivatives<f64> {
+        let psi = warp(u);
+        let (value, bell) = logistic_and_bell(sharpness * psi[0]);
+        unit_stroke(&psi, sharpness, value, bell)
+    }
+
+    fn dual_stroke(u: Dual, sharpness: Dual) -> StrokeDerivatives<Dual> {
+        let psi = warp(u);
+        let (value, bell) = dual_logistic(sharpness * psi[0]);
+        unit_stroke(&psi, sharpness, value, bell)
+    }
+
     fn dual_logistic(phi: Dual) -> (Dual, Dual) {
         let (s, p) = logistic_and_bell(phi.value);
         (
@@ -150,7 +169,7 @@ mod tests {
     fn nothing_moves_outside_the_window() {
         for sharpness in [LogisticStroke::LEAST_SHARPNESS, 4.0, 40.0] {
             for (u, end) in [(-LAST, 0.0), (LAST, 1.0)] {
-                let stroke = unit_stroke(u, sharpness, logistic_and_bell);
+                let stroke = plain_stroke(u, sharpness);
                 assert_eq!(stroke.value, [end, 0.0, 0.0, 0.0, 0.0]);
                 assert_eq!(stroke.by_sharpness, [0.0; 4]);
             }
@@ -174,9 +193,9 @@ mod tests {
         /// coefficients reach near the window's ends.
         #[test]
         fn orders_derive_each_other(u in -0.97_f64..0.97, sharpness in 3.4642_f64..30.0) {
-            let plain = unit_stroke(u, sharpness, logistic_and_bell);
-            let by_u = unit_stroke(Dual::variable(u), Dual::constant(sharpness), dual_logistic);
-            let by_k = unit_stroke(Dual::constant(u), Dual::variable(sharpness), dual_logistic);
+            let plain = plain_stroke(u, sharpness);
+            let by_u = dual_stroke(Dual::variable(u), Dual::constant(sharpness));
+            let by_k = dual_stroke(Dual::constant(u), Dual::variable(sharpness));
             let size = |order: usize| sharpness.max(4.0).powi(order as i32) * 1e3;
             for order in 0..4 {
                 prop_assert!((by_u.value[order].derivative - plain.value[order + 1]).abs() < 1e-12 * size(order + 1));
@@ -189,7 +208,7 @@ mod tests {
         fn map_is_exact_on_the_stroke(u in -0.8_f64..0.8, sharpness in 3.4642_f64..30.0, amplitude in -3.0_f64..3.0) {
             prop_assume!(amplitude.abs() > 0.01);
             let stroke = LogisticStroke { amplitude, centre_s: 1.0, half_duration_s: 0.7, sharpness };
-            let unit = unit_stroke(u, sharpness, logistic_and_bell);
+            let unit = plain_stroke(u, sharpness);
             prop_assume!(unit.value[0] > 1e-12 && unit.value[0] < 1.0 - 1e-12);
             let rates = stroke.rates(amplitude * unit.value[0]).unwrap();
             let [dq, ddq] = [unit.value[1] / 0.7, unit.value[2] / 0.49].map(|x| amplitude * x);

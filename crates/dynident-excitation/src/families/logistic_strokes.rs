@@ -2,9 +2,9 @@
 
 use super::error::{FamilyError, MOST, require, require_frame};
 use super::logistic_map::PathRates;
-use super::logistic_stroke::{LAST, LogisticStroke, StrokeDerivatives, logistic_and_bell, unit_stroke};
+use super::logistic_stroke::{LAST, LogisticStroke, StrokeDerivatives, logistic_and_bell, unit_stroke, warp};
 use super::random_start::{grid, scale_and_shift};
-use super::sampled_basis::load_some;
+use super::sampled_basis::{load_some, store_some};
 use crate::family::Family;
 use crate::motion::{Motion, MotionCotangent};
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
@@ -227,13 +227,14 @@ enum Chunk<T> {
 #[inline(always)]
 fn chunk_of<T: Lane>(stroke: &LogisticStroke, times: &[f64]) -> Chunk<T> {
     let mut warped = [LAST; 8];
+    let (mut least, mut most) = (LAST, -LAST);
     for (u, &time) in warped.iter_mut().zip(times) {
         *u = stroke.warped(time);
+        (least, most) = (least.min(*u), most.max(*u));
     }
-    let seen = &warped[..times.len()];
-    if seen.iter().all(|&u| u >= LAST) {
+    if least >= LAST {
         Chunk::After
-    } else if seen.iter().all(|&u| u <= -LAST) {
+    } else if most <= -LAST {
         Chunk::Before
     } else {
         Chunk::Within(T::load(&warped))
@@ -242,18 +243,18 @@ fn chunk_of<T: Lane>(stroke: &LogisticStroke, times: &[f64]) -> Chunk<T> {
 
 #[inline(always)]
 fn lanes_stroke<T: Lane>(u: T, sharpness: f64) -> StrokeDerivatives<T> {
-    unit_stroke(u, T::splat(sharpness), |phi| {
-        let (mut angles, mut bells) = ([0.0; 8], [0.0; 8]);
-        phi.store(&mut angles);
-        for (phi, bell) in angles.iter_mut().zip(&mut bells).take(T::LANES) {
-            (*phi, *bell) = logistic_and_bell(*phi);
-        }
-        (T::load(&angles), T::load(&bells))
-    })
+    let (psi, kappa) = (warp(u), T::splat(sharpness));
+    let (mut values, mut bells) = ([0.0; 8], [0.0; 8]);
+    (kappa * psi[0]).store(&mut values);
+    for lane in 0..T::LANES {
+        (values[lane], bells[lane]) = logistic_and_bell(values[lane]);
+    }
+    unit_stroke(&psi, kappa, T::load(&values), T::load(&bells))
 }
 
 struct Forward<'a> {
     strokes: &'a [LogisticStroke],
+    start_at: f64,
     times_s: &'a [f64],
     joint: usize,
     out: &'a mut Motion,
@@ -263,33 +264,29 @@ impl Kernel for Forward<'_> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(self) {
-        let Self { strokes, times_s, joint, out } = self;
+        let Self { strokes, start_at, times_s, joint, out } = self;
         let start = out.of(joint).start;
         for (index, times) in times_s.chunks(T::LANES).enumerate() {
             let at = start + index * T::LANES;
-            let arrays = [&mut out.q, &mut out.dq, &mut out.ddq, &mut out.dddq];
-            let mut sums = [T::ZERO; 4];
+            let mut sums = [T::splat(start_at), T::ZERO, T::ZERO, T::ZERO];
             for stroke in strokes {
                 match chunk_of::<T>(stroke, times) {
                     Chunk::Before => {}
                     Chunk::After => sums[0] += T::splat(stroke.amplitude),
                     Chunk::Within(u) => {
                         let unit = lanes_stroke(u, stroke.sharpness);
-                        let mut scale = stroke.amplitude;
-                        for (sum, value) in sums.iter_mut().zip(unit.value) {
-                            *sum = value.mul_add(T::splat(scale), *sum);
-                            scale /= stroke.half_duration_s;
+                        let (mut scale, inverse) = (stroke.amplitude, 1.0 / stroke.half_duration_s);
+                        for order in 0..4 {
+                            sums[order] = unit.value[order].mul_add(T::splat(scale), sums[order]);
+                            scale *= inverse;
                         }
                     }
                 }
             }
-            for (array, sum) in arrays.into_iter().zip(sums) {
-                let mut values = [0.0; 8];
-                sum.store(&mut values);
-                for (out, value) in array[at..at + times.len()].iter_mut().zip(values) {
-                    *out += value;
-                }
-            }
+            store_some(sums[0], &mut out.q, at, times.len());
+            store_some(sums[1], &mut out.dq, at, times.len());
+            store_some(sums[2], &mut out.ddq, at, times.len());
+            store_some(sums[3], &mut out.dddq, at, times.len());
         }
     }
 }
@@ -311,8 +308,12 @@ impl Kernel for Backward<'_> {
         let mut sums = vec![[T::ZERO; 4]; strokes.len()];
         for (index, times) in times_s.chunks(T::LANES).enumerate() {
             let at = start + index * T::LANES;
-            let arrays = [&cotangent.q, &cotangent.dq, &cotangent.ddq, &cotangent.dddq];
-            let pulls: [T; 4] = arrays.map(|array| load_some(array, at, times.len()));
+            let pulls: [T; 4] = [
+                load_some(&cotangent.q, at, times.len()),
+                load_some(&cotangent.dq, at, times.len()),
+                load_some(&cotangent.ddq, at, times.len()),
+                load_some(&cotangent.dddq, at, times.len()),
+            ];
             for (stroke, sum) in strokes.iter().zip(&mut sums) {
                 match chunk_of::<T>(stroke, times) {
                     Chunk::Before => {}
@@ -419,10 +420,8 @@ impl Family for LogisticStrokes {
         assert_eq!(parameters.len(), self.parameters(), "parameters of {NAME}");
         out.reset(self.joints, times_s.len());
         for joint in 0..self.joints {
-            let (start, strokes) = self.strokes(parameters, joint);
-            let span = out.of(joint);
-            out.q[span].fill(start);
-            dispatch(Level::detect(), Forward { strokes: &strokes, times_s, joint, out });
+            let (start_at, strokes) = self.strokes(parameters, joint);
+            dispatch(Level::detect(), Forward { strokes: &strokes, start_at, times_s, joint, out });
         }
     }
 

@@ -172,8 +172,9 @@ fn place<T: Lane, const J: usize>(
     }
 }
 
+/// Stores the first `count` lanes to `array` from `at`.
 #[inline(always)]
-fn store_some<T: Lane>(value: T, array: &mut [f64], at: usize, count: usize) {
+pub(crate) fn store_some<T: Lane>(value: T, array: &mut [f64], at: usize, count: usize) {
     if count == T::LANES {
         value.store(&mut array[at..at + T::LANES]);
     } else {

@@ -335,9 +335,27 @@ mod tests {
                 periods_s: given.then(|| vec![20.0, 15.0]),
                 ..Default::default()
             };
-            let family = family(2, 60.0, &settings);
-            check::derivatives(&family, seed);
-            check::gradient(&family, seed);
+            check::derivatives(&family(2, 60.0, &settings), seed);
+        }
+
+        /// On the strokes: at a splice, which moves with ω where T does, the speed jumps by e^-10 and has no derivative.
+        #[test]
+        fn gradient_is_exact(seed in any::<u64>(), repetitions in 1_usize..4, fixed in any::<bool>(), given in any::<bool>()) {
+            let settings = SplicedLogisticSettings {
+                repetitions,
+                offsets: fixed.then(|| vec![0.1]),
+                periods_s: given.then(|| vec![20.0]),
+                ..Default::default()
+            };
+            let family = family(1, 60.0, &settings);
+            let parameters = check::start(&family, seed);
+            let period = family.period_s(&parameters, 0);
+            let mut times = vec![0.5 * (60.0 + repetitions as f64 * period)];
+            let mut random = Random::new(seed);
+            for half in 0..2 * repetitions {
+                times.extend((0..8).map(|_| period * (0.5 * half as f64 + 0.25 + random.uniform(-0.2, 0.2))));
+            }
+            check::gradient_on(&family, &parameters, &times, seed);
         }
 
         /// The map gives the family's own speed and acceleration back. Its error is the rounding of q, at most ω and ω² times 1e-16 |q|, so 1e-12 of the peaks is ample.
