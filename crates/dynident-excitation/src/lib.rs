@@ -5,6 +5,7 @@
 pub mod check;
 mod column_products;
 pub mod criteria;
+mod design;
 pub mod families;
 mod family;
 mod information;
@@ -13,6 +14,7 @@ mod motion;
 pub mod optimisers;
 pub mod paper_problem;
 
+pub use design::{DesignProgress, DesignSettings, DesignTask, Designed, design, grid};
 pub use family::Family;
 pub use information::Information;
 pub use motion::{Motion, MotionCotangent};
