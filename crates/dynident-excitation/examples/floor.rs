@@ -34,6 +34,61 @@ fn main() {
         }
         _ => panic!(),
     };
+    if criterion == "time" {
+        let mut random = dynident_model::sample::Random::new(1);
+        let ranges: Vec<[f64; 2]> =
+            model.joints().iter().map(|j| [j.limits.lower.unwrap(), j.limits.upper.unwrap()]).collect();
+        let speeds: Vec<f64> = model.joints().iter().map(|j| j.limits.velocity.unwrap()).collect();
+        let x = fam.random(&ranges, &speeds, &mut random);
+        let times = grid(10.0, a[5].parse().unwrap());
+        let mut m = Motion::default();
+        let mut cot = Motion::default();
+        let mut info = Information::new(&model, &layout, &vec![1.0; n], None);
+        let mut ws = set.workspace();
+        let mut vals = Vec::new();
+        let mut grad = vec![0.0; fam.parameters()];
+        fam.motion(&x, &times, &mut m);
+        let d = info.of(&m, 1.0);
+        set.values(&mut ws, &m, &mut vals);
+        let w: Vec<f64> = vals.iter().map(|v| if *v > -0.3 { 1.0 } else { 0.0 }).collect();
+        println!("active {} of {}", w.iter().filter(|x| **x > 0.0).count(), w.len());
+        let time = |name: &str, f: &mut dyn FnMut()| {
+            let mut best = f64::MAX;
+            for _ in 0..200 {
+                let t = std::time::Instant::now();
+                f();
+                best = best.min(t.elapsed().as_secs_f64());
+            }
+            println!("{name:30} {:8.1} us", 1e6 * best);
+        };
+        time("motion", &mut || fam.motion(&x, &times, &mut m));
+        time("information", &mut || {
+            info.of(&m, 1.0);
+        });
+        time("d-optimal", &mut || {
+            DOptimal.value_and_derivative(&d);
+        });
+        time("cond", &mut || {
+            ConditionNumber::default().value_and_derivative(&d);
+        });
+        let g = DOptimal.value_and_derivative(&d).unwrap().1;
+        time("information pull back", &mut || {
+            cot.reset(n, times.len());
+            info.pull_back(&m, 1.0, &g, &mut cot);
+        });
+        time("limits", &mut || {
+            m.q[0] += 1e-9;
+            set.values(&mut ws, &m, &mut vals);
+        });
+        time("limits pull back", &mut || {
+            cot.reset(n, times.len());
+            set.pull_back(&mut ws, &m, &w, &mut cot);
+        });
+        time("family pull back", &mut || {
+            fam.pull_back(&x, &times, &cot, &mut grad);
+        });
+        return;
+    }
     let smooth = ConditionNumber { order: 3.0, scaled: false };
     let sharp = ConditionNumber { order: 40.0, scaled: false };
     let sharper = ConditionNumber { order: 80.0, scaled: false };

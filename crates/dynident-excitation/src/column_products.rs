@@ -91,7 +91,7 @@ fn column_tile(panel: &[f64], rows: usize, first: usize, count: usize) -> [&[f64
     [of(0), of(1), of(2), of(3)]
 }
 
-/// `out = factor · P G[columns, columns]`, in the shape of `P`; `matrix` is `G`, row-major, `size` wide.
+/// `out = factor · P G[columns, columns]`, in the shape of `P`; `matrix` is `G`, row-major, `size` wide; `packed` is scratch.
 #[allow(clippy::too_many_arguments, reason = "one product with its shapes")]
 pub(crate) fn times_matrix(
     level: Level,
@@ -101,18 +101,28 @@ pub(crate) fn times_matrix(
     matrix: &[f64],
     size: usize,
     factor: f64,
+    packed: &mut Vec<f64>,
     out: &mut [f64],
 ) {
-    dispatch(level, Times { panel, rows, columns, matrix, size, factor, out });
+    let count = columns.len();
+    packed.clear();
+    for first in (0..count).step_by(TILE) {
+        for &row in columns {
+            packed.extend(
+                (first..first + TILE)
+                    .map(|k| columns.get(k).map_or(0.0, |column| factor * matrix[row * size + column])),
+            );
+        }
+    }
+    dispatch(level, Times { panel, rows, count, packed, out });
 }
 
 struct Times<'a> {
     panel: &'a [f64],
     rows: usize,
-    columns: &'a [usize],
-    matrix: &'a [f64],
-    size: usize,
-    factor: f64,
+    count: usize,
+    /// Scaled entries of the matrix for these columns: tile after tile of four target columns, source columns one after another within.
+    packed: &'a [f64],
     out: &'a mut [f64],
 }
 
@@ -120,38 +130,53 @@ impl Kernel for Times<'_> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(self) {
-        let (count, rows) = (self.columns.len(), self.rows);
-        let whole = rows - rows % (2 * T::LANES);
-        for j in (0..count).step_by(TILE) {
-            let targets = TILE.min(count - j);
-            let entry = |i: usize, k: usize| {
-                let column = self.columns[(j + k).min(count - 1)];
-                self.factor * self.matrix[self.columns[i] * self.size + column]
-            };
+        let Self { panel, rows, count, packed, out } = self;
+        for (tile, factors) in packed.chunks_exact(TILE * count).enumerate() {
+            let first = tile * TILE;
+            let targets = TILE.min(count - first);
             let mut at = 0;
-            while at < whole {
-                let mut sums = [[T::ZERO; 2]; TILE];
-                for i in 0..count {
-                    let source = &self.panel[i * rows + at..];
-                    let (x, y) = (T::load(source), T::load(&source[T::LANES..]));
-                    for k in 0..TILE {
-                        let g = T::splat(entry(i, k));
-                        sums[k][0] = x.mul_add(g, sums[k][0]);
-                        sums[k][1] = y.mul_add(g, sums[k][1]);
-                    }
-                }
+            while at + 4 * T::LANES <= rows {
+                strip::<T, 4>(panel, rows, at, factors, &mut out[first * rows..], targets);
+                at += 4 * T::LANES;
+            }
+            while at + T::LANES <= rows {
+                strip::<T, 1>(panel, rows, at, factors, &mut out[first * rows..], targets);
+                at += T::LANES;
+            }
+            for s in at..rows {
                 for k in 0..targets {
-                    let to = &mut self.out[(j + k) * rows + at..];
-                    sums[k][0].store(to);
-                    sums[k][1].store(&mut to[T::LANES..]);
-                }
-                at += 2 * T::LANES;
-            }
-            for k in 0..targets {
-                for s in whole..rows {
-                    self.out[(j + k) * rows + s] = (0..count).map(|i| self.panel[i * rows + s] * entry(i, k)).sum();
+                    let products = (0..count).map(|i| panel[i * rows + s] * factors[i * TILE + k]);
+                    out[(first + k) * rows + s] = products.sum();
                 }
             }
+        }
+    }
+}
+
+/// `W` registers of samples of four target columns.
+#[inline(always)]
+fn strip<T: Lane, const W: usize>(
+    panel: &[f64],
+    rows: usize,
+    at: usize,
+    factors: &[f64],
+    out: &mut [f64],
+    targets: usize,
+) {
+    let mut sums = [[T::ZERO; W]; TILE];
+    for (i, factors) in factors.chunks_exact(TILE).enumerate() {
+        let source = &panel[i * rows + at..][..W * T::LANES];
+        for k in 0..TILE {
+            let factor = T::splat(factors[k]);
+            for w in 0..W {
+                sums[k][w] = T::load(&source[w * T::LANES..]).mul_add(factor, sums[k][w]);
+            }
+        }
+    }
+    for (k, sums) in sums.iter().enumerate().take(targets) {
+        let to = &mut out[k * rows + at..][..W * T::LANES];
+        for (w, sum) in sums.iter().enumerate() {
+            sum.store(&mut to[w * T::LANES..]);
         }
     }
 }
@@ -173,7 +198,7 @@ mod tests {
                 let mut gram = vec![0.0; size * size];
                 add_gram(level, &panel, rows, &columns, 0.5, &mut gram, size);
                 let mut out = vec![0.0; rows * count];
-                times_matrix(level, &panel, rows, &columns, &matrix, size, 2.0, &mut out);
+                times_matrix(level, &panel, rows, &columns, &matrix, size, 2.0, &mut Vec::new(), &mut out);
                 for a in 0..count {
                     for b in 0..count {
                         let expected: f64 = (0..rows).map(|s| 0.5 * panel[a * rows + s] * panel[b * rows + s]).sum();

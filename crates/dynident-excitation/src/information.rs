@@ -21,6 +21,7 @@ pub struct Information<'a> {
     workspace: BatchWorkspace,
     panels: Panels,
     cotangent: Panels,
+    packed: Vec<f64>,
 }
 
 impl<'a> Information<'a> {
@@ -45,6 +46,7 @@ impl<'a> Information<'a> {
             workspace: BatchWorkspace::new(model),
             panels: Panels::default(),
             cotangent: Panels::default(),
+            packed: Vec::new(),
         }
     }
 
@@ -83,6 +85,7 @@ impl<'a> Information<'a> {
                 by_information.as_slice(),
                 count,
                 2.0 * weight * self.weights[joint],
+                &mut self.packed,
                 &mut self.cotangent.joint_mut(joint)[..length],
             );
         }

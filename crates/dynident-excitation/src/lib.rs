@@ -5,6 +5,7 @@
 pub mod check;
 mod column_products;
 pub mod criteria;
+mod definite_inverse;
 mod design;
 pub mod families;
 mod family;

@@ -1,6 +1,7 @@
 //! A-optimality: the sum of the parameters' variances, `tr D⁻¹`.
 
 use super::{Criterion, Valued};
+use crate::definite_inverse::log_det_and_inverse;
 use nalgebra::DMatrix;
 
 /// `log tr D⁻¹`, with derivative `-D⁻² / tr D⁻¹`: the logarithm keeps steps of one size from start to end.
@@ -13,12 +14,12 @@ impl Criterion for AOptimal {
     }
 
     fn value_and_derivative(&self, information: &DMatrix<f64>) -> Valued {
-        let inverse = information.clone().cholesky()?.inverse();
+        let (_, inverse) = log_det_and_inverse(information)?;
         let trace = inverse.trace();
         Some((trace.ln(), -(&inverse * &inverse) / trace))
     }
 
     fn figure(&self, information: &DMatrix<f64>) -> Option<f64> {
-        Some(information.clone().cholesky()?.inverse().trace())
+        Some(log_det_and_inverse(information)?.1.trace())
     }
 }

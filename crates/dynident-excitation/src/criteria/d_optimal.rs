@@ -1,6 +1,7 @@
 //! D-optimality: the volume of the parameters' confidence ellipsoid, `-log det D`. Does not depend on units or on the choice of base columns, but for a constant.
 
 use super::{Criterion, Valued};
+use crate::definite_inverse::log_det_and_inverse;
 use nalgebra::DMatrix;
 
 /// `-log det D`, with derivative `-D⁻¹`.
@@ -13,9 +14,8 @@ impl Criterion for DOptimal {
     }
 
     fn value_and_derivative(&self, information: &DMatrix<f64>) -> Valued {
-        let factor = information.clone().cholesky()?;
-        let value = -2.0 * factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
-        Some((value, -factor.inverse()))
+        let (log_det, inverse) = log_det_and_inverse(information)?;
+        Some((-log_det, -inverse))
     }
 
     fn figure(&self, information: &DMatrix<f64>) -> Option<f64> {
