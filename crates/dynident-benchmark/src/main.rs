@@ -1,10 +1,11 @@
-//! Times Dynident's dynamics and its way from samples to triangular factors, and prints one JSON line a figure: the same lines, states and method as
+//! Times Dynident's dynamics, its way from samples to triangular factors and a step of an excitation design, and prints one JSON line a figure: the same lines, states and method as
 //! the programs in `benchmarks/`, which `benchmarks/compare.sh` sets side by side.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing figures is what this program is for")]
 
 mod batch;
 mod clock;
+mod excitation;
 mod identification;
 mod motion;
 mod single;
@@ -63,6 +64,9 @@ fn main() -> ExitCode {
             let report = Report { robot: name, dof: model.dof(), level, only: &options.only };
             single::time_all(&model, &report);
             batch::time_all(&model, &report, usize::from(options.block));
+            if level == Level::detect() && name != "talos_reduced" {
+                excitation::time_all(&model, &report);
+            }
             if name == "panda_arm7"
                 && let Err(error) = identification::time_all(&model, &report)
             {

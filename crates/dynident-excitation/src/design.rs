@@ -143,12 +143,12 @@ pub fn design(
         }
         let Some((parameters, ..)) = &best else { continue };
         // Around the best, by noise that shrinks: most of a family's good basins lie near each other.
-        let size = [0.2, 0.08, 0.03][round.min(2)];
-        let scale = typical(parameters);
+        let size = [0.3, 0.15, 0.08, 0.04][round.min(3)];
+        let scales = joint_scales(parameters, task.family.joints());
         starts = (0..settings.starts.max(4) / 2)
             .map(|k| {
                 let spread = if k == 0 { 0.0 } else { size };
-                parameters.iter().map(|p| p + spread * scale * random.normal()).collect()
+                parameters.iter().zip(&scales).map(|(p, scale)| p + spread * scale * random.normal()).collect()
             })
             .collect();
     }
@@ -211,9 +211,11 @@ fn descent(evaluations: usize) -> AugmentedLagrangianSettings {
     }
 }
 
-/// A length that the parameters have, for the size of noise.
-fn typical(parameters: &[f64]) -> f64 {
-    (parameters.iter().map(|p| p * p).sum::<f64>() / parameters.len().max(1) as f64).sqrt()
+/// For every parameter the root mean square of its joint's, for the size of noise (joint after joint, as families store them).
+fn joint_scales(parameters: &[f64], joints: usize) -> Vec<f64> {
+    let per_joint = (parameters.len() / joints.max(1)).max(1);
+    let rms = |part: &[f64]| (part.iter().map(|p| p * p).sum::<f64>() / part.len() as f64).sqrt();
+    parameters.chunks(per_joint).flat_map(|part| vec![rms(part); part.len()]).collect()
 }
 
 /// Position ranges and speed limits for random starts.
@@ -352,15 +354,12 @@ impl ConstrainedProblem for Problem<'_> {
             }
         }
         let information = self.information.of(&self.motion, self.weight);
-        match self.criterion.value_and_derivative(&information) {
-            Some((value, derivative)) => {
-                self.by_information = Some(derivative);
-                value
-            }
-            None => {
-                self.by_information = None;
-                f64::INFINITY
-            }
+        if let Some((value, derivative)) = self.criterion.value_and_derivative(&information) {
+            self.by_information = Some(derivative);
+            value
+        } else {
+            self.by_information = None;
+            f64::INFINITY
         }
     }
 

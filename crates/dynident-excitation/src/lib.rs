@@ -9,6 +9,7 @@ mod definite_inverse;
 mod design;
 pub mod families;
 mod family;
+mod forecast;
 mod information;
 pub mod limits;
 mod motion;
@@ -17,5 +18,6 @@ pub mod paper_problem;
 
 pub use design::{DesignProgress, DesignSettings, DesignTask, Designed, design, grid};
 pub use family::Family;
+pub use forecast::{Direction, Forecast, forecast};
 pub use information::Information;
 pub use motion::{Motion, MotionCotangent};
