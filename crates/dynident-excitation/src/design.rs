@@ -22,15 +22,15 @@ use std::time::Instant;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DesignSettings {
-    /// Random starts of the first round. Default 24.
+    /// Random starts of the first round. Default 12.
     pub starts: usize,
-    /// Rounds of restarts around the best. Default 2.
+    /// Rounds of restarts around the best. Default 4.
     pub rounds: usize,
-    /// Evaluations of one start at most. Default 300.
+    /// Evaluations of one start at most. Default 150.
     pub evaluations_per_start: usize,
-    /// Evaluations of the polish at most. Default 400.
+    /// Evaluations of one polish at most (up to six, while something is broken between samples). Default 1,000.
     pub polish_evaluations: usize,
-    /// Samples of the search grid. Default 251.
+    /// Samples of the search grid; give more to families that move faster than ten harmonics. Default 96.
     pub search_samples: usize,
     /// Rate at which the robot will be logged, Hz: every sample counts for the information. Default 100.
     pub rate_hz: f64,
@@ -43,11 +43,11 @@ pub struct DesignSettings {
 impl Default for DesignSettings {
     fn default() -> Self {
         Self {
-            starts: 24,
-            rounds: 2,
-            evaluations_per_start: 300,
-            polish_evaluations: 400,
-            search_samples: 251,
+            starts: 12,
+            rounds: 4,
+            evaluations_per_start: 150,
+            polish_evaluations: 1_000,
+            search_samples: 96,
             rate_hz: 100.0,
             time_limit_s: None,
             seed: 1,
@@ -206,7 +206,8 @@ fn descent(evaluations: usize) -> AugmentedLagrangianSettings {
         max_evaluations: evaluations,
         max_inner_iterations: 60,
         feasibility_tolerance: 1e-7,
-        optimality_tolerance: 1e-5,
+        // Criteria are logarithms of some hundred: their own size must not end a descent early.
+        optimality_tolerance: 1e-8,
         ..AugmentedLagrangianSettings::default()
     }
 }
