@@ -49,6 +49,8 @@ enum Command {
     Inspect(commands::inspect::Options),
     /// Dynamics of a robot for a table of states, as CSV with 17 digits.
     Evaluate(commands::evaluate::Options),
+    /// Find the motion that tells most about a study's machine, inside every limit.
+    Design(commands::design::Options),
     /// Fit a study's model to its logs and test it on the held-out ones.
     Identify(commands::identify::Options),
     /// Test a finished model on other logs.
@@ -81,6 +83,7 @@ fn main() -> ExitCode {
     let outcome = commands::with_threads(threads, || match arguments.command {
         Command::Inspect(options) => commands::inspect::run(&options, &context),
         Command::Evaluate(options) => commands::evaluate::run(&options, &context),
+        Command::Design(options) => commands::design::run(&options, &context),
         Command::Identify(options) => commands::identify::run(&options, &context),
         Command::Validate(options) => commands::validate::run(&options, &context),
     });

@@ -7,6 +7,7 @@ mod column_products;
 pub mod criteria;
 mod definite_inverse;
 mod design;
+pub mod export;
 pub mod families;
 mod family;
 mod forecast;

@@ -46,6 +46,7 @@ pub struct Identification {
 /// Everything that [`Error`] names: files, study, logs. A poor fit is not an error.
 pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Identification, Error> {
     let start = Instant::now();
+    study.require_training_log(study_path)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let machine = Machine::new(study, study_path, &folders)?;
     let mut timings = Timings { machine: start.elapsed().as_secs_f64(), ..Timings::default() };

@@ -1,12 +1,17 @@
 //! **The whole job**: a study file in, a dynamic model with error bars and its proof out.
 //!
 //! [`identify()`] fits a [`Study`]'s machine to its logs and tests it on the held-out ones; [`validate()`] tests a finished model; [`inspect()`] audits a robot
-//! description; [`evaluate()`] computes dynamics for a table of states. The rooms below are re-exported: [`model`], [`dynamics`], [`recording`], [`estimation`].
+//! description; [`evaluate()`] computes dynamics for a table of states; [`design_study()`] finds the motion to record. The rooms below are re-exported: [`model`],
+//! [`dynamics`], [`recording`], [`estimation`], [`excitation`].
 
 #![forbid(unsafe_code)]
 
 #[cfg(doctest)]
 pub mod book;
+mod cpu_time;
+mod design;
+mod design_file;
+mod design_section;
 mod error;
 mod evaluate;
 mod evidence;
@@ -27,9 +32,13 @@ mod written_urdf;
 
 pub use dynident_dynamics as dynamics;
 pub use dynident_estimation as estimation;
+pub use dynident_excitation as excitation;
 pub use dynident_model as model;
 pub use dynident_recording as recording;
 
+pub use design::{DesignOutcome, design_study};
+pub use design_file::{DESIGN_SCHEMA, DesignFile, DirectionForecast, ParameterForecast};
+pub use design_section::{CriterionChoice, DesignSection, FamilyChoice, TorqueNoise};
 pub use error::Error;
 pub use evaluate::{Quantity, evaluate};
 pub use evidence::PriorAgreement;

@@ -1,5 +1,6 @@
 //! The study file: a robot, its drives, its logs and how to fit them, without code.
 
+use crate::design_section::DesignSection;
 use crate::error::Error;
 use dynident_estimation::{CovarianceMethod, RankSettings, SegmentSettings};
 use dynident_model::line_and_column;
@@ -65,7 +66,10 @@ pub struct Study {
     /// The estimator.
     #[serde(default)]
     pub estimator: EstimatorSection,
-    /// The logs.
+    /// The excitation trajectory that `design` looks for.
+    #[serde(default)]
+    pub design: Option<DesignSection>,
+    /// The logs; only `design` needs none.
     #[serde(default)]
     pub log: Vec<LogSection>,
 }
@@ -328,7 +332,7 @@ impl Study {
         if text.trim().is_empty() {
             return Err(Error::study(
                 path,
-                "the file is empty: a study needs at least [robot] and one [[log]]".to_owned(),
+                "the file is empty: a study needs at least [robot] and, to identify, one [[log]]".to_owned(),
             ));
         }
         let study: Self = toml::from_str(text).map_err(|error| {
@@ -340,13 +344,25 @@ impl Study {
         Ok(study)
     }
 
-    fn check(&self) -> Result<(), String> {
+    /// That there is a log, as fitting and testing need; a study for `design` may have none.
+    pub(crate) fn require_log(&self, path: &Path) -> Result<(), Error> {
         if self.log.is_empty() {
-            return Err("no [[log]]: name at least one log with `file = \"...\"`".to_owned());
+            return Err(Error::study(path, "no [[log]]: name at least one log with `file = \"...\"`".to_owned()));
         }
+        Ok(())
+    }
+
+    /// That there is a log to fit to.
+    pub(crate) fn require_training_log(&self, path: &Path) -> Result<(), Error> {
+        self.require_log(path)?;
         if !self.log.iter().any(|log| log.role == Role::Identify) {
-            return Err("no log has the role \"identify\": there is nothing to fit to".to_owned());
+            let message = "no log has the role \"identify\": there is nothing to fit to".to_owned();
+            return Err(Error::study(path, message));
         }
+        Ok(())
+    }
+
+    fn check(&self) -> Result<(), String> {
         for (index, log) in self.log.iter().enumerate() {
             if log.format.is_none() && self.format.is_none() {
                 return Err(format!("[[log]] number {}: neither the log nor the study has a [format]", index + 1));
@@ -402,6 +418,9 @@ impl Study {
         }
         if self.parallel_filter.factor == Some(0) {
             return Err("parallel_filter.factor = 0: give 1 or more".to_owned());
+        }
+        if let Some(design) = &self.design {
+            design.validate().map_err(|error| format!("[design]: {error}"))?;
         }
         self.motion.validate().map_err(|error| format!("[motion]: {error}"))?;
         self.estimator.rank.validate().map_err(|error| format!("[estimator.rank]: {error}"))?;

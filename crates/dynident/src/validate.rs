@@ -52,6 +52,7 @@ pub fn validate(
     study_path: &Path,
     options: &RunOptions<'_>,
 ) -> Result<ValidationFile, Error> {
+    study.require_log(study_path)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let machine = Machine::new(study, study_path, &folders)?;
     let (theta, made_with) = stored_model(result_path, &machine)?;

@@ -1,11 +1,13 @@
 //! Results as a person likes to read them: the important first, at most [`WIDTH`](text::WIDTH) columns.
 
+mod design;
 mod findings;
 mod identification;
 mod inspection;
 mod text;
 mod validation;
 
+pub(crate) use design::design;
 pub(crate) use identification::identification;
 pub(crate) use inspection::inspection;
 pub(crate) use validation::validation;

@@ -1,0 +1,156 @@
+//! `dynident design STUDY.toml --out DIR`.
+
+use super::{Context, json, pretty_json, told, told_in};
+use crate::{Verdict, summary, terminal};
+use clap::ValueEnum;
+use core::ops::ControlFlow;
+use core::sync::atomic::{AtomicBool, Ordering};
+use dynident::excitation::DesignProgress;
+use dynident::excitation::export::{
+    Preview, Sampled, UrScriptSettings, preview_svg, ros2_joint_trajectory, trajectory_csv, urscript, waypoints_csv,
+};
+use dynident::{DesignOutcome, RunOptions, Study, check_writable, design_study, write_whole};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::path::PathBuf;
+
+/// Rate of the picture, Hz.
+const PICTURE_RATE_HZ: f64 = 100.0;
+
+/// Set by Ctrl-C: the search ends with the best so far.
+static STOP: AtomicBool = AtomicBool::new(false);
+
+/// Options of `design`.
+#[derive(clap::Args)]
+pub(crate) struct Options {
+    /// The study file; its [design] says what is looked for.
+    study: PathBuf,
+    /// Folder for design.json, trajectory.csv and preview.svg.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Seed of the random starts, in place of the study's.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Also write what a robot takes; may be given several times.
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    to: Vec<Format>,
+    /// Rate of trajectory.csv and of the robot's files, Hz; by default the study's search.rate_hz, and 125 for URScript.
+    #[arg(long, value_name = "HZ", value_parser = rate)]
+    rate_hz: Option<f64>,
+    /// Folder of the robot description, in place of the study's own.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Format {
+    /// ROS 2 JointTrajectory, YAML.
+    Ros2,
+    /// URScript servoj program.
+    Urscript,
+    /// Time and positions, CSV.
+    Waypoints,
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().map_err(|error| format!("{error}: give a number of hertz"))?;
+    if (1.0..=1e4).contains(&value) { Ok(value) } else { Err("give 1 to 10000 Hz".to_owned()) }
+}
+
+pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
+    let mut study = Study::load(&options.study).map_err(told)?;
+    if let Some(seed) = options.seed {
+        study.design.get_or_insert_default().search.seed = seed;
+    }
+    check_writable(&options.out).map_err(told)?;
+    // Without a handler Ctrl-C ends the program as ever.
+    let _ = ctrlc::set_handler(|| {
+        if STOP.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    });
+    let progress = context.progress();
+    let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
+    let line = (!context.quiet && terminal::watched()).then(line);
+    let watch = |at: &DesignProgress| {
+        if let Some(line) = &line {
+            line.set_message(state(at));
+            line.tick();
+        }
+        if STOP.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let outcome = design_study(&study, &options.study, &run, watch).map_err(told_in(&options.study))?;
+    if let Some(line) = line {
+        line.finish_and_clear();
+    }
+    if STOP.load(Ordering::Relaxed) {
+        terminal::remark("stopped: this is the best motion so far");
+    }
+    let files = files(&outcome, options)?;
+    for (name, contents) in &files {
+        write_whole(&options.out.join(name), contents).map_err(told)?;
+    }
+    // The design last: where it stands, everything stands.
+    write_whole(&options.out.join("design.json"), &pretty_json(&outcome.file)?).map_err(told)?;
+    if !outcome.file.feasible && !options.to.is_empty() {
+        terminal::remark("no file for the robot was written: the motion breaks its limits");
+    }
+    if context.json {
+        terminal::print(&json(&outcome.file)?);
+    } else if !context.quiet {
+        let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
+        terminal::print(&summary::design(&outcome.file, &options.out, &names));
+    }
+    Ok(if outcome.file.feasible { Verdict::Good } else { Verdict::Negative })
+}
+
+/// The files beside design.json, all made before the first is written.
+fn files(outcome: &DesignOutcome, options: &Options) -> Result<Vec<(&'static str, Vec<u8>)>, String> {
+    let file = &outcome.file;
+    let at = |rate_hz: f64, write: &dyn Fn(&Sampled<'_>) -> Result<String, String>| {
+        let (times_s, motion) = outcome.sampled(rate_hz);
+        write(&Sampled { joints: &file.joints, times_s: &times_s, motion: &motion }).map(String::into_bytes)
+    };
+    let rate_hz = options.rate_hz.unwrap_or(file.rate_hz);
+    let plain = |write: fn(&Sampled<'_>) -> Result<String, dynident::excitation::export::ExportError>| {
+        at(rate_hz, &|sampled| write(sampled).map_err(|error| error.to_string()))
+    };
+    let picture = |sampled: &Sampled<'_>| {
+        let torque = outcome.torque_nm(sampled.motion);
+        let title = format!("{}: {}, {}", file.name, file.family, file.criterion);
+        let preview = Preview { title: &title, limits: &outcome.limits, torque_nm: torque.as_deref() };
+        preview_svg(sampled, &preview).map_err(|error| error.to_string())
+    };
+    let mut files = vec![("trajectory.csv", plain(trajectory_csv)?), ("preview.svg", at(PICTURE_RATE_HZ, &picture)?)];
+    // A motion that breaks limits is for the eye, not for the robot.
+    for format in options.to.iter().filter(|_| file.feasible) {
+        files.push(match format {
+            Format::Ros2 => ("trajectory.ros2.yaml", plain(ros2_joint_trajectory)?),
+            Format::Waypoints => ("waypoints.csv", plain(waypoints_csv)?),
+            Format::Urscript => {
+                let mut settings = UrScriptSettings::default();
+                settings.rate_hz = options.rate_hz.unwrap_or(settings.rate_hz);
+                let write = |sampled: &Sampled<'_>| urscript(sampled, &settings).map_err(|error| error.to_string());
+                ("trajectory.script", at(settings.rate_hz, &write)?)
+            }
+        });
+    }
+    Ok(files)
+}
+
+/// The line that a person watches.
+fn line() -> ProgressBar {
+    let line = ProgressBar::new_spinner();
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {wide_msg}") {
+        line.set_style(style);
+    }
+    line
+}
+
+fn state(at: &DesignProgress) -> String {
+    let limits = if at.violation <= 1e-6 {
+        "inside all limits".to_owned()
+    } else {
+        format!("{:.2} % over a limit", 100.0 * at.violation)
+    };
+    format!("{}: criterion {:.4}, {limits}; Ctrl-C keeps the best", at.round, at.value)
+}

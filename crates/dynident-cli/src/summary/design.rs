@@ -1,0 +1,87 @@
+//! The summary of `design`.
+
+use super::text::{name, percent, shortened, table, wrapped};
+use core::fmt::Write;
+use dynident::DesignFile;
+use std::path::Path;
+
+/// Limits and parameters shown; the rest stand in the file.
+const SHOWN: usize = 5;
+/// Columns that are left for an expression.
+const EXPRESSION: usize = 40;
+
+/// What was found, and how well it will tell.
+pub(crate) fn design(d: &DesignFile, out: &Path, files: &[&str]) -> String {
+    let mut text = wrapped(&d.name, 2);
+    let _ = writeln!(
+        text,
+        "{} joints, {} base columns, {}, {} s, {}\n",
+        d.joints.len(),
+        d.base_columns,
+        d.family,
+        d.duration_s,
+        d.criterion
+    );
+    let number = |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |value| format!("{value:.digits$}"));
+    let _ = writeln!(
+        text,
+        "condition number {} ({} with scaled columns), log det {}",
+        number(d.condition_number, 2),
+        number(d.condition_number_scaled, 2),
+        number(d.log_det, 1)
+    );
+    let khz = d.check_rate_hz / 1000.0;
+    if d.feasible {
+        let _ = writeln!(text, "feasible: every limit is kept, checked at {khz} kHz\n");
+    } else {
+        let _ = writeln!(text, "NOT FEASIBLE, checked at {khz} kHz:");
+        for sentence in &d.diagnosis {
+            text += &wrapped(&format!("  {sentence}"), 4);
+        }
+        text.push('\n');
+    }
+    text += &limits(d);
+    text.push('\n');
+    text += &forecast(d);
+    for note in &d.notes {
+        text += &wrapped(&format!("note: {note}"), 2);
+    }
+    let _ = writeln!(text, "\n{} evaluations in {:.2} s, seed {}", d.evaluations, d.seconds, d.seed);
+    text += &wrapped(&format!("wrote {}, {}", out.join("design.json").display(), files.join(", ")), 2);
+    text
+}
+
+/// The limits that the motion uses most.
+fn limits(d: &DesignFile) -> String {
+    let mut used: Vec<_> = d.limits.iter().collect();
+    used.sort_by(|a, b| b.worst_ratio.total_cmp(&a.worst_ratio));
+    let rows = used.iter().take(SHOWN).map(|limit| {
+        let part = format!("{:.2}", 100.0 * limit.worst_ratio);
+        vec![limit.kind.to_string(), name(&limit.joint), part, format!("{:.3}", limit.at_s)]
+    });
+    table(&["limit", "of", "used %", "at s"].map(str::to_owned), 2..4, rows.collect())
+}
+
+/// The parameters that will be known best and worst, by relative error where there is a prior.
+fn forecast(d: &DesignFile) -> String {
+    let dark: Vec<&str> = d.forecast.iter().filter(|p| p.std.is_none()).map(|p| p.symbol.as_str()).collect();
+    let mut known: Vec<_> = d.forecast.iter().filter(|p| p.std.is_some()).collect();
+    known.sort_by(|a, b| {
+        let key = |p: &dynident::ParameterForecast| p.relative_std_percent.unwrap_or(f64::INFINITY);
+        key(a).total_cmp(&key(b))
+    });
+    let row = |p: &&dynident::ParameterForecast| {
+        let std = p.std.map_or("-".to_owned(), |std| format!("{std:.2e}"));
+        let prior = p.prior.map_or("-".to_owned(), |prior| format!("{prior:.4}"));
+        vec![shortened(&p.expression, EXPRESSION), prior, std, percent(p.relative_std_percent)]
+    };
+    let ends = known.len().min(SHOWN / 2);
+    let rows: Vec<_> =
+        known[..ends].iter().chain(&known[ends.max(known.len().saturating_sub(SHOWN - ends))..]).map(row).collect();
+    let mut text = String::from("forecast, best and worst known:\n");
+    text += &table(&["parameter", "prior", "std", "std %"].map(str::to_owned), 1..4, rows);
+    if !dark.is_empty() {
+        text += &wrapped(&format!("  not excited at all: {}", dark.join(", ")), 4);
+    }
+    text
+}

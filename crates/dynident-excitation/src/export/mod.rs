@@ -1,0 +1,141 @@
+//! **How does the robot get it?** A sampled motion as the formats that robots and people take, one format a file.
+
+mod preview_svg;
+mod ros2;
+mod trajectory_csv;
+mod urscript;
+mod waypoints;
+
+pub use preview_svg::{Preview, preview_svg};
+pub use ros2::ros2_joint_trajectory;
+pub use trajectory_csv::trajectory_csv;
+pub use urscript::{UrScriptSettings, urscript};
+pub use waypoints::waypoints_csv;
+
+use crate::motion::Motion;
+use thiserror::Error;
+
+/// A motion at a list of times, with the names of its joints.
+#[derive(Clone, Copy, Debug)]
+pub struct Sampled<'a> {
+    /// Names of the joints, in the order of the motion.
+    pub joints: &'a [String],
+    /// Times from the start, s, ascending.
+    pub times_s: &'a [f64],
+    /// The motion at these times.
+    pub motion: &'a Motion,
+}
+
+/// Why a motion cannot be written in a format.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum ExportError {
+    /// Names, times and motion do not belong together.
+    #[error("{what}: expected {expected}, found {found}")]
+    Shape {
+        /// What there are too many or too few of.
+        what: &'static str,
+        /// How many the motion has.
+        expected: usize,
+        /// How many were given.
+        found: usize,
+    },
+    /// A number that no robot can take.
+    #[error("the motion of joint `{joint}` is not finite at {at_s} s: export a finite motion")]
+    NotFinite {
+        /// The joint.
+        joint: String,
+        /// When, s.
+        at_s: f64,
+    },
+    /// A robot with another number of joints than the format is for.
+    #[error(
+        "URScript is for the six joints of a UR arm; the robot has {joints}: lock the others, or choose another format"
+    )]
+    SixJoints {
+        /// The robot's number of joints.
+        joints: usize,
+    },
+    /// A setting without meaning.
+    #[error("{setting} = {value}: give {needed}")]
+    Setting {
+        /// Its name.
+        setting: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        needed: &'static str,
+    },
+}
+
+impl Sampled<'_> {
+    /// Checks that names, times and motion belong together and that every number is finite.
+    fn check(&self) -> Result<(), ExportError> {
+        let Motion { samples, joints, .. } = *self.motion;
+        for (what, expected, found) in
+            [("joint names", joints, self.joints.len()), ("times", samples, self.times_s.len())]
+        {
+            if expected != found {
+                return Err(ExportError::Shape { what, expected, found });
+            }
+        }
+        for (joint, name) in self.joints.iter().enumerate() {
+            for (sample, &at_s) in self.times_s.iter().enumerate() {
+                if !(at_s.is_finite() && self.at(joint, sample).iter().all(|x| x.is_finite())) {
+                    return Err(ExportError::NotFinite { joint: name.clone(), at_s });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// q, q̇, q̈ of one joint at one sample.
+    fn at(&self, joint: usize, sample: usize) -> [f64; 3] {
+        let index = joint * self.motion.samples + sample;
+        [self.motion.q[index], self.motion.dq[index], self.motion.ddq[index]]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::families::{Fourier, FourierSettings};
+    use crate::{Family, grid};
+
+    pub(super) fn sampled(joints: usize, samples: usize) -> (Vec<String>, Vec<f64>, Motion) {
+        let family = Fourier::new(joints, 2.0, &FourierSettings::default()).unwrap();
+        let parameters: Vec<f64> = (0..family.parameters()).map(|k| (k as f64).sin()).collect();
+        let (times, mut motion) = (grid(2.0, samples), Motion::default());
+        family.motion(&parameters, &times, &mut motion);
+        ((0..joints).map(|joint| format!("joint \"{joint}\", a")).collect(), times, motion)
+    }
+
+    #[test]
+    fn what_does_not_belong_together_is_named() {
+        let (mut joints, times, mut motion) = sampled(6, 5);
+        let error = trajectory_csv(&Sampled { joints: &joints, times_s: &times[1..], motion: &motion }).unwrap_err();
+        assert_eq!(error, ExportError::Shape { what: "times", expected: 5, found: 4 });
+        motion.dq[7] = f64::NAN;
+        let error = waypoints_csv(&Sampled { joints: &joints, times_s: &times, motion: &motion }).unwrap_err();
+        assert_eq!(error, ExportError::NotFinite { joint: joints[1].clone(), at_s: times[2] });
+        joints.pop();
+        let error = ros2_joint_trajectory(&Sampled { joints: &joints, times_s: &times, motion: &motion }).unwrap_err();
+        assert_eq!(error, ExportError::Shape { what: "joint names", expected: 6, found: 5 });
+    }
+
+    #[test]
+    fn the_table_holds_the_motion_to_the_last_bit() {
+        let (joints, times, motion) = sampled(2, 9);
+        let csv = trajectory_csv(&Sampled { joints: &joints, times_s: &times, motion: &motion }).unwrap();
+        let mut lines = csv.lines();
+        assert_eq!(lines.next(), Some("t_s,q1,q2,dq1,dq2,ddq1,ddq2"));
+        for (sample, line) in lines.enumerate() {
+            let numbers: Vec<f64> = line.split(',').map(|number| number.parse().unwrap()).collect();
+            let at = |values: &[f64], joint: usize| values[joint * 9 + sample];
+            let (q, dq, ddq) = (&motion.q, &motion.dq, &motion.ddq);
+            let expected = [times[sample], at(q, 0), at(q, 1), at(dq, 0), at(dq, 1), at(ddq, 0), at(ddq, 1)];
+            assert_eq!(numbers, expected);
+        }
+        assert_eq!(csv.lines().count(), 10);
+    }
+}

@@ -1,0 +1,77 @@
+//! ROS 2: a `trajectory_msgs/msg/JointTrajectory` as YAML.
+
+use super::{ExportError, Sampled};
+use core::fmt::Write;
+
+/// A `JointTrajectory` message with positions, velocities and accelerations, as `ros2 topic pub` and parameter files read it. Move the arm to the first point before.
+///
+/// # Source
+/// ROS 2 interfaces `trajectory_msgs/msg/JointTrajectory`, `trajectory_msgs/msg/JointTrajectoryPoint`, `builtin_interfaces/msg/Duration`.
+///
+/// # Errors
+/// Names, times and motion that do not belong together, and numbers that are not finite.
+pub fn ros2_joint_trajectory(sampled: &Sampled<'_>) -> Result<String, ExportError> {
+    sampled.check()?;
+    let mut text = String::from("header:\n  stamp: {sec: 0, nanosec: 0}\n  frame_id: \"\"\njoint_names:\n");
+    for name in sampled.joints {
+        // Writing to a string cannot fail, here and below.
+        let _ = writeln!(text, "  - {}", quoted(name));
+    }
+    text.push_str("points:\n");
+    for (sample, time) in sampled.times_s.iter().enumerate() {
+        for (order, key) in ["  - positions", "    velocities", "    accelerations"].into_iter().enumerate() {
+            // YAML takes `1` for an integer, ROS wants a float: `{:?}` keeps the point.
+            let row: Vec<String> =
+                (0..sampled.joints.len()).map(|joint| format!("{:?}", sampled.at(joint, sample)[order])).collect();
+            let _ = writeln!(text, "{key}: [{}]", row.join(", "));
+        }
+        let nanoseconds = (time * 1e9).round() as u64;
+        let (sec, nanosec) = (nanoseconds / 1_000_000_000, nanoseconds % 1_000_000_000);
+        let _ = writeln!(text, "    time_from_start: {{sec: {sec}, nanosec: {nanosec}}}");
+    }
+    Ok(text)
+}
+
+/// A double-quoted YAML scalar.
+fn quoted(name: &str) -> String {
+    let mut text = String::from("\"");
+    for letter in name.chars() {
+        match letter {
+            '"' | '\\' => {
+                text.push('\\');
+                text.push(letter);
+            }
+            letter if letter.is_control() => {
+                let _ = write!(text, "\\U{:08X}", u32::from(letter));
+            }
+            letter => text.push(letter),
+        }
+    }
+    text.push('"');
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::export::tests::sampled;
+
+    #[test]
+    fn every_point_has_its_time_and_all_three_orders() {
+        let (joints, times, motion) = sampled(2, 5);
+        let text = ros2_joint_trajectory(&Sampled { joints: &joints, times_s: &times, motion: &motion }).unwrap();
+        assert!(text.contains("joint_names:\n  - \"joint \\\"0\\\", a\"\n"), "{text}");
+        for (key, count) in
+            [("- positions: [", 5), ("velocities: [", 5), ("accelerations: [", 5), ("sec: 1, nanosec: 500000000}", 1)]
+        {
+            assert_eq!(text.matches(key).count(), count, "{key}\n{text}");
+        }
+        let line = format!("  - positions: [{:?}, {:?}]", motion.q[3], motion.q[5 + 3]);
+        assert!(text.contains(&line), "{line}\n{text}");
+    }
+
+    #[test]
+    fn control_characters_are_escaped() {
+        assert_eq!(quoted("a\nb"), "\"a\\U0000000Ab\"");
+    }
+}

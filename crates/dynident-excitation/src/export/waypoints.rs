@@ -1,0 +1,47 @@
+//! Plain way-points: time and positions under the joints' own names.
+
+use super::{ExportError, Sampled};
+use core::fmt::Write;
+
+/// `t_s, <joint names>`, one row per time, rad (m); a name with a comma, a quote or a line break is quoted (RFC 4180).
+///
+/// # Errors
+/// Names, times and motion that do not belong together, and numbers that are not finite.
+pub fn waypoints_csv(sampled: &Sampled<'_>) -> Result<String, ExportError> {
+    sampled.check()?;
+    let mut text = String::from("t_s");
+    for name in sampled.joints {
+        text.push(',');
+        if name.contains([',', '"', '\n', '\r']) {
+            let _ = write!(text, "\"{}\"", name.replace('"', "\"\""));
+        } else {
+            text.push_str(name);
+        }
+    }
+    text.push('\n');
+    for (sample, time) in sampled.times_s.iter().enumerate() {
+        let _ = write!(text, "{time}");
+        for joint in 0..sampled.joints.len() {
+            let _ = write!(text, ",{}", sampled.at(joint, sample)[0]);
+        }
+        text.push('\n');
+    }
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::export::tests::sampled;
+
+    #[test]
+    fn names_are_quoted_and_rows_hold_positions() {
+        let (mut joints, times, motion) = sampled(2, 3);
+        joints[1] = "elbow".to_owned();
+        let text = waypoints_csv(&Sampled { joints: &joints, times_s: &times, motion: &motion }).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[0], "t_s,\"joint \"\"0\"\", a\",elbow");
+        assert_eq!(lines[2], format!("{},{},{}", times[1], motion.q[1], motion.q[4]));
+        assert_eq!(lines.len(), 4);
+    }
+}

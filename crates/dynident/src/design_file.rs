@@ -1,0 +1,93 @@
+//! What `design.json` holds.
+
+use crate::design_section::FamilyChoice;
+use dynident_excitation::check::LimitReport;
+use serde::Serialize;
+
+/// Name and version of the schema of [`DesignFile`].
+pub const DESIGN_SCHEMA: &str = "dynident/design/1";
+
+/// What `design` prints as JSON and writes as `design.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct DesignFile {
+    /// [`DESIGN_SCHEMA`].
+    pub schema: &'static str,
+    /// Name of the study.
+    pub name: String,
+    /// Joints in the order of all vectors.
+    pub joints: Vec<String>,
+    /// The family.
+    pub family: &'static str,
+    /// The family's settings, as a study would have them.
+    pub family_settings: FamilyChoice,
+    /// The family's parameters of the motion found.
+    pub parameters: Vec<f64>,
+    /// The criterion.
+    pub criterion: &'static str,
+    /// The criterion's figure, smaller is better; none where a parameter is not excited.
+    pub criterion_figure: Option<f64>,
+    /// Condition number of the stacked base regressor, SI units, no weights.
+    pub condition_number: Option<f64>,
+    /// The same after division of each column by its norm.
+    pub condition_number_scaled: Option<f64>,
+    /// `log det WᵀW` of the stacked base regressor: every torque noise 1 Nm (N).
+    pub log_det: Option<f64>,
+    /// `log det D` with the torque noise of the study.
+    pub log_det_weighted: Option<f64>,
+    /// Base parameters, friction and drive included.
+    pub base_columns: usize,
+    /// Seconds from rest to rest.
+    pub duration_s: f64,
+    /// Rate of the log that the figures count on, Hz.
+    pub rate_hz: f64,
+    /// Standard deviation of each joint's torque, Nm (N).
+    pub torque_std_nm: Vec<f64>,
+    /// Whether every limit is kept, by the independent check.
+    pub feasible: bool,
+    /// Rate of that check, Hz.
+    pub check_rate_hz: f64,
+    /// Every limit, and how much of it the motion uses.
+    pub limits: Vec<LimitReport>,
+    /// Error bars that this motion will give, white torque noise assumed.
+    pub forecast: Vec<ParameterForecast>,
+    /// The combinations of parameters that will be known worst.
+    pub worst_directions: Vec<DirectionForecast>,
+    /// Evaluations of criterion, limits and gradient.
+    pub evaluations: usize,
+    /// Processor seconds, all threads together; none where the system does not tell.
+    pub cpu_s: Option<f64>,
+    /// Seconds by the clock.
+    pub seconds: f64,
+    /// Seed of the random starts.
+    pub seed: u64,
+    /// Why nothing feasible was found, and what would help; empty for a feasible motion.
+    pub diagnosis: Vec<String>,
+    /// What was assumed where the study is silent.
+    pub notes: Vec<String>,
+}
+
+/// What will be known of one base parameter.
+#[derive(Clone, Debug, Serialize)]
+pub struct ParameterForecast {
+    /// Symbol of its column.
+    pub symbol: String,
+    /// What it sums.
+    pub expression: String,
+    /// Unit.
+    pub unit: &'static str,
+    /// Expected standard deviation; none if the motion does not excite it.
+    pub std: Option<f64>,
+    /// The same in percent of the prior value.
+    pub relative_std_percent: Option<f64>,
+    /// Value by the description.
+    pub prior: Option<f64>,
+}
+
+/// A direction in the space of column-scaled parameters.
+#[derive(Clone, Debug, Serialize)]
+pub struct DirectionForecast {
+    /// How many times less is known in it than of a column that stood alone: `1 / √λ` of the correlation-scaled information.
+    pub inflation: f64,
+    /// Symbols of the columns that make it, the largest share first, and their shares.
+    pub terms: Vec<(String, f64)>,
+}

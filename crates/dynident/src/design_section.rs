@@ -1,0 +1,203 @@
+//! `[design]`: which motion is looked for, by what measure, within which limits.
+
+use dynident_excitation::criteria::{AOptimal, ConditionNumber, Criterion, DOptimal, EOptimal};
+use dynident_excitation::families::{
+    BSpline, BSplineSettings, FamilyError, Fourier, FourierSettings, LogisticStrokes, LogisticStrokesSettings,
+    Multisine, MultisineSettings, Quintic, QuinticSettings, SplicedLogistic, SplicedLogisticSettings,
+};
+use dynident_excitation::limits::Limits;
+use dynident_excitation::{DesignSettings, Family};
+use serde::{Deserialize, Serialize};
+
+/// Longest motion, s: the re-check at 10 kHz looks at every one of its samples.
+const MAX_DURATION_S: f64 = 3600.0;
+
+/// Most samples of a search grid, and of the log that is planned.
+const MAX_SAMPLES: f64 = 1e6;
+
+/// Most starts, rounds and evaluations of one start.
+const MAX_COUNT: usize = 1_000_000;
+
+/// `[design]`, all of it optional.
+///
+/// ```
+/// let section: dynident::DesignSection = toml::from_str(
+///     r#"
+///     family = { kind = "fourier", harmonics = 7 }
+///     duration_s = 20.0
+///     criterion = "d-optimal"
+///     torque_std_nm = [1.0, 1.0, 0.5]
+///     search = { seed = 3, starts = 12 }
+///     limits = { joints = [{ joint = "elbow", acceleration = 10.0 }] }
+///     "#,
+/// )?;
+/// assert!(section.validate().is_ok());
+/// # Ok::<(), toml::de::Error>(())
+/// ```
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DesignSection {
+    /// The trajectory family and its settings; five Fourier harmonics with rest at both ends by default.
+    pub family: FamilyChoice,
+    /// How long the motion lasts, s; 10 by default.
+    pub duration_s: f64,
+    /// What makes a motion good; `"d-optimal"` by default.
+    pub criterion: CriterionChoice,
+    /// Standard deviation of each joint's torque, Nm (N): one number, or one per joint in the model's order. By default 1 % of the joint's effort limit, and 1 where there is none.
+    pub torque_std_nm: Option<TorqueNoise>,
+    /// How much is searched, and how finely; also the rate of the log and the seed.
+    pub search: DesignSettings,
+    /// Limits, laid over those of the description.
+    pub limits: Limits,
+}
+
+impl Default for DesignSection {
+    fn default() -> Self {
+        Self {
+            family: FamilyChoice::Fourier(FourierSettings::default()),
+            duration_s: 10.0,
+            criterion: CriterionChoice::default(),
+            torque_std_nm: None,
+            search: DesignSettings::default(),
+            limits: Limits::default(),
+        }
+    }
+}
+
+/// A family by its `kind`, with that family's own settings beside it.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum FamilyChoice {
+    /// Finite Fourier series.
+    Fourier(FourierSettings),
+    /// Splines of degree 5.
+    BSpline(BSplineSettings),
+    /// Quintic polynomials through way-points.
+    Quintic(QuinticSettings),
+    /// Sines with Schroeder phases.
+    Multisine(MultisineSettings),
+    /// Any number of logistic strokes a joint.
+    LogisticStrokes(LogisticStrokesSettings),
+    /// The paper's spliced logistic function.
+    SplicedLogistic(SplicedLogisticSettings),
+}
+
+impl FamilyChoice {
+    /// The `kind` in study files and results.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Fourier(_) => "fourier",
+            Self::BSpline(_) => "b-spline",
+            Self::Quintic(_) => "quintic",
+            Self::Multisine(_) => "multisine",
+            Self::LogisticStrokes(_) => "logistic-strokes",
+            Self::SplicedLogistic(_) => "spliced-logistic",
+        }
+    }
+
+    /// The family itself, for so many joints and seconds.
+    ///
+    /// # Errors
+    /// If a setting has no meaning.
+    pub fn family(&self, joints: usize, duration_s: f64) -> Result<Box<dyn Family>, FamilyError> {
+        Ok(match self {
+            Self::Fourier(settings) => Box::new(Fourier::new(joints, duration_s, settings)?),
+            Self::BSpline(settings) => Box::new(BSpline::new(joints, duration_s, settings)?),
+            Self::Quintic(settings) => Box::new(Quintic::new(joints, duration_s, settings)?),
+            Self::Multisine(settings) => Box::new(Multisine::new(joints, duration_s, settings)?),
+            Self::LogisticStrokes(settings) => Box::new(LogisticStrokes::new(joints, duration_s, settings)?),
+            Self::SplicedLogistic(settings) => Box::new(SplicedLogistic::new(joints, duration_s, settings)?),
+        })
+    }
+}
+
+/// What makes a motion good.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CriterionChoice {
+    /// The volume of the confidence ellipsoid: `-log det D`.
+    #[default]
+    DOptimal,
+    /// The sum of the variances: `tr D⁻¹`.
+    AOptimal,
+    /// The largest variance of any direction: `1 / λ_min(D)`.
+    EOptimal,
+    /// The condition number of the stacked base regressor, SI units, every torque counting alike.
+    ConditionNumber,
+    /// The same after division of each column by its norm.
+    ConditionNumberScaled,
+}
+
+impl CriterionChoice {
+    /// The criterion in the forms that a search uses one after another: smooth first, sharp last.
+    pub(crate) fn criteria(self) -> Vec<Box<dyn Criterion>> {
+        let condition = |scaled| -> Vec<Box<dyn Criterion>> {
+            [3.0, 40.0, 80.0].map(|order| -> Box<dyn Criterion> { Box::new(ConditionNumber { order, scaled }) }).into()
+        };
+        match self {
+            Self::DOptimal => vec![Box::new(DOptimal)],
+            Self::AOptimal => vec![Box::new(AOptimal)],
+            Self::EOptimal => vec![Box::new(EOptimal::default())],
+            Self::ConditionNumber => condition(false),
+            Self::ConditionNumberScaled => condition(true),
+        }
+    }
+
+    /// Whether torque noise plays no part: the figure is of the regressor itself.
+    pub(crate) fn of_regressor(self) -> bool {
+        matches!(self, Self::ConditionNumber | Self::ConditionNumberScaled)
+    }
+}
+
+/// Torque noise: the same for all joints, or one by one.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(untagged, expecting = "a standard deviation in Nm, or a list with one per joint")]
+pub enum TorqueNoise {
+    /// For every joint.
+    Same(f64),
+    /// Joint by joint, in the model's order.
+    Each(Vec<f64>),
+}
+
+impl DesignSection {
+    /// Checks everything that needs no robot.
+    ///
+    /// # Errors
+    /// The first key whose value has no meaning, with what it may be.
+    pub fn validate(&self) -> Result<(), String> {
+        let within = |key: &str, value: f64, least: f64, most: f64| {
+            if value >= least && value <= most {
+                Ok(())
+            } else {
+                Err(format!("{key} = {value}: give {least} to {most}"))
+            }
+        };
+        within("duration_s", self.duration_s, 0.1, MAX_DURATION_S)?;
+        let search = &self.search;
+        within("search.rate_hz", search.rate_hz, 1.0, 1e5)?;
+        let samples = self.duration_s * search.rate_hz;
+        if samples > MAX_SAMPLES {
+            return Err(format!(
+                "duration_s times search.rate_hz makes {samples:.0} samples: at most {MAX_SAMPLES} can be planned"
+            ));
+        }
+        for (key, value, least) in [
+            ("search.starts", search.starts, 1),
+            ("search.rounds", search.rounds, 0),
+            ("search.evaluations_per_start", search.evaluations_per_start, 1),
+            ("search.polish_evaluations", search.polish_evaluations, 1),
+        ] {
+            within(key, value as f64, f64::from(least), MAX_COUNT as f64)?;
+        }
+        within("search.search_samples", search.search_samples as f64, 8.0, MAX_SAMPLES)?;
+        if let Some(limit) = search.time_limit_s {
+            within("search.time_limit_s", limit, 1e-3, 1e7)?;
+        }
+        let stds = match &self.torque_std_nm {
+            None => &[][..],
+            Some(TorqueNoise::Same(std)) => core::slice::from_ref(std),
+            Some(TorqueNoise::Each(stds)) => stds,
+        };
+        stds.iter().try_for_each(|std| within("torque_std_nm", *std, 1e-9, 1e9))
+    }
+}
