@@ -166,7 +166,13 @@ fn torque_limits_need_inertial_parameters() {
     }
     bare.push_str(rest);
     std::fs::write(folder.path().join("arm.urdf"), bare).unwrap();
-    std::fs::write(folder.path().join("study.toml"), "[robot]\nfile = \"arm.urdf\"\n").unwrap();
+    let study = "[robot]\nfile = \"arm.urdf\"\n";
+    std::fs::write(folder.path().join("study.toml"), study).unwrap();
+    let ran = run(folder.path(), &[]);
+    assert_eq!(ran.status, 2, "{}", ran.stderr);
+    assert!(ran.stderr.contains("`shoulder` has no limit of speed"), "{}", ran.stderr);
+    let limited = "[design.limits]\njoints = [{ joint = \"shoulder\", torque = 30.0 }, { joint = \"elbow\", torque = 9.0 }]\n";
+    std::fs::write(folder.path().join("study.toml"), format!("{study}{limited}")).unwrap();
     let ran = run(folder.path(), &[]);
     assert_eq!(ran.status, 2, "{}", ran.stderr);
     assert!(ran.stderr.contains("torque limit") && ran.stderr.contains("are unknown"), "{}", ran.stderr);
