@@ -171,7 +171,8 @@ fn torque_limits_need_inertial_parameters() {
     let ran = run(folder.path(), &[]);
     assert_eq!(ran.status, 2, "{}", ran.stderr);
     assert!(ran.stderr.contains("`shoulder` has no limit of speed"), "{}", ran.stderr);
-    let limited = "[design.limits]\njoints = [{ joint = \"shoulder\", torque = 30.0 }, { joint = \"elbow\", torque = 9.0 }]\n";
+    let limited =
+        "[design.limits]\njoints = [{ joint = \"shoulder\", torque = 30.0 }, { joint = \"elbow\", torque = 9.0 }]\n";
     std::fs::write(folder.path().join("study.toml"), format!("{study}{limited}")).unwrap();
     let ran = run(folder.path(), &[]);
     assert_eq!(ran.status, 2, "{}", ran.stderr);
