@@ -38,7 +38,7 @@ fn help_tells_the_path_and_needs_no_arguments() {
         assert!(ran.stdout.contains(step), "{}", ran.stdout);
     }
     assert!(run_in(&broken(), &["--version"]).stdout.starts_with("dynident "));
-    for name in ["inspect", "evaluate", "identify", "validate"] {
+    for name in ["inspect", "evaluate", "design", "identify", "validate"] {
         assert_eq!(run_in(&broken(), &[name, "--help"]).status, 0);
     }
 }

@@ -26,6 +26,9 @@ const DIAGNOSIS_RATE_HZ: f64 = 1000.0;
 const DIRECTIONS: usize = 3;
 const TERMS: usize = 6;
 
+/// A prior value below this share of the largest is zero.
+const NEGLIGIBLE: f64 = 1e-9;
+
 /// A finished design.
 #[derive(Debug)]
 pub struct DesignOutcome {
@@ -257,11 +260,13 @@ fn forecast(machine: &Machine, information: &DMatrix<f64>) -> (Vec<ParameterFore
         }
         Some(variance.sqrt() * scale[index]).filter(|std| std.is_finite() && *std > 0.0)
     };
+    // A prior that is zero but for the rounding of the description's angles has no relative error.
+    let largest = machine.prior.iter().flatten().fold(0.0_f64, |largest, prior| largest.max(prior.abs()));
     let expressions = machine.base.expressions();
     let parameters = expressions.into_iter().enumerate().map(|(index, expression)| {
         let (std, prior) = (std(index), machine.prior.as_ref().map(|prior| prior[index]));
-        let relative =
-            std.zip(prior).map(|(std, prior)| 100.0 * std / prior.abs()).filter(|percent| percent.is_finite());
+        let size = prior.map(f64::abs).filter(|size| *size > NEGLIGIBLE * largest);
+        let relative = std.zip(size).map(|(std, size)| 100.0 * std / size);
         let (symbol, unit) = (columns[index].symbol(), columns[index].unit());
         ParameterForecast { symbol, expression, unit, std, relative_std_percent: relative, prior }
     });

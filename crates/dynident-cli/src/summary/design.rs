@@ -66,6 +66,10 @@ fn limits(d: &DesignFile) -> String {
 fn forecast(d: &DesignFile) -> String {
     let dark: Vec<&str> = d.forecast.iter().filter(|p| p.std.is_none()).map(|p| p.symbol.as_str()).collect();
     let mut known: Vec<_> = d.forecast.iter().filter(|p| p.std.is_some()).collect();
+    // Where priors are known, those that are zero have no place in a ranking by relative error.
+    if known.iter().any(|p| p.relative_std_percent.is_some()) {
+        known.retain(|p| p.relative_std_percent.is_some());
+    }
     known.sort_by(|a, b| {
         let key = |p: &dynident::ParameterForecast| p.relative_std_percent.unwrap_or(f64::INFINITY);
         key(a).total_cmp(&key(b))

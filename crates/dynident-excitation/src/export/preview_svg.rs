@@ -132,7 +132,7 @@ fn plot(text: &mut String, [left, top]: [f64; 2], times: &[f64], values: &[f64],
         );
     }
     if !beyond.is_empty() {
-        let (x, y) = (left + width - 3.0, top + height - 4.0);
+        let (x, y) = (left + width, top - 4.0);
         let _ = writeln!(
             text,
             "<text x=\"{x}\" y=\"{y}\" text-anchor=\"end\" fill=\"#c22\">limits beyond: {}</text>",
