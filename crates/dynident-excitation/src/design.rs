@@ -152,27 +152,32 @@ pub fn design(
             })
             .collect();
     }
-    // The polish on a finer grid, again with tighter limits while something is broken between its samples.
+    // The polish on a finer grid, again with tighter limits while something is broken between its samples. What is kept is the best trajectory whose limits were found kept everywhere, the
+    // search's own best included; only if there is none, the least broken one.
     let criterion = task.criteria[task.criteria.len() - 1];
     let fine = grid(task.family.duration_s(), 2 * coarse.len() - 1);
-    for attempt in 0..6 {
-        let Some((parameters, ..)) = &best else { break };
-        let start = vec![parameters.clone()];
-        let evaluations_left = if late() { 60 } else { settings.polish_evaluations };
-        let found =
-            run(task, &margins, criterion, &fine, logged.len(), &start, &descent(evaluations_left), |progress| {
-                watch(&DesignProgress {
-                    round: "polish",
-                    value: progress.0,
-                    violation: progress.1,
-                    evaluations: evaluations.load(Ordering::Relaxed),
-                })
-                .is_break()
-            })?;
+    let (mut parameters, ..) = best.ok_or(OptimiserError::Start)?;
+    let (mut kept, _) = assess(task, criterion, parameters.clone(), &fine, &logged);
+    for _ in 0..POLISHES {
+        let start = [parameters];
+        let budget = descent(if late() { LAST_EVALUATIONS } else { settings.polish_evaluations });
+        let found = run(task, &margins, criterion, &fine, logged.len(), &start, &budget, |progress| {
+            watch(&DesignProgress {
+                round: "polish",
+                value: progress.0,
+                violation: progress.1,
+                evaluations: evaluations.load(Ordering::Relaxed),
+            })
+            .is_break()
+        })?;
         evaluations.fetch_add(found.evaluations as u64, Ordering::Relaxed);
-        best = Some((found.parameters, found.value, found.violation));
-        let worst = extremes(task, best.as_ref().map_or(&[][..], |(parameters, ..)| parameters), &fine);
-        if worst.iter().all(|c| *c <= 0.0) || attempt == 5 {
+        parameters = found.parameters;
+        let (polished, worst) = assess(task, criterion, parameters.clone(), &fine, &logged);
+        let whole = polished.violation <= 0.0;
+        if polished.better_than(&kept) {
+            kept = polished;
+        }
+        if whole {
             break;
         }
         for (margin, c) in margins.iter_mut().zip(&worst) {
@@ -180,20 +185,56 @@ pub fn design(
             *margin += if *c > 0.0 { 2.0 * c + 1e-6 } else { 0.0 };
         }
     }
-    let (parameters, ..) = best.ok_or(OptimiserError::Start)?;
-    let mut motion = Motion::default();
-    task.family.motion(&parameters, &logged, &mut motion);
-    let information =
-        Information::new(task.limits.model(), task.layout, task.torque_std_nm, task.prior).of(&motion, 1.0);
-    let violation = extremes(task, &parameters, &fine).into_iter().fold(f64::NEG_INFINITY, f64::max);
     Ok(Designed {
-        figure: criterion.figure(&information),
-        information,
-        violation,
-        parameters,
+        figure: kept.figure,
+        information: kept.information,
+        violation: kept.violation,
+        parameters: kept.parameters,
         evaluations: evaluations.load(Ordering::Relaxed) as usize,
         seconds: begun.elapsed().as_secs_f64(),
     })
+}
+
+/// Polishes at most.
+const POLISHES: usize = 6;
+
+/// Evaluations of a polish once the time is up: enough to come back inside the limits.
+const LAST_EVALUATIONS: usize = 60;
+
+/// A trajectory judged as it will be used: every logged sample, every limit between samples.
+struct Assessed {
+    parameters: Vec<f64>,
+    figure: Option<f64>,
+    information: DMatrix<f64>,
+    violation: f64,
+}
+
+impl Assessed {
+    fn better_than(&self, other: &Self) -> bool {
+        match (self.violation <= 0.0, other.violation <= 0.0) {
+            (true, true) => self.figure.unwrap_or(f64::INFINITY) < other.figure.unwrap_or(f64::INFINITY),
+            (true, false) => true,
+            (false, true) => false,
+            (false, false) => self.violation < other.violation,
+        }
+    }
+}
+
+/// Judges a trajectory; also gives the largest value of every limit's row.
+fn assess(
+    task: &DesignTask<'_>,
+    criterion: &dyn Criterion,
+    parameters: Vec<f64>,
+    fine: &[f64],
+    logged: &[f64],
+) -> (Assessed, Vec<f64>) {
+    let mut motion = Motion::default();
+    task.family.motion(&parameters, logged, &mut motion);
+    let information =
+        Information::new(task.limits.model(), task.layout, task.torque_std_nm, task.prior).of(&motion, 1.0);
+    let worst = extremes(task, &parameters, fine);
+    let violation = worst.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    (Assessed { figure: criterion.figure(&information), parameters, information, violation }, worst)
 }
 
 /// `count` equal steps from 0 to the duration, both ends included.

@@ -12,8 +12,8 @@ use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_excitation::check::{CHECK_RATE_HZ, LimitReport, VIOLATION, check_limits};
 use dynident_excitation::criteria::{ConditionNumber, Criterion, DOptimal};
 use dynident_excitation::limits::{LimitSet, Limits, diagnose};
-use dynident_excitation::{DesignProgress, DesignTask, Family, Information, Motion, design, grid};
-use nalgebra::{DMatrix, SymmetricEigen};
+use dynident_excitation::{DesignProgress, DesignTask, Family, Information, Motion, design, forecast, grid};
+use nalgebra::DMatrix;
 use std::path::Path;
 
 /// The displacement, rad or m, that every joint must at least have the time for.
@@ -126,7 +126,7 @@ pub fn design_study(
     let weighted = Information::new(model, &machine.layout, &torque_std_nm, None).of(&motion, 1.0);
     let log_det = |information: &DMatrix<f64>| DOptimal.figure(information).map(|figure| -figure);
     let condition = |scaled| ConditionNumber { scaled, ..ConditionNumber::default() }.figure(&plain);
-    let (forecast, worst_directions) = forecast(&machine, &weighted);
+    let (forecast, worst_directions) = named_forecast(&machine, &weighted);
     let file = DesignFile {
         schema: DESIGN_SCHEMA,
         name: study_name(&study, study_path),
@@ -238,46 +238,26 @@ fn sentences(
     broken.collect()
 }
 
-/// `√diag D⁻¹`, and the directions of the column-scaled information that are known worst.
-fn forecast(machine: &Machine, information: &DMatrix<f64>) -> (Vec<ParameterForecast>, Vec<DirectionForecast>) {
+/// The forecast with the parameters' names, and with their sizes by the prior.
+fn named_forecast(machine: &Machine, information: &DMatrix<f64>) -> (Vec<ParameterForecast>, Vec<DirectionForecast>) {
     let columns = machine.layout.columns();
-    let count = columns.len();
-    let scale: Vec<f64> =
-        information.diagonal().iter().map(|d| if *d > 0.0 { d.sqrt().recip() } else { 0.0 }).collect();
-    let scaled = DMatrix::from_fn(count, count, |i, j| scale[i] * information[(i, j)] * scale[j]);
-    let eigen = SymmetricEigen::new(scaled);
-    // Below this, rounding of the sum over all samples; such a direction is not excited at all.
-    let least = f64::EPSILON * count as f64 * eigen.eigenvalues.max();
-    let std = |index: usize| -> Option<f64> {
-        let mut variance = 0.0;
-        for (direction, &value) in eigen.eigenvalues.iter().enumerate() {
-            let share = eigen.eigenvectors[(index, direction)].powi(2);
-            if value > least {
-                variance += share / value;
-            } else if share > f64::EPSILON.sqrt() {
-                return None;
-            }
-        }
-        Some(variance.sqrt() * scale[index]).filter(|std| std.is_finite() && *std > 0.0)
-    };
+    let forecast = forecast(information, DIRECTIONS);
     // A prior that is zero but for the rounding of the description's angles has no relative error.
     let largest = machine.prior.iter().flatten().fold(0.0_f64, |largest, prior| largest.max(prior.abs()));
     let expressions = machine.base.expressions();
     let parameters = expressions.into_iter().enumerate().map(|(index, expression)| {
-        let (std, prior) = (std(index), machine.prior.as_ref().map(|prior| prior[index]));
+        let (std, prior) = (forecast.std[index], machine.prior.as_ref().map(|prior| prior[index]));
         let size = prior.map(f64::abs).filter(|size| *size > NEGLIGIBLE * largest);
         let relative = std.zip(size).map(|(std, size)| 100.0 * std / size);
         let (symbol, unit) = (columns[index].symbol(), columns[index].unit());
         ParameterForecast { symbol, expression, unit, std, relative_std_percent: relative, prior }
     });
-    let mut order: Vec<usize> = (0..count).collect();
-    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
-    let directions = order.into_iter().take(DIRECTIONS).map(|direction| {
+    let directions = forecast.worst.iter().map(|direction| {
         let mut terms: Vec<(String, f64)> =
-            (0..count).map(|index| (columns[index].symbol(), eigen.eigenvectors[(index, direction)])).collect();
+            columns.iter().zip(&direction.shares).map(|(column, share)| (column.symbol(), *share)).collect();
         terms.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
         terms.truncate(TERMS);
-        DirectionForecast { inflation: eigen.eigenvalues[direction].max(least).sqrt().recip(), terms }
+        DirectionForecast { inflation: direction.inflation, terms }
     });
     (parameters.collect(), directions.collect())
 }
