@@ -17,7 +17,7 @@ use dynident_model::{Mat3, Model, Transform, Vec3};
 /// Allocation-free.
 ///
 /// # Panics
-/// If a vector's length is not the number of joints, or the workspace was made for another size.
+/// If a vector's length is not the number of joints, or the workspace was made for another tree.
 pub fn torque_regressor<'w>(
     model: &Model,
     workspace: &'w mut Workspace,
@@ -26,6 +26,7 @@ pub fn torque_regressor<'w>(
     ddq: &[f64],
 ) -> &'w [f64] {
     workspace.check(model, &[q, dq, ddq]);
+    workspace.check_tree(model);
     let Workspace { level, scratch, regressor, .. } = workspace;
     dispatch_single(*level, Single { model, scratch, q, dq, ddq, out: regressor });
     regressor

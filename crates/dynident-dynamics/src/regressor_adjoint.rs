@@ -29,7 +29,7 @@ pub struct MotionGradient<'a> {
 /// Allocation-free.
 ///
 /// # Panics
-/// If an array's length is not joints × samples, the panels have another shape, or layout or workspace belong to a model of another size.
+/// If an array's length is not joints × samples, the panels have another shape, or layout or workspace belong to a model with another tree.
 pub fn regressor_panels_pull_back(
     model: &Model,
     workspace: &mut BatchWorkspace,
@@ -40,7 +40,8 @@ pub fn regressor_panels_pull_back(
 ) {
     let MotionGradient { by_q, by_dq, by_ddq } = gradient;
     workspace.check(model, motion.samples, &[motion.q, motion.dq, motion.ddq, by_q, by_dq, by_ddq]);
-    assert_eq!(layout.dof(), model.dof(), "the panel layout was made for a model with another number of joints");
+    workspace.check_tree(model);
+    layout.check_tree(model);
     assert_eq!(cotangent.samples(), motion.samples, "one row of derivatives per sample");
     let BatchWorkspace { level, scratch, .. } = workspace;
     dispatch(*level, PullBack { model, scratch, layout, motion, cotangent, by_q, by_dq, by_ddq });

@@ -4,7 +4,7 @@
 //! after one another, each with one value per sample. The whole regressor is never stored.
 
 use crate::regressor::{BlockSink, Work, regressor_blocks};
-use crate::workspace::{AnyScratch, BatchWorkspace, put_lanes, take_lanes};
+use crate::workspace::{AnyScratch, BatchWorkspace, put_lanes, same_tree, take_lanes, tree};
 use dynident_lanes::{AlignedBuffer, Kernel, Lane, dispatch};
 use dynident_model::laws::{JointMotion, Law};
 use dynident_model::{INERTIAL_NAMES, Model};
@@ -60,6 +60,8 @@ pub struct PanelLayout {
     places: Vec<usize>,
     /// Where each body's places start.
     place_start: Vec<usize>,
+    /// Parents of the bodies it was made for.
+    tree: Vec<Option<usize>>,
 }
 
 #[derive(Clone, Debug)]
@@ -110,7 +112,7 @@ impl PanelLayout {
                 }
             }
         }
-        Self { columns, joints, parameters, places, place_start }
+        Self { columns, joints, parameters, places, place_start, tree: tree(model) }
     }
 
     /// All columns, in global order.
@@ -126,6 +128,10 @@ impl PanelLayout {
     /// Number of joints.
     pub fn dof(&self) -> usize {
         self.joints.len()
+    }
+
+    pub(crate) fn check_tree(&self, model: &Model) {
+        assert!(same_tree(&self.tree, model), "the panel layout was made for a model with another tree");
     }
 
     /// Which of the ten parameters of `body` have columns, as bits, and where these begin in the panel of the `k`-th joint on the way to it; they follow one another.
@@ -181,7 +187,7 @@ impl Panels {
 /// Allocation-free once `panels` has grown to the block's size.
 ///
 /// # Panics
-/// If an array's length is not joints × samples, or layout or workspace belong to a model of another size.
+/// If an array's length is not joints × samples, or layout or workspace belong to a model with another tree.
 pub fn regressor_panels(
     model: &Model,
     workspace: &mut BatchWorkspace,
@@ -190,7 +196,8 @@ pub fn regressor_panels(
     panels: &mut Panels,
 ) {
     workspace.check(model, motion.samples, &[motion.q, motion.dq, motion.ddq]);
-    assert_eq!(layout.dof(), model.dof(), "the panel layout was made for a model with another number of joints");
+    workspace.check_tree(model);
+    layout.check_tree(model);
     panels.resize(layout, motion.samples);
     let BatchWorkspace { level, scratch, .. } = workspace;
     dispatch(*level, Fill { model, scratch, layout, motion, panels });

@@ -111,6 +111,8 @@ impl Kernel for MakeScratch<'_> {
 pub struct Workspace {
     pub(crate) level: Level,
     pub(crate) dof: usize,
+    /// Parents of the bodies it was made for: the regressor's scratch follows the tree.
+    tree: Vec<Option<usize>>,
     pub(crate) scratch: AnyScratch,
     pub(crate) vector: Vec<f64>,
     pub(crate) matrices: [Vec<f64>; 3],
@@ -119,7 +121,7 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// A workspace for models of this model's size, at the best level of this processor.
+    /// A workspace for models of this model's size (for the torque regressor: of its tree), at the best level of this processor.
     pub fn new(model: &Model) -> Self {
         Self::with_level(model, Level::detect())
     }
@@ -130,6 +132,7 @@ impl Workspace {
         Self {
             level,
             dof,
+            tree: tree(model),
             scratch: dispatch_single(level, MakeScratch(model)),
             vector: vec![0.0; dof],
             matrices: core::array::from_fn(|_| vec![0.0; dof * dof]),
@@ -141,6 +144,11 @@ impl Workspace {
     /// The processor level in use.
     pub fn level(&self) -> Level {
         self.level
+    }
+
+    /// For algorithms whose scratch follows the tree.
+    pub(crate) fn check_tree(&self, model: &Model) {
+        assert!(same_tree(&self.tree, model), "the workspace was made for a model with another tree");
     }
 
     pub(crate) fn check(&self, model: &Model, vectors: &[&[f64]]) {
@@ -161,18 +169,24 @@ impl core::fmt::Debug for Workspace {
 pub struct BatchWorkspace {
     pub(crate) level: Level,
     pub(crate) dof: usize,
+    tree: Vec<Option<usize>>,
     pub(crate) scratch: AnyScratch,
 }
 
 impl BatchWorkspace {
-    /// A workspace for models of this model's size, at the best level of this processor.
+    /// A workspace for models of this model's size (for the torque regressor: of its tree), at the best level of this processor.
     pub fn new(model: &Model) -> Self {
         Self::with_level(model, Level::detect())
     }
 
     /// A workspace at a chosen processor level.
     pub fn with_level(model: &Model, level: Level) -> Self {
-        Self { level, dof: model.dof(), scratch: dispatch(level, MakeScratch(model)) }
+        Self { level, dof: model.dof(), tree: tree(model), scratch: dispatch(level, MakeScratch(model)) }
+    }
+
+    /// For algorithms whose scratch follows the tree.
+    pub(crate) fn check_tree(&self, model: &Model) {
+        assert!(same_tree(&self.tree, model), "the workspace was made for a model with another tree");
     }
 
     pub(crate) fn check(&self, model: &Model, samples: usize, arrays: &[&[f64]]) {
@@ -187,6 +201,16 @@ impl core::fmt::Debug for BatchWorkspace {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("BatchWorkspace").field("dof", &self.dof).field("level", &self.level).finish_non_exhaustive()
     }
+}
+
+/// Which body hangs on which.
+pub(crate) fn tree(model: &Model) -> Vec<Option<usize>> {
+    model.maps().iter().map(|map| map.parent).collect()
+}
+
+/// Whether a model's bodies hang on each other as in `tree`.
+pub(crate) fn same_tree(tree: &[Option<usize>], model: &Model) -> bool {
+    model.maps().iter().map(|map| map.parent).eq(tree.iter().copied())
 }
 
 /// Takes one joint vector into scratch scalars.

@@ -278,3 +278,15 @@ fn locked_joints_change_nothing_but_the_number_of_joints() {
         assert_close(inverse_dynamics(&locked, &mut ws, &q, &dq, &ddq), &expected, ROUNDING, "locked");
     }
 }
+
+#[test]
+#[should_panic(expected = "another tree")]
+fn a_workspace_of_another_tree_is_refused_not_misread() {
+    // Same number of joints, other branches: the regressor's scratch would follow the wrong paths.
+    let (model, other) = (random_tree(2, 6), random_tree(5, 6));
+    let parents = |model: &Model| model.joints().iter().map(|joint| joint.parent).collect::<Vec<_>>();
+    assert_ne!(parents(&model), parents(&other), "choose seeds with different trees");
+    let mut workspace = Workspace::new(&model);
+    let zeros = [0.0; 6];
+    let _ = torque_regressor(&other, &mut workspace, &zeros, &zeros, &zeros);
+}

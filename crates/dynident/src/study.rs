@@ -246,7 +246,7 @@ pub enum EstimatorMethod {
 pub struct EstimatorSection {
     /// The method; weighted by default.
     pub method: EstimatorMethod,
-    /// The covariance that error bars come from; `"segments"`, which accounts for coloured residuals, by default.
+    /// The covariance that error bars come from; `"jackknife"`, which accounts for coloured residuals and judges each time segment by the fit without it, by default.
     pub covariance: CovarianceMethod,
     /// When a column counts as excited.
     pub rank: RankSettings,
