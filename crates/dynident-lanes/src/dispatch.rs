@@ -4,6 +4,7 @@ use crate::lanes::{Lane, Wide};
 use crate::portable::Portable;
 #[cfg(target_arch = "x86_64")]
 use crate::x86::{Avx2, Avx512, HasAvx2, HasAvx512, enter_avx2, enter_avx512};
+use std::sync::OnceLock;
 
 /// Work that can run over any lane type. Implementations mark `run`, and everything it calls in its hot path,
 /// `#[inline(always)]`, so that the whole body is compiled once for each processor level.
@@ -30,9 +31,16 @@ enum Instructions {
 pub struct Level(Instructions);
 
 impl Level {
-    /// The best level of this processor.
+    /// The best level of this processor; a lower one if the environment variable `DYNIDENT_INSTRUCTIONS` (`portable`, `avx2` or `avx512`) says so, for tests and comparisons. Any
+    /// other value of the variable counts as none.
     pub fn detect() -> Self {
-        Self::available().last().copied().unwrap_or_else(Self::portable)
+        static CHOSEN: OnceLock<Level> = OnceLock::new();
+        *CHOSEN.get_or_init(|| {
+            let named = std::env::var("DYNIDENT_INSTRUCTIONS").ok();
+            let most = named.and_then(|name| ["portable", "avx2", "avx512"].iter().position(|known| *known == name));
+            let levels = Self::available();
+            levels[most.unwrap_or(levels.len()).min(levels.len() - 1)]
+        })
     }
 
     /// The level that every processor of the build target has. On 64-bit ARM that includes NEON and the fused multiply-add.

@@ -177,7 +177,7 @@ fn place<T: Lane, const J: usize>(
 pub(crate) fn store_some<T: Lane>(value: T, array: &mut [f64], at: usize, count: usize) {
     if count == T::LANES {
         value.store(&mut array[at..at + T::LANES]);
-    } else {
+    } else if count > 0 {
         let mut values = [0.0; BLOCK];
         value.store(&mut values);
         array[at..at + count].copy_from_slice(&values[..count]);
