@@ -4,17 +4,22 @@
 //! (random starts on a coarse grid, restarts around the best, a polish on the fine grid), each within an evaluation budget, so that the result depends on the seed alone; a deadline only
 //! ends it early, with the best feasible trajectory so far.
 
+mod metric;
+mod problem;
+mod rounds;
+
 use crate::criteria::Criterion;
 use crate::family::Family;
 use crate::information::Information;
-use crate::limits::{LimitSet, LimitWorkspace, PeakSettings, peaks};
+use crate::limits::{LimitSet, PeakSettings, peaks};
 use crate::motion::Motion;
-use crate::optimisers::{AugmentedLagrangianSettings, ConstrainedProblem, OptimiserError, multi_start};
+use crate::optimisers::{AugmentedLagrangianState, OptimiserError};
 use core::ops::ControlFlow;
 use core::sync::atomic::{AtomicU64, Ordering};
 use dynident_dynamics::PanelLayout;
 use dynident_model::sample::Random;
 use nalgebra::DMatrix;
+use rounds::{Candidate, Rounds};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -22,16 +27,16 @@ use std::time::Instant;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DesignSettings {
-    /// Random starts of the first round. Default 12.
+    /// Random starts of the first round. Default 8.
     pub starts: usize,
-    /// Rounds of restarts around the best. Default 4.
+    /// Rounds of restarts around the best, of half as many starts. Default 1.
     pub rounds: usize,
-    /// Evaluations of one start at most. Default 150.
+    /// Evaluations of one start at most. Default 1,000.
     pub evaluations_per_start: usize,
     /// Evaluations of one polish at most (up to six, while something is broken between samples). Default 1,000.
     pub polish_evaluations: usize,
-    /// Samples of the search grid; give more to families that move faster than ten harmonics. Default 96.
-    pub search_samples: usize,
+    /// Samples of the search grid. Default 96, and at least five per free number of a joint, for families that move fast.
+    pub search_samples: Option<usize>,
     /// Rate at which the robot will be logged, Hz: every sample counts for the information. Default 100.
     pub rate_hz: f64,
     /// Stop after so many seconds with the best so far; none by default. The result then depends on the machine.
@@ -43,15 +48,24 @@ pub struct DesignSettings {
 impl Default for DesignSettings {
     fn default() -> Self {
         Self {
-            starts: 12,
-            rounds: 4,
-            evaluations_per_start: 150,
+            starts: 8,
+            rounds: 1,
+            evaluations_per_start: 1_000,
             polish_evaluations: 1_000,
-            search_samples: 96,
+            search_samples: None,
             rate_hz: 100.0,
             time_limit_s: None,
             seed: 1,
         }
+    }
+}
+
+impl DesignSettings {
+    /// Samples of the search grid.
+    fn search_grid(&self, family: &dyn Family) -> usize {
+        let each = family.parameters() / family.joints().max(1);
+        // Whole registers.
+        self.search_samples.unwrap_or_else(|| 96.max((5 * each).next_multiple_of(16))).max(8)
     }
 }
 
@@ -114,75 +128,73 @@ pub fn design(
     let begun = Instant::now();
     let late = || settings.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > limit);
     let evaluations = AtomicU64::new(0);
-    let coarse = grid(task.family.duration_s(), settings.search_samples.max(8));
     let logged = grid(task.family.duration_s(), (task.family.duration_s() * settings.rate_hz).round() as usize + 1);
+    let coarse = grid(task.family.duration_s(), settings.search_grid(task.family));
+    let rounds = Rounds { task, times: &coarse, logged: logged.len() };
+    let watch = |round: &'static str| {
+        let (watch, evaluations) = (&watch, &evaluations);
+        move |value: f64, violation: f64| {
+            let evaluations = evaluations.load(Ordering::Relaxed);
+            watch(&DesignProgress { round, value, violation, evaluations }).is_break()
+        }
+    };
     let mut random = Random::new(settings.seed);
     let (ranges, speeds) = ranges(task.limits);
-    let mut starts: Vec<Vec<f64>> =
-        (0..settings.starts.max(1)).map(|_| task.family.random(&ranges, &speeds, &mut random)).collect();
+    let random_start = |random: &mut Random| task.family.random(&ranges, &speeds, random).into();
+    let mut starts: Vec<AugmentedLagrangianState> =
+        (0..settings.starts.max(1)).map(|_| random_start(&mut random)).collect();
     let mut margins = vec![0.0; task.limits.constraints().len()];
-    let mut best: Option<(Vec<f64>, f64, f64)> = None;
-    let rounds = settings.rounds + 1;
-    for round in 0..rounds {
+    let mut best: Option<Candidate> = None;
+    for round in 0..=settings.rounds {
         let criterion = task.criteria[round.min(task.criteria.len() - 1)];
-        let descent = descent(settings.evaluations_per_start);
-        let found = run(task, &margins, criterion, &coarse, logged.len(), &starts, &descent, |progress| {
-            watch(&DesignProgress {
-                round: if round == 0 { "search" } else { "restart" },
-                value: progress.0,
-                violation: progress.1,
-                evaluations: evaluations.load(Ordering::Relaxed),
-            })
-            .is_break()
-                || late()
-        })?;
+        let name = if round == 0 { "search" } else { "restart" };
+        let watch = watch(name);
+        let stop = |value, violation| watch(value, violation) || late();
+        let found = rounds.run(criterion, &margins, &starts, settings.evaluations_per_start, stop)?;
         evaluations.fetch_add(found.evaluations as u64, Ordering::Relaxed);
-        keep_better(&mut best, found);
+        if best.as_ref().is_none_or(|best| found.best.score < best.score) || round < task.criteria.len() {
+            best = Some(found.best);
+        }
         if late() {
             break;
         }
-        let Some((parameters, ..)) = &best else { continue };
+        let Some(best) = &best else { continue };
         // Around the best, by noise that shrinks: most of a family's good basins lie near each other.
-        let size = [0.3, 0.15, 0.08, 0.04][round.min(3)];
-        let scales = joint_scales(parameters, task.family.joints());
-        starts = (0..settings.starts.max(4) / 2)
-            .map(|k| {
-                let spread = if k == 0 { 0.0 } else { size };
-                parameters.iter().zip(&scales).map(|(p, scale)| p + spread * scale * random.normal()).collect()
-            })
-            .collect();
+        let size = RESTART_NOISE[round % RESTART_NOISE.len()];
+        let scales = joint_scales(&best.state.x, task.family.joints());
+        let moved = |_| {
+            let noise = best.state.x.iter().zip(&scales).map(|(p, scale)| p + size * scale * random.normal());
+            noise.collect::<Vec<f64>>().into()
+        };
+        starts = core::iter::once(best.state.clone()).chain((0..(settings.starts / 2).max(2)).map(moved)).collect();
     }
     // The polish on a finer grid, again with tighter limits while something is broken between its samples. What is kept is the best trajectory whose limits were found kept everywhere, the
     // search's own best included; only if there is none, the least broken one.
     let criterion = task.criteria[task.criteria.len() - 1];
     let fine = grid(task.family.duration_s(), 2 * coarse.len() - 1);
-    let (mut parameters, ..) = best.ok_or(OptimiserError::Start)?;
-    let (mut kept, _) = assess(task, criterion, parameters.clone(), &fine, &logged);
+    let rounds = Rounds { task, times: &fine, logged: logged.len() };
+    let mut state = best.ok_or(OptimiserError::Start)?.state.on_twice_the_samples(coarse.len());
+    let (mut kept, _) = assess(task, criterion, state.x.clone(), &fine, &logged);
     for _ in 0..POLISHES {
-        let start = [parameters];
-        let budget = descent(if late() { LAST_EVALUATIONS } else { settings.polish_evaluations });
-        let found = run(task, &margins, criterion, &fine, logged.len(), &start, &budget, |progress| {
-            watch(&DesignProgress {
-                round: "polish",
-                value: progress.0,
-                violation: progress.1,
-                evaluations: evaluations.load(Ordering::Relaxed),
-            })
-            .is_break()
-        })?;
+        let budget = if late() { LAST_EVALUATIONS } else { settings.polish_evaluations };
+        let found = rounds.polish(criterion, &margins, state, budget, watch("polish"))?;
         evaluations.fetch_add(found.evaluations as u64, Ordering::Relaxed);
-        parameters = found.parameters;
-        let (polished, worst) = assess(task, criterion, parameters.clone(), &fine, &logged);
-        let whole = polished.violation <= 0.0;
-        if polished.better_than(&kept) {
-            kept = polished;
+        state = found.best.state;
+        // The last iterate, and the best that kept the limits on the samples.
+        let (ended, worst) = assess(task, criterion, state.x.clone(), &fine, &logged);
+        let (polished, _) = assess(task, criterion, found.best.feasible, &fine, &logged);
+        let whole = ended.violation <= 0.0;
+        for candidate in [ended, polished] {
+            if candidate.better_than(&kept) {
+                kept = candidate;
+            }
         }
         if whole {
             break;
         }
         for (margin, c) in margins.iter_mut().zip(&worst) {
-            // Twice what is broken, and a hair for the optimiser's own tolerance.
-            *margin += if *c > 0.0 { 2.0 * c + 1e-6 } else { 0.0 };
+            // A little more than what is broken, and a hair for the optimiser's own tolerance.
+            *margin += if *c > 0.0 { 1.2 * c + 1e-6 } else { 0.0 };
         }
     }
     Ok(Designed {
@@ -195,11 +207,14 @@ pub fn design(
     })
 }
 
+/// Noise of the restarts, as shares of each joint's root mean square, round after round.
+const RESTART_NOISE: [f64; 3] = [0.3, 0.15, 0.08];
+
 /// Polishes at most.
 const POLISHES: usize = 6;
 
 /// Evaluations of a polish once the time is up: enough to come back inside the limits.
-const LAST_EVALUATIONS: usize = 60;
+const LAST_EVALUATIONS: usize = 300;
 
 /// A trajectory judged as it will be used: every logged sample, every limit between samples.
 struct Assessed {
@@ -242,17 +257,6 @@ pub fn grid(duration_s: f64, count: usize) -> Vec<f64> {
     (0..count).map(|k| duration_s * k as f64 / (count.max(2) - 1) as f64).collect()
 }
 
-fn descent(evaluations: usize) -> AugmentedLagrangianSettings {
-    AugmentedLagrangianSettings {
-        max_evaluations: evaluations,
-        max_inner_iterations: 60,
-        feasibility_tolerance: 1e-7,
-        // Criteria are logarithms of some hundred: their own size must not end a descent early.
-        optimality_tolerance: 1e-8,
-        ..AugmentedLagrangianSettings::default()
-    }
-}
-
 /// For every parameter the root mean square of its joint's, for the size of noise (joint after joint, as families store them).
 fn joint_scales(parameters: &[f64], joints: usize) -> Vec<f64> {
     let per_joint = (parameters.len() / joints.max(1)).max(1);
@@ -272,52 +276,6 @@ fn ranges(limits: &LimitSet) -> (Vec<[f64; 2]>, Vec<f64>) {
     (joints.iter().map(range).collect(), joints.iter().map(|joint| joint.limits.velocity.unwrap_or(2.0)).collect())
 }
 
-struct Found {
-    parameters: Vec<f64>,
-    value: f64,
-    violation: f64,
-    evaluations: usize,
-}
-
-fn keep_better(best: &mut Option<(Vec<f64>, f64, f64)>, found: Found) {
-    const FEASIBLE: f64 = 1e-6;
-    let better =
-        best.as_ref().is_none_or(|(_, value, violation)| match (found.violation <= FEASIBLE, *violation <= FEASIBLE) {
-            (true, true) => found.value < *value,
-            (true, false) => true,
-            (false, true) => false,
-            (false, false) => found.violation < *violation,
-        });
-    if better {
-        *best = Some((found.parameters, found.value, found.violation));
-    }
-}
-
-#[allow(clippy::too_many_arguments, reason = "one round with all that it needs")]
-fn run(
-    task: &DesignTask<'_>,
-    margins: &[f64],
-    criterion: &dyn Criterion,
-    times: &[f64],
-    logged: usize,
-    starts: &[Vec<f64>],
-    settings: &AugmentedLagrangianSettings,
-    stop: impl Fn((f64, f64)) -> bool + Sync,
-) -> Result<Found, OptimiserError> {
-    let weight = logged as f64 / times.len() as f64;
-    let result = multi_start(
-        || Problem::new(task, margins, criterion, times, weight),
-        starts,
-        settings,
-        |progress| {
-            if stop((progress.value, progress.violation)) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        },
-    )?;
-    let evaluations = result.evaluations();
-    let best = result.best().ok_or(OptimiserError::Start)?;
-    Ok(Found { parameters: best.best.clone(), value: best.value, violation: best.violation, evaluations })
-}
-
 /// The largest value of every limit's row, refined between samples.
 fn extremes(task: &DesignTask<'_>, parameters: &[f64], times: &[f64]) -> Vec<f64> {
     let mut workspace = task.limits.workspace();
@@ -325,93 +283,4 @@ fn extremes(task: &DesignTask<'_>, parameters: &[f64], times: &[f64]) -> Vec<f64
         task.family.motion(parameters, times, out);
     });
     found.iter().map(|peak| peak.value).collect()
-}
-
-/// Criterion and limits of one trajectory as functions of the family's parameters.
-struct Problem<'a> {
-    task: &'a DesignTask<'a>,
-    /// Added to every value of each row, so that what is kept on samples is kept between them.
-    margins: &'a [f64],
-    criterion: &'a dyn Criterion,
-    times: &'a [f64],
-    weight: f64,
-    information: Information<'a>,
-    workspace: LimitWorkspace,
-    parameters: Vec<f64>,
-    motion: Motion,
-    cotangent: Motion,
-    by_information: Option<DMatrix<f64>>,
-    values: Vec<f64>,
-}
-
-impl<'a> Problem<'a> {
-    fn new(
-        task: &'a DesignTask<'a>,
-        margins: &'a [f64],
-        criterion: &'a dyn Criterion,
-        times: &'a [f64],
-        weight: f64,
-    ) -> Self {
-        Self {
-            information: Information::new(task.limits.model(), task.layout, task.torque_std_nm, task.prior),
-            workspace: task.limits.workspace(),
-            task,
-            margins,
-            criterion,
-            times,
-            weight,
-            parameters: Vec::new(),
-            motion: Motion::default(),
-            cotangent: Motion::default(),
-            by_information: None,
-            values: Vec::new(),
-        }
-    }
-}
-
-impl ConstrainedProblem for Problem<'_> {
-    fn variables(&self) -> usize {
-        self.task.family.parameters()
-    }
-
-    fn bounds(&self) -> Vec<[f64; 2]> {
-        self.task.family.bounds()
-    }
-
-    fn constraints(&self) -> usize {
-        self.task.limits.constraints().len() * self.times.len()
-    }
-
-    fn values(&mut self, x: &[f64], constraints: &mut [f64]) -> f64 {
-        self.parameters = x.to_vec();
-        self.task.family.motion(x, self.times, &mut self.motion);
-        self.task.limits.values(&mut self.workspace, &self.motion, &mut self.values);
-        for ((to, from), margin) in constraints
-            .chunks_exact_mut(self.times.len())
-            .zip(self.values.chunks_exact(self.times.len()))
-            .zip(self.margins)
-        {
-            for (to, from) in to.iter_mut().zip(from) {
-                *to = from + margin;
-            }
-        }
-        let information = self.information.of(&self.motion, self.weight);
-        if let Some((value, derivative)) = self.criterion.value_and_derivative(&information) {
-            self.by_information = Some(derivative);
-            value
-        } else {
-            self.by_information = None;
-            f64::INFINITY
-        }
-    }
-
-    fn gradient(&mut self, weights: &[f64], gradient: &mut [f64]) {
-        gradient.fill(0.0);
-        self.cotangent.reset(self.motion.joints, self.motion.samples);
-        self.task.limits.pull_back(&mut self.workspace, &self.motion, weights, &mut self.cotangent);
-        if let Some(derivative) = &self.by_information {
-            self.information.pull_back(&self.motion, self.weight, derivative, &mut self.cotangent);
-        }
-        self.task.family.pull_back(&self.parameters, self.times, &self.cotangent, gradient);
-    }
 }

@@ -2,6 +2,7 @@
 
 use crate::motion::{Motion, MotionCotangent};
 use dynident_model::sample::Random;
+use nalgebra::DMatrix;
 
 /// A family of trajectories of all joints over one duration, with a vector of free parameters.
 ///
@@ -37,4 +38,27 @@ pub trait Family: core::fmt::Debug + Send + Sync {
     /// # Panics
     /// If lengths differ.
     fn pull_back(&self, parameters: &[f64], times_s: &[f64], cotangent: &MotionCotangent, gradient: &mut [f64]);
+
+    /// Adds `Σ_s Σ_o w_o(s) b_o(s) b_o(s)ᵀ` of one joint to `out` (square, the joint's parameters), where `b_o` are the derivatives of that joint's q, q̇, q̈ and jerk by its parameters
+    /// and `w_o` the numbers of `weights` in the same arrays. Returns false, with nothing added, if the family does not offer it: optimisers then learn the curvature of limits step by step.
+    ///
+    /// Only for families whose joints have parameters of their own, equally many, joint after joint.
+    ///
+    /// # Panics
+    /// If shapes differ.
+    fn curvature(
+        &self,
+        _parameters: &[f64],
+        _times_s: &[f64],
+        _joint: usize,
+        _weights: &MotionCotangent,
+        _out: &mut DMatrix<f64>,
+    ) -> bool {
+        false
+    }
+
+    /// Whether the motion is linear in the parameters, so that [`curvature`](Family::curvature) does not depend on them.
+    fn is_linear(&self) -> bool {
+        false
+    }
 }

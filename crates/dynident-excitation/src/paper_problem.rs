@@ -19,7 +19,9 @@ mod smooth;
 
 pub use smooth::SmoothPaperProblem;
 
-use crate::optimisers::{AugmentedLagrangianSettings, MultiStartResult, OptimiserError, Progress, multi_start};
+use crate::optimisers::{
+    AugmentedLagrangianSettings, AugmentedLagrangianState, MultiStartResult, OptimiserError, Progress, multi_start,
+};
 use condition::Singular3;
 use core::f64::consts::PI;
 use core::ops::ControlFlow;
@@ -307,10 +309,10 @@ impl PaperProblem {
         let mut random = Random::new(seed);
         let bounds = self.bounds();
         let smooth = SmoothPaperProblem::new(self);
-        let points: Vec<Vec<f64>> = (0..starts)
+        let points: Vec<AugmentedLagrangianState> = (0..starts)
             .map(|_| {
                 let x: Vec<f64> = bounds.iter().map(|[lower, upper]| random.uniform(*lower, *upper)).collect();
-                smooth.with_bounds_of_conditions(&x)
+                smooth.with_bounds_of_conditions(&x).into()
             })
             .collect();
         multi_start(|| smooth.clone(), &points, &AugmentedLagrangianSettings::default(), watch)

@@ -23,11 +23,11 @@ fn ur10() -> (Model, Limits) {
 
 fn small() -> DesignSettings {
     DesignSettings {
-        starts: 6,
-        rounds: 1,
-        evaluations_per_start: 80,
-        polish_evaluations: 150,
-        search_samples: 64,
+        starts: 3,
+        rounds: 0,
+        evaluations_per_start: 500,
+        polish_evaluations: 300,
+        search_samples: Some(64),
         ..DesignSettings::default()
     }
 }
@@ -65,9 +65,9 @@ fn a_design_keeps_every_limit_at_ten_kilohertz_and_does_not_depend_on_threads() 
     for report in reports {
         assert!(!report.violated, "{report:?}");
     }
-    // Random postures of this family reach 300 to 380; the note's must is 439 with twenty times the evaluations.
+    // Random postures of this family reach 300 to 380; 439 is what an independent program needs a second for.
     let figure = -DOptimal.figure(&one.information).expect("every parameter is excited");
-    assert!(figure > 410.0, "log det {figure}");
+    assert!(figure > 435.0, "log det {figure}");
 }
 
 #[test]

@@ -132,7 +132,7 @@ impl CriterionChoice {
     /// The criterion in the forms that a search uses one after another: smooth first, sharp last.
     pub(crate) fn criteria(self) -> Vec<Box<dyn Criterion>> {
         let condition = |scaled| -> Vec<Box<dyn Criterion>> {
-            [3.0, 40.0, 80.0].map(|order| -> Box<dyn Criterion> { Box::new(ConditionNumber { order, scaled }) }).into()
+            [40.0, 80.0].map(|order| -> Box<dyn Criterion> { Box::new(ConditionNumber { order, scaled }) }).into()
         };
         match self {
             Self::DOptimal => vec![Box::new(DOptimal)],
@@ -189,7 +189,9 @@ impl DesignSection {
         ] {
             within(key, value as f64, f64::from(least), MAX_COUNT as f64)?;
         }
-        within("search.search_samples", search.search_samples as f64, 8.0, MAX_SAMPLES)?;
+        if let Some(samples) = search.search_samples {
+            within("search.search_samples", samples as f64, 8.0, MAX_SAMPLES)?;
+        }
         if let Some(limit) = search.time_limit_s {
             within("search.time_limit_s", limit, 1e-3, 1e7)?;
         }

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 /// the condition number itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConditionNumber {
-    /// Order of the norm, positive. Optimise with a small one first, then with 40 to 80.
+    /// Order of the norm, positive. 40 to 80 serve well from the start.
     pub order: f64,
     /// Divide each column by its norm first: the condition that does not depend on units.
     pub scaled: bool,

@@ -18,6 +18,10 @@ impl Criterion for DOptimal {
         Some((-log_det, -inverse))
     }
 
+    fn scale(&self, columns: usize) -> f64 {
+        columns as f64
+    }
+
     fn figure(&self, information: &DMatrix<f64>) -> Option<f64> {
         self.value_and_derivative(information).map(|(value, _)| value)
     }

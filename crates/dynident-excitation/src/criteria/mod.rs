@@ -23,6 +23,11 @@ pub trait Criterion: core::fmt::Debug + Send + Sync {
     /// Value and derivative of the smooth form that optimisers use.
     fn value_and_derivative(&self, information: &DMatrix<f64>) -> Valued;
 
+    /// About how much the value changes when a motion of so many columns is made larger by half: what searches measure penalties and steps with.
+    fn scale(&self, _columns: usize) -> f64 {
+        1.0
+    }
+
     /// The figure to report: the criterion itself, without smoothing.
     fn figure(&self, information: &DMatrix<f64>) -> Option<f64>;
 }

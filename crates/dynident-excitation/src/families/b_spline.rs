@@ -197,6 +197,7 @@ mod tests {
             let family = BSpline::new(2, 4.0, &BSplineSettings { control_points, returns }).unwrap();
             check::derivatives(&family, seed);
             check::gradient(&family, seed);
+            check::curvature(&family, seed);
             check::rest(&family, seed);
         }
 

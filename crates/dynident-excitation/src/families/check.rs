@@ -4,6 +4,7 @@ use super::random_start::grid;
 use crate::family::Family;
 use crate::motion::Motion;
 use dynident_model::sample::Random;
+use nalgebra::{DMatrix, DVector};
 
 /// A random start for joints with unequal ranges and speeds.
 pub(crate) fn start(family: &dyn Family, seed: u64) -> Vec<f64> {
@@ -125,6 +126,46 @@ pub(crate) fn gradient_on(family: &dyn Family, parameters: &[f64], times: &[f64]
             family.name(),
             gradient[index] - 1.0
         );
+    }
+}
+
+/// The curvature of random weights against the gradients of every weighted number of the motion, one by one: Σ w (Jᵀe)(Jᵀe)ᵀ.
+pub(crate) fn curvature(family: &dyn Family, seed: u64) {
+    let parameters = start(family, seed);
+    let mut random = Random::new(seed ^ 0x55);
+    let times: Vec<f64> = (0..5).map(|_| random.uniform(0.0, family.duration_s())).collect();
+    let (joints, each) = (family.joints(), family.parameters() / family.joints());
+    let mut weights = Motion::default();
+    weights.reset(joints, times.len());
+    for values in [&mut weights.q, &mut weights.dq, &mut weights.ddq, &mut weights.dddq] {
+        for value in values.iter_mut() {
+            *value = random.uniform(0.0, 1.0);
+        }
+    }
+    for joint in 0..joints {
+        let mut found = DMatrix::zeros(each, each);
+        assert!(family.curvature(&parameters, &times, joint, &weights, &mut found), "{}", family.name());
+        let mut expected = DMatrix::zeros(each, each);
+        for order in 0..4 {
+            for sample in weights.of(joint) {
+                let mut unit = Motion::default();
+                unit.reset(joints, times.len());
+                let (weights, one) = match order {
+                    0 => (&weights.q, &mut unit.q),
+                    1 => (&weights.dq, &mut unit.dq),
+                    2 => (&weights.ddq, &mut unit.ddq),
+                    _ => (&weights.dddq, &mut unit.dddq),
+                };
+                one[sample] = 1.0;
+                let mut gradient = vec![0.0; parameters.len()];
+                family.pull_back(&parameters, &times, &unit, &mut gradient);
+                let row = DVector::from_column_slice(&gradient[joint * each..(joint + 1) * each]);
+                expected.ger(weights[sample], &row, &row, 1.0);
+            }
+        }
+        // Sums of at most 20 squares, in another order.
+        let error = (&found - &expected).amax();
+        assert!(error <= 1e-12 * expected.amax(), "{}: curvature off by {error:e}", family.name());
     }
 }
 

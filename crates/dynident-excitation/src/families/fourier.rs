@@ -222,6 +222,7 @@ mod tests {
             let family = Fourier::new(3, 7.0, &FourierSettings { harmonics, rest, periods }).unwrap();
             check::derivatives(&family, seed);
             check::gradient(&family, seed);
+            check::curvature(&family, seed);
             if rest { check::rest(&family, seed); }
         }
     }

@@ -5,6 +5,7 @@ use super::sampled_basis::{GridCache, SampledBasis};
 use crate::family::Family;
 use crate::motion::{Motion, MotionCotangent};
 use dynident_model::sample::Random;
+use nalgebra::DMatrix;
 
 /// The functions of time B_c(t) of one joint, q(t) = Σ_c p_c B_c(t), of a [`LinearFamily`].
 pub trait Basis: core::fmt::Debug + Send + Sync {
@@ -125,5 +126,29 @@ impl<B: Basis> Family for LinearFamily<B> {
             |times| self.sample(times),
             |basis, from| basis.pull_back(from, cotangent, gradient),
         );
+    }
+
+    fn is_linear(&self) -> bool {
+        true
+    }
+
+    fn curvature(
+        &self,
+        _parameters: &[f64],
+        times_s: &[f64],
+        joint: usize,
+        weights: &MotionCotangent,
+        out: &mut DMatrix<f64>,
+    ) -> bool {
+        let columns = self.basis.columns();
+        assert_eq!(out.shape(), (columns, columns), "curvature of {}", B::NAME);
+        assert_eq!((weights.joints, weights.samples), (self.joints, times_s.len()), "weights of {}", B::NAME);
+        self.grids.each(
+            self.sets() * columns,
+            times_s,
+            |times| self.sample(times),
+            |basis, from| basis.curvature(from, joint, weights, out),
+        );
+        true
     }
 }

@@ -41,6 +41,29 @@ impl LogisticStroke {
         ((time_s - self.centre_s) / self.half_duration_s).clamp(-LAST, LAST)
     }
 
+    /// Derivatives of q, q̇, q̈ and jerk at a time by (amplitude, centre, half duration, sharpness).
+    pub(super) fn derivatives_by_shape(&self, time_s: f64) -> [[f64; 4]; 4] {
+        let u = self.warped(time_s);
+        let psi = warp(u);
+        let (value, bell) = logistic_and_bell(self.sharpness * psi[0]);
+        let unit = unit_stroke(&psi, self.sharpness, value, bell);
+        let inverse = 1.0 / self.half_duration_s;
+        let mut scale = 1.0;
+        core::array::from_fn(|order| {
+            // Moving the middle by dc is -du·w; stretching by dw scales u: order n gains -(u S_{n+1} + n S_n)/w.
+            let stretched = u * unit.value[order + 1] + order as f64 * unit.value[order];
+            let sized = self.amplitude * scale;
+            let row = [
+                scale * unit.value[order],
+                -sized * inverse * unit.value[order + 1],
+                -sized * inverse * stretched,
+                sized * unit.by_sharpness[order],
+            ];
+            scale *= inverse;
+            row
+        })
+    }
+
     /// Speed and acceleration on this stroke where the joint has gone `gone` rad (m) of it.
     ///
     /// With y = φ/κ = ln(s/(1-s))/κ and r = √(1 + 4y²): u = 2y/(1+r), 1/(1-u²) = (1+r)/2, φ' = κ r(1+r)/2,

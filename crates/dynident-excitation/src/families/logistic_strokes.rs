@@ -9,6 +9,7 @@ use crate::family::Family;
 use crate::motion::{Motion, MotionCotangent};
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use dynident_model::sample::Random;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 const NAME: &str = "logistic_strokes";
@@ -437,6 +438,39 @@ impl Family for LogisticStrokes {
             self.chain(&parameters[joint * each..(joint + 1) * each], &raw, own);
         }
     }
+
+    fn curvature(
+        &self,
+        parameters: &[f64],
+        times_s: &[f64],
+        joint: usize,
+        weights: &MotionCotangent,
+        out: &mut DMatrix<f64>,
+    ) -> bool {
+        assert_eq!((weights.joints, weights.samples), (self.joints, times_s.len()), "weights of {NAME}");
+        let each = self.each();
+        let own = &parameters[joint * each..(joint + 1) * each];
+        let (_, strokes) = self.strokes(parameters, joint);
+        let range = weights.of(joint);
+        let arrays = [&weights.q, &weights.dq, &weights.ddq, &weights.dddq].map(|array| &array[range.clone()]);
+        let (mut raw, mut row) = (vec![[[0.0; 4]; 4]; strokes.len()], DVector::zeros(each));
+        for (sample, &time) in times_s.iter().enumerate() {
+            if arrays.iter().all(|array| array[sample] == 0.0) {
+                continue;
+            }
+            for (raw, stroke) in raw.iter_mut().zip(&strokes) {
+                *raw = stroke.derivatives_by_shape(time);
+            }
+            for (order, array) in arrays.iter().enumerate().filter(|(_, array)| array[sample] != 0.0) {
+                row.fill(0.0);
+                row[0] = if order == 0 { 1.0 } else { 0.0 };
+                let of_order: Vec<[f64; 4]> = raw.iter().map(|raw| raw[order]).collect();
+                self.chain(own, &of_order, row.as_mut_slice());
+                out.ger(array[sample], &row, &row, 1.0);
+            }
+        }
+        true
+    }
 }
 
 #[cfg(test)]
@@ -478,6 +512,7 @@ mod tests {
             let family = family(strokes, order, returns);
             check::derivatives(&family, seed);
             check::gradient(&family, seed);
+            check::curvature(&family, seed);
         }
 
         /// Not nearly at rest but exactly, jerk included; and back at the start up to rounding of the sum.

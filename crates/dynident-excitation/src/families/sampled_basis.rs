@@ -2,6 +2,7 @@
 
 use crate::motion::{Motion, MotionCotangent};
 use dynident_lanes::{AlignedBuffer, Kernel, Lane, Level, dispatch};
+use nalgebra::DMatrix;
 use std::sync::{Arc, PoisonError, RwLock};
 
 /// Samples in a block: the widest lanes.
@@ -80,6 +81,29 @@ impl SampledBasis {
     /// Adds the derivative of a cost by the parameters.
     pub(crate) fn pull_back(&self, from: usize, cotangent: &MotionCotangent, gradient: &mut [f64]) {
         dispatch(Level::detect(), Backward { basis: self, from, cotangent, gradient });
+    }
+
+    /// Adds Σ weight · column columnᵀ of one joint over samples and orders. Most weights are zero.
+    pub(crate) fn curvature(&self, from: usize, joint: usize, weights: &Motion, out: &mut DMatrix<f64>) {
+        let columns = self.set(joint);
+        let start = joint * weights.samples + from;
+        for (order, weights) in [&weights.q, &weights.dq, &weights.ddq, &weights.dddq].into_iter().enumerate() {
+            for (sample, weight) in weights[start..start + self.times_s.len()].iter().enumerate() {
+                if *weight == 0.0 {
+                    continue;
+                }
+                let (block, lane) = (sample / BLOCK, sample % BLOCK);
+                let [first, end] = columns.supports[block];
+                let cells = columns.cells(self.columns, block);
+                let value = |column: usize| cells[column * CELL + order * BLOCK + lane];
+                for a in first..end {
+                    let scaled = weight * value(a);
+                    for b in first..end {
+                        out[(b, a)] += scaled * value(b);
+                    }
+                }
+            }
+        }
     }
 
     #[inline(always)]

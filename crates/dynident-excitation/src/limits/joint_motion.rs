@@ -55,6 +55,38 @@ fn array(motion: &Motion, kind: LimitKind) -> &[f64] {
     }
 }
 
+/// One row of a [`LimitSet`](super::LimitSet) that bounds a single joint's position (order 0), speed, acceleration or jerk (3): `c = |x - middle| / half - 1`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointBand {
+    /// The row.
+    pub row: usize,
+    /// The joint.
+    pub joint: usize,
+    /// Derivative of the position that is bounded.
+    pub order: usize,
+    /// Half the width of the band, rad/s^order (m/s^order).
+    pub half: f64,
+}
+
+impl JointMotionLimits {
+    /// The bands, when this term's rows come first.
+    pub(crate) fn bands(&self) -> Vec<JointBand> {
+        let order = |kind| match kind {
+            LimitKind::Position => 0,
+            LimitKind::Speed => 1,
+            LimitKind::Acceleration => 2,
+            _ => 3,
+        };
+        let band = |(row, band): (usize, &Band)| JointBand {
+            row,
+            joint: band.joint,
+            order: order(band.kind),
+            half: band.half,
+        };
+        self.0.iter().enumerate().map(band).collect()
+    }
+}
+
 impl Term for JointMotionLimits {
     fn constraints(&self) -> Vec<Constraint> {
         self.0.iter().map(|band| band.constraint.clone()).collect()

@@ -2,7 +2,7 @@
 
 use super::description::Limits;
 use super::error::LimitError;
-use super::joint_motion::JointMotionLimits;
+use super::joint_motion::{JointBand, JointMotionLimits};
 use super::kind::Constraint;
 use super::place::PlaceLimits;
 use super::power::PowerLimits;
@@ -21,6 +21,7 @@ pub struct LimitSet {
     terms: Vec<Box<dyn Term>>,
     rows_of: Vec<usize>,
     constraints: Vec<Constraint>,
+    bands: Vec<JointBand>,
     tightening: Vec<f64>,
     torque: bool,
     placements: bool,
@@ -49,8 +50,11 @@ impl LimitSet {
     /// As [`Limits::validate`].
     pub fn new(limits: &Limits, model: &Model) -> Result<Self, LimitError> {
         limits.validate(model)?;
+        let joint_motion = JointMotionLimits::new(model, &limits.joints);
+        let bands = joint_motion.bands();
         let mut terms: Vec<Box<dyn Term>> = vec![
-            Box::new(JointMotionLimits::new(model, &limits.joints)),
+            // First, so that the rows of the bands are the set's own.
+            Box::new(joint_motion),
             Box::new(TorqueLimits::new(model, &limits.joints)),
             Box::new(PowerLimits::new(model, &limits.joints)),
         ];
@@ -74,6 +78,7 @@ impl LimitSet {
             torque: terms.iter().any(|term| term.needs_torque()),
             placements: terms.iter().any(|term| term.needs_placements()),
             tightening: vec![0.0; constraints.len()],
+            bands,
             terms,
             rows_of,
             constraints,
@@ -83,6 +88,11 @@ impl LimitSet {
     /// The rows.
     pub fn constraints(&self) -> &[Constraint] {
         &self.constraints
+    }
+
+    /// The rows that bound a single joint's motion.
+    pub fn bands(&self) -> &[JointBand] {
+        &self.bands
     }
 
     /// The robot.

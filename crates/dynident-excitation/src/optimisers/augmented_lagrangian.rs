@@ -1,7 +1,7 @@
 //! Minimisation under smooth constraints with exact gradients: augmented Lagrangian over a projected L-BFGS.
 
 use super::projected_lbfgs::{Effort, End, Smooth, projected_lbfgs};
-use super::{OptimiserError, Progress, Watch, check_bounds, check_length, setting};
+use super::{OptimiserError, Progress, Step, Watch, check_bounds, check_length, setting};
 use serde::{Deserialize, Serialize};
 
 /// minimise f(x) subject to c_i(x) = 0 for the first [`equalities`](ConstrainedProblem::equalities) constraints, c_i(x) <= 0 for the others, and
@@ -24,6 +24,26 @@ pub trait ConstrainedProblem {
     fn values(&mut self, x: &[f64], constraints: &mut [f64]) -> f64;
     /// Writes the gradient of `f + Σ weights_i c_i` at the `x` of the last [`values`](ConstrainedProblem::values). Most weights are zero.
     fn gradient(&mut self, weights: &[f64], gradient: &mut [f64]);
+    /// Optional: takes up a positive definite model of the augmented Lagrangian's curvature at the `x` of the last [`gradient`](ConstrainedProblem::gradient), from which the quasi-Newton
+    /// matrix starts at every step. Returns whether there is a model.
+    fn prepare_metric(&mut self, _known: &Known<'_>) -> bool {
+        false
+    }
+    /// Multiplies with the inverse of the model of the last [`prepare_metric`](ConstrainedProblem::prepare_metric).
+    fn divide_by_metric(&self, _vector: &mut [f64]) {}
+}
+
+/// What is known of the augmented Lagrangian at a point, for a model of its curvature.
+#[derive(Clone, Copy, Debug)]
+pub struct Known<'a> {
+    /// For every constraint the penalty where it pushes, 0 where it does not.
+    pub pushing: &'a [f64],
+    /// Gradient.
+    pub gradient: &'a [f64],
+    /// Variables that no bound holds; a model must not couple the others with them.
+    pub free: &'a [bool],
+    /// The last step, if any is remembered.
+    pub last: Option<Step<'a>>,
 }
 
 /// Settings of [`augmented_lagrangian()`].
@@ -86,6 +106,24 @@ impl AugmentedLagrangianSettings {
     }
 }
 
+/// Where a search stands, so that another can go on from there.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct AugmentedLagrangianState {
+    /// The point.
+    pub x: Vec<f64>,
+    /// Multipliers of the constraints: what the objective would gain per unit of relaxation. Empty for zeros.
+    pub multipliers: Vec<f64>,
+    /// The penalty; none for that of the settings.
+    pub penalty: Option<f64>,
+}
+
+impl From<Vec<f64>> for AugmentedLagrangianState {
+    /// A point of which nothing else is known.
+    fn from(x: Vec<f64>) -> Self {
+        Self { x, ..Self::default() }
+    }
+}
+
 /// How a search ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -115,8 +153,12 @@ pub struct AugmentedLagrangianResult {
     pub violation: f64,
     /// Whether that is within the tolerance.
     pub feasible: bool,
-    /// Multipliers of the constraints at the end: what the objective would gain per unit of relaxation.
-    pub multipliers: Vec<f64>,
+    /// The last iterate with its multipliers and penalty. While constraints are still violated it tells more than [`best`](Self::best), which may be an early point that kept them by standing still.
+    pub end: AugmentedLagrangianState,
+    /// `f + Σ λ_i c_i` there over the violated constraints: to first order the objective that is left once they are kept.
+    pub lagrangian: f64,
+    /// Largest violation there.
+    pub end_violation: f64,
     /// Updates of the multipliers.
     pub outer_iterations: usize,
     /// Evaluations of objective and constraints.
@@ -140,7 +182,24 @@ pub fn augmented_lagrangian(
     settings: &AugmentedLagrangianSettings,
     watch: &mut Watch<'_>,
 ) -> Result<AugmentedLagrangianResult, OptimiserError> {
+    augmented_lagrangian_from(problem, &start.to_vec().into(), settings, watch)
+}
+
+/// The same, going on from where an earlier search ended.
+///
+/// # Errors
+/// As [`augmented_lagrangian()`]; multipliers of another number.
+pub fn augmented_lagrangian_from(
+    problem: &mut impl ConstrainedProblem,
+    state: &AugmentedLagrangianState,
+    settings: &AugmentedLagrangianSettings,
+    watch: &mut Watch<'_>,
+) -> Result<AugmentedLagrangianResult, OptimiserError> {
+    let start = &state.x;
     settings.validate()?;
+    if !state.multipliers.is_empty() {
+        check_length("multipliers", problem.constraints(), state.multipliers.len())?;
+    }
     let bounds = problem.bounds();
     check_length("start", problem.variables(), start.len())?;
     check_length("bounds", problem.variables(), bounds.len())?;
@@ -150,15 +209,20 @@ pub fn augmented_lagrangian(
     }
     let mut x: Vec<f64> = start.iter().zip(&bounds).map(|(x, &[lower, upper])| x.clamp(lower, upper)).collect();
     let mut search = Search::new(problem, settings, watch);
+    if !state.multipliers.is_empty() {
+        search.multipliers.clone_from(&state.multipliers);
+    }
+    search.penalty = state.penalty.unwrap_or(search.penalty);
     let first = search.value(&x);
     if !first.is_finite() {
         return Err(OptimiserError::Start);
     }
-    search.penalty = settings.initial_penalty.unwrap_or_else(|| {
+    search.penalty = state.penalty.or(settings.initial_penalty).unwrap_or_else(|| {
         let squares: f64 = (0..search.c.len()).map(|i| search.violation_of(i).powi(2)).sum();
         (2.0 * search.objective.abs() / squares.max(1e-12)).clamp(1e-6, 10.0)
     });
-    let mut tolerance: f64 = 0.1;
+    // A search that goes on starts near its end.
+    let mut tolerance: f64 = if state.multipliers.is_empty() { 0.1 } else { 1e-4 };
     let mut last_measure = f64::INFINITY;
     let mut status = AugmentedLagrangianStatus::IterationLimit;
     while search.outer < settings.max_outer_iterations {
@@ -196,6 +260,13 @@ pub fn augmented_lagrangian(
     if search.stopped {
         status = AugmentedLagrangianStatus::Stopped;
     }
+    // The last evaluation may have been a rejected trial.
+    search.objective = search.problem.values(&x, &mut search.c);
+    let end_violation = (0..search.c.len()).fold(0.0, |worst: f64, i| worst.max(search.violation_of(i)));
+    // Slack is not counted: multipliers of a search that has not converged may weigh it absurdly.
+    let pushing =
+        search.multipliers.iter().zip(&search.c).map(|(multiplier, c)| (multiplier * c).max(0.0)).sum::<f64>();
+    let lagrangian = search.objective + pushing;
     let feasible = search.best_violation <= settings.feasibility_tolerance;
     if feasible && status == AugmentedLagrangianStatus::Infeasible {
         status = AugmentedLagrangianStatus::PrecisionLimit;
@@ -208,7 +279,9 @@ pub fn augmented_lagrangian(
         outer_iterations: search.outer,
         evaluations: search.evaluations,
         best: search.best,
-        multipliers: search.multipliers,
+        end: AugmentedLagrangianState { x, multipliers: search.multipliers, penalty: Some(search.penalty) },
+        lagrangian,
+        end_violation,
     })
 }
 
@@ -223,6 +296,7 @@ struct Search<'a, 'w, P: ConstrainedProblem> {
     objective: f64,
     c: Vec<f64>,
     weights: Vec<f64>,
+    curvature: Vec<f64>,
     best: Vec<f64>,
     best_value: f64,
     best_violation: f64,
@@ -244,6 +318,7 @@ impl<'a, 'w, P: ConstrainedProblem> Search<'a, 'w, P> {
             objective: f64::NAN,
             c: vec![0.0; constraints],
             weights: vec![0.0; constraints],
+            curvature: Vec::new(),
             best: Vec::new(),
             best_value: f64::INFINITY,
             best_violation: f64::INFINITY,
@@ -319,6 +394,23 @@ impl<P: ConstrainedProblem> Smooth for Search<'_, '_, P> {
 
     fn gradient(&mut self, gradient: &mut [f64]) {
         self.problem.gradient(&self.weights, gradient);
+        // A rejected trial may follow; the curvature belongs to the point of the gradient.
+        self.curvature.clear();
+        self.curvature.extend(
+            self.weights.iter().enumerate().map(
+                |(i, weight)| {
+                    if i < self.equalities || *weight > 0.0 { self.penalty } else { 0.0 }
+                },
+            ),
+        );
+    }
+
+    fn prepare_metric(&mut self, gradient: &[f64], free: &[bool], last: Option<Step<'_>>) -> bool {
+        self.problem.prepare_metric(&Known { pushing: &self.curvature, gradient, free, last })
+    }
+
+    fn divide_by_metric(&self, vector: &mut [f64]) {
+        self.problem.divide_by_metric(vector);
     }
 
     fn halted(&self) -> bool {

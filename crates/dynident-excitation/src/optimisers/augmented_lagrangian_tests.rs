@@ -77,8 +77,8 @@ fn hock_and_schittkowski_71() {
     }
     assert!(result.feasible && result.violation <= 1e-8);
     // The multipliers' sizes, 0.161469 and 0.552294, as interior-point programs print them for this problem.
-    assert!((result.multipliers[0] - 0.161_468_6).abs() < 1e-5, "{:?}", result.multipliers);
-    assert!((result.multipliers[1] - 0.552_293_7).abs() < 1e-5, "{:?}", result.multipliers);
+    assert!((result.end.multipliers[0] - 0.161_468_6).abs() < 1e-5, "{:?}", result.end.multipliers);
+    assert!((result.end.multipliers[1] - 0.552_293_7).abs() < 1e-5, "{:?}", result.end.multipliers);
 }
 
 #[test]
@@ -114,8 +114,8 @@ fn hock_and_schittkowski_43() {
         assert!((x - exact).abs() < 1e-5, "{:?}", result.best);
     }
     // Stationarity at that point gives the multipliers 1, 0, 2.
-    for (multiplier, exact) in result.multipliers.iter().zip([1.0, 0.0, 2.0]) {
-        assert!((multiplier - exact).abs() < 1e-4, "{:?}", result.multipliers);
+    for (multiplier, exact) in result.end.multipliers.iter().zip([1.0, 0.0, 2.0]) {
+        assert!((multiplier - exact).abs() < 1e-4, "{:?}", result.end.multipliers);
     }
 }
 
@@ -215,8 +215,27 @@ fn bad_starts_and_settings_are_named() {
 }
 
 #[test]
+fn a_search_goes_on_where_another_ended() {
+    let settings = AugmentedLagrangianSettings::default();
+    let whole = augmented_lagrangian(&mut hs71(), &[1.0, 5.0, 5.0, 1.0], &settings, &mut never).unwrap();
+    let short = AugmentedLagrangianSettings { max_evaluations: 25, ..settings.clone() };
+    let first = augmented_lagrangian(&mut hs71(), &[1.0, 5.0, 5.0, 1.0], &short, &mut never).unwrap();
+    let rest = augmented_lagrangian_from(&mut hs71(), &first.end, &settings, &mut never).unwrap();
+    assert_eq!(rest.status, AugmentedLagrangianStatus::Converged);
+    assert!((rest.value - whole.value).abs() < 1e-6, "{} and {}", rest.value, whole.value);
+    // At a solution the multipliers of what pushes weigh violations of the size of the tolerance: the two values agree.
+    assert!((rest.lagrangian - rest.value).abs() < 1e-6, "{rest:?}");
+    // From the solution itself little is left to do.
+    let again = augmented_lagrangian_from(&mut hs71(), &whole.end, &settings, &mut never).unwrap();
+    assert!(again.evaluations < whole.evaluations / 2, "{} of {}", again.evaluations, whole.evaluations);
+    let other = AugmentedLagrangianState { multipliers: vec![0.0; 5], ..whole.end };
+    let error = augmented_lagrangian_from(&mut hs71(), &other, &settings, &mut never).unwrap_err();
+    assert_eq!(error.to_string(), "multipliers has 5 entries, expected 2");
+}
+
+#[test]
 fn many_starts_give_the_same_on_any_number_of_threads() {
-    let starts: Vec<Vec<f64>> = (0..6).map(|k| vec![1.0 + 0.7 * f64::from(k); 4]).collect();
+    let starts: Vec<AugmentedLagrangianState> = (0..6).map(|k| vec![1.0 + 0.7 * f64::from(k); 4].into()).collect();
     let settings = AugmentedLagrangianSettings::default();
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -10,12 +10,13 @@ mod multi_start;
 mod projected_lbfgs;
 
 pub use augmented_lagrangian::{
-    AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianStatus, ConstrainedProblem,
-    augmented_lagrangian,
+    AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianState, AugmentedLagrangianStatus,
+    ConstrainedProblem, Known, augmented_lagrangian, augmented_lagrangian_from,
 };
 pub use binary_genetic::{BinaryGeneticResult, BinaryGeneticSettings, Generation, binary_genetic};
 pub use cma_es::{CmaEsResult, CmaEsRun, CmaEsSettings, CmaEsStatus, cma_es};
 pub use multi_start::{MultiStartResult, multi_start};
+pub use projected_lbfgs::Step;
 
 use core::ops::ControlFlow;
 use rayon::prelude::*;

@@ -1,8 +1,8 @@
 //! Many starts of the augmented Lagrangian side by side; the best of them.
 
 use super::{
-    AugmentedLagrangianResult, AugmentedLagrangianSettings, ConstrainedProblem, OptimiserError, Progress,
-    augmented_lagrangian,
+    AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianState, ConstrainedProblem,
+    OptimiserError, Progress, augmented_lagrangian_from,
 };
 use core::ops::ControlFlow;
 use rayon::prelude::*;
@@ -31,7 +31,7 @@ impl MultiStartResult {
     }
 }
 
-/// Runs [`augmented_lagrangian()`] from every start, in parallel, each on its own problem from `problem`.
+/// Runs [`augmented_lagrangian_from()`] from every start, in parallel, each on its own problem from `problem`.
 ///
 /// `watch` hears the best over all starts whenever it improves, and is asked after every evaluation whether to go on; `iteration` and `evaluations`
 /// are those of the start that speaks.
@@ -41,7 +41,7 @@ impl MultiStartResult {
 /// No start; settings or bounds out of range.
 pub fn multi_start<P: ConstrainedProblem>(
     problem: impl Fn() -> P + Sync,
-    starts: &[Vec<f64>],
+    starts: &[AugmentedLagrangianState],
     settings: &AugmentedLagrangianSettings,
     watch: impl Fn(&Progress<'_>) -> ControlFlow<()> + Sync,
 ) -> Result<MultiStartResult, OptimiserError> {
@@ -62,7 +62,7 @@ pub fn multi_start<P: ConstrainedProblem>(
                 }
                 watch(&Progress { best: &best.0, value: best.1, violation: best.2, ..*progress })
             };
-            augmented_lagrangian(&mut problem(), start, settings, &mut hear)
+            augmented_lagrangian_from(&mut problem(), start, settings, &mut hear)
         })
         .collect();
     let rank = |run: &Result<AugmentedLagrangianResult, OptimiserError>| {

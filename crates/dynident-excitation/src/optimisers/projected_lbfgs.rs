@@ -8,6 +8,12 @@ pub(crate) trait Smooth {
     fn value(&mut self, x: &[f64]) -> f64;
     /// The gradient at the point of the last [`value`](Smooth::value).
     fn gradient(&mut self, gradient: &mut [f64]);
+    /// Takes up a model of the curvature at the point of the last [`gradient`](Smooth::gradient), from the gradient and the last step with its change of the gradient; false if there is none.
+    fn prepare_metric(&mut self, _gradient: &[f64], _free: &[bool], _last: Option<Step<'_>>) -> bool {
+        false
+    }
+    /// Multiplies with the inverse of that model.
+    fn divide_by_metric(&self, _vector: &mut [f64]) {}
     /// Whether the search must end now.
     fn halted(&self) -> bool;
 }
@@ -31,6 +37,15 @@ pub(crate) struct Effort {
     pub(crate) tolerance: f64,
     pub(crate) iterations: usize,
     pub(crate) memory: usize,
+}
+
+/// A step of a search, and how it changed the gradient.
+#[derive(Clone, Copy, Debug)]
+pub struct Step<'a> {
+    /// Difference of the points.
+    pub by: &'a [f64],
+    /// Difference of the gradients.
+    pub gradient_change: &'a [f64],
 }
 
 /// One difference of points and of gradients.
@@ -74,14 +89,18 @@ pub(crate) fn projected_lbfgs(
             (at.x[i] <= bounds[i][0] && at.gradient[i] > 0.0) || (at.x[i] >= bounds[i][1] && at.gradient[i] < 0.0)
         };
         let free: Vec<bool> = (0..n).map(|i| !held(i)).collect();
-        let mut direction = quasi_newton(&pairs, &at.gradient, &free);
+        let last = pairs.back().map(|pair| Step { by: &pair.s, gradient_change: &pair.y });
+        let shaped = function.prepare_metric(&at.gradient, &free, last);
+        let shape = |vector: &mut [f64]| function.divide_by_metric(vector);
+        let shape: Option<&Shape<'_>> = if shaped { Some(&shape) } else { None };
+        let mut direction = quasi_newton(&pairs, &at.gradient, &free, shape);
         let steep = dot(&direction, &at.gradient) < -1e-10 * norm(&direction) * norm(&at.gradient);
         if !pairs.is_empty() && !steep {
             // Curvature that does not lead down (or not to numbers) is forgotten.
             pairs.clear();
-            direction = quasi_newton(&pairs, &at.gradient, &free);
+            direction = quasi_newton(&pairs, &at.gradient, &free, shape);
         }
-        let first = if pairs.is_empty() { cautious_step(&direction, bounds) } else { 1.0 };
+        let first = if pairs.is_empty() && !shaped { cautious_step(&direction, bounds) } else { 1.0 };
         let Some(next) = line_search(function, bounds, &at, &direction, first) else {
             if function.halted() {
                 end = End::Halted;
@@ -165,8 +184,11 @@ fn line_search(
     found
 }
 
-/// `-H g` on the free variables by the two-loop recursion, zero on the others.
-fn quasi_newton(pairs: &VecDeque<Pair>, gradient: &[f64], free: &[bool]) -> Vec<f64> {
+/// Multiplies a vector with the matrix that the recursion starts from.
+type Shape<'a> = dyn Fn(&mut [f64]) + 'a;
+
+/// `-H g` on the free variables by the two-loop recursion, zero on the others; from `shape`, or from a multiple of the identity.
+fn quasi_newton(pairs: &VecDeque<Pair>, gradient: &[f64], free: &[bool], shape: Option<&Shape<'_>>) -> Vec<f64> {
     let masked = |v: &[f64], w: &[f64]| -> f64 { (0..v.len()).filter(|&i| free[i]).map(|i| v[i] * w[i]).sum() };
     let mut direction: Vec<f64> = gradient.iter().zip(free).map(|(&g, &free)| if free { -g } else { 0.0 }).collect();
     // Pairs that lose their curvature when bound variables are left out say nothing here.
@@ -181,7 +203,9 @@ fn quasi_newton(pairs: &VecDeque<Pair>, gradient: &[f64], free: &[bool]) -> Vec<
         weights.push(weight);
         add(&mut direction, -weight, &pair.y, free);
     }
-    if let Some((pair, sy)) = useful.last() {
+    if let Some(shape) = shape {
+        shape(&mut direction);
+    } else if let Some((pair, sy)) = useful.last() {
         let scale = sy / masked(&pair.y, &pair.y);
         for d in &mut direction {
             *d *= scale;

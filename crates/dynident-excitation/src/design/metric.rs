@@ -1,0 +1,151 @@
+//! How strongly the augmented Lagrangian is curved, joint by joint.
+//!
+//! Limits of a single joint depend on that joint's parameters alone: the curvature of those that push is known (exactly for linear families, to first order for others) and need not be learnt
+//! step by step. What is left, the criterion, is curved about as the motion's size is, measured in its limits.
+
+use super::DesignTask;
+use crate::motion::Motion;
+use crate::optimisers::{Known, Step};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+/// `σ G + C`, one block a joint: `G` the mean square of the motion in units of its limits, `C` the curvature of the limits that push, and `σ` the criterion's share, from the last step.
+pub(super) struct Metric {
+    size: Vec<DMatrix<f64>>,
+    limits: Vec<DMatrix<f64>>,
+    factors: Vec<Cholesky<f64, Dyn>>,
+    size_weights: Motion,
+    weights: Motion,
+    /// Whether `size` holds numbers yet.
+    sized: bool,
+    share: f64,
+    /// Parameters of a joint.
+    each: usize,
+}
+
+impl Metric {
+    /// None where joints do not have equally many parameters.
+    pub(super) fn new(task: &DesignTask<'_>, times: &[f64]) -> Option<Self> {
+        let (family, joints) = (task.family, task.family.joints());
+        let each = family.parameters().checked_div(joints)?;
+        if each * joints != family.parameters() {
+            return None;
+        }
+        let mut weights = Motion::default();
+        weights.reset(joints, times.len());
+        for band in task.limits.bands().iter().filter(|band| band.order < 3) {
+            let range = weights.of(band.joint);
+            order(&mut weights, band.order)[range].fill(1.0 / (band.half * band.half * times.len() as f64));
+        }
+        let blocks = vec![DMatrix::zeros(each, each); joints];
+        let size_weights = weights.clone();
+        Some(Self {
+            size: blocks.clone(),
+            limits: blocks,
+            factors: Vec::new(),
+            size_weights,
+            weights,
+            share: 0.0,
+            each,
+            sized: false,
+        })
+    }
+
+    /// `G` at the given parameters; false if the family does not know it.
+    fn take_size(&mut self, task: &DesignTask<'_>, times: &[f64], at: &[f64]) -> bool {
+        for (joint, size) in self.size.iter_mut().enumerate() {
+            size.fill(0.0);
+            if !task.family.curvature(at, times, joint, &self.size_weights, size) {
+                return false;
+            }
+            // Directions that no limit sees, kept from being infinitely long.
+            let floor = 1e-9 * size.trace().max(1e-9) / self.each as f64;
+            for k in 0..self.each {
+                size[(k, k)] += floor;
+            }
+        }
+        self.sized = true;
+        true
+    }
+
+    /// Takes up the limits that push at the parameters `at`, and the criterion's share from the last step and its change of the gradient, or, at the start, such that the first step is a fifth
+    /// of the motion. False if no positive matrix comes of it.
+    pub(super) fn prepare(&mut self, task: &DesignTask<'_>, times: &[f64], at: &[f64], known: &Known<'_>) -> bool {
+        let Known { pushing, gradient, free, last } = *known;
+        // A linear family's size is the same everywhere; another's is taken anew wherever the memory of steps begins anew.
+        if (!self.sized || (last.is_none() && !task.family.is_linear())) && !self.take_size(task, times, at) {
+            return false;
+        }
+        let samples = times.len();
+        self.weights.reset(task.family.joints(), samples);
+        for band in task.limits.bands() {
+            let pushing = &pushing[band.row * samples..(band.row + 1) * samples];
+            let range = self.weights.of(band.joint);
+            let scale = 1.0 / (band.half * band.half);
+            for (to, from) in order(&mut self.weights, band.order)[range].iter_mut().zip(pushing) {
+                *to += from * scale;
+            }
+        }
+        for (joint, limits) in self.limits.iter_mut().enumerate() {
+            limits.fill(0.0);
+            task.family.curvature(at, times, joint, &self.weights, limits);
+        }
+        if let Some(Step { by, gradient_change }) = last {
+            let whole: f64 = by.iter().zip(gradient_change).map(|(s, y)| s * y).sum();
+            let by_limits = self.square(&self.limits, by);
+            let share = (whole - by_limits).max(1e-3 * whole) / self.square(&self.size, by);
+            self.share = if self.share > 0.0 { share.clamp(0.2 * self.share, 5.0 * self.share) } else { share };
+        } else {
+            let squared: f64 = (0..self.size.len())
+                .map(|joint| {
+                    let own = DVector::from_column_slice(&gradient[joint * self.each..(joint + 1) * self.each]);
+                    self.size[joint].clone().cholesky().map_or(0.0, |factor| own.dot(&factor.solve(&own)))
+                })
+                .sum();
+            self.share = (squared / self.square(&self.size, at).max(1e-6)).sqrt() / 0.2;
+        }
+        if !(self.share > 0.0 && self.share.is_finite()) {
+            return false;
+        }
+        self.factors.clear();
+        for (size, limits) in self.size.iter().zip(&self.limits) {
+            let mut block = size * self.share + limits;
+            // What a bound holds stands apart.
+            let held = free[self.factors.len() * self.each..].iter().take(self.each).enumerate();
+            for (k, _) in held.filter(|(_, free)| !**free) {
+                block.row_mut(k).fill(0.0);
+                block.column_mut(k).fill(0.0);
+                block[(k, k)] = 1.0;
+            }
+            let Some(factor) = block.cholesky() else { return false };
+            self.factors.push(factor);
+        }
+        true
+    }
+
+    /// `v ← (σ G + C)⁻¹ v`.
+    pub(super) fn divide(&self, vector: &mut [f64]) {
+        for (own, factor) in vector.chunks_exact_mut(self.each).zip(&self.factors) {
+            let solved = factor.solve(&DVector::from_column_slice(own));
+            own.copy_from_slice(solved.as_slice());
+        }
+    }
+
+    fn square(&self, blocks: &[DMatrix<f64>], v: &[f64]) -> f64 {
+        let parts = v.chunks_exact(self.each).zip(blocks);
+        parts
+            .map(|(own, block)| {
+                let own = DVector::from_column_slice(own);
+                own.dot(&(block * &own))
+            })
+            .sum()
+    }
+}
+
+fn order(motion: &mut Motion, order: usize) -> &mut [f64] {
+    match order {
+        0 => &mut motion.q,
+        1 => &mut motion.dq,
+        2 => &mut motion.ddq,
+        _ => &mut motion.dddq,
+    }
+}

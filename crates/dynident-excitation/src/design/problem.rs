@@ -1,0 +1,116 @@
+//! Criterion and limits of a trajectory, as an optimiser takes them.
+
+use super::DesignTask;
+use super::metric::Metric;
+use crate::criteria::Criterion;
+use crate::information::Information;
+use crate::limits::LimitWorkspace;
+use crate::motion::Motion;
+use crate::optimisers::{ConstrainedProblem, Known};
+use nalgebra::DMatrix;
+
+/// Criterion and limits of one trajectory as functions of the family's parameters.
+pub(super) struct Problem<'a> {
+    task: &'a DesignTask<'a>,
+    /// Added to every value of each row, so that what is kept on samples is kept between them.
+    margins: &'a [f64],
+    criterion: &'a dyn Criterion,
+    times: &'a [f64],
+    weight: f64,
+    information: Information<'a>,
+    workspace: LimitWorkspace,
+    parameters: Vec<f64>,
+    /// Where the gradient was last asked for; a rejected trial may have followed.
+    at_gradient: Vec<f64>,
+    motion: Motion,
+    cotangent: Motion,
+    by_information: Option<DMatrix<f64>>,
+    values: Vec<f64>,
+    metric: Option<Metric>,
+}
+
+impl<'a> Problem<'a> {
+    pub(super) fn new(
+        task: &'a DesignTask<'a>,
+        margins: &'a [f64],
+        criterion: &'a dyn Criterion,
+        times: &'a [f64],
+        weight: f64,
+    ) -> Self {
+        Self {
+            information: Information::new(task.limits.model(), task.layout, task.torque_std_nm, task.prior),
+            workspace: task.limits.workspace(),
+            task,
+            margins,
+            criterion,
+            times,
+            weight,
+            parameters: Vec::new(),
+            at_gradient: Vec::new(),
+            motion: Motion::default(),
+            cotangent: Motion::default(),
+            by_information: None,
+            values: Vec::new(),
+            metric: Metric::new(task, times),
+        }
+    }
+}
+
+impl ConstrainedProblem for Problem<'_> {
+    fn variables(&self) -> usize {
+        self.task.family.parameters()
+    }
+
+    fn bounds(&self) -> Vec<[f64; 2]> {
+        self.task.family.bounds()
+    }
+
+    fn constraints(&self) -> usize {
+        self.task.limits.constraints().len() * self.times.len()
+    }
+
+    fn values(&mut self, x: &[f64], constraints: &mut [f64]) -> f64 {
+        self.parameters = x.to_vec();
+        self.task.family.motion(x, self.times, &mut self.motion);
+        self.task.limits.values(&mut self.workspace, &self.motion, &mut self.values);
+        for ((to, from), margin) in constraints
+            .chunks_exact_mut(self.times.len())
+            .zip(self.values.chunks_exact(self.times.len()))
+            .zip(self.margins)
+        {
+            for (to, from) in to.iter_mut().zip(from) {
+                *to = from + margin;
+            }
+        }
+        let information = self.information.of(&self.motion, self.weight);
+        if let Some((value, derivative)) = self.criterion.value_and_derivative(&information) {
+            self.by_information = Some(derivative);
+            value
+        } else {
+            self.by_information = None;
+            f64::INFINITY
+        }
+    }
+
+    fn gradient(&mut self, weights: &[f64], gradient: &mut [f64]) {
+        gradient.fill(0.0);
+        self.at_gradient.clone_from(&self.parameters);
+        self.cotangent.reset(self.motion.joints, self.motion.samples);
+        self.task.limits.pull_back(&mut self.workspace, &self.motion, weights, &mut self.cotangent);
+        if let Some(derivative) = &self.by_information {
+            self.information.pull_back(&self.motion, self.weight, derivative, &mut self.cotangent);
+        }
+        self.task.family.pull_back(&self.parameters, self.times, &self.cotangent, gradient);
+    }
+
+    fn prepare_metric(&mut self, known: &Known<'_>) -> bool {
+        let Some(metric) = &mut self.metric else { return false };
+        metric.prepare(self.task, self.times, &self.at_gradient, known)
+    }
+
+    fn divide_by_metric(&self, vector: &mut [f64]) {
+        if let Some(metric) = &self.metric {
+            metric.divide(vector);
+        }
+    }
+}

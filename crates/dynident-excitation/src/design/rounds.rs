@@ -1,0 +1,165 @@
+//! One round of a search: every start a good part of the way, the best of them to the end.
+
+use super::DesignTask;
+use super::problem::Problem;
+use crate::criteria::Criterion;
+use crate::optimisers::{
+    AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianState, OptimiserError, multi_start,
+};
+use core::ops::ControlFlow;
+
+/// First penalty of a limit, as a share of the criterion's scale: so low that a start first finds a good motion somewhat outside the limits and is then led inside. Measured on three arms, five
+/// harmonics, ten starts each: 0.02 with slow growth ends 2 to 4 nats better than 2 with fast growth.
+const FIRST_PENALTY: f64 = 0.02;
+const PENALTY_GROWTH: f64 = 3.0;
+
+/// Violation at which a start is told apart from others well enough.
+const LOOSE: f64 = 3e-3;
+/// One in so many starts is followed to the end.
+const FOLLOWED: usize = 4;
+/// Weight of what is still violated when starts are compared, in the criterion's scale.
+const VIOLATION_WEIGHT: f64 = 10.0;
+
+/// The grid of a round, and the samples that it stands for.
+pub(super) struct Rounds<'a> {
+    pub(super) task: &'a DesignTask<'a>,
+    pub(super) times: &'a [f64],
+    pub(super) logged: usize,
+}
+
+/// Where a start ended.
+pub(super) struct Candidate {
+    pub(super) state: AugmentedLagrangianState,
+    /// The best point that kept the limits on the samples, or the least violating one.
+    pub(super) feasible: Vec<f64>,
+    /// What candidates are compared by: the criterion as it would be with all limits kept, and a penalty for what is not.
+    pub(super) score: f64,
+}
+
+/// The best of a round.
+pub(super) struct Found {
+    pub(super) best: Candidate,
+    pub(super) evaluations: usize,
+}
+
+impl Rounds<'_> {
+    /// Follows all starts until limits are nearly kept, then the best of them to the end.
+    pub(super) fn run(
+        &self,
+        criterion: &dyn Criterion,
+        margins: &[f64],
+        starts: &[AugmentedLagrangianState],
+        budget: usize,
+        stop: impl Fn(f64, f64) -> bool + Sync,
+    ) -> Result<Found, OptimiserError> {
+        let first = self.all(criterion, margins, starts, &self.descent(criterion, budget, LOOSE, 1e-4), &stop)?;
+        let mut evaluations = evaluations(&first);
+        let mut candidates = self.candidates(criterion, first);
+        candidates.truncate(starts.len().div_ceil(FOLLOWED));
+        let ends: Vec<AugmentedLagrangianState> = candidates.into_iter().map(|candidate| candidate.state).collect();
+        if ends.is_empty() {
+            return Err(OptimiserError::Start);
+        }
+        let last = self.all(criterion, margins, &ends, &self.descent(criterion, budget, 1e-6, 1e-7), &stop)?;
+        evaluations += self::evaluations(&last);
+        let best = self.candidates(criterion, last).into_iter().next().ok_or(OptimiserError::Start)?;
+        Ok(Found { best, evaluations })
+    }
+
+    /// Goes on from one point to the end.
+    pub(super) fn polish(
+        &self,
+        criterion: &dyn Criterion,
+        margins: &[f64],
+        start: AugmentedLagrangianState,
+        budget: usize,
+        stop: impl Fn(f64, f64) -> bool + Sync,
+    ) -> Result<Found, OptimiserError> {
+        let runs = self.all(criterion, margins, &[start], &self.descent(criterion, budget, 1e-7, 1e-8), &stop)?;
+        let evaluations = evaluations(&runs);
+        let best = self.candidates(criterion, runs).into_iter().next().ok_or(OptimiserError::Start)?;
+        Ok(Found { best, evaluations })
+    }
+
+    fn all(
+        &self,
+        criterion: &dyn Criterion,
+        margins: &[f64],
+        starts: &[AugmentedLagrangianState],
+        settings: &AugmentedLagrangianSettings,
+        stop: &(impl Fn(f64, f64) -> bool + Sync),
+    ) -> Result<Vec<AugmentedLagrangianResult>, OptimiserError> {
+        let weight = self.logged as f64 / self.times.len() as f64;
+        let result = multi_start(
+            || Problem::new(self.task, margins, criterion, self.times, weight),
+            starts,
+            settings,
+            |progress| {
+                if stop(progress.value, progress.violation) {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            },
+        )?;
+        Ok(result.runs.into_iter().flatten().collect())
+    }
+
+    fn descent(
+        &self,
+        criterion: &dyn Criterion,
+        evaluations: usize,
+        feasibility_tolerance: f64,
+        optimality_tolerance: f64,
+    ) -> AugmentedLagrangianSettings {
+        AugmentedLagrangianSettings {
+            max_evaluations: evaluations,
+            max_inner_iterations: 30,
+            initial_penalty: Some(FIRST_PENALTY * criterion.scale(self.task.layout.columns().len())),
+            penalty_growth: PENALTY_GROWTH,
+            feasibility_tolerance,
+            optimality_tolerance,
+            ..AugmentedLagrangianSettings::default()
+        }
+    }
+
+    /// The ends, best first; among equals the earlier start.
+    fn candidates(&self, criterion: &dyn Criterion, runs: Vec<AugmentedLagrangianResult>) -> Vec<Candidate> {
+        let scale = criterion.scale(self.task.layout.columns().len());
+        let mut candidates: Vec<Candidate> = runs
+            .into_iter()
+            .map(|run| Candidate {
+                score: if run.lagrangian.is_finite() {
+                    run.lagrangian + VIOLATION_WEIGHT * scale * run.end_violation
+                } else {
+                    f64::INFINITY
+                },
+                feasible: run.best,
+                state: run.end,
+            })
+            .collect();
+        candidates.sort_by(|a, b| a.score.total_cmp(&b.score));
+        candidates
+    }
+}
+
+fn evaluations(runs: &[AugmentedLagrangianResult]) -> usize {
+    runs.iter().map(|run| run.evaluations).sum()
+}
+
+impl AugmentedLagrangianState {
+    /// The same state for constraints on a grid with a sample between each two of `samples`.
+    pub(super) fn on_twice_the_samples(mut self, samples: usize) -> Self {
+        if !self.multipliers.is_empty() {
+            let fine = 2 * samples - 1;
+            let mut multipliers = vec![0.0; self.multipliers.len() / samples * fine];
+            for (to, from) in multipliers.chunks_exact_mut(fine).zip(self.multipliers.chunks_exact(samples)) {
+                for (to, from) in to.iter_mut().step_by(2).zip(from) {
+                    *to = *from;
+                }
+            }
+            self.multipliers = multipliers;
+        }
+        self
+    }
+}
