@@ -202,15 +202,15 @@ const POLISHES: usize = 6;
 const LAST_EVALUATIONS: usize = 60;
 
 /// A trajectory judged as it will be used: every logged sample, every limit between samples.
-struct Assessed {
-    parameters: Vec<f64>,
-    figure: Option<f64>,
-    information: DMatrix<f64>,
-    violation: f64,
+pub(crate) struct Assessed {
+    pub(crate) parameters: Vec<f64>,
+    pub(crate) figure: Option<f64>,
+    pub(crate) information: DMatrix<f64>,
+    pub(crate) violation: f64,
 }
 
 impl Assessed {
-    fn better_than(&self, other: &Self) -> bool {
+    pub(crate) fn better_than(&self, other: &Self) -> bool {
         match (self.violation <= 0.0, other.violation <= 0.0) {
             (true, true) => self.figure.unwrap_or(f64::INFINITY) < other.figure.unwrap_or(f64::INFINITY),
             (true, false) => true,
@@ -221,7 +221,7 @@ impl Assessed {
 }
 
 /// Judges a trajectory; also gives the largest value of every limit's row.
-fn assess(
+pub(crate) fn assess(
     task: &DesignTask<'_>,
     criterion: &dyn Criterion,
     parameters: Vec<f64>,
@@ -261,7 +261,7 @@ fn joint_scales(parameters: &[f64], joints: usize) -> Vec<f64> {
 }
 
 /// Position ranges and speed limits for random starts.
-fn ranges(limits: &LimitSet) -> (Vec<[f64; 2]>, Vec<f64>) {
+pub(crate) fn ranges(limits: &LimitSet) -> (Vec<[f64; 2]>, Vec<f64>) {
     let range = |joint: &dynident_model::Joint| {
         let free = if joint.turns() { core::f64::consts::PI } else { 0.5 };
         let lower = joint.limits.lower.unwrap_or(-free).max(-free);
