@@ -10,6 +10,7 @@ use crate::information::Information;
 use crate::limits::{LimitSet, LimitWorkspace, PeakSettings, peaks};
 use crate::motion::Motion;
 use crate::optimisers::{AugmentedLagrangianSettings, ConstrainedProblem, OptimiserError, multi_start};
+use crate::restoration::restored;
 use core::ops::ControlFlow;
 use core::sync::atomic::{AtomicU64, Ordering};
 use dynident_dynamics::PanelLayout;
@@ -185,6 +186,13 @@ pub fn design(
             *margin += if *c > 0.0 { 2.0 * c + 1e-6 } else { 0.0 };
         }
     }
+    // A watch that breaks, like the clock, leaves it at that.
+    if kept.violation > 0.0 && !late() {
+        let stop = |progress: &DesignProgress| watch(progress).is_break() || late();
+        let used;
+        (kept, used) = restored(task, settings, kept, [&fine, &logged], &stop)?;
+        evaluations.fetch_add(used as u64, Ordering::Relaxed);
+    }
     Ok(Designed {
         figure: kept.figure,
         information: kept.information,
@@ -242,7 +250,7 @@ pub fn grid(duration_s: f64, count: usize) -> Vec<f64> {
     (0..count).map(|k| duration_s * k as f64 / (count.max(2) - 1) as f64).collect()
 }
 
-fn descent(evaluations: usize) -> AugmentedLagrangianSettings {
+pub(crate) fn descent(evaluations: usize) -> AugmentedLagrangianSettings {
     AugmentedLagrangianSettings {
         max_evaluations: evaluations,
         max_inner_iterations: 60,
@@ -272,11 +280,11 @@ pub(crate) fn ranges(limits: &LimitSet) -> (Vec<[f64; 2]>, Vec<f64>) {
     (joints.iter().map(range).collect(), joints.iter().map(|joint| joint.limits.velocity.unwrap_or(2.0)).collect())
 }
 
-struct Found {
-    parameters: Vec<f64>,
+pub(crate) struct Found {
+    pub(crate) parameters: Vec<f64>,
     value: f64,
-    violation: f64,
-    evaluations: usize,
+    pub(crate) violation: f64,
+    pub(crate) evaluations: usize,
 }
 
 fn keep_better(best: &mut Option<(Vec<f64>, f64, f64)>, found: Found) {
@@ -294,7 +302,7 @@ fn keep_better(best: &mut Option<(Vec<f64>, f64, f64)>, found: Found) {
 }
 
 #[allow(clippy::too_many_arguments, reason = "one round with all that it needs")]
-fn run(
+pub(crate) fn run(
     task: &DesignTask<'_>,
     margins: &[f64],
     criterion: &dyn Criterion,

@@ -17,6 +17,7 @@ pub mod limits;
 mod motion;
 pub mod optimisers;
 pub mod paper_problem;
+mod restoration;
 pub mod step_wise;
 
 pub use derivative_free::{DerivativeFree, design_without_gradients};

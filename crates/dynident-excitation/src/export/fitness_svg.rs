@@ -21,6 +21,7 @@ pub fn fitness_csv(history: &[Generation]) -> String {
 }
 
 /// An SVG picture of the best (solid) and mean (thin) fitness of every generation on a logarithmic scale, with the known optimum dashed.
+/// The scale is that of the best: a mean beyond twice their largest (one individual without full rank is enough) is drawn at the top.
 pub fn fitness_svg(title: &str, history: &[Generation], optimum: Option<f64>) -> String {
     let (width, height) = (LEFT + PLOT[0] + 24.0, TOP + PLOT[1] + 56.0);
     let mut text = format!(
@@ -30,10 +31,10 @@ pub fn fitness_svg(title: &str, history: &[Generation], optimum: Option<f64>) ->
         escaped(title)
     );
     let drawn = |value: f64| value.is_finite() && value > 0.0;
-    let all = history.iter().flat_map(|g| [g.best, g.mean]).chain(optimum).filter(|value| drawn(*value));
+    let all = history.iter().map(|one| one.best).chain(optimum).filter(|value| drawn(*value));
     let (low, high) = all.fold((f64::INFINITY, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
     if low <= high {
-        let (low, high) = (0.92 * low, 1.08 * high);
+        let (low, high) = (0.92 * low, 2.0 * high);
         let x_of = |generation: usize| LEFT + PLOT[0] * generation as f64 / history.len().max(1) as f64;
         let y_of = |value: f64| TOP + PLOT[1] * (high / value).ln() / (high / low).ln();
         for value in ticks(low, high) {
@@ -54,13 +55,13 @@ pub fn fitness_svg(title: &str, history: &[Generation], optimum: Option<f64>) ->
                 PLOT[0]
             );
         }
-        let curves: [(&str, &str, fn(&Generation) -> f64); 2] =
-            [("mean", "#8fb8d8", |g| g.mean), ("best", "#1565a8", |g| g.best)];
-        for (name, colour, value) in curves {
+        let mean: Vec<f64> = history.iter().map(|one| one.mean.min(high)).collect();
+        let best: Vec<f64> = history.iter().map(|one| one.best).collect();
+        for (name, colour, values) in [("mean", "#8fb8d8", mean), ("best", "#1565a8", best)] {
             let mut path = String::new();
-            for (generation, one) in (1..).zip(history).filter(|(_, one)| drawn(value(one))) {
+            for (generation, value) in (1..).zip(values).filter(|(_, value)| drawn(*value)) {
                 let to = if path.is_empty() { 'M' } else { 'L' };
-                let _ = write!(path, "{to}{:.1} {:.1}", x_of(generation), y_of(value(one)));
+                let _ = write!(path, "{to}{:.1} {:.1}", x_of(generation), y_of(value));
             }
             let _ = writeln!(
                 text,

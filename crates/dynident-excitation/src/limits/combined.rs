@@ -39,9 +39,9 @@ pub(super) fn smallest_combination(set: &LimitSet, times_s: &[f64], motion: &Mot
             let (left, right) = (to - GOLDEN * (to - from), from + GOLDEN * (to - from));
             let (left, right) = (at(left), at(right));
             if left.0 <= right.0 {
-                to = right.1
+                to = right.1;
             } else {
-                from = left.1
+                from = left.1;
             }
             for found in [left, right] {
                 if found.0 < best.0 {
