@@ -137,13 +137,13 @@ fn case(index: usize) -> Case {
     let model = arm(index, &mut random);
     let known = index % 5 < 3;
     // Every second problem of random limits has hardly time to move at all.
-    let duration_s = if !known && index % 2 == 0 { 0.6 } else { random.uniform(1.5, 5.0) };
+    let duration_s = if !known && index.is_multiple_of(2) { 0.6 } else { random.uniform(1.5, 5.0) };
     // By blocks of ten and not by the index alone, so that arms and families meet.
     let family = family(index / 10 + index, model.dof(), duration_s);
     let limits = if known {
         let ranges = vec![[-1.0, 1.0]; model.dof()];
         let parameters = family.random(&ranges, &vec![2.0; model.dof()], &mut random);
-        around(&model, &*family, &parameters, index % 4 == 0)
+        around(&model, &*family, &parameters, index.is_multiple_of(4))
     } else {
         anyhow(&model, index, &mut random)
     };
