@@ -4,21 +4,23 @@
 //! (random starts on a coarse grid, restarts around the best, a polish on the fine grid), each within an evaluation budget, so that the result depends on the seed alone; a deadline only
 //! ends it early, with the best feasible trajectory so far.
 
+pub(crate) mod assess;
 mod metric;
 mod problem;
+mod restoration;
 mod rounds;
 
 use crate::criteria::Criterion;
 use crate::family::Family;
-use crate::information::Information;
-use crate::limits::{LimitSet, PeakSettings, peaks};
-use crate::motion::Motion;
+use crate::limits::LimitSet;
 use crate::optimisers::{AugmentedLagrangianState, OptimiserError};
+use assess::assess;
 use core::ops::ControlFlow;
 use core::sync::atomic::{AtomicU64, Ordering};
 use dynident_dynamics::PanelLayout;
 use dynident_model::sample::Random;
 use nalgebra::DMatrix;
+use restoration::restored;
 use rounds::{Candidate, Rounds};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -62,7 +64,7 @@ impl Default for DesignSettings {
 
 impl DesignSettings {
     /// Samples of the search grid.
-    fn search_grid(&self, family: &dyn Family) -> usize {
+    pub(crate) fn search_grid(&self, family: &dyn Family) -> usize {
         let each = family.parameters() / family.joints().max(1);
         // Whole registers.
         self.search_samples.unwrap_or_else(|| 96.max((5 * each).next_multiple_of(16))).max(8)
@@ -131,8 +133,9 @@ pub fn design(
     let logged = grid(task.family.duration_s(), (task.family.duration_s() * settings.rate_hz).round() as usize + 1);
     let coarse = grid(task.family.duration_s(), settings.search_grid(task.family));
     let rounds = Rounds { task, times: &coarse, logged: logged.len() };
+    let watch_all = watch;
     let watch = |round: &'static str| {
-        let (watch, evaluations) = (&watch, &evaluations);
+        let (watch, evaluations) = (&watch_all, &evaluations);
         move |value: f64, violation: f64| {
             let evaluations = evaluations.load(Ordering::Relaxed);
             watch(&DesignProgress { round, value, violation, evaluations }).is_break()
@@ -197,6 +200,13 @@ pub fn design(
             *margin += if *c > 0.0 { 1.2 * c + 1e-6 } else { 0.0 };
         }
     }
+    // A watch that breaks, like the clock, leaves it at that.
+    if kept.violation > 0.0 && !late() {
+        let stop = |progress: &DesignProgress| watch_all(progress).is_break() || late();
+        let used;
+        (kept, used) = restored(task, settings, kept, [&fine, &logged], &stop)?;
+        evaluations.fetch_add(used as u64, Ordering::Relaxed);
+    }
     Ok(Designed {
         figure: kept.figure,
         information: kept.information,
@@ -216,42 +226,6 @@ const POLISHES: usize = 6;
 /// Evaluations of a polish once the time is up: enough to come back inside the limits.
 const LAST_EVALUATIONS: usize = 300;
 
-/// A trajectory judged as it will be used: every logged sample, every limit between samples.
-struct Assessed {
-    parameters: Vec<f64>,
-    figure: Option<f64>,
-    information: DMatrix<f64>,
-    violation: f64,
-}
-
-impl Assessed {
-    fn better_than(&self, other: &Self) -> bool {
-        match (self.violation <= 0.0, other.violation <= 0.0) {
-            (true, true) => self.figure.unwrap_or(f64::INFINITY) < other.figure.unwrap_or(f64::INFINITY),
-            (true, false) => true,
-            (false, true) => false,
-            (false, false) => self.violation < other.violation,
-        }
-    }
-}
-
-/// Judges a trajectory; also gives the largest value of every limit's row.
-fn assess(
-    task: &DesignTask<'_>,
-    criterion: &dyn Criterion,
-    parameters: Vec<f64>,
-    fine: &[f64],
-    logged: &[f64],
-) -> (Assessed, Vec<f64>) {
-    let mut motion = Motion::default();
-    task.family.motion(&parameters, logged, &mut motion);
-    let information =
-        Information::new(task.limits.model(), task.layout, task.torque_std_nm, task.prior).of(&motion, 1.0);
-    let worst = extremes(task, &parameters, fine);
-    let violation = worst.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    (Assessed { figure: criterion.figure(&information), parameters, information, violation }, worst)
-}
-
 /// `count` equal steps from 0 to the duration, both ends included.
 pub fn grid(duration_s: f64, count: usize) -> Vec<f64> {
     (0..count).map(|k| duration_s * k as f64 / (count.max(2) - 1) as f64).collect()
@@ -265,7 +239,7 @@ fn joint_scales(parameters: &[f64], joints: usize) -> Vec<f64> {
 }
 
 /// Position ranges and speed limits for random starts.
-fn ranges(limits: &LimitSet) -> (Vec<[f64; 2]>, Vec<f64>) {
+pub(crate) fn ranges(limits: &LimitSet) -> (Vec<[f64; 2]>, Vec<f64>) {
     let range = |joint: &dynident_model::Joint| {
         let free = if joint.turns() { core::f64::consts::PI } else { 0.5 };
         let lower = joint.limits.lower.unwrap_or(-free).max(-free);
@@ -274,13 +248,4 @@ fn ranges(limits: &LimitSet) -> (Vec<[f64; 2]>, Vec<f64>) {
     };
     let joints = limits.model().joints();
     (joints.iter().map(range).collect(), joints.iter().map(|joint| joint.limits.velocity.unwrap_or(2.0)).collect())
-}
-
-/// The largest value of every limit's row, refined between samples.
-fn extremes(task: &DesignTask<'_>, parameters: &[f64], times: &[f64]) -> Vec<f64> {
-    let mut workspace = task.limits.workspace();
-    let found = peaks(task.limits, &mut workspace, times, PeakSettings::default(), |times, out| {
-        task.family.motion(parameters, times, out);
-    });
-    found.iter().map(|peak| peak.value).collect()
 }

@@ -6,6 +6,7 @@ pub mod check;
 mod column_products;
 pub mod criteria;
 mod definite_inverse;
+mod derivative_free;
 mod design;
 pub mod export;
 pub mod families;
@@ -16,7 +17,9 @@ pub mod limits;
 mod motion;
 pub mod optimisers;
 pub mod paper_problem;
+pub mod step_wise;
 
+pub use derivative_free::{DerivativeFree, design_without_gradients};
 pub use design::{DesignProgress, DesignSettings, DesignTask, Designed, design, grid};
 pub use family::Family;
 pub use forecast::{Direction, Forecast, forecast};

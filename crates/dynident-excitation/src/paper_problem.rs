@@ -16,8 +16,10 @@
 
 mod condition;
 mod smooth;
+mod smooth_stroke;
 
 pub use smooth::SmoothPaperProblem;
+pub(crate) use smooth_stroke::SmoothStroke;
 
 use crate::optimisers::{
     AugmentedLagrangianSettings, AugmentedLagrangianState, MultiStartResult, OptimiserError, Progress, multi_start,
@@ -41,7 +43,7 @@ pub struct Stroke {
 }
 
 impl Stroke {
-    fn of(x: &[f64]) -> Self {
+    pub(crate) fn of(x: &[f64]) -> Self {
         Self { amplitude_rad: x[0], steepness_per_s: x[1], window_s: x[2] }
     }
 
@@ -106,6 +108,11 @@ impl PaperLimit {
     /// By how much the limit is exceeded, as a share of it: 0.68 for 68 % too much, negative inside. None where the limit is zero.
     pub fn excess(&self) -> Option<f64> {
         (self.limit != 0.0).then(|| self.value / self.limit - 1.0)
+    }
+
+    /// The excess, zero inside, told a touch early, so that the lowest point of a graded penalty keeps the limits strictly; ground in rad of sine.
+    pub(crate) fn violation(&self) -> f64 {
+        self.excess().map_or(self.value, |excess| excess + 1e-6 * (1.0 + excess)).max(0.0)
     }
 }
 
@@ -230,27 +237,27 @@ impl PaperProblem {
 
     /// Every limit of (17) and (18) for both joints, kept or not.
     pub fn limits(&self, strokes: &[Stroke; 2]) -> Vec<PaperLimit> {
-        let mut limits = Vec::with_capacity(12);
+        (1..).zip(strokes).flat_map(|(joint, stroke)| self.limits_of(joint, stroke)).collect()
+    }
+
+    /// Every limit of (17) and (18) for one joint, which is only named by `joint`.
+    pub fn limits_of(&self, joint: usize, stroke: &Stroke) -> [PaperLimit; 6] {
         // At rest the stroke stands at f(-ωT/4).
         let rest = 1.0 / (1.0 + (0.25 * self.period_times_steepness).exp());
         let (rest_speed, rest_acceleration) = (rest * (1.0 - rest), rest * (1.0 - rest) * (1.0 - 2.0 * rest));
-        for (joint, stroke) in (1..).zip(strokes) {
-            let Stroke { amplitude_rad: a, steepness_per_s: w, .. } = *stroke;
-            let highest = a * (1.0 - rest);
-            // The sine is concave up to π: its lowest value is at an end of the stroke.
-            let dip = -(a * rest).sin().min(highest.sin()).min(if highest > 1.5 * PI { -1.0 } else { 1.0 });
-            for (quantity, value, limit) in [
-                (PaperQuantity::Position, highest, self.position_limit_rad),
-                (PaperQuantity::Speed, 0.25 * a * w, self.speed_limit),
-                (PaperQuantity::Acceleration, a * w * w * PEAK_OF_SECOND, self.acceleration_limit),
-                (PaperQuantity::RestSpeed, a * w * rest_speed, self.rest_limit),
-                (PaperQuantity::RestAcceleration, a * w * w * rest_acceleration, self.rest_limit),
-                (PaperQuantity::Ground, dip.max(0.0), 0.0),
-            ] {
-                limits.push(PaperLimit { joint, quantity, value, limit });
-            }
-        }
-        limits
+        let Stroke { amplitude_rad: a, steepness_per_s: w, .. } = *stroke;
+        let highest = a * (1.0 - rest);
+        // The sine is concave up to π: its lowest value is at an end of the stroke.
+        let dip = -(a * rest).sin().min(highest.sin()).min(if highest > 1.5 * PI { -1.0 } else { 1.0 });
+        [
+            (PaperQuantity::Position, highest, self.position_limit_rad),
+            (PaperQuantity::Speed, 0.25 * a * w, self.speed_limit),
+            (PaperQuantity::Acceleration, a * w * w * PEAK_OF_SECOND, self.acceleration_limit),
+            (PaperQuantity::RestSpeed, a * w * rest_speed, self.rest_limit),
+            (PaperQuantity::RestAcceleration, a * w * w * rest_acceleration, self.rest_limit),
+            (PaperQuantity::Ground, dip.max(0.0), 0.0),
+        ]
+        .map(|(quantity, value, limit)| PaperLimit { joint, quantity, value, limit })
     }
 
     /// H of equation 19: cond(M) + cond(Q), plus the penalty if any limit is broken. `x` is A1, ω1, δ1, A2, ω2, δ2.
@@ -274,12 +281,7 @@ impl PaperProblem {
     /// If `x` has fewer than six entries.
     pub fn graded_fitness(&self, x: &[f64]) -> f64 {
         let strokes = strokes(x);
-        let violation: f64 = self
-            .limits(&strokes)
-            .iter()
-            // A touch early, so that the lowest point keeps the limits strictly; ground in rad of sine.
-            .map(|limit| limit.excess().map_or(limit.value, |excess| excess + 1e-6 * (1.0 + excess)).max(0.0))
-            .sum();
+        let violation: f64 = self.limits(&strokes).iter().map(PaperLimit::violation).sum();
         let conditions: f64 = strokes.iter().map(|stroke| self.condition_number(stroke)).sum();
         conditions + self.penalty * violation
     }

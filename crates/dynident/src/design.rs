@@ -2,7 +2,8 @@
 
 use crate::cpu_time::cpu_seconds;
 use crate::design_file::{DESIGN_SCHEMA, DesignFile, DirectionForecast, ParameterForecast};
-use crate::design_section::{DesignSection, TorqueNoise};
+use crate::design_section::{CriterionChoice, DesignSection, TorqueNoise};
+use crate::design_windows::{WindowedFile, step_wise};
 use crate::error::Error;
 use crate::job::{RunOptions, joint_names, study_name};
 use crate::machine::Machine;
@@ -12,7 +13,10 @@ use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_excitation::check::{CHECK_RATE_HZ, LimitReport, VIOLATION, check_limits};
 use dynident_excitation::criteria::{ConditionNumber, Criterion, DOptimal};
 use dynident_excitation::limits::{LimitSet, Limits, diagnose};
-use dynident_excitation::{DesignProgress, DesignTask, Family, Information, Motion, design, forecast, grid};
+use dynident_excitation::optimisers::Generation;
+use dynident_excitation::{
+    DesignProgress, DesignTask, Family, Information, Motion, design, design_without_gradients, forecast, grid,
+};
 use nalgebra::DMatrix;
 use std::path::Path;
 
@@ -38,7 +42,21 @@ pub struct DesignOutcome {
     pub machine: Machine,
     /// The limits in force: the description's with the study's laid over them.
     pub limits: Limits,
+    /// The search by generations, for optimisers that have them; empty for gradients.
+    pub history: Vec<Generation>,
     family: Box<dyn Family>,
+}
+
+/// What a search has found.
+struct Found {
+    family: Box<dyn Family>,
+    parameters: Vec<f64>,
+    criterion: &'static str,
+    figure: Option<f64>,
+    windowed: Option<WindowedFile>,
+    history: Vec<Generation>,
+    evaluations: usize,
+    seconds: f64,
 }
 
 impl DesignOutcome {
@@ -96,32 +114,39 @@ pub fn design_study(
     let limits = Limits::from_model(model).overlaid(&section.limits);
     let set = LimitSet::new(&limits, model).map_err(|why| wrong("design.limits", &why))?;
     bounded(&machine, &limits).map_err(|why| wrong("design.limits", &why))?;
-    limits.check_duration(model, section.duration_s, LEAST_DISPLACEMENT).map_err(|why| wrong("design.limits", &why))?;
-    let family = section.family.family(model.dof(), section.duration_s).map_err(|why| wrong("design.family", &why))?;
     let torque_std_nm = torque_std(&section, &machine, &mut notes).map_err(|why| wrong("design", &why))?;
     let ones = vec![1.0; model.dof()];
 
-    let criteria = section.criterion.criteria();
-    let criteria: Vec<&dyn Criterion> = criteria.iter().map(|criterion| &**criterion).collect();
-    let task = DesignTask {
-        family: &*family,
-        criteria: &criteria,
-        limits: &set,
-        layout: &machine.layout,
-        torque_std_nm: if section.criterion.of_regressor() { &ones } else { &torque_std_nm },
-        prior: None,
+    let found = match &section.criterion {
+        CriterionChoice::WindowedCondition(windowed) => {
+            let windowed = step_wise(&section, windowed, &machine, &limits, watch);
+            let windowed = windowed.map_err(|why| wrong("design", &why))?;
+            notes.push(WINDOWED.to_owned());
+            Found {
+                family: Box::new(windowed.family),
+                parameters: windowed.parameters,
+                criterion: "windowed-condition",
+                figure: Some(windowed.file.condition_sum),
+                windowed: Some(windowed.file),
+                history: windowed.history,
+                evaluations: windowed.evaluations,
+                seconds: windowed.seconds,
+            }
+        }
+        _ => searched(&section, &machine, &limits, &set, &torque_std_nm, &wrong, watch)?,
     };
-    let designed = design(&task, &section.search, watch).map_err(|why| wrong("design", &why))?;
-
-    let motion_at = |times: &[f64], out: &mut Motion| family.motion(&designed.parameters, times, out);
-    let reports = check_limits(&limits, model, section.duration_s, CHECK_RATE_HZ, motion_at)
+    let duration_s = found.family.duration_s();
+    let motion_at = |times: &[f64], out: &mut Motion| found.family.motion(&found.parameters, times, out);
+    let reports = check_limits(&limits, model, duration_s, CHECK_RATE_HZ, motion_at)
         .map_err(|why| wrong("design.limits", &why))?;
-    let feasible = reports.iter().all(|report| !report.violated);
-    let diagnosis = if feasible { Vec::new() } else { sentences(&set, &section, &reports, &motion_at) };
+    let inside = reports.iter().all(|report| !report.violated);
+    let mut diagnosis = if inside { Vec::new() } else { sentences(&set, duration_s, &reports, &motion_at) };
+    diagnosis.extend(found.windowed.iter().flat_map(WindowedFile::sentences));
+    let feasible = diagnosis.is_empty();
 
     let rate_hz = section.search.rate_hz;
     let mut motion = Motion::default();
-    motion_at(&grid(section.duration_s, (section.duration_s * rate_hz).round() as usize + 1), &mut motion);
+    motion_at(&grid(duration_s, (duration_s * rate_hz).round() as usize + 1), &mut motion);
     let plain = Information::new(model, &machine.layout, &ones, None).of(&motion, 1.0);
     let weighted = Information::new(model, &machine.layout, &torque_std_nm, None).of(&motion, 1.0);
     let log_det = |information: &DMatrix<f64>| DOptimal.figure(information).map(|figure| -figure);
@@ -131,16 +156,17 @@ pub fn design_study(
         schema: DESIGN_SCHEMA,
         name: study_name(&study, study_path),
         joints: joint_names(&machine),
-        family: section.family.name(),
+        family: if found.windowed.is_some() { found.family.name() } else { section.family.name() },
         family_settings: section.family.clone(),
-        criterion: criteria.last().map_or("", |criterion| criterion.name()),
-        criterion_figure: designed.figure,
+        optimiser: found.windowed.as_ref().map_or(section.optimiser.name(), |windowed| windowed.optimiser),
+        criterion: found.criterion,
+        criterion_figure: found.figure,
         condition_number: condition(false),
         condition_number_scaled: condition(true),
         log_det: log_det(&plain),
         log_det_weighted: log_det(&weighted),
         base_columns: machine.base.count(),
-        duration_s: section.duration_s,
+        duration_s,
         rate_hz,
         torque_std_nm,
         feasible,
@@ -148,15 +174,61 @@ pub fn design_study(
         limits: reports,
         forecast,
         worst_directions,
-        evaluations: designed.evaluations,
+        windowed: found.windowed,
+        evaluations: found.evaluations,
         cpu_s: cpu_at_start.zip(cpu_seconds()).map(|(start, end)| end - start),
-        seconds: designed.seconds,
+        seconds: found.seconds,
         seed: section.search.seed,
         diagnosis,
         notes,
-        parameters: designed.parameters,
+        parameters: found.parameters,
     };
-    Ok(DesignOutcome { file, machine, limits, family })
+    Ok(DesignOutcome { file, machine, limits, history: found.history, family: found.family })
+}
+
+/// What a windowed design leaves to the check.
+const WINDOWED: &str = "the strokes are chosen by position, speed and acceleration of their joints; limits of jerk, torque, power and place are checked on the whole motion afterwards";
+
+/// The search for the ordinary problem: all joints at once, by gradients or without.
+fn searched(
+    section: &DesignSection,
+    machine: &Machine,
+    limits: &Limits,
+    set: &LimitSet,
+    torque_std_nm: &[f64],
+    wrong: &dyn Fn(&str, &dyn core::fmt::Display) -> Error,
+    watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
+) -> Result<Found, Error> {
+    let model = &machine.model;
+    limits.check_duration(model, section.duration_s, LEAST_DISPLACEMENT).map_err(|why| wrong("design.limits", &why))?;
+    let family = section.family.family(model.dof(), section.duration_s).map_err(|why| wrong("design.family", &why))?;
+    let ones = vec![1.0; model.dof()];
+    let criteria = section.criterion.criteria();
+    let criteria: Vec<&dyn Criterion> = criteria.iter().map(|criterion| &**criterion).collect();
+    let task = DesignTask {
+        family: &*family,
+        criteria: &criteria,
+        limits: set,
+        layout: &machine.layout,
+        torque_std_nm: if section.criterion.of_regressor() { &ones } else { torque_std_nm },
+        prior: None,
+    };
+    let (designed, history) = match section.optimiser.derivative_free() {
+        Some(optimiser) => design_without_gradients(&task, &section.search, &optimiser, watch),
+        None => design(&task, &section.search, watch).map(|designed| (designed, Vec::new())),
+    }
+    .map_err(|why| wrong("design", &why))?;
+    let criterion = criteria.last().map_or("", |criterion| criterion.name());
+    Ok(Found {
+        parameters: designed.parameters,
+        criterion,
+        figure: designed.figure,
+        windowed: None,
+        history,
+        evaluations: designed.evaluations,
+        seconds: designed.seconds,
+        family,
+    })
 }
 
 /// The study with smooth steps in place of signs: a sign has no slope to follow.
@@ -219,11 +291,11 @@ fn torque_std(section: &DesignSection, machine: &Machine, notes: &mut Vec<String
 /// Why the motion is not feasible.
 fn sentences(
     set: &LimitSet,
-    section: &DesignSection,
+    duration_s: f64,
     reports: &[LimitReport],
     motion_at: &dyn Fn(&[f64], &mut Motion),
 ) -> Vec<String> {
-    let times = grid(section.duration_s, (section.duration_s * DIAGNOSIS_RATE_HZ).ceil() as usize + 1);
+    let times = grid(duration_s, (duration_s * DIAGNOSIS_RATE_HZ).ceil() as usize + 1);
     let mut motion = Motion::default();
     motion_at(&times, &mut motion);
     let sentences = diagnose(set, &times, &motion).sentences();

@@ -1,6 +1,7 @@
 //! What `design.json` holds.
 
 use crate::design_section::FamilyChoice;
+use crate::design_windows::WindowedFile;
 use dynident_excitation::check::LimitReport;
 use serde::Serialize;
 
@@ -22,6 +23,8 @@ pub struct DesignFile {
     pub family_settings: FamilyChoice,
     /// The family's parameters of the motion found.
     pub parameters: Vec<f64>,
+    /// What looked for the motion.
+    pub optimiser: &'static str,
     /// The criterion.
     pub criterion: &'static str,
     /// The criterion's figure, smaller is better; none where a parameter is not excited.
@@ -52,6 +55,9 @@ pub struct DesignFile {
     pub forecast: Vec<ParameterForecast>,
     /// The combinations of parameters that will be known worst.
     pub worst_directions: Vec<DirectionForecast>,
+    /// The strokes of a windowed design, their condition numbers and the optimum beside them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub windowed: Option<WindowedFile>,
     /// Evaluations of criterion, limits and gradient.
     pub evaluations: usize,
     /// Processor seconds, all threads together; none where the system does not tell.

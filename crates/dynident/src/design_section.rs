@@ -1,5 +1,7 @@
 //! `[design]`: which motion is looked for, by what measure, within which limits.
 
+use crate::design_optimiser::{OptimiserChoice, name_or_table};
+use crate::design_windows::{GivenStroke, WindowedCondition};
 use dynident_excitation::criteria::{AOptimal, ConditionNumber, Criterion, DOptimal, EOptimal};
 use dynident_excitation::families::{
     BSpline, BSplineSettings, FamilyError, Fourier, FourierSettings, LogisticStrokes, LogisticStrokesSettings,
@@ -41,8 +43,14 @@ pub struct DesignSection {
     pub family: FamilyChoice,
     /// How long the motion lasts, s; 10 by default.
     pub duration_s: f64,
-    /// What makes a motion good; `"d-optimal"` by default.
+    /// What makes a motion good; `"d-optimal"` by default. A name, or a table with a `kind` and its settings.
+    #[serde(deserialize_with = "name_or_table")]
     pub criterion: CriterionChoice,
+    /// What looks for it; `"gradient"` by default. A name, or a table with a `kind` and its settings.
+    #[serde(deserialize_with = "name_or_table")]
+    pub optimiser: OptimiserChoice,
+    /// Strokes of a windowed design that are to be judged as they are, one a joint; nothing is searched then. Empty by default.
+    pub parameters: Vec<GivenStroke>,
     /// Standard deviation of each joint's torque, Nm (N): one number, or one per joint in the model's order. By default 1 % of the joint's effort limit, and 1 where there is none.
     pub torque_std_nm: Option<TorqueNoise>,
     /// How much is searched, and how finely; also the rate of the log and the seed.
@@ -57,6 +65,8 @@ impl Default for DesignSection {
             family: FamilyChoice::Fourier(FourierSettings::default()),
             duration_s: 10.0,
             criterion: CriterionChoice::default(),
+            optimiser: OptimiserChoice::default(),
+            parameters: Vec::new(),
             torque_std_nm: None,
             search: DesignSettings::default(),
             limits: Limits::default(),
@@ -112,8 +122,8 @@ impl FamilyChoice {
 }
 
 /// What makes a motion good.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum CriterionChoice {
     /// The volume of the confidence ellipsoid: `-log det D`.
     #[default]
@@ -126,11 +136,13 @@ pub enum CriterionChoice {
     ConditionNumber,
     /// The same after division of each column by its norm.
     ConditionNumberScaled,
+    /// The paper's sum of condition numbers over windows around the mid-points of logistic strokes.
+    WindowedCondition(WindowedCondition),
 }
 
 impl CriterionChoice {
     /// The criterion in the forms that a search uses one after another: smooth first, sharp last.
-    pub(crate) fn criteria(self) -> Vec<Box<dyn Criterion>> {
+    pub(crate) fn criteria(&self) -> Vec<Box<dyn Criterion>> {
         let condition = |scaled| -> Vec<Box<dyn Criterion>> {
             [40.0, 80.0].map(|order| -> Box<dyn Criterion> { Box::new(ConditionNumber { order, scaled }) }).into()
         };
@@ -138,13 +150,13 @@ impl CriterionChoice {
             Self::DOptimal => vec![Box::new(DOptimal)],
             Self::AOptimal => vec![Box::new(AOptimal)],
             Self::EOptimal => vec![Box::new(EOptimal::default())],
-            Self::ConditionNumber => condition(false),
+            Self::ConditionNumber | Self::WindowedCondition(_) => condition(false),
             Self::ConditionNumberScaled => condition(true),
         }
     }
 
     /// Whether torque noise plays no part: the figure is of the regressor itself.
-    pub(crate) fn of_regressor(self) -> bool {
+    pub(crate) fn of_regressor(&self) -> bool {
         matches!(self, Self::ConditionNumber | Self::ConditionNumberScaled)
     }
 }
@@ -173,6 +185,13 @@ impl DesignSection {
             }
         };
         within("duration_s", self.duration_s, 0.1, MAX_DURATION_S)?;
+        self.optimiser.validate()?;
+        if !self.parameters.is_empty() && !matches!(self.criterion, CriterionChoice::WindowedCondition(_)) {
+            return Err(
+                "parameters are strokes of a windowed design: give criterion = { kind = \"windowed-condition\" }"
+                    .to_owned(),
+            );
+        }
         let search = &self.search;
         within("search.rate_hz", search.rate_hz, 1.0, 1e5)?;
         let samples = self.duration_s * search.rate_hz;

@@ -7,7 +7,8 @@ use core::ops::ControlFlow;
 use core::sync::atomic::{AtomicBool, Ordering};
 use dynident::excitation::DesignProgress;
 use dynident::excitation::export::{
-    Preview, Sampled, UrScriptSettings, preview_svg, ros2_joint_trajectory, trajectory_csv, urscript, waypoints_csv,
+    Preview, Sampled, UrScriptSettings, fitness_csv, fitness_svg, preview_svg, ros2_joint_trajectory, trajectory_csv,
+    urscript, waypoints_csv,
 };
 use dynident::{DesignOutcome, RunOptions, Study, check_writable, design_study, write_whole};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -121,6 +122,12 @@ fn files(outcome: &DesignOutcome, options: &Options) -> Result<Vec<(&'static str
         preview_svg(sampled, &preview).map_err(|error| error.to_string())
     };
     let mut files = vec![("trajectory.csv", plain(trajectory_csv)?), ("preview.svg", at(PICTURE_RATE_HZ, &picture)?)];
+    if !outcome.history.is_empty() {
+        let title = format!("{}: {}", file.name, file.optimiser);
+        let optimum = file.windowed.as_ref().and_then(|windowed| windowed.optimum);
+        files.push(("fitness.csv", fitness_csv(&outcome.history).into_bytes()));
+        files.push(("fitness.svg", fitness_svg(&title, &outcome.history, optimum).into_bytes()));
+    }
     // A motion that breaks limits is for the eye, not for the robot.
     for format in options.to.iter().filter(|_| file.feasible) {
         files.push(match format {

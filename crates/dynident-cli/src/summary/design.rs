@@ -2,7 +2,7 @@
 
 use super::text::{name, percent, shortened, table, wrapped};
 use core::fmt::Write;
-use dynident::DesignFile;
+use dynident::{DesignFile, WindowedFile};
 use std::path::Path;
 
 /// Limits and parameters shown; the rest stand in the file.
@@ -30,6 +30,11 @@ pub(crate) fn design(d: &DesignFile, out: &Path, files: &[&str]) -> String {
         number(d.condition_number_scaled, 2),
         number(d.log_det, 1)
     );
+    if let Some(windowed) = &d.windowed {
+        text.push('\n');
+        text += &strokes(windowed);
+        text.push('\n');
+    }
     let khz = d.check_rate_hz / 1000.0;
     if d.feasible {
         let _ = writeln!(text, "feasible: every limit is kept, checked at {khz} kHz\n");
@@ -48,6 +53,31 @@ pub(crate) fn design(d: &DesignFile, out: &Path, files: &[&str]) -> String {
     }
     let _ = writeln!(text, "\n{} evaluations in {:.2} s, seed {}", d.evaluations, d.seconds, d.seed);
     text += &wrapped(&format!("wrote {}, {}", out.join("design.json").display(), files.join(", ")), 2);
+    text
+}
+
+/// The strokes of a windowed design and how far they are from the best ones.
+fn strokes(w: &WindowedFile) -> String {
+    let rows = w.strokes.iter().map(|stroke| {
+        let numbers = [
+            stroke.amplitude_rad,
+            stroke.steepness_per_s,
+            stroke.offset_rad,
+            stroke.period_s,
+            stroke.window_s,
+            stroke.condition_number,
+        ];
+        core::iter::once(name(&stroke.joint)).chain(numbers.map(|number| format!("{number:.3}"))).collect()
+    });
+    let head = ["stroke of", "A rad", "w 1/s", "h rad", "T s", "delta s", "condition"];
+    let mut text = table(&head.map(str::to_owned), 1..7, rows.collect());
+    let _ = writeln!(text, "H {:.3} by {}, condition numbers alone {:.3}", w.fitness, w.optimiser, w.condition_sum);
+    match w.optimum.zip(w.above_optimum_percent) {
+        Some((optimum, above)) => {
+            let _ = writeln!(text, "optimum inside the limits {optimum:.3}: {above:+.2} % from it");
+        }
+        None => text.push_str("no strokes inside the limits were found\n"),
+    }
     text
 }
 

@@ -25,4 +25,9 @@ impl Criterion for DOptimal {
     fn figure(&self, information: &DMatrix<f64>) -> Option<f64> {
         self.value_and_derivative(information).map(|(value, _)| value)
     }
+
+    /// `(det D)^(-1/n)`, the geometric mean of the variances along the axes of the ellipsoid.
+    fn fitness(&self, information: &DMatrix<f64>) -> Option<f64> {
+        self.figure(information).map(|figure| (figure / information.nrows() as f64).exp())
+    }
 }

@@ -30,4 +30,9 @@ pub trait Criterion: core::fmt::Debug + Send + Sync {
 
     /// The figure to report: the criterion itself, without smoothing.
     fn figure(&self, information: &DMatrix<f64>) -> Option<f64>;
+
+    /// A positive form of the figure, smaller is better, for optimisers that choose by 1/H.
+    fn fitness(&self, information: &DMatrix<f64>) -> Option<f64> {
+        self.figure(information)
+    }
 }

@@ -32,6 +32,8 @@ pub(super) struct Candidate {
     pub(super) state: AugmentedLagrangianState,
     /// The best point that kept the limits on the samples, or the least violating one.
     pub(super) feasible: Vec<f64>,
+    /// Largest violation on the samples there.
+    pub(super) violation: f64,
     /// What candidates are compared by: the criterion as it would be with all limits kept, and a penalty for what is not.
     pub(super) score: f64,
 }
@@ -134,6 +136,7 @@ impl Rounds<'_> {
                 } else {
                     f64::INFINITY
                 },
+                violation: run.violation,
                 feasible: run.best,
                 state: run.end,
             })

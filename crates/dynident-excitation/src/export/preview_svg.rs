@@ -142,7 +142,7 @@ fn plot(text: &mut String, [left, top]: [f64; 2], times: &[f64], values: &[f64],
 }
 
 /// Text as XML takes it; control characters have no place there.
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     let clean: String = text.chars().filter(|letter| !letter.is_control()).collect();
     clean.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

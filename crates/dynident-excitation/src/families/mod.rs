@@ -10,6 +10,7 @@
 //! | [`Multisine`]: Schroeder phases | 2 | with ramps |
 //! | [`FrictionLadder`]: constant-speed sweeps | 2 | exactly |
 //! | [`StaticPostures`]: K postures held | K | exactly |
+//! | [`StepWiseLogistic`]: spliced logistic functions, one joint after another | 2 | nearly (e^-10) |
 //! | [`Joined`]: families one after another | sum | as its members |
 
 mod b_spline;
@@ -30,6 +31,7 @@ mod random_start;
 mod sampled_basis;
 mod spliced_logistic;
 mod static_postures;
+mod step_wise;
 
 pub use b_spline::{BSpline, BSplineBasis, BSplineSettings};
 pub use error::FamilyError;
@@ -44,3 +46,4 @@ pub use multisine::{Multisine, MultisineBasis, MultisineSettings};
 pub use quintic::{Quintic, QuinticBasis, QuinticSettings};
 pub use spliced_logistic::{SplicedLogistic, SplicedLogisticSettings};
 pub use static_postures::{StaticPostures, StaticPosturesBasis, StaticPosturesSettings};
+pub use step_wise::{Step, StepWiseLogistic};

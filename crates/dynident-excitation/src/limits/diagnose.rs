@@ -1,14 +1,15 @@
 //! Why nothing feasible was found: which limits bind, where, and the smallest relaxation that would do.
 
+use super::combined::smallest_combination;
 use super::kind::{Constraint, LimitKind};
-use super::set::LimitSet;
+use super::set::{LimitSet, LimitWorkspace};
 use crate::motion::Motion;
 
 /// Values above this count as broken, as in the re-check.
 const TOLERANCE: f64 = 1e-6;
 
 /// The slowest run that is considered, as a multiple of the duration.
-const LARGEST_STRETCH: f64 = 1000.0;
+pub(super) const LARGEST_STRETCH: f64 = 1000.0;
 
 /// A limit that the best motion found still breaks.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +22,9 @@ pub struct BrokenLimit {
     pub at_s: f64,
 }
 
+/// What to change in one limit: `(subject, limit now, limit needed, unit)`. Ranges count from their middle.
+pub type LimitChange = (String, f64, f64, &'static str);
+
 /// One change that would make the motion feasible as it is.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Relaxation {
@@ -31,12 +35,21 @@ pub enum Relaxation {
         /// The longer duration, s.
         duration_s: f64,
     },
-    /// Other values of the limits of one kind, each as `(subject, limit now, limit needed, unit)`. Ranges count from their middle.
+    /// Other values of the limits of one kind.
     Limits {
         /// The kind.
         kind: LimitKind,
         /// What to change.
-        changes: Vec<(String, f64, f64, &'static str)>,
+        changes: Vec<LimitChange>,
+    },
+    /// Several changes at once, where no single one would do: those with the smallest sum of relative changes.
+    Combined {
+        /// Factor on the duration; 1 if a slower run is no part of it.
+        factor: f64,
+        /// The duration with it, s.
+        duration_s: f64,
+        /// Limits that must give as well.
+        changes: Vec<(LimitKind, LimitChange)>,
     },
 }
 
@@ -45,7 +58,8 @@ pub enum Relaxation {
 pub struct Diagnosis {
     /// Broken limits, worst first; empty for a feasible motion.
     pub broken: Vec<BrokenLimit>,
-    /// Single changes that would do, the smallest first (by relative change); empty if limits of several kinds are broken that no slower run mends.
+    /// Single changes that would do, the smallest first (by relative change). Where limits of several kinds are broken that no slower run mends, the smallest combination instead; empty only
+    /// where the motion is not finite.
     pub relaxations: Vec<Relaxation>,
 }
 
@@ -58,19 +72,7 @@ pub struct Diagnosis {
 /// If there is not one time per sample.
 pub fn diagnose(set: &LimitSet, times_s: &[f64], motion: &Motion) -> Diagnosis {
     assert_eq!(times_s.len(), motion.samples, "one time per sample");
-    let mut workspace = set.workspace();
-    let mut values = Vec::new();
-    set.values(&mut workspace, motion, &mut values);
-    let mut broken = Vec::new();
-    for (constraint, values) in set.constraints().iter().zip(values.chunks_exact(motion.samples.max(1))) {
-        let worst = values.iter().map(|c| if c.is_nan() { f64::INFINITY } else { *c }).zip(times_s);
-        if let Some((value, at_s)) = worst.max_by(|a, b| a.0.total_cmp(&b.0))
-            && value > TOLERANCE
-        {
-            broken.push(BrokenLimit { constraint: constraint.clone(), value, at_s: *at_s });
-        }
-    }
-    broken.sort_by(|a, b| b.value.total_cmp(&a.value));
+    let broken = broken_limits(set, &mut set.workspace(), times_s, motion);
     let mut sized = Vec::new();
     if let Some(first) = broken.first().map(|first| first.constraint.kind) {
         if broken.iter().all(|broken| broken.constraint.kind == first && broken.value.is_finite()) {
@@ -83,11 +85,37 @@ pub fn diagnose(set: &LimitSet, times_s: &[f64], motion: &Motion) -> Diagnosis {
         }
     }
     sized.sort_by(|a, b| a.0.total_cmp(&b.0));
-    Diagnosis { broken, relaxations: sized.into_iter().map(|(_, relaxation)| relaxation).collect() }
+    let mut relaxations: Vec<Relaxation> = sized.into_iter().map(|(_, relaxation)| relaxation).collect();
+    if relaxations.is_empty() && !broken.is_empty() {
+        relaxations.extend(smallest_combination(set, times_s, motion));
+    }
+    Diagnosis { broken, relaxations }
+}
+
+/// The limits that a motion breaks, worst first.
+pub(super) fn broken_limits(
+    set: &LimitSet,
+    workspace: &mut LimitWorkspace,
+    times_s: &[f64],
+    motion: &Motion,
+) -> Vec<BrokenLimit> {
+    let mut values = Vec::new();
+    set.values(workspace, motion, &mut values);
+    let mut broken = Vec::new();
+    for (constraint, values) in set.constraints().iter().zip(values.chunks_exact(motion.samples.max(1))) {
+        let worst = values.iter().map(|c| if c.is_nan() { f64::INFINITY } else { *c }).zip(times_s);
+        if let Some((value, at_s)) = worst.max_by(|a, b| a.0.total_cmp(&b.0))
+            && value > TOLERANCE
+        {
+            broken.push(BrokenLimit { constraint: constraint.clone(), value, at_s: *at_s });
+        }
+    }
+    broken.sort_by(|a, b| b.value.total_cmp(&a.value));
+    broken
 }
 
 /// The change of one limit that makes room for the motion.
-fn change(broken: &BrokenLimit) -> (String, f64, f64, &'static str) {
+pub(super) fn change(broken: &BrokenLimit) -> LimitChange {
     let Constraint { kind, subject, middle, size, unit } = &broken.constraint;
     let needed = broken.constraint.quantity(broken.value);
     let now = if *kind == LimitKind::Floor { *middle } else { *size };
@@ -95,7 +123,7 @@ fn change(broken: &BrokenLimit) -> (String, f64, f64, &'static str) {
 }
 
 /// The motion of `q(t / factor)` at the stretched times.
-fn stretched(motion: &Motion, factor: f64) -> Motion {
+pub(super) fn stretched(motion: &Motion, factor: f64) -> Motion {
     let scaled = |values: &[f64], by: f64| values.iter().map(|x| x * by).collect();
     let inverse = 1.0 / factor;
     Motion {
@@ -159,28 +187,36 @@ impl Diagnosis {
                     format!("The same path would do if run {factor:.4} times as long, in {duration_s:.3} s.")
                 }
                 Relaxation::Limits { kind, changes } => {
-                    let changes: Vec<String> = changes
-                        .iter()
-                        .map(|(subject, now, needed, unit)| {
-                            let what = match kind {
-                                LimitKind::Position | LimitKind::Box => "half range",
-                                LimitKind::Floor => "height",
-                                LimitKind::Column | LimitKind::SelfCollision => "distance",
-                                _ => "limit",
-                            };
-                            format!("`{subject}` {what} {needed:.4} {unit} instead of {now:.4}")
-                        })
-                        .collect();
+                    let changes: Vec<String> = changes.iter().map(|changed| in_words(*kind, changed)).collect();
                     format!("It would do to relax {kind} alone: {}.", changes.join(", "))
+                }
+                Relaxation::Combined { factor, duration_s, changes } => {
+                    let mut parts = Vec::new();
+                    if *factor > 1.0 {
+                        parts.push(format!("run the same path {factor:.4} times as long, in {duration_s:.3} s"));
+                    }
+                    parts.extend(changes.iter().map(|(kind, changed)| format!("{kind}: {}", in_words(*kind, changed))));
+                    format!(
+                        "No single change would do. The smallest together, by the sum of their shares: {}.",
+                        parts.join("; ")
+                    )
                 }
             });
         }
         if !self.broken.is_empty() && self.relaxations.is_empty() {
-            sentences.push(
-                "No single change would do: limits of several kinds are broken, and a slower run does not mend them."
-                    .to_owned(),
-            );
+            sentences.push("No change would do: the motion is not finite.".to_owned());
         }
         sentences
     }
+}
+
+/// One limit's change, with its factor where the limit is a magnitude.
+fn in_words(kind: LimitKind, (subject, now, needed, unit): &LimitChange) -> String {
+    let what = match kind {
+        LimitKind::Position | LimitKind::Box => "half range",
+        LimitKind::Floor => return format!("`{subject}` height {needed:.4} {unit} instead of {now:.4}"),
+        LimitKind::Column | LimitKind::SelfCollision => "distance",
+        _ => "limit",
+    };
+    format!("`{subject}` {what} {needed:.4} {unit} instead of {now:.4} (times {:.3})", needed / now)
 }

@@ -6,6 +6,7 @@
 
 mod between_samples;
 mod capsules;
+mod combined;
 mod description;
 mod diagnose;
 mod error;
@@ -26,7 +27,7 @@ mod wrench;
 
 pub use capsules::{BodyCapsule, CapsulePairs, LinkCapsule, SelfCollision};
 pub use description::{BoxLimit, ColumnLimit, FloorLimit, JointLimit, Limits, LinkPoint};
-pub use diagnose::{BrokenLimit, Diagnosis, Relaxation, diagnose};
+pub use diagnose::{BrokenLimit, Diagnosis, LimitChange, Relaxation, diagnose};
 pub use error::LimitError;
 pub use feasibility::shortest_duration_s;
 pub use kind::{Constraint, LimitKind};

@@ -24,22 +24,22 @@ pub struct SmoothPaperProblem {
 }
 
 /// Three pairs of singular values; speed, acceleration, both at rest, window.
-const PAIRS: usize = 3;
-const CONSTRAINTS_PER_JOINT: usize = PAIRS + 5;
-const MARGIN: f64 = 1e-6;
+pub(super) const PAIRS: usize = 3;
+pub(super) const CONSTRAINTS_PER_JOINT: usize = PAIRS + 5;
+pub(super) const MARGIN: f64 = 1e-6;
 
 /// A number and its gradient by A, ω, δ.
-type Slope = (f64, [f64; 3]);
+pub(super) type Slope = (f64, [f64; 3]);
 
 /// ln of the singular values of the odd block, large and small, and of the even one.
-struct LogSingular {
+pub(super) struct LogSingular {
     odd: [Slope; 2],
     even: Slope,
 }
 
 impl LogSingular {
     /// The pairs whose ratio may be the condition number, as differences of logarithms.
-    fn pairs(&self) -> [Slope; PAIRS] {
+    pub(super) fn pairs(&self) -> [Slope; PAIRS] {
         let [large, small] = self.odd;
         [(self.even, small), (large, small), (large, self.even)]
             .map(|(over, under)| (over.0 - under.0, core::array::from_fn(|i| over.1[i] - under.1[i])))
@@ -78,7 +78,7 @@ impl SmoothPaperProblem {
     }
 
     /// Sums over the later half of the window; the earlier one repeats them.
-    fn log_singular(&self, stroke: &Stroke) -> LogSingular {
+    pub(super) fn log_singular(&self, stroke: &Stroke) -> LogSingular {
         let Stroke { amplitude_rad: a, steepness_per_s: w, window_s } = *stroke;
         let gravity = self.problem.gravity;
         // Columns q̈, g sin p, g cos p with their gradients.
@@ -130,7 +130,7 @@ impl SmoothPaperProblem {
     }
 
     /// Value and gradient by A, ω, δ of every limit of one joint. All are products of powers: c = s Aᵃ ωʷ δᵈ - 1.
-    fn limits_of(&self, stroke: &Stroke) -> [Slope; CONSTRAINTS_PER_JOINT - PAIRS] {
+    pub(super) fn limits_of(&self, stroke: &Stroke) -> [Slope; CONSTRAINTS_PER_JOINT - PAIRS] {
         let problem = &self.problem;
         let quarter = 0.25 * problem.period_times_steepness;
         let rest = 1.0 / (1.0 + quarter.exp());

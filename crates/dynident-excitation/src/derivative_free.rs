@@ -1,0 +1,250 @@
+//! The same design by optimisers without derivatives, for comparison: the paper's genetic algorithm and CMA-ES, with penalties for what is broken.
+
+use crate::criteria::Criterion;
+use crate::design::assess::assess;
+use crate::design::{DesignProgress, DesignSettings, DesignTask, Designed, grid, ranges};
+use crate::information::Information;
+use crate::limits::LimitWorkspace;
+use crate::motion::Motion;
+use crate::optimisers::{
+    BinaryGeneticSettings, CmaEsSettings, Generation, OptimiserError, Progress, binary_genetic, cma_es,
+};
+use core::ops::ControlFlow;
+use dynident_model::sample::Random;
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+/// Which optimiser, and its settings.
+#[derive(Clone, Debug, PartialEq)]
+pub enum DerivativeFree {
+    /// [`binary_genetic()`].
+    Genetic(BinaryGeneticSettings),
+    /// [`cma_es()`].
+    CmaEs(CmaEsSettings),
+}
+
+/// Fitness added per unit of violation, and for a motion that does not excite every parameter.
+const PENALTY: f64 = 1000.0;
+
+/// First margin on samples for what lies between them, as a share of each limit.
+const MARGIN: f64 = 0.005;
+
+/// Searches at most: again with wider margins while something is broken between samples.
+const SEARCHES: usize = 3;
+
+/// Random starts that tell how large parameters are, and by how much the box around them is wider.
+const SIZED_BY: usize = 100;
+const WIDER: f64 = 1.3;
+
+/// Searches for [`design`](crate::design())'s task without gradients: the last criterion's [`fitness`](Criterion::fitness) plus 1000 times the sum of the largest violation of each limit.
+///
+/// Parameters are looked for in a box: the family's bounds, where they are finite, else what 100 random starts of the family span, 1.3 times as wide. The search grid is that of the settings; seed and
+/// time limit are theirs, too (a seed in the optimiser's own settings is not used). Up to three searches, with wider margins while something is broken between samples; the best motion by the
+/// check between samples is kept.
+///
+/// Also gives one [`Generation`] of the first search after another (for CMA-ES the best so far, three times).
+///
+/// # Errors
+/// If settings are out of range.
+pub fn design_without_gradients(
+    task: &DesignTask<'_>,
+    settings: &DesignSettings,
+    optimiser: &DerivativeFree,
+    watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
+) -> Result<(Designed, Vec<Generation>), OptimiserError> {
+    let begun = Instant::now();
+    let late = || settings.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > limit);
+    let criterion = task.criteria[task.criteria.len() - 1];
+    let times = grid(task.family.duration_s(), settings.search_grid(task.family));
+    let logged = grid(task.family.duration_s(), (task.family.duration_s() * settings.rate_hz).round() as usize + 1);
+    let fine = grid(task.family.duration_s(), 2 * times.len() - 1);
+    let weight = logged.len() as f64 / times.len() as f64;
+    let (bounds, start) = search_box(task, settings.seed);
+    let mut margins = vec![MARGIN; task.limits.constraints().len()];
+    let mut kept = None;
+    let (mut history, mut evaluations) = (Vec::new(), 0);
+    for search in 0..SEARCHES {
+        let objective = Objective { task, criterion, times: &times, weight, margins: &margins, idle: Mutex::default() };
+        let fitness = |parameters: &[f64]| objective.fitness(parameters);
+        let mut stopped = false;
+        let mut curve = Vec::new();
+        let mut hear = |progress: &Progress<'_>| {
+            curve.push(Generation { best: progress.value, best_so_far: progress.value, mean: progress.value });
+            let told = DesignProgress {
+                round: "generations",
+                value: progress.value,
+                violation: 0.0,
+                evaluations: (evaluations + progress.evaluations) as u64,
+            };
+            stopped = watch(&told).is_break() || late();
+            if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let seed = settings.seed.wrapping_add(search as u64);
+        let (best, used) = match optimiser {
+            DerivativeFree::Genetic(own) => {
+                let own = BinaryGeneticSettings { seed, ..own.clone() };
+                let result = binary_genetic(fitness, &bounds, &own, &mut hear)?;
+                curve = result.history;
+                (result.best, result.evaluations)
+            }
+            DerivativeFree::CmaEs(own) => {
+                let own = CmaEsSettings { seed, ..own.clone() };
+                let steps: Vec<f64> = bounds.iter().map(|[lower, upper]| 0.15 * (upper - lower)).collect();
+                let result = cma_es(fitness, &start, &steps, &bounds, &own, &mut hear)?;
+                (result.best, result.evaluations)
+            }
+        };
+        evaluations += used;
+        if search == 0 {
+            history = curve;
+        }
+        let (found, worst) = assess(task, criterion, best, &fine, &logged);
+        let whole = found.violation <= 0.0;
+        if kept.as_ref().is_none_or(|kept| found.better_than(kept)) {
+            kept = Some(found);
+        }
+        if whole || stopped || late() {
+            break;
+        }
+        for (margin, c) in margins.iter_mut().zip(&worst) {
+            *margin += 2.0 * c.max(0.0);
+        }
+    }
+    let kept = kept.ok_or(OptimiserError::Start)?;
+    let designed = Designed {
+        figure: kept.figure,
+        information: kept.information,
+        violation: kept.violation,
+        parameters: kept.parameters,
+        evaluations,
+        seconds: begun.elapsed().as_secs_f64(),
+    };
+    Ok((designed, history))
+}
+
+/// The box, and a random start of the family in it.
+fn search_box(task: &DesignTask<'_>, seed: u64) -> (Vec<[f64; 2]>, Vec<f64>) {
+    let mut random = Random::new(seed);
+    let (positions, speeds) = ranges(task.limits);
+    let starts: Vec<Vec<f64>> = (0..SIZED_BY).map(|_| task.family.random(&positions, &speeds, &mut random)).collect();
+    let bounds = task.family.bounds().into_iter().enumerate().map(|(parameter, [lower, upper])| {
+        let seen = starts.iter().map(|start| start[parameter]);
+        let (low, high) = seen.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        let (middle, half) = (f64::midpoint(low, high), (WIDER * 0.5 * (high - low)).max(1e-6));
+        let own = [lower, upper];
+        let sized = [middle - half, middle + half];
+        let bound = [own[0].max(sized[0]), own[1].min(sized[1])];
+        if own[0].is_finite() && own[1].is_finite() { own } else { bound }
+    });
+    let bounds: Vec<[f64; 2]> = bounds.collect();
+    let start = starts.into_iter().next().unwrap_or_default();
+    (bounds, start)
+}
+
+/// Fitness of parameters, with scratch for as many threads as ask at once.
+struct Objective<'a> {
+    task: &'a DesignTask<'a>,
+    criterion: &'a dyn Criterion,
+    times: &'a [f64],
+    weight: f64,
+    margins: &'a [f64],
+    idle: Mutex<Vec<Scratch<'a>>>,
+}
+
+struct Scratch<'a> {
+    information: Information<'a>,
+    workspace: LimitWorkspace,
+    motion: Motion,
+    values: Vec<f64>,
+}
+
+impl Objective<'_> {
+    fn fitness(&self, parameters: &[f64]) -> f64 {
+        let task = self.task;
+        let idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut scratch = idle.unwrap_or_else(|| Scratch {
+            information: Information::new(task.limits.model(), task.layout, task.torque_std_nm, task.prior),
+            workspace: task.limits.workspace(),
+            motion: Motion::default(),
+            values: Vec::new(),
+        });
+        let Scratch { information, workspace, motion, values } = &mut scratch;
+        task.family.motion(parameters, self.times, motion);
+        task.limits.values(workspace, motion, values);
+        let rows = values.chunks_exact(self.times.len()).zip(self.margins);
+        let violation: f64 = rows
+            .map(|(row, margin)| {
+                row.iter().fold(0.0_f64, |worst, c| if c.is_nan() { f64::INFINITY } else { worst.max(c + margin) })
+            })
+            .sum();
+        let fitness = self.criterion.fitness(&information.of(motion, self.weight)).unwrap_or(PENALTY);
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
+        fitness + PENALTY * violation
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Family;
+    use crate::criteria::DOptimal;
+    use crate::families::{Fourier, FourierSettings};
+    use crate::limits::{JointLimit, LimitSet, Limits};
+    use dynident_dynamics::{BaseParameterSettings, BaseParameters, PanelLayout};
+    use dynident_model::sample::planar_2r;
+
+    #[test]
+    fn both_find_feasible_motions_that_are_better_than_random_ones_on_any_number_of_threads() {
+        let mut random = Random::new(5);
+        let arm = planar_2r(1.0, random.body(), random.body());
+        let joint = |name: &str| JointLimit {
+            joint: name.to_owned(),
+            position: Some([-2.0, 2.0]),
+            speed: Some(2.0),
+            acceleration: Some(6.0),
+            ..JointLimit::default()
+        };
+        let limits = Limits { joints: vec![joint("joint1"), joint("joint2")], ..Limits::default() };
+        let set = LimitSet::new(&limits, &arm).unwrap();
+        let family = Fourier::new(2, 6.0, &FourierSettings { harmonics: 3, ..FourierSettings::default() }).unwrap();
+        let base = BaseParameters::new(&arm, &[], &BaseParameterSettings::default());
+        let layout = PanelLayout::new(&arm, base.base_columns());
+        let task = DesignTask {
+            family: &family,
+            criteria: &[&DOptimal],
+            limits: &set,
+            layout: &layout,
+            torque_std_nm: &[1.0, 1.0],
+            prior: None,
+        };
+        let settings = DesignSettings { search_samples: 48, ..DesignSettings::default() };
+        let genetic = BinaryGeneticSettings { generations: 120, elite: true, ..BinaryGeneticSettings::default() };
+        let cma = CmaEsSettings { max_evaluations: 4000, ..CmaEsSettings::default() };
+        for (optimiser, generations) in [(DerivativeFree::Genetic(genetic), 120), (DerivativeFree::CmaEs(cma), 1)] {
+            let run = |threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| {
+                    design_without_gradients(&task, &settings, &optimiser, |_| ControlFlow::Continue(())).unwrap()
+                })
+            };
+            let (designed, history) = run(1);
+            assert!(designed.violation <= 0.0, "{optimiser:?}: {}", designed.violation);
+            assert!(history.len() >= generations);
+            assert!(history.windows(2).all(|w| w[1].best_so_far <= w[0].best_so_far));
+            // The median random start is inside position and speed limits; a search must beat it by more than a factor e in the determinant.
+            let (positions, speeds) = ranges(&set);
+            let logged = grid(6.0, 601);
+            let mut figures: Vec<f64> = (0..21)
+                .map(|_| {
+                    let mut motion = Motion::default();
+                    family.motion(&family.random(&positions, &speeds, &mut random), &logged, &mut motion);
+                    let d = Information::new(&arm, &layout, &[1.0, 1.0], None).of(&motion, 1.0);
+                    DOptimal.figure(&d).unwrap()
+                })
+                .collect();
+            figures.sort_by(f64::total_cmp);
+            assert!(designed.figure.unwrap() < figures[10] - 1.0, "{:?} {figures:?}", designed.figure);
+            assert_eq!(run(2).0.parameters, designed.parameters);
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! A trajectory judged as it will be used.
+
+use super::DesignTask;
+use crate::criteria::Criterion;
+use crate::information::Information;
+use crate::limits::{PeakSettings, peaks};
+use crate::motion::Motion;
+use nalgebra::DMatrix;
+
+/// A trajectory judged as it will be used: every logged sample, every limit between samples.
+pub(crate) struct Assessed {
+    pub(crate) parameters: Vec<f64>,
+    pub(crate) figure: Option<f64>,
+    pub(crate) information: DMatrix<f64>,
+    pub(crate) violation: f64,
+}
+
+impl Assessed {
+    pub(crate) fn better_than(&self, other: &Self) -> bool {
+        match (self.violation <= 0.0, other.violation <= 0.0) {
+            (true, true) => self.figure.unwrap_or(f64::INFINITY) < other.figure.unwrap_or(f64::INFINITY),
+            (true, false) => true,
+            (false, true) => false,
+            (false, false) => self.violation < other.violation,
+        }
+    }
+}
+
+/// Judges a trajectory; also gives the largest value of every limit's row.
+pub(crate) fn assess(
+    task: &DesignTask<'_>,
+    criterion: &dyn Criterion,
+    parameters: Vec<f64>,
+    fine: &[f64],
+    logged: &[f64],
+) -> (Assessed, Vec<f64>) {
+    let mut motion = Motion::default();
+    task.family.motion(&parameters, logged, &mut motion);
+    let information =
+        Information::new(task.limits.model(), task.layout, task.torque_std_nm, task.prior).of(&motion, 1.0);
+    let worst = extremes(task, &parameters, fine);
+    let violation = worst.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    (Assessed { figure: criterion.figure(&information), parameters, information, violation }, worst)
+}
+
+/// The largest value of every limit's row, refined between samples.
+fn extremes(task: &DesignTask<'_>, parameters: &[f64], times: &[f64]) -> Vec<f64> {
+    let mut workspace = task.limits.workspace();
+    let found = peaks(task.limits, &mut workspace, times, PeakSettings::default(), |times, out| {
+        task.family.motion(parameters, times, out);
+    });
+    found.iter().map(|peak| peak.value).collect()
+}

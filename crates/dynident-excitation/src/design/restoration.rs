@@ -1,0 +1,104 @@
+//! When a search ends outside the limits: a search for the limits alone.
+
+use super::assess::{Assessed, assess};
+use super::rounds::Rounds;
+use super::{DesignProgress, DesignSettings, DesignTask, ranges};
+use crate::criteria::{Criterion, Valued};
+use crate::optimisers::OptimiserError;
+use dynident_model::sample::Random;
+use nalgebra::DMatrix;
+
+/// Random starts beside the best so far, and evaluations of each descent at least: a small search must still find its way inside.
+const STARTS: usize = 4;
+const EVALUATIONS: usize = 250;
+
+/// Descents from one start, with wider margins while something is broken between samples, and the most that one of them widens.
+const ROUNDS: usize = 4;
+const WIDEST: f64 = 0.02;
+
+/// First margin on samples, as a share of each limit.
+const MARGIN: f64 = 0.003;
+
+/// Nothing to be gained but the limits.
+#[derive(Debug)]
+struct Anything;
+
+impl Criterion for Anything {
+    fn name(&self) -> &'static str {
+        "anything"
+    }
+
+    fn value_and_derivative(&self, information: &DMatrix<f64>) -> Valued {
+        Some((0.0, DMatrix::zeros(information.nrows(), information.ncols())))
+    }
+
+    fn figure(&self, _: &DMatrix<f64>) -> Option<f64> {
+        Some(0.0)
+    }
+
+    /// The first penalty is a fiftieth of it; nothing is to be found outside the limits here.
+    fn scale(&self, _: usize) -> f64 {
+        500.0
+    }
+}
+
+/// The best motion, if need be after a search for the limits alone: from the best so far and from random starts, until one keeps every limit between samples; from there one more descent by the criterion.
+/// Starts follow one another, so that the first that succeeds is the same on any number of threads. Also the number of evaluations.
+///
+/// A criterion can hold a search outside: its slope grows without end as an ill-conditioned motion is pressed into narrow limits, while the penalty only grows in steps.
+pub(crate) fn restored(
+    task: &DesignTask<'_>,
+    settings: &DesignSettings,
+    kept: Assessed,
+    [fine, logged]: [&[f64]; 2],
+    stop: &(dyn Fn(&DesignProgress) -> bool + Sync),
+) -> Result<(Assessed, usize), OptimiserError> {
+    let criterion = task.criteria[task.criteria.len() - 1];
+    let mut random = Random::new(settings.seed ^ 0x5e57);
+    let (positions, speeds) = ranges(task.limits);
+    let (mut best, mut evaluations) = (kept, 0);
+    let tell = |value: f64, violation: f64, evaluations: usize| {
+        stop(&DesignProgress { round: "restoration", value, violation, evaluations: evaluations as u64 })
+    };
+    let rounds = Rounds { task, times: fine, logged: logged.len() };
+    for start in 0..=STARTS {
+        let mut parameters =
+            if start == 0 { best.parameters.clone() } else { task.family.random(&positions, &speeds, &mut random) };
+        let mut margins = vec![MARGIN; task.limits.constraints().len()];
+        for _ in 0..ROUNDS {
+            let budget = settings.polish_evaluations.max(EVALUATIONS);
+            let found = rounds.polish(&Anything, &margins, parameters.into(), budget, |value, violation| {
+                violation <= 0.0 || tell(value, violation, evaluations)
+            })?;
+            evaluations += found.evaluations;
+            parameters = found.best.feasible;
+            let (assessed, worst) = assess(task, criterion, parameters.clone(), fine, logged);
+            let (whole, on_samples) = (assessed.violation <= 0.0, found.best.violation <= MARGIN);
+            if assessed.better_than(&best) {
+                best = assessed;
+            }
+            if whole {
+                let budget = settings.polish_evaluations;
+                let found = rounds.polish(criterion, &margins, parameters.into(), budget, |value, violation| {
+                    tell(value, violation, evaluations)
+                })?;
+                evaluations += found.evaluations;
+                let (assessed, _) = assess(task, criterion, found.best.feasible, fine, logged);
+                if assessed.better_than(&best) {
+                    best = assessed;
+                }
+                return Ok((best, evaluations));
+            }
+            if !on_samples || tell(0.0, best.violation, evaluations) {
+                break;
+            }
+            for (margin, c) in margins.iter_mut().zip(&worst) {
+                *margin += if *c > 0.0 { c.min(WIDEST) + 1e-6 } else { 0.0 };
+            }
+        }
+        if tell(0.0, best.violation, evaluations) {
+            break;
+        }
+    }
+    Ok((best, evaluations))
+}

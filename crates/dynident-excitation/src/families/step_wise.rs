@@ -1,0 +1,168 @@
+//! The paper's experiment as one motion: spliced logistic functions of one joint after another, while the others rest.
+
+use super::error::FamilyError;
+use super::spliced_logistic::{SplicedLogistic, SplicedLogisticSettings};
+use crate::family::Family;
+use crate::motion::{Motion, MotionCotangent};
+use dynident_model::sample::Random;
+
+/// Free numbers a step: A, ω.
+const EACH: usize = 2;
+
+/// One joint's turn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Step {
+    /// The joint that moves.
+    pub joint: usize,
+    /// Its period T, s.
+    pub period_s: f64,
+}
+
+/// [`SplicedLogistic`] of single joints, one after another. Parameters: A in rad (m) and ω in 1/s of each step, in the order of the steps.
+///
+/// Before and after its turn a joint stands where its function starts, A/(1 + e^(ωT/4)) from its offset; a joint without a turn stands at its offset. Speed and acceleration jump by what the splice leaves
+/// (Eq. 17 of the paper asks for less than 1e-4).
+#[derive(Clone, Debug)]
+pub struct StepWiseLogistic {
+    offsets: Vec<f64>,
+    steps: Vec<Turn>,
+    duration_s: f64,
+}
+
+#[derive(Clone, Debug)]
+struct Turn {
+    joint: usize,
+    start_s: f64,
+    family: SplicedLogistic,
+}
+
+impl StepWiseLogistic {
+    /// The family for joints with these offsets h (rad, m). Of `settings` it takes ωT and the repetitions.
+    ///
+    /// # Errors
+    /// As [`SplicedLogistic::new`] for each step.
+    ///
+    /// # Panics
+    /// If a step names a joint that has no offset.
+    pub fn new(offsets: &[f64], steps: &[Step], settings: &SplicedLogisticSettings) -> Result<Self, FamilyError> {
+        let mut start_s = 0.0;
+        let mut turns = Vec::with_capacity(steps.len());
+        for step in steps {
+            let lasts_s = step.period_s * settings.repetitions as f64;
+            let own = SplicedLogisticSettings {
+                periods_s: Some(vec![step.period_s]),
+                offsets: Some(vec![offsets[step.joint]]),
+                ..settings.clone()
+            };
+            turns.push(Turn { joint: step.joint, start_s, family: SplicedLogistic::new(1, lasts_s, &own)? });
+            start_s += lasts_s;
+        }
+        Ok(Self { offsets: offsets.to_vec(), steps: turns, duration_s: start_s })
+    }
+}
+
+impl Turn {
+    fn moves(&self, time_s: f64) -> bool {
+        (self.start_s..=self.start_s + self.family.duration_s()).contains(&time_s)
+    }
+
+    fn own_times(&self, times_s: &[f64]) -> Vec<f64> {
+        times_s.iter().map(|time| (time - self.start_s).clamp(0.0, self.family.duration_s())).collect()
+    }
+}
+
+impl Family for StepWiseLogistic {
+    fn name(&self) -> &'static str {
+        "step_wise_logistic"
+    }
+
+    fn joints(&self) -> usize {
+        self.offsets.len()
+    }
+
+    fn duration_s(&self) -> f64 {
+        self.duration_s
+    }
+
+    fn parameters(&self) -> usize {
+        EACH * self.steps.len()
+    }
+
+    fn bounds(&self) -> Vec<[f64; 2]> {
+        self.steps.iter().flat_map(|turn| turn.family.bounds()).collect()
+    }
+
+    fn random(&self, ranges: &[[f64; 2]], speeds: &[f64], random: &mut Random) -> Vec<f64> {
+        let one = |turn: &Turn| turn.family.random(&[ranges[turn.joint]], &[speeds[turn.joint]], random);
+        self.steps.iter().flat_map(one).collect()
+    }
+
+    fn motion(&self, parameters: &[f64], times_s: &[f64], out: &mut Motion) {
+        assert_eq!(parameters.len(), self.parameters(), "parameters of {}", self.name());
+        out.reset(self.offsets.len(), times_s.len());
+        for (joint, offset) in self.offsets.iter().enumerate() {
+            let of = out.of(joint);
+            out.q[of].fill(*offset);
+        }
+        let mut alone = Motion::default();
+        for (turn, own) in self.steps.iter().zip(parameters.chunks_exact(EACH)) {
+            turn.family.motion(own, &turn.own_times(times_s), &mut alone);
+            for (sample, (at, time)) in out.of(turn.joint).zip(times_s).enumerate() {
+                out.q[at] = alone.q[sample];
+                if turn.moves(*time) {
+                    (out.dq[at], out.ddq[at], out.dddq[at]) = (alone.dq[sample], alone.ddq[sample], alone.dddq[sample]);
+                }
+            }
+        }
+    }
+
+    fn pull_back(&self, parameters: &[f64], times_s: &[f64], cotangent: &MotionCotangent, gradient: &mut [f64]) {
+        assert_eq!(gradient.len(), self.parameters(), "gradient of {}", self.name());
+        let mut alone = Motion::default();
+        let parts = parameters.chunks_exact(EACH).zip(gradient.chunks_exact_mut(EACH));
+        for (turn, (own, gradient)) in self.steps.iter().zip(parts) {
+            alone.reset(1, times_s.len());
+            for (sample, (at, time)) in cotangent.of(turn.joint).zip(times_s).enumerate() {
+                alone.q[sample] = cotangent.q[at];
+                if turn.moves(*time) {
+                    (alone.dq[sample], alone.ddq[sample], alone.dddq[sample]) =
+                        (cotangent.dq[at], cotangent.ddq[at], cotangent.dddq[at]);
+                }
+            }
+            turn.family.pull_back(own, &turn.own_times(times_s), &alone, gradient);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::families::check;
+    use crate::grid;
+
+    fn family() -> StepWiseLogistic {
+        let steps = [Step { joint: 1, period_s: 40.0 }, Step { joint: 0, period_s: 20.0 }];
+        StepWiseLogistic::new(&[0.1, 0.2, 0.3], &steps, &SplicedLogisticSettings::default()).unwrap()
+    }
+
+    #[test]
+    fn one_joint_moves_at_a_time_and_peaks_as_equation_16_says() {
+        let family = family();
+        let times = grid(60.0, 6001);
+        let mut motion = Motion::default();
+        family.motion(&[2.0, 1.0, 1.5, 2.0], &times, &mut motion);
+        for sample in 0..times.len() {
+            assert!((0..3).filter(|joint| motion.dq[joint * 6001 + sample] != 0.0).count() <= 1);
+            assert_eq!(motion.q[2 * 6001 + sample], 0.3);
+        }
+        // Aω/4 at T/4, which is on the grid. Rounding.
+        assert!((motion.dq[6001 + 1000] - 0.5).abs() < 1e-12 && (motion.dq[4500] - 0.75).abs() < 1e-12);
+    }
+
+    #[test]
+    fn gradients_are_exact() {
+        let family = family();
+        let times = grid(60.0, 101);
+        check::gradient_on(&family, &[2.0, 1.1, 1.5, 2.2], &times, 4);
+    }
+}

@@ -1,0 +1,80 @@
+//! `[design] optimiser`: what looks for the motion.
+
+use core::fmt;
+use core::marker::PhantomData;
+use dynident_excitation::DerivativeFree;
+use dynident_excitation::optimisers::{BinaryGeneticSettings, CmaEsSettings};
+use serde::de::value::{MapAccessDeserializer, MapDeserializer};
+use serde::de::{Error as _, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// An optimiser by its `kind`, with its own settings beside it; the name alone stands for the defaults.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum OptimiserChoice {
+    /// Many starts, exact gradients, augmented Lagrangian.
+    #[default]
+    Gradient,
+    /// CMA-ES with a penalty in proportion to what is broken.
+    CmaEs(CmaEsSettings),
+    /// The paper's genetic algorithm.
+    Genetic(BinaryGeneticSettings),
+}
+
+impl OptimiserChoice {
+    /// The `kind` in study files and results.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Gradient => "gradient",
+            Self::CmaEs(_) => "cma-es",
+            Self::Genetic(_) => "genetic",
+        }
+    }
+
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// The first that is out of range, and a seed: the search has one already.
+    pub fn validate(&self) -> Result<(), String> {
+        let (valid, seed) = match self {
+            Self::Gradient => return Ok(()),
+            Self::CmaEs(settings) => (settings.validate(), settings.seed),
+            Self::Genetic(settings) => (settings.validate(), settings.seed),
+        };
+        valid.map_err(|error| format!("optimiser: {error}"))?;
+        if seed != 0 {
+            return Err(format!("optimiser.seed = {seed}: give the seed as search.seed (or --seed)"));
+        }
+        Ok(())
+    }
+
+    /// The optimiser for the ordinary problem; none for gradients.
+    pub(crate) fn derivative_free(&self) -> Option<DerivativeFree> {
+        match self {
+            Self::Gradient => None,
+            Self::CmaEs(settings) => Some(DerivativeFree::CmaEs(settings.clone())),
+            Self::Genetic(settings) => Some(DerivativeFree::Genetic(settings.clone())),
+        }
+    }
+}
+
+/// Reads a choice that is tagged by `kind` from a table, or from its name alone.
+pub(crate) fn name_or_table<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<T, D::Error> {
+    struct NameOrTable<T>(PhantomData<T>);
+    impl<'de, T: Deserialize<'de>> Visitor<'de> for NameOrTable<T> {
+        type Value = T;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("a name, or a table with a `kind`")
+        }
+
+        fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<T, E> {
+            T::deserialize(MapDeserializer::<_, E>::new(core::iter::once(("kind", name.to_owned())))).map_err(E::custom)
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, table: A) -> Result<T, A::Error> {
+            T::deserialize(MapAccessDeserializer::new(table)).map_err(A::Error::custom)
+        }
+    }
+    from.deserialize_any(NameOrTable(PhantomData))
+}

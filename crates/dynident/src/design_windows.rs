@@ -1,0 +1,402 @@
+//! The paper's criterion over windows as a study asks for it, solved by any optimiser, with the optimum beside it.
+
+use crate::design_optimiser::OptimiserChoice;
+use crate::design_section::{DesignSection, FamilyChoice};
+use crate::machine::Machine;
+use core::ops::ControlFlow;
+use dynident_excitation::families::{SplicedLogisticSettings, Step, StepWiseLogistic};
+use dynident_excitation::limits::Limits;
+use dynident_excitation::optimisers::{
+    BinaryGeneticSettings, CmaEsSettings, Generation, Progress, binary_genetic, cma_es,
+};
+use dynident_excitation::paper_problem::{PaperProblem, PaperQuantity, Stroke};
+use dynident_excitation::step_wise::{StepWiseJoint, StepWiseProblem, gravity_across};
+use dynident_excitation::{DesignProgress, Family};
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+
+/// Random starts of the gradient optimiser for each joint.
+const STARTS: usize = 4;
+
+/// A joint without position limits: more than any range of amplitudes.
+const FREE_RAD: f64 = 1e6;
+
+/// Which joints move while others rest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum WindowedProblem {
+    /// One joint after another makes its stroke, from the tip to the base, while all others rest at their offsets: the paper's Q for the tip joint, then M for the base joint.
+    #[default]
+    StepWise,
+}
+
+/// The sum of condition numbers over windows around the mid-points of the strokes (the paper's equation 19 and Fig. 6).
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct WindowedCondition {
+    /// Which joints move while others rest; `"step-wise"` is the one there is.
+    pub problem: WindowedProblem,
+    /// The joints that take part, in the order in which they move. Default: all, from the tip to the base.
+    pub joints: Option<Vec<String>>,
+    /// ε: what a broken limit adds to the fitness. Default 1000.
+    pub penalty: f64,
+    /// Bound of speed and acceleration at rest (equation 17), rad/s and rad/s². Default 1e-4.
+    pub rest_limit: f64,
+    /// Range of A, rad. Default 0.1 to π.
+    pub amplitude_range: [f64; 2],
+    /// Range of ω, 1/s. Default 0.1 to 3.
+    pub steepness_range: [f64; 2],
+    /// Range of δ, s. Default 0.1 to 10.
+    pub window_range: [f64; 2],
+}
+
+impl Default for WindowedCondition {
+    fn default() -> Self {
+        let paper = PaperProblem::default();
+        Self {
+            problem: WindowedProblem::StepWise,
+            joints: None,
+            penalty: paper.penalty,
+            rest_limit: paper.rest_limit,
+            amplitude_range: paper.amplitude_range,
+            steepness_range: paper.steepness_range,
+            window_range: paper.window_range,
+        }
+    }
+}
+
+/// A stroke that the study gives, so that nothing is searched.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct GivenStroke {
+    /// The joint.
+    pub joint: String,
+    /// A, rad.
+    pub amplitude_rad: f64,
+    /// ω, 1/s.
+    pub steepness_per_s: f64,
+    /// δ, s.
+    pub window_s: f64,
+}
+
+/// What `design.json` holds of a windowed design under `windowed`.
+#[derive(Clone, Debug, Serialize)]
+pub struct WindowedFile {
+    /// Which joints move while others rest.
+    pub problem: WindowedProblem,
+    /// `gradient`, `cma-es`, `genetic`, or `given` where the study gives the strokes.
+    pub optimiser: &'static str,
+    /// H of equation 19: the sum of the condition numbers, with the penalty where a limit is broken.
+    pub fitness: f64,
+    /// The sum of the condition numbers alone.
+    pub condition_sum: f64,
+    /// H of the best strokes inside the limits, by exact gradients; none if nothing inside the limits was found.
+    pub optimum: Option<f64>,
+    /// How far `condition_sum` is above it, percent (below zero only for strokes that break limits).
+    pub above_optimum_percent: Option<f64>,
+    /// The strokes, in the order in which the joints move.
+    pub strokes: Vec<StrokeFile>,
+    /// The strokes of the optimum.
+    pub optimum_strokes: Vec<StrokeFile>,
+}
+
+/// One joint's stroke.
+#[derive(Clone, Debug, Serialize)]
+pub struct StrokeFile {
+    /// The joint.
+    pub joint: String,
+    /// A, rad.
+    pub amplitude_rad: f64,
+    /// ω, 1/s.
+    pub steepness_per_s: f64,
+    /// h, rad.
+    pub offset_rad: f64,
+    /// T, s.
+    pub period_s: f64,
+    /// δ, s.
+    pub window_s: f64,
+    /// Condition number of the window.
+    pub condition_number: f64,
+    /// What the stroke makes of each limit, on the whole stroke and not only at samples.
+    pub limits: Vec<StrokeLimitFile>,
+}
+
+/// One limit of a stroke.
+#[derive(Clone, Debug, Serialize)]
+pub struct StrokeLimitFile {
+    /// What is bounded.
+    pub quantity: PaperQuantity,
+    /// Its peak; positions count from the offset. rad and s.
+    pub value: f64,
+    /// What it must stay below.
+    pub limit: f64,
+    /// By how much it is exceeded, percent of the limit; negative inside.
+    pub excess_percent: f64,
+    /// Whether it is kept.
+    pub kept: bool,
+}
+
+impl WindowedFile {
+    /// Whether every stroke keeps its limits.
+    pub fn kept(&self) -> bool {
+        self.strokes.iter().flat_map(|stroke| &stroke.limits).all(|limit| limit.kept)
+    }
+
+    /// Every broken limit in a sentence.
+    pub(crate) fn sentences(&self) -> Vec<String> {
+        let mut sentences = Vec::new();
+        for stroke in &self.strokes {
+            for limit in stroke.limits.iter().filter(|limit| !limit.kept) {
+                let what = match limit.quantity {
+                    PaperQuantity::Position => "reach (rad)",
+                    PaperQuantity::Speed => "peak speed (rad/s)",
+                    PaperQuantity::Acceleration => "peak acceleration (rad/s\u{b2})",
+                    PaperQuantity::RestSpeed => "speed at rest (rad/s)",
+                    PaperQuantity::RestAcceleration => "acceleration at rest (rad/s\u{b2})",
+                    PaperQuantity::Ground => "dip below the ground",
+                };
+                sentences.push(format!(
+                    "The stroke of `{}`, {what}: {} where less than {} is allowed, {:.0} % too much.",
+                    stroke.joint,
+                    digits(limit.value),
+                    digits(limit.limit),
+                    limit.excess_percent
+                ));
+            }
+        }
+        sentences
+    }
+}
+
+/// Four decimals, or as many digits of a small number.
+fn digits(value: f64) -> String {
+    if value < 1e-2 { format!("{value:.3e}") } else { format!("{value:.4}") }
+}
+
+/// A solved windowed design.
+pub(crate) struct Windowed {
+    pub(crate) file: WindowedFile,
+    pub(crate) family: StepWiseLogistic,
+    pub(crate) parameters: Vec<f64>,
+    pub(crate) history: Vec<Generation>,
+    pub(crate) evaluations: usize,
+    pub(crate) seconds: f64,
+}
+
+/// Solves the step-wise problem of a study.
+pub(crate) fn step_wise(
+    section: &DesignSection,
+    windowed: &WindowedCondition,
+    machine: &Machine,
+    limits: &Limits,
+    watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
+) -> Result<Windowed, String> {
+    let begun = Instant::now();
+    let FamilyChoice::SplicedLogistic(settings) = &section.family else {
+        return Err(format!(
+            "criterion windowed-condition is for family = {{ kind = \"spliced-logistic\" }}, whose strokes have mid-points; this one is {}",
+            section.family.name()
+        ));
+    };
+    if settings.periods_s.is_some() {
+        return Err(
+            "family.periods_s: with windowed-condition each period follows from period_times_omega; leave it out"
+                .to_owned(),
+        );
+    }
+    let dof = machine.model.dof();
+    settings.validate(dof, section.duration_s).map_err(|error| error.to_string())?;
+    let offsets = settings.offsets.clone().unwrap_or_else(|| vec![0.0; dof]);
+    let names: Vec<String> = match &windowed.joints {
+        Some(joints) => joints.clone(),
+        None => machine.model.joints().iter().rev().map(|joint| joint.name.clone()).collect(),
+    };
+    let problem = problem(section, windowed, machine, limits, settings, &offsets, &names)?;
+    problem.validate().map_err(|error| error.to_string())?;
+
+    let seed = section.search.seed;
+    let late = || section.search.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > limit);
+    let stop = |round: &'static str, progress: &Progress<'_>| {
+        let told = DesignProgress {
+            round,
+            value: progress.value,
+            violation: progress.violation,
+            evaluations: progress.evaluations as u64,
+        };
+        if watch(&told).is_break() || late() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    // The optimum stands beside every design: it takes a tenth of a second.
+    let optimum = problem.gradient_solution(seed, STARTS, |_| ControlFlow::Continue(()));
+    let (optimum, gradient_evaluations) = optimum.map_err(|error| error.to_string())?;
+    let bounds = problem.bounds();
+    let mut history = Vec::new();
+    let (x, evaluations, optimiser) = if section.parameters.is_empty() {
+        match &section.optimiser {
+            OptimiserChoice::Gradient => (optimum.clone(), gradient_evaluations, section.optimiser.name()),
+            OptimiserChoice::Genetic(own) => {
+                let own = BinaryGeneticSettings { seed, ..own.clone() };
+                let mut hear = |progress: &Progress<'_>| stop("generations", progress);
+                let result = binary_genetic(|x| problem.fitness(x), &bounds, &own, &mut hear);
+                let result = result.map_err(|error| format!("optimiser: {error}"))?;
+                history = result.history;
+                (result.best, result.evaluations, section.optimiser.name())
+            }
+            OptimiserChoice::CmaEs(own) => {
+                let own = CmaEsSettings { seed, ..own.clone() };
+                let start: Vec<f64> = bounds.iter().map(|[low, high]| f64::midpoint(*low, *high)).collect();
+                let steps: Vec<f64> = bounds.iter().map(|[low, high]| 0.3 * (high - low)).collect();
+                let mut hear = |progress: &Progress<'_>| {
+                    let value = progress.value;
+                    history.push(Generation { best: value, best_so_far: value, mean: value });
+                    stop("generations", progress)
+                };
+                let result = cma_es(|x| problem.graded_fitness(x), &start, &steps, &bounds, &own, &mut hear);
+                let result = result.map_err(|error| format!("optimiser: {error}"))?;
+                (result.best, result.evaluations, section.optimiser.name())
+            }
+        }
+    } else {
+        (given(&section.parameters, &names)?, 0, "given")
+    };
+
+    let strokes = problem.strokes(&x);
+    let told = |x: &[f64]| told(&problem, &problem.strokes(x), settings, &offsets, machine);
+    let condition_sum = problem.condition_numbers(&strokes).iter().sum();
+    let optimum_strokes = told(&optimum);
+    let inside = optimum_strokes.iter().flat_map(|stroke| &stroke.limits).all(|limit| limit.kept);
+    let best = inside.then(|| problem.fitness(&optimum));
+    let steps: Vec<Step> = problem
+        .joints
+        .iter()
+        .zip(&strokes)
+        .map(|(joint, stroke)| Step {
+            joint: joint.joint,
+            period_s: settings.period_times_omega / stroke.steepness_per_s,
+        })
+        .collect();
+    let family = StepWiseLogistic::new(&offsets, &steps, settings).map_err(|error| error.to_string())?;
+    let parameters = strokes.iter().flat_map(|stroke| [stroke.amplitude_rad, stroke.steepness_per_s]).collect();
+    let file = WindowedFile {
+        problem: windowed.problem,
+        optimiser,
+        fitness: problem.fitness(&x),
+        condition_sum,
+        optimum: best,
+        above_optimum_percent: best.map(|best| 100.0 * (condition_sum / best - 1.0)),
+        strokes: told(&x),
+        optimum_strokes: if inside { optimum_strokes } else { Vec::new() },
+    };
+    debug_assert_eq!(family.joints(), dof);
+    Ok(Windowed { file, family, parameters, history, evaluations, seconds: begun.elapsed().as_secs_f64() })
+}
+
+/// The constants of every joint.
+fn problem(
+    section: &DesignSection,
+    windowed: &WindowedCondition,
+    machine: &Machine,
+    limits: &Limits,
+    settings: &SplicedLogisticSettings,
+    offsets: &[f64],
+    names: &[String],
+) -> Result<StepWiseProblem, String> {
+    let model = &machine.model;
+    let mut joints = Vec::with_capacity(names.len());
+    for (place, name) in names.iter().enumerate() {
+        let joint =
+            model.joint_index(name).ok_or_else(|| format!("criterion.joints: the robot has no joint `{name}`"))?;
+        if names[..place].contains(name) {
+            return Err(format!("criterion.joints: `{name}` stands twice: name it once"));
+        }
+        let gravity = gravity_across(model, joint, offsets).map_err(|error| format!("criterion.joints: {error}"))?;
+        let missing =
+            |what: &str| format!("joint `{name}` has no {what} limit, which a stroke needs: give one in limits.joints");
+        let limit = limits.of(name).ok_or_else(|| missing("speed or acceleration"))?;
+        let h = offsets[joint];
+        let reach = match limit.position {
+            Some([lower, upper]) if lower <= h && h < upper => upper - h,
+            Some([lower, upper]) => {
+                return Err(format!(
+                    "family.offsets: joint `{name}` starts its stroke at {h} rad, but may go from {lower} to {upper} only; the stroke goes up from its offset"
+                ));
+            }
+            None => FREE_RAD,
+        };
+        let constants = PaperProblem {
+            gravity,
+            rate_hz: section.search.rate_hz,
+            period_times_steepness: settings.period_times_omega,
+            position_limit_rad: reach,
+            speed_limit: limit.speed.ok_or_else(|| missing("speed"))?,
+            acceleration_limit: limit.acceleration.ok_or_else(|| missing("acceleration"))?,
+            rest_limit: windowed.rest_limit,
+            penalty: windowed.penalty,
+            amplitude_range: windowed.amplitude_range,
+            steepness_range: windowed.steepness_range,
+            window_range: windowed.window_range,
+        };
+        joints.push(StepWiseJoint { joint, constants });
+    }
+    if joints.is_empty() {
+        return Err("criterion.joints is empty: name the joints that move, or leave it out for all".to_owned());
+    }
+    Ok(StepWiseProblem { joints })
+}
+
+/// The vector of given strokes.
+fn given(strokes: &[GivenStroke], names: &[String]) -> Result<Vec<f64>, String> {
+    if let Some(stroke) = strokes.iter().find(|stroke| !names.contains(&stroke.joint)) {
+        return Err(format!("parameters: `{}` is not among the joints that move: {}", stroke.joint, names.join(", ")));
+    }
+    let mut x = Vec::with_capacity(3 * names.len());
+    for name in names {
+        let mut own = strokes.iter().filter(|stroke| stroke.joint == *name);
+        let (Some(stroke), None) = (own.next(), own.next()) else {
+            return Err(format!("parameters: give one stroke for joint `{name}`"));
+        };
+        for (key, value) in [
+            ("amplitude_rad", stroke.amplitude_rad),
+            ("steepness_per_s", stroke.steepness_per_s),
+            ("window_s", stroke.window_s),
+        ] {
+            if !(1e-3..=1e3).contains(&value) {
+                return Err(format!("parameters: {key} = {value} of joint `{name}`: give 0.001 to 1000"));
+            }
+            x.push(value);
+        }
+    }
+    Ok(x)
+}
+
+/// Strokes as the file tells them.
+fn told(
+    problem: &StepWiseProblem,
+    strokes: &[Stroke],
+    settings: &SplicedLogisticSettings,
+    offsets: &[f64],
+    machine: &Machine,
+) -> Vec<StrokeFile> {
+    let conditions = problem.condition_numbers(strokes);
+    let one = |place: usize| {
+        let (stroke, joint) = (&strokes[place], problem.joints[place].joint);
+        let limits = problem.limits(place, stroke).into_iter();
+        let limits = limits.filter(|limit| limit.limit < FREE_RAD).map(|limit| StrokeLimitFile {
+            quantity: limit.quantity,
+            value: limit.value,
+            limit: limit.limit,
+            excess_percent: 100.0 * limit.excess().unwrap_or(0.0),
+            kept: limit.kept(),
+        });
+        StrokeFile {
+            joint: machine.model.joints()[joint].name.clone(),
+            amplitude_rad: stroke.amplitude_rad,
+            steepness_per_s: stroke.steepness_per_s,
+            offset_rad: offsets[joint],
+            period_s: settings.period_times_omega / stroke.steepness_per_s,
+            window_s: stroke.window_s,
+            condition_number: conditions[place],
+            limits: limits.collect(),
+        }
+    };
+    (0..strokes.len()).map(one).collect()
+}
