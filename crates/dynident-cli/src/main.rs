@@ -55,6 +55,8 @@ enum Command {
     Identify(commands::identify::Options),
     /// Test a finished model on other logs.
     Validate(commands::validate::Options),
+    /// Compare estimators on simulated recordings with known truth: error over the Cramér-Rao bound, coverage of error bars.
+    Benchmark(commands::benchmark::Options),
 }
 
 /// How a command ended when it did what it was asked to.
@@ -86,6 +88,7 @@ fn main() -> ExitCode {
         Command::Design(options) => commands::design::run(&options, &context),
         Command::Identify(options) => commands::identify::run(&options, &context),
         Command::Validate(options) => commands::validate::run(&options, &context),
+        Command::Benchmark(options) => commands::benchmark::run(&options, &context),
     });
     match outcome {
         Ok(Verdict::Good) => ExitCode::SUCCESS,

@@ -48,6 +48,8 @@ pub(crate) struct Covariances {
     pub(crate) white: DMatrix<f64>,
     /// Clusters G (0 for the white method).
     pub(crate) clusters: usize,
+    /// Degrees of freedom behind every column's variance (infinite for fixed columns).
+    pub(crate) freedom: Vec<f64>,
     /// For every joint the mean score variance over what white noise would give.
     pub(crate) inflation: Vec<f64>,
     /// For every joint the correlation of the scores of neighbouring segments.
@@ -84,6 +86,8 @@ pub(crate) fn covariances(
     let joints = problem.joints().len();
     let (mut found, mut expected, mut spilled) = (vec![0.0; joints], vec![0.0; joints], vec![0.0; joints]);
     let mut clusters: Vec<Vec<f64>> = Vec::new();
+    // For every cluster what share of each estimate's variance comes from it under white noise.
+    let mut shares: Vec<Vec<f64>> = Vec::new();
     let mut log_clusters: Vec<Option<(usize, Vec<usize>)>> = vec![None; problem.logs().len()];
     for (equation, total) in problem.equations().iter().zip(&stacked.totals) {
         let (joint, weight) = (equation.joint, fit.weights[equation.joint]);
@@ -95,6 +99,12 @@ pub(crate) fn covariances(
         }
         let whitened = total.regressor_triangle() * &local_inverse * weight;
         expected[joint] += whitened.norm_squared() * (weight * fit.joint_sigma[joint]).powi(2);
+        if method != CovarianceMethod::White {
+            shares.extend(equation.factor.segment_factors().iter().map(|segment| {
+                let part = segment.regressor_triangle() * &local_inverse * weight * inverse.transpose();
+                part.column_iter().map(|column| column.norm_squared()).collect::<Vec<f64>>()
+            }));
+        }
         let segment_rows = equation.factor.segment_rows();
         let shared = log_clusters[equation.log].as_ref().filter(|_| method == CovarianceMethod::SegmentsAcrossJoints);
         let start = if let Some((start, rows)) = shared {
@@ -145,7 +155,8 @@ pub(crate) fn covariances(
     let neighbours = spilled.iter().zip(&found).map(|(s, f)| if *f > 0.0 { s / f } else { 0.0 }).collect();
     let inflation = found.iter().zip(&expected).map(|(f, e)| if *e > 0.0 { f / e } else { 1.0 }).collect();
     if method == CovarianceMethod::White {
-        return Ok(Covariances { chosen: white.clone(), white, clusters: 0, inflation, neighbours });
+        let freedom = vec![(fit.rows - free) as f64; columns];
+        return Ok(Covariances { chosen: white.clone(), white, clusters: 0, freedom, inflation, neighbours });
     }
     let count = clusters.len();
     if count < 2 {
@@ -163,7 +174,17 @@ pub(crate) fn covariances(
         let rows = prior.sqrt_information().select_columns(&fit.split.free) * inverse;
         inner += rows.tr_mul(&rows);
     }
-    Ok(Covariances { chosen: spread(&inner), white, clusters: count, inflation, neighbours })
+    let freedom = place.iter().map(|place| place.map_or(f64::INFINITY, |k| satterthwaite(&shares, k))).collect();
+    Ok(Covariances { chosen: spread(&inner), white, clusters: count, freedom, inflation, neighbours })
+}
+
+/// `(Σ_g h_g)² / Σ_g h_g²`: the degrees of freedom of a sum of independent squares with expectations h_g.
+///
+/// Satterthwaite, Biometrics Bulletin 2 (1946) 110; for clusters Bell and McCaffrey, Survey Methodology 28 (2002) 169, here without the correlation that the fit puts between clusters, and less the
+/// one degree that the jackknife's factor (G − 1)/G stands for.
+fn satterthwaite(shares: &[Vec<f64>], k: usize) -> f64 {
+    let (sum, square) = shares.iter().fold((0.0, 0.0), |(sum, square), h| (sum + h[k], square + h[k] * h[k]));
+    if square > 0.0 { (sum * sum / square - 1.0).max(1.0) } else { 1.0 }
 }
 
 /// By how much leaving out one segment changes the estimate, in whitened coordinates.

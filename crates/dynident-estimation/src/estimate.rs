@@ -1,6 +1,7 @@
 //! An estimate is never a bare vector: values with covariance, the noise found, and what was decided about the rank.
 
 use crate::covariance::{CovarianceMethod, Fit, covariances};
+use crate::distributions::student_half_width;
 use crate::error::EstimationError;
 use crate::factor::TriangularFactor;
 use crate::problem::StackedProblem;
@@ -39,6 +40,10 @@ pub struct Estimate {
     pub clusters: usize,
     /// Square roots of the diagonal of `covariance`.
     pub std: Vec<f64>,
+    /// How many independent squares the variance of each value was found from (Satterthwaite's degrees of freedom; N − p for white errors). With few, an interval is wider than 1.96 std.
+    pub std_freedom: Vec<f64>,
+    /// Half the width of the 95 % interval: `t₀.₉₇₅(std_freedom) · std`; zero for fixed columns.
+    pub half_width_95: Vec<f64>,
     /// `100 std / |value|`; none for a fixed column or a value of zero.
     pub relative_std_percent: Vec<Option<f64>>,
     /// How the estimator ended.
@@ -120,6 +125,12 @@ impl Fitted {
         };
         Ok(Estimate {
             names: problem.columns().to_vec(),
+            half_width_95: std
+                .iter()
+                .zip(&covariances.freedom)
+                .map(|(s, f)| student_half_width(0.95, *f) * s)
+                .collect(),
+            std_freedom: covariances.freedom,
             relative_std_percent: std.iter().zip(&self.solution.values).map(relative).collect(),
             std,
             covariance: covariances.chosen,

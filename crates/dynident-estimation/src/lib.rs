@@ -12,6 +12,7 @@
 #![forbid(unsafe_code)]
 
 mod covariance;
+mod distributions;
 mod error;
 mod estimate;
 mod factor;
@@ -24,6 +25,7 @@ mod validation;
 mod weighted;
 
 pub use covariance::{CovarianceMethod, correlation};
+pub use distributions::{chi_squared_tail, f_tail, student_half_width};
 pub use error::EstimationError;
 pub use estimate::{Estimate, EstimateStatus};
 pub use factor::{BLOCK_ROWS, FactorWorkspace, TriangularFactor};

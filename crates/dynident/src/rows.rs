@@ -7,10 +7,12 @@ use crate::error::Error;
 use crate::machine::Machine;
 use crate::progress::Progress;
 use crate::study::{ParallelFilterSection, Study};
-use dynident_dynamics::{BatchWorkspace, Panels, regressor_panels};
+use dynident_dynamics::{BatchWorkspace, PanelLayout, Panels, regressor_panels};
+use dynident_model::Model;
 use dynident_model::laws::JointMotion;
 use dynident_recording::{
-    DecimationSettings, Decimator, DifferentiatorSettings, ImportReport, MotionBlock, MotionSettings, MotionStream,
+    DecimationSettings, Decimator, DifferentiatorSettings, FilterError, ImportReport, MotionBlock, MotionSettings,
+    MotionStream,
 };
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -82,7 +84,9 @@ impl Pass<'_> {
             MotionStream::open(&format, self.file, &self.machine.log_joints, self.motion).map_err(failed)?;
         let motion_cutoff_hz = named_cutoff(self.motion);
         let settings = decimation(&self.study.parallel_filter, stream.rate_hz(), motion_cutoff_hz);
-        let mut computer = Computer::new(self, &log, &stream, settings.as_ref())?;
+        let Machine { model, layout, log_place, .. } = self.machine;
+        let mut computer = Computer::new(model, layout, log_place, stream.rate_hz(), settings.as_ref(), self.progress)
+            .map_err(|source| Error::Filter { log: log.clone(), source })?;
         if self.reader_thread && self.most_samples.is_none() {
             read_beside(&mut stream, |block| computer.take(block, sink)).map_err(|error| error.named(&log))?;
         } else {
@@ -145,7 +149,7 @@ pub(crate) fn motion_in_force(
 }
 
 /// The parallel filter in force at this rate.
-fn decimation(
+pub(crate) fn decimation(
     section: &ParallelFilterSection,
     rate_hz: f64,
     motion_cutoff_hz: Option<f64>,
@@ -167,8 +171,10 @@ fn decimation(
 }
 
 /// Turns motion blocks into rows.
-struct Computer<'a> {
-    machine: &'a Machine,
+pub(crate) struct Computer<'a> {
+    model: &'a Model,
+    layout: &'a PanelLayout,
+    log_place: &'a [usize],
     progress: &'a dyn Progress,
     workspace: BatchWorkspace,
     panels: Panels,
@@ -181,27 +187,28 @@ struct Computer<'a> {
 }
 
 impl<'a> Computer<'a> {
-    fn new(
-        pass: &Pass<'a>,
-        log: &str,
-        stream: &MotionStream,
+    /// For samples at `rate_hz`, joint `j` of the model standing at place `log_place[j]` of the motion.
+    pub(crate) fn new(
+        model: &'a Model,
+        layout: &'a PanelLayout,
+        log_place: &'a [usize],
+        rate_hz: f64,
         settings: Option<&DecimationSettings>,
-    ) -> Result<Self, Error> {
-        let machine = pass.machine;
+        progress: &'a dyn Progress,
+    ) -> Result<Self, FilterError> {
         let decimators = settings
             .map(|settings| {
-                (0..machine.model.dof())
-                    .map(|joint| {
-                        Decimator::new(settings, stream.rate_hz(), machine.layout.joint_columns(joint).len() + 1)
-                    })
+                (0..model.dof())
+                    .map(|joint| Decimator::new(settings, rate_hz, layout.joint_columns(joint).len() + 1))
                     .collect::<Result<Vec<_>, _>>()
             })
-            .transpose()
-            .map_err(|source| Error::Filter { log: log.to_owned(), source })?;
+            .transpose()?;
         Ok(Self {
-            machine,
-            progress: pass.progress,
-            workspace: BatchWorkspace::new(&machine.model),
+            model,
+            layout,
+            log_place,
+            progress,
+            workspace: BatchWorkspace::new(model),
             panels: Panels::default(),
             decimators,
             segment: 0,
@@ -217,14 +224,15 @@ impl<'a> Computer<'a> {
         self.decimators.as_ref().and_then(|all| all.first()).map_or(1, Decimator::length)
     }
 
-    fn take(&mut self, block: &MotionBlock, sink: &mut dyn RowSink) -> Result<(), Error> {
+    /// Makes the rows of the next samples.
+    pub(crate) fn take(&mut self, block: &MotionBlock, sink: &mut dyn RowSink) -> Result<(), Error> {
         if block.segment != self.segment {
             self.segment = block.segment;
             self.decimators.iter_mut().flatten().for_each(|decimator| {
                 decimator.finish();
             });
         }
-        let Machine { model, layout, log_place, .. } = self.machine;
+        let (model, layout, log_place) = (self.model, self.layout, self.log_place);
         for from in (0..block.rows).step_by(PANEL_SAMPLES) {
             let samples = PANEL_SAMPLES.min(block.rows - from);
             for (to, source) in self.motion.iter_mut().zip([&block.q, &block.dq, &block.ddq]) {

@@ -1,5 +1,6 @@
 //! One file per subcommand.
 
+pub(crate) mod benchmark;
 pub(crate) mod design;
 pub(crate) mod evaluate;
 pub(crate) mod identify;

@@ -1,5 +1,6 @@
 //! Results as a person likes to read them: the important first, at most [`WIDTH`](text::WIDTH) columns.
 
+mod benchmark;
 mod design;
 mod findings;
 mod identification;
@@ -7,6 +8,7 @@ mod inspection;
 mod text;
 mod validation;
 
+pub(crate) use benchmark::benchmark;
 pub(crate) use design::design;
 pub(crate) use identification::identification;
 pub(crate) use inspection::inspection;

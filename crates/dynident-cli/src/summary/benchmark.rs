@@ -1,0 +1,34 @@
+//! The summary of `benchmark`.
+
+use super::text::{table, wrapped};
+use dynident::benchmark::BenchmarkFile;
+
+/// One line for every estimator at every noise level of every robot.
+pub(crate) fn benchmark(file: &BenchmarkFile) -> String {
+    let header = ["robot", "noise", "estimator", "fail", "bias", "rmse", "worst", "cover %", "ms"].map(str::to_owned);
+    let number = |value: Option<f64>, decimals: usize| {
+        value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
+    };
+    let rows = file
+        .cells
+        .iter()
+        .map(|cell| {
+            vec![
+                cell.robot.clone(),
+                cell.noise.clone(),
+                cell.estimator.clone(),
+                cell.failures.to_string(),
+                number(cell.bias_over_bound, 2),
+                number(cell.rmse_over_bound, 2),
+                number(cell.worst_rmse_over_bound, 2),
+                number(cell.coverage_percent, 1),
+                format!("{:.1}", cell.time_ms),
+            ]
+        })
+        .collect();
+    let words = format!(
+        "{} runs of {} s at {} Hz, seed {}. bias, rmse, worst: in units of the Cramér-Rao bound, root mean square over parameters and the worst one. cover: true values inside their 95 % intervals.",
+        file.settings.runs, file.duration_s, file.rate_hz, file.settings.seed,
+    );
+    format!("{}{}", table(&header, 3..9, rows), wrapped(&words, 0))
+}

@@ -1,0 +1,266 @@
+//! `dynident benchmark`: estimators × noise levels × robots, Monte Carlo after the protocol of BIRDy (Leboutet et al., Applied Sciences 11 (2021) 4303).
+//!
+//! The registries are [`ESTIMATORS`], [`NOISE_LEVELS`] and [`ROBOTS`]: one line each adds to the benchmark.
+
+mod estimators;
+mod figures;
+mod noise;
+mod pipeline;
+mod robots;
+mod scenario;
+
+pub use estimators::{Answer, BenchmarkEstimator, ESTIMATORS, Trial};
+pub use figures::{CellFigures, ParameterFigures, cells_csv};
+pub use noise::{NOISE_LEVELS, NoiseLevel};
+pub use robots::{BenchmarkRobot, ROBOTS};
+pub use scenario::{DURATION_S, HARMONICS, RATE_HZ, Record, Scenario};
+
+use crate::error::Error;
+use crate::progress::Progress;
+use dynident_estimation::EstimationError;
+use dynident_model::UrdfError;
+use dynident_model::sample::Random;
+use dynident_recording::FilterError;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::time::Instant;
+use thiserror::Error as ThisError;
+
+/// Name and version of the schema of [`BenchmarkFile`].
+pub const BENCHMARK_SCHEMA: &str = "dynident/benchmark/1";
+
+/// Spread of the starts about the truth, as in BIRDy.
+const START_SPREAD: f64 = 0.15;
+
+/// Why a benchmark could not be made.
+#[derive(Debug, ThisError)]
+#[non_exhaustive]
+pub enum BenchmarkError {
+    /// A name that is in no registry.
+    #[error("--{option} {name}: not one of {}", known.join(", "))]
+    Unknown {
+        /// The command line's option.
+        option: &'static str,
+        /// The name.
+        name: String,
+        /// What there is.
+        known: Vec<&'static str>,
+    },
+    /// No runs.
+    #[error("--runs {runs}: give 2 to 100000")]
+    Runs {
+        /// The number given.
+        runs: usize,
+    },
+    /// A description that cannot be read.
+    #[error("robot {robot}: {source}")]
+    Robot {
+        /// The robot.
+        robot: String,
+        /// Why.
+        source: UrdfError,
+    },
+    /// No excitation of a robot.
+    #[error("robot {robot}: no excitation: {reason}")]
+    Excitation {
+        /// The robot.
+        robot: String,
+        /// Why.
+        reason: String,
+    },
+    /// The excitation leaves parameters without a bound.
+    #[error("robot {robot}: the excitation does not determine all base parameters; another seed gives another one")]
+    NoBound {
+        /// The robot.
+        robot: String,
+    },
+    /// A filter that does not exist.
+    #[error("robot {robot}: {source}")]
+    Filter {
+        /// The robot.
+        robot: String,
+        /// Why.
+        source: FilterError,
+    },
+    /// Rows that cannot be used.
+    #[error("robot {robot}: {source}")]
+    Estimation {
+        /// The robot.
+        robot: String,
+        /// Why.
+        source: EstimationError,
+    },
+    /// An error of the pipeline.
+    #[error(transparent)]
+    Pipeline(Box<Error>),
+}
+
+/// What is compared.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BenchmarkSettings {
+    /// Names of [`ROBOTS`].
+    pub robots: Vec<String>,
+    /// Names of [`NOISE_LEVELS`].
+    pub noise: Vec<String>,
+    /// Names of [`ESTIMATORS`].
+    pub estimators: Vec<String>,
+    /// Runs of each robot at each noise level, the same for all estimators. Default 100.
+    pub runs: usize,
+    /// Seed of excitation, noise and starts. Default 1.
+    pub seed: u64,
+}
+
+impl Default for BenchmarkSettings {
+    fn default() -> Self {
+        Self {
+            robots: ROBOTS.iter().map(|robot| robot.name.to_owned()).collect(),
+            noise: NOISE_LEVELS.iter().map(|level| level.name.to_owned()).collect(),
+            estimators: ESTIMATORS.iter().map(|estimator| estimator.name.to_owned()).collect(),
+            runs: 100,
+            seed: 1,
+        }
+    }
+}
+
+/// What `benchmark` writes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BenchmarkFile {
+    /// [`BENCHMARK_SCHEMA`].
+    pub schema: &'static str,
+    /// What was compared.
+    pub settings: BenchmarkSettings,
+    /// The noise levels in full.
+    pub noise_levels: Vec<NoiseLevel>,
+    /// Samples per second of a record.
+    pub rate_hz: f64,
+    /// Length of a record.
+    pub duration_s: f64,
+    /// Harmonics of the excitation.
+    pub harmonics: usize,
+    /// What the data are.
+    pub note: &'static str,
+    /// Every estimator on every robot at every noise level.
+    pub cells: Vec<CellFigures>,
+}
+
+impl BenchmarkSettings {
+    /// Checks names and numbers.
+    ///
+    /// # Errors
+    /// [`BenchmarkError::Unknown`] with the names there are, [`BenchmarkError::Runs`].
+    pub fn validate(&self) -> Result<(), BenchmarkError> {
+        if !(2..=100_000).contains(&self.runs) {
+            return Err(BenchmarkError::Runs { runs: self.runs });
+        }
+        chosen("robots", ROBOTS, |robot| robot.name, &self.robots)?;
+        chosen("noise", NOISE_LEVELS, |level| level.name, &self.noise)?;
+        chosen("estimators", ESTIMATORS, |estimator| estimator.name, &self.estimators).map(|_| ())
+    }
+}
+
+/// The entries of a registry that have the given names.
+fn chosen<T: Copy>(
+    option: &'static str,
+    registry: &[T],
+    name_of: impl Fn(&T) -> &'static str,
+    names: &[String],
+) -> Result<Vec<T>, BenchmarkError> {
+    names
+        .iter()
+        .map(|name| {
+            registry.iter().find(|entry| name_of(entry) == name).copied().ok_or_else(|| BenchmarkError::Unknown {
+                option,
+                name: name.clone(),
+                known: registry.iter().map(&name_of).collect(),
+            })
+        })
+        .collect()
+}
+
+/// What one run gave: per estimator an answer (none: failure) and its time.
+type Run = Vec<(Option<Answer>, f64)>;
+
+/// Runs the benchmark. Runs go in parallel; all figures but times are the same for any number of threads.
+///
+/// # Errors
+/// [`BenchmarkError`]; a failing estimator is a figure, not an error.
+pub fn benchmark(settings: &BenchmarkSettings, progress: &dyn Progress) -> Result<BenchmarkFile, BenchmarkError> {
+    settings.validate()?;
+    let robots = chosen("robots", ROBOTS, |robot| robot.name, &settings.robots)?;
+    let levels = chosen("noise", NOISE_LEVELS, |level| level.name, &settings.noise)?;
+    let estimators = chosen("estimators", ESTIMATORS, |estimator| estimator.name, &settings.estimators)?;
+    let mut cells = Vec::new();
+    progress.begin("runs", Some((robots.len() * levels.len() * settings.runs) as u64));
+    for robot in &robots {
+        let scenario = Scenario::new(robot, settings.seed)?;
+        let symbols: Vec<String> = scenario.layout.columns().iter().map(dynident_dynamics::Column::symbol).collect();
+        for level in &levels {
+            let bound =
+                scenario.bound(level).ok_or_else(|| BenchmarkError::NoBound { robot: robot.name.to_owned() })?;
+            let runs: Vec<Run> = (0..settings.runs)
+                .into_par_iter()
+                .map(|run| {
+                    // A generator for each run: the order in which threads take them does not matter.
+                    let place = format!("{} {} {run}", robot.name, level.name);
+                    let mut random = Random::new(settings.seed ^ hash(place.as_bytes()));
+                    let done = one_run(&scenario, level, &estimators, &bound, &mut random);
+                    progress.advance(1);
+                    done
+                })
+                .collect::<Result<_, _>>()?;
+            for (place, estimator) in estimators.iter().enumerate() {
+                let answers: Vec<Option<Answer>> = runs.iter().map(|run| run[place].0.clone()).collect();
+                let time_ms = 1e3 * runs.iter().map(|run| run[place].1).sum::<f64>() / settings.runs as f64;
+                let cell = figures::Cell {
+                    robot: robot.name,
+                    noise: level.name,
+                    estimator: estimator.name,
+                    symbols: &symbols,
+                    truth: &scenario.truth,
+                    bound: &bound,
+                };
+                cells.push(figures::figures(&cell, &answers, time_ms));
+            }
+        }
+    }
+    progress.end();
+    Ok(BenchmarkFile {
+        schema: BENCHMARK_SCHEMA,
+        settings: settings.clone(),
+        noise_levels: levels,
+        rate_hz: RATE_HZ,
+        duration_s: DURATION_S,
+        harmonics: HARMONICS,
+        note: "a random Fourier excitation followed with a small smooth error, exact inverse dynamics with friction, added noise; no closed loop",
+        cells,
+    })
+}
+
+fn one_run(
+    scenario: &Scenario,
+    level: &NoiseLevel,
+    estimators: &[BenchmarkEstimator],
+    bound: &[f64],
+    random: &mut Random,
+) -> Result<Run, BenchmarkError> {
+    let start: Vec<f64> = scenario.truth.iter().map(|value| value * (1.0 + START_SPREAD * random.normal())).collect();
+    let record = scenario.record(level, random);
+    let (motion, cutoff_hz) = pipeline::motion(&record)
+        .map_err(|source| BenchmarkError::Filter { robot: scenario.robot.to_owned(), source })?;
+    let problem = pipeline::problem(scenario, &motion, cutoff_hz)?;
+    let trial = Trial { scenario, record: &record, motion: &motion, problem: &problem, start: &start };
+    Ok(estimators
+        .iter()
+        .map(|estimator| {
+            let started = Instant::now();
+            let answer = (estimator.answer)(&trial).ok();
+            let time_s = started.elapsed().as_secs_f64();
+            (answer.filter(|answer| figures::usable(answer, &scenario.truth, &start, bound)), time_s)
+        })
+        .collect())
+}
+
+/// FNV-1a: a seed from a place, the same on every machine.
+fn hash(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
+}

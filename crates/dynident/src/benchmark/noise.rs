@@ -1,0 +1,34 @@
+//! How noisy a recording is: the levels of BIRDy's protocol, and what its white Gaussian noise leaves out.
+
+use serde::Serialize;
+
+/// Noise of a recording, the same for all joints.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct NoiseLevel {
+    /// Its name on the command line.
+    pub name: &'static str,
+    /// Standard deviation of a position's white noise, degrees.
+    pub position_std_deg: f64,
+    /// Steps of the encoder in a turn of the joint; none for an ideal one.
+    pub encoder_steps: Option<u32>,
+    /// Standard deviation of a torque's noise, Nm.
+    pub torque_std_nm: f64,
+    /// Correlation of a torque's noise from one sample to the next at 1 kHz: AR(1), 0 for white noise.
+    pub torque_correlation: f64,
+}
+
+const fn white(name: &'static str, position_std_deg: f64, torque_std_nm: f64) -> NoiseLevel {
+    NoiseLevel { name, position_std_deg, encoder_steps: None, torque_std_nm, torque_correlation: 0.0 }
+}
+
+/// The registry: one line for each level. The first five are BIRDy's (Leboutet et al., Applied Sciences 11 (2021) 4303).
+pub const NOISE_LEVELS: &[NoiseLevel] = &[
+    white("standard", 1e-3, 0.05),
+    white("low-position", 1e-4, 0.05),
+    white("high-position", 1e-2, 0.05),
+    white("high-torque", 1e-3, 0.10),
+    white("both-high", 1e-2, 0.10),
+    NoiseLevel { torque_correlation: 0.9, ..white("coloured", 1e-3, 0.05) },
+    NoiseLevel { torque_correlation: 0.99, ..white("long-coloured", 1e-3, 0.05) },
+    NoiseLevel { encoder_steps: Some(1 << 17), ..white("quantised", 0.0, 0.05) },
+];

@@ -1,0 +1,239 @@
+//! A machine with true parameters and an excitation, and what a recording of it looks like.
+//!
+//! The motion is given, not simulated: the excitation trajectory followed with the small smooth error that a speed-proportional lag leaves, `q = q_d - ε q̇_d`. Torque is exact inverse dynamics
+//! with friction plus noise. There is no controller, so torque noise does not feed back into the motion.
+
+use super::BenchmarkError;
+use super::noise::NoiseLevel;
+use super::robots::BenchmarkRobot;
+use dynident_dynamics::{BaseParameterSettings, BaseParameters, BatchWorkspace, PanelLayout, Panels, regressor_panels};
+use dynident_excitation::families::{Fourier, FourierSettings};
+use dynident_excitation::{Family, Motion};
+use dynident_model::Model;
+use dynident_model::laws::{CoulombShape, DriveChoice, JointMotion, Law, laws_per_joint};
+use dynident_model::sample::Random;
+use nalgebra::DMatrix;
+
+/// Samples per second of a recording.
+pub const RATE_HZ: f64 = 1000.0;
+/// Length of a recording.
+pub const DURATION_S: f64 = 10.0;
+/// Harmonics of the excitation, of 0.1 Hz each.
+pub const HARMONICS: usize = 20;
+/// Random trajectories among which the most informative is taken.
+const CANDIDATES: usize = 24;
+/// Rate at which candidates are compared.
+const CANDIDATE_RATE_HZ: f64 = 20.0;
+/// ε of the tracking error, s.
+const TRACKING_LAG_S: f64 = 0.005;
+/// Speed at which Coulomb friction has reached 76 %: the study file's default.
+const COULOMB_WIDTH: f64 = 0.02;
+/// Joints without limits get these, so that the excitation is finite.
+const SPEED_RAD_S: f64 = 2.0;
+
+/// A machine, its excitation, and the truth about both.
+#[derive(Debug)]
+pub struct Scenario {
+    /// The robot's name.
+    pub robot: &'static str,
+    /// The machine.
+    pub model: Model,
+    /// Friction and drives, the same in the data and in the fit.
+    pub laws: Vec<Law>,
+    /// Base parameters of bodies and laws.
+    pub base: BaseParameters,
+    /// Panels of base columns.
+    pub layout: PanelLayout,
+    /// What the controller was told to do.
+    pub reference: Motion,
+    pub(super) truth: Vec<f64>,
+    pub(super) motion: Motion,
+    /// Noise-free torque, joint-major.
+    pub(super) torque: Vec<f64>,
+}
+
+/// What encoders and torque sensors say of one run, joint-major.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Record {
+    /// Samples of each joint.
+    pub samples: usize,
+    /// Positions, rad.
+    pub q: Vec<f64>,
+    /// Torques, Nm.
+    pub tau: Vec<f64>,
+}
+
+impl Scenario {
+    /// The scenario of a robot; the same for every noise level and run of a seed.
+    pub(super) fn new(robot: &BenchmarkRobot, seed: u64) -> Result<Self, BenchmarkError> {
+        let model = robot.model()?;
+        let drive = DriveChoice {
+            drive_inertia: true,
+            viscous: true,
+            coulomb: Some(CoulombShape::Smooth { width: COULOMB_WIDTH }),
+            offset: true,
+        };
+        let laws = laws_per_joint(&model, |_| drive);
+        let base = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
+        let layout = PanelLayout::new(&model, base.base_columns());
+        let reference = excitation(robot, &model, &layout, seed)?;
+        let motion = followed(&reference);
+        let mut parameters = model.parameter_vector();
+        parameters.extend(vec![0.0; laws.len()]);
+        let bodies_only = torque(&model, &layout, &motion, &base.values(&parameters));
+        let first = parameters.len() - laws.len();
+        for (law, value) in laws.iter().zip(&mut parameters[first..]) {
+            let joint = law.joints()[0];
+            *value = drive_value(law, &motion, &bodies_only[motion.of(joint)], joint);
+        }
+        let truth = base.values(&parameters);
+        let torque = torque(&model, &layout, &motion, &truth);
+        Ok(Self { robot: robot.name, model, laws, base, layout, reference, truth, motion, torque })
+    }
+
+    /// One run's record.
+    pub(super) fn record(&self, noise: &NoiseLevel, random: &mut Random) -> Record {
+        let samples = self.motion.samples;
+        let position_std = noise.position_std_deg.to_radians();
+        let mut q: Vec<f64> = self.motion.q.iter().map(|q| q + position_std * random.normal()).collect();
+        if let Some(steps) = noise.encoder_steps {
+            let step = core::f64::consts::TAU / f64::from(steps);
+            q.iter_mut().for_each(|q| *q = (*q / step).round() * step);
+        }
+        let mut tau = self.torque.clone();
+        let fresh = noise.torque_std_nm * (1.0 - noise.torque_correlation.powi(2)).sqrt();
+        for joint in tau.chunks_exact_mut(samples) {
+            let mut error = noise.torque_std_nm * random.normal();
+            for tau in joint {
+                *tau += error;
+                error = noise.torque_correlation * error + fresh * random.normal();
+            }
+        }
+        Record { samples, q, tau }
+    }
+
+    /// The Cramér-Rao bound on every base parameter's standard deviation: the diagonal of `(Σ_j Y_jᵀ Ω⁻¹ Y_j)^(-1/2)` for the motion known exactly and torque noise of covariance Ω (AR(1), whitened
+    /// by `y_t - ρ y_{t-1}`). What position noise hides is not in it, so it is a bound for every estimator, and one that cannot quite be reached.
+    pub(super) fn bound(&self, noise: &NoiseLevel) -> Option<Vec<f64>> {
+        let (count, samples) = (self.truth.len(), self.motion.samples);
+        let mut panels = Panels::default();
+        let mut workspace = BatchWorkspace::new(&self.model);
+        regressor_panels(&self.model, &mut workspace, &self.layout, &self.motion.view(), &mut panels);
+        let rho = noise.torque_correlation;
+        let fresh = noise.torque_std_nm * (1.0 - rho * rho).sqrt();
+        let mut information = DMatrix::<f64>::zeros(count, count);
+        for joint in 0..self.model.dof() {
+            let columns = self.layout.joint_columns(joint);
+            let whitened: Vec<Vec<f64>> = panels.joint(joint)[..columns.len() * samples]
+                .chunks_exact(samples)
+                .map(|y| {
+                    let first = core::iter::once(y[0] / noise.torque_std_nm);
+                    first.chain(y.windows(2).map(|pair| (pair[1] - rho * pair[0]) / fresh)).collect()
+                })
+                .collect();
+            for (a, &row) in columns.iter().enumerate() {
+                for (b, &column) in columns.iter().enumerate().take(a + 1) {
+                    let product: f64 = whitened[a].iter().zip(&whitened[b]).map(|(x, y)| x * y).sum();
+                    information[(row, column)] += product;
+                    if a != b {
+                        information[(column, row)] += product;
+                    }
+                }
+            }
+        }
+        // Scaled to a unit diagonal: units of parameters lie far apart.
+        let scale: Vec<f64> = information.diagonal().iter().map(|x| x.sqrt()).collect();
+        let scaled = DMatrix::from_fn(count, count, |i, j| information[(i, j)] / (scale[i] * scale[j]));
+        let inverse = scaled.cholesky()?.inverse();
+        Some((0..count).map(|i| inverse[(i, i)].sqrt() / scale[i]).collect())
+    }
+}
+
+/// Drives in proportion to what the bodies ask of the joint: viscous and Coulomb friction of 15 % each, drive inertia of 20 %, an offset of 3 % of the root mean square torque of inertia and gravity.
+fn drive_value(law: &Law, motion: &Motion, bodies: &[f64], joint: usize) -> f64 {
+    let rms = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();
+    // A joint that the bodies hardly load (a last link about its own axis) has friction all the same.
+    let torque = rms(bodies).max(0.5);
+    match law {
+        Law::Viscous(_) => 0.15 * torque / rms(&motion.dq[motion.of(joint)]),
+        Law::DriveInertia(_) => 0.20 * torque / rms(&motion.ddq[motion.of(joint)]),
+        Law::Coulomb(_) => 0.15 * torque,
+        _ => 0.03 * torque,
+    }
+}
+
+fn torque(model: &Model, layout: &PanelLayout, motion: &Motion, theta: &[f64]) -> Vec<f64> {
+    let (mut panels, mut workspace) = (Panels::default(), BatchWorkspace::new(model));
+    regressor_panels(model, &mut workspace, layout, &motion.view(), &mut panels);
+    let mut tau = Vec::with_capacity(motion.q.len());
+    let mut buffer = Vec::new();
+    for joint in 0..model.dof() {
+        let columns = layout.joint_columns(joint);
+        crate::evidence::predicted(panels.joint(joint), motion.samples, columns, theta, &mut buffer);
+        tau.extend_from_slice(&buffer);
+    }
+    tau
+}
+
+/// `q = q_d - ε q̇_d` and its derivatives, exactly.
+fn followed(reference: &Motion) -> Motion {
+    let late = |value: &[f64], rate: &[f64]| value.iter().zip(rate).map(|(x, dx)| x - TRACKING_LAG_S * dx).collect();
+    let (q, dq) = (late(&reference.q, &reference.dq), late(&reference.dq, &reference.ddq));
+    let ddq = late(&reference.ddq, &reference.dddq);
+    Motion { samples: reference.samples, joints: reference.joints, q, dq, ddq, dddq: reference.dddq.clone() }
+}
+
+/// The random Fourier series with the largest `log det` of its information among a few: no design, but nothing that a user would not do better.
+fn excitation(
+    robot: &BenchmarkRobot,
+    model: &Model,
+    layout: &PanelLayout,
+    seed: u64,
+) -> Result<Motion, BenchmarkError> {
+    let settings = FourierSettings { harmonics: HARMONICS, ..FourierSettings::default() };
+    let family = Fourier::new(model.dof(), DURATION_S, &settings)
+        .map_err(|source| BenchmarkError::Excitation { robot: robot.name.to_owned(), reason: source.to_string() })?;
+    let limits = model.joints().iter().map(|joint| joint.limits);
+    let ranges: Vec<[f64; 2]> = limits
+        .clone()
+        .map(|limits| [limits.lower.unwrap_or(f64::NEG_INFINITY), limits.upper.unwrap_or(f64::INFINITY)])
+        .collect();
+    let speeds: Vec<f64> = limits.map(|limits| limits.velocity.unwrap_or(SPEED_RAD_S)).collect();
+    let times = |rate_hz: f64| -> Vec<f64> {
+        (0..=(DURATION_S * rate_hz) as usize).map(|sample| sample as f64 / rate_hz).collect()
+    };
+    let mut random = Random::new(seed);
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    let (mut motion, mut panels, mut workspace) = (Motion::default(), Panels::default(), BatchWorkspace::new(model));
+    let coarse = times(CANDIDATE_RATE_HZ);
+    for _ in 0..CANDIDATES {
+        let parameters = family.random(&ranges, &speeds, &mut random);
+        family.motion(&parameters, &coarse, &mut motion);
+        let JointMotion { samples, .. } = motion.view();
+        regressor_panels(model, &mut workspace, layout, &motion.view(), &mut panels);
+        let mut information = DMatrix::<f64>::zeros(layout.columns().len(), layout.columns().len());
+        for joint in 0..model.dof() {
+            let columns = layout.joint_columns(joint);
+            let panel =
+                DMatrix::from_column_slice(samples, columns.len(), &panels.joint(joint)[..samples * columns.len()]);
+            let own = panel.tr_mul(&panel);
+            for (a, &row) in columns.iter().enumerate() {
+                for (b, &column) in columns.iter().enumerate() {
+                    information[(row, column)] += own[(a, b)];
+                }
+            }
+        }
+        let log_det = information
+            .cholesky()
+            .map_or(f64::NEG_INFINITY, |factor| factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>());
+        if best.as_ref().is_none_or(|(value, _)| log_det > *value) {
+            best = Some((log_det, parameters));
+        }
+    }
+    let Some((_, parameters)) = best.filter(|(value, _)| value.is_finite()) else {
+        let reason = "no random trajectory excites all base parameters".to_owned();
+        return Err(BenchmarkError::Excitation { robot: robot.name.to_owned(), reason });
+    };
+    family.motion(&parameters, &times(RATE_HZ), &mut motion);
+    Ok(motion)
+}
