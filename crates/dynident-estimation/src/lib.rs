@@ -11,11 +11,14 @@
 
 #![forbid(unsafe_code)]
 
+mod bootstrap;
 mod covariance;
+mod diagnostics;
 mod distributions;
 mod error;
 mod estimate;
 mod factor;
+mod newey_west;
 mod ordinary;
 mod problem;
 mod rank;
@@ -25,6 +28,7 @@ mod validation;
 mod weighted;
 
 pub use covariance::{CovarianceMethod, correlation};
+pub use diagnostics::{Normality, NormalityReport, RegimeFigures, Regimes, RegimesReport, Whiteness, WhitenessReport};
 pub use distributions::{chi_squared_tail, f_tail, student_half_width};
 pub use error::EstimationError;
 pub use estimate::{Estimate, EstimateStatus};

@@ -6,6 +6,7 @@ use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study
 use crate::lag::{self, LAG_SAMPLES, LagCheck};
 use crate::machine::{Machine, prior_parameters};
 use crate::progress::Silent;
+use crate::residuals::Uncertainty;
 use crate::result::{LogSummary, RESULT_SCHEMA, ResultFile, Timings};
 use crate::result_sections::{
     base_parameters, bodies, joint_results, law_results, method_summary, robot_summary, training_result, verdict,
@@ -88,9 +89,17 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
         logs.push(summary);
     }
     let mut validation = Vec::new();
+    let uncertainty = Uncertainty::of(&estimate);
     for index in of_role(study, Role::Validate) {
-        let (summary, figures) =
-            validate_log(study, &machine, &motion, index, &files[index], &estimate.values, options)?;
+        let (summary, figures) = validate_log(
+            study,
+            &machine,
+            &motion,
+            index,
+            &files[index],
+            (&estimate.values, Some(&uncertainty)),
+            options,
+        )?;
         logs.push(summary);
         validation.push(figures);
     }

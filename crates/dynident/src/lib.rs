@@ -25,6 +25,7 @@ mod lag;
 mod machine;
 mod output;
 mod progress;
+mod residuals;
 mod result;
 mod result_sections;
 mod rows;
@@ -53,6 +54,7 @@ pub use job::RunOptions;
 pub use machine::Machine;
 pub use output::{check_writable, write_whole};
 pub use progress::{Progress, Silent};
+pub use residuals::JointResiduals;
 pub use result::{
     BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, LogValidation, MethodSummary, PhysicalVerdict,
     RESULT_SCHEMA, ResultFile, RobotSummary, Timings, TrainingJoint, TrainingResult,

@@ -1,6 +1,7 @@
 //! What `identify` writes: the schema of `result.json`.
 
 use crate::evidence::PriorAgreement;
+use crate::residuals::JointResiduals;
 use dynident_estimation::ValidationReport;
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};
@@ -193,6 +194,8 @@ pub struct LogValidation {
     pub raw: ValidationReport,
     /// The description's own inertials, damping and friction on the filtered torque; none when unknown.
     pub prior: Option<ValidationReport>,
+    /// What the filtered residuals look like, and the predicted torque's 95 % band.
+    pub residuals: Vec<JointResiduals>,
 }
 
 /// Whether a full set is possible.

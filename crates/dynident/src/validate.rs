@@ -5,6 +5,7 @@ use crate::evidence::{Evidence, predicted};
 use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
 use crate::lag::LagCheck;
 use crate::machine::Machine;
+use crate::residuals::{JointWatch, Uncertainty};
 use crate::result::{BaseParameterResult, LogSummary, LogValidation};
 use crate::rows::{JointRows, Pass, RawSamples, RowSink, estimated_rows, motion_in_force, named_cutoff};
 use crate::study::{Folders, Role, Study};
@@ -70,7 +71,7 @@ pub fn validate(
         logs: Vec::new(),
     };
     for index in chosen {
-        let (summary, figures) = validate_log(study, &machine, &motion, index, &files[index], &theta, options)?;
+        let (summary, figures) = validate_log(study, &machine, &motion, index, &files[index], (&theta, None), options)?;
         file.logs.push(summary);
         file.validation.push(figures);
     }
@@ -116,6 +117,7 @@ struct TestSink<'a> {
     machine: &'a Machine,
     file: PathBuf,
     theta: &'a [f64],
+    watches: Vec<JointWatch>,
     model: Validation,
     raw: Validation,
     prior: Option<(&'a [f64], Validation)>,
@@ -136,6 +138,7 @@ impl RowSink for TestSink<'_> {
         let measured = &rows.panel[columns.len() * rows.rows..];
         predicted(rows.panel, rows.rows, columns, self.theta, &mut self.buffer);
         self.model.add_joint(rows.joint, measured, &self.buffer).map_err(|source| self.failed(source))?;
+        self.watches[rows.joint].add(rows.panel, rows.rows, &self.buffer);
         if let Some((prior, validation)) = &mut self.prior {
             predicted(rows.panel, rows.rows, columns, prior, &mut self.buffer);
             let added = validation.add_joint(rows.joint, measured, &self.buffer);
@@ -160,14 +163,14 @@ impl RowSink for TestSink<'_> {
     }
 }
 
-/// Tests base parameters on one log.
+/// Tests base parameters on one log; with their uncertainty also the band of the predicted torque.
 pub(crate) fn validate_log(
     study: &Study,
     machine: &Machine,
     motion: &MotionSettings,
     index: usize,
     file: &Path,
-    theta: &[f64],
+    (theta, uncertainty): (&[f64], Option<&Uncertainty>),
     options: &RunOptions<'_>,
 ) -> Result<(LogSummary, LogValidation), Error> {
     let joints = joint_names(machine);
@@ -176,6 +179,7 @@ pub(crate) fn validate_log(
         machine,
         file: file.to_owned(),
         theta,
+        watches: (0..joints.len()).map(|joint| JointWatch::new(&machine.layout, joint, uncertainty)).collect(),
         model: Validation::new(joints.clone()),
         raw: Validation::new(joints.clone()),
         prior: machine.prior.as_deref().map(|prior| (prior, Validation::new(joints.clone()))),
@@ -204,6 +208,7 @@ pub(crate) fn validate_log(
         model: sink.model.report(),
         raw: sink.raw.report(),
         prior: sink.prior.map(|(_, validation)| validation.report()),
+        residuals: sink.watches.iter().zip(&joints).map(|(watch, name)| watch.report(name)).collect(),
     };
     Ok((log_summary(study, index, passed, agreement, lags, &joints), figures))
 }

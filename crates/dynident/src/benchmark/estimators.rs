@@ -1,10 +1,12 @@
 //! What the benchmark compares. **To add an estimator, add one line to [`ESTIMATORS`].**
 
+use super::pipeline;
 use super::scenario::{Record, Scenario};
 use dynident_estimation::{
     CovarianceMethod, Estimate, EstimateStatus, EstimationError, LinearProblem, OrdinarySettings, WeightedSettings,
     ordinary_least_squares, weighted_least_squares,
 };
+use dynident_excitation::Motion;
 use dynident_recording::MotionBlock;
 
 /// One simulated experiment, as estimators see it.
@@ -16,6 +18,8 @@ pub struct Trial<'a> {
     pub record: &'a Record,
     /// The record after the pipeline's own choice of cut-off and differentiator.
     pub motion: &'a MotionBlock,
+    /// The cut-off chosen from the record.
+    pub cutoff_hz: f64,
     /// The pipeline's filtered rows as triangular factors.
     pub problem: &'a LinearProblem,
     /// Where an iterative estimator starts: the true base parameters with 15 % Gaussian error.
@@ -65,6 +69,22 @@ pub const ESTIMATORS: &[BenchmarkEstimator] = &[
     entry("weighted-segments", "the same, error bars from segments (CR1)", |trial| {
         weighted(trial, CovarianceMethod::Segments)
     }),
+    entry("weighted-newey-west", "the same, error bars by Newey and West", |trial| {
+        weighted(trial, CovarianceMethod::NeweyWest)
+    }),
+    entry("weighted-bootstrap", "the same, error bars by block bootstrap", |trial| {
+        weighted(trial, CovarianceMethod::Bootstrap)
+    }),
+    entry(
+        "weighted-wide",
+        "weighted least squares, cut-off twice the automatic one: what the differentiator's filter costs",
+        wide,
+    ),
+    entry(
+        "weighted-true-motion",
+        "weighted least squares on the true motion, which no one knows: what decimation costs",
+        true_motion,
+    ),
 ];
 
 fn ordinary(trial: &Trial<'_>, covariance: CovarianceMethod) -> Result<Answer, EstimationError> {
@@ -73,6 +93,25 @@ fn ordinary(trial: &Trial<'_>, covariance: CovarianceMethod) -> Result<Answer, E
 
 fn weighted(trial: &Trial<'_>, covariance: CovarianceMethod) -> Result<Answer, EstimationError> {
     weighted_least_squares(trial.problem, &WeightedSettings { covariance, ..WeightedSettings::default() }).map(answer)
+}
+
+/// The fit to the record filtered at twice the automatic cut-off.
+fn wide(trial: &Trial<'_>) -> Result<Answer, EstimationError> {
+    let cutoff_hz = 2.0 * trial.cutoff_hz;
+    let motion = pipeline::differentiated(trial.record, cutoff_hz).map_err(|_| EstimationError::Empty)?;
+    refitted(trial, &motion, cutoff_hz)
+}
+
+/// The fit with the regressor of the true motion: an oracle that separates what differentiation costs from what decimation costs.
+fn true_motion(trial: &Trial<'_>) -> Result<Answer, EstimationError> {
+    let Motion { q, dq, ddq, .. } = trial.scenario.motion.clone();
+    refitted(trial, &MotionBlock { q, dq, ddq, ..trial.motion.clone() }, trial.cutoff_hz)
+}
+
+fn refitted(trial: &Trial<'_>, motion: &MotionBlock, cutoff_hz: f64) -> Result<Answer, EstimationError> {
+    // A pipeline that fails is a failure of the estimator; the figure does not need the reason.
+    let problem = pipeline::problem(trial.scenario, motion, cutoff_hz).map_err(|_| EstimationError::Empty)?;
+    weighted_least_squares(&problem, &WeightedSettings::default()).map(answer)
 }
 
 fn answer(estimate: Estimate) -> Answer {

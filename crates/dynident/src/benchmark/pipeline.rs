@@ -13,6 +13,12 @@ use dynident_recording::{Derivatives, DifferentiatorSettings, FilterError, Motio
 pub(super) fn motion(record: &Record) -> Result<(MotionBlock, f64), FilterError> {
     let positions: Vec<&[f64]> = record.q.chunks_exact(record.samples).collect();
     let cutoff_hz = cutoff(&positions, RATE_HZ).cutoff_hz;
+    differentiated(record, cutoff_hz).map(|block| (block, cutoff_hz))
+}
+
+/// The record's motion by the default differentiator with the given cut-off.
+pub(super) fn differentiated(record: &Record, cutoff_hz: f64) -> Result<MotionBlock, FilterError> {
+    let positions: Vec<&[f64]> = record.q.chunks_exact(record.samples).collect();
     let differentiator = DifferentiatorSettings::default().build(cutoff_hz)?;
     let mut block = MotionBlock {
         rate_hz: RATE_HZ,
@@ -30,7 +36,7 @@ pub(super) fn motion(record: &Record) -> Result<(MotionBlock, f64), FilterError>
             Derivatives { q: &mut block.q[own.clone()], dq: &mut block.dq[own.clone()], ddq: &mut block.ddq[own] };
         differentiator.differentiate(RATE_HZ, q, out)?;
     }
-    Ok((block, cutoff_hz))
+    Ok(block)
 }
 
 struct Factors(Vec<SegmentedFactor>);

@@ -1,0 +1,69 @@
+//! How large residuals are at reversals, at rest and in fast motion.
+
+use serde::{Deserialize, Serialize};
+
+/// Below this speed a joint counts as at rest, rad/s (m/s).
+const STATIC: f64 = 0.005;
+/// Below this speed it counts as reversing, rad/s (m/s): friction's regime.
+const REVERSAL: f64 = 0.1;
+
+/// Sums of squared residuals by the joint's own speed: static (|q̇| < 0.005), reversal (up to 0.1), fast (from 0.1 rad/s on).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Regimes {
+    sums: [(usize, f64); 3],
+}
+
+/// Residuals of one regime.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RegimeFigures {
+    /// Samples.
+    pub samples: usize,
+    /// Their root mean square residual, Nm (N); none without samples.
+    pub rmse_nm: Option<f64>,
+}
+
+/// Residuals by regime.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RegimesReport {
+    /// |q̇| below 0.005 rad/s (m/s).
+    pub at_rest: RegimeFigures,
+    /// |q̇| from there to 0.1 rad/s (m/s).
+    pub reversal: RegimeFigures,
+    /// |q̇| from 0.1 rad/s (m/s) on.
+    pub fast: RegimeFigures,
+}
+
+impl Regimes {
+    /// A residual at a speed.
+    pub fn add(&mut self, speed: f64, residual: f64) {
+        let speed = speed.abs();
+        let place = usize::from(speed >= STATIC) + usize::from(speed >= REVERSAL);
+        self.sums[place].0 += 1;
+        self.sums[place].1 += residual * residual;
+    }
+
+    /// The figures so far.
+    pub fn report(&self) -> RegimesReport {
+        let [at_rest, reversal, fast] = self.sums.map(|(samples, square)| RegimeFigures {
+            samples,
+            rmse_nm: (samples > 0).then(|| (square / samples as f64).sqrt()),
+        });
+        RegimesReport { at_rest, reversal, fast }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_speed_has_its_regime() {
+        let mut regimes = Regimes::default();
+        for (speed, residual) in [(0.0, 1.0), (-0.05, 3.0), (0.05, 4.0), (-2.0, 5.0)] {
+            regimes.add(speed, residual);
+        }
+        let report = regimes.report();
+        assert_eq!((report.at_rest.rmse_nm, report.fast.rmse_nm), (Some(1.0), Some(5.0)));
+        assert_eq!((report.reversal.samples, report.reversal.rmse_nm), (2, Some(12.5_f64.sqrt())));
+    }
+}
