@@ -21,7 +21,8 @@ GENERATORS = {
     "pinocchio": ("pinocchio.py", "pinocchio/*.json"),
     "mujoco": ("mujoco_inverse.py", "mujoco/*.json"),
     "scipy": ("scipy_filters.py", "scipy_*.json"),
-    "statsmodels": ("statsmodels_estimators.py", "statsmodels_*.json"),
+    "newey-west": ("statsmodels_newey_west.py", "statsmodels_newey_west.json"),
+    "statsmodels": ("statsmodels_estimators.py", "statsmodels_estimators.json"),
 }
 
 

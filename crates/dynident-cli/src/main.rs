@@ -20,7 +20,8 @@ use std::process::ExitCode;
         2. write study.toml                      robot, logs, columns (examples/, docs/src/study.md)\n  \
         3. dynident identify study.toml --out R  fit, test on held-out logs, write R/result.json and R/identified.urdf\n  \
         4. dynident validate R/result.json --study other.toml\n  \
-        5. load R/identified.urdf into your controller or simulator"
+        5. load R/identified.urdf into your controller or simulator\n\n\
+        dynident benchmark compares the estimators on simulated recordings with known truth."
 )]
 struct Arguments {
     #[command(flatten)]

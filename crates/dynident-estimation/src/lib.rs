@@ -16,6 +16,7 @@ mod covariance;
 mod diagnostics;
 mod distributions;
 mod error;
+mod essential;
 mod estimate;
 mod factor;
 mod newey_west;
@@ -31,6 +32,10 @@ pub use covariance::{CovarianceMethod, correlation};
 pub use diagnostics::{Normality, NormalityReport, RegimeFigures, Regimes, RegimesReport, Whiteness, WhitenessReport};
 pub use distributions::{chi_squared_tail, f_tail, student_half_width};
 pub use error::EstimationError;
+pub use essential::{
+    CorrelatedPair, DroppedParameter, EssentialEnd, EssentialReport, EssentialSettings, essential,
+    strongest_correlations,
+};
 pub use estimate::{Estimate, EstimateStatus};
 pub use factor::{BLOCK_ROWS, FactorWorkspace, TriangularFactor};
 pub use ordinary::{OrdinarySettings, ordinary_least_squares};

@@ -18,8 +18,8 @@ use crate::validate::validate_log;
 use crate::written_urdf::written_urdf;
 use dynident_dynamics::Column;
 use dynident_estimation::{
-    Estimate, LinearProblem, OrdinarySettings, SegmentedFactor, WeightedSettings, ordinary_least_squares,
-    weighted_least_squares,
+    Estimate, LinearProblem, OrdinarySettings, SegmentedFactor, WeightedSettings, essential, ordinary_least_squares,
+    strongest_correlations, weighted_least_squares,
 };
 use dynident_model::InertialParameters;
 use dynident_model::laws::Law;
@@ -27,6 +27,9 @@ use dynident_recording::MotionSettings;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+
+/// Correlations that a result tells.
+const CORRELATIONS: usize = 10;
 
 /// A finished identification.
 #[derive(Debug)]
@@ -77,6 +80,12 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
         }
     }
     .map_err(in_study)?;
+    let (estimate, dropped) = match &study.estimator.essential {
+        Some(settings) => {
+            essential(&estimate, settings).map(|(rest, report)| (rest, Some(report))).map_err(in_study)?
+        }
+        None => (estimate, None),
+    };
     timings.estimation = started.elapsed().as_secs_f64();
 
     let started = Instant::now();
@@ -121,6 +130,8 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
         method: method_summary(study, &machine, &motion, &estimate),
         base_parameters: base_parameters(&machine, &estimate),
         bodies: bodies(&machine, &inertials),
+        essential: dropped,
+        correlations: strongest_correlations(&estimate, CORRELATIONS),
         joints: joint_results(&machine, &estimate, &parameters),
         couplings: law_results(&machine, &estimate, &parameters, |law| matches!(law, Law::Coupling(_))),
         training: training_result(study, &machine, &problem, &training, &estimate).map_err(in_study)?,

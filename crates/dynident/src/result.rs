@@ -2,7 +2,7 @@
 
 use crate::evidence::PriorAgreement;
 use crate::residuals::JointResiduals;
-use dynident_estimation::ValidationReport;
+use dynident_estimation::{CorrelatedPair, EssentialReport, ValidationReport};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};
 
@@ -24,6 +24,10 @@ pub struct ResultFile {
     pub base_parameters: Vec<BaseParameterResult>,
     /// The bodies: one of the full sets that give these base parameters, the nearest to the prior.
     pub bodies: Vec<BodyResult>,
+    /// What was held at zero because the data hardly tell it; none unless asked for.
+    pub essential: Option<EssentialReport>,
+    /// The strongest correlations between estimates, strongest first.
+    pub correlations: Vec<CorrelatedPair>,
     /// Friction and drives.
     pub joints: Vec<JointResult>,
     /// Drives that turn with two joints.
@@ -101,6 +105,9 @@ pub struct BaseParameterResult {
     pub std: f64,
     /// The same if residuals were white: what a naive tool would print.
     pub std_white: f64,
+    /// Half the width of the 95 % interval.
+    #[serde(default)]
+    pub half_width_95: f64,
     /// `100 std / |value|`.
     pub relative_std_percent: Option<f64>,
     /// By the description's own numbers.

@@ -69,6 +69,7 @@ pub(crate) fn base_parameters(machine: &Machine, estimate: &Estimate) -> Vec<Bas
             unit: columns[index].unit().to_owned(),
             value: estimate.values[index],
             std: estimate.std[index],
+            half_width_95: estimate.half_width_95[index],
             std_white: estimate.covariance_white[(index, index)].max(0.0).sqrt(),
             relative_std_percent: estimate.relative_std_percent[index],
             prior: machine.prior.as_ref().map(|prior| prior[index]),

@@ -2,7 +2,7 @@
 
 use crate::design_section::DesignSection;
 use crate::error::Error;
-use dynident_estimation::{CovarianceMethod, RankSettings, SegmentSettings};
+use dynident_estimation::{CovarianceMethod, EssentialSettings, RankSettings, SegmentSettings};
 use dynident_model::line_and_column;
 use dynident_recording::{LogFormat, MotionSettings};
 use serde::{Deserialize, Serialize};
@@ -252,6 +252,8 @@ pub struct EstimatorSection {
     pub rank: RankSettings,
     /// How logs are cut into segments for the covariance.
     pub segments: SegmentSettings,
+    /// Hold parameters that the data hardly tell at zero; not by default.
+    pub essential: Option<EssentialSettings>,
 }
 
 /// What a log is for.
@@ -425,6 +427,9 @@ impl Study {
         self.motion.validate().map_err(|error| format!("[motion]: {error}"))?;
         self.estimator.rank.validate().map_err(|error| format!("[estimator.rank]: {error}"))?;
         self.estimator.segments.validate().map_err(|error| format!("[estimator.segments]: {error}"))?;
+        if let Some(essential) = &self.estimator.essential {
+            essential.validate().map_err(|error| format!("[estimator.essential]: {error}"))?;
+        }
         Ok(())
     }
 

@@ -2,6 +2,7 @@
 
 use super::findings::findings;
 use super::text::{WIDTH, listed, name, percent, shortened, table, with_deviation, wrapped};
+use super::validation::residuals;
 use core::fmt::Write;
 use dynident::{LogSummary, LogValidation, ResultFile};
 use std::path::Path;
@@ -32,6 +33,9 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
         let _ = writeln!(text, "{found}");
     }
     text += &joints(r);
+    for log in &r.validation {
+        text += &residuals(log);
+    }
     text.push('\n');
     text += &parameters(r);
     text.push('\n');

@@ -3,7 +3,10 @@
 use super::findings::findings;
 use super::text::{name, percent, table, wrapped};
 use dynident::estimation::ValidationReport;
-use dynident::{LogSummary, LogValidation};
+use dynident::{JointResiduals, LogSummary, LogValidation};
+
+/// A test whose probability is below this counts as negative.
+const SIGNIFICANCE: f64 = 0.01;
 
 /// A model's errors on every log.
 pub(crate) fn validation(logs: &[LogValidation], summaries: &[LogSummary]) -> String {
@@ -21,10 +24,36 @@ pub(crate) fn validation(logs: &[LogValidation], summaries: &[LogSummary]) -> St
         rows.push(row(log, None));
         let header = ["joint", "error %", "rms Nm", "max Nm", "R2", "unfiltered %", "prior %"].map(str::to_owned);
         text += &table(&header, 1..7, rows);
+        text += &residuals(log);
         text.push('\n');
     }
     text += &findings(summaries);
     text
+}
+
+/// What the residuals of a held-out log look like, in one line.
+pub(super) fn residuals(log: &LogValidation) -> String {
+    let count = |of: &dyn Fn(&JointResiduals) -> bool| log.residuals.iter().filter(|joint| of(joint)).count();
+    let all = log.residuals.len();
+    let coloured = count(&|joint| joint.whiteness.is_some_and(|test| test.p_value < SIGNIFICANCE));
+    let odd = count(&|joint| joint.normality.is_some_and(|test| test.p_value < SIGNIFICANCE));
+    let ratio = |joint: &JointResiduals| {
+        let regimes = joint.regimes?;
+        let ratio = regimes.reversal.rmse_nm? / regimes.fast.rmse_nm?;
+        ratio.is_finite().then_some(ratio)
+    };
+    let ratios: Vec<f64> = log.residuals.iter().filter_map(ratio).collect();
+    let mut words = format!("  residuals: coloured in {coloured} of {all} joints, not normal in {odd}");
+    if !ratios.is_empty() {
+        let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+        words += &format!(", at reversals {mean:.2} times those of fast motion");
+    }
+    let covered: Vec<f64> = log.residuals.iter().filter_map(|joint| joint.band_coverage_percent).collect();
+    if !covered.is_empty() {
+        let mean = covered.iter().sum::<f64>() / covered.len() as f64;
+        words += &format!("; the 95 % band holds {mean:.1} % of the torque");
+    }
+    wrapped(&words, 4)
 }
 
 fn row(log: &LogValidation, joint: Option<usize>) -> Vec<String> {
