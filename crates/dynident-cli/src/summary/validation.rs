@@ -43,17 +43,19 @@ pub(super) fn residuals(log: &LogValidation) -> String {
         ratio.is_finite().then_some(ratio)
     };
     let ratios: Vec<f64> = log.residuals.iter().filter_map(ratio).collect();
-    let mut words = format!("  residuals: coloured in {coloured} of {all} joints, not normal in {odd}");
-    if !ratios.is_empty() {
-        let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
-        words += &format!(", at reversals {mean:.2} times those of fast motion");
-    }
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let reversal = if ratios.is_empty() {
+        String::new()
+    } else {
+        format!(", at reversals {:.2} times those of fast motion", mean(&ratios))
+    };
     let covered: Vec<f64> = log.residuals.iter().filter_map(|joint| joint.band_coverage_percent).collect();
-    if !covered.is_empty() {
-        let mean = covered.iter().sum::<f64>() / covered.len() as f64;
-        words += &format!("; the 95 % band holds {mean:.1} % of the torque");
-    }
-    wrapped(&words, 4)
+    let band = if covered.is_empty() {
+        String::new()
+    } else {
+        format!("; the 95 % band holds {:.1} % of the torque", mean(&covered))
+    };
+    wrapped(&format!("  residuals: coloured in {coloured} of {all} joints, not normal in {odd}{reversal}{band}"), 4)
 }
 
 fn row(log: &LogValidation, joint: Option<usize>) -> Vec<String> {

@@ -97,7 +97,9 @@ mod tests {
     fn is_the_formula() {
         let r: Vec<f64> = (0..30).map(|k| f64::from((k * 7) % 11) - 5.0).collect();
         let mut whiteness = Whiteness::default();
-        r.iter().for_each(|r| whiteness.add(*r));
+        for r in &r {
+            whiteness.add(*r);
+        }
         let square: f64 = r.iter().map(|x| x * x).sum();
         let q: f64 = (1..=10)
             .map(|lag| (lag..30).map(|t| r[t] * r[t - lag]).sum::<f64>() / square)

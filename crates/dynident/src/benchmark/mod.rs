@@ -58,7 +58,7 @@ pub enum BenchmarkError {
         /// The robot.
         robot: String,
         /// Why.
-        source: UrdfError,
+        source: Box<UrdfError>,
     },
     /// No excitation of a robot.
     #[error("robot {robot}: no excitation: {reason}")]

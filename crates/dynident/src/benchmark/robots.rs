@@ -24,6 +24,6 @@ impl BenchmarkRobot {
     pub(super) fn model(&self) -> Result<Model, BenchmarkError> {
         read_urdf(self.urdf)
             .map(|robot| robot.model)
-            .map_err(|source| BenchmarkError::Robot { robot: self.name.to_owned(), source })
+            .map_err(|source| BenchmarkError::Robot { robot: self.name.to_owned(), source: Box::new(source) })
     }
 }

@@ -98,7 +98,9 @@ impl Scenario {
         let mut q: Vec<f64> = self.motion.q.iter().map(|q| q + position_std * random.normal()).collect();
         if let Some(steps) = noise.encoder_steps {
             let step = core::f64::consts::TAU / f64::from(steps);
-            q.iter_mut().for_each(|q| *q = (*q / step).round() * step);
+            for q in &mut q {
+                *q = (*q / step).round() * step;
+            }
         }
         let mut tau = self.torque.clone();
         let fresh = noise.torque_std_nm * (1.0 - noise.torque_correlation.powi(2)).sqrt();
