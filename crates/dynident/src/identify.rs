@@ -135,6 +135,7 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
         joints: joint_results(&machine, &estimate, &parameters),
         couplings: law_results(&machine, &estimate, &parameters, |law| matches!(law, Law::Coupling(_))),
         training: training_result(study, &machine, &problem, &training, &estimate).map_err(in_study)?,
+        torque_band: validation.iter().flat_map(|log| &log.residuals).filter_map(|joint| joint.band.clone()).collect(),
         validation,
         physical: verdict(&machine, &inertials, &parameters),
         logs,

@@ -54,7 +54,7 @@ pub use job::RunOptions;
 pub use machine::Machine;
 pub use output::{check_writable, write_whole};
 pub use progress::{Progress, Silent};
-pub use residuals::JointResiduals;
+pub use residuals::{JointResiduals, TorqueBand};
 pub use result::{
     BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, LogValidation, MethodSummary, PhysicalVerdict,
     RESULT_SCHEMA, ResultFile, RobotSummary, Timings, TrainingJoint, TrainingResult,

@@ -19,10 +19,22 @@ pub struct JointResiduals {
     pub normality: Option<NormalityReport>,
     /// Residual by speed; none where the speed is not among the model's columns (no viscous friction).
     pub regimes: Option<RegimesReport>,
-    /// Share of the torque inside the predicted 95 % band, percent; none where the covariance is not at hand.
-    pub band_coverage_percent: Option<f64>,
-    /// Mean half width of that band, Nm (N).
-    pub band_half_width_nm: Option<f64>,
+    /// The predicted torque's 95 % band; none where the covariance is not at hand. Written as `torque_band` of a result, for a finished model's test has none.
+    #[serde(skip)]
+    pub band: Option<TorqueBand>,
+}
+
+/// How well the predicted 95 % band `τ̂ ± t √(w V wᵀ + σ²)` holds the torque of one joint on a held-out log.
+#[derive(Clone, Debug, Serialize)]
+pub struct TorqueBand {
+    /// The log.
+    pub log: String,
+    /// The joint.
+    pub joint: String,
+    /// Share of the filtered torque inside, percent.
+    pub coverage_percent: f64,
+    /// Its mean half width, Nm (N).
+    pub half_width_nm: f64,
 }
 
 /// What the band needs of an estimate.
@@ -109,7 +121,7 @@ impl JointWatch {
         }
     }
 
-    pub(crate) fn report(&self, name: &str) -> JointResiduals {
+    pub(crate) fn report(&self, log: &str, name: &str) -> JointResiduals {
         let counted = self.sigma.is_some() && self.samples > 0;
         let samples = self.samples as f64;
         JointResiduals {
@@ -117,8 +129,12 @@ impl JointWatch {
             whiteness: self.whiteness.report(),
             normality: self.normality.report(),
             regimes: self.speed.map(|_| self.regimes.report()),
-            band_coverage_percent: counted.then(|| 100.0 * self.inside as f64 / samples),
-            band_half_width_nm: counted.then(|| self.widths / samples),
+            band: counted.then(|| TorqueBand {
+                log: log.to_owned(),
+                joint: name.to_owned(),
+                coverage_percent: 100.0 * self.inside as f64 / samples,
+                half_width_nm: self.widths / samples,
+            }),
         }
     }
 }

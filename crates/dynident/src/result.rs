@@ -1,7 +1,7 @@
 //! What `identify` writes: the schema of `result.json`.
 
 use crate::evidence::PriorAgreement;
-use crate::residuals::JointResiduals;
+use crate::residuals::{JointResiduals, TorqueBand};
 use dynident_estimation::{CorrelatedPair, EssentialReport, ValidationReport};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};
@@ -36,6 +36,8 @@ pub struct ResultFile {
     pub training: TrainingResult,
     /// The test on logs that were not used.
     pub validation: Vec<LogValidation>,
+    /// How well the 95 % band of the predicted torque holds on held-out logs.
+    pub torque_band: Vec<TorqueBand>,
     /// Whether the full set is physically possible.
     pub physical: PhysicalVerdict,
     /// What the importer found in each log.

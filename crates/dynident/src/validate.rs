@@ -208,7 +208,12 @@ pub(crate) fn validate_log(
         model: sink.model.report(),
         raw: sink.raw.report(),
         prior: sink.prior.map(|(_, validation)| validation.report()),
-        residuals: sink.watches.iter().zip(&joints).map(|(watch, name)| watch.report(name)).collect(),
+        residuals: sink
+            .watches
+            .iter()
+            .zip(&joints)
+            .map(|(watch, name)| watch.report(&study.log_name(index), name))
+            .collect(),
     };
     Ok((log_summary(study, index, passed, agreement, lags, &joints), figures))
 }

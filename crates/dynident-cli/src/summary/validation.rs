@@ -49,7 +49,8 @@ pub(super) fn residuals(log: &LogValidation) -> String {
     } else {
         format!(", at reversals {:.2} times those of fast motion", mean(&ratios))
     };
-    let covered: Vec<f64> = log.residuals.iter().filter_map(|joint| joint.band_coverage_percent).collect();
+    let covered: Vec<f64> =
+        log.residuals.iter().filter_map(|joint| Some(joint.band.as_ref()?.coverage_percent)).collect();
     let band = if covered.is_empty() {
         String::new()
     } else {
