@@ -10,8 +10,6 @@
 pub mod book;
 mod cpu_time;
 mod design;
-mod design_file;
-mod design_section;
 mod error;
 mod evaluate;
 mod evidence;
@@ -36,9 +34,10 @@ pub use dynident_excitation as excitation;
 pub use dynident_model as model;
 pub use dynident_recording as recording;
 
-pub use design::{DesignOutcome, design_study};
-pub use design_file::{DESIGN_SCHEMA, DesignFile, DirectionForecast, ParameterForecast};
-pub use design_section::{CriterionChoice, DesignSection, FamilyChoice, TorqueNoise};
+pub use design::{
+    CriterionChoice, DESIGN_SCHEMA, DesignFile, DesignOutcome, DesignSection, DirectionForecast, FamilyChoice,
+    ParameterForecast, TorqueNoise, design_study,
+};
 pub use error::Error;
 pub use evaluate::{Quantity, evaluate};
 pub use evidence::PriorAgreement;

@@ -1,6 +1,6 @@
 //! What `design.json` holds.
 
-use crate::design_section::FamilyChoice;
+use super::section::FamilyChoice;
 use dynident_excitation::check::LimitReport;
 use serde::Serialize;
 

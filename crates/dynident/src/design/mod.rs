@@ -1,8 +1,13 @@
 //! A study to the motion that should be recorded: the best of a family inside every limit, checked again, with a forecast.
 
+mod file;
+mod forecast;
+mod section;
+
+pub use file::{DESIGN_SCHEMA, DesignFile, DirectionForecast, ParameterForecast};
+pub use section::{CriterionChoice, DesignSection, FamilyChoice, TorqueNoise};
+
 use crate::cpu_time::cpu_seconds;
-use crate::design_file::{DESIGN_SCHEMA, DesignFile, DirectionForecast, ParameterForecast};
-use crate::design_section::{DesignSection, TorqueNoise};
 use crate::error::Error;
 use crate::job::{RunOptions, joint_names, study_name};
 use crate::machine::Machine;
@@ -12,7 +17,8 @@ use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_excitation::check::{CHECK_RATE_HZ, LimitReport, VIOLATION, check_limits};
 use dynident_excitation::criteria::{ConditionNumber, Criterion, DOptimal};
 use dynident_excitation::limits::{LimitSet, Limits, diagnose};
-use dynident_excitation::{DesignProgress, DesignTask, Family, Information, Motion, design, forecast, grid};
+use dynident_excitation::{DesignProgress, DesignTask, Family, Information, Motion, design, grid};
+use forecast::named_forecast;
 use nalgebra::DMatrix;
 use std::path::Path;
 
@@ -21,13 +27,6 @@ const LEAST_DISPLACEMENT: f64 = 0.05;
 
 /// Rate of the diagnosis, Hz.
 const DIAGNOSIS_RATE_HZ: f64 = 1000.0;
-
-/// Worst directions that are told, and the terms of each.
-const DIRECTIONS: usize = 3;
-const TERMS: usize = 6;
-
-/// A prior value below this share of the largest is zero.
-const NEGLIGIBLE: f64 = 1e-9;
 
 /// A finished design.
 #[derive(Debug)]
@@ -236,28 +235,4 @@ fn sentences(
         format!("The {} limit of `{}` is exceeded by {excess:.4} % at {:.4} s.", report.kind, report.joint, report.at_s)
     });
     broken.collect()
-}
-
-/// The forecast with the parameters' names, and with their sizes by the prior.
-fn named_forecast(machine: &Machine, information: &DMatrix<f64>) -> (Vec<ParameterForecast>, Vec<DirectionForecast>) {
-    let columns = machine.layout.columns();
-    let forecast = forecast(information, DIRECTIONS);
-    // A prior that is zero but for the rounding of the description's angles has no relative error.
-    let largest = machine.prior.iter().flatten().fold(0.0_f64, |largest, prior| largest.max(prior.abs()));
-    let expressions = machine.base.expressions();
-    let parameters = expressions.into_iter().enumerate().map(|(index, expression)| {
-        let (std, prior) = (forecast.std[index], machine.prior.as_ref().map(|prior| prior[index]));
-        let size = prior.map(f64::abs).filter(|size| *size > NEGLIGIBLE * largest);
-        let relative = std.zip(size).map(|(std, size)| 100.0 * std / size);
-        let (symbol, unit) = (columns[index].symbol(), columns[index].unit());
-        ParameterForecast { symbol, expression, unit, std, relative_std_percent: relative, prior }
-    });
-    let directions = forecast.worst.iter().map(|direction| {
-        let mut terms: Vec<(String, f64)> =
-            columns.iter().zip(&direction.shares).map(|(column, share)| (column.symbol(), *share)).collect();
-        terms.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
-        terms.truncate(TERMS);
-        DirectionForecast { inflation: direction.inflation, terms }
-    });
-    (parameters.collect(), directions.collect())
 }
