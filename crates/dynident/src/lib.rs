@@ -1,7 +1,7 @@
 //! **The whole job**: a study file in, a dynamic model with error bars and its proof out.
 //!
 //! [`identify()`] fits a [`Study`]'s machine to its logs and tests it on the held-out ones; [`validate()`] tests a finished model; [`inspect()`] audits a robot
-//! description; [`evaluate()`] computes dynamics for a table of states; [`design_study()`] finds the motion to record. The rooms below are re-exported: [`model`],
+//! description; [`evaluate()`] computes dynamics for a table of states; [`design_study()`] finds the motion to record, [`check_trajectory()`] and [`check_log()`] judge one that is there. The rooms below are re-exported: [`model`],
 //! [`dynamics`], [`recording`], [`estimation`], [`excitation`].
 
 #![forbid(unsafe_code)]
@@ -35,8 +35,9 @@ pub use dynident_model as model;
 pub use dynident_recording as recording;
 
 pub use design::{
-    CriterionChoice, DESIGN_SCHEMA, DesignFile, DesignOutcome, DesignSection, DirectionForecast, FamilyChoice,
-    ParameterForecast, TorqueNoise, design_study,
+    CriterionChoice, CriterionSetting, CriterionTable, DESIGN_SCHEMA, DesignFile, DesignOutcome, DesignSection,
+    DirectionForecast, FamilyChoice, JoinedChoice, ParameterForecast, PriorSection, StartPosture, TorqueNoise,
+    check_log, check_trajectory, design_study,
 };
 pub use error::Error;
 pub use evaluate::{Quantity, evaluate};

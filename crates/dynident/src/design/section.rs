@@ -1,9 +1,14 @@
 //! `[design]`: which motion is looked for, by what measure, within which limits.
 
+use super::criterion::CriterionSetting;
+use super::joined::JoinedChoice;
+use super::prior::PriorSection;
+use super::start_posture::StartPosture;
 use dynident_excitation::criteria::{AOptimal, ConditionNumber, Criterion, DOptimal, EOptimal};
 use dynident_excitation::families::{
-    BSpline, BSplineSettings, FamilyError, Fourier, FourierSettings, LogisticStrokes, LogisticStrokesSettings,
-    Multisine, MultisineSettings, Quintic, QuinticSettings, SplicedLogistic, SplicedLogisticSettings,
+    BSpline, BSplineSettings, FamilyError, Fourier, FourierSettings, FrictionLadder, FrictionLadderSettings,
+    LogisticStrokes, LogisticStrokesSettings, Multisine, MultisineSettings, Quintic, QuinticSettings, SplicedLogistic,
+    SplicedLogisticSettings, StaticPostures, StaticPosturesSettings,
 };
 use dynident_excitation::limits::Limits;
 use dynident_excitation::{DesignSettings, Family};
@@ -42,7 +47,11 @@ pub struct DesignSection {
     /// How long the motion lasts, s; 10 by default.
     pub duration_s: f64,
     /// What makes a motion good; `"d-optimal"` by default.
-    pub criterion: CriterionChoice,
+    pub criterion: CriterionSetting,
+    /// Where the motion starts, and where a family that returns ends; free by default.
+    pub start_posture: Option<StartPosture>,
+    /// What is known before the motion; nothing by default.
+    pub prior: PriorSection,
     /// Standard deviation of each joint's torque, Nm (N): one number, or one per joint in the model's order. By default 1 % of the joint's effort limit, and 1 where there is none.
     pub torque_std_nm: Option<TorqueNoise>,
     /// How much is searched, and how finely; also the rate of the log and the seed.
@@ -56,7 +65,9 @@ impl Default for DesignSection {
         Self {
             family: FamilyChoice::Fourier(FourierSettings::default()),
             duration_s: 10.0,
-            criterion: CriterionChoice::default(),
+            criterion: CriterionSetting::default(),
+            start_posture: None,
+            prior: PriorSection::default(),
             torque_std_nm: None,
             search: DesignSettings::default(),
             limits: Limits::default(),
@@ -80,6 +91,12 @@ pub enum FamilyChoice {
     LogisticStrokes(LogisticStrokesSettings),
     /// The paper's spliced logistic function.
     SplicedLogistic(SplicedLogisticSettings),
+    /// Sweeps at constant speeds, for friction.
+    FrictionLadder(FrictionLadderSettings),
+    /// Postures held one after another, for gravity.
+    StaticPostures(StaticPosturesSettings),
+    /// Families one after another.
+    Joined(JoinedChoice),
 }
 
 impl FamilyChoice {
@@ -92,6 +109,9 @@ impl FamilyChoice {
             Self::Multisine(_) => "multisine",
             Self::LogisticStrokes(_) => "logistic-strokes",
             Self::SplicedLogistic(_) => "spliced-logistic",
+            Self::FrictionLadder(_) => "friction-ladder",
+            Self::StaticPostures(_) => "static-postures",
+            Self::Joined(_) => "joined",
         }
     }
 
@@ -107,6 +127,9 @@ impl FamilyChoice {
             Self::Multisine(settings) => Box::new(Multisine::new(joints, duration_s, settings)?),
             Self::LogisticStrokes(settings) => Box::new(LogisticStrokes::new(joints, duration_s, settings)?),
             Self::SplicedLogistic(settings) => Box::new(SplicedLogistic::new(joints, duration_s, settings)?),
+            Self::FrictionLadder(settings) => Box::new(FrictionLadder::new(joints, duration_s, settings)?),
+            Self::StaticPostures(settings) => Box::new(StaticPostures::new(joints, duration_s, settings)?),
+            Self::Joined(settings) => Box::new(settings.family(joints, duration_s)?),
         })
     }
 }
@@ -192,6 +215,18 @@ impl DesignSection {
         within("search.search_samples", search.search_samples as f64, 8.0, MAX_SAMPLES)?;
         if let Some(limit) = search.time_limit_s {
             within("search.time_limit_s", limit, 1e-3, 1e7)?;
+        }
+        self.prior.validate()?;
+        if !self.prior.is_empty() && self.criterion.of_regressor() {
+            return Err(
+                "prior: a condition number is of the motion's regressor alone; choose the criterion \"d-optimal\", \"a-optimal\", \"e-optimal\" or prediction"
+                    .to_owned(),
+            );
+        }
+        if let (Some(_), FamilyChoice::Joined(joined)) = (&self.start_posture, &self.family)
+            && (joined.start.is_some() || joined.end.is_some())
+        {
+            return Err("start_posture and the joined family's own start or end: keep one".to_owned());
         }
         let stds = match &self.torque_std_nm {
             None => &[][..],
