@@ -208,10 +208,7 @@ fn a_written_trajectory_is_judged_as_the_design_was() {
     std::fs::write(&path, trajectory_csv(&sampled).unwrap()).unwrap();
     let checked = check_trajectory(&job.study, &job.path, &path, &Job::options(1)).unwrap();
     let (own, found) = (&outcome.file, &checked.file);
-    assert_eq!(
-        (found.family, found.feasible, found.evaluations, found.notes.len()),
-        ("given", true, 0, own.notes.len() - 1)
-    );
+    assert_eq!((found.family, found.feasible, found.evaluations, &found.notes), ("given", true, 0, &own.notes));
     let near =
         |a: Option<f64>, b: Option<f64>, tolerance: f64| (a.unwrap() - b.unwrap()).abs() < tolerance * b.unwrap().abs();
     // The same samples, with 17 digits.
@@ -262,7 +259,5 @@ fn prediction_on_a_task() {
     );
     // Designed for the task, the motion predicts it better than the one that was designed for all parameters alike, at the same effort of search.
     let for_task = designed(&study);
-    assert!(
-        for_task.file.feasible && for_task.file.criterion_figure.unwrap() <= checked.criterion_figure.unwrap() * 1.2
-    );
+    assert!(for_task.file.feasible && for_task.file.criterion_figure.unwrap() <= checked.criterion_figure.unwrap());
 }
