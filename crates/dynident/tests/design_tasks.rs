@@ -125,7 +125,9 @@ fn a_result_is_a_prior_for_the_next_run() {
     parameters.reverse();
     let rows = result["base_parameter_covariance"].as_array_mut().unwrap();
     rows.reverse();
-    rows.iter_mut().for_each(|row| row.as_array_mut().unwrap().reverse());
+    for row in rows {
+        row.as_array_mut().unwrap().reverse();
+    }
     write(&result);
     let [_, again] = stds(&designed(&deaf));
     assert!(again.iter().zip(&known).all(|(a, b)| (a - b).abs() < 1e-6 * b));

@@ -53,7 +53,9 @@ impl Given {
             require(pair[1] > pair[0], NAME, "time", pair[1], "give times that increase")?;
         }
         let first = times_s[0];
-        times_s.iter_mut().for_each(|time| *time -= first);
+        for time in &mut times_s {
+            *time -= first;
+        }
         let last = times_s[times_s.len() - 1];
         require(last.is_finite(), NAME, "time", last, "give finite times")?;
         Ok(Self { times_s, samples })

@@ -53,10 +53,8 @@ pub fn check_trajectory(
     prepared.notes.extend(not_at_rest(&given, &joints));
     let motion_at = |times: &[f64], out: &mut Motion| given.motion(&[], times, out);
     let reports = checked(&prepared, study_path, duration_s, CHECK_RATE_HZ, &motion_at)?;
-    let diagnosis = match reports.iter().any(|report| report.violated) {
-        true => sentences(&prepared.set, duration_s, &reports, &motion_at),
-        false => Vec::new(),
-    };
+    let broken = reports.iter().any(|report| report.violated);
+    let diagnosis = if broken { sentences(&prepared.set, duration_s, &reports, &motion_at) } else { Vec::new() };
     let rate_hz = prepared.section.search.rate_hz;
     let times = grid(duration_s, (duration_s * rate_hz).round() as usize + 1);
     let [plain, weighted] = prepared.informations(&times, &motion_at);
@@ -181,7 +179,7 @@ fn pieces(study: &Study, machine: &Machine, index: usize, file: &Path) -> Result
     let log = study.log_name(index);
     let failed = |source| Error::recording(&log, source);
     let mut files = vec![PathBuf::new(); study.log.len()];
-    files[index] = file.to_owned();
+    file.clone_into(&mut files[index]);
     let motion = motion_in_force(study, machine, &files, &[index], None)?;
     let mut stream = MotionStream::open(&study.format_of(index), file, &machine.log_joints, &motion).map_err(failed)?;
     let rate_hz = stream.rate_hz();
