@@ -127,7 +127,7 @@ fn a_task_that_is_none_is_named() {
         (
             table(positions, 50, |row, fields| {
                 if row == 3 {
-                    fields[2] = "NaN".to_owned()
+                    fields[2] = "NaN".to_owned();
                 }
             }),
             &["task.csv:5", "`q2`", "finite"],
@@ -135,7 +135,7 @@ fn a_task_that_is_none_is_named() {
         (
             table(positions, 50, |row, fields| {
                 if row == 3 {
-                    fields.truncate(4)
+                    fields.truncate(4);
                 }
             }),
             &["task.csv:5", "`q4`"],
@@ -143,7 +143,7 @@ fn a_task_that_is_none_is_named() {
         (
             table(positions, 50, |row, fields| {
                 if row == 3 {
-                    fields[0] = "0".to_owned()
+                    fields[0] = "0".to_owned();
                 }
             }),
             &["task.csv:5", "increase"],
@@ -151,7 +151,7 @@ fn a_task_that_is_none_is_named() {
         (
             table(positions, 50, |row, fields| {
                 if row == 49 {
-                    fields[0] = "9".to_owned()
+                    fields[0] = "9".to_owned();
                 }
             }),
             &["even"],
