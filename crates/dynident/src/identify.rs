@@ -111,6 +111,7 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
         robot: robot_summary(&machine),
         method: method_summary(study, &machine, &motion, &estimate),
         base_parameters: base_parameters(&machine, &estimate),
+        base_parameter_covariance: estimate.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
         bodies: bodies(&machine, &inertials),
         joints: joint_results(&machine, &estimate, &parameters),
         couplings: law_results(&machine, &estimate, &parameters, |law| matches!(law, Law::Coupling(_))),

@@ -1,7 +1,7 @@
 //! **The whole job**: a study file in, a dynamic model with error bars and its proof out.
 //!
 //! [`identify()`] fits a [`Study`]'s machine to its logs and tests it on the held-out ones; [`validate()`] tests a finished model; [`inspect()`] audits a robot
-//! description; [`evaluate()`] computes dynamics for a table of states; [`design_study()`] finds the motion to record. The rooms below are re-exported: [`model`],
+//! description; [`evaluate()`] computes dynamics for a table of states; [`design_study()`] finds the motion to record, [`check_trajectory()`] and [`check_log()`] judge one that is there. The rooms below are re-exported: [`model`],
 //! [`dynamics`], [`recording`], [`estimation`], [`excitation`].
 
 #![forbid(unsafe_code)]
@@ -10,10 +10,6 @@
 pub mod book;
 mod cpu_time;
 mod design;
-mod design_file;
-mod design_optimiser;
-mod design_section;
-mod design_windows;
 mod error;
 mod evaluate;
 mod evidence;
@@ -38,11 +34,12 @@ pub use dynident_excitation as excitation;
 pub use dynident_model as model;
 pub use dynident_recording as recording;
 
-pub use design::{DesignOutcome, design_study};
-pub use design_file::{DESIGN_SCHEMA, DesignFile, DirectionForecast, ParameterForecast};
-pub use design_optimiser::OptimiserChoice;
-pub use design_section::{CriterionChoice, DesignSection, FamilyChoice, TorqueNoise};
-pub use design_windows::{GivenStroke, StrokeFile, StrokeLimitFile, WindowedCondition, WindowedFile, WindowedProblem};
+pub use design::{
+    CriterionChoice, DESIGN_SCHEMA, DesignFile, DesignOutcome, DesignSection, DirectionForecast, FamilyChoice,
+    GivenStroke, JoinedChoice, OptimiserChoice, ParameterForecast, PriorSection, StartPosture, StrokeFile,
+    StrokeLimitFile, TorqueNoise, WindowedCondition, WindowedFile, WindowedProblem, check_log, check_trajectory,
+    design_study,
+};
 pub use error::Error;
 pub use evaluate::{Quantity, evaluate};
 pub use evidence::PriorAgreement;

@@ -21,6 +21,8 @@ pub struct ResultFile {
     pub method: MethodSummary,
     /// The base parameters, in the order of the tree.
     pub base_parameters: Vec<BaseParameterResult>,
+    /// Covariance of the base parameters by the method's own account, rows and columns in their order, symmetric; zero where a parameter is not excited.
+    pub base_parameter_covariance: Vec<Vec<f64>>,
     /// The bodies: one of the full sets that give these base parameters, the nearest to the prior.
     pub bodies: Vec<BodyResult>,
     /// Friction and drives.

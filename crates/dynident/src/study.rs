@@ -1,6 +1,6 @@
 //! The study file: a robot, its drives, its logs and how to fit them, without code.
 
-use crate::design_section::DesignSection;
+use crate::design::DesignSection;
 use crate::error::Error;
 use dynident_estimation::{CovarianceMethod, RankSettings, SegmentSettings};
 use dynident_model::line_and_column;
