@@ -217,7 +217,7 @@ mod tests {
             torque_std_nm: &[1.0, 1.0],
             prior: None,
         };
-        let settings = DesignSettings { search_samples: 48, ..DesignSettings::default() };
+        let settings = DesignSettings { search_samples: Some(48), ..DesignSettings::default() };
         let genetic = BinaryGeneticSettings { generations: 120, elite: true, ..BinaryGeneticSettings::default() };
         let cma = CmaEsSettings { max_evaluations: 4000, ..CmaEsSettings::default() };
         for (optimiser, generations) in [(DerivativeFree::Genetic(genetic), 120), (DerivativeFree::CmaEs(cma), 1)] {

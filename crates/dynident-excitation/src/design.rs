@@ -16,7 +16,7 @@ use crate::limits::LimitSet;
 use crate::optimisers::{AugmentedLagrangianState, OptimiserError};
 use assess::assess;
 use core::ops::ControlFlow;
-use core::sync::atomic::{AtomicU64, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use dynident_dynamics::PanelLayout;
 use dynident_model::sample::Random;
 use nalgebra::DMatrix;
@@ -118,7 +118,7 @@ pub struct DesignProgress {
     pub evaluations: u64,
 }
 
-/// Searches. `watch` hears of every better point, from any thread, and may end the search.
+/// Searches. `watch` hears of every better point, from any thread, and may end the search; the best so far is then still led inside the limits.
 ///
 /// # Errors
 /// If settings are out of range or no start can be evaluated at all.
@@ -134,11 +134,15 @@ pub fn design(
     let coarse = grid(task.family.duration_s(), settings.search_grid(task.family));
     let rounds = Rounds { task, times: &coarse, logged: logged.len() };
     let watch_all = watch;
+    let stopped = AtomicBool::new(false);
+    let over = || stopped.load(Ordering::Relaxed) || late();
     let watch = |round: &'static str| {
-        let (watch, evaluations) = (&watch_all, &evaluations);
+        let (watch, evaluations, stopped) = (&watch_all, &evaluations, &stopped);
         move |value: f64, violation: f64| {
             let evaluations = evaluations.load(Ordering::Relaxed);
-            watch(&DesignProgress { round, value, violation, evaluations }).is_break()
+            let ended = watch(&DesignProgress { round, value, violation, evaluations }).is_break();
+            stopped.fetch_or(ended, Ordering::Relaxed);
+            stopped.load(Ordering::Relaxed)
         }
     };
     let mut random = Random::new(settings.seed);
@@ -158,7 +162,7 @@ pub fn design(
         if best.as_ref().is_none_or(|best| found.best.score < best.score) || round < task.criteria.len() {
             best = Some(found.best);
         }
-        if late() {
+        if over() {
             break;
         }
         let Some(best) = &best else { continue };
@@ -179,8 +183,12 @@ pub fn design(
     let mut state = best.ok_or(OptimiserError::Start)?.state.on_twice_the_samples(coarse.len());
     let (mut kept, _) = assess(task, criterion, state.x.clone(), &fine, &logged);
     for _ in 0..POLISHES {
-        let budget = if late() { LAST_EVALUATIONS } else { settings.polish_evaluations };
-        let found = rounds.polish(criterion, &margins, state, budget, watch("polish"))?;
+        // A search that was ended still comes back inside the limits: some tenths of a second.
+        let ended = over();
+        let budget = if ended { LAST_EVALUATIONS } else { settings.polish_evaluations };
+        let tell = watch("polish");
+        let stop = |value, violation| tell(value, violation) && !ended;
+        let found = rounds.polish(criterion, &margins, state, budget, stop)?;
         evaluations.fetch_add(found.evaluations as u64, Ordering::Relaxed);
         state = found.best.state;
         // The last iterate, and the best that kept the limits on the samples.
@@ -200,8 +208,7 @@ pub fn design(
             *margin += if *c > 0.0 { 1.2 * c + 1e-6 } else { 0.0 };
         }
     }
-    // A watch that breaks, like the clock, leaves it at that.
-    if kept.violation > 0.0 && !late() {
+    if kept.violation > 0.0 && !over() {
         let stop = |progress: &DesignProgress| watch_all(progress).is_break() || late();
         let used;
         (kept, used) = restored(task, settings, kept, [&fine, &logged], &stop)?;
