@@ -117,13 +117,12 @@ impl<'a> CrossValidation<'a> {
         weights: &[f64],
     ) -> Result<JointFolds, EstimationError> {
         let joints = self.problem.joints();
-        for (what, expected, found) in [
-            ("weights of joints", joints.len(), weights.len()),
-            ("a joint number", joints.len(), joint.saturating_add(usize::from(joint < joints.len()))),
-        ] {
-            if (what == "weights of joints" && expected != found) || found > expected {
-                return Err(EstimationError::Mismatch { what: what.into(), expected, found });
-            }
+        let mismatch = |what: &str, expected, found| EstimationError::Mismatch { what: what.into(), expected, found };
+        if weights.len() != joints.len() {
+            return Err(mismatch("weights of joints", joints.len(), weights.len()));
+        }
+        if joint >= joints.len() {
+            return Err(mismatch("a joint number below the number of joints", joints.len(), joint));
         }
         let size = self.problem.columns().len();
         crate::factor::check_columns(common, size)?;

@@ -18,6 +18,8 @@ use serde::{Deserialize, Serialize};
 const FOLDS: [usize; 2] = [10, 5];
 /// Terms added at most to viscous friction and a step.
 const MOST_ADDED: usize = 3;
+/// Rounds over all joints: from the second on, the others have the friction that was chosen for them.
+const ROUNDS: usize = 2;
 /// Root mean square speed below which a joint does not move, rad/s or m/s: what the position noise of a standing joint looks like.
 const MOVING: f64 = 1.0e-3;
 
@@ -109,29 +111,51 @@ pub(crate) fn choose_friction(
     let norms = wide_problem.column_norms();
     let place =
         |law: &Law| wide.layout.columns().iter().position(|column| matches!(column, Column::Law(l) if l == law));
-    let of_joint = |(&joint, columns): (&usize, &Vec<CandidateColumn>)| -> Result<JointFriction, EstimationError> {
+    let of_joint = |joint: usize, columns: &[CandidateColumn], before: &[Option<Vec<usize>>]| {
         let variable: Vec<usize> = columns.iter().filter_map(|column| place(&column.law)).collect();
         let speed = norms[variable[0]] / (rows[joint].max(1) as f64).sqrt();
         if speed < MOVING {
-            return Ok(refused(joint, "the joint does not move in the training logs"));
+            return Ok((refused(joint, "the joint does not move in the training logs"), Vec::new()));
         }
-        // The stated model without this joint's friction, as far as the data excite it.
-        let own = |index: usize| match &machine.layout.columns()[index] {
-            Column::Law(law) => law.is_joint_friction() && law.acts_on(joint),
-            Column::Body { .. } => false,
+        // The stated model, as far as the data excite it, without this joint's friction, and with that of others as chosen before.
+        let chosen_before = |other: usize| choose.iter().position(|&c| c == other).and_then(|c| before[c].as_ref());
+        let kept = |index: &usize| match &machine.layout.columns()[*index] {
+            Column::Law(law) if law.is_joint_friction() => {
+                law.joints().iter().all(|&other| other != joint && chosen_before(other).is_none())
+            }
+            _ => true,
         };
-        let fixed = |index: usize| plain.rank.fixed.iter().any(|fixed| fixed.column == index);
-        let common: Vec<usize> =
-            (0..machine.layout.columns().len()).filter(|&index| !own(index) && !fixed(index)).collect();
+        let fixed = |index: &usize| plain.rank.fixed.iter().any(|fixed| fixed.column == *index);
+        let stated = (0..machine.layout.columns().len()).filter(|index| kept(index) && !fixed(index));
+        let others = choose.iter().filter(|&&other| other != joint).filter_map(|&other| chosen_before(other));
+        let common: Vec<usize> = stated.chain(others.flatten().copied()).collect();
         match validation.joint(joint, &common, &variable, &weights) {
             Ok(prepared) => Ok(search(name(joint), folds, &prepared, columns)),
             Err(EstimationError::TooFewRows { .. }) => {
-                Ok(refused(joint, "fewer rows than columns once a block is left out"))
+                Ok((refused(joint, "fewer rows than columns once a block is left out"), Vec::new()))
             }
             Err(error) => Err(error),
         }
     };
-    choose.par_iter().zip(columns).map(of_joint).collect()
+    let mut chosen: Vec<JointFriction> = Vec::new();
+    let mut before: Vec<Option<Vec<usize>>> = vec![None; choose.len()];
+    for _ in 0..ROUNDS {
+        let found: Vec<(JointFriction, Vec<usize>)> = choose
+            .par_iter()
+            .zip(columns)
+            .map(|(&joint, columns)| of_joint(joint, columns, &before))
+            .collect::<Result<_, EstimationError>>()?;
+        (chosen, before) = found
+            .into_iter()
+            .zip(columns)
+            .map(|((friction, places), columns)| {
+                let wide = places.iter().filter_map(|&at| place(&columns[at].law)).collect();
+                let known = friction.drive.is_some().then_some(wide);
+                (friction, known)
+            })
+            .unzip();
+    }
+    Ok(chosen)
 }
 
 /// A candidate with the best of its constants.
@@ -188,7 +212,8 @@ fn tuned(folds: &JointFolds, columns: &[CandidateColumn], terms: Vec<Term>, befo
         .unwrap_or_else(|| Evaluated { terms, places: Vec::new(), errors: folds.errors(&[], &[]) })
 }
 
-fn search(joint: String, count: usize, folds: &JointFolds, columns: &[CandidateColumn]) -> JointFriction {
+/// The choice for one joint, and the places of its columns.
+fn search(joint: String, count: usize, folds: &JointFolds, columns: &[CandidateColumn]) -> (JointFriction, Vec<usize>) {
     let mut met = vec![
         tuned(folds, columns, vec![Term::Viscous, Term::Coulomb], None),
         tuned(folds, columns, vec![Term::Viscous, Term::Sigmoid], None),
@@ -242,11 +267,12 @@ fn search(joint: String, count: usize, folds: &JointFolds, columns: &[CandidateC
         chosen: index == chosen,
     };
     let present: Vec<&CandidateColumn> = met[chosen].present().iter().map(|&place| &columns[place]).collect();
-    JointFriction {
+    let friction = JointFriction {
         joint,
         chosen: met[chosen].name(),
         drive: Some(stated(&present)),
         folds: count,
         candidates: met.iter().enumerate().map(candidate).collect(),
-    }
+    };
+    (friction, met[chosen].present())
 }

@@ -170,10 +170,10 @@ impl Law {
         }
     }
 
-    /// True when a negative parameter is not possible: friction takes power from the motion, inertia is positive. An offset may have either sign; so may a power of the speed, which
-    /// corrects the other laws, and a coupling's cross terms, which are judged with their drive.
+    /// True when a negative parameter is not possible: friction takes power from the motion at every speed, inertia is positive. An offset may have either sign; a coupling's
+    /// cross terms are judged with their drive.
     pub fn is_nonnegative(&self) -> bool {
-        !matches!(self, Self::Offset(_) | Self::Power(_) | Self::Coupling(_))
+        !matches!(self, Self::Offset(_) | Self::Coupling(_))
     }
 
     /// True for friction of one joint: all but offset, drive inertia and couplings.
