@@ -2,7 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use dynident_estimation::{
-    CrossValidation, EstimationError, LinearProblem, SegmentSettings, SegmentedFactor, ordinary_least_squares,
+    CrossValidation, EstimationError, LinearProblem, OrdinarySettings, SegmentSettings, SegmentedFactor,
+    ordinary_least_squares,
 };
 
 const ROWS: usize = 200;
@@ -38,7 +39,7 @@ fn errors_on_left_out_blocks_equal_those_of_fits_without_them() {
         for fold in 0..5 {
             let out = 40 * fold..40 * (fold + 1);
             let kept: Vec<Vec<f64>> = rows.iter().map(|c| [&c[..out.start], &c[out.end..]].concat()).collect();
-            let fit = ordinary_least_squares(&problem(&columns, &kept, 0..160), &Default::default()).unwrap();
+            let fit = ordinary_least_squares(&problem(&columns, &kept, 0..160), &OrdinarySettings::default()).unwrap();
             let square: f64 = out
                 .map(|k| rows[4][k] - columns.iter().zip(&fit.values).map(|(&c, v)| rows[c][k] * v).sum::<f64>())
                 .map(|e| e * e)

@@ -178,6 +178,14 @@ impl Evaluated {
         present.len() + self.terms.iter().filter(tuned).map(|term| term.constants()).sum::<usize>()
     }
 
+    /// Its terms that have a value at all.
+    fn present_name(&self, columns: &[CandidateColumn]) -> String {
+        let mut terms: Vec<Term> = self.present().iter().map(|&place| columns[place].term).collect();
+        terms.dedup();
+        let names: Vec<&str> = terms.into_iter().map(Term::name).collect();
+        if names.is_empty() { "none".to_owned() } else { names.join(" + ") }
+    }
+
     fn name(&self) -> String {
         self.terms.iter().map(|term| term.name()).collect::<Vec<_>>().join(" + ")
     }
@@ -269,7 +277,7 @@ fn search(joint: String, count: usize, folds: &JointFolds, columns: &[CandidateC
     let present: Vec<&CandidateColumn> = met[chosen].present().iter().map(|&place| &columns[place]).collect();
     let friction = JointFriction {
         joint,
-        chosen: met[chosen].name(),
+        chosen: met[chosen].present_name(columns),
         drive: Some(stated(&present)),
         folds: count,
         candidates: met.iter().enumerate().map(candidate).collect(),

@@ -56,7 +56,7 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
 
     let training: Vec<usize> = of_role(study, Role::Identify);
     let motion = motion_in_force(study, &machine, &files, &training, None)?;
-    let job = Training { study_path, folders: &folders, motion: &motion, files: &files, training: &training, options };
+    let job = Training { study_path, folders: &folders, motion: &motion, files: &files, logs: &training, options };
     let fitted = job.fit(study, machine, &mut timings)?;
     let (study, machine) = (&fitted.study, &fitted.machine);
     let (fits, problem, estimate) = (&fitted.fits, &fitted.problem, fitted.estimate);
@@ -115,7 +115,8 @@ struct Training<'a> {
     folders: &'a Folders,
     motion: &'a MotionSettings,
     files: &'a [PathBuf],
-    training: &'a [usize],
+    /// The logs to fit to.
+    logs: &'a [usize],
     options: &'a RunOptions<'a>,
 }
 
@@ -149,7 +150,7 @@ impl Training<'_> {
         let further = further.filter(|law| !known.contains(&Column::Law(law.clone())));
         let wide = first.machine.with_columns_of(further).with_load_of(&first.machine, &first.estimate.values);
         let started = Instant::now();
-        let fits = read_logs(study, &wide, self.motion, self.files, self.training, self.options)?;
+        let fits = read_logs(study, &wide, self.motion, self.files, self.logs, self.options)?;
         timings.logs += started.elapsed().as_secs_f64();
         let started = Instant::now();
         let wide_problem = problem(study, &wide, &fits).map_err(in_study)?;
@@ -169,7 +170,7 @@ impl Training<'_> {
 
     fn fit_once(&self, study: Study, machine: Machine, timings: &mut Timings) -> Result<Fitted, Error> {
         let started = Instant::now();
-        let fits = read_logs(&study, &machine, self.motion, self.files, self.training, self.options)?;
+        let fits = read_logs(&study, &machine, self.motion, self.files, self.logs, self.options)?;
         timings.logs += started.elapsed().as_secs_f64();
         let started = Instant::now();
         let in_study = |source| Error::Estimation { path: self.study_path.to_owned(), source };
