@@ -12,9 +12,11 @@
 #![forbid(unsafe_code)]
 
 mod covariance;
+mod cross_validation;
 mod error;
 mod estimate;
 mod factor;
+mod nonnegative;
 mod ordinary;
 mod problem;
 mod rank;
@@ -24,6 +26,7 @@ mod validation;
 mod weighted;
 
 pub use covariance::{CovarianceMethod, correlation};
+pub use cross_validation::{CrossValidation, FoldErrors, JointFolds};
 pub use error::EstimationError;
 pub use estimate::{Estimate, EstimateStatus};
 pub use factor::{BLOCK_ROWS, FactorWorkspace, TriangularFactor};

@@ -1,7 +1,7 @@
 //! A factor that remembers when: the rows of one joint in one log as at most K factors of consecutive time segments.
 
 use crate::error::EstimationError;
-use crate::factor::{FactorWorkspace, TriangularFactor, check_panel};
+use crate::factor::{FactorWorkspace, TriangularFactor, check_columns, check_panel};
 use core::ops::Range;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
@@ -173,6 +173,24 @@ impl SegmentedFactor {
         }
         self.segments = merged;
         self.length_rows *= 2;
+    }
+
+    /// The same rows and segments with only the given columns, in the order given: a smaller model from the factors of a larger one, without a second pass over the log.
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] for a column out of range.
+    pub fn selected(&self, columns: &[usize]) -> Result<Self, EstimationError> {
+        check_columns(columns, self.columns)?;
+        let segment = |segment: &Segment| match segment {
+            Segment::Factor(factor) => factor.selected(columns).map(Segment::Factor),
+            Segment::Rows(values) => {
+                let rows = values.chunks_exact(self.columns + 1);
+                let places = || columns.iter().copied().chain([self.columns]);
+                Ok(Segment::Rows(rows.flat_map(|row| places().map(|place| row[place])).collect()))
+            }
+        };
+        let segments = self.segments.iter().map(segment).collect::<Result<_, _>>()?;
+        Ok(Self { columns: columns.len(), segments, workspace: FactorWorkspace::default(), ..*self })
     }
 
     /// The factor of every segment, in order of time.

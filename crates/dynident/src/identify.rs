@@ -2,6 +2,8 @@
 
 use crate::error::Error;
 use crate::evidence::Evidence;
+use crate::friction_candidates::{candidate_columns, joints_to_choose};
+use crate::friction_choice::{JointFriction, choose_friction, with_friction};
 use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
 use crate::lag::{self, LAG_SAMPLES, LagCheck};
 use crate::machine::{Machine, prior_parameters};
@@ -52,45 +54,27 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
     let mut timings = Timings { machine: start.elapsed().as_secs_f64(), ..Timings::default() };
     let files = log_files(study, &folders)?;
 
-    let started = Instant::now();
     let training: Vec<usize> = of_role(study, Role::Identify);
     let motion = motion_in_force(study, &machine, &files, &training, None)?;
-    let fits = read_logs(study, &machine, &motion, &files, &training, options)?;
-    timings.logs = started.elapsed().as_secs_f64();
-
-    let started = Instant::now();
+    let job = Training { study_path, folders: &folders, motion: &motion, files: &files, logs: &training, options };
+    let fitted = job.fit(study, machine, &mut timings)?;
+    let (study, machine) = (&fitted.study, &fitted.machine);
+    let (fits, problem, estimate) = (&fitted.fits, &fitted.problem, fitted.estimate);
     let in_study = |source| Error::Estimation { path: study_path.to_owned(), source };
-    let problem = problem(study, &machine, &fits).map_err(in_study)?;
-    let estimate = match study.estimator.method {
-        EstimatorMethod::Ordinary => {
-            let settings = OrdinarySettings { rank: study.estimator.rank, covariance: study.estimator.covariance };
-            ordinary_least_squares(&problem, &settings)
-        }
-        EstimatorMethod::Weighted => {
-            let settings = WeightedSettings {
-                rank: study.estimator.rank,
-                covariance: study.estimator.covariance,
-                ..WeightedSettings::default()
-            };
-            weighted_least_squares(&problem, &settings)
-        }
-    }
-    .map_err(in_study)?;
-    timings.estimation = started.elapsed().as_secs_f64();
 
     let started = Instant::now();
-    let joints = joint_names(&machine);
+    let joints = joint_names(machine);
     let mut logs = Vec::new();
-    for fit in &fits {
+    for fit in fits {
         let mut summary = fit.summary.clone();
-        summary.torque_lag_s = training_lags(study, &machine, &motion, fit.index, &files[fit.index], &estimate.values)?;
+        summary.torque_lag_s = training_lags(study, machine, &motion, fit.index, &files[fit.index], &estimate.values)?;
         summary.model_findings.extend(lag::findings(&summary.torque_lag_s, &joints));
         logs.push(summary);
     }
     let mut validation = Vec::new();
     for index in of_role(study, Role::Validate) {
         let (summary, figures) =
-            validate_log(study, &machine, &motion, index, &files[index], &estimate.values, options)?;
+            validate_log(study, machine, &motion, index, &files[index], &estimate.values, options)?;
         logs.push(summary);
         validation.push(figures);
     }
@@ -101,23 +85,24 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
     let parameters = nearest_to_prior(&machine.model, &machine.base, &estimate.values, &prior);
     let inertials = inertials(&machine.model, &parameters);
     // Parameters that URDF cannot express leave a result without one; it is no reason to lose the result.
-    let (urdf, no_urdf) = match written_urdf(&machine, &inertials, &parameters) {
+    let (urdf, no_urdf) = match written_urdf(machine, &inertials, &parameters) {
         Ok(urdf) => (Some(urdf), None),
         Err(reason) => (None, Some(reason)),
     };
     let result = ResultFile {
         schema: RESULT_SCHEMA,
         name: study_name(study, study_path),
-        robot: robot_summary(&machine),
-        method: method_summary(study, &machine, &motion, &estimate),
-        base_parameters: base_parameters(&machine, &estimate),
+        robot: robot_summary(machine),
+        method: method_summary(study, machine, &motion, &estimate),
+        base_parameters: base_parameters(machine, &estimate),
         base_parameter_covariance: estimate.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
-        bodies: bodies(&machine, &inertials),
-        joints: joint_results(&machine, &estimate, &parameters),
-        couplings: law_results(&machine, &estimate, &parameters, |law| matches!(law, Law::Coupling(_))),
-        training: training_result(study, &machine, &problem, &training, &estimate).map_err(in_study)?,
+        bodies: bodies(machine, &inertials),
+        joints: joint_results(machine, &estimate, &parameters),
+        friction_choice: fitted.friction_choice,
+        couplings: law_results(machine, &estimate, &parameters, |law| matches!(law, Law::Coupling(_))),
+        training: training_result(study, machine, problem, &training, &estimate).map_err(in_study)?,
         validation,
-        physical: verdict(&machine, &inertials, &parameters),
+        physical: verdict(machine, &inertials, &parameters),
         logs,
         no_urdf,
         timings_s: timings,
@@ -125,11 +110,117 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
     Ok(Identification { result, estimate, inertials, urdf })
 }
 
+/// What fitting needs beside study and machine.
+struct Training<'a> {
+    study_path: &'a Path,
+    folders: &'a Folders,
+    motion: &'a MotionSettings,
+    files: &'a [PathBuf],
+    /// The logs to fit to.
+    logs: &'a [usize],
+    options: &'a RunOptions<'a>,
+}
+
+/// A fit, and the study and machine with the friction that it was made with.
+struct Fitted {
+    study: Study,
+    machine: Machine,
+    fits: Vec<LogFit>,
+    problem: LinearProblem,
+    estimate: Estimate,
+    friction_choice: Vec<JointFriction>,
+}
+
+impl Training<'_> {
+    /// Fits the stated model; where friction is to be chosen or depends on the load, once more with what that fit says.
+    fn fit(&self, study: &Study, machine: Machine, timings: &mut Timings) -> Result<Fitted, Error> {
+        let first = self.fit_once(study.clone(), machine, timings)?;
+        let choose = joints_to_choose(study, &first.machine);
+        if choose.is_empty() {
+            let machine = first.machine.clone().with_load_of(&first.machine, &first.estimate.values);
+            return if machine.load_parameters.is_some() {
+                self.fit_once(first.study, machine, timings)
+            } else {
+                Ok(first)
+            };
+        }
+        let in_study = |source| Error::Estimation { path: self.study_path.to_owned(), source };
+        let columns = candidate_columns(study, &first.machine, &choose);
+        let known = first.machine.layout.columns();
+        let further = columns.iter().flatten().map(|column| column.law.clone());
+        let further = further.filter(|law| !known.contains(&Column::Law(law.clone())));
+        let wide = first.machine.with_columns_of(further).with_load_of(&first.machine, &first.estimate.values);
+        let started = Instant::now();
+        let fits = read_logs(study, &wide, self.motion, self.files, self.logs, self.options)?;
+        timings.logs += started.elapsed().as_secs_f64();
+        let started = Instant::now();
+        let wide_problem = problem(study, &wide, &fits).map_err(in_study)?;
+        let friction_choice =
+            choose_friction(study, &first.machine, &wide, &wide_problem, &choose, &columns, &first.estimate)
+                .map_err(in_study)?;
+        let study = with_friction(study, &friction_choice);
+        let machine =
+            Machine::new(&study, self.study_path, self.folders)?.with_load_of(&first.machine, &first.estimate.values);
+        let fits =
+            fits.into_iter().map(|fit| fit.of(&wide, &machine)).collect::<Result<Vec<_>, _>>().map_err(in_study)?;
+        let problem = problem(&study, &machine, &fits).map_err(in_study)?;
+        let estimate = estimate(&study, &problem).map_err(in_study)?;
+        timings.estimation += started.elapsed().as_secs_f64();
+        Ok(Fitted { study, machine, fits, problem, estimate, friction_choice })
+    }
+
+    fn fit_once(&self, study: Study, machine: Machine, timings: &mut Timings) -> Result<Fitted, Error> {
+        let started = Instant::now();
+        let fits = read_logs(&study, &machine, self.motion, self.files, self.logs, self.options)?;
+        timings.logs += started.elapsed().as_secs_f64();
+        let started = Instant::now();
+        let in_study = |source| Error::Estimation { path: self.study_path.to_owned(), source };
+        let problem = problem(&study, &machine, &fits).map_err(in_study)?;
+        let estimate = estimate(&study, &problem).map_err(in_study)?;
+        timings.estimation += started.elapsed().as_secs_f64();
+        Ok(Fitted { study, machine, fits, problem, estimate, friction_choice: Vec::new() })
+    }
+}
+
+fn estimate(study: &Study, problem: &LinearProblem) -> Result<Estimate, dynident_estimation::EstimationError> {
+    match study.estimator.method {
+        EstimatorMethod::Ordinary => {
+            let settings = OrdinarySettings { rank: study.estimator.rank, covariance: study.estimator.covariance };
+            ordinary_least_squares(problem, &settings)
+        }
+        EstimatorMethod::Weighted => {
+            let settings = WeightedSettings {
+                rank: study.estimator.rank,
+                covariance: study.estimator.covariance,
+                ..WeightedSettings::default()
+            };
+            weighted_least_squares(problem, &settings)
+        }
+    }
+}
+
 /// What is left of one log for fitting.
 struct LogFit {
     index: usize,
     factors: Vec<SegmentedFactor>,
     summary: LogSummary,
+}
+
+impl LogFit {
+    /// The same rows as another machine sees them, whose columns are among those of `wide`.
+    fn of(mut self, wide: &Machine, machine: &Machine) -> Result<Self, dynident_estimation::EstimationError> {
+        for (joint, factor) in self.factors.iter_mut().enumerate() {
+            let seen = wide.layout.joint_columns(joint);
+            // A column that is not there gets a number out of range, which the selection refuses.
+            let place = |&column: &usize| {
+                let wanted = &machine.layout.columns()[column];
+                seen.iter().position(|&global| wide.layout.columns()[global] == *wanted).unwrap_or(usize::MAX)
+            };
+            let places: Vec<usize> = machine.layout.joint_columns(joint).iter().map(place).collect();
+            *factor = factor.selected(&places)?;
+        }
+        Ok(self)
+    }
 }
 
 struct FitSink<'a> {

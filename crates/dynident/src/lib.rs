@@ -13,6 +13,9 @@ mod design;
 mod error;
 mod evaluate;
 mod evidence;
+mod friction_candidates;
+mod friction_choice;
+mod friction_section;
 mod identify;
 mod inspect;
 mod job;
@@ -43,6 +46,8 @@ pub use design::{
 pub use error::Error;
 pub use evaluate::{Quantity, evaluate};
 pub use evidence::PriorAgreement;
+pub use friction_choice::{FrictionCandidate, JointFriction};
+pub use friction_section::{FrictionChoice, FrictionLaw};
 pub use identify::{Identification, identify};
 pub use inspect::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary, inspect};
 pub use job::RunOptions;

@@ -1,6 +1,7 @@
 //! What `identify` writes: the schema of `result.json`.
 
 use crate::evidence::PriorAgreement;
+use crate::friction_choice::JointFriction;
 use dynident_estimation::ValidationReport;
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};
@@ -27,6 +28,8 @@ pub struct ResultFile {
     pub bodies: Vec<BodyResult>,
     /// Friction and drives.
     pub joints: Vec<JointResult>,
+    /// How friction was chosen, for the joints where the study asks for it.
+    pub friction_choice: Vec<JointFriction>,
     /// Drives that turn with two joints.
     pub couplings: Vec<LawResult>,
     /// The fit on the logs that it was made from.
@@ -85,6 +88,8 @@ pub struct MethodSummary {
     pub base_gap: [f64; 2],
     /// Base parameters that the data do not excite; they were held at the prior (or zero).
     pub not_excited: Vec<String>,
+    /// With load-dependent friction: the base parameters, by the estimate without it, whose torque is the load.
+    pub load_parameters: Option<Vec<f64>>,
 }
 
 /// One base parameter.

@@ -56,6 +56,7 @@ pub(crate) fn method_summary(
             .to_owned(),
         base_gap: [weakest, strongest],
         not_excited: estimate.rank.fixed.iter().map(|fixed| fixed.name.clone()).collect(),
+        load_parameters: machine.load_parameters.clone(),
     }
 }
 
@@ -189,7 +190,7 @@ pub(crate) fn verdict(machine: &Machine, inertials: &[InertialParameters], param
         }
     }
     for (law, value) in machine.laws.iter().zip(&parameters[10 * machine.model.dof()..]) {
-        if *value < 0.0 && matches!(law, Law::Viscous(_) | Law::Coulomb(_) | Law::DriveInertia(_)) {
+        if *value < 0.0 && law.is_nonnegative() {
             violations.push(format!("{} = {value:.4} {}", law.symbol(), law.unit()));
         }
     }

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::machine::Machine;
 use crate::progress::Progress;
 use crate::study::{ParallelFilterSection, Study};
-use dynident_dynamics::{BatchWorkspace, Panels, regressor_panels};
+use dynident_dynamics::{BatchWorkspace, LawHistory, Panels, regressor_panels_following};
 use dynident_model::laws::JointMotion;
 use dynident_recording::{
     DecimationSettings, Decimator, DifferentiatorSettings, ImportReport, MotionBlock, MotionSettings, MotionStream,
@@ -172,6 +172,7 @@ struct Computer<'a> {
     progress: &'a dyn Progress,
     workspace: BatchWorkspace,
     panels: Panels,
+    history: LawHistory,
     decimators: Option<Vec<Decimator>>,
     segment: usize,
     motion: [Vec<f64>; 3],
@@ -203,6 +204,7 @@ impl<'a> Computer<'a> {
             progress: pass.progress,
             workspace: BatchWorkspace::new(&machine.model),
             panels: Panels::default(),
+            history: LawHistory::new(machine.load_parameters.clone()),
             decimators,
             segment: 0,
             motion: [Vec::new(), Vec::new(), Vec::new()],
@@ -220,6 +222,7 @@ impl<'a> Computer<'a> {
     fn take(&mut self, block: &MotionBlock, sink: &mut dyn RowSink) -> Result<(), Error> {
         if block.segment != self.segment {
             self.segment = block.segment;
+            self.history.restart();
             self.decimators.iter_mut().flatten().for_each(|decimator| {
                 decimator.finish();
             });
@@ -235,7 +238,14 @@ impl<'a> Computer<'a> {
             }
             let [q, dq, ddq] = &self.motion;
             let motion = JointMotion { samples, q, dq, ddq };
-            regressor_panels(model, &mut self.workspace, layout, &motion, &mut self.panels);
+            regressor_panels_following(
+                model,
+                &mut self.workspace,
+                layout,
+                &motion,
+                &mut self.history,
+                &mut self.panels,
+            );
             for (joint, &place) in log_place.iter().enumerate() {
                 let tau = &block.joint(&block.tau, place)[from..from + samples];
                 self.panels.torque_mut(joint).copy_from_slice(tau);

@@ -2,6 +2,7 @@
 
 use crate::design::DesignSection;
 use crate::error::Error;
+use crate::friction_section::{FrictionChoice, FrictionLaw};
 use dynident_estimation::{CovarianceMethod, RankSettings, SegmentSettings};
 use dynident_model::line_and_column;
 use dynident_recording::{LogFormat, MotionSettings};
@@ -126,6 +127,10 @@ pub struct DriveSection {
     pub coulomb_dead_band: f64,
     /// A constant torque. On by default.
     pub offset: bool,
+    /// Further laws of friction. None by default.
+    pub laws: Vec<FrictionLaw>,
+    /// Whether the keys above say which friction there is (`"stated"`, the default), or the training logs (`"auto"`).
+    pub friction: FrictionChoice,
     /// Exceptions, by joint name.
     pub joints: BTreeMap<String, JointDrive>,
 }
@@ -139,13 +144,15 @@ impl Default for DriveSection {
             coulomb_width: 0.02,
             coulomb_dead_band: 0.0,
             offset: true,
+            laws: Vec::new(),
+            friction: FrictionChoice::Stated,
             joints: BTreeMap::new(),
         }
     }
 }
 
 /// What one joint has in place of `[drive]`.
-#[derive(Clone, Debug, Default, Deserialize, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct JointDrive {
     /// In place of `drive.drive_inertia`.
@@ -160,6 +167,10 @@ pub struct JointDrive {
     pub coulomb_dead_band: Option<f64>,
     /// In place of `drive.offset`.
     pub offset: Option<bool>,
+    /// In place of `drive.laws`.
+    pub laws: Option<Vec<FrictionLaw>>,
+    /// In place of `drive.friction`.
+    pub friction: Option<FrictionChoice>,
 }
 
 /// `[[coupling]]`: a drive whose speed is `ratios[0] · q̇_first + ratios[1] · q̇_second`.
@@ -387,7 +398,13 @@ impl Study {
         };
         positive(self.drive.coulomb_width, "drive.coulomb_width")?;
         not_negative(self.drive.coulomb_dead_band, "drive.coulomb_dead_band")?;
+        for (index, law) in self.drive.laws.iter().enumerate() {
+            law.validate(&format!("drive.laws number {}", index + 1))?;
+        }
         for (joint, drive) in &self.drive.joints {
+            for (index, law) in drive.laws.iter().flatten().enumerate() {
+                law.validate(&format!("drive.joints.{joint}.laws number {}", index + 1))?;
+            }
             if let Some(width) = drive.coulomb_width {
                 positive(width, &format!("drive.joints.{joint}.coulomb_width"))?;
             }

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::evidence::{Evidence, predicted};
+use crate::friction_choice::{JointFriction, with_friction};
 use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
 use crate::lag::LagCheck;
 use crate::machine::Machine;
@@ -34,12 +35,16 @@ pub struct ValidationFile {
 struct StoredModel {
     schema: String,
     method: StoredMethod,
+    #[serde(default)]
+    friction_choice: Vec<JointFriction>,
     base_parameters: Vec<BaseParameterResult>,
 }
 
 #[derive(Deserialize)]
 struct StoredMethod {
     motion: MotionSettings,
+    #[serde(default)]
+    load_parameters: Option<Vec<f64>>,
 }
 
 /// Tests the model of a `result.json` on the logs of a study that have the role `validate`, or on all its logs if none has.
@@ -54,8 +59,12 @@ pub fn validate(
 ) -> Result<ValidationFile, Error> {
     study.require_log(study_path)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
+    let stored = read_model(result_path)?;
+    // With the friction that was chosen when the model was made.
+    let chosen = with_friction(study, &stored.friction_choice);
+    let study = &chosen;
     let machine = Machine::new(study, study_path, &folders)?;
-    let (theta, made_with) = stored_model(result_path, &machine)?;
+    let (theta, made_with, machine) = stored_model(result_path, stored, machine)?;
     let files = log_files(study, &folders)?;
     let mut chosen = of_role(study, Role::Validate);
     if chosen.is_empty() {
@@ -77,8 +86,7 @@ pub fn validate(
     Ok(file)
 }
 
-/// The base parameters of a stored result, in the machine's order, and the motion settings that they were found with.
-fn stored_model(path: &Path, machine: &Machine) -> Result<(Vec<f64>, MotionSettings), Error> {
+fn read_model(path: &Path) -> Result<StoredModel, Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
     let stored: StoredModel = serde_json::from_slice(&bytes).map_err(|error| {
@@ -88,6 +96,23 @@ fn stored_model(path: &Path, machine: &Machine) -> Result<(Vec<f64>, MotionSetti
         let expected = crate::result::RESULT_SCHEMA;
         return Err(wrong(format!("schema `{}`, not `{expected}`: identify again with this version", stored.schema)));
     }
+    for joint in &stored.friction_choice {
+        joint
+            .drive
+            .iter()
+            .flat_map(|drive| drive.laws.iter().flatten())
+            .try_for_each(|law| law.validate(&format!("friction_choice of joint `{}`", joint.joint)).map_err(wrong))?;
+    }
+    Ok(stored)
+}
+
+/// The base parameters of a stored result, in the machine's order, the motion settings that they were found with, and the machine with its load.
+fn stored_model(
+    path: &Path,
+    stored: StoredModel,
+    mut machine: Machine,
+) -> Result<(Vec<f64>, MotionSettings, Machine), Error> {
+    let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     let expressions = machine.base.expressions();
     if stored.base_parameters.len() != expressions.len() {
         return Err(wrong(format!(
@@ -109,7 +134,13 @@ fn stored_model(path: &Path, machine: &Machine) -> Result<(Vec<f64>, MotionSetti
         }
         values.push(stored.value);
     }
-    Ok((values, stored.method.motion))
+    if let Some(load) = &stored.method.load_parameters
+        && (load.len() != values.len() || load.iter().any(|value| !value.is_finite()))
+    {
+        return Err(wrong("load_parameters are not one finite number per base parameter: identify again".to_owned()));
+    }
+    machine.load_parameters = stored.method.load_parameters;
+    Ok((values, stored.method.motion, machine))
 }
 
 struct TestSink<'a> {

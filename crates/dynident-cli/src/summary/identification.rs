@@ -3,7 +3,7 @@
 use super::findings::findings;
 use super::text::{WIDTH, listed, name, percent, shortened, table, with_deviation, wrapped};
 use core::fmt::Write;
-use dynident::{LogSummary, LogValidation, ResultFile};
+use dynident::{FrictionCandidate, LogSummary, LogValidation, ResultFile};
 use std::path::Path;
 
 /// Base parameters shown with their error bars; the rest stand in the file.
@@ -33,6 +33,10 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
     }
     text += &joints(r);
     text.push('\n');
+    if !r.friction_choice.is_empty() {
+        text += &friction(r);
+        text.push('\n');
+    }
     text += &parameters(r);
     text.push('\n');
     text += &physics(r);
@@ -118,6 +122,19 @@ fn joints(r: &ResultFile) -> String {
         let _ = writeln!(text, "  {} more held-out logs in result.json", r.validation.len() - COLUMNS);
     }
     text
+}
+
+/// What friction the training logs chose, against the plain one.
+fn friction(r: &ResultFile) -> String {
+    let header = ["friction by cross-validation", "chosen Nm", "plain Nm", ""].map(str::to_owned);
+    let rows = r.friction_choice.iter().map(|joint| {
+        let error = |candidate: Option<&FrictionCandidate>| {
+            candidate.map_or_else(|| "-".to_owned(), |candidate| format!("{:.3}", candidate.cv_error_nm))
+        };
+        let chosen = joint.candidates.iter().find(|candidate| candidate.chosen);
+        vec![name(&joint.joint), error(chosen), error(joint.candidates.first()), shortened(&joint.chosen, EXPRESSION)]
+    });
+    table(&header, 1..3, rows.collect())
 }
 
 /// The best known base parameters, and how many are hardly known.
