@@ -37,7 +37,8 @@ pub struct DesignSettings {
     pub evaluations_per_start: usize,
     /// Evaluations of one polish at most (up to six, while something is broken between samples). Default 1,000.
     pub polish_evaluations: usize,
-    /// Samples of the search grid. Default 96, and at least five per free number of a joint, for families that move fast.
+    /// Samples of the search grid. Default 96, at least five per free number of a joint, for families that move fast, and 25 a second where places are limited: an arm crosses a thin obstacle
+    /// between two samples of a coarse grid without being seen.
     pub search_samples: Option<usize>,
     /// Rate at which the robot will be logged, Hz: every sample counts for the information. Default 100.
     pub rate_hz: f64,
@@ -64,12 +65,16 @@ impl Default for DesignSettings {
 
 impl DesignSettings {
     /// Samples of the search grid.
-    pub(crate) fn search_grid(&self, family: &dyn Family) -> usize {
+    pub(crate) fn search_grid(&self, family: &dyn Family, limits: &LimitSet) -> usize {
         let each = family.parameters() / family.joints().max(1);
+        let of_place = if limits.has_places() { (PLACE_RATE_HZ * family.duration_s()) as usize } else { 0 };
         // Whole registers.
-        self.search_samples.unwrap_or_else(|| 96.max((5 * each).next_multiple_of(16))).max(8)
+        self.search_samples.unwrap_or_else(|| 96.max((5 * each).max(of_place).next_multiple_of(16))).max(8)
     }
 }
+
+/// Rate of the search grid where places are limited, Hz.
+const PLACE_RATE_HZ: f64 = 25.0;
 
 /// What is to be designed.
 #[derive(Clone, Copy)]
@@ -131,7 +136,7 @@ pub fn design(
     let late = || settings.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > limit);
     let evaluations = AtomicU64::new(0);
     let logged = grid(task.family.duration_s(), (task.family.duration_s() * settings.rate_hz).round() as usize + 1);
-    let coarse = grid(task.family.duration_s(), settings.search_grid(task.family));
+    let coarse = grid(task.family.duration_s(), settings.search_grid(task.family, task.limits));
     let rounds = Rounds { task, times: &coarse, logged: logged.len() };
     let watch_all = watch;
     let stopped = AtomicBool::new(false);

@@ -95,6 +95,11 @@ impl LimitSet {
         &self.bands
     }
 
+    /// Whether the places of points are limited: boxes, floor, column, self-collision.
+    pub fn has_places(&self) -> bool {
+        self.placements
+    }
+
     /// The robot.
     pub fn model(&self) -> &Model {
         &self.model
