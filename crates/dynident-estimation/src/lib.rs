@@ -16,6 +16,7 @@ mod error;
 mod estimate;
 mod factor;
 mod ordinary;
+pub mod physical;
 mod problem;
 mod rank;
 mod reflect;
