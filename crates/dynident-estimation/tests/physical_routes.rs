@@ -1,6 +1,7 @@
 //! A thousand random problems: all end, all are feasible, all carry a certificate, and two solvers that share only the certificate agree.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
+#![allow(clippy::print_stdout, reason = "the figures are the point of the long run")]
 
 mod physical_problems;
 
@@ -53,9 +54,8 @@ fn run(seeds: std::ops::Range<u64>, bodies: impl Fn(u64) -> usize) -> Worst {
     let mut worst = Worst::default();
     for seed in seeds {
         let case = case(seed, bodies(seed));
-        let fits = [PhysicalRoute::InteriorPoint, PhysicalRoute::LogCholesky].map(|route| {
-            physical_fit(&case.problem, &PhysicalSettings { route, ..case.settings.clone() }).unwrap()
-        });
+        let fits = [PhysicalRoute::InteriorPoint, PhysicalRoute::LogCholesky]
+            .map(|route| physical_fit(&case.problem, &PhysicalSettings { route, ..case.settings.clone() }).unwrap());
         let objectives = fits.each_ref().map(|fit| fit.data_objective + fit.prior_objective);
         let apart = (objectives[0] - objectives[1]).abs() / (1.0 + objectives[0].abs());
         for (k, fit) in fits.iter().enumerate() {
@@ -92,7 +92,7 @@ fn check(worst: &Worst) {
 #[test]
 fn both_routes_find_the_same_optimum_of_150_problems() {
     // Mostly small ones, one of twelve bodies in thirty, to keep the everyday suite quick.
-    check(&run(std::env::var("S").map_or(0..150, |s| { let s: u64 = s.parse().unwrap(); s..s+1 }), |seed| if seed % 30 == 7 { 12 } else { 2 + (seed % 4) as usize }));
+    check(&run(0..150, |seed| if seed % 30 == 7 { 12 } else { 2 + (seed % 4) as usize }));
 }
 
 /// The whole promise, some minutes in the release profile:

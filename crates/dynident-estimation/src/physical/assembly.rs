@@ -142,13 +142,13 @@ impl Assembled {
             };
             x[self.first_scalar + index] = inside / scalar.scale;
         }
-        if self.program.strictly_inside(&x) { Ok(x) } else { self.roomiest(x) }
+        if self.program.strictly_inside(&x) { Ok(x) } else { self.roomiest(&x) }
     }
 
     /// Maximises t with `S_k ⪰ t 1` and every unit row at least t. Not positive: the constraints exclude each other, and those with multipliers are at odds
     /// (a theorem of the alternative: Boyd and Vandenberghe 5.8).
-    fn roomiest(&self, x: DVector<f64>) -> Result<DVector<f64>, PhysicalError> {
-        let phase = RoomProgram::new(&self.program, &x);
+    fn roomiest(&self, x: &DVector<f64>) -> Result<DVector<f64>, PhysicalError> {
+        let phase = RoomProgram::new(&self.program, x);
         let solved =
             interior_point(&phase.program, phase.start, ROOM_TOLERANCE, 300).ok_or(PhysicalError::Breakdown)?;
         let count = self.program.variables;
@@ -207,10 +207,12 @@ impl RoomProgram {
             least = least.min(super::cone::least_eigenvalue(&s));
             let entries: Vec<(usize, f64)> =
                 trace.iter().enumerate().filter(|(_, v)| **v != 0.0).map(|(k, &v)| (k, -v)).collect();
-            let offset = 4.0 * LARGEST + 2.0 * s.trace().abs() - block.offset.dot(&unit);
-            let length = entries.iter().map(|(_, v)| v * v).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
-            let entries = entries.into_iter().map(|(k, v)| (k, v / length)).collect();
-            program.rows.push(Row { entries, offset: offset / length, label: usize::MAX });
+            if !entries.is_empty() {
+                let offset = 4.0 * LARGEST + 2.0 * s.trace().abs() - block.offset.dot(&unit);
+                let length = entries.iter().map(|(_, v)| v * v).sum::<f64>().sqrt();
+                let entries = entries.into_iter().map(|(k, v)| (k, v / length)).collect();
+                program.rows.push(Row { entries, offset: offset / length, label: usize::MAX });
+            }
             program.blocks.push(Block { map: BlockMap::General(map), ..block.clone() });
         }
         for row in &constrained.rows {

@@ -6,11 +6,10 @@ use nalgebra::{Matrix4, Vector4};
 /// The scaling of Nesterov and Todd for a pair `S, Z ≻ 0`: R with `R⁻¹ S R⁻ᵀ = Rᵀ Z R = diag(λ)`.
 ///
 /// Nesterov and Todd, SIAM J. Optimization 8 (1998) 324; computed as in Vandenberghe's CVXOPT notes (2010), section 5.3: with `S = L Lᵀ`,
-/// `Z = M Mᵀ` and `MᵀL = U diag(λ) Vᵀ`, `R = L V diag(λ)^{-1/2}`.
+/// `Z = M Mᵀ` and `MᵀL = U diag(λ) Vᵀ`, `R⁻¹ = diag(λ)^{-1/2} Uᵀ Mᵀ`. Only R⁻¹ is ever needed.
 #[derive(Clone, Debug)]
 pub(super) struct Scaling {
     pub(super) lambda: Vector4<f64>,
-    r: Matrix4<f64>,
     r_inverse: Matrix4<f64>,
 }
 
@@ -19,15 +18,13 @@ impl Scaling {
     pub(super) fn new(s: &Matrix4<f64>, z: &Matrix4<f64>) -> Option<Self> {
         let l = s.cholesky()?.l();
         let m = z.cholesky()?.l();
-        let (lambda, v, u) = singular_values(&(m.transpose() * l));
+        let (lambda, u) = singular_values(&(m.transpose() * l));
         let root = lambda.map(f64::sqrt);
         if !lambda.iter().all(|&value| value > 0.0 && value.is_finite()) {
             return None;
         }
-        let r = l * v * Matrix4::from_diagonal(&root.map(|value| 1.0 / value));
-        // R⁻¹ = diag(λ)^{-1/2} Uᵀ Mᵀ, without inverting anything.
         let r_inverse = Matrix4::from_diagonal(&root.map(|value| 1.0 / value)) * u.transpose() * m.transpose();
-        Some(Self { lambda, r, r_inverse })
+        Some(Self { lambda, r_inverse })
     }
 
     /// `R⁻¹ X R⁻ᵀ`: a primal direction, scaled.
@@ -52,16 +49,9 @@ impl Scaling {
 
     /// The largest α for which `diag(λ) + α D` stays positive semidefinite (infinite if it always does).
     pub(super) fn largest_step(&self, d: &Matrix4<f64>) -> f64 {
-        let scaled =
-            Matrix4::from_fn(|i, j| 0.5 * (d[(i, j)] + d[(j, i)]) / (self.lambda[i] * self.lambda[j]).sqrt());
+        let scaled = Matrix4::from_fn(|i, j| 0.5 * (d[(i, j)] + d[(j, i)]) / (self.lambda[i] * self.lambda[j]).sqrt());
         let least = least_eigenvalue(&scaled);
         if least < 0.0 { -1.0 / least } else { f64::INFINITY }
-    }
-
-    /// R, for tests.
-    #[cfg(test)]
-    fn r(&self) -> &Matrix4<f64> {
-        &self.r
     }
 }
 
@@ -96,10 +86,10 @@ pub(super) fn inverse(matrix: &Matrix4<f64>) -> Option<Matrix4<f64>> {
     Some(matrix_of(&vector_of(&inverse)))
 }
 
-/// Singular values and both sides' vectors `A = U diag(σ) Vᵀ` by one-sided Jacobi rotations (Golub and Van Loan 8.6.3), returned as (σ, V, U): small values come
-/// out with as many digits as large ones, which a bidiagonal method does not give.
-fn singular_values(a: &Matrix4<f64>) -> (Vector4<f64>, Matrix4<f64>, Matrix4<f64>) {
-    let (mut b, mut v) = (*a, Matrix4::identity());
+/// Singular values and left vectors of `A = U diag(σ) Vᵀ` by one-sided Jacobi rotations (Golub and Van Loan 8.6.3): small values come out with as many digits as
+/// large ones, which a bidiagonal method does not give.
+fn singular_values(a: &Matrix4<f64>) -> (Vector4<f64>, Matrix4<f64>) {
+    let mut b = *a;
     // Six to eight sweeps settle a 4 × 4 matrix; the limit only guards the loop.
     for _ in 0..30 {
         let mut turned = false;
@@ -115,12 +105,10 @@ fn singular_values(a: &Matrix4<f64>) -> (Vector4<f64>, Matrix4<f64>, Matrix4<f64
                 let t = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
                 let c = 1.0 / t.hypot(1.0);
                 let s = c * t;
-                for matrix in [&mut b, &mut v] {
-                    for row in 0..4 {
-                        let (x, y) = (matrix[(row, p)], matrix[(row, q)]);
-                        matrix[(row, p)] = c * x - s * y;
-                        matrix[(row, q)] = s * x + c * y;
-                    }
+                for row in 0..4 {
+                    let (x, y) = (b[(row, p)], b[(row, q)]);
+                    b[(row, p)] = c * x - s * y;
+                    b[(row, q)] = s * x + c * y;
                 }
             }
         }
@@ -130,7 +118,7 @@ fn singular_values(a: &Matrix4<f64>) -> (Vector4<f64>, Matrix4<f64>, Matrix4<f64
     }
     let sigma = Vector4::from_fn(|k, _| b.column(k).norm());
     let u = Matrix4::from_fn(|i, k| b[(i, k)] / sigma[k]);
-    (sigma, v, u)
+    (sigma, u)
 }
 
 #[cfg(test)]
@@ -151,7 +139,6 @@ mod tests {
             let diagonal = Matrix4::from_diagonal(&scaling.lambda);
             // The condition of S times rounding, with room.
             assert!((scaling.scaled_primal(&s) - diagonal).amax() < 1e-9);
-            assert!((scaling.r().transpose() * z * scaling.r() - diagonal).amax() < 1e-9);
             assert!((scaling.unscaled_dual(&diagonal) - z).amax() < 1e-9);
         }
     }

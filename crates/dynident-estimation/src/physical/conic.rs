@@ -9,8 +9,8 @@
 //! `S_k Z_k = γ_k 1`, and `s_l z_l = 0` (Boyd and Vandenberghe, Convex Optimization, 5.9.2). A block with γ > 0 is an entropic prior: its own barrier keeps it
 //! inside, and it stops on its central path at γ instead of zero.
 
-use super::coordinates::{Vector10, matrix_of, vector_of};
 use super::cone::log_determinant;
+use super::coordinates::{Vector10, matrix_of, vector_of};
 use nalgebra::{DMatrix, DVector, Matrix4};
 
 /// One positive semidefinite 4 × 4 block.
@@ -179,15 +179,6 @@ impl Program {
         let rest = (&self.data * x - &self.target).abs();
         let size = self.data.abs() * x.abs() + self.target.abs();
         4.0 * f64::EPSILON * rest.dot(&size)
-    }
-
-    /// f(x), or none outside of the constraints' interior.
-    pub(super) fn objective(&self, x: &DVector<f64>) -> Option<f64> {
-        let mut sum = self.smooth_objective(x);
-        for block in self.blocks.iter().filter(|block| block.entropy > 0.0) {
-            sum -= block.entropy * log_determinant(&block.value(x))?;
-        }
-        Some(sum)
     }
 
     /// Whether x lies strictly inside all constraints.

@@ -36,10 +36,22 @@ pub(super) fn matrix_of(vector: &Vector10) -> Matrix4<f64> {
 pub(super) fn pseudo_inertia(p: &[f64]) -> Matrix4<f64> {
     let half = 0.5 * (p[4] + p[7] + p[9]);
     Matrix4::new(
-        half - p[4], -p[5], -p[6], p[1], //
-        -p[5], half - p[7], -p[8], p[2], //
-        -p[6], -p[8], half - p[9], p[3], //
-        p[1], p[2], p[3], p[0],
+        half - p[4],
+        -p[5],
+        -p[6],
+        p[1], //
+        -p[5],
+        half - p[7],
+        -p[8],
+        p[2], //
+        -p[6],
+        -p[8],
+        half - p[9],
+        p[3], //
+        p[1],
+        p[2],
+        p[3],
+        p[0],
     )
 }
 
@@ -95,7 +107,15 @@ impl Whitening {
     /// The reference's own units of the ten parameters: m, m ℓ (three times), m ℓ² (six times).
     pub(super) fn units(&self) -> [f64; 10] {
         let (m, l) = (self.mass_kg, self.length_m);
-        core::array::from_fn(|k| m * [1.0, l, l * l][if k == 0 { 0 } else if k < 4 { 1 } else { 2 }])
+        core::array::from_fn(|k| {
+            m * [1.0, l, l * l][if k == 0 {
+                0
+            } else if k < 4 {
+                1
+            } else {
+                2
+            }]
+        })
     }
 
     /// T⁻¹ of `π = T x`.

@@ -1,7 +1,7 @@
 //! What a physical fit is asked: bodies, scalars, the map to base parameters, and the data.
 
-use super::coordinates::{Whitening, pseudo_inertia};
 use super::cone::least_eigenvalue;
+use super::coordinates::{Whitening, pseudo_inertia};
 use super::error::PhysicalError;
 use crate::factor::TriangularFactor;
 use nalgebra::{DMatrix, DVector};
@@ -219,7 +219,11 @@ fn checked_body(body: &PhysicalBody) -> Result<Whitening, PhysicalError> {
     if let Some(limits) = body.mass_kg {
         interval(&format!("body {name}: mass"), limits)?;
         if limits[1] <= 0.0 {
-            return Err(PhysicalError::EmptyInterval { what: format!("body {name}: mass"), lower: 0.0, upper: limits[1] });
+            return Err(PhysicalError::EmptyInterval {
+                what: format!("body {name}: mass"),
+                lower: 0.0,
+                upper: limits[1],
+            });
         }
     }
     if let Some([low, high]) = body.com_box_m {

@@ -86,6 +86,8 @@ pub enum PhysicalError {
         shortfall: f64,
     },
     /// The solver could not even start: magnitudes beyond double precision.
-    #[error("the physical fit breaks down in double precision: columns and bodies differ by too many powers of ten; check units and scales")]
+    #[error(
+        "the physical fit breaks down in double precision: columns and bodies differ by too many powers of ten; check units and scales"
+    )]
     Breakdown,
 }

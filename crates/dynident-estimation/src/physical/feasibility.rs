@@ -93,7 +93,12 @@ pub fn base_feasibility(problem: &PhysicalProblem, theta: &[f64]) -> Result<Base
             verdict: BaseVerdict::Impossible,
             margin: f64::NEG_INFINITY.max(-missed / size),
             parameters,
-            limiting: problem.bodies.iter().filter(|b| b.known.is_some()).map(|b| format!("body {}: known", b.name)).collect(),
+            limiting: problem
+                .bodies
+                .iter()
+                .filter(|b| b.known.is_some())
+                .map(|b| format!("body {}: known", b.name))
+                .collect(),
             separating: Some(SeparatingSum { weights, value, least }),
         });
     }
@@ -137,7 +142,13 @@ pub fn base_feasibility(problem: &PhysicalProblem, theta: &[f64]) -> Result<Base
     let mut functional = DVector::zeros(b.ncols());
     let mut least = 0.0;
     let mut limiting = Vec::new();
-    let heaviest = solved.multipliers.blocks.iter().map(nalgebra::Matrix4::trace).chain(solved.multipliers.rows.iter().copied()).fold(0.0, f64::max);
+    let heaviest = solved
+        .multipliers
+        .blocks
+        .iter()
+        .map(nalgebra::Matrix4::trace)
+        .chain(solved.multipliers.rows.iter().copied())
+        .fold(0.0, f64::max);
     let mut note = |label: usize, share: f64| {
         if share >= 1.0e-3 * heaviest && label < names.len() && !limiting.contains(&names[label]) {
             limiting.push(names[label].clone());

@@ -127,14 +127,14 @@ pub fn physical_fit(problem: &PhysicalProblem, settings: &PhysicalSettings) -> R
         }
     }
     .ok_or(PhysicalError::Breakdown)?;
-    Ok(finished(problem, settings, &assembled, solved))
+    Ok(finished(problem, settings, &assembled, &solved))
 }
 
 fn finished(
     problem: &PhysicalProblem,
     settings: &PhysicalSettings,
     assembled: &Assembled,
-    solved: Solved,
+    solved: &Solved,
 ) -> PhysicalFit {
     let parameters = assembled.parameters(problem, &solved.x);
     let base = problem.base.matrix() * DVector::from_column_slice(&parameters);

@@ -160,8 +160,7 @@ impl State {
         let target = |mu: f64| -> Vec<Matrix4<f64>> {
             squares.iter().zip(&floors).map(|(square, &floor)| Matrix4::identity() * mu.max(floor) - square).collect()
         };
-        let row_target =
-            |mu: f64| -> Vec<f64> { slacks.iter().zip(&self.rows).map(|(&s, &z)| mu - s * z).collect() };
+        let row_target = |mu: f64| -> Vec<f64> { slacks.iter().zip(&self.rows).map(|(&s, &z)| mu - s * z).collect() };
         let direction = |targets: &[Matrix4<f64>], row_targets: &[f64]| -> Option<Direction> {
             let mut right = -residual.clone();
             let wanted: Vec<Matrix4<f64>> =
@@ -198,7 +197,8 @@ impl State {
             let (d, alpha) = direction.map_or((None, 0.0), |(d, alpha)| (Some(d), alpha));
             let blocks = (0..scalings.len()).map(|k| {
                 let diagonal = Matrix4::from_diagonal(&scalings[k].lambda);
-                let (s, z) = d.map_or((diagonal, diagonal), |d| (diagonal + d.primal[k] * alpha, diagonal + d.dual[k] * alpha));
+                let (s, z) =
+                    d.map_or((diagonal, diagonal), |d| (diagonal + d.primal[k] * alpha, diagonal + d.dual[k] * alpha));
                 (s.dot(&z) - 4.0 * floors[k]).max(0.0)
             });
             let rows = (0..slacks.len()).map(|l| {

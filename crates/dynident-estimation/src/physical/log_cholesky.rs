@@ -25,11 +25,10 @@ use super::interior_point::{Ending, Solved, add_block};
 use super::linear_solver::DefiniteSystem;
 use nalgebra::{DMatrix, DVector, Matrix4};
 
-/// μ falls by this factor from stage to stage.
+/// μ falls by a factor from stage to stage: by this one at first, then by less after a stage that took many steps and by more after a short one.
 const REDUCTION: f64 = 0.1;
-
-/// Steps of one stage before μ falls regardless; some five are usual.
-const STAGE_LIMIT: usize = 40;
+const SLOWEST_REDUCTION: f64 = 0.7;
+const FASTEST_REDUCTION: f64 = 0.02;
 
 /// Steps of the last stage without progress of the certificate.
 const PATIENCE: usize = 25;
@@ -61,7 +60,7 @@ pub(super) fn log_cholesky(
     let mut mu = program.gradient(start).0.amax().clamp(1.0e-3, 1.0e12);
     let mut best: Option<Solved> = None;
     let (mut stage, mut idle, mut iterations) = (0, 0, 0);
-    let mut ending = Ending::Limit;
+    let (mut ending, mut reduction) = (Ending::Limit, REDUCTION);
     while iterations < max_iterations {
         iterations += 1;
         let (multipliers, certificate) = point.certified(program, mu)?;
@@ -80,15 +79,19 @@ pub(super) fn log_cholesky(
         let pull = if last { 0.0 } else { mu };
         let predicted = point.step(program, &hessian, &bodies, mu, pull);
         stage += 1;
-        if std::env::var("S").is_ok() { eprintln!("it {iterations} mu {mu:.1e} pred {predicted:?} f {:.6e} st {:.1e} gap {:.1e}", certificate.objective, certificate.stationarity, certificate.gap); }
         if last {
             if predicted.is_none() || idle > PATIENCE && stage > PATIENCE {
                 ending = Ending::Stalled;
                 break;
             }
-        } else if predicted.is_none_or(|predicted| predicted <= 0.01 * mu * degree) || stage > STAGE_LIMIT {
-            // Near enough to this stage's optimum: another step would gain less than a hundredth of what μ costs.
-            mu = (mu * REDUCTION).max(0.8 * tolerance * scale / degree);
+        } else if predicted.is_none_or(|predicted| predicted <= 0.05 * mu) {
+            // Inside the region where Newton's steps converge quadratically (a decrement below a third).
+            reduction = match stage {
+                ..5 => (reduction * reduction).max(FASTEST_REDUCTION),
+                5..9 => reduction,
+                _ => reduction.sqrt().min(SLOWEST_REDUCTION),
+            };
+            mu = (mu * reduction).max(0.8 * tolerance * scale / degree);
             stage = 0;
         }
     }
@@ -158,14 +161,7 @@ impl Point {
     }
 
     /// One step; gives the decrease that the model predicted, or none when no length of it goes down.
-    fn step(
-        &mut self,
-        program: &Program,
-        hessian: &DMatrix<f64>,
-        bodies: &[Body],
-        mu: f64,
-        pull: f64,
-    ) -> Option<f64> {
+    fn step(&mut self, program: &Program, hessian: &DMatrix<f64>, bodies: &[Body], mu: f64, pull: f64) -> Option<f64> {
         let mut gradient = program.gradient(&self.x).0;
         let mut matrix = hessian.clone();
         for block in program.blocks.iter().filter(|block| block.entropy > 0.0) {
@@ -201,15 +197,15 @@ impl Point {
         let step = DefiniteSystem::new(matrix)?.solve(&-gradient.clone());
         let predicted = -0.5 * gradient.dot(&step);
         if predicted.is_nan() || predicted <= 0.0 {
-            if std::env::var("S").is_ok() {eprintln!("BAD {predicted} {}", step.amax());}
             return None;
         }
         let now = self.barrier(program, mu, pull)?;
         let slack = 4.0e-15 * (1.0 + now.abs()) + program.objective_noise(&self.x);
-        let better = |candidate: Option<Self>, best: &mut Option<(f64, Self)>| {
+        // Armijo's rule: a tenth of the fall that the slope promises.
+        let better = |candidate: Option<Self>, alpha: f64, best: &mut Option<(f64, Self)>| {
             if let Some(candidate) = candidate
                 && let Some(value) = candidate.barrier(program, mu, pull)
-                && value <= now + slack
+                && value <= now - 0.2 * alpha * predicted + slack
                 && best.as_ref().is_none_or(|(least, _)| value < *least)
             {
                 *best = Some((value, candidate));
@@ -218,11 +214,11 @@ impl Point {
         let mut best = None;
         let mut alpha = 1.0;
         for _ in 0..50 {
-            better(self.moved(program, bodies, &(&step * alpha), curved), &mut best);
+            better(self.moved(program, bodies, &(&step * alpha), curved), alpha, &mut best);
             // Close by, both are the same but for digits that the curve keeps.
             let short = bodies.iter().all(|(first, _)| (step.rows(*first, 10) * alpha).amax() < 0.1);
             if best.is_none() || !short {
-                better(self.moved(program, bodies, &(&step * alpha), straight), &mut best);
+                better(self.moved(program, bodies, &(&step * alpha), straight), alpha, &mut best);
             }
             if let Some((_, next)) = best {
                 *self = next;
@@ -239,27 +235,35 @@ impl Point {
         program: &Program,
         bodies: &[Body],
         step: &DVector<f64>,
-        change: fn(&Vector10) -> Option<Matrix4<f64>>,
+        way: fn(&Vector10) -> Option<Change>,
     ) -> Option<Self> {
         let mut x = &self.x + step;
+        let mut changes = step.clone();
         let mut factors = Vec::with_capacity(bodies.len());
         for ((first, offset), u) in bodies.iter().zip(&self.factors) {
-            let next = u * change(&Vector10::from_column_slice(&step.as_slice()[*first..first + 10]))?;
+            let change = way(&Vector10::from_column_slice(&step.as_slice()[*first..first + 10]))?;
+            let next = u * change.factor;
+            changes.rows_mut(*first, 10).copy_from(&vector_of(&(u * change.difference * u.transpose())));
             x.rows_mut(*first, 10).copy_from(&(vector_of(&(next * next.transpose())) - offset));
             factors.push(next);
         }
-        self.checked(program, factors, x)
+        self.checked(program, factors, x, &changes)
     }
 
-    fn checked(&self, program: &Program, factors: Vec<Matrix4<f64>>, x: DVector<f64>) -> Option<Self> {
-        let change = &x - &self.x;
+    fn checked(
+        &self,
+        program: &Program,
+        factors: Vec<Matrix4<f64>>,
+        x: DVector<f64>,
+        changes: &DVector<f64>,
+    ) -> Option<Self> {
         let rows: Vec<f64> = program
             .rows
             .iter()
             .zip(&self.rows)
             .map(|(row, &old)| {
                 // A small slack is known better by its changes than as a difference of large numbers.
-                let change = row.linear_part(&change);
+                let change = row.linear_part(changes);
                 if change.abs() < 0.5 * old { old + change } else { row.value(&x) }
             })
             .collect();
@@ -268,23 +272,35 @@ impl Point {
     }
 }
 
+/// What a step does to a body.
+struct Change {
+    /// V.
+    factor: Matrix4<f64>,
+    /// `V Vᵀ − 1`, with the digits that the difference would lose.
+    difference: Matrix4<f64>,
+}
+
 /// V of ten numbers: logarithms on the diagonal.
-fn curved(n: &Vector10) -> Option<Matrix4<f64>> {
-    let mut v = Matrix4::zeros();
+fn curved(n: &Vector10) -> Option<Change> {
+    let mut less = Matrix4::zeros();
     for (k, (i, j)) in PAIRS.into_iter().enumerate() {
-        v[(i, j)] = if i == j { n[k].exp() } else { n[k] };
+        less[(i, j)] = if i == j { n[k].exp_m1() } else { n[k] };
     }
-    v.iter().all(|value| value.is_finite()).then_some(v)
+    let difference = less + less.transpose() + less * less.transpose();
+    let change = Change { factor: Matrix4::identity() + less, difference };
+    let usable = (0..4).all(|k| change.factor[(k, k)] > 0.0) && difference.iter().all(|value| value.is_finite());
+    usable.then_some(change)
 }
 
 /// V with `V Vᵀ = 1 + G`, G the first-order change of ten numbers; none outside of the cone.
-fn straight(n: &Vector10) -> Option<Matrix4<f64>> {
-    let mut g = Matrix4::identity();
+fn straight(n: &Vector10) -> Option<Change> {
+    let mut difference = Matrix4::zeros();
     for (k, (i, j)) in PAIRS.into_iter().enumerate() {
-        g[(i, j)] += n[k];
-        g[(j, i)] += n[k];
+        difference[(i, j)] += n[k];
+        difference[(j, i)] += n[k];
     }
-    upper_factor(&g)
+    let factor = upper_factor(&(Matrix4::identity() + difference))?;
+    Some(Change { factor, difference })
 }
 
 /// Upper triangular U with `U Uᵀ = S`, or none.
@@ -311,13 +327,16 @@ mod tests {
     #[test]
     fn the_jacobian_is_the_derivative_of_both_ways_to_move() {
         let numbers = Vector10::from([0.3, -0.2, 0.4, -1.0, 0.5, -0.3, 0.2, 0.1, -0.6, 0.7]);
-        let u = curved(&numbers).unwrap();
+        let u = curved(&numbers).unwrap().factor;
         assert!((upper_factor(&(u * u.transpose())).unwrap() - u).amax() < 1e-14);
         let analytic = jacobian(&u);
         for way in [curved, straight] {
             let s = |n: &Vector10| {
-                let next = u * way(n).unwrap();
-                vector_of(&(next * next.transpose()))
+                let change = way(n).unwrap();
+                let next = u * change.factor;
+                let s = next * next.transpose();
+                assert!((u * (Matrix4::identity() + change.difference) * u.transpose() - s).amax() < 1e-13);
+                vector_of(&s)
             };
             for k in 0..10 {
                 let h = Vector10::from_fn(|i, _| if i == k { 1.0e-5 } else { 0.0 });

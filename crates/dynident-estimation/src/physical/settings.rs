@@ -30,7 +30,7 @@ pub struct PhysicalSettings {
     pub margin: f64,
     /// Largest certificate (stationarity and duality gap, both relative) at which a fit counts as solved. Default 5e-8.
     pub tolerance: f64,
-    /// Most iterations. Default 500; the interior point takes 15 to 40, log-Cholesky some 100.
+    /// Most iterations. Default 2000; the interior point takes 15 to 40, log-Cholesky 60 to 400.
     pub max_iterations: usize,
 }
 
@@ -42,7 +42,7 @@ impl Default for PhysicalSettings {
             prior_weight: 1.0e-2,
             margin: 1.0e-4,
             tolerance: 5.0e-8,
-            max_iterations: 500,
+            max_iterations: 2000,
         }
     }
 }
@@ -60,7 +60,13 @@ impl PhysicalSettings {
                 Err(PhysicalError::Setting { setting, value, mend })
             }
         };
-        within("prior_weight", self.prior_weight, 1.0e-9, 1.0e9, "give a weight from 1e-9 to 1e9: without any, directions that no data reach have no answer")?;
+        within(
+            "prior_weight",
+            self.prior_weight,
+            1.0e-9,
+            1.0e9,
+            "give a weight from 1e-9 to 1e9: without any, directions that no data reach have no answer",
+        )?;
         within("margin", self.margin, 1.0e-9, 0.5, "give a share of the reference body from 1e-9 to 0.5")?;
         within("tolerance", self.tolerance, 1.0e-10, 1.0e-2, "give a relative accuracy from 1e-10 to 1e-2")?;
         within("max_iterations", self.max_iterations as f64, 1.0, f64::INFINITY, "give at least 1")

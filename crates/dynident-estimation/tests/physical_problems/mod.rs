@@ -1,5 +1,4 @@
 //! Random physical problems: noisy, near-singular, with their optimum on the boundary, with and without limits.
-
 use dynident_estimation::TriangularFactor;
 use dynident_estimation::physical::{
     BaseMap, Ellipsoid, PhysicalBody, PhysicalPrior, PhysicalProblem, PhysicalScalar, PhysicalSettings, rough_body,
@@ -7,10 +6,10 @@ use dynident_estimation::physical::{
 use nalgebra::{DMatrix, DVector};
 
 /// A small generator of its own: the same numbers on every machine.
-pub struct Random(pub u64);
+pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
-    pub fn uniform(&mut self) -> f64 {
+    pub(crate) fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -18,22 +17,22 @@ impl Random {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    pub fn within(&mut self, low: f64, high: f64) -> f64 {
+    pub(crate) fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.uniform()
     }
 
-    pub fn normal(&mut self) -> f64 {
+    pub(crate) fn normal(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
         radius * (core::f64::consts::TAU * self.uniform()).cos()
     }
 
-    pub fn below(&mut self, count: usize) -> usize {
+    pub(crate) fn below(&mut self, count: usize) -> usize {
         (self.uniform() * count as f64) as usize
     }
 }
 
 /// A body of point masses: possible by construction, on the cone's boundary with three points or fewer.
-pub fn points(random: &mut Random, count: usize) -> [f64; 10] {
+pub(crate) fn points(random: &mut Random, count: usize) -> [f64; 10] {
     let mut body = [0.0; 10];
     let size = 10_f64.powf(random.within(-1.5, 0.0));
     for _ in 0..count {
@@ -48,14 +47,15 @@ pub fn points(random: &mut Random, count: usize) -> [f64; 10] {
     body
 }
 
-pub struct Case {
-    pub problem: PhysicalProblem,
-    pub settings: PhysicalSettings,
-    pub truth: Vec<f64>,
+pub(crate) struct Case {
+    pub(crate) problem: PhysicalProblem,
+    pub(crate) settings: PhysicalSettings,
+    #[allow(dead_code, reason = "not every test asks for it")]
+    pub(crate) truth: Vec<f64>,
 }
 
 /// Problem number `seed` with `bodies` bodies.
-pub fn case(seed: u64, bodies: usize) -> Case {
+pub(crate) fn case(seed: u64, bodies: usize) -> Case {
     let mut random = Random(seed.wrapping_mul(0xD134_2543_DE82_EF95) + 1);
     let kind = seed % 4;
     let scalars = 2 * bodies;
@@ -81,7 +81,8 @@ pub fn case(seed: u64, bodies: usize) -> Case {
                 let com = [1, 2, 3].map(|k| body[k] / mass);
                 [com.map(|c| c - 0.1), com.map(|c| c + 0.2)]
             }),
-            inside: (limited && random.below(2) == 0).then_some(Ellipsoid { centre_m: [0.0; 3], semi_axes_m: [1.8, 1.9, 2.0] }),
+            inside: (limited && random.below(2) == 0)
+                .then_some(Ellipsoid { centre_m: [0.0; 3], semi_axes_m: [1.8, 1.9, 2.0] }),
         });
     }
     let mut named = Vec::new();
@@ -89,7 +90,13 @@ pub fn case(seed: u64, bodies: usize) -> Case {
         let value = if random.below(4) == 0 { 0.0 } else { random.within(0.0, 5.0) };
         truth.push(value);
         let upper = (random.below(5) == 0).then_some(6.0);
-        named.push(PhysicalScalar { name: format!("friction{index}"), lower: Some(0.0), upper, prior: 0.0, scale: 1.0 });
+        named.push(PhysicalScalar {
+            name: format!("friction{index}"),
+            lower: Some(0.0),
+            upper,
+            prior: 0.0,
+            scale: 1.0,
+        });
     }
     // Base columns: some 60 % of the bodies' are independent, the others go into up to four of them; scalars stand alone.
     let mut independent: Vec<usize> = (0..columns).filter(|&c| c >= 10 * bodies || random.uniform() < 0.6).collect();
@@ -125,6 +132,7 @@ pub fn case(seed: u64, bodies: usize) -> Case {
         problem = problem.with_total_mass_kg([total * 0.98, total * 1.01]).unwrap();
     }
     let prior = [PhysicalPrior::Entropic, PhysicalPrior::Pullback, PhysicalPrior::Euclidean][random.below(3)];
-    let settings = PhysicalSettings { prior, prior_weight: [1.0e-2, 1.0, 1.0e-3][random.below(3)], ..PhysicalSettings::default() };
+    let settings =
+        PhysicalSettings { prior, prior_weight: [1.0e-2, 1.0, 1.0e-3][random.below(3)], ..PhysicalSettings::default() };
     Case { problem, settings, truth }
 }
