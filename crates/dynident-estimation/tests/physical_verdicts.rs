@@ -100,7 +100,7 @@ fn a_possible_vector_comes_with_bodies_and_an_impossible_one_with_a_proof() {
 fn the_margin_of_a_single_body_is_its_least_eigenvalue() {
     // Nothing is left open, so the margin is that of the body itself in its reference's units.
     let mut own = rough_body(1.0, 0.1);
-    own[4] = 0.5 * own[4];
+    own[4] *= 0.5;
     let problem = seen(vec![body("bob")], vec![]);
     let found = base_feasibility(&problem, &own).unwrap();
     // Σ = ½ tr(I) − I: along y and z half of Ixx's change is lost, a quarter of the reference's ½ tr − Ixx = 0.01.

@@ -59,7 +59,11 @@ pub(crate) fn method_summary(
     }
 }
 
-pub(crate) fn base_parameters(machine: &Machine, estimate: &Estimate) -> Vec<BaseParameterResult> {
+pub(crate) fn base_parameters(
+    machine: &Machine,
+    estimate: &Estimate,
+    physical: Option<&[f64]>,
+) -> Vec<BaseParameterResult> {
     let expressions = machine.base.expressions();
     let columns = machine.layout.columns();
     (0..columns.len())
@@ -72,6 +76,7 @@ pub(crate) fn base_parameters(machine: &Machine, estimate: &Estimate) -> Vec<Bas
             std_white: estimate.covariance_white[(index, index)].max(0.0).sqrt(),
             relative_std_percent: estimate.relative_std_percent[index],
             prior: machine.prior.as_ref().map(|prior| prior[index]),
+            physical: physical.map(|values| values[index]),
             excited: !estimate.rank.fixed.iter().any(|fixed| fixed.column == index),
         })
         .collect()
@@ -196,6 +201,8 @@ pub(crate) fn verdict(machine: &Machine, inertials: &[InertialParameters], param
     PhysicalVerdict {
         consistent: violations.is_empty(),
         violations,
+        fit: None,
+        failure: None,
         note: "of the full set nearest to the prior; plain least squares does not enforce it, and another set with the same torques may pass",
     }
 }

@@ -70,7 +70,7 @@ pub fn validate(
         logs: Vec::new(),
     };
     for index in chosen {
-        let (summary, figures) = validate_log(study, &machine, &motion, index, &files[index], &theta, options)?;
+        let (summary, figures) = validate_log(study, &machine, &motion, index, &files[index], (&theta, None), options)?;
         file.logs.push(summary);
         file.validation.push(figures);
     }
@@ -117,6 +117,7 @@ struct TestSink<'a> {
     file: PathBuf,
     theta: &'a [f64],
     model: Validation,
+    physical: Option<(&'a [f64], Validation)>,
     raw: Validation,
     prior: Option<(&'a [f64], Validation)>,
     evidence: Option<Evidence<'a>>,
@@ -136,10 +137,10 @@ impl RowSink for TestSink<'_> {
         let measured = &rows.panel[columns.len() * rows.rows..];
         predicted(rows.panel, rows.rows, columns, self.theta, &mut self.buffer);
         self.model.add_joint(rows.joint, measured, &self.buffer).map_err(|source| self.failed(source))?;
-        if let Some((prior, validation)) = &mut self.prior {
+        for (prior, validation) in [&mut self.prior, &mut self.physical].into_iter().flatten() {
             predicted(rows.panel, rows.rows, columns, prior, &mut self.buffer);
             let added = validation.add_joint(rows.joint, measured, &self.buffer);
-            added.map_err(|source| self.failed(source))?;
+            added.map_err(|source| Error::Estimation { path: self.file.clone(), source })?;
         }
         if let Some(evidence) = &mut self.evidence {
             evidence.filtered(rows, &mut self.buffer);
@@ -160,14 +161,14 @@ impl RowSink for TestSink<'_> {
     }
 }
 
-/// Tests base parameters on one log.
+/// Tests base parameters, and those of the physically possible set beside them, on one log.
 pub(crate) fn validate_log(
     study: &Study,
     machine: &Machine,
     motion: &MotionSettings,
     index: usize,
     file: &Path,
-    theta: &[f64],
+    (theta, physical): (&[f64], Option<&[f64]>),
     options: &RunOptions<'_>,
 ) -> Result<(LogSummary, LogValidation), Error> {
     let joints = joint_names(machine);
@@ -177,6 +178,7 @@ pub(crate) fn validate_log(
         file: file.to_owned(),
         theta,
         model: Validation::new(joints.clone()),
+        physical: physical.map(|physical| (physical, Validation::new(joints.clone()))),
         raw: Validation::new(joints.clone()),
         prior: machine.prior.as_deref().map(|prior| (prior, Validation::new(joints.clone()))),
         evidence: machine.prior.as_deref().map(|prior| Evidence::new(columns, prior)),
@@ -203,6 +205,7 @@ pub(crate) fn validate_log(
         log: study.log_name(index),
         model: sink.model.report(),
         raw: sink.raw.report(),
+        physical: sink.physical.map(|(_, validation)| validation.report()),
         prior: sink.prior.map(|(_, validation)| validation.report()),
     };
     Ok((log_summary(study, index, passed, agreement, lags, &joints), figures))

@@ -49,6 +49,7 @@ pub(crate) fn points(random: &mut Random, count: usize) -> [f64; 10] {
 
 pub(crate) struct Case {
     pub(crate) problem: PhysicalProblem,
+    #[allow(dead_code, reason = "not every test asks for it")]
     pub(crate) settings: PhysicalSettings,
     #[allow(dead_code, reason = "not every test asks for it")]
     pub(crate) truth: Vec<f64>,
