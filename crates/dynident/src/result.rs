@@ -139,9 +139,9 @@ pub struct LawResult {
     pub symbol: String,
     /// Its unit at a turning joint.
     pub unit: String,
-    /// The estimate; where it stands in a base parameter with others, its share in the full set.
+    /// Its value in the full set of `bodies`: the physically possible one unless `estimator.physical` is false.
     pub value: f64,
-    /// Standard deviation; none where it is not a base parameter by itself.
+    /// Standard deviation of the unconstrained estimate; none where it is not a base parameter by itself.
     pub std: Option<f64>,
     /// The base parameter that it stands in.
     pub base_parameter: Option<String>,

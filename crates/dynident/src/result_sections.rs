@@ -122,7 +122,7 @@ pub(crate) fn law_results(
         LawResult {
             symbol: law.symbol(),
             unit: law.unit().to_owned(),
-            value: alone.map_or(parameters[column], |place| estimate.values[place]),
+            value: parameters[column],
             std: alone.map(|place| estimate.std[place]),
             base_parameter: home.map(|place| expressions[place].clone()),
         }

@@ -55,7 +55,7 @@ pub fn validate(
     study.require_log(study_path)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let machine = Machine::new(study, study_path, &folders)?;
-    let (theta, made_with) = stored_model(result_path, &machine)?;
+    let (theta, possible, made_with) = stored_model(result_path, &machine)?;
     let files = log_files(study, &folders)?;
     let mut chosen = of_role(study, Role::Validate);
     if chosen.is_empty() {
@@ -70,15 +70,19 @@ pub fn validate(
         logs: Vec::new(),
     };
     for index in chosen {
-        let (summary, figures) = validate_log(study, &machine, &motion, index, &files[index], (&theta, None), options)?;
+        let (summary, figures) =
+            validate_log(study, &machine, &motion, index, &files[index], (&theta, possible.as_deref()), options)?;
         file.logs.push(summary);
         file.validation.push(figures);
     }
     Ok(file)
 }
 
-/// The base parameters of a stored result, in the machine's order, and the motion settings that they were found with.
-fn stored_model(path: &Path, machine: &Machine) -> Result<(Vec<f64>, MotionSettings), Error> {
+/// Base parameters, those of the possible set if the result has one, and the motion settings that they were found with.
+type StoredParameters = (Vec<f64>, Option<Vec<f64>>, MotionSettings);
+
+/// The base parameters of a stored result, in the machine's order.
+fn stored_model(path: &Path, machine: &Machine) -> Result<StoredParameters, Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
     let stored: StoredModel = serde_json::from_slice(&bytes).map_err(|error| {
@@ -109,7 +113,11 @@ fn stored_model(path: &Path, machine: &Machine) -> Result<(Vec<f64>, MotionSetti
         }
         values.push(stored.value);
     }
-    Ok((values, stored.method.motion))
+    let possible: Option<Vec<f64>> = stored.base_parameters.iter().map(|stored| stored.physical).collect();
+    if possible.as_ref().is_some_and(|values| values.iter().any(|value| !value.is_finite())) {
+        return Err(wrong("a physical value of a base parameter is not a finite number".to_owned()));
+    }
+    Ok((values, possible, stored.method.motion))
 }
 
 struct TestSink<'a> {
