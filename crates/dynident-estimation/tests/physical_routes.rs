@@ -95,8 +95,8 @@ fn both_routes_find_the_same_optimum_of_150_problems() {
     check(&run(0..150, |seed| if seed % 30 == 7 { 12 } else { 2 + (seed % 4) as usize }));
 }
 
-/// The whole promise, ten minutes in the release profile. Not kept yet: the last run left 4 of 1000 uncertified by the interior point and 25 by log-Cholesky, nearly all with
-/// objectives above a million under a weak entropic prior. See the limits in the book's page on estimation.
+/// The whole promise, ten minutes in the release profile. Not kept yet: the last run left 4 of 1000 uncertified by the interior point and 29 by log-Cholesky, nearly all under
+/// an entropic prior, with objectives of 1e4 to 5e6. See the limits in the book's page on estimation.
 /// `cargo test --release -p dynident-estimation --test physical_routes -- --ignored --nocapture`
 #[test]
 #[ignore = "takes minutes: run in the release profile"]
