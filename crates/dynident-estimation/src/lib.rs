@@ -18,6 +18,7 @@ mod estimate;
 mod factor;
 mod nonnegative;
 mod ordinary;
+pub mod physical;
 mod problem;
 mod rank;
 mod reflect;

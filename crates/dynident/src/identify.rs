@@ -7,6 +7,7 @@ use crate::friction_choice::{JointFriction, choose_friction, with_friction};
 use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
 use crate::lag::{self, LAG_SAMPLES, LagCheck};
 use crate::machine::{Machine, prior_parameters};
+use crate::physical::{physical_fit_result, possible_parameters};
 use crate::progress::Silent;
 use crate::result::{LogSummary, RESULT_SCHEMA, ResultFile, Timings};
 use crate::result_sections::{
@@ -61,6 +62,18 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
     let (study, machine) = (&fitted.study, &fitted.machine);
     let (fits, problem, estimate) = (&fitted.fits, &fitted.problem, fitted.estimate);
     let in_study = |source| Error::Estimation { path: study_path.to_owned(), source };
+    let started = Instant::now();
+    let prior = prior_parameters(&machine.model, &machine.laws);
+    let (possible, failure) = if study.estimator.physical {
+        match possible_parameters(machine, problem, &estimate, &prior) {
+            Ok(fit) => (Some(fit), None),
+            Err(reason) => (None, Some(reason)),
+        }
+    } else {
+        (None, None)
+    };
+    let physical = possible.as_ref().map(|fit| &fit.base_values[..]);
+    timings.estimation += started.elapsed().as_secs_f64();
 
     let started = Instant::now();
     let joints = joint_names(machine);
@@ -74,18 +87,35 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
     let mut validation = Vec::new();
     for index in of_role(study, Role::Validate) {
         let (summary, figures) =
-            validate_log(study, machine, &motion, index, &files[index], &estimate.values, options)?;
+            validate_log(study, machine, &motion, index, &files[index], (&estimate.values, physical), options)?;
         logs.push(summary);
         validation.push(figures);
     }
     timings.validation = started.elapsed().as_secs_f64();
     timings.total = start.elapsed().as_secs_f64();
 
-    let prior = prior_parameters(&machine.model, &machine.laws);
-    let parameters = nearest_to_prior(&machine.model, &machine.base, &estimate.values, &prior);
+    let parameters = possible.as_ref().map_or_else(
+        || nearest_to_prior(&machine.model, &machine.base, &estimate.values, &prior),
+        |fit| fit.parameters.clone(),
+    );
     let inertials = inertials(&machine.model, &parameters);
+    let mut verdict = verdict(machine, &inertials, &parameters);
+    if let Some(fit) = &possible {
+        verdict.fit = Some(physical_fit_result(fit, &estimate));
+        verdict.note =
+            "of the possible set that fits the logs best; the base parameters above it are the unconstrained estimate";
+    }
+    verdict.failure = failure;
     // Parameters that URDF cannot express leave a result without one; it is no reason to lose the result.
-    let (urdf, no_urdf) = match written_urdf(machine, &inertials, &parameters) {
+    let written = if study.estimator.physical && !verdict.consistent {
+        let reason = verdict.failure.clone().unwrap_or_else(|| verdict.violations.join("; "));
+        Err(format!(
+            "the bodies are not physically possible: {reason} (estimator.physical = false writes them as they are)"
+        ))
+    } else {
+        written_urdf(machine, &inertials, &parameters)
+    };
+    let (urdf, no_urdf) = match written {
         Ok(urdf) => (Some(urdf), None),
         Err(reason) => (None, Some(reason)),
     };
@@ -94,7 +124,7 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
         name: study_name(study, study_path),
         robot: robot_summary(machine),
         method: method_summary(study, machine, &motion, &estimate),
-        base_parameters: base_parameters(machine, &estimate),
+        base_parameters: base_parameters(machine, &estimate, physical),
         base_parameter_covariance: estimate.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
         bodies: bodies(machine, &inertials),
         joints: joint_results(machine, &estimate, &parameters),
@@ -102,7 +132,7 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
         couplings: law_results(machine, &estimate, &parameters, |law| matches!(law, Law::Coupling(_))),
         training: training_result(study, machine, problem, &training, &estimate).map_err(in_study)?,
         validation,
-        physical: verdict(machine, &inertials, &parameters),
+        physical: verdict,
         logs,
         no_urdf,
         timings_s: timings,

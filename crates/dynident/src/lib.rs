@@ -22,6 +22,7 @@ mod job;
 mod lag;
 mod machine;
 mod output;
+mod physical;
 mod progress;
 mod result;
 mod result_sections;
@@ -55,8 +56,9 @@ pub use machine::Machine;
 pub use output::{check_writable, write_whole};
 pub use progress::{Progress, Silent};
 pub use result::{
-    BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, LogValidation, MethodSummary, PhysicalVerdict,
-    RESULT_SCHEMA, ResultFile, RobotSummary, Timings, TrainingJoint, TrainingResult,
+    BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, LogValidation, MethodSummary,
+    PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, Timings,
+    TrainingJoint, TrainingResult,
 };
 pub use study::{
     CoulombChoice, CouplingSection, DriveSection, EstimatorMethod, EstimatorSection, Folders, JointDrive, LogSection,

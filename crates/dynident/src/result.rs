@@ -111,6 +111,9 @@ pub struct BaseParameterResult {
     pub relative_std_percent: Option<f64>,
     /// By the description's own numbers.
     pub prior: Option<f64>,
+    /// Of the physically possible set in `bodies` and `joints`; none when that was not asked for.
+    #[serde(default)]
+    pub physical: Option<f64>,
     /// False when the data do not excite it; value is then the prior's and std means nothing.
     pub excited: bool,
 }
@@ -143,9 +146,9 @@ pub struct LawResult {
     pub symbol: String,
     /// Its unit at a turning joint.
     pub unit: String,
-    /// The estimate; where it stands in a base parameter with others, its share in the full set.
+    /// Its value in the full set of `bodies`: the physically possible one unless `estimator.physical` is false.
     pub value: f64,
-    /// Standard deviation; none where it is not a base parameter by itself.
+    /// Standard deviation of the unconstrained estimate; none where it is not a base parameter by itself.
     pub std: Option<f64>,
     /// The base parameter that it stands in.
     pub base_parameter: Option<String>,
@@ -198,6 +201,8 @@ pub struct LogValidation {
     pub model: ValidationReport,
     /// The model against the torque as logged: nothing is filtered but the motion.
     pub raw: ValidationReport,
+    /// The physically possible set on the filtered torque; none where it is not at hand.
+    pub physical: Option<ValidationReport>,
     /// The description's own inertials, damping and friction on the filtered torque; none when unknown.
     pub prior: Option<ValidationReport>,
 }
@@ -211,6 +216,42 @@ pub struct PhysicalVerdict {
     pub violations: Vec<String>,
     /// What the verdict is about.
     pub note: &'static str,
+    /// The physically consistent fit behind the bodies; none when it was not asked for or failed.
+    pub fit: Option<PhysicalFitResult>,
+    /// Why it failed.
+    pub failure: Option<String>,
+}
+
+/// A physically consistent fit.
+#[derive(Clone, Debug, Serialize)]
+pub struct PhysicalFitResult {
+    /// `solved`, `stalled` or `iteration-limit`; all of them meet every constraint.
+    pub status: &'static str,
+    /// Iterations of the solver.
+    pub iterations: usize,
+    /// Stationarity of its certificate, relative.
+    pub stationarity: f64,
+    /// Duality gap of its certificate, relative.
+    pub duality_gap: f64,
+    /// How far the base parameters moved from the estimate in all, in standard deviations of white residuals.
+    pub moved_sigma: f64,
+    /// The largest move of a base parameter in units of its reported standard deviation.
+    pub largest_move_std: Option<f64>,
+    /// Limits that hold with equality and push: friction or drive inertia at zero.
+    pub active: Vec<String>,
+    /// Body by body.
+    pub bodies: Vec<PhysicalBodyResult>,
+}
+
+/// How possible a body is.
+#[derive(Clone, Debug, Serialize)]
+pub struct PhysicalBodyResult {
+    /// Its name.
+    pub name: String,
+    /// Smallest eigenvalue of its pseudo-inertia in units of the description's body.
+    pub margin: f64,
+    /// Whether the data want it outside of what is possible.
+    pub on_the_boundary: bool,
 }
 
 /// What is known of a log.

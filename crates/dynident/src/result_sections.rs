@@ -60,7 +60,11 @@ pub(crate) fn method_summary(
     }
 }
 
-pub(crate) fn base_parameters(machine: &Machine, estimate: &Estimate) -> Vec<BaseParameterResult> {
+pub(crate) fn base_parameters(
+    machine: &Machine,
+    estimate: &Estimate,
+    physical: Option<&[f64]>,
+) -> Vec<BaseParameterResult> {
     let expressions = machine.base.expressions();
     let columns = machine.layout.columns();
     (0..columns.len())
@@ -73,6 +77,7 @@ pub(crate) fn base_parameters(machine: &Machine, estimate: &Estimate) -> Vec<Bas
             std_white: estimate.covariance_white[(index, index)].max(0.0).sqrt(),
             relative_std_percent: estimate.relative_std_percent[index],
             prior: machine.prior.as_ref().map(|prior| prior[index]),
+            physical: physical.map(|values| values[index]),
             excited: !estimate.rank.fixed.iter().any(|fixed| fixed.column == index),
         })
         .collect()
@@ -118,7 +123,7 @@ pub(crate) fn law_results(
         LawResult {
             symbol: law.symbol(),
             unit: law.unit().to_owned(),
-            value: alone.map_or(parameters[column], |place| estimate.values[place]),
+            value: parameters[column],
             std: alone.map(|place| estimate.std[place]),
             base_parameter: home.map(|place| expressions[place].clone()),
         }
@@ -197,6 +202,8 @@ pub(crate) fn verdict(machine: &Machine, inertials: &[InertialParameters], param
     PhysicalVerdict {
         consistent: violations.is_empty(),
         violations,
+        fit: None,
+        failure: None,
         note: "of the full set nearest to the prior; plain least squares does not enforce it, and another set with the same torques may pass",
     }
 }

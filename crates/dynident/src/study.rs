@@ -252,17 +252,32 @@ pub enum EstimatorMethod {
 }
 
 /// `[estimator]`.
-#[derive(Clone, Debug, Default, Deserialize, Serialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct EstimatorSection {
     /// The method; weighted by default.
     pub method: EstimatorMethod,
     /// The covariance that error bars come from; `"jackknife"`, which accounts for coloured residuals and judges each time segment by the fit without it, by default.
     pub covariance: CovarianceMethod,
+    /// Whether the bodies, friction and drives written are those of a possible machine that fit the logs best (true by default), or the set nearest to the
+    /// description that has exactly the estimated base parameters.
+    pub physical: bool,
     /// When a column counts as excited.
     pub rank: RankSettings,
     /// How logs are cut into segments for the covariance.
     pub segments: SegmentSettings,
+}
+
+impl Default for EstimatorSection {
+    fn default() -> Self {
+        Self {
+            method: EstimatorMethod::default(),
+            covariance: CovarianceMethod::default(),
+            physical: true,
+            rank: RankSettings::default(),
+            segments: SegmentSettings::default(),
+        }
+    }
 }
 
 /// What a log is for.

@@ -64,7 +64,7 @@ pub fn validate(
     let chosen = with_friction(study, &stored.friction_choice);
     let study = &chosen;
     let machine = Machine::new(study, study_path, &folders)?;
-    let (theta, made_with, machine) = stored_model(result_path, stored, machine)?;
+    let (theta, possible, made_with, machine) = stored_model(result_path, stored, machine)?;
     let files = log_files(study, &folders)?;
     let mut chosen = of_role(study, Role::Validate);
     if chosen.is_empty() {
@@ -79,7 +79,8 @@ pub fn validate(
         logs: Vec::new(),
     };
     for index in chosen {
-        let (summary, figures) = validate_log(study, &machine, &motion, index, &files[index], &theta, options)?;
+        let (summary, figures) =
+            validate_log(study, &machine, &motion, index, &files[index], (&theta, possible.as_deref()), options)?;
         file.logs.push(summary);
         file.validation.push(figures);
     }
@@ -111,7 +112,7 @@ fn stored_model(
     path: &Path,
     stored: StoredModel,
     mut machine: Machine,
-) -> Result<(Vec<f64>, MotionSettings, Machine), Error> {
+) -> Result<(Vec<f64>, Option<Vec<f64>>, MotionSettings, Machine), Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     let expressions = machine.base.expressions();
     if stored.base_parameters.len() != expressions.len() {
@@ -134,13 +135,17 @@ fn stored_model(
         }
         values.push(stored.value);
     }
+    let possible: Option<Vec<f64>> = stored.base_parameters.iter().map(|stored| stored.physical).collect();
+    if possible.as_ref().is_some_and(|values| values.iter().any(|value| !value.is_finite())) {
+        return Err(wrong("a physical value of a base parameter is not a finite number".to_owned()));
+    }
     if let Some(load) = &stored.method.load_parameters
         && (load.len() != values.len() || load.iter().any(|value| !value.is_finite()))
     {
         return Err(wrong("load_parameters are not one finite number per base parameter: identify again".to_owned()));
     }
     machine.load_parameters = stored.method.load_parameters;
-    Ok((values, stored.method.motion, machine))
+    Ok((values, possible, stored.method.motion, machine))
 }
 
 struct TestSink<'a> {
@@ -148,6 +153,7 @@ struct TestSink<'a> {
     file: PathBuf,
     theta: &'a [f64],
     model: Validation,
+    physical: Option<(&'a [f64], Validation)>,
     raw: Validation,
     prior: Option<(&'a [f64], Validation)>,
     evidence: Option<Evidence<'a>>,
@@ -167,10 +173,10 @@ impl RowSink for TestSink<'_> {
         let measured = &rows.panel[columns.len() * rows.rows..];
         predicted(rows.panel, rows.rows, columns, self.theta, &mut self.buffer);
         self.model.add_joint(rows.joint, measured, &self.buffer).map_err(|source| self.failed(source))?;
-        if let Some((prior, validation)) = &mut self.prior {
+        for (prior, validation) in [&mut self.prior, &mut self.physical].into_iter().flatten() {
             predicted(rows.panel, rows.rows, columns, prior, &mut self.buffer);
             let added = validation.add_joint(rows.joint, measured, &self.buffer);
-            added.map_err(|source| self.failed(source))?;
+            added.map_err(|source| Error::Estimation { path: self.file.clone(), source })?;
         }
         if let Some(evidence) = &mut self.evidence {
             evidence.filtered(rows, &mut self.buffer);
@@ -191,14 +197,14 @@ impl RowSink for TestSink<'_> {
     }
 }
 
-/// Tests base parameters on one log.
+/// Tests base parameters, and those of the physically possible set beside them, on one log.
 pub(crate) fn validate_log(
     study: &Study,
     machine: &Machine,
     motion: &MotionSettings,
     index: usize,
     file: &Path,
-    theta: &[f64],
+    (theta, physical): (&[f64], Option<&[f64]>),
     options: &RunOptions<'_>,
 ) -> Result<(LogSummary, LogValidation), Error> {
     let joints = joint_names(machine);
@@ -208,6 +214,7 @@ pub(crate) fn validate_log(
         file: file.to_owned(),
         theta,
         model: Validation::new(joints.clone()),
+        physical: physical.map(|physical| (physical, Validation::new(joints.clone()))),
         raw: Validation::new(joints.clone()),
         prior: machine.prior.as_deref().map(|prior| (prior, Validation::new(joints.clone()))),
         evidence: machine.prior.as_deref().map(|prior| Evidence::new(columns, prior)),
@@ -234,6 +241,7 @@ pub(crate) fn validate_log(
         log: study.log_name(index),
         model: sink.model.report(),
         raw: sink.raw.report(),
+        physical: sink.physical.map(|(_, validation)| validation.report()),
         prior: sink.prior.map(|(_, validation)| validation.report()),
     };
     Ok((log_summary(study, index, passed, agreement, lags, &joints), figures))
