@@ -168,7 +168,7 @@ fn a_task_that_is_none_is_named() {
         ("{ kind = \"prediction\" }", &["trajectory"][..]),
         ("{ kind = \"predictions\", trajectory = \"task.csv\" }", &["prediction"]),
         ("\"best\"", &["best", "d-optimal"]),
-        ("3", &["the name of a criterion"]),
+        ("3", &["expected a name, or a table with a `kind`"]),
     ] {
         assert_named(folder.path(), &text(&format!("criterion = {criterion}")), names);
     }
