@@ -30,6 +30,21 @@ impl Default for HausmanSettings {
     }
 }
 
+impl HausmanSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`EstimationError::Setting`] for a level outside 1e-6 to 0.5 or rank settings out of range.
+    pub fn validate(&self) -> Result<(), EstimationError> {
+        self.rank.validate()?;
+        if !(1.0e-6..=0.5).contains(&self.level) {
+            let mend = "give a probability from 1e-6 to 0.5";
+            return Err(EstimationError::Setting { setting: "level", value: self.level, mend });
+        }
+        Ok(())
+    }
+}
+
 /// What the test says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -88,11 +103,7 @@ pub fn hausman_test(
     estimate: &InstrumentalEstimate,
     settings: &HausmanSettings,
 ) -> Result<HausmanTest, EstimationError> {
-    settings.rank.validate()?;
-    if !(1.0e-6..=0.5).contains(&settings.level) {
-        let mend = "give a probability from 1e-6 to 0.5";
-        return Err(EstimationError::Setting { setting: "level", value: settings.level, mend });
-    }
+    settings.validate()?;
     let sigma = &estimate.estimate.joint_sigma;
     crate::problem::expect("joints of the estimate", problem.joints().len(), sigma.len())?;
     crate::problem::expect("columns of the estimate", problem.columns().len(), estimate.estimate.values.len())?;

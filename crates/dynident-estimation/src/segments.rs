@@ -191,6 +191,11 @@ impl SegmentedFactor {
         total.factor(self.columns, &mut workspace)
     }
 
+    /// The same columns and segments without their rows, for another pass over the same log.
+    pub(crate) fn emptied(&self) -> Self {
+        Self { rows: 0, segments: Vec::new(), workspace: FactorWorkspace::default(), ..*self }
+    }
+
     /// The factor of other rows made of these: for every matrix C of `blocks`, shape (columns + 1, new columns + 1), the rows `[W | τ] C`, all blocks
     /// stacked. Segments stay what they were in time; their numbers of rows are multiplied by the number of blocks.
     pub(crate) fn transformed(&self, blocks: &[DMatrix<f64>]) -> Self {

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::evidence::Evidence;
+use crate::fit::{Fitted, Logs, fitted};
 use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
 use crate::lag::{self, LAG_SAMPLES, LagCheck};
 use crate::machine::{Machine, prior_parameters};
@@ -12,14 +13,11 @@ use crate::result_sections::{
 };
 use crate::rows::{JointRows, Pass, RawSamples, RowSink, motion_in_force};
 use crate::standard_parameters::{inertials, nearest_to_prior};
-use crate::study::{EstimatorMethod, Folders, Role, Study};
+use crate::study::{Folders, Role, Study};
 use crate::validate::validate_log;
 use crate::written_urdf::written_urdf;
 use dynident_dynamics::Column;
-use dynident_estimation::{
-    Estimate, LinearProblem, OrdinarySettings, SegmentedFactor, WeightedSettings, ordinary_least_squares,
-    weighted_least_squares,
-};
+use dynident_estimation::{Estimate, LinearProblem, SegmentedFactor};
 use dynident_model::InertialParameters;
 use dynident_model::laws::Law;
 use dynident_recording::MotionSettings;
@@ -61,21 +59,16 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
     let started = Instant::now();
     let in_study = |source| Error::Estimation { path: study_path.to_owned(), source };
     let problem = problem(study, &machine, &fits).map_err(in_study)?;
-    let estimate = match study.estimator.method {
-        EstimatorMethod::Ordinary => {
-            let settings = OrdinarySettings { rank: study.estimator.rank, covariance: study.estimator.covariance };
-            ordinary_least_squares(&problem, &settings)
-        }
-        EstimatorMethod::Weighted => {
-            let settings = WeightedSettings {
-                rank: study.estimator.rank,
-                covariance: study.estimator.covariance,
-                ..WeightedSettings::default()
-            };
-            weighted_least_squares(&problem, &settings)
-        }
-    }
-    .map_err(in_study)?;
+    let logs = Logs {
+        study,
+        path: study_path,
+        machine: &machine,
+        motion: &motion,
+        files: &files,
+        training: &training,
+        options,
+    };
+    let Fitted { estimate, noise_in_regressor } = fitted(&logs, &problem)?;
     timings.estimation = started.elapsed().as_secs_f64();
 
     let started = Instant::now();
@@ -110,6 +103,7 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
         name: study_name(study, study_path),
         robot: robot_summary(&machine),
         method: method_summary(study, &machine, &motion, &estimate),
+        noise_in_regressor,
         base_parameters: base_parameters(&machine, &estimate),
         bodies: bodies(&machine, &inertials),
         joints: joint_results(&machine, &estimate, &parameters),

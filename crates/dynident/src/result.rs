@@ -1,6 +1,7 @@
 //! What `identify` writes: the schema of `result.json`.
 
 use crate::evidence::PriorAgreement;
+use crate::fit::NoiseInRegressor;
 use dynident_estimation::ValidationReport;
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};
@@ -19,6 +20,8 @@ pub struct ResultFile {
     pub robot: RobotSummary,
     /// How the fit was made.
     pub method: MethodSummary,
+    /// Whether noise in the regressor biases least squares; none unless the study asks for instruments.
+    pub noise_in_regressor: Option<NoiseInRegressor>,
     /// The base parameters, in the order of the tree.
     pub base_parameters: Vec<BaseParameterResult>,
     /// The bodies: one of the full sets that give these base parameters, the nearest to the prior.
@@ -61,7 +64,7 @@ pub struct RobotSummary {
 /// How a fit was made.
 #[derive(Clone, Debug, Serialize)]
 pub struct MethodSummary {
-    /// `ordinary` or `weighted`.
+    /// The study's `estimator.method`.
     pub estimator: String,
     /// `complete`, `not-all-excited` or `iteration-limit`.
     pub status: String,

@@ -2,6 +2,7 @@
 
 use crate::design_section::DesignSection;
 use crate::error::Error;
+use crate::instruments::InstrumentSection;
 use dynident_estimation::{CovarianceMethod, RankSettings, SegmentSettings};
 use dynident_model::line_and_column;
 use dynident_recording::{LogFormat, MotionSettings};
@@ -238,6 +239,19 @@ pub enum EstimatorMethod {
     /// Weighted least squares: every joint counts by its own noise.
     #[default]
     Weighted,
+    /// Instrumental variables: noise in the regressor does not bias the estimate.
+    Instrumental,
+}
+
+impl EstimatorMethod {
+    /// The name in the study file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ordinary => "ordinary",
+            Self::Weighted => "weighted",
+            Self::Instrumental => "instrumental",
+        }
+    }
 }
 
 /// `[estimator]`.
@@ -252,6 +266,8 @@ pub struct EstimatorSection {
     pub rank: RankSettings,
     /// How logs are cut into segments for the covariance.
     pub segments: SegmentSettings,
+    /// Instruments for `method = "instrumental"`. With another method they only test whether noise in the regressor biases it.
+    pub instruments: Option<InstrumentSection>,
 }
 
 /// What a log is for.
@@ -424,6 +440,20 @@ impl Study {
         }
         self.motion.validate().map_err(|error| format!("[motion]: {error}"))?;
         self.estimator.rank.validate().map_err(|error| format!("[estimator.rank]: {error}"))?;
+        let instruments = self.estimator.instruments.clone().unwrap_or_default();
+        crate::fit::instrumental_settings(&self.estimator, &instruments)
+            .validate()
+            .map_err(|error| format!("[estimator.instruments]: {error}"))?;
+        crate::fit::hausman_settings(&self.estimator, &instruments)
+            .validate()
+            .map_err(|error| format!("[estimator.instruments], test_level: {error}"))?;
+        if let Some(cutoff) = instruments.cutoff_hz {
+            positive(cutoff, "estimator.instruments.cutoff_hz").map_err(|_| {
+                format!(
+                    "estimator.instruments.cutoff_hz = {cutoff}: give a positive frequency, below the motion's cut-off"
+                )
+            })?;
+        }
         self.estimator.segments.validate().map_err(|error| format!("[estimator.segments]: {error}"))?;
         Ok(())
     }

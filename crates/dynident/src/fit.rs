@@ -1,0 +1,146 @@
+//! From the study's choice of an estimator to an estimate: some need the logs once more.
+
+use crate::error::Error;
+use crate::instrument_rows::instrumented_factors;
+use crate::instruments::{InstrumentSection, InstrumentSource, SmoothedMotion};
+use crate::job::RunOptions;
+use crate::machine::Machine;
+use crate::rows::{Pass, estimated_rows};
+use crate::study::{EstimatorMethod, EstimatorSection, Study};
+use dynident_estimation::{
+    Estimate, HausmanSettings, HausmanTest, InstrumentReport, InstrumentalEstimate, InstrumentalSettings,
+    InstrumentedProblem, LinearProblem, OrdinarySettings, WeightedSettings, hausman_test, instrumental_variables,
+    ordinary_least_squares, weighted_least_squares,
+};
+use dynident_recording::MotionSettings;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// What was found out about noise in the regressor.
+#[derive(Clone, Debug, Serialize)]
+pub struct NoiseInRegressor {
+    /// Lowest and highest cut-off of the instruments over the logs, Hz; none when they do not come from a filter.
+    pub instrument_cutoff_hz: Option<[f64; 2]>,
+    /// How well the instruments explain the regressor.
+    pub instruments: InstrumentReport,
+    /// Least squares against instruments: was filtering enough?
+    pub hausman: HausmanTest,
+}
+
+/// An estimate and what its method alone can tell.
+pub(crate) struct Fitted {
+    pub(crate) estimate: Estimate,
+    pub(crate) noise_in_regressor: Option<NoiseInRegressor>,
+}
+
+/// The logs behind a fit, for estimators that pass them again.
+pub(crate) struct Logs<'a> {
+    pub(crate) study: &'a Study,
+    pub(crate) path: &'a Path,
+    pub(crate) machine: &'a Machine,
+    pub(crate) motion: &'a MotionSettings,
+    pub(crate) files: &'a [PathBuf],
+    /// Logs to fit to, in the order of `problem`'s logs.
+    pub(crate) training: &'a [usize],
+    pub(crate) options: &'a RunOptions<'a>,
+}
+
+impl Logs<'_> {
+    fn pass(&self, index: usize) -> Pass<'_> {
+        Pass {
+            study: self.study,
+            machine: self.machine,
+            motion: self.motion,
+            index,
+            file: &self.files[index],
+            reader_thread: false,
+            most_samples: None,
+            progress: self.options.progress,
+        }
+    }
+
+    fn begin(&self, what: &str) {
+        let rows = estimated_rows(self.training.iter().map(|&index| &*self.files[index]));
+        self.options.progress.begin(what, rows);
+    }
+}
+
+/// The estimate that the study asks for, and the test of least squares if it names instruments.
+pub(crate) fn fitted(logs: &Logs<'_>, problem: &LinearProblem) -> Result<Fitted, Error> {
+    let section = &logs.study.estimator;
+    let EstimatorSection { rank, covariance, .. } = *section;
+    let in_study = |source| Error::Estimation { path: logs.path.to_owned(), source };
+    let instrumented = if section.method == EstimatorMethod::Instrumental || section.instruments.is_some() {
+        let choice = section.instruments.clone().unwrap_or_default();
+        let mut source = SmoothedMotion::new(logs.study, logs.machine, logs.files, logs.motion, &choice);
+        let (found, hausman) = with_instruments(logs, problem, &choice, &mut source)?;
+        let range = source.cutoffs_hz.iter().fold(None, |range: Option<[f64; 2]>, &cutoff| {
+            Some(range.map_or([cutoff, cutoff], |[low, high]| [low.min(cutoff), high.max(cutoff)]))
+        });
+        let report = found.instruments.clone();
+        Some((found, NoiseInRegressor { instrument_cutoff_hz: range, instruments: report, hausman }))
+    } else {
+        None
+    };
+    let (by_instruments, noise_in_regressor) = instrumented.unzip();
+    let estimate = match section.method {
+        EstimatorMethod::Ordinary => {
+            ordinary_least_squares(problem, &OrdinarySettings { rank, covariance }).map_err(in_study)?
+        }
+        EstimatorMethod::Instrumental if by_instruments.is_some() => by_instruments
+            .map(|found| found.estimate)
+            .ok_or_else(|| in_study(dynident_estimation::EstimationError::Empty))?,
+        _ => {
+            let settings = WeightedSettings { rank, covariance, ..WeightedSettings::default() };
+            weighted_least_squares(problem, &settings).map_err(in_study)?
+        }
+    };
+    Ok(Fitted { estimate, noise_in_regressor })
+}
+
+/// The instrumental estimate and the test, with instruments from any source.
+fn with_instruments(
+    logs: &Logs<'_>,
+    problem: &LinearProblem,
+    choice: &InstrumentSection,
+    source: &mut dyn InstrumentSource,
+) -> Result<(InstrumentalEstimate, HausmanTest), Error> {
+    let section = &logs.study.estimator;
+    let in_study = |source| Error::Estimation { path: logs.path.to_owned(), source };
+    let mut instrumented = InstrumentedProblem::new(problem.columns().to_vec(), problem.joints().to_vec())
+        .with_fallback(problem.fallback().to_vec())
+        .map_err(in_study)?;
+    logs.begin("instruments");
+    for (place, &index) in logs.training.iter().enumerate() {
+        let factors = instrumented_factors(&logs.pass(index), source, section.segments)?;
+        for (joint, factor) in factors.into_iter().enumerate() {
+            let columns = logs.machine.layout.joint_columns(joint);
+            instrumented.add(&problem.logs()[place], joint, columns, factor).map_err(in_study)?;
+        }
+    }
+    logs.options.progress.end();
+    let found = instrumental_variables(&instrumented, &instrumental_settings(section, choice)).map_err(in_study)?;
+    let test = hausman_test(&instrumented, &found, &hausman_settings(section, choice)).map_err(in_study)?;
+    Ok((found, test))
+}
+
+/// The estimator's settings by the study.
+pub(crate) fn instrumental_settings(section: &EstimatorSection, choice: &InstrumentSection) -> InstrumentalSettings {
+    let default = InstrumentalSettings::default();
+    InstrumentalSettings {
+        rank: section.rank,
+        covariance: section.covariance,
+        weak_below: choice.weak_below.unwrap_or(default.weak_below),
+        ..default
+    }
+}
+
+/// The test's settings by the study.
+pub(crate) fn hausman_settings(section: &EstimatorSection, choice: &InstrumentSection) -> HausmanSettings {
+    let default = HausmanSettings::default();
+    HausmanSettings {
+        rank: section.rank,
+        covariance: section.covariance,
+        level: choice.test_level.unwrap_or(default.level),
+    }
+}
