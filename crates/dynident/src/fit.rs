@@ -1,6 +1,7 @@
 //! From the study's choice of an estimator to an estimate: some need the logs once more.
 
 use crate::error::Error;
+use crate::further_passes::{generalized, robust};
 use crate::instrument_rows::instrumented_factors;
 use crate::instruments::{InstrumentSection, InstrumentSource, SmoothedMotion};
 use crate::job::RunOptions;
@@ -8,9 +9,9 @@ use crate::machine::Machine;
 use crate::rows::{Pass, estimated_rows};
 use crate::study::{EstimatorMethod, EstimatorSection, Study};
 use dynident_estimation::{
-    Estimate, HausmanSettings, HausmanTest, InstrumentReport, InstrumentalEstimate, InstrumentalSettings,
-    InstrumentedProblem, LinearProblem, OrdinarySettings, WeightedSettings, hausman_test, instrumental_variables,
-    ordinary_least_squares, weighted_least_squares,
+    Estimate, EstimationError, HausmanSettings, HausmanTest, InstrumentReport, InstrumentalEstimate,
+    InstrumentalSettings, InstrumentedProblem, LinearProblem, OrdinarySettings, RowWeight, WeightedSettings,
+    hausman_test, instrumental_variables, ordinary_least_squares, weighted_least_squares,
 };
 use dynident_recording::MotionSettings;
 use serde::Serialize;
@@ -27,10 +28,21 @@ pub struct NoiseInRegressor {
     pub hausman: HausmanTest,
 }
 
+/// What a robust estimator thought of the rows, joint by joint.
+#[derive(Clone, Debug, Serialize)]
+pub struct GrossErrors {
+    /// Share of rows whose weight is below one half.
+    pub share: Vec<f64>,
+    /// Mean weight of the rows.
+    pub mean_weight: Vec<f64>,
+}
+
 /// An estimate and what its method alone can tell.
 pub(crate) struct Fitted {
     pub(crate) estimate: Estimate,
     pub(crate) noise_in_regressor: Option<NoiseInRegressor>,
+    pub(crate) gross_errors: Option<GrossErrors>,
+    pub(crate) noise_correlation: Option<Vec<Vec<f64>>>,
 }
 
 /// The logs behind a fit, for estimators that pass them again.
@@ -46,7 +58,7 @@ pub(crate) struct Logs<'a> {
 }
 
 impl Logs<'_> {
-    fn pass(&self, index: usize) -> Pass<'_> {
+    pub(crate) fn pass(&self, index: usize) -> Pass<'_> {
         Pass {
             study: self.study,
             machine: self.machine,
@@ -59,7 +71,11 @@ impl Logs<'_> {
         }
     }
 
-    fn begin(&self, what: &str) {
+    pub(crate) fn in_study(&self, source: EstimationError) -> Error {
+        Error::Estimation { path: self.path.to_owned(), source }
+    }
+
+    pub(crate) fn begin(&self, what: &str) {
         let rows = estimated_rows(self.training.iter().map(|&index| &*self.files[index]));
         self.options.progress.begin(what, rows);
     }
@@ -69,7 +85,7 @@ impl Logs<'_> {
 pub(crate) fn fitted(logs: &Logs<'_>, problem: &LinearProblem) -> Result<Fitted, Error> {
     let section = &logs.study.estimator;
     let EstimatorSection { rank, covariance, .. } = *section;
-    let in_study = |source| Error::Estimation { path: logs.path.to_owned(), source };
+    let in_study = |source| logs.in_study(source);
     let instrumented = if section.method == EstimatorMethod::Instrumental || section.instruments.is_some() {
         let choice = section.instruments.clone().unwrap_or_default();
         let mut source = SmoothedMotion::new(logs.study, logs.machine, logs.files, logs.motion, &choice);
@@ -83,19 +99,32 @@ pub(crate) fn fitted(logs: &Logs<'_>, problem: &LinearProblem) -> Result<Fitted,
         None
     };
     let (by_instruments, noise_in_regressor) = instrumented.unzip();
+    let (mut gross_errors, mut noise_correlation) = (None, None);
     let estimate = match section.method {
         EstimatorMethod::Ordinary => {
             ordinary_least_squares(problem, &OrdinarySettings { rank, covariance }).map_err(in_study)?
         }
-        EstimatorMethod::Instrumental if by_instruments.is_some() => by_instruments
-            .map(|found| found.estimate)
-            .ok_or_else(|| in_study(dynident_estimation::EstimationError::Empty))?,
-        _ => {
+        EstimatorMethod::Instrumental => {
+            by_instruments.map(|found| found.estimate).ok_or_else(|| in_study(EstimationError::Empty))?
+        }
+        EstimatorMethod::Huber | EstimatorMethod::Tukey => {
+            let tukey = section.method == EstimatorMethod::Tukey;
+            let found = robust(logs, problem, if tukey { RowWeight::tukey() } else { RowWeight::huber() })?;
+            gross_errors = Some(GrossErrors { share: found.outlier_share, mean_weight: found.mean_weight });
+            found.estimate
+        }
+        EstimatorMethod::Generalized => {
+            let found = generalized(logs, problem)?;
+            let rows = found.noise_correlation.row_iter();
+            noise_correlation = Some(rows.map(|row| row.iter().copied().collect()).collect());
+            found.estimate
+        }
+        EstimatorMethod::Weighted => {
             let settings = WeightedSettings { rank, covariance, ..WeightedSettings::default() };
             weighted_least_squares(problem, &settings).map_err(in_study)?
         }
     };
-    Ok(Fitted { estimate, noise_in_regressor })
+    Ok(Fitted { estimate, noise_in_regressor, gross_errors, noise_correlation })
 }
 
 /// The instrumental estimate and the test, with instruments from any source.
@@ -106,7 +135,7 @@ fn with_instruments(
     source: &mut dyn InstrumentSource,
 ) -> Result<(InstrumentalEstimate, HausmanTest), Error> {
     let section = &logs.study.estimator;
-    let in_study = |source| Error::Estimation { path: logs.path.to_owned(), source };
+    let in_study = |source| logs.in_study(source);
     let mut instrumented = InstrumentedProblem::new(problem.columns().to_vec(), problem.joints().to_vec())
         .with_fallback(problem.fallback().to_vec())
         .map_err(in_study)?;

@@ -68,7 +68,7 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
         training: &training,
         options,
     };
-    let Fitted { estimate, noise_in_regressor } = fitted(&logs, &problem)?;
+    let Fitted { estimate, noise_in_regressor, gross_errors, noise_correlation } = fitted(&logs, &problem)?;
     timings.estimation = started.elapsed().as_secs_f64();
 
     let started = Instant::now();
@@ -104,6 +104,8 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
         robot: robot_summary(&machine),
         method: method_summary(study, &machine, &motion, &estimate),
         noise_in_regressor,
+        gross_errors,
+        noise_correlation,
         base_parameters: base_parameters(&machine, &estimate),
         bodies: bodies(&machine, &inertials),
         joints: joint_results(&machine, &estimate, &parameters),

@@ -30,8 +30,8 @@ pub trait InstrumentSource {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct InstrumentSection {
-    /// Cut-off of the zero-phase Butterworth filter of fourth order; by default half of what the log suggests for its motion, which is about the highest frequency that
-    /// stands out of the noise.
+    /// Cut-off of the zero-phase Butterworth filter of fourth order; by default a quarter of what the log suggests for its motion, which is half of the highest frequency
+    /// that stands out of the noise.
     pub cutoff_hz: Option<f64>,
     /// First-stage F below which instruments are called weak; 10 by default.
     pub weak_below: Option<f64>,
@@ -91,7 +91,7 @@ impl InstrumentSource for SmoothedMotion<'_> {
             return Err(self.unaligned());
         };
         if cutoff_hz.is_none() {
-            *cutoff_hz = Some(0.5 * open(&self.motion)?.cutoff().cutoff_hz);
+            *cutoff_hz = Some(0.25 * open(&self.motion)?.cutoff().cutoff_hz);
         }
         self.cutoffs_hz.extend(*cutoff_hz);
         self.stream = Some(open(&motion)?);

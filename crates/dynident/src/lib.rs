@@ -18,6 +18,7 @@ mod error;
 mod evaluate;
 mod evidence;
 mod fit;
+mod further_passes;
 mod identify;
 mod inspect;
 mod instrument_rows;
@@ -49,7 +50,7 @@ pub use design_windows::{GivenStroke, StrokeFile, StrokeLimitFile, WindowedCondi
 pub use error::Error;
 pub use evaluate::{Quantity, evaluate};
 pub use evidence::PriorAgreement;
-pub use fit::NoiseInRegressor;
+pub use fit::{GrossErrors, NoiseInRegressor};
 pub use identify::{Identification, identify};
 pub use inspect::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary, inspect};
 pub use instruments::{InstrumentSection, InstrumentSource, SmoothedMotion};

@@ -1,7 +1,7 @@
 //! What `identify` writes: the schema of `result.json`.
 
 use crate::evidence::PriorAgreement;
-use crate::fit::NoiseInRegressor;
+use crate::fit::{GrossErrors, NoiseInRegressor};
 use dynident_estimation::ValidationReport;
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};
@@ -22,6 +22,10 @@ pub struct ResultFile {
     pub method: MethodSummary,
     /// Whether noise in the regressor biases least squares; none unless the study asks for instruments.
     pub noise_in_regressor: Option<NoiseInRegressor>,
+    /// Rows that a robust estimator gave little weight; none for other estimators.
+    pub gross_errors: Option<GrossErrors>,
+    /// Correlations of the joints' errors at one instant, in the order of `robot.joints`; none unless the estimator is `generalized`.
+    pub noise_correlation: Option<Vec<Vec<f64>>>,
     /// The base parameters, in the order of the tree.
     pub base_parameters: Vec<BaseParameterResult>,
     /// The bodies: one of the full sets that give these base parameters, the nearest to the prior.

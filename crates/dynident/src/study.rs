@@ -230,7 +230,7 @@ impl Default for ParallelFilterSection {
     }
 }
 
-/// Linear estimators.
+/// Estimators that are linear in the parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EstimatorMethod {
@@ -239,6 +239,12 @@ pub enum EstimatorMethod {
     /// Weighted least squares: every joint counts by its own noise.
     #[default]
     Weighted,
+    /// Generalised least squares: errors of the joints at one instant are correlated.
+    Generalized,
+    /// Iteratively reweighted with Huber's weights: rows far off count less.
+    Huber,
+    /// Iteratively reweighted with Tukey's weights: rows far off do not count.
+    Tukey,
     /// Instrumental variables: noise in the regressor does not bias the estimate.
     Instrumental,
 }
@@ -249,6 +255,9 @@ impl EstimatorMethod {
         match self {
             Self::Ordinary => "ordinary",
             Self::Weighted => "weighted",
+            Self::Generalized => "generalized",
+            Self::Huber => "huber",
+            Self::Tukey => "tukey",
             Self::Instrumental => "instrumental",
         }
     }
