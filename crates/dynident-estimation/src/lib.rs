@@ -7,6 +7,8 @@
 //! 2. The factors of all joints and logs make a [`LinearProblem`] over named columns.
 //! 3. [`ordinary_least_squares`] or [`weighted_least_squares`] gives an [`Estimate`]: values, a covariance that accounts for
 //!    residuals correlated in time, the noise of every joint, and what was decided about columns that the data do not excite.
+//!    [`generalized_least_squares`] lets errors of joints be correlated, [`robust_least_squares`] sets gross errors aside, [`total_least_squares`] and
+//!    [`instrumental_variables`] account for errors in the columns, and [`hausman_test`] says whether those matter.
 //! 4. [`Validation`] compares predicted with measured torque, on data that were not used for the fit.
 
 #![forbid(unsafe_code)]
@@ -27,6 +29,7 @@ mod rank;
 mod reflect;
 mod robust;
 mod segments;
+mod total;
 mod validation;
 mod weighted;
 
@@ -44,5 +47,6 @@ pub use problem::{JointRows, LinearProblem, Prior};
 pub use rank::{FixedColumn, RankReport, RankSettings};
 pub use robust::{RobustEstimate, RobustSettings, RowBlock, RowVisitor, RowWeight, robust_least_squares};
 pub use segments::{SegmentScore, SegmentSettings, SegmentedFactor};
+pub use total::{TotalEstimate, TotalSettings, total_least_squares};
 pub use validation::{JointValidation, Validation, ValidationReport};
 pub use weighted::{WeightedSettings, weighted_least_squares};
