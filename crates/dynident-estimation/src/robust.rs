@@ -370,7 +370,9 @@ fn median_scale(mut residuals: Vec<f64>) -> f64 {
     if count == 0 {
         return 0.0;
     }
-    residuals.iter_mut().for_each(|r| *r = r.abs());
+    for residual in &mut residuals {
+        *residual = residual.abs();
+    }
     let (below, middle, _) = residuals.select_nth_unstable_by(count / 2, f64::total_cmp);
     let median = if count % 2 == 1 { *middle } else { 0.5 * (*middle + below.iter().copied().fold(0.0, f64::max)) };
     median / MEDIAN_OF_NORMAL

@@ -169,7 +169,9 @@ fn total_solution(
     let scale = |column: usize| if d[column] == 0.0 { norms[column] } else { d[column] };
     let (size, count, first) = (triangle.columns(), order.len(), exact.len());
     let mut known = values.to_vec();
-    order.iter().for_each(|&column| known[column] = 0.0);
+    for &column in &order {
+        known[column] = 0.0;
+    }
     let torque = triangle.residual(&known);
     let rho = triangle.entry(size, size);
     let mut ordered = TriangularFactor::new(count);
@@ -188,7 +190,7 @@ fn total_solution(
     let place = decomposition.singular_values.imin();
     let (smallest, vector) = (decomposition.singular_values[place], right.row(place));
     // Without a part in the torque the errors explain a whole combination of columns.
-    if !(vector[left].abs() > 1.0e-8) {
+    if vector[left].is_nan() || vector[left].abs() < 1.0e-8 {
         return Err(EstimationError::NoTotalSolution);
     }
     let mut solution = vec![0.0; count];
