@@ -81,20 +81,25 @@ impl Logs<'_> {
     }
 }
 
-/// The estimate that the study asks for, and the test of least squares if it names instruments.
-pub(crate) fn fitted(logs: &Logs<'_>, problem: &LinearProblem) -> Result<Fitted, Error> {
+/// The estimate that the study asks for, and the test of least squares if there are instruments: those of `source`, or the study's own.
+pub(crate) fn fitted(
+    logs: &Logs<'_>,
+    problem: &LinearProblem,
+    source: Option<&mut dyn InstrumentSource>,
+) -> Result<Fitted, Error> {
     let section = &logs.study.estimator;
     let EstimatorSection { rank, covariance, .. } = *section;
     let in_study = |source| logs.in_study(source);
-    let instrumented = if section.method == EstimatorMethod::Instrumental || section.instruments.is_some() {
-        let choice = section.instruments.clone().unwrap_or_default();
+    let choice = section.instruments.clone().unwrap_or_default();
+    let instrumented = if let Some(source) = source {
+        Some(with_instruments(logs, problem, &choice, source)?)
+    } else if section.method == EstimatorMethod::Instrumental || section.instruments.is_some() {
         let mut source = SmoothedMotion::new(logs.study, logs.machine, logs.files, logs.motion, &choice);
-        let (found, hausman) = with_instruments(logs, problem, &choice, &mut source)?;
-        let range = source.cutoffs_hz.iter().fold(None, |range: Option<[f64; 2]>, &cutoff| {
+        let (found, mut noise) = with_instruments(logs, problem, &choice, &mut source)?;
+        noise.instrument_cutoff_hz = source.cutoffs_hz.iter().fold(None, |range: Option<[f64; 2]>, &cutoff| {
             Some(range.map_or([cutoff, cutoff], |[low, high]| [low.min(cutoff), high.max(cutoff)]))
         });
-        let report = found.instruments.clone();
-        Some((found, NoiseInRegressor { instrument_cutoff_hz: range, instruments: report, hausman }))
+        Some((found, noise))
     } else {
         None
     };
@@ -133,7 +138,7 @@ fn with_instruments(
     problem: &LinearProblem,
     choice: &InstrumentSection,
     source: &mut dyn InstrumentSource,
-) -> Result<(InstrumentalEstimate, HausmanTest), Error> {
+) -> Result<(InstrumentalEstimate, NoiseInRegressor), Error> {
     let section = &logs.study.estimator;
     let in_study = |source| logs.in_study(source);
     let mut instrumented = InstrumentedProblem::new(problem.columns().to_vec(), problem.joints().to_vec())
@@ -149,8 +154,9 @@ fn with_instruments(
     }
     logs.options.progress.end();
     let found = instrumental_variables(&instrumented, &instrumental_settings(section, choice)).map_err(in_study)?;
-    let test = hausman_test(&instrumented, &found, &hausman_settings(section, choice)).map_err(in_study)?;
-    Ok((found, test))
+    let hausman = hausman_test(&instrumented, &found, &hausman_settings(section, choice)).map_err(in_study)?;
+    let instruments = found.instruments.clone();
+    Ok((found, NoiseInRegressor { instrument_cutoff_hz: None, instruments, hausman }))
 }
 
 /// The estimator's settings by the study.

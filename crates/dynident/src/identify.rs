@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::evidence::Evidence;
 use crate::fit::{Fitted, Logs, fitted};
+use crate::instruments::InstrumentSource;
 use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
 use crate::lag::{self, LAG_SAMPLES, LagCheck};
 use crate::machine::{Machine, prior_parameters};
@@ -13,7 +14,7 @@ use crate::result_sections::{
 };
 use crate::rows::{JointRows, Pass, RawSamples, RowSink, motion_in_force};
 use crate::standard_parameters::{inertials, nearest_to_prior};
-use crate::study::{Folders, Role, Study};
+use crate::study::{EstimatorMethod, Folders, Role, Study};
 use crate::validate::validate_log;
 use crate::written_urdf::written_urdf;
 use dynident_dynamics::Column;
@@ -43,6 +44,31 @@ pub struct Identification {
 /// # Errors
 /// Everything that [`Error`] names: files, study, logs. A poor fit is not an error.
 pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Identification, Error> {
+    identified(study, study_path, options, None)
+}
+
+/// As [`identify()`] with the method `"instrumental"`, whatever the study asks for, and instruments from `source`: the closed loop simulated with the model so far (IDIM-IV: call again with a new
+/// simulation until the parameters settle), or a repeated run.
+///
+/// # Errors
+/// As [`identify()`], and what `source` returns.
+pub fn identify_with_instruments(
+    study: &Study,
+    study_path: &Path,
+    options: &RunOptions<'_>,
+    source: &mut dyn InstrumentSource,
+) -> Result<Identification, Error> {
+    let mut study = study.clone();
+    study.estimator.method = EstimatorMethod::Instrumental;
+    identified(&study, study_path, options, Some(source))
+}
+
+fn identified(
+    study: &Study,
+    study_path: &Path,
+    options: &RunOptions<'_>,
+    source: Option<&mut dyn InstrumentSource>,
+) -> Result<Identification, Error> {
     let start = Instant::now();
     study.require_training_log(study_path)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
@@ -68,7 +94,7 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
         training: &training,
         options,
     };
-    let Fitted { estimate, noise_in_regressor, gross_errors, noise_correlation } = fitted(&logs, &problem)?;
+    let Fitted { estimate, noise_in_regressor, gross_errors, noise_correlation } = fitted(&logs, &problem, source)?;
     timings.estimation = started.elapsed().as_secs_f64();
 
     let started = Instant::now();

@@ -51,7 +51,7 @@ pub use error::Error;
 pub use evaluate::{Quantity, evaluate};
 pub use evidence::PriorAgreement;
 pub use fit::{GrossErrors, NoiseInRegressor};
-pub use identify::{Identification, identify};
+pub use identify::{Identification, identify, identify_with_instruments};
 pub use inspect::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary, inspect};
 pub use instruments::{InstrumentSection, InstrumentSource, SmoothedMotion};
 pub use job::RunOptions;
