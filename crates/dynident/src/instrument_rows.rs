@@ -43,6 +43,16 @@ pub(crate) fn instrumented_factors(
     source.begin(pass.index)?;
     while stream.next_block(&mut measured).map_err(failed)? {
         source.motion(&measured, &mut other)?;
+        (other.rows, other.joints) = (measured.rows, measured.joints);
+        let numbers = measured.rows * measured.joints;
+        for (name, values) in [("q", &other.q), ("dq", &other.dq), ("ddq", &other.ddq)] {
+            if values.len() != numbers {
+                let found = values.len();
+                let message =
+                    format!("{found} numbers for {name} where {numbers} are needed: one for each joint and row");
+                return Err(Error::Instruments { log, message });
+            }
+        }
         if measured.segment != segment {
             segment = measured.segment;
             decimators.iter_mut().flatten().for_each(|decimator| {
