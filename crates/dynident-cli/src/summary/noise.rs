@@ -41,10 +41,12 @@ fn verdict(noise: &NoiseInRegressor, used: bool) -> String {
         .map_or(String::new(), |(f, p)| format!(" (Durbin-Wu-Hausman test: F = {f:.1}, p = {p:.1e})"));
     match test.verdict {
         HausmanVerdict::RejectLeastSquares if used => {
-            format!("noise in the regressor would bias least squares{figures}; instruments avoid that")
+            format!("least squares would be biased by noise in the regressor{figures}; instruments avoid that")
         }
         HausmanVerdict::RejectLeastSquares => {
-            format!("noise in the regressor biases least squares{figures}: use method = \"instrumental\"")
+            format!(
+                "least squares is rejected{figures}: noise in the regressor biases it, or the model fails in fast motion; compare method = \"instrumental\" on the held-out log"
+            )
         }
         HausmanVerdict::FilteringWasEnough => {
             format!("filtering was enough: noise in the regressor does not show{figures}")
