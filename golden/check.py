@@ -23,7 +23,8 @@ GENERATORS = {
     "pinocchio": ("pinocchio.py", "pinocchio/*.json"),
     "mujoco": ("mujoco_inverse.py", "mujoco/*.json"),
     "scipy": ("scipy_filters.py", "scipy_*.json"),
-    "statsmodels": ("statsmodels_estimators.py", "statsmodels_*.json"),
+    "statsmodels": ("statsmodels_estimators.py", "statsmodels_estimators.json"),
+    "robust": ("statsmodels_robust.py", "statsmodels_robust.json"),
     "cvxpy": ("cvxpy_physical.py", "cvxpy_*.json"),
 }
 

@@ -7,6 +7,8 @@
 //! 2. The factors of all joints and logs make a [`LinearProblem`] over named columns.
 //! 3. [`ordinary_least_squares`] or [`weighted_least_squares`] gives an [`Estimate`]: values, a covariance that accounts for
 //!    residuals correlated in time, the noise of every joint, and what was decided about columns that the data do not excite.
+//!    [`generalized_least_squares`] lets errors of joints be correlated, [`robust_least_squares`] sets gross errors aside, [`total_least_squares`] and
+//!    [`instrumental_variables`] account for errors in the columns, and [`hausman_test`] says whether those matter.
 //! 4. [`Validation`] compares predicted with measured torque, on data that were not used for the fit.
 
 #![forbid(unsafe_code)]
@@ -15,14 +17,22 @@ mod covariance;
 mod cross_validation;
 mod error;
 mod estimate;
+mod f_distribution;
 mod factor;
+mod generalized;
+mod hausman;
+mod instrumental;
+mod instrumented;
 mod nonnegative;
 mod ordinary;
 pub mod physical;
 mod problem;
+mod projection;
 mod rank;
 mod reflect;
+mod robust;
 mod segments;
+mod total;
 mod validation;
 mod weighted;
 
@@ -30,10 +40,17 @@ pub use covariance::{CovarianceMethod, correlation};
 pub use cross_validation::{CrossValidation, FoldErrors, JointFolds};
 pub use error::EstimationError;
 pub use estimate::{Estimate, EstimateStatus};
+pub use f_distribution::f_tail;
 pub use factor::{BLOCK_ROWS, FactorWorkspace, TriangularFactor};
+pub use generalized::{CrossProblem, GeneralizedEstimate, generalized_least_squares};
+pub use hausman::{HausmanColumn, HausmanSettings, HausmanTest, HausmanVerdict, hausman_test};
+pub use instrumental::{InstrumentReport, InstrumentalEstimate, InstrumentalSettings, instrumental_variables};
+pub use instrumented::InstrumentedProblem;
 pub use ordinary::{OrdinarySettings, ordinary_least_squares};
 pub use problem::{JointRows, LinearProblem, Prior};
 pub use rank::{FixedColumn, RankReport, RankSettings};
+pub use robust::{RobustEstimate, RobustSettings, RowBlock, RowVisitor, RowWeight, robust_least_squares};
 pub use segments::{SegmentScore, SegmentSettings, SegmentedFactor};
+pub use total::{TotalEstimate, TotalSettings, total_least_squares};
 pub use validation::{JointValidation, Validation, ValidationReport};
 pub use weighted::{WeightedSettings, weighted_least_squares};

@@ -3,7 +3,7 @@
 use crate::error::EstimationError;
 use crate::factor::{FactorWorkspace, TriangularFactor, check_columns, check_panel};
 use core::ops::Range;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 /// How a log is cut into segments.
@@ -207,6 +207,39 @@ impl SegmentedFactor {
             total.append(self.columns, &mut workspace, segment);
         }
         total.factor(self.columns, &mut workspace)
+    }
+
+    /// The same columns and segments without their rows, for another pass over the same log.
+    pub(crate) fn emptied(&self) -> Self {
+        Self { rows: 0, segments: Vec::new(), workspace: FactorWorkspace::default(), ..*self }
+    }
+
+    /// The factor of other rows made of these: for every matrix C of `blocks`, shape (columns + 1, new columns + 1), the rows `[W | τ] C`, all blocks
+    /// stacked. Segments stay what they were in time; their numbers of rows are multiplied by the number of blocks.
+    pub(crate) fn transformed(&self, blocks: &[DMatrix<f64>]) -> Self {
+        let size = self.columns + 1;
+        let columns = blocks.first().map_or(0, |block| block.ncols().saturating_sub(1));
+        let mut workspace = FactorWorkspace::default();
+        let segments = self.segments.iter().map(|segment| {
+            let old = segment.factor(self.columns, &mut workspace);
+            let triangle = DMatrix::from_fn(size, size, |row, column| old.entry(row, column));
+            let mut new = TriangularFactor::new(columns);
+            for block in blocks {
+                let rows = &triangle * block;
+                new.absorb_entries(&mut workspace, size, |row, column| rows[(row, column)]);
+            }
+            new.count(old.rows() * blocks.len());
+            Segment::Factor(new)
+        });
+        let segments = segments.collect();
+        Self {
+            columns,
+            max_segments: self.max_segments,
+            length_rows: self.length_rows * blocks.len().max(1),
+            rows: self.rows * blocks.len(),
+            segments,
+            workspace: FactorWorkspace::default(),
+        }
     }
 
     /// `Wᵀ(τ − Wθ)` of every segment, in order of time: the sums that a covariance with correlated errors is made of.

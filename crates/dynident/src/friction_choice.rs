@@ -103,9 +103,7 @@ pub(crate) fn choose_friction(
     // Rows count as in the plain fit.
     let weights: Vec<f64> = match study.estimator.method {
         crate::study::EstimatorMethod::Ordinary => vec![1.0; plain.joint_sigma.len()],
-        crate::study::EstimatorMethod::Weighted => {
-            plain.joint_sigma.iter().map(|sigma| if *sigma > 0.0 { sigma.recip() } else { 1.0 }).collect()
-        }
+        _ => plain.joint_sigma.iter().map(|sigma| if *sigma > 0.0 { sigma.recip() } else { 1.0 }).collect(),
     };
     let rows = wide_problem.joint_rows();
     let norms = wide_problem.column_norms();

@@ -2,8 +2,10 @@
 
 use crate::error::Error;
 use crate::evidence::Evidence;
+use crate::fit::{Fitted, Logs};
 use crate::friction_candidates::{candidate_columns, joints_to_choose};
 use crate::friction_choice::{JointFriction, choose_friction, with_friction};
+use crate::instruments::InstrumentSource;
 use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
 use crate::lag::{self, LAG_SAMPLES, LagCheck};
 use crate::machine::{Machine, prior_parameters};
@@ -48,6 +50,31 @@ pub struct Identification {
 /// # Errors
 /// Everything that [`Error`] names: files, study, logs. A poor fit is not an error.
 pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Identification, Error> {
+    identified(study, study_path, options, None)
+}
+
+/// As [`identify()`] with the method `"instrumental"`, whatever the study asks for, and instruments from `source`: the closed loop simulated with the model so far (IDIM-IV: call again with a new
+/// simulation until the parameters settle), or a repeated run.
+///
+/// # Errors
+/// As [`identify()`], and what `source` returns.
+pub fn identify_with_instruments(
+    study: &Study,
+    study_path: &Path,
+    options: &RunOptions<'_>,
+    source: &mut dyn InstrumentSource,
+) -> Result<Identification, Error> {
+    let mut study = study.clone();
+    study.estimator.method = EstimatorMethod::Instrumental;
+    identified(&study, study_path, options, Some(source))
+}
+
+fn identified(
+    study: &Study,
+    study_path: &Path,
+    options: &RunOptions<'_>,
+    source: Option<&mut dyn InstrumentSource>,
+) -> Result<Identification, Error> {
     let start = Instant::now();
     study.require_training_log(study_path)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
@@ -60,9 +87,13 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
     let job = Training { study_path, folders: &folders, motion: &motion, files: &files, logs: &training, options };
     let fitted = job.fit(study, machine, &mut timings)?;
     let (study, machine) = (&fitted.study, &fitted.machine);
-    let (fits, problem, estimate) = (&fitted.fits, &fitted.problem, fitted.estimate);
+    let (fits, problem) = (&fitted.fits, &fitted.problem);
     let in_study = |source| Error::Estimation { path: study_path.to_owned(), source };
+    let passes =
+        Logs { study, path: study_path, machine, motion: &motion, files: &files, training: &training, options };
     let started = Instant::now();
+    let Fitted { estimate, noise_in_regressor, gross_errors, noise_correlation } =
+        crate::fit::fitted(&passes, problem, source)?;
     let prior = prior_parameters(&machine.model, &machine.laws);
     let (possible, failure) = if study.estimator.physical {
         match possible_parameters(machine, problem, &estimate, &prior) {
@@ -124,6 +155,9 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
         name: study_name(study, study_path),
         robot: robot_summary(machine),
         method: method_summary(study, machine, &motion, &estimate),
+        noise_in_regressor,
+        gross_errors,
+        noise_correlation,
         base_parameters: base_parameters(machine, &estimate, physical),
         base_parameter_covariance: estimate.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
         bodies: bodies(machine, &inertials),
@@ -152,7 +186,7 @@ struct Training<'a> {
 }
 
 /// A fit, and the study and machine with the friction that it was made with.
-struct Fitted {
+struct TrainingFit {
     study: Study,
     machine: Machine,
     fits: Vec<LogFit>,
@@ -163,7 +197,7 @@ struct Fitted {
 
 impl Training<'_> {
     /// Fits the stated model; where friction is to be chosen or depends on the load, once more with what that fit says.
-    fn fit(&self, study: &Study, machine: Machine, timings: &mut Timings) -> Result<Fitted, Error> {
+    fn fit(&self, study: &Study, machine: Machine, timings: &mut Timings) -> Result<TrainingFit, Error> {
         let first = self.fit_once(study.clone(), machine, timings)?;
         let choose = joints_to_choose(study, &first.machine);
         if choose.is_empty() {
@@ -196,10 +230,10 @@ impl Training<'_> {
         let problem = problem(&study, &machine, &fits).map_err(in_study)?;
         let estimate = estimate(&study, &problem).map_err(in_study)?;
         timings.estimation += started.elapsed().as_secs_f64();
-        Ok(Fitted { study, machine, fits, problem, estimate, friction_choice })
+        Ok(TrainingFit { study, machine, fits, problem, estimate, friction_choice })
     }
 
-    fn fit_once(&self, study: Study, machine: Machine, timings: &mut Timings) -> Result<Fitted, Error> {
+    fn fit_once(&self, study: Study, machine: Machine, timings: &mut Timings) -> Result<TrainingFit, Error> {
         let started = Instant::now();
         let fits = read_logs(&study, &machine, self.motion, self.files, self.logs, self.options)?;
         timings.logs += started.elapsed().as_secs_f64();
@@ -208,17 +242,18 @@ impl Training<'_> {
         let problem = problem(&study, &machine, &fits).map_err(in_study)?;
         let estimate = estimate(&study, &problem).map_err(in_study)?;
         timings.estimation += started.elapsed().as_secs_f64();
-        Ok(Fitted { study, machine, fits, problem, estimate, friction_choice: Vec::new() })
+        Ok(TrainingFit { study, machine, fits, problem, estimate, friction_choice: Vec::new() })
     }
 }
 
+/// The estimate that friction is chosen and loads are taken by: least squares, whatever estimator comes in the end.
 fn estimate(study: &Study, problem: &LinearProblem) -> Result<Estimate, dynident_estimation::EstimationError> {
     match study.estimator.method {
         EstimatorMethod::Ordinary => {
             let settings = OrdinarySettings { rank: study.estimator.rank, covariance: study.estimator.covariance };
             ordinary_least_squares(problem, &settings)
         }
-        EstimatorMethod::Weighted => {
+        _ => {
             let settings = WeightedSettings {
                 rank: study.estimator.rank,
                 covariance: study.estimator.covariance,

@@ -1,6 +1,7 @@
 //! What `identify` writes: the schema of `result.json`.
 
 use crate::evidence::PriorAgreement;
+use crate::fit::{GrossErrors, NoiseInRegressor};
 use crate::friction_choice::JointFriction;
 use dynident_estimation::ValidationReport;
 use dynident_recording::{Finding, ImportReport, MotionSettings};
@@ -20,6 +21,12 @@ pub struct ResultFile {
     pub robot: RobotSummary,
     /// How the fit was made.
     pub method: MethodSummary,
+    /// Whether noise in the regressor biases least squares; none unless the study asks for instruments.
+    pub noise_in_regressor: Option<NoiseInRegressor>,
+    /// Rows that a robust estimator gave little weight; none for other estimators.
+    pub gross_errors: Option<GrossErrors>,
+    /// Correlations of the joints' errors at one instant, in the order of `robot.joints`; none unless the estimator is `generalized`.
+    pub noise_correlation: Option<Vec<Vec<f64>>>,
     /// The base parameters, in the order of the tree.
     pub base_parameters: Vec<BaseParameterResult>,
     /// Covariance of the base parameters by the method's own account, rows and columns in their order, symmetric; zero where a parameter is not excited.
@@ -66,7 +73,7 @@ pub struct RobotSummary {
 /// How a fit was made.
 #[derive(Clone, Debug, Serialize)]
 pub struct MethodSummary {
-    /// `ordinary` or `weighted`.
+    /// The study's `estimator.method`.
     pub estimator: String,
     /// `complete`, `not-all-excited` or `iteration-limit`.
     pub status: String,

@@ -6,7 +6,7 @@ use crate::result::{
     BaseParameterResult, BodyResult, JointResult, LawResult, MethodSummary, PhysicalVerdict, RobotSummary,
     TrainingJoint, TrainingResult,
 };
-use crate::study::{EstimatorMethod, Study};
+use crate::study::Study;
 use dynident_estimation::{Estimate, EstimateStatus, LinearProblem};
 use dynident_model::laws::Law;
 use dynident_model::{INERTIAL_NAMES, InertialParameters};
@@ -31,11 +31,7 @@ pub(crate) fn method_summary(
 ) -> MethodSummary {
     let (weakest, strongest) = machine.base.gap();
     MethodSummary {
-        estimator: match study.estimator.method {
-            EstimatorMethod::Ordinary => "ordinary",
-            EstimatorMethod::Weighted => "weighted",
-        }
-        .to_owned(),
+        estimator: study.estimator.method.name().to_owned(),
         status: match estimate.status {
             EstimateStatus::Complete => "complete",
             EstimateStatus::NotAllExcited => "not-all-excited",

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 /// Samples that are made into panels at a time: small enough for the cache, large enough to spread the filter's overhead.
-const PANEL_SAMPLES: usize = 256;
+pub(crate) const PANEL_SAMPLES: usize = 256;
 
 /// Motion blocks that may wait between reader and computer.
 const WAITING: usize = 3;
@@ -145,7 +145,7 @@ pub(crate) fn motion_in_force(
 }
 
 /// The parallel filter in force at this rate.
-fn decimation(
+pub(crate) fn decimation(
     section: &ParallelFilterSection,
     rate_hz: f64,
     motion_cutoff_hz: Option<f64>,
@@ -164,6 +164,22 @@ fn decimation(
         stop_band_db: section.stop_band_db,
         ..DecimationSettings::default()
     })
+}
+
+/// Some samples of a block's positions, velocities and accelerations, joints in the model's order.
+pub(crate) fn in_model_order(
+    block: &MotionBlock,
+    log_place: &[usize],
+    from: usize,
+    samples: usize,
+    motion: &mut [Vec<f64>; 3],
+) {
+    for (to, source) in motion.iter_mut().zip([&block.q, &block.dq, &block.ddq]) {
+        to.clear();
+        for &place in log_place {
+            to.extend_from_slice(&block.joint(source, place)[from..from + samples]);
+        }
+    }
 }
 
 /// Turns motion blocks into rows.
@@ -230,12 +246,7 @@ impl<'a> Computer<'a> {
         let Machine { model, layout, log_place, .. } = self.machine;
         for from in (0..block.rows).step_by(PANEL_SAMPLES) {
             let samples = PANEL_SAMPLES.min(block.rows - from);
-            for (to, source) in self.motion.iter_mut().zip([&block.q, &block.dq, &block.ddq]) {
-                to.clear();
-                for &place in log_place {
-                    to.extend_from_slice(&block.joint(source, place)[from..from + samples]);
-                }
-            }
+            in_model_order(block, log_place, from, samples, &mut self.motion);
             let [q, dq, ddq] = &self.motion;
             let motion = JointMotion { samples, q, dq, ddq };
             regressor_panels_following(

@@ -3,6 +3,7 @@
 use crate::design::DesignSection;
 use crate::error::Error;
 use crate::friction_section::{FrictionChoice, FrictionLaw};
+use crate::instruments::InstrumentSection;
 use dynident_estimation::{CovarianceMethod, RankSettings, SegmentSettings};
 use dynident_model::line_and_column;
 use dynident_recording::{LogFormat, MotionSettings};
@@ -240,7 +241,7 @@ impl Default for ParallelFilterSection {
     }
 }
 
-/// Linear estimators.
+/// Estimators that are linear in the parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EstimatorMethod {
@@ -249,6 +250,28 @@ pub enum EstimatorMethod {
     /// Weighted least squares: every joint counts by its own noise.
     #[default]
     Weighted,
+    /// Generalised least squares: errors of the joints at one instant are correlated.
+    Generalized,
+    /// Iteratively reweighted with Huber's weights: rows far off count less.
+    Huber,
+    /// Iteratively reweighted with Tukey's weights: rows far off do not count.
+    Tukey,
+    /// Instrumental variables: noise in the regressor does not bias the estimate.
+    Instrumental,
+}
+
+impl EstimatorMethod {
+    /// The name in the study file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ordinary => "ordinary",
+            Self::Weighted => "weighted",
+            Self::Generalized => "generalized",
+            Self::Huber => "huber",
+            Self::Tukey => "tukey",
+            Self::Instrumental => "instrumental",
+        }
+    }
 }
 
 /// `[estimator]`.
@@ -266,6 +289,8 @@ pub struct EstimatorSection {
     pub rank: RankSettings,
     /// How logs are cut into segments for the covariance.
     pub segments: SegmentSettings,
+    /// Instruments for `method = "instrumental"`. With another method they only test whether noise in the regressor biases it.
+    pub instruments: Option<InstrumentSection>,
 }
 
 impl Default for EstimatorSection {
@@ -276,6 +301,7 @@ impl Default for EstimatorSection {
             physical: true,
             rank: RankSettings::default(),
             segments: SegmentSettings::default(),
+            instruments: None,
         }
     }
 }
@@ -456,6 +482,20 @@ impl Study {
         }
         self.motion.validate().map_err(|error| format!("[motion]: {error}"))?;
         self.estimator.rank.validate().map_err(|error| format!("[estimator.rank]: {error}"))?;
+        let instruments = self.estimator.instruments.clone().unwrap_or_default();
+        crate::fit::instrumental_settings(&self.estimator, &instruments)
+            .validate()
+            .map_err(|error| format!("[estimator.instruments]: {error}"))?;
+        crate::fit::hausman_settings(&self.estimator, &instruments)
+            .validate()
+            .map_err(|error| format!("[estimator.instruments], test_level: {error}"))?;
+        if let Some(cutoff) = instruments.cutoff_hz {
+            positive(cutoff, "estimator.instruments.cutoff_hz").map_err(|_| {
+                format!(
+                    "estimator.instruments.cutoff_hz = {cutoff}: give a positive frequency, below the motion's cut-off"
+                )
+            })?;
+        }
         self.estimator.segments.validate().map_err(|error| format!("[estimator.segments]: {error}"))?;
         Ok(())
     }

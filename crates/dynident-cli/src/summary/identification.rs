@@ -1,6 +1,7 @@
 //! The summary of `identify`.
 
 use super::findings::findings;
+use super::noise::noise;
 use super::text::{WIDTH, listed, name, percent, shortened, table, with_deviation, wrapped};
 use core::fmt::Write;
 use dynident::{FrictionCandidate, LogSummary, LogValidation, ResultFile};
@@ -20,10 +21,10 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
     let mut text = wrapped(&r.name, 2);
     let _ = writeln!(
         text,
-        "{} joints, {} base parameters, {} least squares\n",
+        "{} joints, {} base parameters, {}\n",
         r.robot.dof,
         r.base_parameters.len(),
-        r.method.estimator
+        estimator(&r.method.estimator)
     );
     text += &headline(r);
     text.push('\n');
@@ -31,6 +32,7 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
     if !found.is_empty() {
         let _ = writeln!(text, "{found}");
     }
+    text += &noise(r);
     text += &joints(r);
     text.push('\n');
     if !r.friction_choice.is_empty() {
@@ -55,6 +57,15 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
         text += &wrapped(&format!("no identified.urdf: {reason}"), 2);
     }
     text
+}
+
+/// The estimator in words.
+fn estimator(name: &str) -> String {
+    match name {
+        "instrumental" => "instrumental variables".to_owned(),
+        "huber" | "tukey" => format!("reweighted least squares ({name})"),
+        other => format!("{other} least squares"),
+    }
 }
 
 /// The figures that count, first.
