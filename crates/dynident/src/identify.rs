@@ -248,19 +248,11 @@ impl Training<'_> {
 
 /// The estimate that friction is chosen and loads are taken by: least squares, whatever estimator comes in the end.
 fn estimate(study: &Study, problem: &LinearProblem) -> Result<Estimate, dynident_estimation::EstimationError> {
-    match study.estimator.method {
-        EstimatorMethod::Ordinary => {
-            let settings = OrdinarySettings { rank: study.estimator.rank, covariance: study.estimator.covariance };
-            ordinary_least_squares(problem, &settings)
-        }
-        _ => {
-            let settings = WeightedSettings {
-                rank: study.estimator.rank,
-                covariance: study.estimator.covariance,
-                ..WeightedSettings::default()
-            };
-            weighted_least_squares(problem, &settings)
-        }
+    let (rank, covariance) = (study.estimator.rank, study.estimator.covariance);
+    if study.estimator.method == EstimatorMethod::Ordinary {
+        ordinary_least_squares(problem, &OrdinarySettings { rank, covariance })
+    } else {
+        weighted_least_squares(problem, &WeightedSettings { rank, covariance, ..WeightedSettings::default() })
     }
 }
 

@@ -107,12 +107,11 @@ fn read_model(path: &Path) -> Result<StoredModel, Error> {
     Ok(stored)
 }
 
+/// Base parameters, those of the possible set if the result has one, the motion settings that they were found with, and the machine with its load.
+type Stored = (Vec<f64>, Option<Vec<f64>>, MotionSettings, Machine);
+
 /// The base parameters of a stored result, in the machine's order, the motion settings that they were found with, and the machine with its load.
-fn stored_model(
-    path: &Path,
-    stored: StoredModel,
-    mut machine: Machine,
-) -> Result<(Vec<f64>, Option<Vec<f64>>, MotionSettings, Machine), Error> {
+fn stored_model(path: &Path, stored: StoredModel, mut machine: Machine) -> Result<Stored, Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     let expressions = machine.base.expressions();
     if stored.base_parameters.len() != expressions.len() {
