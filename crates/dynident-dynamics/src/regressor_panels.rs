@@ -3,10 +3,11 @@
 //! A joint's row has entries only for the bodies that it moves and for the laws that it feels, so each joint has its own narrow panel: columns
 //! after one another, each with one value per sample. The whole regressor is never stored.
 
+use crate::law_history::LawHistory;
 use crate::regressor::{BlockSink, Work, regressor_blocks};
 use crate::workspace::{AnyScratch, BatchWorkspace, put_lanes, same_tree, take_lanes, tree};
 use dynident_lanes::{AlignedBuffer, Kernel, Lane, dispatch};
-use dynident_model::laws::{JointMotion, Law};
+use dynident_model::laws::{JointMotion, Law, LawInput, LawMemory};
 use dynident_model::{INERTIAL_NAMES, Model};
 
 /// One column of the full regressor: a parameter of the machine.
@@ -195,17 +196,64 @@ pub fn regressor_panels(
     motion: &JointMotion<'_>,
     panels: &mut Panels,
 ) {
+    regressor_panels_following(model, workspace, layout, motion, &mut LawHistory::default(), panels);
+}
+
+/// [`regressor_panels`](regressor_panels()) of a block that follows others of the same recording: laws with memory go on where `history` left them, load-dependent ones know their load.
+///
+/// # Panics
+/// As [`regressor_panels`](regressor_panels()), or if the history has load parameters of another number than the layout's columns.
+pub fn regressor_panels_following(
+    model: &Model,
+    workspace: &mut BatchWorkspace,
+    layout: &PanelLayout,
+    motion: &JointMotion<'_>,
+    history: &mut LawHistory,
+    panels: &mut Panels,
+) {
     workspace.check(model, motion.samples, &[motion.q, motion.dq, motion.ddq]);
     workspace.check_tree(model);
     layout.check_tree(model);
     panels.resize(layout, motion.samples);
     let BatchWorkspace { level, scratch, .. } = workspace;
     dispatch(*level, Fill { model, scratch, layout, motion, panels });
+    let samples = motion.samples;
     for (joint, panel) in layout.joints.iter().enumerate() {
+        let mut load_is_known = false;
         for &(place, global) in &panel.laws {
-            if let Column::Law(law) = &layout.columns[global] {
-                let at = place * motion.samples;
-                law.column(joint, motion, &mut panels.joint_mut(joint)[at..at + motion.samples]);
+            let Column::Law(law) = &layout.columns[global] else { continue };
+            let columns = panels.joint_mut(joint);
+            if let (Law::Load(_), false, Some(parameters)) = (law, load_is_known, &history.load_parameters) {
+                load_of(&layout.columns, panel, parameters, columns, samples, &mut history.load);
+                load_is_known = true;
+            }
+            if matches!(law, Law::MaxwellSlip(_)) && history.memories.len() < layout.columns.len() {
+                history.memories.resize_with(layout.columns.len(), LawMemory::default);
+            }
+            let mut none = LawMemory::default();
+            let memory = history.memories.get_mut(global).unwrap_or(&mut none);
+            let mut input = LawInput { load: load_is_known.then_some(&history.load[..]), memory };
+            law.column_following(joint, motion, &mut input, &mut columns[place * samples..(place + 1) * samples]);
+        }
+    }
+}
+
+/// The torque that the bodies ask of one joint.
+fn load_of(
+    columns: &[Column],
+    panel: &JointPanel,
+    parameters: &[f64],
+    values: &[f64],
+    samples: usize,
+    load: &mut Vec<f64>,
+) {
+    assert_eq!(parameters.len(), columns.len(), "one load parameter per column");
+    load.clear();
+    load.resize(samples, 0.0);
+    for (place, &global) in panel.columns.iter().enumerate() {
+        if let Column::Body { .. } = columns[global] {
+            for (sum, w) in load.iter_mut().zip(&values[place * samples..(place + 1) * samples]) {
+                *sum += w * parameters[global];
             }
         }
     }

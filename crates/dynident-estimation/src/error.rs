@@ -102,6 +102,11 @@ pub enum EstimationError {
         /// The column.
         name: String,
     },
+    /// Total least squares has no solution.
+    #[error(
+        "total least squares has no solution: the errors given are as large as a combination of columns; give smaller standard deviations for columns, or larger ones for torque"
+    )]
+    NoTotalSolution,
     /// The problem has no equations.
     #[error("no rows of any joint: absorb a log before estimating")]
     Empty,

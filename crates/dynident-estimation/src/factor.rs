@@ -309,6 +309,20 @@ impl TriangularFactor {
         score
     }
 
+    /// The factor of the same rows with only the given columns, in the order given.
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] for a column out of range.
+    pub fn selected(&self, columns: &[usize]) -> Result<Self, EstimationError> {
+        check_columns(columns, self.columns)?;
+        let mut selected = Self::new(columns.len());
+        selected.absorb_entries(&mut FactorWorkspace::default(), self.filled_rows(), |row, column| {
+            self.entry(row, columns.get(column).copied().unwrap_or(self.columns))
+        });
+        selected.rows = self.rows;
+        Ok(selected)
+    }
+
     /// The norm of every column of W over all rows.
     pub fn column_norms(&self) -> Vec<f64> {
         (0..self.columns).map(|c| (0..=c).map(|r| self.entry(r, c).powi(2)).sum::<f64>().sqrt()).collect()
@@ -336,6 +350,18 @@ impl TriangularFactor {
             .rev()
             .find(|&r| self.triangle[row_start(size, r)..row_start(size, r + 1)].iter().any(|&x| x != 0.0))
             .map_or(0, |r| r + 1)
+    }
+}
+
+/// That all column numbers of a selection are below `size`.
+pub(crate) fn check_columns(columns: &[usize], size: usize) -> Result<(), EstimationError> {
+    match columns.iter().find(|&&column| column >= size) {
+        Some(&found) => Err(EstimationError::Mismatch {
+            what: "a selected column below the number of columns".into(),
+            expected: size,
+            found,
+        }),
+        None => Ok(()),
     }
 }
 

@@ -253,7 +253,7 @@ impl Prior {
     }
 }
 
-fn expect(what: &str, expected: usize, found: usize) -> Result<(), EstimationError> {
+pub(crate) fn expect(what: &str, expected: usize, found: usize) -> Result<(), EstimationError> {
     if expected == found { Ok(()) } else { Err(EstimationError::Mismatch { what: what.into(), expected, found }) }
 }
 

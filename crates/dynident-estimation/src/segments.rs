@@ -1,9 +1,9 @@
 //! A factor that remembers when: the rows of one joint in one log as at most K factors of consecutive time segments.
 
 use crate::error::EstimationError;
-use crate::factor::{FactorWorkspace, TriangularFactor, check_panel};
+use crate::factor::{FactorWorkspace, TriangularFactor, check_columns, check_panel};
 use core::ops::Range;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 /// How a log is cut into segments.
@@ -175,6 +175,24 @@ impl SegmentedFactor {
         self.length_rows *= 2;
     }
 
+    /// The same rows and segments with only the given columns, in the order given: a smaller model from the factors of a larger one, without a second pass over the log.
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] for a column out of range.
+    pub fn selected(&self, columns: &[usize]) -> Result<Self, EstimationError> {
+        check_columns(columns, self.columns)?;
+        let segment = |segment: &Segment| match segment {
+            Segment::Factor(factor) => factor.selected(columns).map(Segment::Factor),
+            Segment::Rows(values) => {
+                let rows = values.chunks_exact(self.columns + 1);
+                let places = || columns.iter().copied().chain([self.columns]);
+                Ok(Segment::Rows(rows.flat_map(|row| places().map(|place| row[place])).collect()))
+            }
+        };
+        let segments = self.segments.iter().map(segment).collect::<Result<_, _>>()?;
+        Ok(Self { columns: columns.len(), segments, workspace: FactorWorkspace::default(), ..*self })
+    }
+
     /// The factor of every segment, in order of time.
     pub fn segment_factors(&self) -> Vec<TriangularFactor> {
         let mut workspace = FactorWorkspace::default();
@@ -189,6 +207,39 @@ impl SegmentedFactor {
             total.append(self.columns, &mut workspace, segment);
         }
         total.factor(self.columns, &mut workspace)
+    }
+
+    /// The same columns and segments without their rows, for another pass over the same log.
+    pub(crate) fn emptied(&self) -> Self {
+        Self { rows: 0, segments: Vec::new(), workspace: FactorWorkspace::default(), ..*self }
+    }
+
+    /// The factor of other rows made of these: for every matrix C of `blocks`, shape (columns + 1, new columns + 1), the rows `[W | τ] C`, all blocks
+    /// stacked. Segments stay what they were in time; their numbers of rows are multiplied by the number of blocks.
+    pub(crate) fn transformed(&self, blocks: &[DMatrix<f64>]) -> Self {
+        let size = self.columns + 1;
+        let columns = blocks.first().map_or(0, |block| block.ncols().saturating_sub(1));
+        let mut workspace = FactorWorkspace::default();
+        let segments = self.segments.iter().map(|segment| {
+            let old = segment.factor(self.columns, &mut workspace);
+            let triangle = DMatrix::from_fn(size, size, |row, column| old.entry(row, column));
+            let mut new = TriangularFactor::new(columns);
+            for block in blocks {
+                let rows = &triangle * block;
+                new.absorb_entries(&mut workspace, size, |row, column| rows[(row, column)]);
+            }
+            new.count(old.rows() * blocks.len());
+            Segment::Factor(new)
+        });
+        let segments = segments.collect();
+        Self {
+            columns,
+            max_segments: self.max_segments,
+            length_rows: self.length_rows * blocks.len().max(1),
+            rows: self.rows * blocks.len(),
+            segments,
+            workspace: FactorWorkspace::default(),
+        }
     }
 
     /// `Wᵀ(τ − Wθ)` of every segment, in order of time: the sums that a covariance with correlated errors is made of.

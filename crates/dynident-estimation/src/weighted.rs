@@ -75,17 +75,11 @@ pub fn weighted_least_squares(
     let split = split(&triangle, &settings.rank);
     let freedom = joint_freedom(&stacked, split.free.len())?;
     let mut solution = solve(&triangle, &split, &settings.rank, problem.fallback());
-    let mut joint_sigma = Vec::new();
+    let mut joint_sigma;
     let (mut iterations, mut converged) = (1, false);
     loop {
         let (squares, torque) = stacked.joint_squares(&solution.values)?;
-        let largest = torque.iter().zip(&freedom).map(|(t, f)| t / f).fold(0.0, f64::max);
-        joint_sigma.clear();
-        for (joint, freedom) in freedom.iter().enumerate() {
-            let rms = (if torque[joint] > 0.0 { torque[joint] / freedom } else { largest }).sqrt();
-            let floor = SMALLEST_SIGMA * if rms > 0.0 { rms } else { 1.0 };
-            joint_sigma.push((squares[joint] / freedom).sqrt().max(floor));
-        }
+        joint_sigma = noise_of_joints(&squares, &torque, &freedom);
         // From the second solution on, the weights in use are the last σ's reciprocals.
         if iterations > 1 {
             let change = joint_sigma.iter().zip(&weights).map(|(s, w)| (s * w - 1.0).abs()).fold(0.0, f64::max);
@@ -104,4 +98,15 @@ pub fn weighted_least_squares(
     // The rows were scaled by the last weights; what noise is left in them is one up to the tolerance, unless the limit came first.
     Fitted { triangle, split, solution, weights, joint_sigma, weighted_variance: 1.0, iterations, converged }
         .into_estimate(&stacked, &settings.rank, settings.covariance)
+}
+
+/// Noise of every joint, never below the rounding of its torque.
+pub(crate) fn noise_of_joints(squares: &[f64], torque: &[f64], freedom: &[f64]) -> Vec<f64> {
+    let largest = torque.iter().zip(freedom).map(|(t, f)| t / f).fold(0.0, f64::max);
+    let of_joint = |joint: usize| {
+        let rms = (if torque[joint] > 0.0 { torque[joint] / freedom[joint] } else { largest }).sqrt();
+        let floor = SMALLEST_SIGMA * if rms > 0.0 { rms } else { 1.0 };
+        (squares[joint] / freedom[joint]).sqrt().max(floor)
+    };
+    (0..squares.len()).map(of_joint).collect()
 }

@@ -55,7 +55,7 @@ pub fn design_without_gradients(
     let begun = Instant::now();
     let late = || settings.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > limit);
     let criterion = task.criteria[task.criteria.len() - 1];
-    let times = grid(task.family.duration_s(), settings.search_grid(task.family));
+    let times = grid(task.family.duration_s(), settings.search_grid(task.family, task.limits));
     let logged = grid(task.family.duration_s(), (task.family.duration_s() * settings.rate_hz).round() as usize + 1);
     let fine = grid(task.family.duration_s(), 2 * times.len() - 1);
     let weight = logged.len() as f64 / times.len() as f64;
@@ -217,7 +217,7 @@ mod tests {
             torque_std_nm: &[1.0, 1.0],
             prior: None,
         };
-        let settings = DesignSettings { search_samples: 48, ..DesignSettings::default() };
+        let settings = DesignSettings { search_samples: Some(48), ..DesignSettings::default() };
         let genetic = BinaryGeneticSettings { generations: 120, elite: true, ..BinaryGeneticSettings::default() };
         let cma = CmaEsSettings { max_evaluations: 4000, ..CmaEsSettings::default() };
         for (optimiser, generations) in [(DerivativeFree::Genetic(genetic), 120), (DerivativeFree::CmaEs(cma), 1)] {

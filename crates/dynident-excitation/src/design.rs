@@ -16,7 +16,7 @@ use crate::limits::LimitSet;
 use crate::optimisers::{AugmentedLagrangianState, OptimiserError};
 use assess::assess;
 use core::ops::ControlFlow;
-use core::sync::atomic::{AtomicU64, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use dynident_dynamics::PanelLayout;
 use dynident_model::sample::Random;
 use nalgebra::DMatrix;
@@ -37,7 +37,8 @@ pub struct DesignSettings {
     pub evaluations_per_start: usize,
     /// Evaluations of one polish at most (up to six, while something is broken between samples). Default 1,000.
     pub polish_evaluations: usize,
-    /// Samples of the search grid. Default 96, and at least five per free number of a joint, for families that move fast.
+    /// Samples of the search grid. Default 96, at least five per free number of a joint, for families that move fast, and 25 a second where places are limited: an arm crosses a thin obstacle
+    /// between two samples of a coarse grid without being seen.
     pub search_samples: Option<usize>,
     /// Rate at which the robot will be logged, Hz: every sample counts for the information. Default 100.
     pub rate_hz: f64,
@@ -64,12 +65,16 @@ impl Default for DesignSettings {
 
 impl DesignSettings {
     /// Samples of the search grid.
-    pub(crate) fn search_grid(&self, family: &dyn Family) -> usize {
+    pub(crate) fn search_grid(&self, family: &dyn Family, limits: &LimitSet) -> usize {
         let each = family.parameters() / family.joints().max(1);
+        let of_place = if limits.has_places() { (PLACE_RATE_HZ * family.duration_s()) as usize } else { 0 };
         // Whole registers.
-        self.search_samples.unwrap_or_else(|| 96.max((5 * each).next_multiple_of(16))).max(8)
+        self.search_samples.unwrap_or_else(|| 96.max((5 * each).max(of_place).next_multiple_of(16))).max(8)
     }
 }
+
+/// Rate of the search grid where places are limited, Hz.
+const PLACE_RATE_HZ: f64 = 25.0;
 
 /// What is to be designed.
 #[derive(Clone, Copy)]
@@ -118,7 +123,7 @@ pub struct DesignProgress {
     pub evaluations: u64,
 }
 
-/// Searches. `watch` hears of every better point, from any thread, and may end the search.
+/// Searches. `watch` hears of every better point, from any thread, and may end the search; the best so far is then still led inside the limits.
 ///
 /// # Errors
 /// If settings are out of range or no start can be evaluated at all.
@@ -131,14 +136,18 @@ pub fn design(
     let late = || settings.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > limit);
     let evaluations = AtomicU64::new(0);
     let logged = grid(task.family.duration_s(), (task.family.duration_s() * settings.rate_hz).round() as usize + 1);
-    let coarse = grid(task.family.duration_s(), settings.search_grid(task.family));
+    let coarse = grid(task.family.duration_s(), settings.search_grid(task.family, task.limits));
     let rounds = Rounds { task, times: &coarse, logged: logged.len() };
     let watch_all = watch;
+    let stopped = AtomicBool::new(false);
+    let over = || stopped.load(Ordering::Relaxed) || late();
     let watch = |round: &'static str| {
-        let (watch, evaluations) = (&watch_all, &evaluations);
+        let (watch, evaluations, stopped) = (&watch_all, &evaluations, &stopped);
         move |value: f64, violation: f64| {
             let evaluations = evaluations.load(Ordering::Relaxed);
-            watch(&DesignProgress { round, value, violation, evaluations }).is_break()
+            let ended = watch(&DesignProgress { round, value, violation, evaluations }).is_break();
+            stopped.fetch_or(ended, Ordering::Relaxed);
+            stopped.load(Ordering::Relaxed)
         }
     };
     let mut random = Random::new(settings.seed);
@@ -158,7 +167,7 @@ pub fn design(
         if best.as_ref().is_none_or(|best| found.best.score < best.score) || round < task.criteria.len() {
             best = Some(found.best);
         }
-        if late() {
+        if over() {
             break;
         }
         let Some(best) = &best else { continue };
@@ -179,8 +188,12 @@ pub fn design(
     let mut state = best.ok_or(OptimiserError::Start)?.state.on_twice_the_samples(coarse.len());
     let (mut kept, _) = assess(task, criterion, state.x.clone(), &fine, &logged);
     for _ in 0..POLISHES {
-        let budget = if late() { LAST_EVALUATIONS } else { settings.polish_evaluations };
-        let found = rounds.polish(criterion, &margins, state, budget, watch("polish"))?;
+        // A search that was ended still comes back inside the limits: some tenths of a second.
+        let ended = over();
+        let budget = if ended { LAST_EVALUATIONS } else { settings.polish_evaluations };
+        let tell = watch("polish");
+        let stop = |value, violation| tell(value, violation) && !ended;
+        let found = rounds.polish(criterion, &margins, state, budget, stop)?;
         evaluations.fetch_add(found.evaluations as u64, Ordering::Relaxed);
         state = found.best.state;
         // The last iterate, and the best that kept the limits on the samples.
@@ -200,8 +213,7 @@ pub fn design(
             *margin += if *c > 0.0 { 1.2 * c + 1e-6 } else { 0.0 };
         }
     }
-    // A watch that breaks, like the clock, leaves it at that.
-    if kept.violation > 0.0 && !late() {
+    if kept.violation > 0.0 && !over() {
         let stop = |progress: &DesignProgress| watch_all(progress).is_break() || late();
         let used;
         (kept, used) = restored(task, settings, kept, [&fine, &logged], &stop)?;

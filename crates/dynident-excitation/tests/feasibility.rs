@@ -156,7 +156,7 @@ fn small(index: usize) -> DesignSettings {
         rounds: 1,
         evaluations_per_start: 30,
         polish_evaluations: 40,
-        search_samples: 40,
+        search_samples: Some(40),
         rate_hz: 20.0,
         seed: index as u64,
         ..DesignSettings::default()

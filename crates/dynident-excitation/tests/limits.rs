@@ -5,19 +5,29 @@ mod common;
 use common::{Harmonics, all_limits, grid, ur10};
 use dynident_excitation::Motion;
 use dynident_excitation::check::check_limits;
-use dynident_excitation::limits::{LimitKind, LimitSet, PeakSettings, SelfCollision, peaks};
+use dynident_excitation::limits::{
+    ColumnLimit, LimitKind, LimitSet, LimitWorkspace, LinkPoint, PeakSettings, SelfCollision, peaks,
+};
 use dynident_model::Model;
 use dynident_model::sample::{Random, random_tree};
 use std::collections::BTreeMap;
 
 /// Σ w c of a motion.
-fn cost(set: &LimitSet, motion: &Motion, weights: &[f64]) -> f64 {
+fn cost(set: &LimitSet, motion: &Motion, weights: &[f64], swept: bool) -> f64 {
     let mut values = Vec::new();
-    set.values(&mut set.workspace(), motion, &mut values);
+    set.values(&mut workspace(set, swept), motion, &mut values);
     values.iter().zip(weights).map(|(c, w)| c * w).sum()
 }
 
-fn gradient_agrees(model: &Model, seed: u64) {
+fn workspace(set: &LimitSet, swept: bool) -> LimitWorkspace {
+    let mut workspace = set.workspace();
+    if swept {
+        workspace.sweep();
+    }
+    workspace
+}
+
+fn gradient_agrees(model: &Model, seed: u64, swept: bool) {
     let set = LimitSet::new(&all_limits(model), model).expect("the limits fit the model");
     let mut random = Random::new(seed);
     let mut motion = Motion::default();
@@ -30,7 +40,7 @@ fn gradient_agrees(model: &Model, seed: u64) {
         }
         let mut cotangent = Motion::default();
         cotangent.reset(model.dof(), motion.samples);
-        set.pull_back(&mut set.workspace(), &motion, &weights, &mut cotangent);
+        set.pull_back(&mut workspace(&set, swept), &motion, &weights, &mut cotangent);
         let h = 1e-6;
         let mut ahead = motion.clone();
         let mut behind = motion.clone();
@@ -53,7 +63,7 @@ fn gradient_agrees(model: &Model, seed: u64) {
                 size = size.max(pulled.abs());
             }
         }
-        let difference = (cost(&set, &ahead, &weights) - cost(&set, &behind, &weights)) / (2.0 * h);
+        let difference = (cost(&set, &ahead, &weights, swept) - cost(&set, &behind, &weights, swept)) / (2.0 * h);
         // Central differences: truncation h² times third derivatives, rounding 1e-16 / h = 1e-10 of the values.
         let error = (difference - expected).abs() / size;
         assert!(error < 1e-7, "seed {seed}, {:?}: {difference} {expected}", set.constraints()[row]);
@@ -62,10 +72,33 @@ fn gradient_agrees(model: &Model, seed: u64) {
 
 #[test]
 fn pull_back_equals_central_differences() {
-    gradient_agrees(&ur10(), 3);
-    for seed in 0..12 {
-        gradient_agrees(&random_tree(seed, 1 + seed as usize % 8), seed);
+    for swept in [false, true] {
+        gradient_agrees(&ur10(), 3, swept);
+        for seed in 0..12 {
+            gradient_agrees(&random_tree(seed, 1 + seed as usize % 8), seed, swept);
+        }
     }
+}
+
+/// Half a turn in one step, straight over the column: both samples stand outside, and only the way between them tells.
+#[test]
+fn a_column_is_seen_between_two_samples() {
+    let model = ur10();
+    let column = ColumnLimit {
+        radius_m: 0.3,
+        axis_xy_m: [0.0, 0.0],
+        points: vec![LinkPoint { link: "wrist_3_link".to_owned(), at_m: [0.0; 3], radius_m: 0.0 }],
+    };
+    let set = LimitSet::new(&Limits { column: Some(column), ..Limits::default() }, &model).unwrap();
+    let mut motion = Motion::default();
+    motion.reset(model.dof(), 2);
+    motion.q[1] = core::f64::consts::PI;
+    let (mut sampled, mut swept) = (Vec::new(), Vec::new());
+    set.values(&mut set.workspace(), &motion, &mut sampled);
+    set.values(&mut workspace(&set, true), &motion, &mut swept);
+    assert!(sampled.iter().all(|c| *c < 0.0), "{sampled:?}");
+    // A half turn takes the point to the other side of the axis: the way goes through it.
+    assert!((swept[0] - 1.0).abs() < 1e-9 && swept[1] == sampled[1], "{swept:?}");
 }
 
 /// Largest value per kind and subject.

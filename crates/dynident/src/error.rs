@@ -96,6 +96,14 @@ pub enum Error {
         /// What is wrong.
         source: EstimationError,
     },
+    /// Instruments that do not belong to the log.
+    #[error("log `{log}`, instruments: {message}")]
+    Instruments {
+        /// The log.
+        log: String,
+        /// What is wrong, and the mend.
+        message: String,
+    },
     /// A result that does not belong to the study.
     #[error("{}: {message}", path.display())]
     Result {

@@ -2,9 +2,14 @@
 
 use crate::error::Error;
 use crate::evidence::Evidence;
+use crate::fit::{Fitted, Logs};
+use crate::friction_candidates::{candidate_columns, joints_to_choose};
+use crate::friction_choice::{JointFriction, choose_friction, with_friction};
+use crate::instruments::InstrumentSource;
 use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
 use crate::lag::{self, LAG_SAMPLES, LagCheck};
 use crate::machine::{Machine, prior_parameters};
+use crate::physical::{physical_fit_result, possible_parameters};
 use crate::progress::Silent;
 use crate::residuals::Uncertainty;
 use crate::result::{LogSummary, RESULT_SCHEMA, ResultFile, Timings};
@@ -14,7 +19,7 @@ use crate::result_sections::{
 use crate::rows::{JointRows, Pass, RawSamples, RowSink, motion_in_force};
 use crate::standard_parameters::{inertials, nearest_to_prior};
 use crate::study::{EstimatorMethod, Folders, Role, Study};
-use crate::validate::validate_log;
+use crate::validate::{Tested, validate_log};
 use crate::written_urdf::written_urdf;
 use dynident_dynamics::Column;
 use dynident_estimation::{
@@ -49,6 +54,31 @@ pub struct Identification {
 /// # Errors
 /// Everything that [`Error`] names: files, study, logs. A poor fit is not an error.
 pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Identification, Error> {
+    identified(study, study_path, options, None)
+}
+
+/// As [`identify()`] with the method `"instrumental"`, whatever the study asks for, and instruments from `source`: the closed loop simulated with the model so far (IDIM-IV: call again with a new
+/// simulation until the parameters settle), or a repeated run.
+///
+/// # Errors
+/// As [`identify()`], and what `source` returns.
+pub fn identify_with_instruments(
+    study: &Study,
+    study_path: &Path,
+    options: &RunOptions<'_>,
+    source: &mut dyn InstrumentSource,
+) -> Result<Identification, Error> {
+    let mut study = study.clone();
+    study.estimator.method = EstimatorMethod::Instrumental;
+    identified(&study, study_path, options, Some(source))
+}
+
+fn identified(
+    study: &Study,
+    study_path: &Path,
+    options: &RunOptions<'_>,
+    source: Option<&mut dyn InstrumentSource>,
+) -> Result<Identification, Error> {
     let start = Instant::now();
     study.require_training_log(study_path)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
@@ -56,88 +86,101 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
     let mut timings = Timings { machine: start.elapsed().as_secs_f64(), ..Timings::default() };
     let files = log_files(study, &folders)?;
 
-    let started = Instant::now();
     let training: Vec<usize> = of_role(study, Role::Identify);
     let motion = motion_in_force(study, &machine, &files, &training, None)?;
-    let fits = read_logs(study, &machine, &motion, &files, &training, options)?;
-    timings.logs = started.elapsed().as_secs_f64();
-
-    let started = Instant::now();
+    let job = Training { study_path, folders: &folders, motion: &motion, files: &files, logs: &training, options };
+    let fitted = job.fit(study, machine, &mut timings)?;
+    let (study, machine) = (&fitted.study, &fitted.machine);
+    let (fits, problem) = (&fitted.fits, &fitted.problem);
     let in_study = |source| Error::Estimation { path: study_path.to_owned(), source };
-    let problem = problem(study, &machine, &fits).map_err(in_study)?;
-    let estimate = match study.estimator.method {
-        EstimatorMethod::Ordinary => {
-            let settings = OrdinarySettings { rank: study.estimator.rank, covariance: study.estimator.covariance };
-            ordinary_least_squares(&problem, &settings)
-        }
-        EstimatorMethod::Weighted => {
-            let settings = WeightedSettings {
-                rank: study.estimator.rank,
-                covariance: study.estimator.covariance,
-                ..WeightedSettings::default()
-            };
-            weighted_least_squares(&problem, &settings)
-        }
-    }
-    .map_err(in_study)?;
+    let passes =
+        Logs { study, path: study_path, machine, motion: &motion, files: &files, training: &training, options };
+    let started = Instant::now();
+    let Fitted { estimate, noise_in_regressor, gross_errors, noise_correlation } =
+        crate::fit::fitted(&passes, problem, source)?;
     let (estimate, dropped) = match &study.estimator.essential {
         Some(settings) => {
             essential(&estimate, settings).map(|(rest, report)| (rest, Some(report))).map_err(in_study)?
         }
         None => (estimate, None),
     };
-    timings.estimation = started.elapsed().as_secs_f64();
+    let prior = prior_parameters(&machine.model, &machine.laws);
+    let (possible, failure) = if study.estimator.physical {
+        match possible_parameters(machine, problem, &estimate, &prior) {
+            Ok(fit) => (Some(fit), None),
+            Err(reason) => (None, Some(reason)),
+        }
+    } else {
+        (None, None)
+    };
+    let physical = possible.as_ref().map(|fit| &fit.base_values[..]);
+    timings.estimation += started.elapsed().as_secs_f64();
 
     let started = Instant::now();
-    let joints = joint_names(&machine);
+    let joints = joint_names(machine);
     let mut logs = Vec::new();
-    for fit in &fits {
+    for fit in fits {
         let mut summary = fit.summary.clone();
-        summary.torque_lag_s = training_lags(study, &machine, &motion, fit.index, &files[fit.index], &estimate.values)?;
+        summary.torque_lag_s = training_lags(study, machine, &motion, fit.index, &files[fit.index], &estimate.values)?;
         summary.model_findings.extend(lag::findings(&summary.torque_lag_s, &joints));
         logs.push(summary);
     }
     let mut validation = Vec::new();
     let uncertainty = Uncertainty::of(&estimate);
     for index in of_role(study, Role::Validate) {
-        let (summary, figures) = validate_log(
-            study,
-            &machine,
-            &motion,
-            index,
-            &files[index],
-            (&estimate.values, Some(&uncertainty)),
-            options,
-        )?;
+        let tested = Tested { theta: &estimate.values, physical, uncertainty: Some(&uncertainty) };
+        let (summary, figures) = validate_log(study, machine, &motion, index, &files[index], &tested, options)?;
         logs.push(summary);
         validation.push(figures);
     }
     timings.validation = started.elapsed().as_secs_f64();
     timings.total = start.elapsed().as_secs_f64();
 
-    let prior = prior_parameters(&machine.model, &machine.laws);
-    let parameters = nearest_to_prior(&machine.model, &machine.base, &estimate.values, &prior);
+    let parameters = possible.as_ref().map_or_else(
+        || nearest_to_prior(&machine.model, &machine.base, &estimate.values, &prior),
+        |fit| fit.parameters.clone(),
+    );
     let inertials = inertials(&machine.model, &parameters);
+    let mut verdict = verdict(machine, &inertials, &parameters);
+    if let Some(fit) = &possible {
+        verdict.fit = Some(physical_fit_result(fit, &estimate));
+        verdict.note =
+            "of the possible set that fits the logs best; the base parameters above it are the unconstrained estimate";
+    }
+    verdict.failure = failure;
     // Parameters that URDF cannot express leave a result without one; it is no reason to lose the result.
-    let (urdf, no_urdf) = match written_urdf(&machine, &inertials, &parameters) {
+    let written = if study.estimator.physical && !verdict.consistent {
+        let reason = verdict.failure.clone().unwrap_or_else(|| verdict.violations.join("; "));
+        Err(format!(
+            "the bodies are not physically possible: {reason} (estimator.physical = false writes them as they are)"
+        ))
+    } else {
+        written_urdf(machine, &inertials, &parameters)
+    };
+    let (urdf, no_urdf) = match written {
         Ok(urdf) => (Some(urdf), None),
         Err(reason) => (None, Some(reason)),
     };
     let result = ResultFile {
         schema: RESULT_SCHEMA,
         name: study_name(study, study_path),
-        robot: robot_summary(&machine),
-        method: method_summary(study, &machine, &motion, &estimate),
-        base_parameters: base_parameters(&machine, &estimate),
-        bodies: bodies(&machine, &inertials),
+        robot: robot_summary(machine),
+        method: method_summary(study, machine, &motion, &estimate),
+        noise_in_regressor,
+        gross_errors,
+        noise_correlation,
+        base_parameters: base_parameters(machine, &estimate, physical),
+        base_parameter_covariance: estimate.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        bodies: bodies(machine, &inertials),
         essential: dropped,
         correlations: strongest_correlations(&estimate, CORRELATIONS),
-        joints: joint_results(&machine, &estimate, &parameters),
-        couplings: law_results(&machine, &estimate, &parameters, |law| matches!(law, Law::Coupling(_))),
-        training: training_result(study, &machine, &problem, &training, &estimate).map_err(in_study)?,
+        joints: joint_results(machine, &estimate, &parameters),
+        friction_choice: fitted.friction_choice,
+        couplings: law_results(machine, &estimate, &parameters, |law| matches!(law, Law::Coupling(_))),
+        training: training_result(study, machine, problem, &training, &estimate).map_err(in_study)?,
         torque_band: validation.iter().flat_map(|log| &log.residuals).filter_map(|joint| joint.band.clone()).collect(),
         validation,
-        physical: verdict(&machine, &inertials, &parameters),
+        physical: verdict,
         logs,
         no_urdf,
         timings_s: timings,
@@ -145,11 +188,110 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
     Ok(Identification { result, estimate, inertials, urdf })
 }
 
+/// What fitting needs beside study and machine.
+struct Training<'a> {
+    study_path: &'a Path,
+    folders: &'a Folders,
+    motion: &'a MotionSettings,
+    files: &'a [PathBuf],
+    /// The logs to fit to.
+    logs: &'a [usize],
+    options: &'a RunOptions<'a>,
+}
+
+/// A fit, and the study and machine with the friction that it was made with.
+struct TrainingFit {
+    study: Study,
+    machine: Machine,
+    fits: Vec<LogFit>,
+    problem: LinearProblem,
+    estimate: Estimate,
+    friction_choice: Vec<JointFriction>,
+}
+
+impl Training<'_> {
+    /// Fits the stated model; where friction is to be chosen or depends on the load, once more with what that fit says.
+    fn fit(&self, study: &Study, machine: Machine, timings: &mut Timings) -> Result<TrainingFit, Error> {
+        let first = self.fit_once(study.clone(), machine, timings)?;
+        let choose = joints_to_choose(study, &first.machine);
+        if choose.is_empty() {
+            let machine = first.machine.clone().with_load_of(&first.machine, &first.estimate.values);
+            return if machine.load_parameters.is_some() {
+                self.fit_once(first.study, machine, timings)
+            } else {
+                Ok(first)
+            };
+        }
+        let in_study = |source| Error::Estimation { path: self.study_path.to_owned(), source };
+        let columns = candidate_columns(study, &first.machine, &choose);
+        let known = first.machine.layout.columns();
+        let further = columns.iter().flatten().map(|column| column.law.clone());
+        let further = further.filter(|law| !known.contains(&Column::Law(law.clone())));
+        let wide = first.machine.with_columns_of(further).with_load_of(&first.machine, &first.estimate.values);
+        let started = Instant::now();
+        let fits = read_logs(study, &wide, self.motion, self.files, self.logs, self.options)?;
+        timings.logs += started.elapsed().as_secs_f64();
+        let started = Instant::now();
+        let wide_problem = problem(study, &wide, &fits).map_err(in_study)?;
+        let friction_choice =
+            choose_friction(study, &first.machine, &wide, &wide_problem, &choose, &columns, &first.estimate)
+                .map_err(in_study)?;
+        let study = with_friction(study, &friction_choice);
+        let machine =
+            Machine::new(&study, self.study_path, self.folders)?.with_load_of(&first.machine, &first.estimate.values);
+        let fits =
+            fits.into_iter().map(|fit| fit.of(&wide, &machine)).collect::<Result<Vec<_>, _>>().map_err(in_study)?;
+        let problem = problem(&study, &machine, &fits).map_err(in_study)?;
+        let estimate = estimate(&study, &problem).map_err(in_study)?;
+        timings.estimation += started.elapsed().as_secs_f64();
+        Ok(TrainingFit { study, machine, fits, problem, estimate, friction_choice })
+    }
+
+    fn fit_once(&self, study: Study, machine: Machine, timings: &mut Timings) -> Result<TrainingFit, Error> {
+        let started = Instant::now();
+        let fits = read_logs(&study, &machine, self.motion, self.files, self.logs, self.options)?;
+        timings.logs += started.elapsed().as_secs_f64();
+        let started = Instant::now();
+        let in_study = |source| Error::Estimation { path: self.study_path.to_owned(), source };
+        let problem = problem(&study, &machine, &fits).map_err(in_study)?;
+        let estimate = estimate(&study, &problem).map_err(in_study)?;
+        timings.estimation += started.elapsed().as_secs_f64();
+        Ok(TrainingFit { study, machine, fits, problem, estimate, friction_choice: Vec::new() })
+    }
+}
+
+/// The estimate that friction is chosen and loads are taken by: least squares, whatever estimator comes in the end.
+fn estimate(study: &Study, problem: &LinearProblem) -> Result<Estimate, dynident_estimation::EstimationError> {
+    let (rank, covariance) = (study.estimator.rank, study.estimator.covariance);
+    if study.estimator.method == EstimatorMethod::Ordinary {
+        ordinary_least_squares(problem, &OrdinarySettings { rank, covariance })
+    } else {
+        weighted_least_squares(problem, &WeightedSettings { rank, covariance, ..WeightedSettings::default() })
+    }
+}
+
 /// What is left of one log for fitting.
 struct LogFit {
     index: usize,
     factors: Vec<SegmentedFactor>,
     summary: LogSummary,
+}
+
+impl LogFit {
+    /// The same rows as another machine sees them, whose columns are among those of `wide`.
+    fn of(mut self, wide: &Machine, machine: &Machine) -> Result<Self, dynident_estimation::EstimationError> {
+        for (joint, factor) in self.factors.iter_mut().enumerate() {
+            let seen = wide.layout.joint_columns(joint);
+            // A column that is not there gets a number out of range, which the selection refuses.
+            let place = |&column: &usize| {
+                let wanted = &machine.layout.columns()[column];
+                seen.iter().position(|&global| wide.layout.columns()[global] == *wanted).unwrap_or(usize::MAX)
+            };
+            let places: Vec<usize> = machine.layout.joint_columns(joint).iter().map(place).collect();
+            *factor = factor.selected(&places)?;
+        }
+        Ok(self)
+    }
 }
 
 struct FitSink<'a> {

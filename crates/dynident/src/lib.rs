@@ -1,7 +1,7 @@
 //! **The whole job**: a study file in, a dynamic model with error bars and its proof out.
 //!
 //! [`identify()`] fits a [`Study`]'s machine to its logs and tests it on the held-out ones; [`validate()`] tests a finished model; [`inspect()`] audits a robot
-//! description; [`evaluate()`] computes dynamics for a table of states; [`design_study()`] finds the motion to record. The rooms below are re-exported: [`model`],
+//! description; [`evaluate()`] computes dynamics for a table of states; [`design_study()`] finds the motion to record, [`check_trajectory()`] and [`check_log()`] judge one that is there. The rooms below are re-exported: [`model`],
 //! [`dynamics`], [`recording`], [`estimation`], [`excitation`].
 
 #![forbid(unsafe_code)]
@@ -11,19 +11,23 @@ pub mod benchmark;
 pub mod book;
 mod cpu_time;
 mod design;
-mod design_file;
-mod design_optimiser;
-mod design_section;
-mod design_windows;
 mod error;
 mod evaluate;
 mod evidence;
+mod fit;
+mod friction_candidates;
+mod friction_choice;
+mod friction_section;
+mod further_passes;
 mod identify;
 mod inspect;
+mod instrument_rows;
+mod instruments;
 mod job;
 mod lag;
 mod machine;
 mod output;
+mod physical;
 mod progress;
 mod residuals;
 mod result;
@@ -40,24 +44,30 @@ pub use dynident_excitation as excitation;
 pub use dynident_model as model;
 pub use dynident_recording as recording;
 
-pub use design::{DesignOutcome, design_study};
-pub use design_file::{DESIGN_SCHEMA, DesignFile, DirectionForecast, ParameterForecast};
-pub use design_optimiser::OptimiserChoice;
-pub use design_section::{CriterionChoice, DesignSection, FamilyChoice, TorqueNoise};
-pub use design_windows::{GivenStroke, StrokeFile, StrokeLimitFile, WindowedCondition, WindowedFile, WindowedProblem};
+pub use design::{
+    CriterionChoice, DESIGN_SCHEMA, DesignFile, DesignOutcome, DesignSection, DirectionForecast, FamilyChoice,
+    GivenStroke, JoinedChoice, OptimiserChoice, ParameterForecast, PriorSection, StartPosture, StrokeFile,
+    StrokeLimitFile, TorqueNoise, WindowedCondition, WindowedFile, WindowedProblem, check_log, check_trajectory,
+    design_study,
+};
 pub use error::Error;
 pub use evaluate::{Quantity, evaluate};
 pub use evidence::PriorAgreement;
-pub use identify::{Identification, identify};
+pub use fit::{GrossErrors, NoiseInRegressor};
+pub use friction_choice::{FrictionCandidate, JointFriction};
+pub use friction_section::{FrictionChoice, FrictionLaw};
+pub use identify::{Identification, identify, identify_with_instruments};
 pub use inspect::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary, inspect};
+pub use instruments::{InstrumentSection, InstrumentSource, SmoothedMotion};
 pub use job::RunOptions;
 pub use machine::Machine;
 pub use output::{check_writable, write_whole};
 pub use progress::{Progress, Silent};
 pub use residuals::{JointResiduals, TorqueBand};
 pub use result::{
-    BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, LogValidation, MethodSummary, PhysicalVerdict,
-    RESULT_SCHEMA, ResultFile, RobotSummary, Timings, TrainingJoint, TrainingResult,
+    BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, LogValidation, MethodSummary,
+    PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, Timings,
+    TrainingJoint, TrainingResult,
 };
 pub use study::{
     CoulombChoice, CouplingSection, DriveSection, EstimatorMethod, EstimatorSection, Folders, JointDrive, LogSection,

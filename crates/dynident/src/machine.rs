@@ -2,13 +2,13 @@
 
 use crate::error::Error;
 use crate::study::{CoulombChoice, Folders, JointDrive, Study};
-use dynident_dynamics::{BaseParameterSettings, BaseParameters, PanelLayout};
+use dynident_dynamics::{BaseParameterSettings, BaseParameters, Column, PanelLayout};
 use dynident_model::laws::{Coulomb, CoulombShape, Coupling, CouplingEffect, DriveChoice, Law, laws_per_joint};
 use dynident_model::{Model, Robot, Vec3, load_robot};
 use std::path::Path;
 
 /// A study's machine, ready to make regressors.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Machine {
     /// The description as read.
     pub robot: Robot,
@@ -26,6 +26,8 @@ pub struct Machine {
     pub layout: PanelLayout,
     /// Base parameters by the description's own inertials, damping and friction; `None` while a moving body's inertial is unknown.
     pub prior: Option<Vec<f64>>,
+    /// For load-dependent friction: the bodies by an earlier estimate, one value per column of the layout. Without it such friction has a column of zeros.
+    pub load_parameters: Option<Vec<f64>>,
 }
 
 impl Machine {
@@ -80,6 +82,12 @@ impl Machine {
             model.joint_index(joint).ok_or_else(|| unknown(joint))?;
         }
         let mut laws = laws_per_joint(&model, |joint| drive_choice(study, &model.joints()[joint].name));
+        for (joint, description) in model.joints().iter().enumerate() {
+            let own = study.drive.joints.get(&description.name);
+            let step = friction_step(study, &description.name);
+            let further = own.and_then(|own| own.laws.as_ref()).unwrap_or(&study.drive.laws);
+            laws.extend(further.iter().flat_map(|law| law.laws(joint, step)));
+        }
         for section in &study.coupling {
             let [first, second] = &section.joints;
             let first = model.joint_index(first).ok_or_else(|| unknown(first))?;
@@ -98,7 +106,29 @@ impl Machine {
         let base = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
         let layout = PanelLayout::new(&model, base.base_columns());
         let prior = model.bodies_without_prior().is_empty().then(|| base.values(&prior_parameters(&model, &laws)));
-        Ok(Self { robot, model, log_joints, log_place, laws, base, layout, prior })
+        Ok(Self { robot, model, log_joints, log_place, laws, base, layout, prior, load_parameters: None })
+    }
+
+    /// The machine with further laws behind its base columns, dependent or not: for choosing among them from one set of factors. `base` and `laws` stay as they are.
+    pub(crate) fn with_columns_of(&self, further: impl IntoIterator<Item = Law>) -> Self {
+        let mut columns = self.base.base_columns();
+        columns.extend(further.into_iter().map(Column::Law));
+        let mut wide = self.clone();
+        for parameters in wide.prior.iter_mut().chain(&mut wide.load_parameters) {
+            parameters.resize(columns.len(), 0.0);
+        }
+        wide.layout = PanelLayout::new(&self.model, columns);
+        wide
+    }
+
+    /// The machine with the bodies of an estimate of `other`, where load-dependent friction needs them.
+    pub(crate) fn with_load_of(mut self, other: &Self, values: &[f64]) -> Self {
+        if self.layout.columns().iter().any(|column| matches!(column, Column::Law(Law::Load(_)))) {
+            let known = other.layout.columns();
+            let value = |column: &Column| known.iter().position(|c| c == column).map_or(0.0, |place| values[place]);
+            self.load_parameters = Some(self.layout.columns().iter().map(value).collect());
+        }
+        self
     }
 }
 
@@ -113,7 +143,7 @@ pub(crate) fn prior_parameters(model: &Model, laws: &[Law]) -> Vec<f64> {
     parameters
 }
 
-fn drive_choice(study: &Study, joint: &str) -> DriveChoice {
+pub(crate) fn drive_choice(study: &Study, joint: &str) -> DriveChoice {
     let default = JointDrive::default();
     let own = study.drive.joints.get(joint).unwrap_or(&default);
     DriveChoice {
@@ -122,6 +152,12 @@ fn drive_choice(study: &Study, joint: &str) -> DriveChoice {
         coulomb: shape(own.coulomb.unwrap_or(study.drive.coulomb), study, own),
         offset: own.offset.unwrap_or(study.drive.offset),
     }
+}
+
+/// The step of friction that is no Coulomb friction: the joint's Coulomb step, or a smooth one where it has none.
+pub(crate) fn friction_step(study: &Study, joint: &str) -> CoulombShape {
+    let width = study.drive.joints.get(joint).and_then(|own| own.coulomb_width).unwrap_or(study.drive.coulomb_width);
+    drive_choice(study, joint).coulomb.unwrap_or(CoulombShape::Smooth { width })
 }
 
 fn shape(choice: CoulombChoice, study: &Study, own: &JointDrive) -> Option<CoulombShape> {

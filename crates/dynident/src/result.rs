@@ -1,6 +1,8 @@
 //! What `identify` writes: the schema of `result.json`.
 
 use crate::evidence::PriorAgreement;
+use crate::fit::{GrossErrors, NoiseInRegressor};
+use crate::friction_choice::JointFriction;
 use crate::residuals::{JointResiduals, TorqueBand};
 use dynident_estimation::{CorrelatedPair, EssentialReport, ValidationReport};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
@@ -20,8 +22,16 @@ pub struct ResultFile {
     pub robot: RobotSummary,
     /// How the fit was made.
     pub method: MethodSummary,
+    /// Whether noise in the regressor biases least squares; none unless the study asks for instruments.
+    pub noise_in_regressor: Option<NoiseInRegressor>,
+    /// Rows that a robust estimator gave little weight; none for other estimators.
+    pub gross_errors: Option<GrossErrors>,
+    /// Correlations of the joints' errors at one instant, in the order of `robot.joints`; none unless the estimator is `generalized`.
+    pub noise_correlation: Option<Vec<Vec<f64>>>,
     /// The base parameters, in the order of the tree.
     pub base_parameters: Vec<BaseParameterResult>,
+    /// Covariance of the base parameters by the method's own account, rows and columns in their order, symmetric; zero where a parameter is not excited.
+    pub base_parameter_covariance: Vec<Vec<f64>>,
     /// The bodies: one of the full sets that give these base parameters, the nearest to the prior.
     pub bodies: Vec<BodyResult>,
     /// What was held at zero because the data hardly tell it; none unless asked for.
@@ -30,6 +40,8 @@ pub struct ResultFile {
     pub correlations: Vec<CorrelatedPair>,
     /// Friction and drives.
     pub joints: Vec<JointResult>,
+    /// How friction was chosen, for the joints where the study asks for it.
+    pub friction_choice: Vec<JointFriction>,
     /// Drives that turn with two joints.
     pub couplings: Vec<LawResult>,
     /// The fit on the logs that it was made from.
@@ -68,7 +80,7 @@ pub struct RobotSummary {
 /// How a fit was made.
 #[derive(Clone, Debug, Serialize)]
 pub struct MethodSummary {
-    /// `ordinary` or `weighted`.
+    /// The study's `estimator.method`.
     pub estimator: String,
     /// `complete`, `not-all-excited` or `iteration-limit`.
     pub status: String,
@@ -90,6 +102,8 @@ pub struct MethodSummary {
     pub base_gap: [f64; 2],
     /// Base parameters that the data do not excite; they were held at the prior (or zero).
     pub not_excited: Vec<String>,
+    /// With load-dependent friction: the base parameters, by the estimate without it, whose torque is the load.
+    pub load_parameters: Option<Vec<f64>>,
 }
 
 /// One base parameter.
@@ -114,6 +128,9 @@ pub struct BaseParameterResult {
     pub relative_std_percent: Option<f64>,
     /// By the description's own numbers.
     pub prior: Option<f64>,
+    /// Of the physically possible set in `bodies` and `joints`; none when that was not asked for.
+    #[serde(default)]
+    pub physical: Option<f64>,
     /// False when the data do not excite it; value is then the prior's and std means nothing.
     pub excited: bool,
 }
@@ -146,9 +163,9 @@ pub struct LawResult {
     pub symbol: String,
     /// Its unit at a turning joint.
     pub unit: String,
-    /// The estimate; where it stands in a base parameter with others, its share in the full set.
+    /// Its value in the full set of `bodies`: the physically possible one unless `estimator.physical` is false.
     pub value: f64,
-    /// Standard deviation; none where it is not a base parameter by itself.
+    /// Standard deviation of the unconstrained estimate; none where it is not a base parameter by itself.
     pub std: Option<f64>,
     /// The base parameter that it stands in.
     pub base_parameter: Option<String>,
@@ -201,6 +218,8 @@ pub struct LogValidation {
     pub model: ValidationReport,
     /// The model against the torque as logged: nothing is filtered but the motion.
     pub raw: ValidationReport,
+    /// The physically possible set on the filtered torque; none where it is not at hand.
+    pub physical: Option<ValidationReport>,
     /// The description's own inertials, damping and friction on the filtered torque; none when unknown.
     pub prior: Option<ValidationReport>,
     /// What the filtered residuals look like, and the predicted torque's 95 % band.
@@ -216,6 +235,42 @@ pub struct PhysicalVerdict {
     pub violations: Vec<String>,
     /// What the verdict is about.
     pub note: &'static str,
+    /// The physically consistent fit behind the bodies; none when it was not asked for or failed.
+    pub fit: Option<PhysicalFitResult>,
+    /// Why it failed.
+    pub failure: Option<String>,
+}
+
+/// A physically consistent fit.
+#[derive(Clone, Debug, Serialize)]
+pub struct PhysicalFitResult {
+    /// `solved`, `stalled` or `iteration-limit`; all of them meet every constraint.
+    pub status: &'static str,
+    /// Iterations of the solver.
+    pub iterations: usize,
+    /// Stationarity of its certificate, relative.
+    pub stationarity: f64,
+    /// Duality gap of its certificate, relative.
+    pub duality_gap: f64,
+    /// How far the base parameters moved from the estimate in all, in standard deviations of white residuals.
+    pub moved_sigma: f64,
+    /// The largest move of a base parameter in units of its reported standard deviation.
+    pub largest_move_std: Option<f64>,
+    /// Limits that hold with equality and push: friction or drive inertia at zero.
+    pub active: Vec<String>,
+    /// Body by body.
+    pub bodies: Vec<PhysicalBodyResult>,
+}
+
+/// How possible a body is.
+#[derive(Clone, Debug, Serialize)]
+pub struct PhysicalBodyResult {
+    /// Its name.
+    pub name: String,
+    /// Smallest eigenvalue of its pseudo-inertia in units of the description's body.
+    pub margin: f64,
+    /// Whether the data want it outside of what is possible.
+    pub on_the_boundary: bool,
 }
 
 /// What is known of a log.

@@ -6,7 +6,7 @@ use crate::result::{
     BaseParameterResult, BodyResult, JointResult, LawResult, MethodSummary, PhysicalVerdict, RobotSummary,
     TrainingJoint, TrainingResult,
 };
-use crate::study::{EstimatorMethod, Study};
+use crate::study::Study;
 use dynident_estimation::{Estimate, EstimateStatus, LinearProblem};
 use dynident_model::laws::Law;
 use dynident_model::{INERTIAL_NAMES, InertialParameters};
@@ -31,11 +31,7 @@ pub(crate) fn method_summary(
 ) -> MethodSummary {
     let (weakest, strongest) = machine.base.gap();
     MethodSummary {
-        estimator: match study.estimator.method {
-            EstimatorMethod::Ordinary => "ordinary",
-            EstimatorMethod::Weighted => "weighted",
-        }
-        .to_owned(),
+        estimator: study.estimator.method.name().to_owned(),
         status: match estimate.status {
             EstimateStatus::Complete => "complete",
             EstimateStatus::NotAllExcited => "not-all-excited",
@@ -56,10 +52,15 @@ pub(crate) fn method_summary(
             .to_owned(),
         base_gap: [weakest, strongest],
         not_excited: estimate.rank.fixed.iter().map(|fixed| fixed.name.clone()).collect(),
+        load_parameters: machine.load_parameters.clone(),
     }
 }
 
-pub(crate) fn base_parameters(machine: &Machine, estimate: &Estimate) -> Vec<BaseParameterResult> {
+pub(crate) fn base_parameters(
+    machine: &Machine,
+    estimate: &Estimate,
+    physical: Option<&[f64]>,
+) -> Vec<BaseParameterResult> {
     let expressions = machine.base.expressions();
     let columns = machine.layout.columns();
     (0..columns.len())
@@ -73,6 +74,7 @@ pub(crate) fn base_parameters(machine: &Machine, estimate: &Estimate) -> Vec<Bas
             std_white: estimate.covariance_white[(index, index)].max(0.0).sqrt(),
             relative_std_percent: estimate.relative_std_percent[index],
             prior: machine.prior.as_ref().map(|prior| prior[index]),
+            physical: physical.map(|values| values[index]),
             excited: !estimate.rank.fixed.iter().any(|fixed| fixed.column == index),
         })
         .collect()
@@ -118,7 +120,7 @@ pub(crate) fn law_results(
         LawResult {
             symbol: law.symbol(),
             unit: law.unit().to_owned(),
-            value: alone.map_or(parameters[column], |place| estimate.values[place]),
+            value: parameters[column],
             std: alone.map(|place| estimate.std[place]),
             base_parameter: home.map(|place| expressions[place].clone()),
         }
@@ -190,13 +192,15 @@ pub(crate) fn verdict(machine: &Machine, inertials: &[InertialParameters], param
         }
     }
     for (law, value) in machine.laws.iter().zip(&parameters[10 * machine.model.dof()..]) {
-        if *value < 0.0 && matches!(law, Law::Viscous(_) | Law::Coulomb(_) | Law::DriveInertia(_)) {
+        if *value < 0.0 && law.is_nonnegative() {
             violations.push(format!("{} = {value:.4} {}", law.symbol(), law.unit()));
         }
     }
     PhysicalVerdict {
         consistent: violations.is_empty(),
         violations,
+        fit: None,
+        failure: None,
         note: "of the full set nearest to the prior; plain least squares does not enforce it, and another set with the same torques may pass",
     }
 }

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::machine::Machine;
 use crate::progress::Progress;
 use crate::study::{ParallelFilterSection, Study};
-use dynident_dynamics::{BatchWorkspace, PanelLayout, Panels, regressor_panels};
+use dynident_dynamics::{BatchWorkspace, LawHistory, PanelLayout, Panels, regressor_panels_following};
 use dynident_model::Model;
 use dynident_model::laws::JointMotion;
 use dynident_recording::{
@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 /// Samples that are made into panels at a time: small enough for the cache, large enough to spread the filter's overhead.
-const PANEL_SAMPLES: usize = 256;
+pub(crate) const PANEL_SAMPLES: usize = 256;
 
 /// Motion blocks that may wait between reader and computer.
 const WAITING: usize = 3;
@@ -85,8 +85,16 @@ impl Pass<'_> {
         let motion_cutoff_hz = named_cutoff(self.motion);
         let settings = decimation(&self.study.parallel_filter, stream.rate_hz(), motion_cutoff_hz);
         let Machine { model, layout, log_place, .. } = self.machine;
-        let mut computer = Computer::new(model, layout, log_place, stream.rate_hz(), settings.as_ref(), self.progress)
-            .map_err(|source| Error::Filter { log: log.clone(), source })?;
+        let mut computer = Computer::new(
+            model,
+            layout,
+            log_place,
+            stream.rate_hz(),
+            settings.as_ref(),
+            self.machine.load_parameters.clone(),
+            self.progress,
+        )
+        .map_err(|source| Error::Filter { log: log.clone(), source })?;
         if self.reader_thread && self.most_samples.is_none() {
             read_beside(&mut stream, |block| computer.take(block, sink)).map_err(|error| error.named(&log))?;
         } else {
@@ -170,6 +178,22 @@ pub(crate) fn decimation(
     })
 }
 
+/// Some samples of a block's positions, velocities and accelerations, joints in the model's order.
+pub(crate) fn in_model_order(
+    block: &MotionBlock,
+    log_place: &[usize],
+    from: usize,
+    samples: usize,
+    motion: &mut [Vec<f64>; 3],
+) {
+    for (to, source) in motion.iter_mut().zip([&block.q, &block.dq, &block.ddq]) {
+        to.clear();
+        for &place in log_place {
+            to.extend_from_slice(&block.joint(source, place)[from..from + samples]);
+        }
+    }
+}
+
 /// Turns motion blocks into rows.
 pub(crate) struct Computer<'a> {
     model: &'a Model,
@@ -178,6 +202,7 @@ pub(crate) struct Computer<'a> {
     progress: &'a dyn Progress,
     workspace: BatchWorkspace,
     panels: Panels,
+    history: LawHistory,
     decimators: Option<Vec<Decimator>>,
     segment: usize,
     motion: [Vec<f64>; 3],
@@ -194,6 +219,7 @@ impl<'a> Computer<'a> {
         log_place: &'a [usize],
         rate_hz: f64,
         settings: Option<&DecimationSettings>,
+        load_parameters: Option<Vec<f64>>,
         progress: &'a dyn Progress,
     ) -> Result<Self, FilterError> {
         let decimators = settings
@@ -210,6 +236,7 @@ impl<'a> Computer<'a> {
             progress,
             workspace: BatchWorkspace::new(model),
             panels: Panels::default(),
+            history: LawHistory::new(load_parameters),
             decimators,
             segment: 0,
             motion: [Vec::new(), Vec::new(), Vec::new()],
@@ -228,6 +255,7 @@ impl<'a> Computer<'a> {
     pub(crate) fn take(&mut self, block: &MotionBlock, sink: &mut dyn RowSink) -> Result<(), Error> {
         if block.segment != self.segment {
             self.segment = block.segment;
+            self.history.restart();
             self.decimators.iter_mut().flatten().for_each(|decimator| {
                 decimator.finish();
             });
@@ -235,15 +263,17 @@ impl<'a> Computer<'a> {
         let (model, layout, log_place) = (self.model, self.layout, self.log_place);
         for from in (0..block.rows).step_by(PANEL_SAMPLES) {
             let samples = PANEL_SAMPLES.min(block.rows - from);
-            for (to, source) in self.motion.iter_mut().zip([&block.q, &block.dq, &block.ddq]) {
-                to.clear();
-                for &place in log_place {
-                    to.extend_from_slice(&block.joint(source, place)[from..from + samples]);
-                }
-            }
+            in_model_order(block, log_place, from, samples, &mut self.motion);
             let [q, dq, ddq] = &self.motion;
             let motion = JointMotion { samples, q, dq, ddq };
-            regressor_panels(model, &mut self.workspace, layout, &motion, &mut self.panels);
+            regressor_panels_following(
+                model,
+                &mut self.workspace,
+                layout,
+                &motion,
+                &mut self.history,
+                &mut self.panels,
+            );
             for (joint, &place) in log_place.iter().enumerate() {
                 let tau = &block.joint(&block.tau, place)[from..from + samples];
                 self.panels.torque_mut(joint).copy_from_slice(tau);

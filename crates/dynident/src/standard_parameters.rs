@@ -40,7 +40,7 @@ pub(crate) fn nearest_to_prior(model: &Model, base: &BaseParameters, theta: &[f6
 }
 
 /// A length that the machine's links have: the mean distance between successive joints, at least a centimetre.
-fn typical_length_m(model: &Model) -> f64 {
+pub(crate) fn typical_length_m(model: &Model) -> f64 {
     let lengths: Vec<f64> = model.joints().iter().map(|joint| joint.placement.translation.norm()).collect();
     (lengths.iter().sum::<f64>() / lengths.len().max(1) as f64).max(0.01)
 }

@@ -1,7 +1,9 @@
 //! The study file: a robot, its drives, its logs and how to fit them, without code.
 
-use crate::design_section::DesignSection;
+use crate::design::DesignSection;
 use crate::error::Error;
+use crate::friction_section::{FrictionChoice, FrictionLaw};
+use crate::instruments::InstrumentSection;
 use dynident_estimation::{CovarianceMethod, EssentialSettings, RankSettings, SegmentSettings};
 use dynident_model::line_and_column;
 use dynident_recording::{LogFormat, MotionSettings};
@@ -126,6 +128,10 @@ pub struct DriveSection {
     pub coulomb_dead_band: f64,
     /// A constant torque. On by default.
     pub offset: bool,
+    /// Further laws of friction. None by default.
+    pub laws: Vec<FrictionLaw>,
+    /// Whether the keys above say which friction there is (`"stated"`, the default), or the training logs (`"auto"`).
+    pub friction: FrictionChoice,
     /// Exceptions, by joint name.
     pub joints: BTreeMap<String, JointDrive>,
 }
@@ -139,13 +145,15 @@ impl Default for DriveSection {
             coulomb_width: 0.02,
             coulomb_dead_band: 0.0,
             offset: true,
+            laws: Vec::new(),
+            friction: FrictionChoice::Stated,
             joints: BTreeMap::new(),
         }
     }
 }
 
 /// What one joint has in place of `[drive]`.
-#[derive(Clone, Debug, Default, Deserialize, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct JointDrive {
     /// In place of `drive.drive_inertia`.
@@ -160,6 +168,10 @@ pub struct JointDrive {
     pub coulomb_dead_band: Option<f64>,
     /// In place of `drive.offset`.
     pub offset: Option<bool>,
+    /// In place of `drive.laws`.
+    pub laws: Option<Vec<FrictionLaw>>,
+    /// In place of `drive.friction`.
+    pub friction: Option<FrictionChoice>,
 }
 
 /// `[[coupling]]`: a drive whose speed is `ratios[0] · q̇_first + ratios[1] · q̇_second`.
@@ -229,7 +241,7 @@ impl Default for ParallelFilterSection {
     }
 }
 
-/// Linear estimators.
+/// Estimators that are linear in the parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EstimatorMethod {
@@ -238,22 +250,63 @@ pub enum EstimatorMethod {
     /// Weighted least squares: every joint counts by its own noise.
     #[default]
     Weighted,
+    /// Generalised least squares: errors of the joints at one instant are correlated.
+    Generalized,
+    /// Iteratively reweighted with Huber's weights: rows far off count less.
+    Huber,
+    /// Iteratively reweighted with Tukey's weights: rows far off do not count.
+    Tukey,
+    /// Instrumental variables: noise in the regressor does not bias the estimate.
+    Instrumental,
+}
+
+impl EstimatorMethod {
+    /// The name in the study file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ordinary => "ordinary",
+            Self::Weighted => "weighted",
+            Self::Generalized => "generalized",
+            Self::Huber => "huber",
+            Self::Tukey => "tukey",
+            Self::Instrumental => "instrumental",
+        }
+    }
 }
 
 /// `[estimator]`.
-#[derive(Clone, Debug, Default, Deserialize, Serialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct EstimatorSection {
     /// The method; weighted by default.
     pub method: EstimatorMethod,
     /// The covariance that error bars come from; `"jackknife"`, which accounts for coloured residuals and judges each time segment by the fit without it, by default.
     pub covariance: CovarianceMethod,
+    /// Whether the bodies, friction and drives written are those of a possible machine that fit the logs best (true by default), or the set nearest to the
+    /// description that has exactly the estimated base parameters.
+    pub physical: bool,
     /// When a column counts as excited.
     pub rank: RankSettings,
     /// How logs are cut into segments for the covariance.
     pub segments: SegmentSettings,
     /// Hold parameters that the data hardly tell at zero; not by default.
     pub essential: Option<EssentialSettings>,
+    /// Instruments for `method = "instrumental"`. With another method they only test whether noise in the regressor biases it.
+    pub instruments: Option<InstrumentSection>,
+}
+
+impl Default for EstimatorSection {
+    fn default() -> Self {
+        Self {
+            method: EstimatorMethod::default(),
+            covariance: CovarianceMethod::default(),
+            physical: true,
+            rank: RankSettings::default(),
+            segments: SegmentSettings::default(),
+            essential: None,
+            instruments: None,
+        }
+    }
 }
 
 /// What a log is for.
@@ -389,7 +442,13 @@ impl Study {
         };
         positive(self.drive.coulomb_width, "drive.coulomb_width")?;
         not_negative(self.drive.coulomb_dead_band, "drive.coulomb_dead_band")?;
+        for (index, law) in self.drive.laws.iter().enumerate() {
+            law.validate(&format!("drive.laws number {}", index + 1))?;
+        }
         for (joint, drive) in &self.drive.joints {
+            for (index, law) in drive.laws.iter().flatten().enumerate() {
+                law.validate(&format!("drive.joints.{joint}.laws number {}", index + 1))?;
+            }
             if let Some(width) = drive.coulomb_width {
                 positive(width, &format!("drive.joints.{joint}.coulomb_width"))?;
             }
@@ -426,6 +485,20 @@ impl Study {
         }
         self.motion.validate().map_err(|error| format!("[motion]: {error}"))?;
         self.estimator.rank.validate().map_err(|error| format!("[estimator.rank]: {error}"))?;
+        let instruments = self.estimator.instruments.clone().unwrap_or_default();
+        crate::fit::instrumental_settings(&self.estimator, &instruments)
+            .validate()
+            .map_err(|error| format!("[estimator.instruments]: {error}"))?;
+        crate::fit::hausman_settings(&self.estimator, &instruments)
+            .validate()
+            .map_err(|error| format!("[estimator.instruments], test_level: {error}"))?;
+        if let Some(cutoff) = instruments.cutoff_hz {
+            positive(cutoff, "estimator.instruments.cutoff_hz").map_err(|_| {
+                format!(
+                    "estimator.instruments.cutoff_hz = {cutoff}: give a positive frequency, below the motion's cut-off"
+                )
+            })?;
+        }
         self.estimator.segments.validate().map_err(|error| format!("[estimator.segments]: {error}"))?;
         if let Some(essential) = &self.estimator.essential {
             essential.validate().map_err(|error| format!("[estimator.essential]: {error}"))?;

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::evidence::{Evidence, predicted};
+use crate::friction_choice::{JointFriction, with_friction};
 use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
 use crate::lag::LagCheck;
 use crate::machine::Machine;
@@ -35,12 +36,16 @@ pub struct ValidationFile {
 struct StoredModel {
     schema: String,
     method: StoredMethod,
+    #[serde(default)]
+    friction_choice: Vec<JointFriction>,
     base_parameters: Vec<BaseParameterResult>,
 }
 
 #[derive(Deserialize)]
 struct StoredMethod {
     motion: MotionSettings,
+    #[serde(default)]
+    load_parameters: Option<Vec<f64>>,
 }
 
 /// Tests the model of a `result.json` on the logs of a study that have the role `validate`, or on all its logs if none has.
@@ -55,8 +60,12 @@ pub fn validate(
 ) -> Result<ValidationFile, Error> {
     study.require_log(study_path)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
+    let stored = read_model(result_path)?;
+    // With the friction that was chosen when the model was made.
+    let chosen = with_friction(study, &stored.friction_choice);
+    let study = &chosen;
     let machine = Machine::new(study, study_path, &folders)?;
-    let (theta, made_with) = stored_model(result_path, &machine)?;
+    let (theta, possible, made_with, machine) = stored_model(result_path, stored, machine)?;
     let files = log_files(study, &folders)?;
     let mut chosen = of_role(study, Role::Validate);
     if chosen.is_empty() {
@@ -71,15 +80,15 @@ pub fn validate(
         logs: Vec::new(),
     };
     for index in chosen {
-        let (summary, figures) = validate_log(study, &machine, &motion, index, &files[index], (&theta, None), options)?;
+        let tested = Tested { theta: &theta, physical: possible.as_deref(), uncertainty: None };
+        let (summary, figures) = validate_log(study, &machine, &motion, index, &files[index], &tested, options)?;
         file.logs.push(summary);
         file.validation.push(figures);
     }
     Ok(file)
 }
 
-/// The base parameters of a stored result, in the machine's order, and the motion settings that they were found with.
-fn stored_model(path: &Path, machine: &Machine) -> Result<(Vec<f64>, MotionSettings), Error> {
+fn read_model(path: &Path) -> Result<StoredModel, Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
     let stored: StoredModel = serde_json::from_slice(&bytes).map_err(|error| {
@@ -89,6 +98,22 @@ fn stored_model(path: &Path, machine: &Machine) -> Result<(Vec<f64>, MotionSetti
         let expected = crate::result::RESULT_SCHEMA;
         return Err(wrong(format!("schema `{}`, not `{expected}`: identify again with this version", stored.schema)));
     }
+    for joint in &stored.friction_choice {
+        joint
+            .drive
+            .iter()
+            .flat_map(|drive| drive.laws.iter().flatten())
+            .try_for_each(|law| law.validate(&format!("friction_choice of joint `{}`", joint.joint)).map_err(wrong))?;
+    }
+    Ok(stored)
+}
+
+/// Base parameters, those of the possible set if the result has one, the motion settings that they were found with, and the machine with its load.
+type Stored = (Vec<f64>, Option<Vec<f64>>, MotionSettings, Machine);
+
+/// The base parameters of a stored result, in the machine's order, the motion settings that they were found with, and the machine with its load.
+fn stored_model(path: &Path, stored: StoredModel, mut machine: Machine) -> Result<Stored, Error> {
+    let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     let expressions = machine.base.expressions();
     if stored.base_parameters.len() != expressions.len() {
         return Err(wrong(format!(
@@ -110,7 +135,17 @@ fn stored_model(path: &Path, machine: &Machine) -> Result<(Vec<f64>, MotionSetti
         }
         values.push(stored.value);
     }
-    Ok((values, stored.method.motion))
+    let possible: Option<Vec<f64>> = stored.base_parameters.iter().map(|stored| stored.physical).collect();
+    if possible.as_ref().is_some_and(|values| values.iter().any(|value| !value.is_finite())) {
+        return Err(wrong("a physical value of a base parameter is not a finite number".to_owned()));
+    }
+    if let Some(load) = &stored.method.load_parameters
+        && (load.len() != values.len() || load.iter().any(|value| !value.is_finite()))
+    {
+        return Err(wrong("load_parameters are not one finite number per base parameter: identify again".to_owned()));
+    }
+    machine.load_parameters = stored.method.load_parameters;
+    Ok((values, possible, stored.method.motion, machine))
 }
 
 struct TestSink<'a> {
@@ -119,6 +154,7 @@ struct TestSink<'a> {
     theta: &'a [f64],
     watches: Vec<JointWatch>,
     model: Validation,
+    physical: Option<(&'a [f64], Validation)>,
     raw: Validation,
     prior: Option<(&'a [f64], Validation)>,
     evidence: Option<Evidence<'a>>,
@@ -139,10 +175,10 @@ impl RowSink for TestSink<'_> {
         predicted(rows.panel, rows.rows, columns, self.theta, &mut self.buffer);
         self.model.add_joint(rows.joint, measured, &self.buffer).map_err(|source| self.failed(source))?;
         self.watches[rows.joint].add(rows.panel, rows.rows, &self.buffer);
-        if let Some((prior, validation)) = &mut self.prior {
+        for (prior, validation) in [&mut self.prior, &mut self.physical].into_iter().flatten() {
             predicted(rows.panel, rows.rows, columns, prior, &mut self.buffer);
             let added = validation.add_joint(rows.joint, measured, &self.buffer);
-            added.map_err(|source| self.failed(source))?;
+            added.map_err(|source| Error::Estimation { path: self.file.clone(), source })?;
         }
         if let Some(evidence) = &mut self.evidence {
             evidence.filtered(rows, &mut self.buffer);
@@ -163,16 +199,27 @@ impl RowSink for TestSink<'_> {
     }
 }
 
-/// Tests base parameters on one log; with their uncertainty also the band of the predicted torque.
+/// What is tested on a log.
+pub(crate) struct Tested<'a> {
+    /// Base parameters.
+    pub(crate) theta: &'a [f64],
+    /// Those of the physically possible set.
+    pub(crate) physical: Option<&'a [f64]>,
+    /// What the band of the predicted torque is made from.
+    pub(crate) uncertainty: Option<&'a Uncertainty>,
+}
+
+/// Tests base parameters on one log, those of the possible set beside them; with their uncertainty also the band of the predicted torque.
 pub(crate) fn validate_log(
     study: &Study,
     machine: &Machine,
     motion: &MotionSettings,
     index: usize,
     file: &Path,
-    (theta, uncertainty): (&[f64], Option<&Uncertainty>),
+    tested: &Tested<'_>,
     options: &RunOptions<'_>,
 ) -> Result<(LogSummary, LogValidation), Error> {
+    let Tested { theta, physical, uncertainty } = *tested;
     let joints = joint_names(machine);
     let columns = (0..machine.model.dof()).map(|joint| machine.layout.joint_columns(joint)).collect();
     let mut sink = TestSink {
@@ -181,6 +228,7 @@ pub(crate) fn validate_log(
         theta,
         watches: (0..joints.len()).map(|joint| JointWatch::new(&machine.layout, joint, uncertainty)).collect(),
         model: Validation::new(joints.clone()),
+        physical: physical.map(|physical| (physical, Validation::new(joints.clone()))),
         raw: Validation::new(joints.clone()),
         prior: machine.prior.as_deref().map(|prior| (prior, Validation::new(joints.clone()))),
         evidence: machine.prior.as_deref().map(|prior| Evidence::new(columns, prior)),
@@ -207,6 +255,7 @@ pub(crate) fn validate_log(
         log: study.log_name(index),
         model: sink.model.report(),
         raw: sink.raw.report(),
+        physical: sink.physical.map(|(_, validation)| validation.report()),
         prior: sink.prior.map(|(_, validation)| validation.report()),
         residuals: sink
             .watches

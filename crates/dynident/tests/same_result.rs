@@ -61,7 +61,7 @@ fn the_written_urdf_gives_the_torques_of_the_base_parameters() {
     // All parameters with the dependent ones zero: another full set than the one in the URDF, of the same torques.
     let mut parameters = vec![0.0; machine.base.all_columns().len()];
     for (&column, parameter) in machine.base.independent().iter().zip(&found.result.base_parameters) {
-        parameters[column] = parameter.value;
+        parameters[column] = parameter.physical.unwrap();
     }
     let (mut workspace, mut random) = (Workspace::new(&written), Random(3));
     let mut workspace_of_study = Workspace::new(&machine.model);
@@ -119,7 +119,10 @@ fn moments_without_mass_leave_a_result_and_a_reason() {
     std::fs::write(folder.path().join("log.csv"), format!("t,q1,tau1\n{}\n", rows.join("\n"))).unwrap();
     let job = Job::new(
         folder.path(),
-        &format!("robot.file = \"pendulum.urdf\"\nlog = [{{ file = \"log.csv\" }}]\n{}", format(1)),
+        &format!(
+            "robot.file = \"pendulum.urdf\"\nestimator.physical = false\nlog = [{{ file = \"log.csv\" }}]\n{}",
+            format(1)
+        ),
     );
     let found = job.identify();
     assert!(found.urdf.is_none());

@@ -7,10 +7,12 @@ use core::ops::ControlFlow;
 use core::sync::atomic::{AtomicBool, Ordering};
 use dynident::excitation::DesignProgress;
 use dynident::excitation::export::{
-    Preview, Sampled, UrScriptSettings, fitness_csv, fitness_svg, preview_svg, ros2_joint_trajectory, trajectory_csv,
-    urscript, waypoints_csv,
+    Preview, Sampled, UrScriptSettings, fitness_csv, fitness_svg, path_svg, preview_svg, ros2_joint_trajectory,
+    trajectory_csv, urscript, waypoints_csv,
 };
-use dynident::{DesignOutcome, RunOptions, Study, check_writable, design_study, write_whole};
+use dynident::{
+    DesignOutcome, RunOptions, Study, check_log, check_trajectory, check_writable, design_study, write_whole,
+};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 
@@ -25,9 +27,15 @@ static STOP: AtomicBool = AtomicBool::new(false);
 pub(crate) struct Options {
     /// The study file; its [design] says what is looked for.
     study: PathBuf,
-    /// Folder for design.json, trajectory.csv and preview.svg.
+    /// Folder for design.json, trajectory.csv, preview.svg and path.svg.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Do not search: judge this trajectory (t_s, q1.., dq1.., ddq1.. or positions alone) against the study's limits, with a forecast.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["check_log", "seed"])]
+    check: Option<PathBuf>,
+    /// Do not search: judge a log of the study, by its name or file: what the finished run tells about each parameter.
+    #[arg(long, value_name = "NAME", conflicts_with = "seed")]
+    check_log: Option<String>,
     /// Seed of the random starts, in place of the study's.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -79,7 +87,12 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         }
         if STOP.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let outcome = design_study(&study, &options.study, &run, watch).map_err(told_in(&options.study))?;
+    let outcome = match (&options.check, &options.check_log) {
+        (Some(trajectory), _) => check_trajectory(&study, &options.study, trajectory, &run),
+        (None, Some(log)) => check_log(&study, &options.study, log, &run),
+        (None, None) => design_study(&study, &options.study, &run, watch),
+    };
+    let outcome = outcome.map_err(told_in(&options.study))?;
     if let Some(line) = line {
         line.finish_and_clear();
     }
@@ -121,7 +134,15 @@ fn files(outcome: &DesignOutcome, options: &Options) -> Result<Vec<(&'static str
         let preview = Preview { title: &title, limits: &outcome.limits, torque_nm: torque.as_deref() };
         preview_svg(sampled, &preview).map_err(|error| error.to_string())
     };
-    let mut files = vec![("trajectory.csv", plain(trajectory_csv)?), ("preview.svg", at(PICTURE_RATE_HZ, &picture)?)];
+    let path = |sampled: &Sampled<'_>| {
+        let title = format!("{}: {}, {} s", file.name, file.family, file.duration_s);
+        path_svg(sampled, &title, &outcome.machine.model, &outcome.limits).map_err(|error| error.to_string())
+    };
+    let mut files = vec![("preview.svg", at(PICTURE_RATE_HZ, &picture)?), ("path.svg", at(PICTURE_RATE_HZ, &path)?)];
+    // Who brings a trajectory has it, maybe under this very name.
+    if file.given.is_none() {
+        files.insert(0, ("trajectory.csv", plain(trajectory_csv)?));
+    }
     if !outcome.history.is_empty() {
         let title = format!("{}: {}", file.name, file.optimiser);
         let optimum = file.windowed.as_ref().and_then(|windowed| windowed.optimum);

@@ -22,6 +22,11 @@ pub(crate) fn design(d: &DesignFile, out: &Path, files: &[&str]) -> String {
         d.duration_s,
         d.criterion
     );
+    if let Some(given) = &d.given {
+        text += &wrapped(&format!("looked at: {given}"), 2);
+        text += &wrapped(&format!("limits on {}", d.check_of), 2);
+        text.push('\n');
+    }
     let number = |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |value| format!("{value:.digits$}"));
     let _ = writeln!(
         text,
@@ -35,7 +40,8 @@ pub(crate) fn design(d: &DesignFile, out: &Path, files: &[&str]) -> String {
         text += &strokes(windowed);
         text.push('\n');
     }
-    let khz = d.check_rate_hz / 1000.0;
+    let khz = format!("{:.4}", d.check_rate_hz / 1000.0);
+    let khz = khz.trim_end_matches('0').trim_end_matches('.');
     if d.feasible {
         let _ = writeln!(text, "feasible: every limit is kept, checked at {khz} kHz\n");
     } else {
@@ -51,7 +57,9 @@ pub(crate) fn design(d: &DesignFile, out: &Path, files: &[&str]) -> String {
     for note in &d.notes {
         text += &wrapped(&format!("note: {note}"), 2);
     }
-    let _ = writeln!(text, "\n{} evaluations in {:.2} s, seed {}", d.evaluations, d.seconds, d.seed);
+    if d.given.is_none() {
+        let _ = writeln!(text, "\n{} evaluations in {:.2} s, seed {}", d.evaluations, d.seconds, d.seed);
+    }
     text += &wrapped(&format!("wrote {}, {}", out.join("design.json").display(), files.join(", ")), 2);
     text
 }
@@ -104,16 +112,25 @@ fn forecast(d: &DesignFile) -> String {
         let key = |p: &dynident::ParameterForecast| p.relative_std_percent.unwrap_or(f64::INFINITY);
         key(a).total_cmp(&key(b))
     });
+    let with_prior = d.forecast.iter().any(|p| p.std_with_prior.is_some());
     let row = |p: &&dynident::ParameterForecast| {
-        let std = p.std.map_or("-".to_owned(), |std| format!("{std:.2e}"));
+        let short = |std: Option<f64>| std.map_or("-".to_owned(), |std| format!("{std:.2e}"));
+        let std = short(p.std);
         let prior = p.prior.map_or("-".to_owned(), |prior| format!("{prior:.4}"));
-        vec![shortened(&p.expression, EXPRESSION), prior, std, percent(p.relative_std_percent)]
+        let mut row = vec![shortened(&p.expression, EXPRESSION), prior, std, percent(p.relative_std_percent)];
+        if with_prior {
+            row[0] = shortened(&p.expression, EXPRESSION - 12);
+            row.push(short(p.std_with_prior));
+        }
+        row
     };
     let ends = known.len().min(SHOWN / 2);
     let rows: Vec<_> =
         known[..ends].iter().chain(&known[ends.max(known.len().saturating_sub(SHOWN - ends))..]).map(row).collect();
     let mut text = String::from("forecast, best and worst known:\n");
-    text += &table(&["parameter", "prior", "std", "std %"].map(str::to_owned), 1..4, rows);
+    let heads = ["parameter", "prior", "std", "std %", "with prior"].map(str::to_owned);
+    let columns = if with_prior { 5 } else { 4 };
+    text += &table(&heads[..columns], 1..columns, rows);
     if !dark.is_empty() {
         text += &wrapped(&format!("  not excited at all: {}", dark.join(", ")), 4);
     }

@@ -1,10 +1,11 @@
 //! The summary of `identify`.
 
 use super::findings::findings;
+use super::noise::noise;
 use super::text::{WIDTH, listed, name, percent, shortened, table, with_deviation, wrapped};
 use super::validation::residuals;
 use core::fmt::Write;
-use dynident::{LogSummary, LogValidation, ResultFile};
+use dynident::{FrictionCandidate, LogSummary, LogValidation, ResultFile};
 use std::path::Path;
 
 /// Base parameters shown with their error bars; the rest stand in the file.
@@ -21,10 +22,10 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
     let mut text = wrapped(&r.name, 2);
     let _ = writeln!(
         text,
-        "{} joints, {} base parameters, {} least squares\n",
+        "{} joints, {} base parameters, {}\n",
         r.robot.dof,
         r.base_parameters.len(),
-        r.method.estimator
+        estimator(&r.method.estimator)
     );
     text += &headline(r);
     text.push('\n');
@@ -32,11 +33,16 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
     if !found.is_empty() {
         let _ = writeln!(text, "{found}");
     }
+    text += &noise(r);
     text += &joints(r);
     for log in &r.validation {
         text += &residuals(log);
     }
     text.push('\n');
+    if !r.friction_choice.is_empty() {
+        text += &friction(r);
+        text.push('\n');
+    }
     text += &parameters(r);
     text.push('\n');
     text += &physics(r);
@@ -55,6 +61,15 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
         text += &wrapped(&format!("no identified.urdf: {reason}"), 2);
     }
     text
+}
+
+/// The estimator in words.
+fn estimator(name: &str) -> String {
+    match name {
+        "instrumental" => "instrumental variables".to_owned(),
+        "huber" | "tukey" => format!("reweighted least squares ({name})"),
+        other => format!("{other} least squares"),
+    }
 }
 
 /// The figures that count, first.
@@ -122,6 +137,19 @@ fn joints(r: &ResultFile) -> String {
         let _ = writeln!(text, "  {} more held-out logs in result.json", r.validation.len() - COLUMNS);
     }
     text
+}
+
+/// What friction the training logs chose, against the plain one.
+fn friction(r: &ResultFile) -> String {
+    let header = ["friction by cross-validation", "chosen Nm", "plain Nm", ""].map(str::to_owned);
+    let rows = r.friction_choice.iter().map(|joint| {
+        let error = |candidate: Option<&FrictionCandidate>| {
+            candidate.map_or_else(|| "-".to_owned(), |candidate| format!("{:.3}", candidate.cv_error_nm))
+        };
+        let chosen = joint.candidates.iter().find(|candidate| candidate.chosen);
+        vec![name(&joint.joint), error(chosen), error(joint.candidates.first()), shortened(&joint.chosen, EXPRESSION)]
+    });
+    table(&header, 1..3, rows.collect())
 }
 
 /// The best known base parameters, and how many are hardly known.

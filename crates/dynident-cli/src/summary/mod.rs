@@ -5,6 +5,7 @@ mod design;
 mod findings;
 mod identification;
 mod inspection;
+mod noise;
 mod text;
 mod validation;
 

@@ -14,7 +14,10 @@
 //! inertial parameter identification* (2024); drive inertias, couplings and offsets join as constants in single entries.
 
 use crate::inverse_dynamics::inertial_wrench;
-use dynident_model::laws::{Coulomb, Coupling, CouplingEffect, Law};
+use dynident_model::laws::{
+    Coulomb, Coupling, CouplingEffect, Direction, DirectionalCoulomb, DirectionalViscous, Law, LoadFriction,
+    MaxwellSlip, Power, Sigmoid, Stribeck,
+};
 use dynident_model::{InertialParameters, Joint, Model, Transform, Vec3};
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, SVector};
 
@@ -230,8 +233,24 @@ fn friction_conditions(laws: &[Law], dof: usize, columns: usize) -> Vec<DVector<
 fn friction_functions(law: &Law) -> Vec<(String, f64)> {
     let key = |row: usize, function: &dyn core::fmt::Debug| format!("row {row}: {function:?}");
     match law {
-        Law::Viscous(law) => vec![(key(law.joint, &law.joint), 1.0)],
-        Law::Coulomb(Coulomb { joint, shape }) => vec![(key(*joint, &(joint, shape)), 1.0)],
+        // What holds in both directions is the sum of both halves.
+        Law::Viscous(law) => vec![(key(law.joint, &law.joint), 1.0), (key(law.joint, &(law.joint, '-')), 1.0)],
+        Law::DirectionalViscous(DirectionalViscous { joint, direction: Direction::Forward }) => {
+            vec![(key(*joint, joint), 1.0)]
+        }
+        Law::DirectionalViscous(law) => vec![(key(law.joint, &(law.joint, '-')), 1.0)],
+        Law::Coulomb(Coulomb { joint, shape }) => {
+            vec![(key(*joint, &(joint, shape)), 1.0), (key(*joint, &(joint, shape, '-')), 1.0)]
+        }
+        Law::DirectionalCoulomb(DirectionalCoulomb { joint, direction: Direction::Forward, shape }) => {
+            vec![(key(*joint, &(joint, shape)), 1.0)]
+        }
+        Law::DirectionalCoulomb(law) => vec![(key(law.joint, &(law.joint, law.shape, '-')), 1.0)],
+        Law::Stribeck(Stribeck { joint, .. })
+        | Law::Sigmoid(Sigmoid { joint, .. })
+        | Law::Power(Power { joint, .. })
+        | Law::Load(LoadFriction { joint, .. })
+        | Law::MaxwellSlip(MaxwellSlip { joint, .. }) => vec![(key(*joint, law), 1.0)],
         Law::Coupling(Coupling { effect: CouplingEffect::Viscous, first, second, ratios, .. }) => {
             let cross = ratios[0] * ratios[1];
             vec![(key(*first, second), cross), (key(*second, first), cross)]

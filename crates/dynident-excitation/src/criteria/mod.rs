@@ -4,11 +4,13 @@ mod a_optimal;
 mod condition_number;
 mod d_optimal;
 mod e_optimal;
+mod prediction;
 
 pub use a_optimal::AOptimal;
 pub use condition_number::ConditionNumber;
 pub use d_optimal::DOptimal;
 pub use e_optimal::EOptimal;
+pub use prediction::Prediction;
 
 use nalgebra::DMatrix;
 

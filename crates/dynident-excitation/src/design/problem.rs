@@ -39,7 +39,11 @@ impl<'a> Problem<'a> {
     ) -> Self {
         Self {
             information: Information::new(task.limits.model(), task.layout, task.torque_std_nm, task.prior),
-            workspace: task.limits.workspace(),
+            workspace: {
+                let mut workspace = task.limits.workspace();
+                workspace.sweep();
+                workspace
+            },
             task,
             margins,
             criterion,

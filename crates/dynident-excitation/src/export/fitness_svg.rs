@@ -1,6 +1,6 @@
 //! The fitness curve of a search by generations: the paper's Fig. 7, and its numbers.
 
-use super::preview_svg::escaped;
+use super::svg::escaped;
 use crate::optimisers::Generation;
 use core::fmt::Write;
 

@@ -1,13 +1,16 @@
 //! **How does the robot get it?** A sampled motion as the formats that robots and people take, one format a file.
 
 mod fitness_svg;
+mod path_svg;
 mod preview_svg;
 mod ros2;
+mod svg;
 mod trajectory_csv;
 mod urscript;
 mod waypoints;
 
 pub use fitness_svg::{fitness_csv, fitness_svg};
+pub use path_svg::path_svg;
 pub use preview_svg::{Preview, preview_svg};
 pub use ros2::ros2_joint_trajectory;
 pub use trajectory_csv::trajectory_csv;

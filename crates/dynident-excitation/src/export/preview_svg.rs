@@ -1,5 +1,6 @@
 //! A picture of the motion: per joint position, speed, acceleration and torque over time, limits dashed.
 
+use super::svg::escaped;
 use super::{ExportError, Sampled};
 use crate::limits::{JointLimit, Limits};
 use core::fmt::Write;
@@ -139,12 +140,6 @@ fn plot(text: &mut String, [left, top]: [f64; 2], times: &[f64], values: &[f64],
             beyond.join(", ")
         );
     }
-}
-
-/// Text as XML takes it; control characters have no place there.
-pub(super) fn escaped(text: &str) -> String {
-    let clean: String = text.chars().filter(|letter| !letter.is_control()).collect();
-    clean.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

@@ -12,6 +12,8 @@
 //! | [`StaticPostures`]: K postures held | K | exactly |
 //! | [`StepWiseLogistic`]: spliced logistic functions, one joint after another | 2 | nearly (e^-10) |
 //! | [`Joined`]: families one after another | sum | as its members |
+//! | [`StartingAt`]: a family moved to a start posture | as the family | as the family |
+//! | [`Given`]: a motion that is known already | none | as it is |
 
 mod b_spline;
 #[cfg(test)]
@@ -19,6 +21,7 @@ mod check;
 mod error;
 mod fourier;
 mod friction_ladder;
+mod given;
 mod joined;
 mod linear;
 mod logistic_map;
@@ -30,6 +33,7 @@ mod quintic;
 mod random_start;
 mod sampled_basis;
 mod spliced_logistic;
+mod starting_at;
 mod static_postures;
 mod step_wise;
 
@@ -37,6 +41,7 @@ pub use b_spline::{BSpline, BSplineBasis, BSplineSettings};
 pub use error::FamilyError;
 pub use fourier::{Fourier, FourierBasis, FourierSettings};
 pub use friction_ladder::{FrictionLadder, FrictionLadderBasis, FrictionLadderSettings, LadderPace};
+pub use given::Given;
 pub use joined::{Joined, JoinedSettings};
 pub use linear::{Basis, LinearFamily};
 pub use logistic_map::{Branch, LogisticMap, PathRates};
@@ -45,5 +50,6 @@ pub use logistic_strokes::{LogisticStrokes, LogisticStrokesSettings, StrokeOrder
 pub use multisine::{Multisine, MultisineBasis, MultisineSettings};
 pub use quintic::{Quintic, QuinticBasis, QuinticSettings};
 pub use spliced_logistic::{SplicedLogistic, SplicedLogisticSettings};
+pub use starting_at::StartingAt;
 pub use static_postures::{StaticPostures, StaticPosturesBasis, StaticPosturesSettings};
 pub use step_wise::{Step, StepWiseLogistic};

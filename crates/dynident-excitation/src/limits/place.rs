@@ -20,6 +20,16 @@ enum Room {
 }
 
 impl Room {
+    /// The place on the straight way from `here` to `next` that counts, and its share of the way: nearest to the axis of a column, and `here` itself for everything that is not thin.
+    fn nearest(&self, here: Vec3, next: Option<Vec3>) -> (Vec3, f64) {
+        let (Self::Outside { axis, .. }, Some(next)) = (self, next) else { return (here, 0.0) };
+        let (x, y) = (here[0] - axis[0], here[1] - axis[1]);
+        let (dx, dy) = (next[0] - here[0], next[1] - here[1]);
+        let length = dx * dx + dy * dy;
+        let share = if length > 0.0 { (-(x * dx + y * dy) / length).clamp(0.0, 1.0) } else { 0.0 };
+        (Vec3([here[0] + share * dx, here[1] + share * dy, here[2] + share * (next[2] - here[2])]), share)
+    }
+
     /// The constraint's value at a place, and its gradient.
     fn value(&self, place: Vec3) -> (f64, Vec3) {
         let mut gradient = Vec3::ZERO;
@@ -43,6 +53,13 @@ impl Room {
         };
         (value, gradient)
     }
+}
+
+/// Where a point is at a sample, and where it goes next if samples follow one another.
+fn way(inputs: &Inputs<'_>, point: &BodyPoint, sample: usize) -> (Vec3, Option<Vec3>) {
+    let at = |sample| inputs.placement(point.body, sample).point(point.at);
+    let follows = inputs.swept && sample + 1 < inputs.motion.samples;
+    (at(sample), follows.then(|| at(sample + 1)))
 }
 
 /// Rows of points and the room that each must keep to.
@@ -97,7 +114,8 @@ impl Term for PlaceLimits {
     fn values(&self, inputs: &Inputs<'_>, out: &mut [f64]) {
         for ((point, room, _), row) in self.0.iter().zip(out.chunks_exact_mut(inputs.motion.samples)) {
             for (sample, c) in row.iter_mut().enumerate() {
-                *c = room.value(inputs.placement(point.body, sample).point(point.at)).0;
+                let (here, next) = way(inputs, point, sample);
+                *c = room.value(room.nearest(here, next).0).0;
             }
         }
     }
@@ -106,9 +124,15 @@ impl Term for PlaceLimits {
         for ((point, room, _), row) in self.0.iter().zip(weights.chunks_exact(inputs.motion.samples)) {
             for (sample, &weight) in row.iter().enumerate() {
                 if weight != 0.0 {
-                    let place = inputs.placement(point.body, sample).point(point.at);
+                    let (here, next) = way(inputs, point, sample);
+                    let (place, share) = room.nearest(here, next);
                     let gradient = room.value(place).1.scale(weight);
-                    pull.point(point.body, inputs.motion.joints, sample, place, gradient);
+                    let joints = inputs.motion.joints;
+                    // The nearest place moves with both ends; its own sliding along the way changes nothing to first order.
+                    pull.point(point.body, joints, sample, here, gradient.scale(1.0 - share));
+                    if let Some(next) = next {
+                        pull.point(point.body, joints, sample + 1, next, gradient.scale(share));
+                    }
                 }
             }
         }

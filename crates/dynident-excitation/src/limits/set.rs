@@ -41,6 +41,14 @@ pub struct LimitWorkspace {
     wrenches: Vec<Wrench>,
     q: Vec<f64>,
     by_position: Vec<f64>,
+    swept: bool,
+}
+
+impl LimitWorkspace {
+    /// From now on samples are consecutive times of one motion, and columns are also looked for on the straight way from one sample to the next: an arm would else pass through a thin one unseen.
+    pub fn sweep(&mut self) {
+        self.swept = true;
+    }
 }
 
 impl LimitSet {
@@ -95,6 +103,11 @@ impl LimitSet {
         &self.bands
     }
 
+    /// Whether the places of points are limited: boxes, floor, column, self-collision.
+    pub fn has_places(&self) -> bool {
+        self.placements
+    }
+
     /// The robot.
     pub fn model(&self) -> &Model {
         &self.model
@@ -112,6 +125,7 @@ impl LimitSet {
             wrenches: Vec::new(),
             q: vec![0.0; self.model.dof()],
             by_position: Vec::new(),
+            swept: false,
         }
     }
 
@@ -141,7 +155,7 @@ impl LimitSet {
         if samples == 0 {
             return;
         }
-        let inputs = Inputs { motion, tau: &workspace.tau, placements: &workspace.placements };
+        let inputs = Inputs { motion, tau: &workspace.tau, placements: &workspace.placements, swept: workspace.swept };
         let mut rest = out.as_mut_slice();
         for (term, rows) in self.terms.iter().zip(&self.rows_of) {
             let (own, others) = rest.split_at_mut(rows * samples);
@@ -176,12 +190,12 @@ impl LimitSet {
             return;
         }
         self.prepare(workspace, motion);
-        let LimitWorkspace { single, tau, placements, by_torque, wrenches, by_position, .. } = workspace;
+        let LimitWorkspace { single, tau, placements, by_torque, wrenches, by_position, swept, .. } = workspace;
         by_torque.clear();
         by_torque.resize(if self.torque { dof * samples } else { 0 }, 0.0);
         wrenches.clear();
         wrenches.resize(if self.placements { dof * samples } else { 0 }, Wrench::ZERO);
-        let inputs = Inputs { motion, tau, placements };
+        let inputs = Inputs { motion, tau, placements, swept: *swept };
         let mut rest = weights;
         for (term, rows) in self.terms.iter().zip(&self.rows_of) {
             let (own, others) = rest.split_at(rows * samples);

@@ -12,6 +12,8 @@ pub(crate) struct Inputs<'a> {
     pub(crate) motion: &'a Motion,
     pub(crate) tau: &'a [f64],
     pub(crate) placements: &'a [Transform],
+    /// Samples are consecutive times of one motion: obstacles are also looked for between them.
+    pub(crate) swept: bool,
 }
 
 impl Inputs<'_> {

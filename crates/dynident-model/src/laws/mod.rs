@@ -3,17 +3,30 @@
 
 mod coulomb;
 mod coupling;
+mod directional;
 mod drive_inertia;
+mod load;
 mod offset;
+mod power;
+mod sigmoid;
+mod slip;
+mod stribeck;
 mod viscous;
 
 pub use coulomb::{Coulomb, CoulombShape};
 pub use coupling::{Coupling, CouplingEffect};
+pub use directional::{Direction, DirectionalCoulomb, DirectionalViscous};
 pub use drive_inertia::DriveInertia;
+pub use load::LoadFriction;
 pub use offset::Offset;
+pub use power::{Power, PowerExponent};
+pub use sigmoid::Sigmoid;
+pub use slip::{LawMemory, MaxwellSlip};
+pub use stribeck::Stribeck;
 pub use viscous::Viscous;
 
 use crate::tree::Model;
+use directional::by_speed;
 
 /// Joint motion of a block of samples, joint-major: joint `j`, sample `s` stands at `j * samples + s`.
 #[derive(Clone, Copy, Debug)]
@@ -28,7 +41,21 @@ pub struct JointMotion<'a> {
     pub ddq: &'a [f64],
 }
 
+/// What a law is given beside the motion of a block.
+#[derive(Debug)]
+pub struct LawInput<'a> {
+    /// The load of the law's joint sample by sample, Nm (N), where it is known.
+    pub load: Option<&'a [f64]>,
+    /// What the law remembers of earlier samples; afterwards, of this block as well.
+    pub memory: &'a mut LawMemory,
+}
+
 impl<'a> JointMotion<'a> {
+    /// Positions of joint `joint`.
+    pub fn q_of(&self, joint: usize) -> &'a [f64] {
+        &self.q[joint * self.samples..(joint + 1) * self.samples]
+    }
+
     /// Velocities of joint `joint`.
     pub fn dq_of(&self, joint: usize) -> &'a [f64] {
         &self.dq[joint * self.samples..(joint + 1) * self.samples]
@@ -47,6 +74,20 @@ pub enum Law {
     Viscous(Viscous),
     /// Torque by the sign of the speed.
     Coulomb(Coulomb),
+    /// Torque in proportion to speed, in one direction.
+    DirectionalViscous(DirectionalViscous),
+    /// Torque by the sign of the speed, in one direction.
+    DirectionalCoulomb(DirectionalCoulomb),
+    /// More torque near rest.
+    Stribeck(Stribeck),
+    /// A shifted smooth step.
+    Sigmoid(Sigmoid),
+    /// Torque by a power of the speed.
+    Power(Power),
+    /// Torque in proportion to the load, against the motion.
+    Load(LoadFriction),
+    /// A spring that slips: hysteresis.
+    MaxwellSlip(MaxwellSlip),
     /// A constant torque.
     Offset(Offset),
     /// Inertia of a drive that turns with its joint only.
@@ -61,6 +102,14 @@ impl Law {
         match self {
             Self::Viscous(law) => format!("fv{}", law.joint + 1),
             Self::Coulomb(law) => format!("fc{}", law.joint + 1),
+            Self::DirectionalViscous(law) => format!("fv{}{}", law.joint + 1, law.direction.sign()),
+            Self::DirectionalCoulomb(law) => format!("fc{}{}", law.joint + 1, law.direction.sign()),
+            Self::Stribeck(law) => format!("fs{}", law.joint + 1),
+            Self::Sigmoid(law) => format!("sig{}", law.joint + 1),
+            Self::Power(Power { joint, exponent: PowerExponent::CubeRoot, .. }) => format!("fr{}", joint + 1),
+            Self::Power(Power { joint, exponent: PowerExponent::Quadratic, .. }) => format!("fq{}", joint + 1),
+            Self::Load(law) => format!("fl{}", law.joint + 1),
+            Self::MaxwellSlip(law) => format!("slip{}_{}", law.joint + 1, law.yield_displacement),
             Self::Offset(law) => format!("off{}", law.joint + 1),
             Self::DriveInertia(law) => format!("Ia{}", law.joint + 1),
             Self::Coupling(law) => law.symbol(),
@@ -70,46 +119,97 @@ impl Law {
     /// Unit of the parameter at a turning joint.
     pub fn unit(&self) -> &'static str {
         match self {
-            Self::Viscous(_) | Self::Coupling(Coupling { effect: CouplingEffect::Viscous, .. }) => "Nm s/rad",
+            Self::Viscous(_)
+            | Self::DirectionalViscous(_)
+            | Self::Coupling(Coupling { effect: CouplingEffect::Viscous, .. }) => "Nm s/rad",
+            Self::Power(Power { exponent: PowerExponent::CubeRoot, .. }) => "Nm (s/rad)^(1/3)",
+            Self::Power(Power { exponent: PowerExponent::Quadratic, .. }) => "Nm (s/rad)^2",
+            Self::Load(_) => "1",
             Self::Coulomb(_)
+            | Self::DirectionalCoulomb(_)
+            | Self::Stribeck(_)
+            | Self::Sigmoid(_)
+            | Self::MaxwellSlip(_)
             | Self::Offset(_)
             | Self::Coupling(Coupling { effect: CouplingEffect::Coulomb(_), .. }) => "Nm",
             Self::DriveInertia(_) | Self::Coupling(Coupling { effect: CouplingEffect::Inertia, .. }) => "kg m^2",
         }
     }
 
+    /// The one joint that the law belongs to; none for a drive that turns with two.
+    fn own_joint(&self) -> Option<usize> {
+        Some(match self {
+            Self::Viscous(law) => law.joint,
+            Self::Coulomb(law) => law.joint,
+            Self::DirectionalViscous(law) => law.joint,
+            Self::DirectionalCoulomb(law) => law.joint,
+            Self::Stribeck(law) => law.joint,
+            Self::Sigmoid(law) => law.joint,
+            Self::Power(law) => law.joint,
+            Self::Load(law) => law.joint,
+            Self::MaxwellSlip(law) => law.joint,
+            Self::Offset(law) => law.joint,
+            Self::DriveInertia(law) => law.joint,
+            Self::Coupling(_) => return None,
+        })
+    }
+
     /// The joints that feel this law.
     pub fn joints(&self) -> Vec<usize> {
         match self {
-            Self::Viscous(law) => vec![law.joint],
-            Self::Coulomb(law) => vec![law.joint],
-            Self::Offset(law) => vec![law.joint],
-            Self::DriveInertia(law) => vec![law.joint],
             Self::Coupling(law) => vec![law.first, law.second],
+            _ => self.own_joint().into_iter().collect(),
         }
     }
 
     /// True when joint `joint` feels this law. Allocates nothing, unlike [`joints`](Law::joints).
     pub fn acts_on(&self, joint: usize) -> bool {
         match self {
-            Self::Viscous(law) => law.joint == joint,
-            Self::Coulomb(law) => law.joint == joint,
-            Self::Offset(law) => law.joint == joint,
-            Self::DriveInertia(law) => law.joint == joint,
             Self::Coupling(law) => law.first == joint || law.second == joint,
+            _ => self.own_joint() == Some(joint),
         }
     }
 
-    /// The regressor column of this parameter in the row of joint `row`: `out[s] = ∂τ_row/∂parameter` at sample `s`.
+    /// True when a negative parameter is not possible: friction takes power from the motion at every speed, inertia is positive. An offset may have either sign; a coupling's
+    /// cross terms are judged with their drive.
+    pub fn is_nonnegative(&self) -> bool {
+        !matches!(self, Self::Offset(_) | Self::Coupling(_))
+    }
+
+    /// True for friction of one joint: all but offset, drive inertia and couplings.
+    pub fn is_joint_friction(&self) -> bool {
+        !matches!(self, Self::Offset(_) | Self::DriveInertia(_) | Self::Coupling(_))
+    }
+
+    /// The regressor column of this parameter in the row of joint `row`: `out[s] = ∂τ_row/∂parameter` at sample `s`. The block counts as a recording of its own, without known
+    /// load: see [`column_following`](Law::column_following).
     ///
     /// # Panics
     /// If `row` is not one of [`joints`](Law::joints) or `out` is not one value per sample.
     pub fn column(&self, row: usize, motion: &JointMotion<'_>, out: &mut [f64]) {
+        self.column_following(row, motion, &mut LawInput { load: None, memory: &mut LawMemory::default() }, out);
+    }
+
+    /// The regressor column as [`column`](Law::column), of a block that follows others: with one sample a block, what a simulation needs.
+    ///
+    /// # Panics
+    /// If `row` is not one of [`joints`](Law::joints), or `out` or the load are not one value per sample.
+    pub fn column_following(&self, row: usize, motion: &JointMotion<'_>, input: &mut LawInput<'_>, out: &mut [f64]) {
         assert_eq!(out.len(), motion.samples);
         assert!(self.acts_on(row), "joint {row} does not feel {}", self.symbol());
         match self {
             Self::Viscous(law) => law.column(motion, out),
             Self::Coulomb(law) => law.column(motion, out),
+            Self::DirectionalViscous(law) => by_speed(row, motion, out, |dq| law.value(dq)),
+            Self::DirectionalCoulomb(law) => by_speed(row, motion, out, |dq| law.value(dq)),
+            Self::Stribeck(law) => by_speed(row, motion, out, |dq| law.value(dq)),
+            Self::Sigmoid(law) => by_speed(row, motion, out, |dq| law.value(dq)),
+            Self::Power(law) => by_speed(row, motion, out, |dq| law.value(dq)),
+            Self::Load(law) => {
+                assert!(input.load.is_none_or(|load| load.len() == motion.samples), "one load per sample");
+                law.column(motion, input.load, out);
+            }
+            Self::MaxwellSlip(law) => law.column(motion.q_of(row), input.memory, out),
             Self::Offset(law) => law.column(out),
             Self::DriveInertia(law) => law.column(motion, out),
             Self::Coupling(law) => law.column(row, motion, out),
@@ -117,7 +217,7 @@ impl Law {
     }
 
     /// Adds to `by_dq` and `by_ddq` (joint-major) the derivatives of `Σ weights[s] · column[s]` by the speeds and accelerations, where `column` is that of
-    /// [`column`](Law::column) in the row of joint `row`. The sign step counts as constant.
+    /// [`column`](Law::column) in the row of joint `row`. The sign step counts as constant, and so does the deflection of a Maxwell-slip element, which follows positions.
     ///
     /// # Panics
     /// If lengths differ.
@@ -131,16 +231,23 @@ impl Law {
     ) {
         assert_eq!(weights.len(), motion.samples);
         let range = |joint: usize| joint * motion.samples..(joint + 1) * motion.samples;
-        let add = |to: &mut [f64], factor: f64| to.iter_mut().zip(weights).for_each(|(to, w)| *to += factor * w);
+        let slopes = |slope: &dyn Fn(f64) -> f64, by_dq: &mut [f64]| {
+            for ((to, w), &dq) in by_dq[range(row)].iter_mut().zip(weights).zip(motion.dq_of(row)) {
+                *to += w * slope(dq);
+            }
+        };
         match self {
-            Self::Viscous(law) => add(&mut by_dq[range(law.joint)], 1.0),
-            Self::DriveInertia(law) => add(&mut by_ddq[range(law.joint)], 1.0),
-            Self::Offset(_) => {}
-            Self::Coulomb(law) => {
-                let speeds = motion.dq_of(law.joint);
-                for ((to, w), &dq) in by_dq[range(law.joint)].iter_mut().zip(weights).zip(speeds) {
-                    *to += w * law.shape.slope(dq);
-                }
+            Self::Viscous(_) => slopes(&|_| 1.0, by_dq),
+            Self::Coulomb(law) => slopes(&|dq| law.shape.slope(dq), by_dq),
+            Self::DirectionalViscous(law) => slopes(&|dq| law.slope(dq), by_dq),
+            Self::DirectionalCoulomb(law) => slopes(&|dq| law.slope(dq), by_dq),
+            Self::Stribeck(law) => slopes(&|dq| law.slope(dq), by_dq),
+            Self::Sigmoid(law) => slopes(&|dq| law.slope(dq), by_dq),
+            Self::Power(law) => slopes(&|dq| law.slope(dq), by_dq),
+            // Without a load the column is zero.
+            Self::Load(_) | Self::MaxwellSlip(_) | Self::Offset(_) => {}
+            Self::DriveInertia(law) => {
+                by_ddq[range(law.joint)].iter_mut().zip(weights).for_each(|(to, w)| *to += w);
             }
             Self::Coupling(law) => law.pull_back(row, motion, weights, by_dq, by_ddq),
         }

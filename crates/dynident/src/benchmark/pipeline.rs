@@ -70,7 +70,7 @@ pub(super) fn problem(
     let filter = decimation(&ParallelFilterSection::default(), motion.rate_hz, Some(cutoff_hz));
     let places: Vec<usize> = (0..model.dof()).collect();
     let mut sink = Factors(factors);
-    Computer::new(model, layout, &places, motion.rate_hz, filter.as_ref(), &Silent)
+    Computer::new(model, layout, &places, motion.rate_hz, filter.as_ref(), None, &Silent)
         .map_err(|source| BenchmarkError::Filter { robot: scenario.robot.to_owned(), source })?
         .take(motion, &mut sink)
         .map_err(|source| BenchmarkError::Pipeline(Box::new(source)))?;

@@ -94,7 +94,7 @@ impl Truth {
             Law::Viscous(law) => self.drive[law.joint][1],
             Law::Coulomb(law) => self.drive[law.joint][2],
             Law::Offset(law) => self.drive[law.joint][3],
-            Law::Coupling(_) => 0.0,
+            _ => 0.0,
         }));
         machine.base.values(&all)
     }

@@ -1,12 +1,8 @@
 //! `[design] optimiser`: what looks for the motion.
 
-use core::fmt;
-use core::marker::PhantomData;
 use dynident_excitation::DerivativeFree;
 use dynident_excitation::optimisers::{BinaryGeneticSettings, CmaEsSettings};
-use serde::de::value::{MapAccessDeserializer, MapDeserializer};
-use serde::de::{Error as _, MapAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
 /// An optimiser by its `kind`, with its own settings beside it; the name alone stands for the defaults.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
@@ -56,25 +52,4 @@ impl OptimiserChoice {
             Self::Genetic(settings) => Some(DerivativeFree::Genetic(settings.clone())),
         }
     }
-}
-
-/// Reads a choice that is tagged by `kind` from a table, or from its name alone.
-pub(crate) fn name_or_table<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<T, D::Error> {
-    struct NameOrTable<T>(PhantomData<T>);
-    impl<'de, T: Deserialize<'de>> Visitor<'de> for NameOrTable<T> {
-        type Value = T;
-
-        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-            f.write_str("a name, or a table with a `kind`")
-        }
-
-        fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<T, E> {
-            T::deserialize(MapDeserializer::<_, E>::new(core::iter::once(("kind", name.to_owned())))).map_err(E::custom)
-        }
-
-        fn visit_map<A: MapAccess<'de>>(self, table: A) -> Result<T, A::Error> {
-            T::deserialize(MapAccessDeserializer::new(table)).map_err(A::Error::custom)
-        }
-    }
-    from.deserialize_any(NameOrTable(PhantomData))
 }

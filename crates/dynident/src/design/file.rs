@@ -1,7 +1,7 @@
 //! What `design.json` holds.
 
-use crate::design_section::FamilyChoice;
-use crate::design_windows::WindowedFile;
+use super::section::FamilyChoice;
+use super::windows::WindowedFile;
 use dynident_excitation::check::LimitReport;
 use serde::Serialize;
 
@@ -17,13 +17,17 @@ pub struct DesignFile {
     pub name: String,
     /// Joints in the order of all vectors.
     pub joints: Vec<String>,
-    /// The family.
+    /// The family; `given` for a trajectory or log that was only looked at.
     pub family: &'static str,
-    /// The family's settings, as a study would have them.
-    pub family_settings: FamilyChoice,
-    /// The family's parameters of the motion found.
+    /// The trajectory or log that was looked at; none for a search.
+    pub given: Option<String>,
+    /// The family's settings, as a study would have them; none for a motion that was given.
+    pub family_settings: Option<FamilyChoice>,
+    /// The family's parameters of the motion found; the motion is then moved to `start_posture`.
     pub parameters: Vec<f64>,
-    /// What looked for the motion.
+    /// Where the study lets each joint start, rad (m): none for a joint that is free, empty where all are.
+    pub start_posture: Vec<Option<f64>>,
+    /// What looked for the motion; `none` for one that was given.
     pub optimiser: &'static str,
     /// The criterion.
     pub criterion: &'static str,
@@ -49,11 +53,13 @@ pub struct DesignFile {
     pub feasible: bool,
     /// Rate of that check, Hz.
     pub check_rate_hz: f64,
+    /// What was checked: the motion itself, or how a given one was understood between its samples.
+    pub check_of: &'static str,
     /// Every limit, and how much of it the motion uses.
     pub limits: Vec<LimitReport>,
-    /// Error bars that this motion will give, white torque noise assumed.
+    /// Error bars that this motion will give, or that a log gives, white torque noise assumed.
     pub forecast: Vec<ParameterForecast>,
-    /// The combinations of parameters that will be known worst.
+    /// The combinations of parameters that will be known worst, with the prior if there is one.
     pub worst_directions: Vec<DirectionForecast>,
     /// The strokes of a windowed design, their condition numbers and the optimum beside them.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -81,9 +87,11 @@ pub struct ParameterForecast {
     pub expression: String,
     /// Unit.
     pub unit: &'static str,
-    /// Expected standard deviation; none if the motion does not excite it.
+    /// Expected standard deviation from the motion alone; none if the motion does not excite it.
     pub std: Option<f64>,
-    /// The same in percent of the prior value.
+    /// The same with what the prior knows; none without a prior.
+    pub std_with_prior: Option<f64>,
+    /// `std` in percent of the prior value.
     pub relative_std_percent: Option<f64>,
     /// Value by the description.
     pub prior: Option<f64>,

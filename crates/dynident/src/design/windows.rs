@@ -1,7 +1,7 @@
 //! The paper's criterion over windows as a study asks for it, solved by any optimiser, with the optimum beside it.
 
-use crate::design_optimiser::OptimiserChoice;
-use crate::design_section::{DesignSection, FamilyChoice};
+use super::optimiser::OptimiserChoice;
+use super::section::{DesignSection, FamilyChoice};
 use crate::machine::Machine;
 use core::ops::ControlFlow;
 use dynident_excitation::families::{SplicedLogisticSettings, Step, StepWiseLogistic};

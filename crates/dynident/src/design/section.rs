@@ -1,15 +1,21 @@
 //! `[design]`: which motion is looked for, by what measure, within which limits.
 
-use crate::design_optimiser::{OptimiserChoice, name_or_table};
-use crate::design_windows::{GivenStroke, WindowedCondition};
+use super::joined::JoinedChoice;
+use super::name_or_table::name_or_table;
+use super::optimiser::OptimiserChoice;
+use super::prior::PriorSection;
+use super::start_posture::StartPosture;
+use super::windows::{GivenStroke, WindowedCondition};
 use dynident_excitation::criteria::{AOptimal, ConditionNumber, Criterion, DOptimal, EOptimal};
 use dynident_excitation::families::{
-    BSpline, BSplineSettings, FamilyError, Fourier, FourierSettings, LogisticStrokes, LogisticStrokesSettings,
-    Multisine, MultisineSettings, Quintic, QuinticSettings, SplicedLogistic, SplicedLogisticSettings,
+    BSpline, BSplineSettings, FamilyError, Fourier, FourierSettings, FrictionLadder, FrictionLadderSettings,
+    LogisticStrokes, LogisticStrokesSettings, Multisine, MultisineSettings, Quintic, QuinticSettings, SplicedLogistic,
+    SplicedLogisticSettings, StaticPostures, StaticPosturesSettings,
 };
 use dynident_excitation::limits::Limits;
 use dynident_excitation::{DesignSettings, Family};
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 
 /// Longest motion, s: the re-check at 10 kHz looks at every one of its samples.
 const MAX_DURATION_S: f64 = 3600.0;
@@ -51,6 +57,10 @@ pub struct DesignSection {
     pub optimiser: OptimiserChoice,
     /// Strokes of a windowed design that are to be judged as they are, one a joint; nothing is searched then. Empty by default.
     pub parameters: Vec<GivenStroke>,
+    /// Where the motion starts, and where a family that returns ends; free by default.
+    pub start_posture: Option<StartPosture>,
+    /// What is known before the motion; nothing by default.
+    pub prior: PriorSection,
     /// Standard deviation of each joint's torque, Nm (N): one number, or one per joint in the model's order. By default 1 % of the joint's effort limit, and 1 where there is none.
     pub torque_std_nm: Option<TorqueNoise>,
     /// How much is searched, and how finely; also the rate of the log and the seed.
@@ -67,6 +77,8 @@ impl Default for DesignSection {
             criterion: CriterionChoice::default(),
             optimiser: OptimiserChoice::default(),
             parameters: Vec::new(),
+            start_posture: None,
+            prior: PriorSection::default(),
             torque_std_nm: None,
             search: DesignSettings::default(),
             limits: Limits::default(),
@@ -90,6 +102,12 @@ pub enum FamilyChoice {
     LogisticStrokes(LogisticStrokesSettings),
     /// The paper's spliced logistic function.
     SplicedLogistic(SplicedLogisticSettings),
+    /// Sweeps at constant speeds, for friction.
+    FrictionLadder(FrictionLadderSettings),
+    /// Postures held one after another, for gravity.
+    StaticPostures(StaticPosturesSettings),
+    /// Families one after another.
+    Joined(JoinedChoice),
 }
 
 impl FamilyChoice {
@@ -102,6 +120,9 @@ impl FamilyChoice {
             Self::Multisine(_) => "multisine",
             Self::LogisticStrokes(_) => "logistic-strokes",
             Self::SplicedLogistic(_) => "spliced-logistic",
+            Self::FrictionLadder(_) => "friction-ladder",
+            Self::StaticPostures(_) => "static-postures",
+            Self::Joined(_) => "joined",
         }
     }
 
@@ -117,13 +138,16 @@ impl FamilyChoice {
             Self::Multisine(settings) => Box::new(Multisine::new(joints, duration_s, settings)?),
             Self::LogisticStrokes(settings) => Box::new(LogisticStrokes::new(joints, duration_s, settings)?),
             Self::SplicedLogistic(settings) => Box::new(SplicedLogistic::new(joints, duration_s, settings)?),
+            Self::FrictionLadder(settings) => Box::new(FrictionLadder::new(joints, duration_s, settings)?),
+            Self::StaticPostures(settings) => Box::new(StaticPostures::new(joints, duration_s, settings)?),
+            Self::Joined(settings) => Box::new(settings.family(joints, duration_s)?),
         })
     }
 }
 
 /// What makes a motion good.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(tag = "kind", rename_all = "kebab-case")]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum CriterionChoice {
     /// The volume of the confidence ellipsoid: `-log det D`.
     #[default]
@@ -136,28 +160,34 @@ pub enum CriterionChoice {
     ConditionNumber,
     /// The same after division of each column by its norm.
     ConditionNumberScaled,
+    /// V-optimality: the mean square error of the torque that the fitted model will predict on a task.
+    Prediction {
+        /// The task: a table with `t_s`, `q1..` and, if at hand, `dq1..` and `ddq1..` (rad, m, s), or positions under the joints' names. Found as the study's logs are.
+        trajectory: PathBuf,
+    },
     /// The paper's sum of condition numbers over windows around the mid-points of logistic strokes.
     WindowedCondition(WindowedCondition),
 }
 
 impl CriterionChoice {
-    /// The criterion in the forms that a search uses one after another: smooth first, sharp last.
-    pub(crate) fn criteria(&self) -> Vec<Box<dyn Criterion>> {
+    /// The criterion in the forms that a search uses one after another: smooth first, sharp last. None for a task, which has to be read first.
+    pub(crate) fn criteria(&self) -> Option<Vec<Box<dyn Criterion>>> {
         let condition = |scaled| -> Vec<Box<dyn Criterion>> {
             [40.0, 80.0].map(|order| -> Box<dyn Criterion> { Box::new(ConditionNumber { order, scaled }) }).into()
         };
-        match self {
+        Some(match self {
             Self::DOptimal => vec![Box::new(DOptimal)],
             Self::AOptimal => vec![Box::new(AOptimal)],
             Self::EOptimal => vec![Box::new(EOptimal::default())],
             Self::ConditionNumber | Self::WindowedCondition(_) => condition(false),
             Self::ConditionNumberScaled => condition(true),
-        }
+            Self::Prediction { .. } => return None,
+        })
     }
 
     /// Whether torque noise plays no part: the figure is of the regressor itself.
     pub(crate) fn of_regressor(&self) -> bool {
-        matches!(self, Self::ConditionNumber | Self::ConditionNumberScaled)
+        matches!(self, Self::ConditionNumber | Self::ConditionNumberScaled | Self::WindowedCondition(_))
     }
 }
 
@@ -192,6 +222,9 @@ impl DesignSection {
                     .to_owned(),
             );
         }
+        if self.start_posture.is_some() && matches!(self.criterion, CriterionChoice::WindowedCondition(_)) {
+            return Err("start_posture: a windowed design starts at family.offsets; give the posture there".to_owned());
+        }
         let search = &self.search;
         within("search.rate_hz", search.rate_hz, 1.0, 1e5)?;
         let samples = self.duration_s * search.rate_hz;
@@ -213,6 +246,18 @@ impl DesignSection {
         }
         if let Some(limit) = search.time_limit_s {
             within("search.time_limit_s", limit, 1e-3, 1e7)?;
+        }
+        self.prior.validate()?;
+        if !self.prior.is_empty() && self.criterion.of_regressor() {
+            return Err(
+                "prior: a condition number is of the motion's regressor alone; choose the criterion \"d-optimal\", \"a-optimal\", \"e-optimal\" or prediction"
+                    .to_owned(),
+            );
+        }
+        if let (Some(_), FamilyChoice::Joined(joined)) = (&self.start_posture, &self.family)
+            && (joined.start.is_some() || joined.end.is_some())
+        {
+            return Err("start_posture and the joined family's own start or end: keep one".to_owned());
         }
         let stds = match &self.torque_std_nm {
             None => &[][..],

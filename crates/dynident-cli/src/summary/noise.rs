@@ -1,0 +1,59 @@
+//! What the summary says of noise in the regressor and of rows that were set aside.
+
+use super::text::{percent, wrapped};
+use dynident::estimation::HausmanVerdict;
+use dynident::{NoiseInRegressor, ResultFile};
+
+/// Whether noise in the regressor shows, and how many rows a robust estimator gave little weight; empty when the study asks for neither.
+pub(crate) fn noise(r: &ResultFile) -> String {
+    let mut text = String::new();
+    if let Some(noise) = &r.noise_in_regressor {
+        text += &wrapped(&verdict(noise, r.method.estimator == "instrumental"), 2);
+        if noise.instruments.weak {
+            let column = noise.instruments.weakest_column.as_deref().unwrap_or("some columns");
+            let f = noise.instruments.weakest_f.unwrap_or(0.0);
+            let weak = format!(
+                "weak instruments: they say little about {column} (first-stage F {f:.1}); choose a higher cut-off for them"
+            );
+            text += &wrapped(&weak, 2);
+        }
+    }
+    if let Some(gross) = &r.gross_errors
+        && let Some((joint, share)) = gross.share.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))
+    {
+        let joint = r.robot.joints.get(joint).map_or("a joint", String::as_str);
+        let share = percent(Some(100.0 * share));
+        let most =
+            format!("gross errors: at most {share}\u{a0}% of a joint's rows lost half their weight or more ({joint})");
+        text += &wrapped(&most, 2);
+    }
+    if !text.is_empty() {
+        text.push('\n');
+    }
+    text
+}
+
+fn verdict(noise: &NoiseInRegressor, used: bool) -> String {
+    let test = &noise.hausman;
+    let figures = test
+        .f
+        .zip(test.p_value)
+        .map_or(String::new(), |(f, p)| format!(" (Durbin-Wu-Hausman test: F = {f:.1}, p = {p:.1e})"));
+    match test.verdict {
+        HausmanVerdict::RejectLeastSquares if used => {
+            format!("least squares would be biased by noise in the regressor{figures}; instruments avoid that")
+        }
+        HausmanVerdict::RejectLeastSquares => {
+            format!(
+                "least squares is rejected{figures}: noise in the regressor biases it, or the model fails in fast motion; compare method = \"instrumental\" on the held-out log"
+            )
+        }
+        HausmanVerdict::FilteringWasEnough => {
+            format!("filtering was enough: noise in the regressor does not show{figures}")
+        }
+        HausmanVerdict::Undecided => {
+            let reason = test.reason.as_deref().unwrap_or("no reason given");
+            format!("whether noise in the regressor biases least squares is undecided: {reason}")
+        }
+    }
+}

@@ -1,0 +1,348 @@
+//! Route 2: Gauss-Newton in log-Cholesky coordinates with a barrier that is lowered step by step.
+//!
+//! Every body is `S = U Uᵀ` with
+//!
+//! ```text
+//!     U = e^α [ e^d1  s12  s13  t1 ]
+//!             [   0  e^d2  s23  t2 ]
+//!             [   0    0  e^d3  t3 ]
+//!             [   0    0    0    1 ]
+//! ```
+//!
+//! (Rucker and Wensing, RA-L 7 (2022) 2771, eq. 19), so that any ten numbers are a possible body. Where the best body lies on the cone's boundary the bare fit runs
+//! away (d → −∞) and never ends. Here `−μ ln det S` keeps the optimum of every stage finite, and μ falls until the duality gap `μ ν` is below the tolerance. The
+//! coordinates map all numbers one to one onto the cone's interior, so that a stage has one stationary point only: the optimum.
+//!
+//! A step is the ten numbers of a second such matrix V that multiplies U from the right: upper triangular matrices are a group, and seen from U every body is the unit
+//! matrix, so that the barrier's Hessian is constant and small eigenvalues keep all their digits. The rest of the Hessian is `Jᵀ H J`: what is left out is multiplied by
+//! the gradient in x, which vanishes at the optimum, so steps become Newton's. Stiff data make curved valleys of straight ones; a long step may therefore also follow
+//! the straight line of S, `V Vᵀ = 1 + U⁻¹ ΔS U⁻ᵀ`, where the theory of self-concordant barriers promises progress (Boyd and Vandenberghe 9.6.4).
+
+use super::cone::{congruence, inverse, log_determinant};
+use super::conic::{BlockMap, Certificate, Multipliers, Program, Slacks};
+use super::coordinates::{Matrix10, PAIRS, Vector10, vector_of};
+use super::interior_point::{Ending, Solved, add_block};
+use super::linear_solver::DefiniteSystem;
+use nalgebra::{DMatrix, DVector, Matrix4};
+
+/// μ falls by a factor from stage to stage: by this one at first, then by less after a stage that took many steps and by more after a short one.
+const REDUCTION: f64 = 0.1;
+const SLOWEST_REDUCTION: f64 = 0.7;
+const FASTEST_REDUCTION: f64 = 0.02;
+
+/// Steps of the last stage without progress of the certificate.
+const PATIENCE: usize = 25;
+
+/// One body: its first variable and the constant part of its block.
+type Body = (usize, Vector10);
+
+/// Solves a program all of whose plain blocks have variables of their own; none when `start` is not strictly inside or a block is shared.
+pub(super) fn log_cholesky(
+    program: &Program,
+    start: &DVector<f64>,
+    tolerance: f64,
+    max_iterations: usize,
+) -> Option<Solved> {
+    let plain = || program.blocks.iter().filter(|block| block.entropy == 0.0);
+    let bodies = plain()
+        .map(|block| match block.map {
+            BlockMap::Own(first) => Some((first, block.offset)),
+            BlockMap::General(_) => None,
+        })
+        .collect::<Option<Vec<Body>>>()?;
+    let mut point = Point {
+        factors: plain().map(|block| upper_factor(&block.value(start))).collect::<Option<Vec<_>>>()?,
+        x: start.clone(),
+        rows: program.rows.iter().map(|row| row.value(start)).collect(),
+    };
+    let hessian = program.hessian();
+    let degree = (4 * bodies.len() + program.rows.len()).max(1) as f64;
+    let mut mu = program.gradient(start).0.amax().clamp(1.0e-3, 1.0e12);
+    let mut best: Option<Solved> = None;
+    let (mut stage, mut idle, mut iterations) = (0, 0, 0);
+    let (mut ending, mut reduction) = (Ending::Limit, REDUCTION);
+    while iterations < max_iterations {
+        iterations += 1;
+        let (multipliers, certificate) = point.certified(program, mu)?;
+        idle += 1;
+        if best.as_ref().is_none_or(|b| certificate.residual() < b.certificate.residual()) {
+            let x = point.x.clone();
+            best = Some(Solved { x, multipliers, certificate, iterations, ending: Ending::Limit });
+            idle = 0;
+        }
+        if certificate.residual() <= tolerance {
+            ending = Ending::Solved;
+            break;
+        }
+        let scale = 1.0 + certificate.objective.abs();
+        let last = mu * degree <= tolerance * scale;
+        let pull = if last { 0.0 } else { mu };
+        let predicted = point.step(program, &hessian, &bodies, mu, pull);
+        stage += 1;
+        if last {
+            if predicted.is_none() || idle > PATIENCE && stage > PATIENCE {
+                ending = Ending::Stalled;
+                break;
+            }
+        } else if predicted.is_none_or(|predicted| predicted <= 0.05 * mu) {
+            // Inside the region where Newton's steps converge quadratically (a decrement below a third).
+            reduction = match stage {
+                ..5 => (reduction * reduction).max(FASTEST_REDUCTION),
+                5..9 => reduction,
+                _ => reduction.sqrt().min(SLOWEST_REDUCTION),
+            };
+            mu = (mu * reduction).max(0.8 * tolerance * scale / degree);
+            stage = 0;
+        }
+    }
+    let mut best = best?;
+    (best.iterations, best.ending) = (iterations, ending);
+    Some(best)
+}
+
+#[derive(Clone)]
+struct Point {
+    /// U, one per body.
+    factors: Vec<Matrix4<f64>>,
+    x: DVector<f64>,
+    /// Slacks of the rows.
+    rows: Vec<f64>,
+}
+
+impl Point {
+    fn slacks(&self, program: &Program) -> Slacks {
+        let mut factors = self.factors.iter();
+        let blocks = program.blocks.iter().map(|block| match block.entropy {
+            0.0 => factors.next().map_or_else(Matrix4::zeros, |u| u * u.transpose()),
+            _ => block.value(&self.x),
+        });
+        Slacks { blocks: blocks.collect(), rows: self.rows.clone() }
+    }
+
+    /// The point judged with the multipliers that the barrier implies: `Z = μ S⁻¹`, `z = μ/s`.
+    fn certified(&self, program: &Program, mu: f64) -> Option<(Multipliers, Certificate)> {
+        let slacks = self.slacks(program);
+        let mut factors = self.factors.iter();
+        let blocks = program
+            .blocks
+            .iter()
+            .zip(&slacks.blocks)
+            .map(|(block, s)| match block.entropy {
+                0.0 => factors.next().and_then(|u| {
+                    let inverse = u.solve_upper_triangular(&Matrix4::identity())?;
+                    Some(inverse.transpose() * inverse * mu)
+                }),
+                gamma => inverse(s).map(|inverse| inverse * gamma),
+            })
+            .collect::<Option<Vec<_>>>()?;
+        let multipliers = Multipliers { blocks, rows: slacks.rows.iter().map(|s| mu / s).collect() };
+        let certificate = program.certificate_of(&self.x, &slacks, &multipliers)?;
+        Some((multipliers, certificate))
+    }
+
+    /// `f − μ Σ ln det S − μ Σ ln s + pull Σ tr S`, or none outside. The pull keeps early stages, whose μ is large, near the reference in directions that
+    /// nothing else holds.
+    fn barrier(&self, program: &Program, mu: f64, pull: f64) -> Option<f64> {
+        let mut sum = program.smooth_objective(&self.x);
+        for block in program.blocks.iter().filter(|block| block.entropy > 0.0) {
+            sum -= block.entropy * log_determinant(&block.value(&self.x))?;
+        }
+        for u in &self.factors {
+            sum -= 2.0 * mu * (0..4).map(|k| u[(k, k)].ln()).sum::<f64>();
+            sum += pull * u.norm_squared();
+        }
+        for &s in &self.rows {
+            if s.is_nan() || s <= 0.0 {
+                return None;
+            }
+            sum -= mu * s.ln();
+        }
+        sum.is_finite().then_some(sum)
+    }
+
+    /// One step; gives the decrease that the model predicted, or none when no length of it goes down.
+    fn step(&mut self, program: &Program, hessian: &DMatrix<f64>, bodies: &[Body], mu: f64, pull: f64) -> Option<f64> {
+        let mut gradient = program.gradient(&self.x).0;
+        let mut matrix = hessian.clone();
+        for block in program.blocks.iter().filter(|block| block.entropy > 0.0) {
+            let inverse = inverse(&block.value(&self.x))?;
+            block.add_transposed(&vector_of(&inverse), -block.entropy, &mut gradient);
+            add_block(&mut matrix, &block.map, &(congruence(&inverse) * block.entropy));
+        }
+        for (row, &s) in program.rows.iter().zip(&self.rows) {
+            row.add_to(-mu / s, &mut gradient);
+            for &(i, a) in &row.entries {
+                for &(j, b) in &row.entries {
+                    matrix[(i, j)] += a * b * mu / (s * s);
+                }
+            }
+        }
+        // Into the numbers' coordinates, ten columns and rows at a time; the bodies' own barrier is exact there.
+        for ((first, _), u) in bodies.iter().zip(&self.factors) {
+            let jacobian = jacobian(u);
+            let columns = matrix.columns(*first, 10) * jacobian;
+            matrix.columns_mut(*first, 10).copy_from(&columns);
+            let rows = jacobian.transpose() * matrix.rows(*first, 10);
+            matrix.rows_mut(*first, 10).copy_from(&rows);
+            let outside = gradient.rows(*first, 10) + vector_of(&Matrix4::identity()) * pull;
+            let mut part = jacobian.tr_mul(&outside);
+            for (k, (i, j)) in PAIRS.into_iter().enumerate() {
+                // Of −ln det V Vᵀ: only the logarithms on the diagonal count, and tr(G²) is 4 for them and 2 for the others.
+                let diagonal = f64::from(i == j);
+                part[k] -= 2.0 * diagonal * mu;
+                matrix[(first + k, first + k)] += (2.0 + 2.0 * diagonal) * mu;
+            }
+            gradient.rows_mut(*first, 10).copy_from(&part);
+        }
+        let step = DefiniteSystem::new(matrix)?.solve(&-gradient.clone());
+        let predicted = -0.5 * gradient.dot(&step);
+        if predicted.is_nan() || predicted <= 0.0 {
+            return None;
+        }
+        let now = self.barrier(program, mu, pull)?;
+        let slack = 4.0e-15 * (1.0 + now.abs()) + program.objective_noise(&self.x);
+        // Armijo's rule: a tenth of the fall that the slope promises.
+        let better = |candidate: Option<Self>, alpha: f64, best: &mut Option<(f64, Self)>| {
+            if let Some(candidate) = candidate
+                && let Some(value) = candidate.barrier(program, mu, pull)
+                && value <= now - 0.2 * alpha * predicted + slack
+                && best.as_ref().is_none_or(|(least, _)| value < *least)
+            {
+                *best = Some((value, candidate));
+            }
+        };
+        let mut best = None;
+        let mut alpha = 1.0;
+        for _ in 0..50 {
+            better(self.moved(program, bodies, &(&step * alpha), curved), alpha, &mut best);
+            // Close by, both are the same but for digits that the curve keeps.
+            let short = bodies.iter().all(|(first, _)| (step.rows(*first, 10) * alpha).amax() < 0.1);
+            if best.is_none() || !short {
+                better(self.moved(program, bodies, &(&step * alpha), straight), alpha, &mut best);
+            }
+            if let Some((_, next)) = best {
+                *self = next;
+                return Some(predicted);
+            }
+            alpha *= 0.6;
+        }
+        None
+    }
+
+    /// The point after a step, with V by `change`.
+    fn moved(
+        &self,
+        program: &Program,
+        bodies: &[Body],
+        step: &DVector<f64>,
+        way: fn(&Vector10) -> Option<Change>,
+    ) -> Option<Self> {
+        let mut x = &self.x + step;
+        let mut changes = step.clone();
+        let mut factors = Vec::with_capacity(bodies.len());
+        for ((first, offset), u) in bodies.iter().zip(&self.factors) {
+            let change = way(&Vector10::from_column_slice(&step.as_slice()[*first..first + 10]))?;
+            let next = u * change.factor;
+            changes.rows_mut(*first, 10).copy_from(&vector_of(&(u * change.difference * u.transpose())));
+            x.rows_mut(*first, 10).copy_from(&(vector_of(&(next * next.transpose())) - offset));
+            factors.push(next);
+        }
+        self.checked(program, factors, x, &changes)
+    }
+
+    fn checked(
+        &self,
+        program: &Program,
+        factors: Vec<Matrix4<f64>>,
+        x: DVector<f64>,
+        changes: &DVector<f64>,
+    ) -> Option<Self> {
+        let rows: Vec<f64> = program
+            .rows
+            .iter()
+            .zip(&self.rows)
+            .map(|(row, &old)| {
+                // A small slack is known better by its changes than as a difference of large numbers.
+                let change = row.linear_part(changes);
+                if change.abs() < 0.5 * old { old + change } else { row.value(&x) }
+            })
+            .collect();
+        let finite = x.iter().all(|v| v.is_finite()) && rows.iter().all(|&s| s > 0.0);
+        finite.then_some(Self { factors, x, rows })
+    }
+}
+
+/// What a step does to a body.
+struct Change {
+    /// V.
+    factor: Matrix4<f64>,
+    /// `V Vᵀ − 1`, with the digits that the difference would lose.
+    difference: Matrix4<f64>,
+}
+
+/// V of ten numbers: logarithms on the diagonal.
+fn curved(n: &Vector10) -> Option<Change> {
+    let mut less = Matrix4::zeros();
+    for (k, (i, j)) in PAIRS.into_iter().enumerate() {
+        less[(i, j)] = if i == j { n[k].exp_m1() } else { n[k] };
+    }
+    let difference = less + less.transpose() + less * less.transpose();
+    let change = Change { factor: Matrix4::identity() + less, difference };
+    let usable = (0..4).all(|k| change.factor[(k, k)] > 0.0) && difference.iter().all(|value| value.is_finite());
+    usable.then_some(change)
+}
+
+/// V with `V Vᵀ = 1 + G`, G the first-order change of ten numbers; none outside of the cone.
+fn straight(n: &Vector10) -> Option<Change> {
+    let mut difference = Matrix4::zeros();
+    for (k, (i, j)) in PAIRS.into_iter().enumerate() {
+        difference[(i, j)] += n[k];
+        difference[(j, i)] += n[k];
+    }
+    let factor = upper_factor(&(Matrix4::identity() + difference))?;
+    Some(Change { factor, difference })
+}
+
+/// Upper triangular U with `U Uᵀ = S`, or none.
+fn upper_factor(s: &Matrix4<f64>) -> Option<Matrix4<f64>> {
+    // The Cholesky factor of the matrix read backwards.
+    let flipped = Matrix4::from_fn(|i, j| s[(3 - i, 3 - j)]);
+    let l = flipped.cholesky()?.l();
+    Some(Matrix4::from_fn(|i, j| l[(3 - i, 3 - j)]))
+}
+
+/// `∂ vec(U V Vᵀ Uᵀ) / ∂ numbers of V` at V = 1.
+fn jacobian(u: &Matrix4<f64>) -> Matrix10 {
+    let columns = PAIRS.map(|(i, j)| -> Vector10 {
+        let product = u.column(i) * u.column(j).transpose();
+        vector_of(&(product + product.transpose()))
+    });
+    Matrix10::from_columns(&columns)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_jacobian_is_the_derivative_of_both_ways_to_move() {
+        let numbers = Vector10::from([0.3, -0.2, 0.4, -1.0, 0.5, -0.3, 0.2, 0.1, -0.6, 0.7]);
+        let u = curved(&numbers).unwrap().factor;
+        assert!((upper_factor(&(u * u.transpose())).unwrap() - u).amax() < 1e-14);
+        let analytic = jacobian(&u);
+        for way in [curved, straight] {
+            let s = |n: &Vector10| {
+                let change = way(n).unwrap();
+                let next = u * change.factor;
+                let s = next * next.transpose();
+                assert!((u * (Matrix4::identity() + change.difference) * u.transpose() - s).amax() < 1e-13);
+                vector_of(&s)
+            };
+            for k in 0..10 {
+                let h = Vector10::from_fn(|i, _| if i == k { 1.0e-5 } else { 0.0 });
+                // Central differences: h² times third derivatives of order ten.
+                assert!(((s(&h) - s(&-h)) / 2.0e-5 - analytic.column(k)).amax() < 1e-8, "{k}");
+            }
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! Settings of a physical fit.
+
+use super::error::PhysicalError;
+use super::priors::PhysicalPrior;
+use serde::{Deserialize, Serialize};
+
+/// How the convex problem is solved. Both routes end at the same optimum.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PhysicalRoute {
+    /// Primal-dual interior point on the pseudo-inertias: fast, and as exact on the cone's boundary as inside.
+    #[default]
+    InteriorPoint,
+    /// Gauss-Newton in log-Cholesky coordinates with a falling barrier: an independent check.
+    LogCholesky,
+}
+
+/// Settings of [`physical_fit`](super::physical_fit).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PhysicalSettings {
+    /// The solver. Default `interior-point`.
+    pub route: PhysicalRoute,
+    /// Distance from the prior bodies. Default `entropic`.
+    pub prior: PhysicalPrior,
+    /// γ: what one unit of that distance costs, against half the squared distance from the data's own optimum in standard deviations. Default 0.01: the data's
+    /// fit is given up by at most 0.01 times the distance, which no test could notice, while directions that no data reach get the prior's values.
+    pub prior_weight: f64,
+    /// ε of `P ⪰ ε P0` for every body. Default 1e-4: mass spread over a hundredth of the reference's size in every direction, which any real link has.
+    pub margin: f64,
+    /// Largest certificate (stationarity and duality gap, both relative) at which a fit counts as solved. Default 5e-8.
+    pub tolerance: f64,
+    /// Most iterations. Default 2000; the interior point takes 15 to 40, log-Cholesky 60 to 400.
+    pub max_iterations: usize,
+}
+
+impl Default for PhysicalSettings {
+    fn default() -> Self {
+        Self {
+            route: PhysicalRoute::default(),
+            prior: PhysicalPrior::default(),
+            prior_weight: 1.0e-2,
+            margin: 1.0e-4,
+            tolerance: 5.0e-8,
+            max_iterations: 2000,
+        }
+    }
+}
+
+impl PhysicalSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`PhysicalError::Setting`] for a prior weight outside 1e-9 to 1e9, a margin outside 1e-9 to 0.5, a tolerance outside 1e-10 to 1e-2, or no iterations.
+    pub fn validate(&self) -> Result<(), PhysicalError> {
+        let within = |setting, value: f64, least: f64, greatest: f64, mend| {
+            if (least..=greatest).contains(&value) {
+                Ok(())
+            } else {
+                Err(PhysicalError::Setting { setting, value, mend })
+            }
+        };
+        within(
+            "prior_weight",
+            self.prior_weight,
+            1.0e-9,
+            1.0e9,
+            "give a weight from 1e-9 to 1e9: without any, directions that no data reach have no answer",
+        )?;
+        within("margin", self.margin, 1.0e-9, 0.5, "give a share of the reference body from 1e-9 to 0.5")?;
+        within("tolerance", self.tolerance, 1.0e-10, 1.0e-2, "give a relative accuracy from 1e-10 to 1e-2")?;
+        within("max_iterations", self.max_iterations as f64, 1.0, f64::INFINITY, "give at least 1")
+    }
+}

@@ -1,0 +1,88 @@
+//! V-optimality: how well the fitted model will predict the torque of a task.
+
+use super::{Criterion, Valued};
+use crate::definite_inverse::log_det_and_inverse;
+use nalgebra::DMatrix;
+
+/// `log tr(D⁻¹ M)` with `M = Σ W_taskᵀ Σ⁻¹ W_task / samples`, with derivative `-D⁻¹ M D⁻¹ / tr(D⁻¹ M)`.
+///
+/// The covariance of a prediction `W_task θ̂` is `W_task D⁻¹ W_taskᵀ`. Its trace, each joint measured in its own torque noise and averaged over the task's samples, is `tr(D⁻¹ M)`: the
+/// mean square of the prediction error that the parameters' uncertainty causes, all joints summed, in units of the torque noise's variance. Fedorov, Theory of Optimal
+/// Experiments (1972), section 2.7; called V- or I-optimality.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prediction {
+    task: DMatrix<f64>,
+}
+
+impl Prediction {
+    /// For a task with `M` = `task`: symmetric, positive semi-definite, in the columns of the information that is to be judged. [`Information::of`](crate::Information::of) gives it for
+    /// the task's motion with the weight `1 / samples`.
+    pub fn new(task: DMatrix<f64>) -> Self {
+        Self { task }
+    }
+}
+
+impl Criterion for Prediction {
+    fn name(&self) -> &'static str {
+        "prediction"
+    }
+
+    fn value_and_derivative(&self, information: &DMatrix<f64>) -> Valued {
+        let (_, inverse) = log_det_and_inverse(information)?;
+        let spread = &inverse * &self.task;
+        let trace = spread.trace();
+        // A task without any torque has nothing to predict.
+        (trace > 0.0 && trace.is_finite()).then(|| (trace.ln(), -(spread * inverse) / trace))
+    }
+
+    fn figure(&self, information: &DMatrix<f64>) -> Option<f64> {
+        let (_, inverse) = log_det_and_inverse(information)?;
+        Some(inverse.component_mul(&self.task).sum())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::criteria::AOptimal;
+    use dynident_model::sample::Random;
+
+    fn random_definite(random: &mut Random, size: usize) -> DMatrix<f64> {
+        let root = DMatrix::from_fn(3 * size, size, |_, _| random.normal());
+        root.transpose() * root
+    }
+
+    /// With M = 1 the criterion is A-optimality; with M = D every parameter counts once.
+    #[test]
+    fn known_cases() {
+        let mut random = Random::new(3);
+        let information = random_definite(&mut random, 9);
+        let unit = Prediction::new(DMatrix::identity(9, 9));
+        let (value, derivative) = unit.value_and_derivative(&information).unwrap();
+        let (a_value, a_derivative) = AOptimal.value_and_derivative(&information).unwrap();
+        // Condition of some tens, sums of nine products.
+        assert!((value - a_value).abs() < 1e-12 && (derivative - a_derivative).amax() < 1e-12);
+        let own = Prediction::new(information.clone());
+        assert!((own.figure(&information).unwrap() - 9.0).abs() < 1e-11);
+        assert!(unit.value_and_derivative(&DMatrix::zeros(9, 9)).is_none());
+        assert!(Prediction::new(DMatrix::zeros(9, 9)).value_and_derivative(&information).is_none());
+    }
+
+    /// The derivative against central differences of fourth order: step 1e-3 leaves 1e-12 of truncation, rounding 1e-13.
+    #[test]
+    fn derivative_is_the_slope() {
+        let mut random = Random::new(8);
+        let (information, task) = (random_definite(&mut random, 7), random_definite(&mut random, 7));
+        let criterion = Prediction::new(task);
+        let root = DMatrix::from_fn(7, 7, |_, _| random.normal());
+        let direction = &root + root.transpose();
+        let (_, derivative) = criterion.value_and_derivative(&information).unwrap();
+        let at = |step: f64| criterion.value_and_derivative(&(&information + &direction * step)).unwrap().0;
+        let step = 1e-3;
+        let slope = (8.0 * (at(step) - at(-step)) - (at(2.0 * step) - at(-2.0 * step))) / (12.0 * step);
+        let expected = derivative.component_mul(&direction).sum();
+        assert!((slope - expected).abs() < 1e-8 * expected.abs().max(1.0), "{slope} {expected}");
+        let (value, figure) = (at(0.0), criterion.figure(&information).unwrap());
+        assert!((value.exp() - figure).abs() < 1e-12 * figure.max(1.0));
+    }
+}

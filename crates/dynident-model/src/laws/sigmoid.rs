@@ -1,0 +1,31 @@
+//! Friction as one sigmoid: `τ = φ₁ [1/(1 + e^{-φ₂(q̇ + φ₃)}) - 1/(1 + e^{-φ₂ φ₃})]`.
+//!
+//! It is a Coulomb step of height `φ₁` whose middle lies at `-φ₃`; linear in `φ₁` at given `φ₂` and `φ₃`. With `φ₃ = 0` it is half a smooth Coulomb step of width `2/φ₂`. Source: Gaz,
+//! Cognetti, Oliva, Robuffo Giordano and De Luca, IEEE RA-L 4 (2019) 4147.
+
+/// The step of one joint, Nm (N).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sigmoid {
+    /// The joint.
+    pub joint: usize,
+    /// Steepness `φ₂`, s/rad or s/m, positive.
+    pub steepness: f64,
+    /// Offset of the speed `φ₃`, rad/s or m/s.
+    pub offset_speed: f64,
+}
+
+/// `1/(1 + e^{-x})`, without overflow.
+fn logistic(x: f64) -> f64 {
+    0.5 * (1.0 + (0.5 * x).tanh())
+}
+
+impl Sigmoid {
+    pub(super) fn value(self, dq: f64) -> f64 {
+        logistic(self.steepness * (dq + self.offset_speed)) - logistic(self.steepness * self.offset_speed)
+    }
+
+    pub(super) fn slope(self, dq: f64) -> f64 {
+        let share = logistic(self.steepness * (dq + self.offset_speed));
+        self.steepness * share * (1.0 - share)
+    }
+}

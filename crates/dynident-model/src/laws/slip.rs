@@ -1,0 +1,41 @@
+//! One element of the generalised Maxwell-slip model: a spring in series with a Coulomb slider, `τ = W z/Δ`.
+//!
+//! The spring's deflection follows the joint and stops at the yield displacement: `z ← clamp(z + q_k - q_{k-1}, -Δ, Δ)`. Elements with a grid of `Δ` side by side give
+//! friction with hysteresis after reversals, linear in their yield torques `W`. The deflection is the one thing that a law remembers from sample to sample
+//! ([`LawMemory`]); an uninterrupted recording starts undeflected, and the start is forgotten once the joint has moved by 2Δ in one direction. Source: Al-Bender, Lampaert and
+//! Swevers, IEEE Trans. Automatic Control 50 (2005) 1883 (without its sliding dynamics); Lampaert, Swevers and Al-Bender (2002).
+
+/// Yield torque of one element of one joint, Nm (N).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MaxwellSlip {
+    /// The joint.
+    pub joint: usize,
+    /// Yield displacement `Δ`, rad or m, positive; part of the parameter's symbol.
+    pub yield_displacement: f64,
+}
+
+/// What a law remembers of the samples before a block; [`Default`] is the start of a recording.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LawMemory {
+    /// Last position and deflection.
+    last: Option<[f64; 2]>,
+}
+
+impl LawMemory {
+    /// Forgets: the next sample starts a recording.
+    pub fn restart(&mut self) {
+        self.last = None;
+    }
+}
+
+impl MaxwellSlip {
+    pub(super) fn column(self, q: &[f64], memory: &mut LawMemory, out: &mut [f64]) {
+        let limit = self.yield_displacement;
+        for (to, &q) in out.iter_mut().zip(q) {
+            let [before, deflection] = memory.last.unwrap_or([q, 0.0]);
+            let deflection = (deflection + q - before).clamp(-limit, limit);
+            memory.last = Some([q, deflection]);
+            *to = deflection / limit;
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! The forecast under the parameters' names.
+
+use super::file::{DirectionForecast, ParameterForecast};
+use crate::machine::Machine;
+use dynident_excitation::forecast;
+use nalgebra::DMatrix;
+
+/// Worst directions that are told, and the terms of each.
+const DIRECTIONS: usize = 3;
+const TERMS: usize = 6;
+
+/// A prior value below this share of the largest is zero.
+const NEGLIGIBLE: f64 = 1e-9;
+
+/// The forecast from the motion's information, with the parameters' names and with their sizes by the description; `with_prior` is the information that includes what was known before. Worst
+/// directions are those of all that is known.
+pub(super) fn named_forecast(
+    machine: &Machine,
+    information: &DMatrix<f64>,
+    with_prior: Option<&DMatrix<f64>>,
+) -> (Vec<ParameterForecast>, Vec<DirectionForecast>) {
+    let columns = machine.layout.columns();
+    let alone = forecast(information, DIRECTIONS);
+    let all = with_prior.map(|information| forecast(information, DIRECTIONS));
+    // A prior that is zero but for the rounding of the description's angles has no relative error.
+    let largest = machine.prior.iter().flatten().fold(0.0_f64, |largest, prior| largest.max(prior.abs()));
+    let expressions = machine.base.expressions();
+    let parameters = expressions.into_iter().enumerate().map(|(index, expression)| {
+        let (std, prior) = (alone.std[index], machine.prior.as_ref().map(|prior| prior[index]));
+        let size = prior.map(f64::abs).filter(|size| *size > NEGLIGIBLE * largest);
+        let relative = std.zip(size).map(|(std, size)| 100.0 * std / size);
+        let (symbol, unit) = (columns[index].symbol(), columns[index].unit());
+        let std_with_prior = all.as_ref().and_then(|all| all.std[index]);
+        ParameterForecast { symbol, expression, unit, std, std_with_prior, relative_std_percent: relative, prior }
+    });
+    let directions = all.as_ref().unwrap_or(&alone).worst.iter().map(|direction| {
+        let mut terms: Vec<(String, f64)> =
+            columns.iter().zip(&direction.shares).map(|(column, share)| (column.symbol(), *share)).collect();
+        terms.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+        terms.truncate(TERMS);
+        DirectionForecast { inflation: direction.inflation, terms }
+    });
+    (parameters.collect(), directions.collect())
+}

@@ -1,0 +1,256 @@
+//! What a search and the check of a given motion share: machine, limits, noise, prior and criterion of a study, and the figures that are told in the end.
+
+use super::file::{DESIGN_SCHEMA, DesignFile};
+use super::forecast::named_forecast;
+use super::section::{CriterionChoice, DesignSection, FamilyChoice, TorqueNoise};
+use super::windows::WindowedFile;
+use super::{DesignOutcome, table};
+use crate::cpu_time::cpu_seconds;
+use crate::error::Error;
+use crate::job::{RunOptions, joint_names, study_name};
+use crate::machine::Machine;
+use crate::study::{CoulombChoice, Folders, Study};
+use dynident_excitation::check::LimitReport;
+use dynident_excitation::criteria::{ConditionNumber, Criterion, DOptimal, Prediction};
+use dynident_excitation::limits::{LimitSet, Limits};
+use dynident_excitation::optimisers::Generation;
+use dynident_excitation::{Family, Information, Motion};
+use nalgebra::DMatrix;
+use std::path::Path;
+
+/// Samples whose regressor is held at once.
+const SAMPLES_AT_ONCE: usize = 4096;
+
+/// A study's `[design]`, ready.
+pub(super) struct Prepared {
+    pub(super) name: String,
+    pub(super) section: DesignSection,
+    pub(super) machine: Machine,
+    pub(super) limits: Limits,
+    pub(super) set: LimitSet,
+    pub(super) criteria: Vec<Box<dyn Criterion>>,
+    pub(super) prior: Option<DMatrix<f64>>,
+    torque_std_nm: Vec<f64>,
+    ones: Vec<f64>,
+    pub(super) notes: Vec<String>,
+}
+
+/// What is known of a motion in the end.
+pub(super) struct Judged {
+    pub(super) family: &'static str,
+    pub(super) family_settings: Option<FamilyChoice>,
+    pub(super) given: Option<String>,
+    pub(super) parameters: Vec<f64>,
+    pub(super) start_posture: Vec<Option<f64>>,
+    pub(super) optimiser: &'static str,
+    pub(super) criterion: &'static str,
+    pub(super) figure: Option<f64>,
+    pub(super) windowed: Option<WindowedFile>,
+    pub(super) history: Vec<Generation>,
+    pub(super) plain: DMatrix<f64>,
+    pub(super) weighted: DMatrix<f64>,
+    pub(super) duration_s: f64,
+    pub(super) rate_hz: f64,
+    pub(super) reports: Vec<LimitReport>,
+    pub(super) check_rate_hz: f64,
+    pub(super) check_of: &'static str,
+    pub(super) diagnosis: Vec<String>,
+    pub(super) evaluations: usize,
+    pub(super) seconds: f64,
+    pub(super) cpu_at_start: Option<f64>,
+}
+
+impl Prepared {
+    /// For a search: laws are smooth, and something bounds how fast each joint moves.
+    pub(super) fn for_search(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Self, Error> {
+        let mut notes = Vec::new();
+        let prepared = Self::new(&smooth(study, &mut notes), study_path, options, notes)?;
+        bounded(&prepared.machine, &prepared.limits)
+            .map_err(|why| Error::study(study_path, format!("[design.limits]: {why}")))?;
+        Ok(prepared)
+    }
+
+    /// For a motion that is there already: laws as the study has them.
+    pub(super) fn for_check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Self, Error> {
+        Self::new(study, study_path, options, Vec::new())
+    }
+
+    fn new(study: &Study, study_path: &Path, options: &RunOptions<'_>, mut notes: Vec<String>) -> Result<Self, Error> {
+        let section = study.design.clone().unwrap_or_default();
+        let wrong = |part: &str, why: &dyn core::fmt::Display| Error::study(study_path, format!("[{part}]: {why}"));
+        section.validate().map_err(|why| wrong("design", &why))?;
+        let folders = Folders::new(study, study_path, options.data.as_deref());
+        let machine = Machine::new(study, study_path, &folders)?;
+        let limits = Limits::from_model(&machine.model).overlaid(&section.limits);
+        let set = LimitSet::new(&limits, &machine.model).map_err(|why| wrong("design.limits", &why))?;
+        let torque_std_nm = torque_std(&section, &machine, &mut notes).map_err(|why| wrong("design", &why))?;
+        let prior = section.prior.information(&machine, study_path, &folders, &mut notes)?;
+        let criteria = match &section.criterion {
+            CriterionChoice::Prediction { trajectory } => {
+                let path = folders.find(trajectory, None)?;
+                let task = table::trajectory(&path, &joint_names(&machine), &study.motion)?;
+                notes.extend(task.note.map(|note| format!("task: {note}")));
+                let samples = task.given.samples();
+                let motion_at = |times: &[f64], out: &mut Motion| task.given.motion(&[], times, out);
+                let sum = information(&machine, &torque_std_nm, task.given.times_s(), &motion_at);
+                let criterion: Box<dyn Criterion> = Box::new(Prediction::new(sum / samples.samples as f64));
+                vec![criterion]
+            }
+            named => named.criteria().unwrap_or_default(),
+        };
+        Ok(Self {
+            name: study_name(study, study_path),
+            ones: vec![1.0; machine.model.dof()],
+            section,
+            machine,
+            limits,
+            set,
+            criteria,
+            prior,
+            torque_std_nm,
+            notes,
+        })
+    }
+
+    /// The torque noise that the criterion counts with.
+    pub(super) fn counted_std_nm(&self) -> &[f64] {
+        if self.section.criterion.of_regressor() { &self.ones } else { &self.torque_std_nm }
+    }
+
+    /// `Σ WᵀW` and `Σ Wᵀ Σ⁻¹ W` of a motion at `times`.
+    pub(super) fn informations(&self, times: &[f64], motion_at: &dyn Fn(&[f64], &mut Motion)) -> [DMatrix<f64>; 2] {
+        [&self.ones, &self.torque_std_nm].map(|std| information(&self.machine, std, times, motion_at))
+    }
+
+    /// The criterion's name.
+    pub(super) fn criterion(&self) -> &'static str {
+        self.criteria.last().map_or("", |criterion| criterion.name())
+    }
+
+    /// The criterion's figure of a motion that was not searched for.
+    pub(super) fn figure(&self, plain: &DMatrix<f64>, weighted: &DMatrix<f64>) -> Option<f64> {
+        let counted = if self.section.criterion.of_regressor() { plain.clone() } else { self.with_prior(weighted) };
+        self.criteria.last().and_then(|criterion| criterion.figure(&counted))
+    }
+
+    fn with_prior(&self, information: &DMatrix<f64>) -> DMatrix<f64> {
+        self.prior.as_ref().map_or_else(|| information.clone(), |prior| prior + information)
+    }
+
+    /// All of it as it is told.
+    pub(super) fn outcome(self, judged: Judged, family: Box<dyn Family>) -> DesignOutcome {
+        let log_det = |information: &DMatrix<f64>| DOptimal.figure(information).map(|figure| -figure);
+        let condition = |scaled| ConditionNumber { scaled, ..ConditionNumber::default() }.figure(&judged.plain);
+        let all = self.prior.as_ref().map(|prior| prior + &judged.weighted);
+        let (forecast, worst_directions) = named_forecast(&self.machine, &judged.weighted, all.as_ref());
+        let file = DesignFile {
+            schema: DESIGN_SCHEMA,
+            name: self.name,
+            joints: joint_names(&self.machine),
+            family: judged.family,
+            family_settings: judged.family_settings,
+            given: judged.given,
+            parameters: judged.parameters,
+            start_posture: judged.start_posture,
+            optimiser: judged.optimiser,
+            criterion: judged.criterion,
+            criterion_figure: judged.figure,
+            condition_number: condition(false),
+            condition_number_scaled: condition(true),
+            log_det: log_det(&judged.plain),
+            log_det_weighted: log_det(&judged.weighted),
+            base_columns: self.machine.base.count(),
+            duration_s: judged.duration_s,
+            rate_hz: judged.rate_hz,
+            torque_std_nm: self.torque_std_nm,
+            feasible: judged.diagnosis.is_empty() && judged.reports.iter().all(|report| !report.violated),
+            check_rate_hz: judged.check_rate_hz,
+            check_of: judged.check_of,
+            limits: judged.reports,
+            forecast,
+            worst_directions,
+            windowed: judged.windowed,
+            evaluations: judged.evaluations,
+            cpu_s: judged.cpu_at_start.zip(cpu_seconds()).map(|(start, end)| end - start),
+            seconds: judged.seconds,
+            seed: self.section.search.seed,
+            diagnosis: judged.diagnosis,
+            notes: self.notes,
+        };
+        DesignOutcome { file, machine: self.machine, limits: self.limits, history: judged.history, family }
+    }
+}
+
+/// Information of a motion at `times`, a block at a time.
+fn information(
+    machine: &Machine,
+    torque_std_nm: &[f64],
+    times: &[f64],
+    motion_at: &dyn Fn(&[f64], &mut Motion),
+) -> DMatrix<f64> {
+    let count = machine.layout.columns().len();
+    let mut gatherer = Information::new(&machine.model, &machine.layout, torque_std_nm, None);
+    let (mut sum, mut motion) = (DMatrix::zeros(count, count), Motion::default());
+    for times in times.chunks(SAMPLES_AT_ONCE) {
+        motion_at(times, &mut motion);
+        sum += gatherer.of(&motion, 1.0);
+    }
+    sum
+}
+
+/// The study with smooth steps in place of signs: a sign has no slope to follow.
+fn smooth(study: &Study, notes: &mut Vec<String>) -> Study {
+    let mut study = study.clone();
+    let mut changed = false;
+    let choices = core::iter::once(Some(&mut study.drive.coulomb))
+        .chain(study.drive.joints.values_mut().map(|joint| joint.coulomb.as_mut()))
+        .chain(study.coupling.iter_mut().map(|coupling| coupling.coulomb.as_mut()));
+    for choice in choices.flatten().filter(|choice| **choice == CoulombChoice::Sign) {
+        *choice = CoulombChoice::Smooth;
+        changed = true;
+    }
+    if changed {
+        notes.push(
+            "Coulomb friction is designed for with a smooth step (coulomb_width) in place of the sign".to_owned(),
+        );
+    }
+    study
+}
+
+/// That something bounds how fast each joint moves: without it the best motion is infinitely fast.
+fn bounded(machine: &Machine, limits: &Limits) -> Result<(), String> {
+    for joint in machine.model.joints() {
+        let free = limits.of(&joint.name).is_none_or(|limit| {
+            let rates = [limit.speed, limit.acceleration, limit.jerk, limit.torque, limit.power_w];
+            rates.iter().all(Option::is_none)
+        });
+        if free {
+            return Err(format!(
+                "joint `{0}` has no limit of speed, acceleration, jerk, torque or power, so that the best motion would be infinitely fast; \
+                 give one: joints = [{{ joint = \"{0}\", acceleration = ... }}]",
+                joint.name
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Torque noise of every joint.
+fn torque_std(section: &DesignSection, machine: &Machine, notes: &mut Vec<String>) -> Result<Vec<f64>, String> {
+    let joints = machine.model.joints();
+    match &section.torque_std_nm {
+        Some(TorqueNoise::Same(std)) => Ok(vec![*std; joints.len()]),
+        Some(TorqueNoise::Each(stds)) if stds.len() == joints.len() => Ok(stds.clone()),
+        Some(TorqueNoise::Each(stds)) => {
+            Err(format!("torque_std_nm has {} entries, the robot {} joints: give one each", stds.len(), joints.len()))
+        }
+        None => {
+            notes.push(
+                "torque noise is taken as 1 % of each effort limit (torque_std_nm), 1 Nm where there is none"
+                    .to_owned(),
+            );
+            let of = |effort: Option<f64>| effort.filter(|effort| *effort > 0.0).map_or(1.0, |effort| 0.01 * effort);
+            Ok(joints.iter().map(|joint| of(joint.limits.effort)).collect())
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! Friction in the study file: laws beyond viscous, Coulomb and offset, and whether the data choose them.
+
+use dynident_model::laws::{
+    CoulombShape, Direction, DirectionalCoulomb, DirectionalViscous, Law, LoadFriction, MaxwellSlip, Power,
+    PowerExponent, Sigmoid, Stribeck,
+};
+use serde::{Deserialize, Serialize};
+
+/// Who says which friction a joint has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FrictionChoice {
+    /// The study's keys.
+    #[default]
+    Stated,
+    /// Cross-validation inside the training logs. The keys `offset` and `drive_inertia` stay in force; what else is stated is one of the candidates.
+    Auto,
+}
+
+/// A law of `drive.laws`, beside `viscous`, `coulomb` and `offset`.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(tag = "law", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum FrictionLaw {
+    /// Viscous friction by direction, in place of `viscous`.
+    AsymmetricViscous {},
+    /// Coulomb friction by direction, in place of `coulomb`; with a sign it says the same as `offset`, so switch one off.
+    AsymmetricCoulomb {},
+    /// `e^{-|dq/speed|^exponent}` times the step.
+    Stribeck {
+        /// rad/s or m/s.
+        speed: f64,
+        /// 1 to 2.8 are usual.
+        exponent: f64,
+        /// Width of its smooth step, rad/s or m/s; by default the step is the joint's Coulomb step.
+        #[serde(default)]
+        width: Option<f64>,
+    },
+    /// A shifted smooth step, in place of `coulomb`.
+    Sigmoid {
+        /// s/rad or s/m.
+        steepness: f64,
+        /// rad/s or m/s.
+        #[serde(default)]
+        offset_speed: f64,
+    },
+    /// Torque by the cube root of the speed.
+    CubeRoot {},
+    /// Torque by the square of the speed.
+    Quadratic {},
+    /// Torque in proportion to the load, against the motion.
+    Load {
+        /// As for `stribeck`.
+        #[serde(default)]
+        width: Option<f64>,
+    },
+    /// Springs that slip, one per yield displacement.
+    MaxwellSlip {
+        /// rad or m.
+        yield_displacements: Vec<f64>,
+    },
+}
+
+/// Speed below which a power of it is rounded, rad/s or m/s: below any speed that a differentiated encoder tells from rest.
+const ROUNDING: f64 = 1.0e-3;
+/// Elements of one joint: each is a column.
+const MOST_ELEMENTS: usize = 50;
+
+impl FrictionLaw {
+    /// The parameters of this law at `joint`, whose Coulomb step is `step`.
+    pub(crate) fn laws(&self, joint: usize, step: CoulombShape) -> Vec<Law> {
+        let both = [Direction::Forward, Direction::Backward];
+        let power = |exponent| vec![Law::Power(Power { joint, exponent, rounding: ROUNDING })];
+        match self {
+            Self::AsymmetricViscous {} => {
+                both.map(|direction| Law::DirectionalViscous(DirectionalViscous { joint, direction })).to_vec()
+            }
+            Self::AsymmetricCoulomb {} => both
+                .map(|direction| Law::DirectionalCoulomb(DirectionalCoulomb { joint, direction, shape: step }))
+                .to_vec(),
+            &Self::Stribeck { speed, exponent, width } => {
+                let shape = width.map_or(step, |width| CoulombShape::Smooth { width });
+                vec![Law::Stribeck(Stribeck { joint, speed, exponent, shape })]
+            }
+            &Self::Sigmoid { steepness, offset_speed } => {
+                vec![Law::Sigmoid(Sigmoid { joint, steepness, offset_speed })]
+            }
+            Self::CubeRoot {} => power(PowerExponent::CubeRoot),
+            Self::Quadratic {} => power(PowerExponent::Quadratic),
+            &Self::Load { width } => {
+                let shape = width.map_or(step, |width| CoulombShape::Smooth { width });
+                vec![Law::Load(LoadFriction { joint, shape })]
+            }
+            Self::MaxwellSlip { yield_displacements } => {
+                let element = |&yield_displacement| Law::MaxwellSlip(MaxwellSlip { joint, yield_displacement });
+                yield_displacements.iter().map(element).collect()
+            }
+        }
+    }
+
+    /// Checks its constants; `key` is where it stands.
+    pub(crate) fn validate(&self, key: &str) -> Result<(), String> {
+        let within = |name: &str, value: f64, from: f64, to: f64| {
+            if value >= from && value <= to {
+                Ok(())
+            } else {
+                Err(format!("{key}: {name} = {value}: give a number from {from} to {to}"))
+            }
+        };
+        match self {
+            Self::Stribeck { speed, exponent, width } => {
+                within("speed", *speed, 1.0e-6, 1.0e3)?;
+                within("exponent", *exponent, 0.1, 10.0)?;
+                width.map_or(Ok(()), |width| within("width", width, 1.0e-6, 1.0e3))
+            }
+            Self::Sigmoid { steepness, offset_speed } => {
+                within("steepness", *steepness, 1.0e-3, 1.0e6)?;
+                within("offset_speed", *offset_speed, -1.0e3, 1.0e3)
+            }
+            Self::Load { width } => width.map_or(Ok(()), |width| within("width", width, 1.0e-6, 1.0e3)),
+            Self::MaxwellSlip { yield_displacements } => {
+                if yield_displacements.is_empty() || yield_displacements.len() > MOST_ELEMENTS {
+                    return Err(format!("{key}: give 1 to {MOST_ELEMENTS} yield_displacements"));
+                }
+                for (place, value) in yield_displacements.iter().enumerate() {
+                    within("yield_displacements", *value, 1.0e-7, 100.0)?;
+                    if yield_displacements[..place].contains(value) {
+                        return Err(format!("{key}: yield_displacements: {value} stands twice"));
+                    }
+                }
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+}
