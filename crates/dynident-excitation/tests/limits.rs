@@ -6,7 +6,7 @@ use common::{Harmonics, all_limits, grid, ur10};
 use dynident_excitation::Motion;
 use dynident_excitation::check::check_limits;
 use dynident_excitation::limits::{
-    ColumnLimit, LimitKind, LimitSet, LimitWorkspace, LinkPoint, PeakSettings, SelfCollision, peaks,
+    ColumnLimit, LimitKind, LimitSet, LimitWorkspace, Limits, LinkPoint, PeakSettings, SelfCollision, peaks,
 };
 use dynident_model::Model;
 use dynident_model::sample::{Random, random_tree};

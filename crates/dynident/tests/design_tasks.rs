@@ -11,7 +11,7 @@ use std::path::Path;
 
 /// A search of some hundred evaluations: what is asked here does not need the best motion.
 const SMALL: &str =
-    "search = { starts = 2, rounds = 0, evaluations_per_start = 30, polish_evaluations = 60, search_samples = 61 }";
+    "search = { starts = 2, rounds = 0, evaluations_per_start = 400, polish_evaluations = 300, search_samples = 64 }";
 
 /// The first three joints of a UR10: small and quick.
 fn job(folder: &Path, design: &str, further: &str) -> Job {
