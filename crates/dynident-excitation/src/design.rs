@@ -137,7 +137,7 @@ pub fn design(
     let evaluations = AtomicU64::new(0);
     let logged = grid(task.family.duration_s(), (task.family.duration_s() * settings.rate_hz).round() as usize + 1);
     let coarse = grid(task.family.duration_s(), settings.search_grid(task.family, task.limits));
-    let rounds = Rounds { task, times: &coarse, logged: logged.len() };
+    let rounds = Rounds { task, times: &coarse, logged: logged.len(), shaped: true };
     let watch_all = watch;
     let stopped = AtomicBool::new(false);
     let over = || stopped.load(Ordering::Relaxed) || late();
@@ -184,7 +184,7 @@ pub fn design(
     // search's own best included; only if there is none, the least broken one.
     let criterion = task.criteria[task.criteria.len() - 1];
     let fine = grid(task.family.duration_s(), 2 * coarse.len() - 1);
-    let rounds = Rounds { task, times: &fine, logged: logged.len() };
+    let rounds = Rounds { task, times: &fine, logged: logged.len(), shaped: true };
     let mut state = best.ok_or(OptimiserError::Start)?.state.on_twice_the_samples(coarse.len());
     let (mut kept, _) = assess(task, criterion, state.x.clone(), &fine, &logged);
     for _ in 0..POLISHES {

@@ -1,11 +1,14 @@
 //! A trajectory judged as it will be used.
 
-use super::DesignTask;
+use super::{DesignTask, grid};
 use crate::criteria::Criterion;
 use crate::information::Information;
 use crate::limits::{PeakSettings, peaks};
 use crate::motion::Motion;
 use nalgebra::DMatrix;
+
+/// Samples on which extremes are looked for at least.
+const LEAST_SAMPLES: usize = 1001;
 
 /// A trajectory judged as it will be used: every logged sample, every limit between samples.
 pub(crate) struct Assessed {
@@ -38,7 +41,9 @@ pub(crate) fn assess(
     task.family.motion(&parameters, logged, &mut motion);
     let information =
         Information::new(task.limits.model(), task.layout, task.torque_std_nm, task.prior).of(&motion, 1.0);
-    let worst = extremes(task, &parameters, fine);
+    // Finer than any grid of a search: a peak that falls between samples is refined only if it is seen.
+    let dense = grid(task.family.duration_s(), (4 * fine.len()).max(LEAST_SAMPLES));
+    let worst = extremes(task, &parameters, &dense);
     let violation = worst.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     (Assessed { figure: criterion.figure(&information), parameters, information, violation }, worst)
 }

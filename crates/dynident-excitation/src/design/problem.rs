@@ -36,6 +36,7 @@ impl<'a> Problem<'a> {
         criterion: &'a dyn Criterion,
         times: &'a [f64],
         weight: f64,
+        shaped: bool,
     ) -> Self {
         Self {
             information: Information::new(task.limits.model(), task.layout, task.torque_std_nm, task.prior),
@@ -55,7 +56,7 @@ impl<'a> Problem<'a> {
             cotangent: Motion::default(),
             by_information: None,
             values: Vec::new(),
-            metric: Metric::new(task, times),
+            metric: if shaped { Metric::new(task, times) } else { None },
         }
     }
 }

@@ -10,7 +10,7 @@ use nalgebra::DMatrix;
 
 /// Random starts beside the best so far, and evaluations of each descent at least: a small search must still find its way inside.
 const STARTS: usize = 4;
-const EVALUATIONS: usize = 250;
+const EVALUATIONS: usize = 400;
 
 /// Descents from one start, with wider margins while something is broken between samples, and the most that one of them widens.
 const ROUNDS: usize = 4;
@@ -36,9 +36,9 @@ impl Criterion for Anything {
         Some(0.0)
     }
 
-    /// The first penalty is a fiftieth of it; nothing is to be found outside the limits here.
+    /// Nothing is to be found outside the limits here: with the evaluations of a restoration the first penalty is about ten.
     fn scale(&self, _: usize) -> f64 {
-        500.0
+        50.0
     }
 }
 
@@ -60,14 +60,15 @@ pub(crate) fn restored(
     let tell = |value: f64, violation: f64, evaluations: usize| {
         stop(&DesignProgress { round: "restoration", value, violation, evaluations: evaluations as u64 })
     };
-    let rounds = Rounds { task, times: fine, logged: logged.len() };
+    // Without a criterion nothing says how long a step may be where no limit pushes.
+    let [plain, rounds] = [false, true].map(|shaped| Rounds { task, times: fine, logged: logged.len(), shaped });
     for start in 0..=STARTS {
         let mut parameters =
             if start == 0 { best.parameters.clone() } else { task.family.random(&positions, &speeds, &mut random) };
         let mut margins = vec![MARGIN; task.limits.constraints().len()];
         for _ in 0..ROUNDS {
             let budget = settings.polish_evaluations.max(EVALUATIONS);
-            let found = rounds.polish(&Anything, &margins, parameters.into(), budget, |value, violation| {
+            let found = plain.polish(&Anything, &margins, parameters.into(), budget, |value, violation| {
                 violation <= 0.0 || tell(value, violation, evaluations)
             })?;
             evaluations += found.evaluations;

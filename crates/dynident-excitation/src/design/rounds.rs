@@ -12,6 +12,8 @@ use core::ops::ControlFlow;
 /// harmonics, ten starts each: 0.02 with slow growth ends 2 to 4 nats better than 2 with fast growth.
 const FIRST_PENALTY: f64 = 0.02;
 const PENALTY_GROWTH: f64 = 3.0;
+/// Evaluations that this slow way needs.
+const FULL_EVALUATIONS: f64 = 1000.0;
 
 /// Violation at which a start is told apart from others well enough.
 const LOOSE: f64 = 3e-3;
@@ -25,6 +27,8 @@ pub(super) struct Rounds<'a> {
     pub(super) task: &'a DesignTask<'a>,
     pub(super) times: &'a [f64],
     pub(super) logged: usize,
+    /// Whether the curvature of limits is made use of.
+    pub(super) shaped: bool,
 }
 
 /// Where a start ended.
@@ -93,7 +97,7 @@ impl Rounds<'_> {
     ) -> Result<Vec<AugmentedLagrangianResult>, OptimiserError> {
         let weight = self.logged as f64 / self.times.len() as f64;
         let result = multi_start(
-            || Problem::new(self.task, margins, criterion, self.times, weight),
+            || Problem::new(self.task, margins, criterion, self.times, weight, self.shaped),
             starts,
             settings,
             |progress| {
@@ -114,11 +118,15 @@ impl Rounds<'_> {
         feasibility_tolerance: f64,
         optimality_tolerance: f64,
     ) -> AugmentedLagrangianSettings {
+        // With few evaluations there is no time to wander outside.
+        let hurry = (FULL_EVALUATIONS / evaluations.max(1) as f64).max(1.0);
         AugmentedLagrangianSettings {
             max_evaluations: evaluations,
             max_inner_iterations: 30,
-            initial_penalty: Some(FIRST_PENALTY * criterion.scale(self.task.layout.columns().len())),
-            penalty_growth: PENALTY_GROWTH,
+            initial_penalty: Some(
+                FIRST_PENALTY * (hurry * hurry).min(1e3) * criterion.scale(self.task.layout.columns().len()),
+            ),
+            penalty_growth: (PENALTY_GROWTH * hurry).min(10.0),
             feasibility_tolerance,
             optimality_tolerance,
             ..AugmentedLagrangianSettings::default()
