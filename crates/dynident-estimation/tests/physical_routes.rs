@@ -99,7 +99,7 @@ fn both_routes_find_the_same_optimum_of_150_problems() {
 /// an entropic prior, with objectives of 1e4 to 5e6. See the limits in the book's page on estimation.
 /// `cargo test --release -p dynident-estimation --test physical_routes -- --ignored --nocapture`
 #[test]
-#[ignore = "takes minutes: run in the release profile"]
+#[ignore = "takes ten minutes in the release profile, and is not kept yet: 4 and 29 of 1,000 end uncertified"]
 fn both_routes_find_the_same_optimum_of_1000_problems_of_up_to_30_bodies() {
     check(&run(1000..2000, |seed| 2 + (seed % 29) as usize));
 }
