@@ -7,7 +7,7 @@ use crate::factor::{FactorWorkspace, TriangularFactor};
 use crate::instrumented::InstrumentedProblem;
 use crate::projection::Projection;
 use crate::rank::{RankSettings, Split, solve, split};
-use crate::weighted::{WeightedSettings, noise_of_joints};
+use crate::weighted::{WeightedSettings, noise_change, noise_of_joints};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -114,8 +114,7 @@ pub fn instrumental_variables(
         let (squares, torque) = stacked.joint_squares(&problem.over_both(&solution.values))?;
         joint_sigma = noise_of_joints(&squares, &torque, &freedom);
         if iterations > 1 {
-            let change = joint_sigma.iter().zip(&weights).map(|(s, w)| (s * w - 1.0).abs()).fold(0.0, f64::max);
-            converged = change <= settings.tolerance;
+            converged = noise_change(&joint_sigma, &weights) <= settings.tolerance;
         }
         if converged || iterations == settings.max_iterations {
             break;

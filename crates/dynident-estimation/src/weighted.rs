@@ -82,8 +82,7 @@ pub fn weighted_least_squares(
         joint_sigma = noise_of_joints(&squares, &torque, &freedom);
         // From the second solution on, the weights in use are the last σ's reciprocals.
         if iterations > 1 {
-            let change = joint_sigma.iter().zip(&weights).map(|(s, w)| (s * w - 1.0).abs()).fold(0.0, f64::max);
-            converged = change <= settings.tolerance;
+            converged = noise_change(&joint_sigma, &weights) <= settings.tolerance;
         }
         if converged || iterations == settings.max_iterations {
             break;
@@ -98,6 +97,11 @@ pub fn weighted_least_squares(
     // The rows were scaled by the last weights; what noise is left in them is one up to the tolerance, unless the limit came first.
     Fitted { triangle, split, solution, weights, joint_sigma, weighted_variance: 1.0, iterations, converged }
         .into_estimate(&stacked, &settings.rank, settings.covariance)
+}
+
+/// Largest relative change from the noise that the weights stand for to the noise that was found with them.
+pub(crate) fn noise_change(joint_sigma: &[f64], weights: &[f64]) -> f64 {
+    joint_sigma.iter().zip(weights).map(|(s, w)| (s * w - 1.0).abs()).fold(0.0, f64::max)
 }
 
 /// Noise of every joint, never below the rounding of its torque.

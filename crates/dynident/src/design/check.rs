@@ -59,27 +59,13 @@ pub fn check_trajectory(
     let times = grid(duration_s, (duration_s * rate_hz).round() as usize + 1);
     let [plain, weighted] = prepared.informations(&times, &motion_at);
     let judged = Judged {
-        family: GIVEN,
-        family_settings: None,
-        given: Some(trajectory.display().to_string()),
-        parameters: Vec::new(),
-        start_posture: Vec::new(),
-        figure: prepared.figure(&plain, &weighted),
-        plain,
-        weighted,
         duration_s,
         rate_hz,
         reports,
         check_rate_hz: CHECK_RATE_HZ,
         check_of: "the quintic spline through the samples of the table",
         diagnosis,
-        optimiser: "none",
-        criterion: prepared.criterion(),
-        windowed: None,
-        history: Vec::new(),
-        evaluations: 0,
-        seconds: started.elapsed().as_secs_f64(),
-        cpu_at_start,
+        ..looked_at(&prepared, trajectory.display().to_string(), [plain, weighted], (started, cpu_at_start))
     };
     Ok(prepared.outcome(judged, Box::new(given)))
 }
@@ -129,29 +115,47 @@ pub fn check_log(
     let longest = (0..pieces.len())
         .fold(0, |best, piece| if pieces[piece].duration_s() > pieces[best].duration_s() { piece } else { best });
     let judged = Judged {
-        family: GIVEN,
-        family_settings: None,
-        given: Some(study.log_name(index)),
-        parameters: Vec::new(),
-        start_posture: Vec::new(),
-        figure: prepared.figure(&plain, &weighted),
-        plain,
-        weighted,
         duration_s,
         rate_hz,
         reports,
         check_rate_hz: rate_hz,
         check_of: "the log's own samples, its positions through the study's differentiator",
         diagnosis,
+        ..looked_at(&prepared, study.log_name(index), [plain, weighted], (started, cpu_at_start))
+    };
+    Ok(prepared.outcome(judged, Box::new(pieces.swap_remove(longest))))
+}
+
+/// What is the same of every motion that was given: no search, no family. Limits, times and rates are filled in by who knows them.
+fn looked_at(
+    prepared: &Prepared,
+    given: String,
+    [plain, weighted]: [DMatrix<f64>; 2],
+    (started, cpu_at_start): (Instant, Option<f64>),
+) -> Judged {
+    Judged {
+        family: GIVEN,
+        family_settings: None,
+        given: Some(given),
+        parameters: Vec::new(),
+        start_posture: Vec::new(),
         optimiser: "none",
         criterion: prepared.criterion(),
+        figure: prepared.figure(&plain, &weighted),
         windowed: None,
         history: Vec::new(),
+        plain,
+        weighted,
+        duration_s: 0.0,
+        rate_hz: 0.0,
+        reports: Vec::new(),
+        check_rate_hz: 0.0,
+        check_of: "",
+        diagnosis: Vec::new(),
         evaluations: 0,
         seconds: started.elapsed().as_secs_f64(),
         cpu_at_start,
-    };
-    Ok(prepared.outcome(judged, Box::new(pieces.swap_remove(longest))))
+    }
 }
 
 fn checked(
