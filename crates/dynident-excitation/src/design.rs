@@ -5,6 +5,7 @@
 //! ends it early, with the best feasible trajectory so far.
 
 pub(crate) mod assess;
+mod clear_starts;
 mod metric;
 mod problem;
 mod restoration;
@@ -15,6 +16,7 @@ use crate::family::Family;
 use crate::limits::LimitSet;
 use crate::optimisers::{AugmentedLagrangianState, OptimiserError};
 use assess::assess;
+use clear_starts::Starts;
 use core::ops::ControlFlow;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use dynident_dynamics::PanelLayout;
@@ -37,8 +39,8 @@ pub struct DesignSettings {
     pub evaluations_per_start: usize,
     /// Evaluations of one polish at most (up to six, while something is broken between samples). Default 1,000.
     pub polish_evaluations: usize,
-    /// Samples of the search grid. Default 96, at least five per free number of a joint, for families that move fast, and 25 a second where places are limited: an arm crosses a thin obstacle
-    /// between two samples of a coarse grid without being seen.
+    /// Samples of the search grid. Default 96, at least five per free number of a joint, for families that move fast, and 12.5 a second where places are limited, so that the ways between
+    /// samples, on which columns are looked for, are nearly straight.
     pub search_samples: Option<usize>,
     /// Rate at which the robot will be logged, Hz: every sample counts for the information. Default 100.
     pub rate_hz: f64,
@@ -74,7 +76,7 @@ impl DesignSettings {
 }
 
 /// Rate of the search grid where places are limited, Hz.
-const PLACE_RATE_HZ: f64 = 25.0;
+const PLACE_RATE_HZ: f64 = 12.5;
 
 /// What is to be designed.
 #[derive(Clone, Copy)]
@@ -151,10 +153,9 @@ pub fn design(
         }
     };
     let mut random = Random::new(settings.seed);
-    let (ranges, speeds) = ranges(task.limits);
-    let random_start = |random: &mut Random| task.family.random(&ranges, &speeds, random).into();
+    let mut random_starts = Starts::new(task, &coarse);
     let mut starts: Vec<AugmentedLagrangianState> =
-        (0..settings.starts.max(1)).map(|_| random_start(&mut random)).collect();
+        (0..settings.starts.max(1)).map(|_| random_starts.next(&mut random).into()).collect();
     let mut margins = vec![0.0; task.limits.constraints().len()];
     let mut best: Option<Candidate> = None;
     for round in 0..=settings.rounds {
@@ -250,14 +251,30 @@ fn joint_scales(parameters: &[f64], joints: usize) -> Vec<f64> {
     parameters.chunks(per_joint).flat_map(|part| vec![rms(part); part.len()]).collect()
 }
 
-/// Position ranges and speed limits for random starts.
+/// Position ranges and speed limits for random starts: the study's where it narrows the description's.
 pub(crate) fn ranges(limits: &LimitSet) -> (Vec<[f64; 2]>, Vec<f64>) {
-    let range = |joint: &dynident_model::Joint| {
-        let free = if joint.turns() { core::f64::consts::PI } else { 0.5 };
-        let lower = joint.limits.lower.unwrap_or(-free).max(-free);
-        let upper = joint.limits.upper.unwrap_or(free).min(free);
-        [lower.min(upper), upper.max(lower)]
-    };
-    let joints = limits.model().joints();
-    (joints.iter().map(range).collect(), joints.iter().map(|joint| joint.limits.velocity.unwrap_or(2.0)).collect())
+    let free = |joint: &dynident_model::Joint| if joint.turns() { core::f64::consts::PI } else { 0.5 };
+    let mut ranges: Vec<[f64; 2]> = limits.model().joints().iter().map(|joint| [-free(joint), free(joint)]).collect();
+    let mut speeds = vec![UNKNOWN_SPEED; ranges.len()];
+    for band in limits.bands() {
+        let middle = limits.constraints()[band.row].middle;
+        match band.order {
+            0 => {
+                let range = &mut ranges[band.joint];
+                let [lower, upper] = [middle - band.half, middle + band.half];
+                // A range that lies beyond half a turn is taken as it is.
+                *range = if lower < range[1] && upper > range[0] {
+                    [lower.max(range[0]), upper.min(range[1])]
+                } else {
+                    [lower, upper]
+                };
+            }
+            1 => speeds[band.joint] = band.half,
+            _ => {}
+        }
+    }
+    (ranges, speeds)
 }
+
+/// Speed of random starts where none is limited, rad/s (m/s).
+const UNKNOWN_SPEED: f64 = 2.0;

@@ -27,6 +27,9 @@ struct Options {
     /// Random starts of one design.
     #[arg(long, default_value_t = 4)]
     starts: usize,
+    /// Rounds of restarts around the best of one design.
+    #[arg(long, default_value_t = 0)]
+    rounds: usize,
     /// Studies with the limits.
     #[arg(default_values_t = ["ur10", "panda", "iiwa14"].map(|robot| format!("examples/design_{robot}.toml")))]
     studies: Vec<String>,
@@ -97,7 +100,7 @@ fn best(path: &Path, family: &str, choice: &CriterionChoice, options: &Options) 
     section.criterion = choice.clone();
     section.optimiser = OptimiserChoice::Gradient;
     section.search.starts = options.starts;
-    section.search.rounds = 0;
+    section.search.rounds = options.rounds;
     let run = RunOptions { data: None, threads: 1, progress: &dynident::Silent };
     let begun = clock();
     let (mut found, mut evaluations, mut designs): (Option<DesignFile>, usize, u64) = (None, 0, 0);

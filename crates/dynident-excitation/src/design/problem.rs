@@ -9,6 +9,12 @@ use crate::motion::Motion;
 use crate::optimisers::{ConstrainedProblem, Known};
 use nalgebra::DMatrix;
 
+/// A place that is broken weighs so much more than a speed: a search may wander outside a joint's limits and come back, but not to the other side of an obstacle.
+const PLACE_SCALE: f64 = 5.0;
+
+/// No step leads deeper into an obstacle than this share of its limit (metres for a floor): penalties alone do not keep a long step from ending on its other side.
+const WALL: f64 = 0.16;
+
 /// Criterion and limits of one trajectory as functions of the family's parameters.
 pub(super) struct Problem<'a> {
     task: &'a DesignTask<'a>,
@@ -19,6 +25,11 @@ pub(super) struct Problem<'a> {
     weight: f64,
     information: Information<'a>,
     workspace: LimitWorkspace,
+    /// What each row's values are multiplied by.
+    scales: Vec<f64>,
+    scaled_weights: Vec<f64>,
+    /// How far places may be broken: [`WALL`], or as far as the first motion does.
+    wall: Option<f64>,
     parameters: Vec<f64>,
     /// Where the gradient was last asked for; a rejected trial may have followed.
     at_gradient: Vec<f64>,
@@ -45,6 +56,14 @@ impl<'a> Problem<'a> {
                 workspace.sweep();
                 workspace
             },
+            scales: task
+                .limits
+                .constraints()
+                .iter()
+                .map(|constraint| if constraint.kind.is_place() { PLACE_SCALE } else { 1.0 })
+                .collect(),
+            scaled_weights: Vec::new(),
+            wall: None,
             task,
             margins,
             criterion,
@@ -58,6 +77,19 @@ impl<'a> Problem<'a> {
             values: Vec::new(),
             metric: if shaped { Metric::new(task, times) } else { None },
         }
+    }
+}
+
+impl Problem<'_> {
+    /// Whether the motion breaks places so deeply that it may have come to the other side of an obstacle.
+    fn beyond_the_wall(&mut self) -> bool {
+        if !self.task.limits.has_places() {
+            return false;
+        }
+        let rows = self.values.chunks_exact(self.times.len()).zip(self.task.limits.constraints());
+        let places = rows.filter(|(_, constraint)| constraint.kind.is_place()).flat_map(|(values, _)| values);
+        let deepest = places.fold(0.0, |deepest: f64, value| deepest.max(*value));
+        deepest > *self.wall.get_or_insert(deepest.max(WALL))
     }
 }
 
@@ -78,14 +110,19 @@ impl ConstrainedProblem for Problem<'_> {
         self.parameters = x.to_vec();
         self.task.family.motion(x, self.times, &mut self.motion);
         self.task.limits.values(&mut self.workspace, &self.motion, &mut self.values);
-        for ((to, from), margin) in constraints
+        for (((to, from), margin), scale) in constraints
             .chunks_exact_mut(self.times.len())
             .zip(self.values.chunks_exact(self.times.len()))
             .zip(self.margins)
+            .zip(&self.scales)
         {
             for (to, from) in to.iter_mut().zip(from) {
-                *to = from + margin;
+                *to = scale * (from + margin);
             }
+        }
+        if self.beyond_the_wall() {
+            self.by_information = None;
+            return f64::INFINITY;
         }
         let information = self.information.of(&self.motion, self.weight);
         if let Some((value, derivative)) = self.criterion.value_and_derivative(&information) {
@@ -101,7 +138,11 @@ impl ConstrainedProblem for Problem<'_> {
         gradient.fill(0.0);
         self.at_gradient.clone_from(&self.parameters);
         self.cotangent.reset(self.motion.joints, self.motion.samples);
-        self.task.limits.pull_back(&mut self.workspace, &self.motion, weights, &mut self.cotangent);
+        self.scaled_weights.clear();
+        for (weights, scale) in weights.chunks_exact(self.times.len()).zip(&self.scales) {
+            self.scaled_weights.extend(weights.iter().map(|weight| scale * weight));
+        }
+        self.task.limits.pull_back(&mut self.workspace, &self.motion, &self.scaled_weights, &mut self.cotangent);
         if let Some(derivative) = &self.by_information {
             self.information.pull_back(&self.motion, self.weight, derivative, &mut self.cotangent);
         }

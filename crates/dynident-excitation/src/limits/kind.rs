@@ -35,6 +35,11 @@ impl LimitKind {
         matches!(self, Self::Speed | Self::Acceleration | Self::Jerk | Self::Torque | Self::Power)
     }
 
+    /// True for limits on where points of the arm are, which no single joint decides.
+    pub fn is_place(self) -> bool {
+        matches!(self, Self::Box | Self::Floor | Self::Column | Self::SelfCollision)
+    }
+
     /// True where the limit is a least distance and not a largest magnitude.
     pub fn is_clearance(self) -> bool {
         matches!(self, Self::Floor | Self::Column | Self::SelfCollision)
