@@ -80,9 +80,6 @@ impl Equations {
         }
     }
 
-    pub(super) fn dof(&self) -> usize {
-        self.zeros.len()
-    }
 
     pub(super) fn workspace(&mut self) -> (&Model, &mut Workspace) {
         (&self.model, &mut self.workspace)

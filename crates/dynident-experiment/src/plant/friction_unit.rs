@@ -111,6 +111,7 @@ impl FrictionUnit {
     }
 
     /// Largest friction at rest against motion forward and backward.
+    #[cfg(test)]
     pub(super) fn level(&self) -> [f64; 2] {
         self.level
     }
