@@ -51,7 +51,9 @@ pub enum ExperimentError {
         value: f64,
     },
     /// The mass matrix has no inverse: some joint moves nothing.
-    #[error("the simulated robot's mass matrix is not positive definite at the start: give every body at the tip a mass and an inertia, or its drive an inertia")]
+    #[error(
+        "the simulated robot's mass matrix is not positive definite at the start: give every body at the tip a mass and an inertia, or its drive an inertia"
+    )]
     MassMatrix,
     /// A model's parts do not fit.
     #[error(transparent)]
@@ -72,10 +74,6 @@ pub(crate) fn require(
 }
 
 /// `Ok` if the numbers are equal, else [`ExperimentError::Length`].
-pub(crate) fn require_length(
-    what: impl Into<String>,
-    expected: usize,
-    found: usize,
-) -> Result<(), ExperimentError> {
+pub(crate) fn require_length(what: impl Into<String>, expected: usize, found: usize) -> Result<(), ExperimentError> {
     if expected == found { Ok(()) } else { Err(ExperimentError::Length { what: what.into(), expected, found }) }
 }

@@ -70,8 +70,7 @@ impl SensorSettings {
         let rate_hz = self.record_rate_hz.unwrap_or(run.rate_hz);
         let stretch = 1.0 + 1e-6 * self.clock_drift_ppm;
         let end_s = run.samples.saturating_sub(1) as f64 / run.rate_hz;
-        let samples =
-            if run.samples == 0 { 0 } else { (end_s * rate_hz / stretch + 1e-9).floor() as usize + 1 };
+        let samples = if run.samples == 0 { 0 } else { (end_s * rate_hz / stretch + 1e-9).floor() as usize + 1 };
         let [mut position, mut torque, mut instant] = STREAMS.map(|stream| Random::new(self.seed ^ stream));
         let times_s: Vec<f64> = (0..samples).map(|sample| sample as f64 / rate_hz).collect();
         let true_times: Vec<f64> = times_s

@@ -22,9 +22,11 @@ impl Reference {
     pub fn new(rate_hz: f64, motion: Motion) -> Result<Self, ExperimentError> {
         require_rate(rate_hz)?;
         require(motion.samples >= 1 && motion.joints >= 1, "samples of the reference", 0.0, "give one or more")?;
-        for (what, values) in
-            [("reference positions", &motion.q), ("reference speeds", &motion.dq), ("reference accelerations", &motion.ddq)]
-        {
+        for (what, values) in [
+            ("reference positions", &motion.q),
+            ("reference speeds", &motion.dq),
+            ("reference accelerations", &motion.ddq),
+        ] {
             require_length(what, motion.samples * motion.joints, values.len())?;
             for &value in values {
                 require(value.is_finite(), what, value, "give finite numbers")?;

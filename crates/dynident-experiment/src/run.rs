@@ -101,7 +101,11 @@ impl core::fmt::Display for RunStatus {
         match self {
             Self::Done => write!(f, "done"),
             Self::LimitBroken { time_s, joint, quantity, value, limit } => {
-                write!(f, "stopped at {time_s:.3} s: {} of {joint} is {value:.4}, its limit {limit:.4}", quantity.name())
+                write!(
+                    f,
+                    "stopped at {time_s:.3} s: {} of {joint} is {value:.4}, its limit {limit:.4}",
+                    quantity.name()
+                )
             }
             Self::Diverged { time_s, reason } => write!(f, "diverged at {time_s:.3} s: {reason}"),
         }
@@ -167,7 +171,8 @@ impl Run {
             return;
         }
         let Motion { q, dq, ddq, dddq, .. } = &mut self.reference;
-        let own = [&mut self.q, &mut self.dq, &mut self.ddq, &mut self.tau, &mut self.measured_q, &mut self.measured_dq];
+        let own =
+            [&mut self.q, &mut self.dq, &mut self.ddq, &mut self.tau, &mut self.measured_q, &mut self.measured_dq];
         for values in own.into_iter().chain([q, dq, ddq, dddq]) {
             if values.len() == joints * before {
                 for joint in 0..joints {

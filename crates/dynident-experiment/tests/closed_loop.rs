@@ -2,12 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+use dynident_excitation::Motion;
 use dynident_experiment::controllers::{JointPd, JointPdSettings, Measured, Target};
 use dynident_experiment::{
     Controller, Divergence, Integrator, LimitedQuantity, LoopSettings, Plant, Reference, Run, RunLimits, RunStatus,
     SensorSettings, SpeedSource, Start, closed_loop,
 };
-use dynident_excitation::Motion;
 use dynident_model::sample::planar_2r;
 use dynident_model::{InertialParameters, Mat3, Vec3};
 
@@ -180,9 +180,8 @@ fn encoders_quantise_and_noise_has_its_size() {
     let step = core::f64::consts::TAU / 4096.0;
     assert!(record.q.iter().all(|q| (q / step - (q / step).round()).abs() < 1e-6));
     assert!(record.tau.iter().all(|tau| (tau / 1e-3 - (tau / 1e-3).round()).abs() < 1e-6));
-    let std = |a: &[f64], b: &[f64]| {
-        (a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / a.len() as f64).sqrt()
-    };
+    let std =
+        |a: &[f64], b: &[f64]| (a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / a.len() as f64).sqrt();
     // White noise and a uniform error of a step: σ² + Δ²/12, to five standard errors of 20,000 samples.
     let expected = (1e-6 + step * step / 12.0).sqrt();
     assert!((std(&record.q, &run.q) / expected - 1.0).abs() < 0.03);
@@ -226,10 +225,8 @@ fn channels_come_late_and_clocks_drift() {
 /// Speeds by differences lag by half a sample and the filter's `1/(2πf)`; feedback that comes late makes the loop softer.
 #[test]
 fn feedback_by_encoders_and_late() {
-    let (_, own, _) = sine_run(SensorSettings {
-        speed: SpeedSource::Differences { cutoff_hz: 50.0 },
-        ..SensorSettings::default()
-    });
+    let (_, own, _) =
+        sine_run(SensorSettings { speed: SpeedSource::Differences { cutoff_hz: 50.0 }, ..SensorSettings::default() });
     let lag_s = 0.5e-3 + 1.0 / (core::f64::consts::TAU * 50.0);
     let own_range = own.of(0);
     let (seen, truth) = (&own.measured_dq[own_range.clone()], &own.dq[own_range]);
@@ -240,8 +237,7 @@ fn feedback_by_encoders_and_late() {
         // The exact exponential's lag differs from 1/(2πf) by up to half a sample: 1e-3 s of 2 rad/s².
         assert!((seen[k] - expected).abs() < 2e-3, "{k} {} {expected}", seen[k]);
     }
-    let (_, delayed, _) =
-        sine_run(SensorSettings { feedback_delay_samples: 3, ..SensorSettings::default() });
+    let (_, delayed, _) = sine_run(SensorSettings { feedback_delay_samples: 3, ..SensorSettings::default() });
     let range = delayed.of(0);
     let (seen, truth) = (&delayed.measured_q[range.clone()], &delayed.q[range]);
     assert_eq!(seen[100..], truth[97..truth.len() - 3]);

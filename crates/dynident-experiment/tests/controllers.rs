@@ -155,12 +155,8 @@ fn slotine_li_has_the_skew_matrix() {
     let mut random = Random::new(3);
     let mut vector = || (0..dof).map(|_| random.uniform(-1.0, 1.0)).collect::<Vec<f64>>();
     let (q, u, v, w) = (vector(), vector(), vector(), vector());
-    let settings = SlotineLiSettings {
-        lambda: 0.0.into(),
-        kd: 0.0.into(),
-        gamma: 0.0,
-        friction: FrictionCompensation::None,
-    };
+    let settings =
+        SlotineLiSettings { lambda: 0.0.into(), kd: 0.0.into(), gamma: 0.0, friction: FrictionCompensation::None };
     let mut controller = SlotineLi::new(ControllerModel::new(&model, &[], &[]).unwrap(), &settings).unwrap();
     let mut torque = |measured: &[f64], reference: &[f64], acceleration: &[f64]| {
         let mut tau = vec![0.0; dof];
@@ -195,12 +191,8 @@ fn slotine_li_adapts() {
     let nothing = ControllerModel::from_parameters(&paper_arm(), &laws, &[0.0; 28]).unwrap();
     let reference = sines(1000.0, 20.0);
     let mut late = |gamma: f64| {
-        let settings = SlotineLiSettings {
-            lambda: 5.0.into(),
-            kd: 20.0.into(),
-            gamma,
-            friction: FrictionCompensation::Reference,
-        };
+        let settings =
+            SlotineLiSettings { lambda: 5.0.into(), kd: 20.0.into(), gamma, friction: FrictionCompensation::Reference };
         let mut controller = ControllerSettings::SlotineLi(settings).build(2, Some(&nothing)).unwrap();
         let own = run(&mut plant, controller.as_mut(), &reference, Start::Reference);
         assert!(own.status.is_done());
@@ -210,7 +202,8 @@ fn slotine_li_adapts() {
     assert!(adapted < 0.1 * fixed, "{fixed} {adapted}");
     // With the true model from the start there is nothing to learn: what is left is the sampling.
     let exact = ControllerModel::new(&paper_arm(), &laws, &values).unwrap();
-    let settings = SlotineLiSettings { lambda: 5.0.into(), kd: 20.0.into(), gamma: 0.0, friction: FrictionCompensation::Measured };
+    let settings =
+        SlotineLiSettings { lambda: 5.0.into(), kd: 20.0.into(), gamma: 0.0, friction: FrictionCompensation::Measured };
     let mut controller = ControllerSettings::SlotineLi(settings).build(2, Some(&exact)).unwrap();
     let own = run(&mut plant, controller.as_mut(), &reference, Start::Reference);
     assert!(own.max_error[0] < 2e-3, "{}", own.max_error[0]);
@@ -256,8 +249,7 @@ fn base_parameters_are_enough() {
 #[test]
 fn the_papers_first_run() {
     let (amplitude, omega) = (2.094, 0.996);
-    let settings =
-        SplicedLogisticSettings { offsets: Some(vec![0.0, 0.0]), ..SplicedLogisticSettings::default() };
+    let settings = SplicedLogisticSettings { offsets: Some(vec![0.0, 0.0]), ..SplicedLogisticSettings::default() };
     let family = SplicedLogistic::new(2, 40.0 / omega, &settings).unwrap();
     let reference = Reference::of_family(&family, &[1.0, omega, amplitude, omega], 100.0, None)
         .unwrap()

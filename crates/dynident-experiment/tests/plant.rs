@@ -16,6 +16,8 @@ const EULER: Integrator = Integrator::SemiImplicitEuler { steps_per_sample: 1 };
 const RK4: Integrator = Integrator::Rk4 { steps_per_sample: 1 };
 const TIGHT: Integrator = Integrator::Adaptive { relative_tolerance: 1e-11, absolute_tolerance: 1e-11 };
 
+type Make = fn(usize) -> Integrator;
+
 fn point(mass: f64) -> InertialParameters {
     InertialParameters::from_centre_of_mass(mass, Vec3([1.0, 0.0, 0.0]), &Mat3::ZERO)
 }
@@ -72,10 +74,7 @@ fn methods_have_their_order() {
         plant.q().to_vec()
     };
     let truth = end(TIGHT);
-    let mut error = |integrator| {
-        end(integrator).iter().zip(&truth).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-    };
-    type Make = fn(usize) -> Integrator;
+    let mut error = |integrator| end(integrator).iter().zip(&truth).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let euler: Make = |steps_per_sample| Integrator::SemiImplicitEuler { steps_per_sample };
     let rk4: Make = |steps_per_sample| Integrator::Rk4 { steps_per_sample };
     for (make, steps, order) in [(euler, 16, 2.0), (rk4, 2, 16.0)] {

@@ -61,8 +61,8 @@ impl Controller for JointPd {
     fn torque(&mut self, _time_s: f64, target: Target<'_>, measured: Measured<'_>, tau: &mut [f64]) {
         let [kp, kd] = &self.gains;
         for joint in 0..kp.len() {
-            tau[joint] = kp[joint] * (target.q[joint] - measured.q[joint])
-                + kd[joint] * (target.dq[joint] - measured.dq[joint]);
+            tau[joint] =
+                kp[joint] * (target.q[joint] - measured.q[joint]) + kd[joint] * (target.dq[joint] - measured.dq[joint]);
         }
     }
 }

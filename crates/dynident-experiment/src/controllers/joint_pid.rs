@@ -49,11 +49,8 @@ impl JointPid {
     /// # Errors
     /// As [`JointPidSettings::validate`].
     pub fn new(joints: usize, settings: &JointPidSettings) -> Result<Self, ExperimentError> {
-        let gains = [
-            settings.kp.gains("kp", joints)?,
-            settings.ki.gains("ki", joints)?,
-            settings.kd.gains("kd", joints)?,
-        ];
+        let gains =
+            [settings.kp.gains("kp", joints)?, settings.ki.gains("ki", joints)?, settings.kd.gains("kd", joints)?];
         let limit = match &settings.integral_limit {
             Some(limit) => limit.gains("integral_limit", joints)?,
             None => vec![f64::INFINITY; joints],

@@ -33,7 +33,10 @@ pub struct ControllerModel {
 
 impl core::fmt::Debug for ControllerModel {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("ControllerModel").field("model", &self.model.name()).field("laws", &self.laws).finish_non_exhaustive()
+        f.debug_struct("ControllerModel")
+            .field("model", &self.model.name())
+            .field("laws", &self.laws)
+            .finish_non_exhaustive()
     }
 }
 

@@ -143,7 +143,12 @@ mod tests {
             let point = [0.1, -0.2, 0.3];
             let placed = Placed::new(
                 &model,
-                &Disturbance::Body { joint: name, point_m: point, force_n: [1.0, 2.0, -3.0], time: TimeCourse::Constant },
+                &Disturbance::Body {
+                    joint: name,
+                    point_m: point,
+                    force_n: [1.0, 2.0, -3.0],
+                    time: TimeCourse::Constant,
+                },
             )
             .unwrap();
             let q: Vec<f64> = (0..6).map(|j| 0.3 * f64::from(j) - 0.5).collect();

@@ -3,7 +3,7 @@
 use super::friction_unit::FrictionUnit;
 use crate::error::{ExperimentError, require, require_length};
 use dynident_model::Model;
-use dynident_model::laws::{CouplingEffect, Coulomb, JointMotion, Law, LawInput, LawMemory};
+use dynident_model::laws::{Coulomb, CouplingEffect, JointMotion, Law, LawInput, LawMemory};
 
 /// Laws with their parameters: constants of the mass matrix and of the torque, linear damping, springs that slip, and friction that follows a speed.
 #[derive(Clone, Debug)]
@@ -56,18 +56,24 @@ impl Drives {
                 Law::DriveInertia(law) => drives.inertia.push((law.joint, law.joint, value)),
                 Law::Offset(law) => drives.constant[law.joint] += value,
                 Law::Viscous(law) => drives.viscous.push((law.joint, law.joint, value)),
-                Law::MaxwellSlip(slip) => drives.slips.push(Slip {
-                    joint: slip.joint,
-                    law: law.clone(),
-                    value,
-                    memory: LawMemory::default(),
-                }),
+                Law::MaxwellSlip(slip) => {
+                    drives.slips.push(Slip {
+                        joint: slip.joint,
+                        law: law.clone(),
+                        value,
+                        memory: LawMemory::default(),
+                    });
+                }
                 Law::Coupling(coupling) => {
                     let [first, second] = [coupling.first, coupling.second];
                     let cross = coupling.ratios[0] * coupling.ratios[1] * value;
                     match coupling.effect {
-                        CouplingEffect::Inertia => drives.inertia.extend([(first, second, cross), (second, first, cross)]),
-                        CouplingEffect::Viscous => drives.viscous.extend([(first, second, cross), (second, first, cross)]),
+                        CouplingEffect::Inertia => {
+                            drives.inertia.extend([(first, second, cross), (second, first, cross)]);
+                        }
+                        CouplingEffect::Viscous => {
+                            drives.viscous.extend([(first, second, cross), (second, first, cross)]);
+                        }
                         CouplingEffect::Coulomb(shape) => {
                             if value < 0.0 {
                                 return Err(ExperimentError::Negative { law: law.symbol(), value });

@@ -1,11 +1,11 @@
 //! The equation of motion of a simulated robot, put together at one state: `M q̈ = τ + d(t) - h(q, q̇) - τ₀ - springs - F_v q̇ - Cᵀ f`.
 
+use super::PlantFault;
 use super::disturbance::Placed;
 use super::drives::Drives;
 use super::factor::{cholesky, eliminate, solve};
 use super::friction_solver::FrictionSolver;
 use super::friction_unit::FrictionUnit;
-use super::PlantFault;
 use dynident_dynamics::{Workspace, inverse_dynamics, mass_matrix};
 use dynident_model::Model;
 
@@ -79,7 +79,6 @@ impl Equations {
             drives,
         }
     }
-
 
     pub(super) fn workspace(&mut self) -> (&Model, &mut Workspace) {
         (&self.model, &mut self.workspace)
@@ -198,8 +197,7 @@ impl Equations {
             self.free[place] = factor * unit.speed(&self.acceleration) + start.map_or(0.0, |dq| unit.speed(dq));
         }
         let Self { drives, compliance, free, solver, chosen, .. } = self;
-        let settled =
-            solver.solve(&drives.units, chosen, &compliance[..count * count], &free[..count], factor, jumps);
+        let settled = solver.solve(&drives.units, chosen, &compliance[..count * count], &free[..count], factor, jumps);
         self.unsettled += usize::from(!settled);
         self.push_back();
     }

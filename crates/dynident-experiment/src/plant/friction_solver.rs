@@ -13,6 +13,8 @@ use super::friction_unit::{FrictionUnit, Resolved};
 const ROUNDS: usize = 400;
 /// Share of the largest speed below which a change counts as none.
 const SETTLED: f64 = 1e-13;
+/// Speeds below this are none: their products are too small for floating-point numbers.
+const NONE: f64 = 1e-250;
 
 /// Torques and scratch, kept from step to step: the last solution is the next start.
 #[derive(Clone, Debug, Default)]
@@ -52,7 +54,7 @@ impl FrictionSolver {
             return true;
         }
         for _ in 0..ROUNDS {
-            if self.sweep(&problem) <= SETTLED * scale {
+            if self.sweep(&problem) <= SETTLED * scale.max(NONE) {
                 return true;
             }
             if self.newton(&problem) && problem.defect(&self.trial) < problem.defect(&self.torque) {
@@ -155,9 +157,8 @@ mod tests {
         for _ in 0..300 {
             let n = 1 + (random.bits() % 8) as usize;
             let root: Vec<f64> = (0..n * n).map(|_| 1.0 + 0.3 * random.normal()).collect();
-            let a: Vec<f64> = (0..n * n)
-                .map(|at| (0..n).map(|k| root[at / n * n + k] * root[at % n * n + k]).sum::<f64>())
-                .collect();
+            let a: Vec<f64> =
+                (0..n * n).map(|at| (0..n).map(|k| root[at / n * n + k] * root[at % n * n + k]).sum::<f64>()).collect();
             let units: Vec<FrictionUnit> = (0..n)
                 .map(|joint| {
                     let mut unit = FrictionUnit::new(vec![(joint, 1.0)]);

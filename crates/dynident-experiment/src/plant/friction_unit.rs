@@ -34,7 +34,6 @@ pub(super) struct FrictionUnit {
     steps: bool,
     smooth: bool,
     pub(super) by_load: bool,
-    fading: bool,
 }
 
 /// Where the friction of a unit ends up.
@@ -79,7 +78,6 @@ impl FrictionUnit {
             Shape::Smooth(_) => self.smooth = true,
         }
         self.by_load |= by_load;
-        self.fading |= fading.is_some();
         self.terms.push(Term { value, by_load, fading, shape, size: if by_load { 0.0 } else { value } });
         self.update(0.0, 0.0);
     }

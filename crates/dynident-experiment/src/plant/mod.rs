@@ -86,7 +86,10 @@ pub struct Plant {
 
 impl core::fmt::Debug for Plant {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("Plant").field("model", &self.equations.model.name()).field("state", &self.state).finish_non_exhaustive()
+        f.debug_struct("Plant")
+            .field("model", &self.equations.model.name())
+            .field("state", &self.state)
+            .finish_non_exhaustive()
     }
 }
 
@@ -116,7 +119,8 @@ impl Plant {
     /// # Errors
     /// A joint that does not exist, a number that is not finite.
     pub fn with_disturbances(mut self, disturbances: &[Disturbance]) -> Result<Self, ExperimentError> {
-        let placed = disturbances.iter().map(|one| Placed::new(&self.equations.model, one)).collect::<Result<_, _>>()?;
+        let placed =
+            disturbances.iter().map(|one| Placed::new(&self.equations.model, one)).collect::<Result<_, _>>()?;
         self.equations.disturbances = placed;
         Ok(self)
     }

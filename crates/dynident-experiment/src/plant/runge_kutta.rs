@@ -95,12 +95,7 @@ pub(super) fn margin(equations: &Equations, dq: &[f64]) -> f64 {
 }
 
 /// Shortens the step to where the first sliding unit comes to rest, and puts that unit to rest. None if the units that cross zero began at rest: there is no such place.
-fn stop(
-    equations: &mut Equations,
-    stages: &mut Stages,
-    at: At<'_>,
-    h: f64,
-) -> Result<Option<f64>, PlantFault> {
+fn stop(equations: &mut Equations, stages: &mut Stages, at: At<'_>, h: f64) -> Result<Option<f64>, PlantFault> {
     let (mut low, mut at_low) = (0.0, margin(equations, at.dq));
     let (mut high, mut at_high) = (h, margin(equations, &stages.dq_next));
     if at_low <= 0.0 {
