@@ -54,7 +54,7 @@ impl<'a> Feedback<'a> {
     #[inline]
     pub(crate) fn read(&mut self, q: &[f64], dq: &[f64]) {
         let joints = q.len();
-        self.place = (self.place + 1) % self.slots;
+        self.place = self.after(self.place);
         let own = self.place * joints;
         for joint in 0..joints {
             let reading = self.settings.position(joint, q[joint], self.turns[joint], &mut self.random);
@@ -83,9 +83,13 @@ impl<'a> Feedback<'a> {
         }
     }
 
+    fn after(&self, place: usize) -> usize {
+        if place + 1 == self.slots { 0 } else { place + 1 }
+    }
+
     pub(crate) fn measured(&self) -> Measured<'_> {
         let joints = self.last_q.len();
-        let oldest = (self.place + 1) % self.slots * joints;
+        let oldest = self.after(self.place) * joints;
         Measured { q: &self.q[oldest..oldest + joints], dq: &self.dq[oldest..oldest + joints] }
     }
 }

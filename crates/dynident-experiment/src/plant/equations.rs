@@ -3,7 +3,7 @@
 use super::PlantFault;
 use super::disturbance::Placed;
 use super::drives::Drives;
-use super::factor::{cholesky, eliminate, solve};
+use super::factor::{eliminate, factor, solve};
 use super::friction_solver::FrictionSolver;
 use super::friction_unit::FrictionUnit;
 use dynident_dynamics::{Workspace, inverse_dynamics, mass_matrix};
@@ -149,7 +149,7 @@ impl Equations {
     #[inline]
     pub(super) fn factor_and_solve(&mut self) -> Result<(), PlantFault> {
         let n = self.zeros.len();
-        if !cholesky(&mut self.matrix, n) {
+        if !factor(&mut self.matrix, n) {
             return Err(PlantFault::MassMatrix);
         }
         solve(&self.matrix, n, &mut self.acceleration);

@@ -1,47 +1,108 @@
 //! Factors of small symmetric positive definite matrices, row-major, without allocation.
 
-/// `A = L Lᵀ` in the lower triangle of `a` (n × n); the diagonal holds 1/L_ii. False if `A` is not positive definite (or not a number).
+/// `A = L D Lᵀ` in the lower triangle of `a` (n × n); the diagonal holds 1/D_ii, the upper triangle is not used. False if `A` is not positive definite (or not a number).
 #[inline]
-pub(super) fn cholesky(a: &mut [f64], n: usize) -> bool {
-    for i in 0..n {
-        let (above, rest) = a.split_at_mut(i * n);
-        let row = &mut rest[..=i];
-        for j in 0..i {
-            let other = &above[j * n..=j * n + j];
-            let mut sum = row[j];
-            for k in 0..j {
-                sum -= row[k] * other[k];
+pub(super) fn factor(a: &mut [f64], n: usize) -> bool {
+    // Sizes known to the compiler: arms have six or seven joints, and loops that end there are unrolled.
+    match n {
+        2 => factor_of::<2>(a),
+        6 => factor_of::<6>(a),
+        7 => factor_of::<7>(a),
+        _ => {
+            for j in 0..n {
+                let pivot = a[j * n + j];
+                if !is_pivot(pivot) {
+                    return false;
+                }
+                let inverse = pivot.recip();
+                for i in j + 1..n {
+                    let ratio = a[i * n + j] * inverse;
+                    for k in j + 1..=i {
+                        a[i * n + k] -= ratio * a[k * n + j];
+                    }
+                }
+                scale_column(a, n, j, inverse);
             }
-            row[j] = sum * other[j];
+            true
         }
-        let mut square = row[i];
-        for &x in &row[..i] {
-            square -= x * x;
-        }
-        // False for NaN as well.
-        if !(square > 0.0 && square < f64::INFINITY) {
+    }
+}
+
+fn is_pivot(pivot: f64) -> bool {
+    // False for NaN as well.
+    pivot > 0.0 && pivot < f64::INFINITY
+}
+
+fn scale_column(a: &mut [f64], n: usize, j: usize, inverse: f64) {
+    for i in j + 1..n {
+        a[i * n + j] *= inverse;
+    }
+    a[j * n + j] = inverse;
+}
+
+#[inline(always)]
+fn factor_of<const N: usize>(a: &mut [f64]) -> bool {
+    let (rows, _) = a.as_chunks_mut::<N>();
+    let Ok(m) = <&mut [[f64; N]; N]>::try_from(rows) else { return false };
+    for j in 0..N {
+        let pivot = m[j][j];
+        if !is_pivot(pivot) {
             return false;
         }
-        row[i] = square.sqrt().recip();
+        let inverse = pivot.recip();
+        for i in j + 1..N {
+            let ratio = m[i][j] * inverse;
+            for k in j + 1..=i {
+                m[i][k] -= ratio * m[k][j];
+            }
+        }
+        for row in m.iter_mut().skip(j + 1) {
+            row[j] *= inverse;
+        }
+        m[j][j] = inverse;
     }
     true
 }
 
-/// Solves `L Lᵀ x = b` in place, with the factor of [`cholesky`].
+/// Solves `L D Lᵀ x = b` in place, with the result of [`factor`].
 #[inline]
 pub(super) fn solve(l: &[f64], n: usize, b: &mut [f64]) {
-    for i in 0..n {
-        let mut sum = b[i];
-        for k in 0..i {
-            sum -= l[i * n + k] * b[k];
+    match n {
+        2 => solve_of::<2>(l, b),
+        6 => solve_of::<6>(l, b),
+        7 => solve_of::<7>(l, b),
+        _ => {
+            for i in 0..n {
+                let x = b[i];
+                for k in i + 1..n {
+                    b[k] -= l[k * n + i] * x;
+                }
+            }
+            for i in (0..n).rev() {
+                let x = b[i];
+                b[i] = l[i * n + i] * x - (i + 1..n).map(|k| l[k * n + i] * b[k]).sum::<f64>();
+            }
         }
-        b[i] = sum * l[i * n + i];
     }
-    for i in (0..n).rev() {
-        let x = b[i] * l[i * n + i];
-        b[i] = x;
+}
+
+#[inline(always)]
+fn solve_of<const N: usize>(l: &[f64], b: &mut [f64]) {
+    let (rows, _) = l.as_chunks::<N>();
+    let (Ok(l), Ok(b)) = (<&[[f64; N]; N]>::try_from(rows), <&mut [f64; N]>::try_from(b)) else { return };
+    for i in 0..N {
+        let x = b[i];
+        for k in i + 1..N {
+            b[k] -= l[k][i] * x;
+        }
+    }
+    for i in 0..N {
+        b[i] *= l[i][i];
+    }
+    for i in (0..N).rev() {
+        let x = b[i];
         for k in 0..i {
-            b[k] -= l[i * n + k] * x;
+            b[k] -= l[i][k] * x;
         }
     }
 }
@@ -89,16 +150,16 @@ mod tests {
     #[test]
     fn solutions_solve() {
         let mut random = Random::new(1);
-        for n in 1..=8 {
+        for n in 1..=9 {
             let root: Vec<f64> = (0..n * n).map(|_| random.normal()).collect();
             let entry = |i: usize, j: usize| {
                 (0..n).map(|k| root[i * n + k] * root[j * n + k]).sum::<f64>() + if i == j { 0.1 } else { 0.0 }
             };
             let a: Vec<f64> = (0..n * n).map(|at| entry(at / n, at % n)).collect();
             let b: Vec<f64> = (0..n).map(|_| random.normal()).collect();
-            let (mut factor, mut x) = (a.clone(), b.clone());
-            assert!(cholesky(&mut factor, n));
-            solve(&factor, n, &mut x);
+            let (mut lower, mut x) = (a.clone(), b.clone());
+            assert!(factor(&mut lower, n));
+            solve(&lower, n, &mut x);
             let (mut used, mut y) = (a.clone(), b.clone());
             assert!(eliminate(&mut used, n, &mut y));
             for solution in [x, y] {
@@ -108,7 +169,7 @@ mod tests {
                 }
             }
         }
-        assert!(!cholesky(&mut [1.0, 2.0, 2.0, 1.0], 2) && !cholesky(&mut [f64::NAN], 1));
+        assert!(!factor(&mut [1.0, 2.0, 2.0, 1.0], 2) && !factor(&mut [f64::NAN], 1));
         assert!(!eliminate(&mut [0.0], 1, &mut [1.0]));
     }
 }
