@@ -2,15 +2,17 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use dynident_experiment::controllers::{ComputedTorqueSettings, JointPdSettings};
+use dynident_excitation::Motion;
+use dynident_experiment::controllers::{ComputedTorqueSettings, FiniteTimeSettings, JointPdSettings};
 use dynident_experiment::robot::{
-    FolderRobot, FolderSettings, ProcessLimits, ProcessMode, ProcessRobot, ProcessSettings, controller_json,
-    trajectory_csv,
+    FolderRobot, FolderSettings, ProcessLimits, ProcessMode, ProcessRobot, ProcessSettings, ToClient, ToHost,
+    controller_json, trajectory_csv,
 };
 use dynident_experiment::{
     ControllerModel, ControllerSettings, LoopSettings, Plant, Reference, Robot, RobotFault, RobotRun, RobotStatus,
     RunRequest, SimulatedRobot,
 };
+use dynident_model::laws::{Law, Viscous};
 use dynident_model::{Model, load_robot};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -185,6 +187,31 @@ fn a_folder_waits_for_its_log() {
     assert_eq!(stopped.record.samples, 99);
 }
 
+/// The book's lines are the protocol's: a program's can be read, and Dynident's are what it writes.
+#[test]
+fn the_book_tells_the_protocol() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/robot-protocol.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let (trajectory, controller) = ("/…/run_1/trajectory.csv".to_owned(), "/…/run_1/controller.json".to_owned());
+    let own = [
+        ToClient::Run { run: 1, rate_hz: 1000.0, duration_s: 10.0, trajectory, controller },
+        ToClient::Begin { run: 1, rate_hz: 1000.0, samples: 10_001, q: vec![0.1, 0.2], dq: vec![0.0, 0.0] },
+        ToClient::Torque { tau: vec![3.1, 0.4] },
+        ToClient::Finish {},
+        ToClient::Bye {},
+    ];
+    let mut own: Vec<String> = own.iter().map(|message| serde_json::to_string(message).unwrap()).collect();
+    assert!(page.contains(&own.pop().unwrap()));
+    let mut read = 0;
+    for line in page.lines().filter(|line| line.starts_with('{')) {
+        if !own.contains(&line.to_owned()) {
+            serde_json::from_str::<ToHost>(line).unwrap_or_else(|error| panic!("{line}: {error}"));
+            read += 1;
+        }
+    }
+    assert!(read >= 7 && own.iter().all(|line| page.contains(line)), "{read}");
+}
+
 /// What is handed over holds the controller's torque: the table's is the model's inverse dynamics, the file's numbers are the model's.
 #[test]
 fn what_is_handed_over_is_enough() {
@@ -214,4 +241,54 @@ fn what_is_handed_over_is_enough() {
     // Requests without meaning are refused before anybody is spoken to.
     let mut robot = ProcessRobot::new(settings(ProcessMode::Run, ""), joints()).unwrap();
     assert!(robot.run(&RunRequest { model: None, ..request }).is_err());
+}
+
+/// MuJoCo behind the example program, in both modes and under four controllers, against the built-in simulator. Needs Python with MuJoCo: DYNIDENT_PYTHON names the interpreter.
+#[test]
+#[ignore = "needs Python with MuJoCo in DYNIDENT_PYTHON"]
+fn mujoco_is_a_robot() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let python = std::env::var("DYNIDENT_PYTHON").unwrap();
+    let path = |name: &str| root.join(name).to_str().unwrap().to_owned();
+    let urdf = "robots/panda_arm7.urdf";
+    let model = load_robot(root.join(urdf)).unwrap().model;
+    let names: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
+    let mut motion = Motion::default();
+    motion.reset(7, 501);
+    for at in 0..7 * 501 {
+        let (joint, time_s) = (at / 501, (at % 501) as f64 / 1000.0);
+        let omega = 2.0 + 0.5 * joint as f64;
+        let (sine, cosine) = (omega * time_s).sin_cos();
+        let centre = [0.1, 0.2, 0.3, -1.6, 0.5, 1.6, 0.7][joint];
+        (motion.q[at], motion.dq[at], motion.ddq[at]) =
+            (centre + 0.3 * sine, 0.3 * omega * cosine, -0.3 * omega * omega * sine);
+    }
+    let reference = Reference::new(1000.0, motion).unwrap();
+    let laws: Vec<Law> = (0..7).map(|joint| Law::Viscous(Viscous { joint })).collect();
+    let believed = ControllerModel::new(&model, &laws, &[0.4; 7]).unwrap();
+    let friction = dynident_experiment::FrictionCompensation::Measured;
+    let gains = JointPdSettings { kp: vec![300.0, 300.0, 200.0, 200.0, 60.0, 60.0, 10.0].into(), kd: 0.5.into() };
+    let controllers = [
+        ControllerSettings::JointPd(gains.clone()),
+        ControllerSettings::PdGravity(gains),
+        ControllerSettings::ComputedTorque(ComputedTorqueSettings { kp: 100.0.into(), kd: 20.0.into(), friction }),
+        ControllerSettings::FiniteTime(FiniteTimeSettings::with_gains(8.0, 6.0)),
+    ];
+    for mode in [ProcessMode::Run, ProcessMode::Step] {
+        let command = vec![python.clone(), path("examples/robots/mujoco_client.py"), path(urdf)];
+        let command = command.into_iter().chain(["--damping", "0.5"].map(str::to_owned)).collect();
+        let settings = ProcessSettings { command, ..settings(mode, "") };
+        let mut mujoco = ProcessRobot::new(settings, names.clone()).unwrap();
+        let plant = Plant::new(&model, &laws, &[0.5; 7]).unwrap();
+        let mut own = SimulatedRobot::new(plant, LoopSettings::default()).unwrap();
+        for controller in &controllers {
+            let request = RunRequest { run: 1, reference: &reference, controller, model: Some(&believed) };
+            let (theirs, own) = (mujoco.run(&request).unwrap(), own.run(&request).unwrap());
+            assert!(theirs.status.is_done(), "{}: {}", controller.name(), theirs.status);
+            let worst = theirs.record.q.iter().zip(&own.record.q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let error = own.max_error(&reference).into_iter().fold(0.0, f64::max);
+            println!("{mode:?} {}: {worst:.1e} rad; largest tracking error {error:.1e} rad", controller.name());
+            assert!(worst < 1e-9, "{mode:?} {}: {worst:e}", controller.name());
+        }
+    }
 }
