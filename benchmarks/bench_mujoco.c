@@ -1,5 +1,6 @@
 /* MuJoCo on URDF arms, single thread: ns a call for the recursive Newton-Euler algorithm and the composite rigid body
- * algorithm, each with the kinematics that it needs (MuJoCo keeps them as separate stages).
+ * algorithm, each with the kinematics that it needs (MuJoCo keeps them as separate stages); and for a step of 1 ms under joint
+ * PD towards zero (gains 100 and 20 times the mass matrix' diagonal at zero) by its Euler and RK4 integrators.
  *   ./bench_mujoco robots/panda_arm7.urdf ...      one JSON line per robot and algorithm */
 #include <mujoco/mujoco.h>
 #include <stdio.h>
@@ -38,6 +39,28 @@ static void run(const char* robot, const char* algo, void (*call)(const mjModel*
   fflush(stdout);
 }
 
+/* Runs of STEPS steps from a posture near zero. */
+static void closed_loop(const char* robot, const char* algo, int integrator, mjModel* m, mjData* d) {
+  enum { STEPS = 5000 };
+  double ns[REPEATS];
+  m->opt.integrator = integrator; m->opt.timestep = 1e-3;
+  for (int r = -1; r < REPEATS; ++r) {
+    mj_resetData(m, d);
+    srand(1);
+    for (int j = 0; j < m->nq; ++j) d->qpos[j] = uniform(-0.3, 0.3);
+    double start = cpu();
+    for (int s = 0; s < STEPS; ++s) {
+      for (int j = 0; j < m->nv; ++j) d->qfrc_applied[j] = -m->dof_M0[j] * (100 * d->qpos[j] + 20 * d->qvel[j]);
+      mj_step(m, d);
+    }
+    if (r >= 0) ns[r] = (cpu() - start) / STEPS;
+  }
+  qsort(ns, REPEATS, sizeof *ns, ascending);
+  printf("{\"job\":\"mujoco\",\"build\":\"wheel\",\"robot\":\"%s\",\"nv\":%d,\"algo\":\"%s\",\"ns\":%.1f,\"min\":%.1f,\"max\":%.1f}\n",
+         robot, (int)m->nv, algo, ns[REPEATS / 2], ns[0], ns[REPEATS - 1]);
+  fflush(stdout);
+}
+
 int main(int argc, char** argv) {
   for (int k = 1; k < argc; ++k) {
     char error[500] = "";
@@ -60,6 +83,9 @@ int main(int argc, char** argv) {
     if (dot) *dot = 0;
     run(name, "rnea", rnea, m, d, states);
     run(name, "crba", crba, m, d, states);
+    for (int j = 0; j < m->nv; ++j) m->dof_damping[j] = m->dof_frictionloss[j] = 0;
+    closed_loop(name, "pd_step_euler", mjINT_EULER, m, d);
+    closed_loop(name, "pd_step_rk4", mjINT_RK4, m, d);
     free(states); mj_deleteData(d); mj_deleteModel(m);
   }
   return 0;

@@ -22,6 +22,7 @@ SOLVED = {"cvxpy_physical.json": ("solution", 1e-6)}
 GENERATORS = {
     "pinocchio": ("pinocchio.py", "pinocchio/*.json"),
     "mujoco": ("mujoco_inverse.py", "mujoco/*.json"),
+    "mujoco-closed-loop": ("mujoco_closed_loop.py", "mujoco_closed_loop.json"),
     "scipy": ("scipy_filters.py", "scipy_*.json"),
     "newey-west": ("statsmodels_newey_west.py", "statsmodels_newey_west.json"),
     "statsmodels": ("statsmodels_estimators.py", "statsmodels_estimators.json"),

@@ -1,10 +1,11 @@
-//! Times Dynident's dynamics, its way from samples to triangular factors and a step of an excitation design, and prints one JSON line a figure: the same lines, states and method as
+//! Times Dynident's dynamics, its way from samples to triangular factors, a step of an excitation design and one of the closed loop, and prints one JSON line a figure: the same lines, states and method as
 //! the programs in `benchmarks/`, which `benchmarks/compare.sh` sets side by side.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing figures is what this program is for")]
 
 mod batch;
 mod clock;
+mod closed_loop;
 mod excitation;
 mod identification;
 mod motion;
@@ -66,6 +67,10 @@ fn main() -> ExitCode {
             batch::time_all(&model, &report, usize::from(options.block));
             if level == Level::detect() && name != "talos_reduced" {
                 excitation::time_all(&model, &report);
+                if let Err(error) = closed_loop::time_all(&model, &report) {
+                    eprintln!("{name}: closed loop: {error}");
+                    return ExitCode::FAILURE;
+                }
             }
             if name == "panda_arm7"
                 && let Err(error) = identification::time_all(&model, &report)

@@ -105,6 +105,12 @@ fn every_code_block_is_of_a_kind_that_is_checked() {
                     serde_json::from_str::<serde_json::Value>(&block.text)
                         .unwrap_or_else(|error| panic!("{}: {error}", block.place));
                 }
+                ["json", "lines"] => {
+                    for line in block.text.lines() {
+                        serde_json::from_str::<serde_json::Value>(line)
+                            .unwrap_or_else(|error| panic!("{}: {error}", block.place));
+                    }
+                }
                 // Equations, pictures, output; commands.
                 ["text" | "sh"] => {}
                 ["rust"] => assert!(

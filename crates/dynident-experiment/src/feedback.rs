@@ -1,0 +1,95 @@
+//! The sensors as the controller has them, sample by sample.
+
+use crate::controllers::Measured;
+use crate::plant::Plant;
+use crate::sensors::{SensorSettings, SpeedSource};
+use dynident_model::sample::Random;
+
+/// Distinguishes the stream of the feedback's noise from those of the record.
+const STREAM: u64 = 0x5eed_feed_bacc_0001;
+
+#[derive(Debug)]
+pub(crate) struct Feedback<'a> {
+    settings: &'a SensorSettings,
+    turns: Vec<bool>,
+    random: Random,
+    /// Last `delay + 1` readings, joint after joint, as a ring.
+    q: Vec<f64>,
+    dq: Vec<f64>,
+    place: usize,
+    slots: usize,
+    /// Share of a new difference in the filtered speed; the speed itself and the position before.
+    share: f64,
+    filtered: Vec<f64>,
+    last_q: Vec<f64>,
+    rate_hz: f64,
+    started: bool,
+}
+
+impl<'a> Feedback<'a> {
+    pub(crate) fn new(settings: &'a SensorSettings, plant: &Plant, rate_hz: f64) -> Self {
+        let joints = plant.dof();
+        let slots = settings.feedback_delay_samples + 1;
+        let share = match settings.speed {
+            SpeedSource::True => 1.0,
+            SpeedSource::Differences { cutoff_hz } => 1.0 - (-core::f64::consts::TAU * cutoff_hz / rate_hz).exp(),
+        };
+        Self {
+            settings,
+            turns: plant.model().maps().iter().map(|map| map.turns).collect(),
+            random: Random::new(settings.seed ^ STREAM),
+            q: vec![0.0; joints * slots],
+            dq: vec![0.0; joints * slots],
+            place: 0,
+            slots,
+            share,
+            filtered: vec![0.0; joints],
+            last_q: vec![0.0; joints],
+            rate_hz,
+            started: false,
+        }
+    }
+
+    /// Takes a reading; [`measured`](Self::measured) is then the one the controller sees.
+    #[inline]
+    pub(crate) fn read(&mut self, q: &[f64], dq: &[f64]) {
+        let joints = q.len();
+        self.place = self.after(self.place);
+        let own = self.place * joints;
+        for joint in 0..joints {
+            let reading = self.settings.position(joint, q[joint], self.turns[joint], &mut self.random);
+            self.q[own + joint] = reading;
+            self.dq[own + joint] = match self.settings.speed {
+                SpeedSource::True => dq[joint],
+                SpeedSource::Differences { .. } => {
+                    if self.started {
+                        let difference = (reading - self.last_q[joint]) * self.rate_hz;
+                        self.filtered[joint] += self.share * (difference - self.filtered[joint]);
+                    }
+                    self.filtered[joint]
+                }
+            };
+            self.last_q[joint] = reading;
+        }
+        if !self.started {
+            self.started = true;
+            // Before the run the robot stood where it starts.
+            for slot in 0..self.slots {
+                for joint in 0..joints {
+                    self.q[slot * joints + joint] = self.last_q[joint];
+                    self.dq[slot * joints + joint] = self.dq[own + joint];
+                }
+            }
+        }
+    }
+
+    fn after(&self, place: usize) -> usize {
+        if place + 1 == self.slots { 0 } else { place + 1 }
+    }
+
+    pub(crate) fn measured(&self) -> Measured<'_> {
+        let joints = self.last_q.len();
+        let oldest = self.after(self.place) * joints;
+        Measured { q: &self.q[oldest..oldest + joints], dq: &self.dq[oldest..oldest + joints] }
+    }
+}

@@ -1,0 +1,279 @@
+//! The equation of motion of a simulated robot, put together at one state: `M q̈ = τ + d(t) - h(q, q̇) - τ₀ - springs - F_v q̇ - Cᵀ f`.
+
+use super::PlantFault;
+use super::disturbance::Placed;
+use super::drives::Drives;
+use super::factor::{eliminate, factor, solve};
+use super::friction_solver::FrictionSolver;
+use super::friction_unit::FrictionUnit;
+use dynident_dynamics::{Workspace, inverse_dynamics, mass_matrix};
+use dynident_model::Model;
+
+/// What a friction unit does during an explicit step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mode {
+    /// It moves, or cannot hold: friction by its branch.
+    Forward,
+    Backward,
+    /// At rest: whatever torque keeps it there.
+    Held,
+}
+
+/// A state of the robot as integrators see it.
+#[derive(Clone, Copy)]
+pub(super) struct At<'a> {
+    pub(super) time_s: f64,
+    pub(super) q: &'a [f64],
+    pub(super) dq: &'a [f64],
+    pub(super) tau: &'a [f64],
+}
+
+pub(super) struct Equations {
+    pub(super) model: Model,
+    pub(super) drives: Drives,
+    pub(super) disturbances: Vec<Placed>,
+    pub(super) locked: Vec<bool>,
+    pub(super) any_locked: bool,
+    workspace: Workspace,
+    zeros: Vec<f64>,
+    /// Mass matrix, then its factor.
+    matrix: Vec<f64>,
+    /// Right-hand side, then accelerations.
+    pub(super) acceleration: Vec<f64>,
+    /// Torque of the bodies at the last acceleration: the load of load-dependent friction.
+    load: Vec<f64>,
+    /// `M⁻¹ c_u` of every unit.
+    responses: Vec<f64>,
+    /// `C M⁻¹ Cᵀ` of the units looked at.
+    compliance: Vec<f64>,
+    free: Vec<f64>,
+    pub(super) solver: FrictionSolver,
+    pub(super) modes: Vec<Mode>,
+    /// Units looked at.
+    chosen: Vec<usize>,
+    /// How often friction torques had not settled.
+    pub(super) unsettled: usize,
+}
+
+impl Equations {
+    pub(super) fn new(model: Model, drives: Drives) -> Self {
+        let (n, units) = (model.dof(), drives.units.len());
+        let zeros = |count: usize| vec![0.0; count];
+        Self {
+            workspace: Workspace::new(&model),
+            disturbances: Vec::new(),
+            locked: vec![false; n],
+            any_locked: false,
+            zeros: zeros(n),
+            matrix: zeros(n * n),
+            acceleration: zeros(n),
+            load: zeros(n),
+            responses: zeros(n * units),
+            compliance: zeros(units * units),
+            free: zeros(units),
+            solver: FrictionSolver::new(units),
+            modes: vec![Mode::Forward; units],
+            chosen: Vec::with_capacity(units),
+            unsettled: 0,
+            model,
+            drives,
+        }
+    }
+
+    pub(super) fn workspace(&mut self) -> (&Model, &mut Workspace) {
+        (&self.model, &mut self.workspace)
+    }
+
+    /// Mass matrix `M + implicit · F_v` and right-hand side without friction by speed.
+    #[inline]
+    pub(super) fn assemble(&mut self, at: At<'_>, implicit: f64) {
+        let n = self.zeros.len();
+        let Self { model, workspace, drives, matrix, acceleration, zeros, load, .. } = self;
+        matrix.copy_from_slice(mass_matrix(model, workspace, at.q));
+        let bias = inverse_dynamics(model, workspace, at.q, at.dq, zeros);
+        if drives.by_load {
+            // The accelerations of the evaluation before.
+            for j in 0..n {
+                load[j] = bias[j] + (0..n).map(|k| matrix[j * n + k] * acceleration[k]).sum::<f64>();
+            }
+        }
+        for j in 0..n {
+            acceleration[j] = at.tau[j] - bias[j] - drives.constant[j];
+        }
+        for &(row, column, value) in &drives.inertia {
+            matrix[row * n + column] += value;
+        }
+        for &(row, column, value) in &drives.viscous {
+            matrix[row * n + column] += implicit * value;
+            acceleration[row] -= value * at.dq[column];
+        }
+        drives.subtract_slips(at.q, acceleration);
+        for disturbance in &self.disturbances {
+            disturbance.add(model, workspace, at.time_s, at.q, acceleration);
+        }
+        if self.any_locked {
+            for joint in 0..n {
+                if self.locked[joint] {
+                    for k in 0..n {
+                        matrix[joint * n + k] = 0.0;
+                        matrix[k * n + joint] = 0.0;
+                    }
+                    matrix[joint * n + joint] = 1.0;
+                    acceleration[joint] = 0.0;
+                }
+            }
+        }
+        for unit in &mut drives.units {
+            let speed = unit.speed(at.dq);
+            unit.update(speed, if unit.by_load { load[unit.joints[0].0] } else { 0.0 });
+        }
+    }
+
+    /// Takes the friction of the units that slide off the right-hand side.
+    pub(super) fn slide(&mut self, dq: &[f64]) {
+        for (unit, mode) in self.drives.units.iter().zip(&self.modes) {
+            let torque = match mode {
+                Mode::Held => continue,
+                // Without a jump the direction does not matter.
+                mode => unit.sliding(unit.speed(dq), *mode == Mode::Forward),
+            };
+            for &(joint, ratio) in &unit.joints {
+                if !self.locked[joint] {
+                    self.acceleration[joint] -= ratio * torque;
+                }
+            }
+        }
+    }
+
+    /// Accelerations without the friction of units that were not taken off.
+    #[inline]
+    pub(super) fn factor_and_solve(&mut self) -> Result<(), PlantFault> {
+        let n = self.zeros.len();
+        if !factor(&mut self.matrix, n) {
+            return Err(PlantFault::MassMatrix);
+        }
+        solve(&self.matrix, n, &mut self.acceleration);
+        Ok(())
+    }
+
+    /// Chooses the units for the next calls.
+    pub(super) fn choose(&mut self, wanted: impl Fn(&FrictionUnit, Mode) -> bool) -> usize {
+        self.chosen.clear();
+        for (index, unit) in self.drives.units.iter().enumerate() {
+            if wanted(unit, self.modes[index]) {
+                self.chosen.push(index);
+            }
+        }
+        self.chosen.len()
+    }
+
+    /// `M⁻¹ c_u` of the chosen units and their compliance `C M⁻¹ Cᵀ`.
+    fn couple(&mut self) {
+        let (n, count) = (self.zeros.len(), self.chosen.len());
+        for (place, &index) in self.chosen.iter().enumerate() {
+            let response = &mut self.responses[place * n..(place + 1) * n];
+            response.fill(0.0);
+            for &(joint, ratio) in &self.drives.units[index].joints {
+                if !self.locked[joint] {
+                    response[joint] = ratio;
+                }
+            }
+            solve(&self.matrix, n, response);
+        }
+        for (row, &index) in self.chosen.iter().enumerate() {
+            for column in 0..count {
+                let response = &self.responses[column * n..(column + 1) * n];
+                self.compliance[row * count + column] = self.drives.units[index].speed(response);
+            }
+        }
+    }
+
+    /// Friction of the chosen units so that `w = start + factor · acceleration` belongs to their maps; `start` gives a unit's speed, or nothing. With `jumps` the maps' jumps alone count.
+    pub(super) fn rub(&mut self, start: Option<&[f64]>, factor: f64, jumps: bool) {
+        let count = self.chosen.len();
+        self.couple();
+        for (place, &index) in self.chosen.iter().enumerate() {
+            let unit = &self.drives.units[index];
+            self.free[place] = factor * unit.speed(&self.acceleration) + start.map_or(0.0, |dq| unit.speed(dq));
+        }
+        let Self { drives, compliance, free, solver, chosen, .. } = self;
+        let settled = solver.solve(&drives.units, chosen, &compliance[..count * count], &free[..count], factor, jumps);
+        self.unsettled += usize::from(!settled);
+        self.push_back();
+    }
+
+    /// Takes what the chosen units' torques do off the accelerations.
+    fn push_back(&mut self) {
+        let n = self.zeros.len();
+        for place in 0..self.chosen.len() {
+            let torque = self.solver.torque[place];
+            let response = &self.responses[place * n..(place + 1) * n];
+            for (a, x) in self.acceleration.iter_mut().zip(response) {
+                *a -= x * torque;
+            }
+        }
+    }
+
+    /// Calls `each(unit, speed after)` for the chosen units.
+    pub(super) fn after_rubbing(&mut self, mut each: impl FnMut(&FrictionUnit, &mut Mode, f64)) {
+        for (place, &index) in self.chosen.iter().enumerate() {
+            each(&self.drives.units[index], &mut self.modes[index], self.solver.speed[place]);
+        }
+    }
+
+    /// Accelerations with every unit in its mode.
+    pub(super) fn in_modes(&mut self, at: At<'_>) -> Result<(), PlantFault> {
+        self.assemble(at, 0.0);
+        if self.drives.units.is_empty() {
+            return self.factor_and_solve();
+        }
+        self.slide(at.dq);
+        self.factor_and_solve()?;
+        let count = self.choose(|_, mode| mode == Mode::Held);
+        if count > 0 {
+            self.couple();
+            // A joint and a drive that turns with it can be held at once, and then one of the two torques is free: the small diagonal shares it out.
+            for place in 0..count {
+                self.compliance[place * count + place] *= 1.0 + 1e-13;
+                self.solver.torque[place] = self.drives.units[self.chosen[place]].speed(&self.acceleration);
+            }
+            if !eliminate(&mut self.compliance[..count * count], count, &mut self.solver.torque[..count]) {
+                self.solver.torque[..count].fill(0.0);
+            }
+            self.push_back();
+            for &index in &self.chosen {
+                if let [(joint, _)] = self.drives.units[index].joints[..] {
+                    self.acceleration[joint] = 0.0;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Decides at a state which units are held: those at rest (`w = 0`, or held until now) whose friction can. `true` if any unit can hold.
+    pub(super) fn decide(&mut self, at: At<'_>) -> Result<bool, PlantFault> {
+        let mut at_rest = false;
+        for (unit, mode) in self.drives.units.iter().zip(&mut self.modes) {
+            let speed = unit.speed(at.dq);
+            if unit.holds() && (speed == 0.0 || *mode == Mode::Held) {
+                *mode = Mode::Held;
+                at_rest = true;
+            } else {
+                *mode = if speed >= 0.0 { Mode::Forward } else { Mode::Backward };
+            }
+        }
+        if at_rest {
+            self.assemble(at, 0.0);
+            self.slide(at.dq);
+            self.factor_and_solve()?;
+            self.choose(|_, mode| mode == Mode::Held);
+            self.rub(None, 1.0, true);
+            self.after_rubbing(|_, mode, acceleration| {
+                if acceleration != 0.0 {
+                    *mode = if acceleration > 0.0 { Mode::Forward } else { Mode::Backward };
+                }
+            });
+        }
+        Ok(self.drives.units.iter().any(FrictionUnit::holds))
+    }
+}

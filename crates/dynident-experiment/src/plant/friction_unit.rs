@@ -1,0 +1,251 @@
+//! Friction of one speed: of a joint, or of a drive that turns with two joints.
+
+use dynident_model::laws::{Coulomb, CoulombShape, DirectionalCoulomb, JointMotion, Law};
+
+/// How a term of friction follows the speed.
+#[derive(Clone, Debug)]
+enum Shape {
+    /// A sign: at rest, anything up to the level. In which directions it is felt.
+    Step { forward: bool, backward: bool },
+    /// A law of joint 0 without a jump.
+    Smooth(Law),
+}
+
+/// A parameter times a shape; a Stribeck or load-dependent term changes its size with the state.
+#[derive(Clone, Debug)]
+struct Term {
+    value: f64,
+    by_load: bool,
+    /// Speed and exponent of the Stribeck effect.
+    fading: Option<(f64, f64)>,
+    shape: Shape,
+    /// Value with load and fading at the current state.
+    size: f64,
+}
+
+/// All friction that follows one speed `w = Σ ratio q̇`: the map `w ↦ f(w)`, set-valued at rest. The torque of a joint is `ratio f`.
+#[derive(Clone, Debug, Default)]
+pub(super) struct FrictionUnit {
+    /// The joints that make the speed, and their ratios.
+    pub(super) joints: Vec<(usize, f64)>,
+    terms: Vec<Term>,
+    /// Friction at rest is at most this in motion forward and backward.
+    level: [f64; 2],
+    steps: bool,
+    smooth: bool,
+    pub(super) by_load: bool,
+}
+
+/// Where the friction of a unit ends up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Resolved {
+    pub(super) speed: f64,
+    pub(super) torque: f64,
+    /// None: at rest, held by the jump of the map. Else the map's slope at the speed.
+    pub(super) slope: Option<f64>,
+}
+
+impl FrictionUnit {
+    pub(super) fn new(joints: Vec<(usize, f64)>) -> Self {
+        Self { joints, ..Self::default() }
+    }
+
+    /// Adds a friction law with its parameter. The dead band of a sign is a device for noisy speeds of a log: a simulated robot has none.
+    pub(super) fn add(&mut self, law: &Law, value: f64) {
+        let (mut by_load, mut fading) = (false, None);
+        let both = |shape: CoulombShape| match shape {
+            CoulombShape::Sign { .. } => Shape::Step { forward: true, backward: true },
+            CoulombShape::Smooth { .. } => Shape::Smooth(Law::Coulomb(Coulomb { joint: 0, shape })),
+        };
+        let shape = match law {
+            Law::Coulomb(law) => both(law.shape),
+            Law::DirectionalCoulomb(DirectionalCoulomb { shape: CoulombShape::Sign { .. }, direction, .. }) => {
+                let forward = direction.sign() == '+';
+                Shape::Step { forward, backward: !forward }
+            }
+            Law::Stribeck(law) => {
+                fading = Some((law.speed, law.exponent));
+                both(law.shape)
+            }
+            Law::Load(law) => {
+                by_load = true;
+                both(law.shape)
+            }
+            other => Shape::Smooth(at_first_joint(other)),
+        };
+        match shape {
+            Shape::Step { .. } => self.steps = true,
+            Shape::Smooth(_) => self.smooth = true,
+        }
+        self.by_load |= by_load;
+        self.terms.push(Term { value, by_load, fading, shape, size: if by_load { 0.0 } else { value } });
+        self.update(0.0, 0.0);
+    }
+
+    /// Whether it can hold a joint at rest.
+    pub(super) fn holds(&self) -> bool {
+        self.steps
+    }
+
+    /// Takes the size of Stribeck and load-dependent terms at this speed and load; they keep it until the next call.
+    #[inline]
+    pub(super) fn update(&mut self, speed: f64, load: f64) {
+        let mut level = [0.0; 2];
+        for term in &mut self.terms {
+            let mut size = term.value;
+            if term.by_load {
+                size *= load.abs();
+            }
+            if let Some((fade, exponent)) = term.fading {
+                size *= (-(speed / fade).abs().powf(exponent)).exp();
+            }
+            term.size = size;
+            if let Shape::Step { forward, backward } = term.shape {
+                level[0] += if forward { size } else { 0.0 };
+                level[1] += if backward { size } else { 0.0 };
+            }
+        }
+        self.level = level;
+    }
+
+    /// Largest friction at rest against motion forward and backward.
+    #[cfg(test)]
+    pub(super) fn level(&self) -> [f64; 2] {
+        self.level
+    }
+
+    /// The part without jump and its slope.
+    fn smooth(&self, speed: f64) -> [f64; 2] {
+        let mut sum = [0.0; 2];
+        if self.smooth {
+            for term in &self.terms {
+                if let Shape::Smooth(law) = &term.shape {
+                    let [value, slope] = value_and_slope(law, speed);
+                    sum[0] += term.size * value;
+                    sum[1] += term.size * slope;
+                }
+            }
+        }
+        sum
+    }
+
+    /// Friction torque at `speed` in motion forward (or backward): the map's branch, also where the speed has just crossed zero.
+    #[inline]
+    pub(super) fn sliding(&self, speed: f64, forward: bool) -> f64 {
+        let jump = if forward { self.level[0] } else { -self.level[1] };
+        jump + self.smooth(speed)[0]
+    }
+
+    /// The solution of `w + c f(w) = r` for c > 0: unique, because the map is monotone.
+    pub(super) fn resolve(&self, r: f64, c: f64) -> Resolved {
+        let at_jump = self.resolve_jump(r, c);
+        let (rest, jump) = (at_jump.speed, at_jump.torque);
+        if !self.smooth || at_jump.slope.is_none() || !rest.is_finite() {
+            return at_jump;
+        }
+        // Between rest and `rest`: friction takes power, so that it brings the speed nearer to zero. Newton from rest, kept inside the bracket.
+        let (mut low, mut high) = if rest > 0.0 { (0.0, rest) } else { (rest, 0.0) };
+        let mut speed = 0.0;
+        let mut own = self.smooth(speed);
+        for _ in 0..200 {
+            let defect = speed + c * own[0] - rest;
+            if defect > 0.0 {
+                high = speed;
+            } else {
+                low = speed;
+            }
+            let mut next = speed - defect / (1.0 + c * own[1].max(0.0));
+            if !(next >= low && next <= high) {
+                next = 0.5 * (low + high);
+            }
+            let done = (next - speed).abs() <= 1e-15 * rest.abs();
+            speed = next;
+            own = self.smooth(speed);
+            if done {
+                break;
+            }
+        }
+        Resolved { speed, torque: jump + own[0], slope: Some(own[1].max(0.0)) }
+    }
+
+    /// [`resolve`](Self::resolve) with the jump alone.
+    #[inline]
+    pub(super) fn resolve_jump(&self, r: f64, c: f64) -> Resolved {
+        if self.steps && r <= c * self.level[0] && r >= -c * self.level[1] {
+            return Resolved { speed: 0.0, torque: r / c, slope: None };
+        }
+        let torque = if r > 0.0 { self.level[0] } else { -self.level[1] };
+        Resolved { speed: r - c * torque, torque, slope: Some(0.0) }
+    }
+
+    /// Its speed from the joints'.
+    #[inline]
+    pub(super) fn speed(&self, dq: &[f64]) -> f64 {
+        self.joints.iter().map(|&(joint, ratio)| ratio * dq[joint]).sum()
+    }
+}
+
+fn value_and_slope(law: &Law, speed: f64) -> [f64; 2] {
+    let motion = JointMotion { samples: 1, q: &[0.0], dq: &[speed], ddq: &[0.0] };
+    let (mut value, mut slope) = ([0.0], [0.0]);
+    law.column(0, &motion, &mut value);
+    law.pull_back(0, &motion, &[1.0], &mut slope, &mut [0.0]);
+    [value[0], slope[0]]
+}
+
+/// The same law of joint 0.
+fn at_first_joint(law: &Law) -> Law {
+    let mut law = law.clone();
+    match &mut law {
+        Law::Viscous(law) => law.joint = 0,
+        Law::Coulomb(law) => law.joint = 0,
+        Law::DirectionalViscous(law) => law.joint = 0,
+        Law::DirectionalCoulomb(law) => law.joint = 0,
+        Law::Stribeck(law) => law.joint = 0,
+        Law::Sigmoid(law) => law.joint = 0,
+        Law::Power(law) => law.joint = 0,
+        Law::Load(law) => law.joint = 0,
+        Law::MaxwellSlip(law) => law.joint = 0,
+        Law::Offset(law) => law.joint = 0,
+        Law::DriveInertia(law) => law.joint = 0,
+        Law::Coupling(_) => {}
+    }
+    law
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynident_model::laws::{Power, PowerExponent, Sigmoid, Stribeck};
+
+    /// The scalar problem is solved: w + c f(w) = r, for steep and flat maps alike. Rounding of r, with room.
+    #[test]
+    fn resolved_speeds_fulfil_their_equation() {
+        let mut unit = FrictionUnit::new(vec![(0, 1.0)]);
+        let shape = CoulombShape::Smooth { width: 1e-3 };
+        unit.add(&Law::Coulomb(Coulomb { joint: 3, shape: CoulombShape::Sign { dead_band: 0.1 } }), 0.5);
+        unit.add(&Law::Coulomb(Coulomb { joint: 3, shape }), 10.0);
+        unit.add(&Law::Sigmoid(Sigmoid { joint: 3, steepness: 20.0, offset_speed: 0.1 }), 0.7);
+        unit.add(&Law::Power(Power { joint: 3, exponent: PowerExponent::CubeRoot, rounding: 1e-6 }), 0.3);
+        unit.add(
+            &Law::Stribeck(Stribeck {
+                joint: 3,
+                speed: 0.1,
+                exponent: 2.0,
+                shape: CoulombShape::Sign { dead_band: 0.0 },
+            }),
+            0.4,
+        );
+        for c in [1e-4, 0.05, 3.0, 200.0] {
+            for r in [-50.0, -1.0, -1e-3, 0.0, 1e-9, 0.2, 4.0, 900.0] {
+                let found = unit.resolve(r, c);
+                assert!((found.speed + c * found.torque - r).abs() <= 1e-12 * (1.0 + r.abs()), "{r} {c} {found:?}");
+                // Friction never pushes.
+                assert!(found.speed * found.torque >= 0.0);
+                if found.slope.is_none() {
+                    assert!(found.torque.abs() <= 0.9 + 1e-12);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! The messages between an experiment (the host) and a robot program (the client): one JSON object a line. The book's page `robot-protocol.md` tells them with examples.
+
+use serde::{Deserialize, Serialize};
+
+/// Name and version of the protocol.
+pub const PROTOCOL: &str = "dynident-robot/1";
+
+/// What the host writes to the client's standard input.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "type", rename_all = "kebab-case")]
+pub enum ToClient {
+    /// Run the trajectory of a file under the controller of a file, by yourself; then the client sends samples and an end.
+    Run {
+        /// Number of the run.
+        run: usize,
+        /// Samples a second that the controller should run at.
+        rate_hz: f64,
+        /// The trajectory's length, s.
+        duration_s: f64,
+        /// Path of the trajectory: `t_s, q.., dq.., ddq..` and the model's torques `tau..`, if there is a model.
+        trajectory: String,
+        /// Path of the controller.
+        controller: String,
+    },
+    /// A run in steps begins: go to the start and send the state.
+    Begin {
+        /// Number of the run.
+        run: usize,
+        /// Samples a second.
+        rate_hz: f64,
+        /// How many torques will come.
+        samples: usize,
+        /// Positions to start from, rad (m).
+        q: Vec<f64>,
+        /// Speeds to start with.
+        dq: Vec<f64>,
+    },
+    /// Hold this torque for one sample, then send the state.
+    Torque {
+        /// Nm (N).
+        tau: Vec<f64>,
+    },
+    /// The steps are over: stop, and send an end.
+    Finish {},
+    /// Nothing more will come.
+    Bye {},
+}
+
+/// What the client writes to its standard output. Missing numbers (`null`) are read and told apart from garbage.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum ToHost {
+    /// First of all.
+    Hello {
+        /// [`PROTOCOL`].
+        protocol: String,
+        /// What the robot is.
+        name: String,
+        /// Names of its joints, in the order of all its vectors.
+        joints: Vec<String>,
+        /// Which of `run` and `step` it offers.
+        modes: Vec<String>,
+    },
+    /// One sample of a run.
+    Sample {
+        /// Time since the run's begin, s.
+        t_s: Option<f64>,
+        /// Positions, rad (m).
+        q: Vec<Option<f64>>,
+        /// Torques of the drives, Nm (N).
+        tau: Vec<Option<f64>>,
+    },
+    /// The state in a run by steps.
+    State {
+        /// Time since the run's begin, s.
+        t_s: Option<f64>,
+        /// Positions, rad (m).
+        q: Vec<Option<f64>>,
+        /// Speeds, rad/s (m/s).
+        dq: Vec<Option<f64>>,
+    },
+    /// The run is over.
+    End {
+        /// `done` or `stopped`.
+        status: EndStatus,
+        /// Why it stopped.
+        #[serde(default)]
+        reason: String,
+    },
+}
+
+/// How a client ends a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EndStatus {
+    /// The whole trajectory.
+    Done,
+    /// Early.
+    Stopped,
+}
+
+impl ToHost {
+    /// The message's type.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Hello { .. } => "hello",
+            Self::Sample { .. } => "sample",
+            Self::State { .. } => "state",
+            Self::End { .. } => "end",
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! What came of a run.
+
+use crate::plant::PlantFault;
+use dynident_excitation::Motion;
+use serde::Serialize;
+
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "status", rename_all = "kebab-case")]
+pub enum RunStatus {
+    /// At the reference's end.
+    Done,
+    /// A limit was broken, and the run stopped.
+    LimitBroken {
+        /// When, s.
+        time_s: f64,
+        /// The joint's name.
+        joint: String,
+        /// What was limited.
+        quantity: LimitedQuantity,
+        /// Its value, rad, rad/s (m, m/s).
+        value: f64,
+        /// The limit.
+        limit: f64,
+    },
+    /// The motion blew up, and the run stopped.
+    Diverged {
+        /// When, s.
+        time_s: f64,
+        /// Why.
+        reason: Divergence,
+    },
+}
+
+/// What a run may not exceed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LimitedQuantity {
+    /// Position.
+    Position,
+    /// Speed.
+    Speed,
+    /// Distance from the reference.
+    TrackingError,
+}
+
+impl LimitedQuantity {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Position => "position",
+            Self::Speed => "speed",
+            Self::TrackingError => "tracking error",
+        }
+    }
+}
+
+/// Why a run counts as diverged.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Divergence {
+    /// The simulated robot cannot go on.
+    Plant {
+        /// Why.
+        fault: PlantFault,
+    },
+    /// The controller asked for a torque that is not a number.
+    Torque {
+        /// The joint's place.
+        joint: usize,
+    },
+    /// A speed beyond all robots.
+    Speed {
+        /// The joint's place.
+        joint: usize,
+        /// rad/s (m/s).
+        value: f64,
+    },
+}
+
+impl core::fmt::Display for Divergence {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Plant { fault } => write!(f, "{fault}"),
+            Self::Torque { joint } => {
+                write!(f, "the controller's torque of joint {} is not a finite number", joint + 1)
+            }
+            Self::Speed { joint, value } => write!(f, "joint {} moves at {value:.3e} rad/s", joint + 1),
+        }
+    }
+}
+
+impl RunStatus {
+    /// Whether the run reached the reference's end.
+    pub fn is_done(&self) -> bool {
+        *self == Self::Done
+    }
+}
+
+impl core::fmt::Display for RunStatus {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Done => write!(f, "done"),
+            Self::LimitBroken { time_s, joint, quantity, value, limit } => {
+                write!(
+                    f,
+                    "stopped at {time_s:.3} s: {} of {joint} is {value:.4}, its limit {limit:.4}",
+                    quantity.name()
+                )
+            }
+            Self::Diverged { time_s, reason } => write!(f, "diverged at {time_s:.3} s: {reason}"),
+        }
+    }
+}
+
+/// A run: what truly was at every sample of the controller up to its end, what the controller saw, and how it went. Arrays are joint-major: joint `j`, sample `s` at `j * samples + s`. All numbers are
+/// finite, whatever happened.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// Names of the joints.
+    pub joints: Vec<String>,
+    /// Samples a second.
+    pub rate_hz: f64,
+    /// Samples of each joint; sample `k` stands at `k / rate_hz`.
+    pub samples: usize,
+    /// How it ended.
+    pub status: RunStatus,
+    /// What was to be followed, up to the run's end.
+    pub reference: Motion,
+    /// True positions, rad (m).
+    pub q: Vec<f64>,
+    /// True speeds.
+    pub dq: Vec<f64>,
+    /// True accelerations just after each sample, if they were asked for; else empty.
+    pub ddq: Vec<f64>,
+    /// Torques of the drives from each sample to the next, Nm (N), after the limits.
+    pub tau: Vec<f64>,
+    /// Positions as the controller saw them.
+    pub measured_q: Vec<f64>,
+    /// Speeds as the controller saw them.
+    pub measured_dq: Vec<f64>,
+    /// Per joint: the largest true distance from the reference, rad (m).
+    pub max_error: Vec<f64>,
+    /// Per joint: the root mean square of that distance.
+    pub rms_error: Vec<f64>,
+    /// Per joint: samples at which the torque was cut to its limit.
+    pub saturated: Vec<usize>,
+    /// Steps whose friction torques had not settled: see [`Plant::unsettled_steps`](crate::Plant::unsettled_steps).
+    pub unsettled_steps: usize,
+}
+
+impl Run {
+    /// The range of one joint in any of the arrays.
+    pub fn of(&self, joint: usize) -> core::ops::Range<usize> {
+        joint * self.samples..(joint + 1) * self.samples
+    }
+
+    /// Time of a sample, s.
+    pub fn time_s(&self, sample: usize) -> f64 {
+        sample as f64 / self.rate_hz
+    }
+
+    /// `q_d - q` of one joint at every sample.
+    pub fn tracking_error(&self, joint: usize) -> impl Iterator<Item = f64> + '_ {
+        self.reference.q[self.of(joint)].iter().zip(&self.q[self.of(joint)]).map(|(reference, q)| reference - q)
+    }
+
+    /// Drops all samples but the first `samples`.
+    pub(crate) fn cut(&mut self, samples: usize) {
+        let (before, joints) = (self.samples, self.joints.len());
+        if samples == before {
+            return;
+        }
+        let Motion { q, dq, ddq, dddq, .. } = &mut self.reference;
+        let own =
+            [&mut self.q, &mut self.dq, &mut self.ddq, &mut self.tau, &mut self.measured_q, &mut self.measured_dq];
+        for values in own.into_iter().chain([q, dq, ddq, dddq]) {
+            if values.len() == joints * before {
+                for joint in 0..joints {
+                    values.copy_within(joint * before..joint * before + samples, joint * samples);
+                }
+                values.truncate(joints * samples);
+            }
+        }
+        (self.samples, self.reference.samples) = (samples, samples);
+    }
+}

@@ -1,0 +1,233 @@
+"""A robot program for Dynident's line protocol: MuJoCo on a URDF arm (see docs/src/robot-protocol.md).
+
+    pip install mujoco numpy
+    python examples/robots/mujoco_client.py robots/panda_arm7.urdf [--friction 0.2] [--damping 0.5]
+
+It offers both modes. In `run` it runs the control loop itself from the two files it is handed: joint PD and PID by their gains,
+model-based controllers through a small Newton-Euler recursion over the numbers of controller.json. In `step` it holds the
+torques that it is sent. --friction and --damping give every joint dry (Nm) and viscous (Nm s/rad) friction that the URDF does
+not tell. Standard output belongs to the protocol; messages go to standard error.
+"""
+import argparse
+import csv
+import json
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+PROTOCOL = "dynident-robot/1"
+
+
+def send(kind, **fields):
+    print(json.dumps({"type": kind, **fields}, allow_nan=False), flush=True)
+
+
+def load(path, friction, damping):
+    tree = ElementTree.parse(path)
+    extension = ElementTree.SubElement(tree.getroot(), "mujoco")
+    ElementTree.SubElement(extension, "compiler", fusestatic="false", balanceinertia="false", boundmass="0", boundinertia="0",
+                           discardvisual="true")
+    model = mujoco.MjModel.from_xml_string(ElementTree.tostring(tree.getroot(), encoding="unicode"))
+    model.dof_frictionloss[:], model.dof_damping[:] = friction, damping
+    # Limits of joints are the controller's business, and links may overlap at their joints.
+    model.jnt_limited[:] = 0
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    return model
+
+
+class InverseDynamics:
+    """tau = M(q) ddq + h(q, dq) by the recursive Newton-Euler algorithm, and the laws of the drives."""
+
+    def __init__(self, model):
+        joints = model["joints"]
+        names = [joint["name"] for joint in joints]
+        self.parent = [names.index(joint["parent"]) if joint["parent"] else None for joint in joints]
+        self.turns = [joint["turns"] for joint in joints]
+        self.placement = [(np.array(j["rotation"]), np.array(j["translation_m"]), np.array(j["axis"])) for j in joints]
+        self.bodies = []
+        for joint in joints:
+            m, hx, hy, hz, xx, xy, xz, yy, yz, zz = joint["inertial"]
+            self.bodies.append((m, np.array([hx, hy, hz]), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])))
+        self.gravity = np.array(model["gravity_m_s2"])
+        self.laws = [(law, [names.index(name) for name in law["joints"]]) for law in model["laws"]]
+
+    def bodies_torque(self, q, dq, ddq):
+        n = len(q)
+        frames, wrenches = [None] * n, [None] * n
+        motion = [None] * n
+        for i in range(n):
+            rotation, translation, axis = self.placement[i]
+            if self.turns[i]:
+                c, s = np.cos(q[i]), np.sin(q[i])
+                cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+                rotation = rotation @ (np.outer(axis, axis) * (1 - c) + np.eye(3) * c + cross * s)
+            else:
+                translation = translation + rotation @ axis * q[i]
+            frames[i] = rotation, translation
+            if self.parent[i] is None:
+                w, dw, a = np.zeros(3), np.zeros(3), -self.gravity
+            else:
+                w, dw, a = motion[self.parent[i]]
+            a = rotation.T @ (a + np.cross(dw, translation) + np.cross(w, np.cross(w, translation)))
+            w, dw = rotation.T @ w, rotation.T @ dw
+            if self.turns[i]:
+                dw = dw + np.cross(w, axis * dq[i]) + axis * ddq[i]
+                w = w + axis * dq[i]
+            else:
+                a = a + 2 * np.cross(w, axis * dq[i]) + axis * ddq[i]
+            motion[i] = w, dw, a
+            m, h, inertia = self.bodies[i]
+            force = m * a + np.cross(dw, h) + np.cross(w, np.cross(w, h))
+            wrenches[i] = [force, inertia @ dw + np.cross(w, inertia @ w) + np.cross(h, a)]
+        tau = np.zeros(n)
+        for i in reversed(range(n)):
+            force, moment = wrenches[i]
+            tau[i] = self.placement[i][2] @ (moment if self.turns[i] else force)
+            if self.parent[i] is not None:
+                rotation, translation = frames[i]
+                force = rotation @ force
+                wrenches[self.parent[i]][0] += force
+                wrenches[self.parent[i]][1] += rotation @ moment + np.cross(translation, force)
+        return tau
+
+    def torque(self, q, dq, ddq, friction_speed):
+        """`friction_speed` is the speed at which friction is taken, or None for no friction."""
+        tau = self.bodies_torque(q, dq, ddq)
+        for law, joints in self.laws:
+            kind, value, j = law["kind"], law["value"], joints[0]
+            if kind == "drive-inertia":
+                tau[j] += value * ddq[j]
+            elif kind == "offset":
+                tau[j] += value
+            elif friction_speed is None:
+                continue
+            elif kind == "viscous":
+                tau[j] += value * friction_speed[j]
+            elif kind == "coulomb":
+                shape, speed = law["shape"], friction_speed[j]
+                step = np.tanh(speed / shape["width"]) if shape["step"] == "smooth" else np.sign(speed)
+                tau[j] += value * step
+            else:
+                raise ValueError(f"this client does not know the law {kind}: add it here, or run in the mode step")
+        return tau
+
+
+class Controller:
+    """Torque from the files' settings; `feed_forward` is the model's torque along the trajectory."""
+
+    def __init__(self, file):
+        self.settings, n = file["controller"], len(file["joints"])
+        self.model = InverseDynamics(file["model"]) if file["model"] else None
+        of = lambda key: np.broadcast_to(np.array(self.settings.get(key, 0.0), float), n)
+        self.kp, self.ki, self.kd = of("kp"), of("ki"), of("kd")
+        limit = self.settings.get("integral_limit")
+        self.limit = np.broadcast_to(np.array(np.inf if limit is None else limit, float), n)
+        self.integral, self.last_error = np.zeros(n), None
+        self.period = 1.0 / file["rate_hz"]
+
+    def power(self, x, alpha, blend):
+        inside = blend ** (alpha - 1) * x if blend > 0 else x
+        return np.where(np.abs(x) < blend, inside, np.sign(x) * np.abs(x) ** alpha)
+
+    def torque(self, target, q, dq):
+        q_d, dq_d, ddq_d = target
+        e, de, kind = q_d - q, dq_d - dq, self.settings["kind"]
+        if kind in ("joint-pd", "joint-pid", "pd-gravity"):
+            tau = self.kp * e + self.kd * de
+            if kind == "joint-pid":
+                if self.last_error is not None:
+                    grown = self.integral + self.ki * 0.5 * self.period * (e + self.last_error)
+                    self.integral = np.clip(grown, -self.limit, self.limit)
+                self.last_error = e
+                tau = tau + self.integral
+            if kind == "pd-gravity":
+                zero = np.zeros_like(q)
+                tau = tau + self.model.torque(q, zero, zero, None)
+            return tau
+        if kind == "computed-torque":
+            a = ddq_d + self.kp * e + self.kd * de
+        elif kind == "finite-time":
+            s = self.settings
+            alpha = s["alpha"]
+            a = ddq_d + self.kp * self.power(e, alpha, s["blend_position"])
+            a = a + self.kd * self.power(de, 2 * alpha / (1 + alpha), s["blend_speed"])
+        else:
+            raise ValueError(f"this client does not know the controller {kind}: run in the mode step")
+        speed = {"none": None, "reference": dq_d, "measured": dq}[self.settings["friction"]]
+        return self.model.torque(q, dq, a, speed)
+
+
+class Robot:
+    def __init__(self, model):
+        self.model, self.data = model, mujoco.MjData(model)
+        self.joints = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, j) for j in range(model.njnt)]
+
+    def start(self, rate_hz, q, dq):
+        # Whole steps of at most 1 ms from one sample of the controller to the next.
+        self.steps = max(1, int(np.ceil(1000.0 / rate_hz)))
+        self.model.opt.timestep = 1.0 / rate_hz / self.steps
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:], self.data.qvel[:] = q, dq
+
+    def advance(self, tau):
+        self.data.qfrc_applied[:] = tau
+        for _ in range(self.steps):
+            mujoco.mj_step(self.model, self.data)
+
+    def run(self, message):
+        file = json.loads(Path(message["controller"]).read_text(encoding="utf-8"))
+        # The files' order is the host's; this robot's own order is its hello's.
+        order = [file["joints"].index(name) for name in self.joints]
+        back = [self.joints.index(name) for name in file["joints"]]
+        with open(message["trajectory"], newline="", encoding="utf-8") as text:
+            rows = [[float(x) for x in row] for row in list(csv.reader(text))[1:]]
+        table, n = np.array(rows), len(order)
+        controller = Controller(file)
+        first = [table[0, 1 + k * n: 1 + (k + 1) * n][order] for k in range(2)]
+        self.start(message["rate_hz"], *first)
+        for row in table:
+            target = [row[1 + k * n: 1 + (k + 1) * n] for k in range(3)]
+            q, dq = self.data.qpos.copy(), self.data.qvel.copy()
+            if not np.all(np.isfinite(q)) or np.max(np.abs(dq)) > 100:
+                return send("end", status="stopped", reason=f"a joint moves too fast at {row[0]:.3f} s")
+            tau = controller.torque(target, q[back], dq[back])[order]
+            send("sample", t_s=row[0], q=q.tolist(), tau=tau.tolist())
+            self.advance(tau)
+        send("end", status="done")
+
+    def step(self, message):
+        self.start(message["rate_hz"], message["q"], message["dq"])
+        for sample in range(message["samples"]):
+            time = sample / message["rate_hz"]
+            send("state", t_s=time, q=self.data.qpos.tolist(), dq=self.data.qvel.tolist())
+            answer = json.loads(sys.stdin.readline())
+            if answer["type"] != "torque":
+                break
+            self.advance(answer["tau"])
+        send("end", status="done")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("urdf", type=Path)
+    parser.add_argument("--friction", type=float, default=0.0, help="dry friction of every joint, Nm")
+    parser.add_argument("--damping", type=float, default=0.0, help="viscous friction of every joint, Nm s/rad")
+    options = parser.parse_args()
+    robot = Robot(load(options.urdf, options.friction, options.damping))
+    send("hello", protocol=PROTOCOL, name=f"MuJoCo {mujoco.__version__}: {options.urdf.name}", joints=robot.joints,
+         modes=["run", "step"])
+    for line in sys.stdin:
+        message = json.loads(line)
+        if message["type"] == "run":
+            robot.run(message)
+        elif message["type"] == "begin":
+            robot.step(message)
+        elif message["type"] == "bye":
+            return
+
+
+if __name__ == "__main__":
+    main()
