@@ -68,8 +68,14 @@ impl Differentiator for Deviation {
             None => 0.0,
         };
         let time_s = |i: usize| place.time_s(i) - lag_s;
-        let deviation: Vec<f64> =
-            q.iter().enumerate().map(|(i, q)| q - self.reference.at(place.joint, time_s(i))[0]).collect();
+        // Where the reference is not known, the deviation of the nearest sample where it is: a jump would reach into good samples.
+        let known: Vec<bool> = (0..q.len()).map(|i| self.reference.covers(place.joint, time_s(i))).collect();
+        let mut deviation = vec![0.0; q.len()];
+        let mut last = (0..q.len()).find(|&i| known[i]).unwrap_or(0);
+        for i in 0..q.len() {
+            last = if known[i] { i } else { last };
+            deviation[i] = q[last] - self.reference.at(place.joint, time_s(last))[0];
+        }
         let inner = Derivatives { q: &mut *out.q, dq: &mut *out.dq, ddq: &mut *out.ddq };
         let mut marked = self.smoother.differentiate_at(place, &deviation, inner)?;
         for i in 0..q.len() {
@@ -77,7 +83,7 @@ impl Differentiator for Deviation {
             out.q[i] += q_d;
             out.dq[i] += dq_d;
             out.ddq[i] += ddq_d;
-            if !self.reference.covers(place.joint, time_s(i)) {
+            if !known[i] {
                 add_sample(&mut marked, i);
             }
         }
@@ -149,7 +155,7 @@ mod tests {
         let [y, dy, ddy] = &mut out;
         let place = Place { rate_hz: 100.0, joint: 0, first_time_s: 0.0 };
         let marked = way.differentiate_at(place, &q, Derivatives { q: y, dq: dy, ddq: ddy }).unwrap();
-        assert_eq!(marked, [101..150]);
+        assert_eq!(marked, vec![101..150; 1]);
         assert!((out[1][50] - 1.0).abs() < 1e-12);
     }
 }

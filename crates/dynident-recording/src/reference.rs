@@ -60,7 +60,7 @@ impl Reference {
                 joints.len()
             )));
         }
-        if times_s.windows(2).any(|pair| !(pair[1] - pair[0] > 0.0)) || times_s.iter().any(|t| !t.is_finite()) {
+        if times_s.windows(2).any(|pair| pair[1] <= pair[0]) || times_s.iter().any(|t| !t.is_finite()) {
             return Err(wrong("its times do not increase from row to row".to_owned()));
         }
         let times: std::sync::Arc<[f64]> = times_s.into();
@@ -243,7 +243,7 @@ fn rests(value: &[f64; 3], peak: [f64; 2]) -> bool {
 impl Sampled {
     fn at(&self, time_s: f64) -> [f64; 3] {
         let last = self.times_s.len() - 1;
-        if !(time_s > self.times_s[0]) {
+        if time_s <= self.times_s[0] || time_s.is_nan() {
             return if time_s == self.times_s[0] { self.values[0] } else { [self.values[0][0], 0.0, 0.0] };
         }
         if time_s >= self.times_s[last] {

@@ -9,7 +9,7 @@ use crate::stroke::Stroke;
 const COARSE_SAMPLES: usize = 400;
 /// Lags that the coarse search tries on either side.
 const COARSE_LAGS: i32 = 50;
-/// Newton steps are a millionth of the first before this.
+/// The search halves its step or better each time; it ends long before this.
 const MOST_STEPS: usize = 30;
 
 /// The lag of one stroke.
@@ -47,7 +47,7 @@ pub fn stroke_lags(
         .map(|stroke| {
             let samples = samples_of(&stroke, common, place, q.len());
             if samples.is_empty() {
-                return StrokeLag { stroke, lag_s: common, rms: 0.0, at_limit: false };
+                return StrokeLag { stroke, lag_s: 0.0, rms: 0.0, at_limit: false };
             }
             let (lag_s, rms, at_limit) = best(reference, place, q, samples, [-max_lag_s, max_lag_s]);
             StrokeLag { stroke, lag_s, rms, at_limit }
@@ -104,21 +104,24 @@ fn best(
 ) -> (f64, f64, bool) {
     let joint = place.joint;
     let step = (samples.len() / COARSE_SAMPLES).max(1);
-    let sum = |lag_s: f64, step: usize| {
-        let mut squares = 0.0;
-        for i in samples.clone().step_by(step) {
+    // Samples at which the shifted reference is known.
+    let known = |i: usize, lag_s: f64| reference.covers(joint, place.time_s(i) - lag_s);
+    let mean_square = |lag_s: f64, step: usize| {
+        let (mut squares, mut count) = (0.0, 0);
+        for i in samples.clone().step_by(step).filter(|&i| known(i, lag_s)) {
             squares += (q[i] - reference.at(joint, place.time_s(i) - lag_s)[0]).powi(2);
+            count += 1;
         }
-        squares
+        if count > 0 { squares / f64::from(count) } else { f64::INFINITY }
     };
     let mut lag_s = (-COARSE_LAGS..=COARSE_LAGS)
         .map(|k| most * f64::from(k) / f64::from(COARSE_LAGS))
-        .map(|lag_s| (sum(lag_s, step), lag_s))
+        .map(|lag_s| (mean_square(lag_s, step), lag_s))
         .fold((f64::INFINITY, 0.0), |best, tried| if tried.0 < best.0 { tried } else { best })
         .1;
     for _ in 0..MOST_STEPS {
         let (mut gradient, mut curvature) = (0.0, 0.0);
-        for i in samples.clone() {
+        for i in samples.clone().filter(|&i| known(i, lag_s)) {
             let [q_d, dq_d, _] = reference.at(joint, place.time_s(i) - lag_s);
             gradient += dq_d * (q_d - q[i]);
             curvature += dq_d * dq_d;
@@ -136,8 +139,8 @@ fn best(
         }
     }
     let moves = reference.peak_speed(joint) > 0.0;
-    let rms = (sum(lag_s, 1) / samples.len().max(1) as f64).sqrt();
-    (lag_s, rms, moves && (lag_s <= least || lag_s >= most))
+    let rms = mean_square(lag_s, 1).sqrt();
+    (lag_s, rms, moves && (lag_s <= least || lag_s >= most || !rms.is_finite()))
 }
 
 #[cfg(test)]

@@ -261,7 +261,7 @@ impl MotionStream {
                 if given {
                     return Ok(true);
                 }
-                if self.ended && self.raw_at >= self.raw.rows() {
+                if self.waiting.is_empty() && self.ended && self.raw_at >= self.raw.rows() {
                     return self.finish(block);
                 }
                 continue;

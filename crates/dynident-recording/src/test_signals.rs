@@ -9,7 +9,9 @@ pub(crate) fn normal(seed: u64, n: usize) -> Vec<f64> {
         state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         ((state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
     };
-    (0..20).for_each(|_| drop(uniform()));
+    for _ in 0..20 {
+        uniform();
+    }
     (0..n).map(|_| (-2.0 * uniform().ln()).sqrt() * (core::f64::consts::TAU * uniform()).cos()).collect()
 }
 

@@ -26,6 +26,7 @@ mod instruments;
 mod job;
 mod lag;
 mod machine;
+mod motion_log;
 mod output;
 mod physical;
 mod progress;

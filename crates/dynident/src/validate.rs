@@ -8,7 +8,7 @@ use crate::lag::LagCheck;
 use crate::machine::Machine;
 use crate::residuals::{JointWatch, Uncertainty};
 use crate::result::{BaseParameterResult, LogSummary, LogValidation};
-use crate::rows::{JointRows, Pass, RawSamples, RowSink, estimated_rows, motion_in_force, named_cutoff};
+use crate::rows::{JointRows, Pass, RawSamples, RowSink, estimated_rows, motion_in_force};
 use crate::study::{Folders, Role, Study};
 use dynident_estimation::Validation;
 use dynident_recording::MotionSettings;
@@ -71,7 +71,7 @@ pub fn validate(
     if chosen.is_empty() {
         chosen = (0..study.log.len()).collect();
     }
-    let of_model_hz = named_cutoff(&made_with);
+    let of_model_hz = made_with.differentiator.cutoff_hz();
     let motion = motion_in_force(study, &machine, &files, &chosen, of_model_hz)?;
     let mut file = ValidationFile {
         schema: VALIDATION_SCHEMA,
