@@ -12,6 +12,7 @@ const RATE_HZ: f64 = 1000.0;
 /// BIRDy's three levels, and two beyond; degrees.
 const NOISE_DEG: [f64; 5] = [0.0, 1e-4, 1e-3, 1e-2, 1e-1];
 const SEEDS: u64 = 3;
+const DURATION_S: f64 = 40.0;
 /// Left out at both ends.
 const TRIM_S: f64 = 1.0;
 
@@ -25,7 +26,7 @@ const TRACKING: [(&str, Tracking); 6] = [
     ("vibration", Tracking { delay_s: 0.0, shape: 0.0, vibration: 1e-4 }),
 ];
 
-const WAYS: [(&str, &str); 14] = [
+const WAYS: [(&str, &str); 15] = [
     ("low-pass", ""),
     ("butterworth", ""),
     ("central-differences", "order = 2"),
@@ -34,6 +35,7 @@ const WAYS: [(&str, &str); 14] = [
     ("smoothed-differences", "window = 101"),
     ("five-point-cubic", ""),
     ("frequency-domain", ""),
+    ("frequency-domain", "ends = \"periodic\""),
     ("fourier-fit", "SERIES"),
     ("speed-series", "SERIES"),
     ("position-map", ""),
@@ -66,10 +68,6 @@ impl Told {
             Self::Stroke => "The paper's stroke (A = 2.094 rad, ω = 0.996 1/s, T = 40/ω)",
             Self::Series => "A Fourier series (five harmonics of 0.1 Hz, four periods)",
         }
-    }
-
-    fn duration_s(self) -> f64 {
-        40.0
     }
 
     fn series(self) -> &'static str {
@@ -116,7 +114,7 @@ impl Told {
     }
 }
 
-/// Root mean square of the mean error over the seeds, of what the seeds scatter about it, and of both; for dq and ddq.
+/// Root mean square of the error without noise, of what noise adds, and of both; for dq and ddq.
 #[derive(Clone, Copy, Default)]
 struct Figures {
     bias: [f64; 2],
@@ -128,7 +126,7 @@ struct Figures {
 
 fn main() {
     for told in [Told::Stroke, Told::Series] {
-        let n = (told.duration_s() * RATE_HZ) as usize;
+        let n = (DURATION_S * RATE_HZ) as usize;
         let none = TRACKING[0].1;
         let times: Vec<f64> = (0..n + 200).map(|i| i as f64 / RATE_HZ).collect();
         let columns = [0, 1, 2].map(|order| times.iter().map(|t| told.at(*t, none)[order]).collect());
@@ -155,8 +153,9 @@ fn label(way: usize) -> String {
     let (method, settings) = WAYS[way];
     let short = match way {
         2 | 3 => settings.replace("order = ", "order "),
-        12 => "of Butterworth, cut-off from the data".to_owned(),
-        13 => "of Butterworth at 0.5 Hz, behind the lag".to_owned(),
+        13 => "of Butterworth, cut-off from the data".to_owned(),
+        14 => "of Butterworth at 0.5 Hz, behind the lag".to_owned(),
+        8 => "periodic".to_owned(),
         _ => return method.to_owned(),
     };
     format!("{method}, {short}")
@@ -169,6 +168,10 @@ fn table(figures: &[Vec<Vec<Figures>>], order: usize, quantity: &str) {
     println!("| {quantity} | {} | {} |", biases.join(" | "), deviations.join(" | "));
     println!("| --- |{}", " --- |".repeat(biases.len() + deviations.len()));
     for (way, figures) in figures.iter().enumerate() {
+        if figures[2].iter().all(|cell| cell.refused > 0.99) {
+            println!("| {} |{}", label(way), " refused |".repeat(biases.len() + deviations.len()));
+            continue;
+        }
         let bias = figures[2].iter().map(|cell| {
             let refused =
                 if cell.refused > 0.005 { format!(" ({:.0} % refused)", 100.0 * cell.refused) } else { String::new() };
@@ -203,54 +206,46 @@ fn measured(
     noise_deg: f64,
     tracking: Tracking,
 ) -> Figures {
-    let n = (told.duration_s() * RATE_HZ) as usize;
+    let n = (DURATION_S * RATE_HZ) as usize;
     let exact: Vec<[f64; 3]> = (0..n).map(|i| told.at(i as f64 / RATE_HZ, tracking)).collect();
-    let seeds = if noise_deg > 0.0 { SEEDS } else { 1 };
-    let mut out = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
-    // Sums of errors and of their squares, and how many seeds gave a value.
-    let (mut sums, mut squares, mut counts) = (vec![[0.0; 2]; n], [0.0; 2], vec![0_u32; n]);
-    let mut refused = 0;
-    for seed in 0..seeds {
-        let noise = normal(seed, n);
-        let q: Vec<f64> = exact.iter().zip(noise).map(|(x, e)| x[0] + noise_deg.to_radians() * e).collect();
-        let built = way.build_following(cutoff(&[&q[..]], RATE_HZ).cutoff_hz, Some(reference)).unwrap();
+    let clean: Vec<f64> = exact.iter().map(|x| x[0]).collect();
+    let run = |q: &[f64], cutoff_hz: f64| {
+        let mut out = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
         let [y, dq, ddq] = &mut out;
         let place = Place { rate_hz: RATE_HZ, joint: 0, first_time_s: 0.0 };
-        let marked = built.differentiate_at(place, &q, Derivatives { q: y, dq, ddq }).unwrap();
+        let built = way.build_following(cutoff_hz, Some(reference)).unwrap();
+        let marked = built.differentiate_at(place, q, Derivatives { q: y, dq, ddq }).unwrap();
         let mut kept = vec![true; n];
         for range in marked {
             kept[range].fill(false);
         }
-        let trim = (TRIM_S * RATE_HZ) as usize;
+        (out, kept)
+    };
+    let trim = (TRIM_S * RATE_HZ) as usize;
+    let (mut figures, mut count, mut refused) = (Figures::default(), 0.0, 0.0);
+    for seed in 0..if noise_deg > 0.0 { SEEDS } else { 1 } {
+        let q: Vec<f64> = clean.iter().zip(normal(seed, n)).map(|(x, e)| x + noise_deg.to_radians() * e).collect();
+        // Without noise, but with the cut-off that the noisy data ask for.
+        let cutoff_hz = cutoff(&[&q[..]], RATE_HZ).cutoff_hz;
+        let (noisy, kept) = run(&q, cutoff_hz);
+        let (quiet, kept_quiet) = run(&clean, cutoff_hz);
         for i in trim..n - trim {
-            if !kept[i] {
-                refused += 1;
+            if !(kept[i] && kept_quiet[i]) {
+                refused += 1.0;
                 continue;
             }
-            counts[i] += 1;
+            count += 1.0;
             for order in 0..2 {
-                let error = out[order + 1][i] - exact[i][order + 1];
-                sums[i][order] += error;
-                squares[order] += error * error;
+                let (noisy, quiet, exact) = (noisy[order + 1][i], quiet[order + 1][i], exact[i][order + 1]);
+                figures.bias[order] += (quiet - exact).powi(2);
+                figures.deviation[order] += (noisy - quiet).powi(2);
+                figures.total[order] += (noisy - exact).powi(2);
             }
         }
     }
-    let all = f64::from(counts.iter().sum::<u32>()).max(1.0);
-    let mut figures = Figures { refused: f64::from(refused) / (f64::from(refused) + all), ..Figures::default() };
-    for order in 0..2 {
-        let total = squares[order] / all;
-        let mean: f64 = sums
-            .iter()
-            .zip(&counts)
-            .filter(|(_, c)| **c > 0)
-            .map(|(s, c)| s[order] * s[order] / f64::from(*c))
-            .sum::<f64>()
-            / all;
-        // The mean of S seeds keeps 1/S of their variance.
-        let variance = if seeds > 1 { (total - mean) * seeds as f64 / (seeds - 1) as f64 } else { 0.0 };
-        figures.deviation[order] = variance.max(0.0).sqrt();
-        figures.bias[order] = (total - variance).max(0.0).sqrt();
-        figures.total[order] = total.sqrt();
+    figures.refused = refused / (refused + count);
+    for sums in [&mut figures.bias, &mut figures.deviation, &mut figures.total] {
+        *sums = sums.map(|sum| (sum / f64::max(count, 1.0)).sqrt());
     }
     figures
 }
