@@ -47,4 +47,5 @@ pub use line_plot::{Line, LinePlot};
 pub use page::{Report, Section};
 pub use table::{Cell, Table};
 pub use text::Text;
+pub use ticks::short;
 pub use tone::Tone;

@@ -4,6 +4,7 @@ use crate::decimation::kept_samples;
 use crate::error::ReportError;
 use crate::plot_data::{CurveData, PlotData, check_axis, check_length, rounded};
 use crate::ticks::{short, ticks};
+use core::fmt::Write;
 use serde::Serialize;
 
 /// Pixel columns that a curve is drawn for.
@@ -153,7 +154,8 @@ impl LinePlot {
             for &i in &kept {
                 if curve[i].is_finite() {
                     let command = if pen_down { 'L' } else { 'M' };
-                    text += &format!("{command}{:.1} {:.1}", at_x(self.x[i]), at_y(curve[i]));
+                    // Writing to a string cannot fail.
+                    let _ = write!(text, "{command}{:.1} {:.1}", at_x(self.x[i]), at_y(curve[i]));
                 }
                 pen_down = curve[i].is_finite();
             }

