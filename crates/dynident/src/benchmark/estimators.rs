@@ -81,6 +81,14 @@ pub const ESTIMATORS: &[BenchmarkEstimator] = &[
         wide,
     ),
     entry(
+        "weighted-fourier",
+        "weighted least squares, motion by a Fourier fit at the excitation's own frequencies",
+        |trial| periodic(trial, Some(trial.cutoff_hz)),
+    ),
+    entry("weighted-fourier-all-rows", "the same on all rows, neither filtered nor decimated", |trial| {
+        periodic(trial, None)
+    }),
+    entry(
         "weighted-true-motion",
         "weighted least squares on the true motion, which no one knows: what decimation costs",
         true_motion,
@@ -99,16 +107,22 @@ fn weighted(trial: &Trial<'_>, covariance: CovarianceMethod) -> Result<Answer, E
 fn wide(trial: &Trial<'_>) -> Result<Answer, EstimationError> {
     let cutoff_hz = 2.0 * trial.cutoff_hz;
     let motion = pipeline::differentiated(trial.record, cutoff_hz).map_err(|_| EstimationError::Empty)?;
+    refitted(trial, &motion, Some(cutoff_hz))
+}
+
+/// The fit with the motion of a Fourier series: the excitation is periodic, and its frequencies are known.
+fn periodic(trial: &Trial<'_>, cutoff_hz: Option<f64>) -> Result<Answer, EstimationError> {
+    let motion = pipeline::periodic(trial.record).map_err(|_| EstimationError::Empty)?;
     refitted(trial, &motion, cutoff_hz)
 }
 
 /// The fit with the regressor of the true motion: an oracle that separates what differentiation costs from what decimation costs.
 fn true_motion(trial: &Trial<'_>) -> Result<Answer, EstimationError> {
     let Motion { q, dq, ddq, .. } = trial.scenario.motion.clone();
-    refitted(trial, &MotionBlock { q, dq, ddq, ..trial.motion.clone() }, trial.cutoff_hz)
+    refitted(trial, &MotionBlock { q, dq, ddq, ..trial.motion.clone() }, Some(trial.cutoff_hz))
 }
 
-fn refitted(trial: &Trial<'_>, motion: &MotionBlock, cutoff_hz: f64) -> Result<Answer, EstimationError> {
+fn refitted(trial: &Trial<'_>, motion: &MotionBlock, cutoff_hz: Option<f64>) -> Result<Answer, EstimationError> {
     // A pipeline that fails is a failure of the estimator; the figure does not need the reason.
     let problem = pipeline::problem(trial.scenario, motion, cutoff_hz).map_err(|_| EstimationError::Empty)?;
     weighted_least_squares(&problem, &WeightedSettings::default()).map(answer)

@@ -247,7 +247,7 @@ fn one_run(
     let record = scenario.record(level, random);
     let (motion, cutoff_hz) = pipeline::motion(&record)
         .map_err(|source| BenchmarkError::Filter { robot: scenario.robot.to_owned(), source })?;
-    let problem = pipeline::problem(scenario, &motion, cutoff_hz)?;
+    let problem = pipeline::problem(scenario, &motion, Some(cutoff_hz))?;
     let trial = Trial { scenario, record: &record, motion: &motion, cutoff_hz, problem: &problem, start: &start };
     Ok(estimators
         .iter()

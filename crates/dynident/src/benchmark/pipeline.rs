@@ -1,7 +1,7 @@
 //! The pipeline's own way from a record to triangular factors, in memory.
 
 use super::BenchmarkError;
-use super::scenario::{RATE_HZ, Record, Scenario};
+use super::scenario::{DURATION_S, HARMONICS, RATE_HZ, Record, Scenario};
 use crate::error::Error;
 use crate::progress::Silent;
 use crate::rows::{Computer, JointRows, RawSamples, RowSink, decimation};
@@ -18,8 +18,23 @@ pub(super) fn motion(record: &Record) -> Result<(MotionBlock, f64), FilterError>
 
 /// The record's motion by the default differentiator with the given cut-off.
 pub(super) fn differentiated(record: &Record, cutoff_hz: f64) -> Result<MotionBlock, FilterError> {
+    differentiated_by(&DifferentiatorSettings::default(), record, cutoff_hz)
+}
+
+/// The record's motion by a Fourier series of the excitation's own frequencies, fitted to the positions: what is known of a periodic motion before the run.
+pub(super) fn periodic(record: &Record) -> Result<MotionBlock, FilterError> {
+    let settings =
+        DifferentiatorSettings::FourierFit { base_hz: 1.0 / DURATION_S, harmonics: HARMONICS, trend: false };
+    differentiated_by(&settings, record, 1.0)
+}
+
+fn differentiated_by(
+    settings: &DifferentiatorSettings,
+    record: &Record,
+    cutoff_hz: f64,
+) -> Result<MotionBlock, FilterError> {
     let positions: Vec<&[f64]> = record.q.chunks_exact(record.samples).collect();
-    let differentiator = DifferentiatorSettings::default().build(cutoff_hz)?;
+    let differentiator = settings.build(cutoff_hz)?;
     let mut block = MotionBlock {
         rate_hz: RATE_HZ,
         rows: record.samples,
@@ -53,11 +68,11 @@ impl RowSink for Factors {
     }
 }
 
-/// Filtered rows of the motion as a problem; filter and decimation follow from the cut-off as in `identify`.
+/// Filtered rows of the motion as a problem; filter and decimation follow from the cut-off as in `identify`. Without a cut-off every sample as it is.
 pub(super) fn problem(
     scenario: &Scenario,
     motion: &MotionBlock,
-    cutoff_hz: f64,
+    cutoff_hz: Option<f64>,
 ) -> Result<LinearProblem, BenchmarkError> {
     let (model, layout) = (&scenario.model, &scenario.layout);
     let segments = EstimatorSection::default().segments;
@@ -67,7 +82,8 @@ pub(super) fn problem(
         .map(|joint| SegmentedFactor::new(layout.joint_columns(joint).len(), segments))
         .collect::<Result<Vec<_>, _>>()
         .map_err(estimation)?;
-    let filter = decimation(&ParallelFilterSection::default(), motion.rate_hz, Some(cutoff_hz));
+    let filter =
+        cutoff_hz.and_then(|cutoff| decimation(&ParallelFilterSection::default(), motion.rate_hz, Some(cutoff)));
     let places: Vec<usize> = (0..model.dof()).collect();
     let mut sink = Factors(factors);
     Computer::new(model, layout, &places, motion.rate_hz, filter.as_ref(), None, &Silent)
