@@ -74,6 +74,65 @@ def savitzky_golay(x, window, degree, rate_hz):
     return {"window": window, "degree": degree, "rate_hz": rate_hz, "derivatives": derivatives}
 
 
+def causal(x, order, cutoff_hz, rate_hz):
+    """sosfilt of x behind its odd extension, and central differences of sixth order of the output, the extension at the end kept."""
+    sos = signal.butter(order, cutoff_hz, fs=rate_hz, output="sos")
+    pad = 3 * (order + 1)
+    extended = odd_ext(x, pad)
+    y, _ = signal.sosfilt(sos, extended, zi=signal.sosfilt_zi(sos) * extended[0])
+    at = np.arange(pad, pad + len(x))
+    dq = rate_hz * (45 * (y[at + 1] - y[at - 1]) - 9 * (y[at + 2] - y[at - 2]) + (y[at + 3] - y[at - 3])) / 60
+    ddq = rate_hz**2 * (
+        270 * (y[at + 1] + y[at - 1]) - 27 * (y[at + 2] + y[at - 2]) + 2 * (y[at + 3] + y[at - 3]) - 490 * y[at]
+    ) / 180
+    _, delay = signal.group_delay(signal.butter(order, cutoff_hz, fs=rate_hz), w=[1e-6])
+    return {
+        "order": order, "cutoff_hz": cutoff_hz, "rate_hz": rate_hz, "q": y[at], "dq": dq, "ddq": ddq, "delay_s": delay[0] / rate_hz,
+    }
+
+
+def series(x, base_hz, harmonics, trend, rate_hz):
+    """numpy.linalg.lstsq of offset, straight line and harmonics, and the derivatives of the fit."""
+    t = np.arange(len(x)) / rate_hz
+    zero, one = np.zeros_like(t), np.ones_like(t)
+    columns = [[one, zero, zero]] + ([[t, one, zero]] if trend else [])
+    for k in range(1, harmonics + 1):
+        w = 2 * math.pi * k * base_hz
+        s, c = np.sin(w * t), np.cos(w * t)
+        columns += [[s, w * c, -w * w * s], [c, -w * s, -w * w * c]]
+    basis = np.array(columns)
+    coefficients = np.linalg.lstsq(basis[:, 0].T, x, rcond=None)[0]
+    q, dq, ddq = np.einsum("k,kdn->dn", coefficients, basis)
+    return {"base_hz": base_hz, "harmonics": harmonics, "trend": trend, "rate_hz": rate_hz, "q": q, "dq": dq, "ddq": ddq}
+
+
+def in_frequency(x, cutoff_hz, mirrored, rate_hz):
+    """numpy.fft: jw X up to the cut-off, nothing beyond."""
+    whole = np.concatenate([x, x[-2:0:-1]]) if mirrored else x
+    spectrum, f = np.fft.rfft(whole), np.fft.rfftfreq(len(whole), 1 / rate_hz)
+    kept = np.where(f <= cutoff_hz, spectrum, 0)
+    q, dq, ddq = [np.fft.irfft(kept * (2j * math.pi * f) ** d, len(whole))[: len(x)] for d in range(3)]
+    return {"cutoff_hz": cutoff_hz, "mirrored": mirrored, "rate_hz": rate_hz, "q": q, "dq": dq, "ddq": ddq}
+
+
+def averaged_differences(x, window, rate_hz):
+    """numpy.gradient-like second differences of second order, then a centred mean whose window shrinks at the ends."""
+    second = np.empty_like(x)
+    second[1:-1] = x[2:] - 2 * x[1:-1] + x[:-2]
+    second[0], second[-1] = second[1], second[-2]
+    n, half = len(x), window // 2
+    mean = lambda y, i, h: y[i - h : i + h + 1].mean()
+    ddq = np.array([mean(second, i, min(half, i, n - 1 - i)) for i in range(n)]) * rate_hz**2
+    return {"window": window, "rate_hz": rate_hz, "dq": np.gradient(x, 1 / rate_hz, edge_order=2), "ddq": ddq}
+
+
+def five_points(x, passes):
+    """savgol_filter(5, 3, mode="interp"), repeated: the weights (-3, 12, 17, 12, -3)/35."""
+    for _ in range(passes):
+        x = signal.savgol_filter(x, 5, 3, mode="interp")
+    return {"passes": passes, "smooth": x}
+
+
 def kaiser_taps(factor, stop_band_db, rate_hz):
     """Kaiser-windowed sinc by scipy.signal.firwin, with the length and shape that DecimationSettings documents."""
     reduced = rate_hz / factor
@@ -109,6 +168,11 @@ def main():
         "savitzky_golay": [
             savitzky_golay(x, window, degree, 200.0) for window, degree in [(5, 2), (5, 3), (11, 4), (31, 5), (101, 4), (101, 8)]
         ],
+        "low_pass": [causal(x, *case, 200.0) for case in [(1, 20.0), (2, 5.0), (4, 8.0), (5, 30.0)]],
+        "fourier_fit": [series(x, *case, 200.0) for case in [(1.5, 3, True), (1.25, 8, False), (0.7, 2, True)]],
+        "frequency_domain": [in_frequency(x, *case, 200.0) for case in [(12.0, True), (12.0, False), (60.0, True)]],
+        "smoothed_differences": [averaged_differences(x, window, 200.0) for window in [3, 11, 31]],
+        "five_point_cubic": [five_points(x, passes) for passes in [1, 4]],
         "gradient": np.gradient(x, 1 / 200.0, edge_order=2),
         "decimation": [kaiser_taps(*case) for case in [(2, 60.0, 1000.0), (10, 60.0, 1000.0), (5, 90.0, 500.0), (25, 40.0, 5000.0)]],
     }

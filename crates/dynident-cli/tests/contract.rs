@@ -151,6 +151,8 @@ fn a_worse_validation_than_asked_has_status_1() {
         let ran = identify_held_out(folder.path(), &["--max-validation-error", limit]);
         assert_eq!(ran.status, status, "{}", ran.stderr);
         assert!(folder.path().join("result.json").exists());
+        let report = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+        assert!(report.ends_with("</html>") && report.contains("data-plot"));
     }
     let out = folder.path().display().to_string();
     let ran = run_in(&broken(), &["identify", "good.toml", "--out", &out, "--max-validation-error", "1000"]);
@@ -179,17 +181,17 @@ fn summaries_fit_eighty_columns_and_say_the_important_first() {
 fn outputs_are_whole_or_not_there() {
     let folder = tempfile::tempdir().unwrap();
     let old = "an earlier result";
-    for name in ["result.json", "identified.urdf"] {
+    for name in ["result.json", "report.html", "identified.urdf"] {
         std::fs::write(folder.path().join(name), old).unwrap();
     }
     let out = folder.path().display().to_string();
     for study in ["log_nan.toml", "rows_beyond.toml", "unknown_key.toml"] {
         assert_eq!(run_in(&broken(), &["identify", study, "--out", &out]).status, 2);
     }
-    for name in ["result.json", "identified.urdf"] {
+    for name in ["result.json", "report.html", "identified.urdf"] {
         assert_eq!(std::fs::read_to_string(folder.path().join(name)).unwrap(), old);
     }
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "temporary files were left");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3, "temporary files were left");
     // A file where the folder should be: refused before the work, and the file stays.
     let file = folder.path().join("result.json").display().to_string();
     let ran = run_in(&broken(), &["identify", "good.toml", "--out", &file]);

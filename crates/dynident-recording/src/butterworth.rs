@@ -94,18 +94,8 @@ impl Differentiator for ButterworthZeroPhase {
         signal[last][2] = -signal[last][1];
         let end = signal[last][0];
         run(&sections, &mut signal, [end, 0.0, 0.0], true);
-        let square = rate_hz * rate_hz;
-        for (i, n) in (pad..pad + q.len()).enumerate() {
-            let d2 = |k: isize| signal[n.wrapping_add_signed(k)][2];
-            let first = 0.5 * (signal[n][1] + signal[n + 1][1]);
-            // mu delta^3 and mu delta^5, delta^4 and delta^6 from second differences.
-            let third = 0.5 * (d2(1) - d2(-1));
-            let fifth = 0.5 * (d2(2) - 2.0 * d2(1) + 2.0 * d2(-1) - d2(-2));
-            let fourth = d2(1) - 2.0 * d2(0) + d2(-1);
-            let sixth = d2(2) - 4.0 * d2(1) + 6.0 * d2(0) - 4.0 * d2(-1) + d2(-2);
-            out.q[i] = signal[n][0];
-            out.dq[i] = rate_hz * (first - third / 6.0 + fifth / 30.0);
-            out.ddq[i] = square * (d2(0) - fourth / 12.0 + sixth / 90.0);
+        for i in 0..q.len() {
+            [out.q[i], out.dq[i], out.ddq[i]] = sixth_order(&signal, pad + i, rate_hz);
         }
         Ok(())
     }
@@ -125,8 +115,27 @@ impl Differentiator for ButterworthZeroPhase {
     }
 }
 
+/// Samples on either side that [`sixth_order`] needs.
+pub(crate) const DIFFERENCE_REACH: usize = 3;
+
+/// Value, first and second derivative at sample `n` from the signal with its backward first and central second differences: central differences of sixth order.
+pub(crate) fn sixth_order(signal: &[Triple], n: usize, rate_hz: f64) -> [f64; 3] {
+    let d2 = |k: isize| signal[n.wrapping_add_signed(k)][2];
+    let first = 0.5 * (signal[n][1] + signal[n + 1][1]);
+    // mu delta^3 and mu delta^5, delta^4 and delta^6 from second differences.
+    let third = 0.5 * (d2(1) - d2(-1));
+    let fifth = 0.5 * (d2(2) - 2.0 * d2(1) + 2.0 * d2(-1) - d2(-2));
+    let fourth = d2(1) - 2.0 * d2(0) + d2(-1);
+    let sixth = d2(2) - 4.0 * d2(1) + 6.0 * d2(0) - 4.0 * d2(-1) + d2(-2);
+    [
+        signal[n][0],
+        rate_hz * (first - third / 6.0 + fifth / 30.0),
+        rate_hz * rate_hz * (d2(0) - fourth / 12.0 + sixth / 90.0),
+    ]
+}
+
 /// The signal with `pad` more on either side, point-mirrored at its end values: `2 x₀ - x_k`.
-fn extended(signal: &[f64], pad: usize) -> Vec<Triple> {
+pub(crate) fn extended(signal: &[f64], pad: usize) -> Vec<Triple> {
     let (first, last) = (signal[0], signal[signal.len() - 1]);
     let before = signal[1..=pad].iter().rev().map(|x| 2.0 * first - x);
     let after = signal[signal.len() - 1 - pad..signal.len() - 1].iter().rev().map(|x| 2.0 * last - x);

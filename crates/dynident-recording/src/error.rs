@@ -182,6 +182,24 @@ pub enum RecordingError {
     /// A setting of a filter that cannot be met.
     #[error(transparent)]
     Filter(#[from] FilterError),
+    /// A table of the commanded motion that is none.
+    #[error("{}: not a reference motion: {problem}; give a table as design writes it: t_s, q1.., dq1.., ddq1..", file.display())]
+    Reference {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+    /// No sample at which a way that needs the commanded motion applies.
+    #[error("{}: at none of {samples} samples does {method} apply: the joints do not follow this reference; check its file, start_s and max_lag_s", file.display())]
+    NotFollowed {
+        /// The log's main file.
+        file: PathBuf,
+        /// The differentiator.
+        method: &'static str,
+        /// Samples looked at.
+        samples: u64,
+    },
     /// No segment of the log is long enough for the filter.
     #[error("{}: the longest uninterrupted piece has {found} samples, the {method} filter needs {needed}; widen the range or choose a shorter filter", file.display())]
     TooShort {
@@ -227,5 +245,29 @@ pub enum FilterError {
         found: usize,
         /// Samples needed.
         needed: usize,
+    },
+    /// A fit whose unknowns the samples do not tell apart.
+    #[error("{method}: {samples} samples do not determine the fit: {mend}")]
+    Undetermined {
+        /// The differentiator.
+        method: &'static str,
+        /// Samples given.
+        samples: usize,
+        /// What to do.
+        mend: &'static str,
+    },
+    /// A commanded motion that makes no sense.
+    #[error("the reference motion is wrong: {problem}")]
+    Reference {
+        /// What is wrong, and the mend.
+        problem: String,
+    },
+    /// A way that needs the commanded motion, without one.
+    #[error(
+        "{method} needs the motion that was commanded: name its table, reference = \"trajectory.csv\", in the differentiator or in the log"
+    )]
+    NoReference {
+        /// The differentiator.
+        method: &'static str,
     },
 }

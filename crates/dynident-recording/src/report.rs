@@ -83,6 +83,8 @@ pub struct ImportReport {
     pub segments: usize,
     /// Pieces too short for the filter, and the samples in them.
     pub short_segments: [u64; 2],
+    /// Samples left out because the way from q to dq and ddq does not apply there.
+    pub unmapped_samples: u64,
     /// Every channel of every joint.
     pub channels: Vec<ChannelReport>,
     /// Logged velocities against the derivative of the position.
@@ -120,6 +122,13 @@ impl ImportReport {
                 "time",
                 format!("{pieces} pieces too short for the filter were left out ({samples} samples)"),
             );
+        }
+        if self.unmapped_samples > 0 {
+            let message = format!(
+                "{} samples were left out: off the stroke, or the commanded motion is not followed or not known there",
+                self.unmapped_samples
+            );
+            add(Level::Warning, "position", message);
         }
         if self.duplicate_stamps > 0 {
             add(Level::Warning, "time", format!("{} stamps equal the one before", self.duplicate_stamps));

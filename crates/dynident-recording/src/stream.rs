@@ -4,15 +4,19 @@ use crate::channel_checks::{ChannelCheck, quantisation_step};
 use crate::clock::{Clock, clock};
 use crate::comparison::Comparison;
 use crate::cutoff::{CUTOFF_SAMPLES, CutoffChoice, cutoff};
-use crate::differentiator::{Derivatives, Differentiator, DifferentiatorSettings};
+use crate::differentiator::{Derivatives, Differentiator, DifferentiatorSettings, Place};
 use crate::error::{FilterError, RecordingError};
 use crate::format::LogFormat;
+use crate::marks::{kept_runs, part};
 use crate::reader::{LogReader, RawBlock};
+use crate::reference::Reference;
 use crate::report::ImportReport;
 use crate::segments::Segmenter;
 use crate::time_checks::TimeCheck;
 use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Rows of a [`MotionBlock`] at least, but for the last of a segment.
 const CHUNK_ROWS: usize = 8192;
@@ -110,6 +114,13 @@ pub struct MotionStream {
     velocity: Vec<Comparison>,
     acceleration: Vec<Comparison>,
     window: [Vec<f64>; 4],
+    /// Blocks that wait because samples between them were left out.
+    waiting: VecDeque<MotionBlock>,
+    /// How often a piece was cut where the differentiator does not apply, and whether the last sample was left out.
+    cuts: usize,
+    in_cut: bool,
+    unmapped: u64,
+    given: u64,
 }
 
 /// The first part of a log, as read for the decisions.
@@ -131,6 +142,22 @@ impl MotionStream {
         joints: &[String],
         settings: &MotionSettings,
     ) -> Result<Self, RecordingError> {
+        Self::open_following(format, file, joints, settings, None)
+    }
+
+    /// As [`open`](Self::open), with the commanded motion for a way that needs it, its joints in the order of `joints`.
+    ///
+    /// Where the way does not apply to a joint, the samples of all joints are left out, the piece is cut there, and the report says how many.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_following(
+        format: &LogFormat,
+        file: &Path,
+        joints: &[String],
+        settings: &MotionSettings,
+        reference: Option<&Arc<Reference>>,
+    ) -> Result<Self, RecordingError> {
         settings.validate()?;
         let (prefix, time_label) = prefix(format, file, joints)?;
         let clock = match format.rate_hz {
@@ -147,7 +174,7 @@ impl MotionStream {
         };
         let segmenter = Segmenter::new(&clock, format.max_gap_steps, 2 * joints.len());
         let cutoff = cutoff(&longest_segment(segmenter, &prefix), clock.rate_hz);
-        let differentiator = settings.differentiator.build(cutoff.cutoff_hz)?;
+        let differentiator = settings.differentiator.build_following(cutoff.cutoff_hz, reference)?;
         let mut checks = Vec::new();
         for (key, _, quantity) in format.groups() {
             for (index, joint) in joints.iter().enumerate() {
@@ -191,6 +218,11 @@ impl MotionStream {
             velocity,
             acceleration,
             window: Default::default(),
+            waiting: VecDeque::new(),
+            cuts: 0,
+            in_cut: false,
+            unmapped: 0,
+            given: 0,
         })
     }
 
@@ -210,6 +242,10 @@ impl MotionStream {
     /// If the log cannot be read further, or no piece of it is long enough for the filter.
     pub fn next_block(&mut self, block: &mut MotionBlock) -> Result<bool, RecordingError> {
         loop {
+            if let Some(next) = self.waiting.pop_front() {
+                *block = next;
+                return Ok(true);
+            }
             let available = self.uniform[0].len();
             if let Some(context) = self.context
                 && available >= self.done + self.chunk() + context.max(self.trim)
@@ -225,7 +261,7 @@ impl MotionStream {
                 if given {
                     return Ok(true);
                 }
-                if self.ended && self.raw_at >= self.raw.rows() {
+                if self.waiting.is_empty() && self.ended && self.raw_at >= self.raw.rows() {
                     return self.finish(block);
                 }
                 continue;
@@ -242,6 +278,13 @@ impl MotionStream {
                 found: self.longest_short,
                 needed: self.needed(),
                 method: self.differentiator.name(),
+            });
+        }
+        if self.given == 0 && self.unmapped > 0 {
+            return Err(RecordingError::NotFollowed {
+                file: self.reader.file().to_owned(),
+                method: self.differentiator.name(),
+                samples: self.unmapped,
             });
         }
         Ok(false)
@@ -301,6 +344,7 @@ impl MotionStream {
         self.uniform.iter_mut().for_each(Vec::clear);
         self.done = 0;
         self.passed = 0;
+        self.in_cut = false;
         self.segmenter.reopen();
         Ok(given)
     }
@@ -314,13 +358,14 @@ impl MotionStream {
         let (joints, rows) = (self.joints.len(), end.saturating_sub(from));
         let rate = self.clock.rate_hz;
         block.rate_hz = rate;
-        block.segment = self.segments;
+        block.segment = self.segments + self.cuts;
         block.first_time_s = self.segmenter.first_time_s() + (self.passed as f64 + from as f64) / rate;
         block.rows = rows;
         block.joints = joints;
         for values in [&mut block.q, &mut block.dq, &mut block.ddq, &mut block.tau, &mut block.tau_smooth] {
             values.clear();
         }
+        let mut marked = Vec::new();
         if rows > 0 {
             let inside = from - window_from..end - window_from;
             let [q, dq, ddq, other] = &mut self.window;
@@ -329,7 +374,10 @@ impl MotionStream {
             }
             for joint in 0..joints {
                 let signal = &self.uniform[joint][window_from..window_to];
-                self.differentiator.differentiate(rate, signal, Derivatives { q, dq, ddq })?;
+                let before = self.passed as f64 + window_from as f64;
+                let first_time_s = self.segmenter.first_time_s() + before / rate;
+                let place = Place { rate_hz: rate, joint, first_time_s };
+                marked.extend(self.differentiator.differentiate_at(place, signal, Derivatives { q, dq, ddq })?);
                 block.q.extend_from_slice(&q[inside.clone()]);
                 block.dq.extend_from_slice(&dq[inside.clone()]);
                 block.ddq.extend_from_slice(&ddq[inside.clone()]);
@@ -358,7 +406,30 @@ impl MotionStream {
             self.done -= unneeded;
             self.passed += unneeded as u64;
         }
-        Ok(rows > 0)
+        self.given += rows as u64;
+        if marked.is_empty() {
+            self.in_cut &= rows == 0;
+            return Ok(rows > 0);
+        }
+        self.keep_unmarked(block, &marked, from - window_from);
+        Ok(false)
+    }
+
+    /// Leaves the marked samples out; what remains waits as blocks of pieces of their own. `first` is the place of the block's first row in the window that the marks count in.
+    fn keep_unmarked(&mut self, block: &MotionBlock, marked: &[core::ops::Range<usize>], first: usize) {
+        let runs = kept_runs(marked, first, block.rows);
+        let kept: usize = runs.iter().map(ExactSizeIterator::len).sum();
+        self.unmapped += (block.rows - kept) as u64;
+        self.given -= (block.rows - kept) as u64;
+        for run in &runs {
+            // A run at the block's start goes on with the piece before it.
+            self.cuts += usize::from(run.start > 0 || self.in_cut);
+            let mut kept = part(block, run);
+            kept.segment = self.segments + self.cuts;
+            self.waiting.push_back(kept);
+            self.in_cut = run.end < block.rows;
+        }
+        self.in_cut |= runs.is_empty() && block.rows > 0;
     }
 
     /// What was found so far; complete once [`next_block`](Self::next_block) has returned false.
@@ -377,6 +448,7 @@ impl MotionStream {
             dropped: self.reader.dropped().clone(),
             segments: self.segments,
             short_segments: self.short_segments,
+            unmapped_samples: self.unmapped,
             channels: self.checks.iter().map(ChannelCheck::report).collect(),
             velocity: self.velocity.iter().map(|c| c.report(self.clock.rate_hz)).collect(),
             acceleration: self.acceleration.iter().map(|c| c.report(self.clock.rate_hz)).collect(),

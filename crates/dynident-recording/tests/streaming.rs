@@ -2,7 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use dynident_recording::{
-    Derivatives, DifferentiatorSettings, LogFormat, LogReader, MotionBlock, MotionSettings, MotionStream, RawBlock,
+    Derivatives, DifferentiatorSettings, LogFormat, LogReader, LogisticPath, MotionBlock, MotionSettings, MotionStream,
+    RawBlock, ReferenceSettings,
 };
 use proptest::prelude::*;
 use std::fmt::Write as _;
@@ -37,6 +38,9 @@ fn pieces_give_what_the_whole_log_gives() {
         DifferentiatorSettings::Butterworth { order: 5, cutoff_hz: None },
         DifferentiatorSettings::CentralDifferences { order: 8 },
         DifferentiatorSettings::SavitzkyGolay { window: 41, degree: 4 },
+        DifferentiatorSettings::LowPass { order: 4, cutoff_hz: Some(8.0) },
+        DifferentiatorSettings::FivePointCubic { passes: 3, cutoff_hz: Some(20.0) },
+        DifferentiatorSettings::SmoothedDifferences { order: 4, window: 21 },
     ] {
         let settings = MotionSettings { differentiator, smooth_torque: true, ..MotionSettings::default() };
         let mut stream = MotionStream::open(&format, file.path(), &["joint".to_owned()], &settings).unwrap();
@@ -54,7 +58,11 @@ fn pieces_give_what_the_whole_log_gives() {
             }
             for i in 0..block.rows {
                 assert_eq!(block.tau[i], -q[at + i]);
-                assert!((block.tau_smooth[i] + block.q[i]).abs() < 1e-9);
+            }
+            let mut smooth = vec![0.0; n];
+            whole.smooth(rate, &q, &mut smooth).unwrap();
+            for (ours, whole) in block.tau_smooth.iter().zip(&smooth[at..]) {
+                assert!((ours + whole).abs() < 1e-9);
             }
             at += block.rows;
             blocks += 1;
@@ -92,6 +100,93 @@ fn gaps_split_the_log_and_trimming_cuts_both_ends() {
     assert_eq!(seen, [(0, 110), (1, 210)]);
     let report = stream.report();
     assert_eq!((report.gap_count, report.gaps[0].row, report.segments), (1, 149, 2));
+}
+
+/// One joint on the paper's stroke with a lag, one that overshoots by a tenth: where the second is off its stroke, both are left out, and what remains are pieces of their own.
+#[test]
+fn samples_off_the_stroke_are_cut_out_and_counted() {
+    let path = LogisticPath { amplitude: 1.5, omega: 2.0, offset: 0.2, period_s: 20.0, repetitions: 1 };
+    let mut text = "t,q1,q2,tau1,tau2\n".to_owned();
+    for i in 0..2000 {
+        let t = f64::from(i) * 0.01;
+        let second = path.offset + 1.1 * (path.at(t)[0] - path.offset);
+        writeln!(text, "{t},{},{second},{i},0", path.at(t - 0.05)[0]).unwrap();
+    }
+    let file = file(text.as_bytes());
+    let format =
+        format("time = { column = \"t\" }\nposition = { columns = \"q{1..2}\" }\ntorque = { columns = \"tau{1..2}\" }");
+    let reference = ReferenceSettings { joints: vec![path; 2], ..ReferenceSettings::default() };
+    let settings = |reference| MotionSettings {
+        differentiator: DifferentiatorSettings::PositionMap { reference, max_lag_s: 0.5 },
+        ..MotionSettings::default()
+    };
+    let names = ["a".to_owned(), "b".to_owned()];
+    let mut stream = MotionStream::open(&format, file.path(), &names, &settings(reference.clone())).unwrap();
+    let (mut block, mut pieces, mut rows) = (MotionBlock::default(), Vec::new(), 0);
+    while stream.next_block(&mut block).unwrap() {
+        pieces.push(block.segment);
+        rows += block.rows;
+        for i in 0..block.rows {
+            let t = block.first_time_s + i as f64 / block.rate_hz;
+            assert!((block.joint(&block.tau, 0)[i] / 100.0 - t).abs() < 1e-9, "the torque of another sample");
+            let exact = path.at(t - 0.05)[1];
+            // At the splice the speed is 1e-3 of its peak of 0.75 or less.
+            assert!((block.joint(&block.dq, 0)[i] - exact).abs() < 1.5e-3, "{t}");
+        }
+    }
+    let report = stream.report();
+    assert!(pieces.windows(2).all(|pair| pair[1] == pair[0] + 1), "{pieces:?}");
+    assert!(pieces.len() > 1 && report.unmapped_samples > 100, "{pieces:?} {}", report.unmapped_samples);
+    assert_eq!(rows as u64 + report.unmapped_samples, 2000);
+    assert!(report.findings.iter().any(|finding| finding.message.contains("off the stroke")));
+
+    // A start that is ten seconds out: refused by name.
+    let far = ReferenceSettings { start_s: -500.0, ..reference };
+    let mut stream = MotionStream::open(&format, file.path(), &names, &settings(far)).unwrap();
+    let error = loop {
+        match stream.next_block(&mut block) {
+            Ok(true) => {}
+            Ok(false) => panic!("a motion that nobody follows"),
+            Err(error) => break error.to_string(),
+        }
+    };
+    assert!(error.contains("position-map") && error.contains("start_s"), "{error}");
+}
+
+/// A way whose pieces the stream cuts for memory sees the reference at the right times.
+#[test]
+fn a_deviation_is_the_same_in_pieces_as_at_once() {
+    let (rate, n) = (500.0, 40_000_usize);
+    let path = LogisticPath { amplitude: 1.0, omega: 1.0, offset: 0.0, period_s: 40.0, repetitions: 2 };
+    let q: Vec<f64> = (0..n).map(|i| i as f64 / rate).map(|t| path.at(t - 1.0)[0] + 0.01 * (5.0 * t).sin()).collect();
+    let mut text = String::new();
+    for x in &q {
+        writeln!(text, "{x},0").unwrap();
+    }
+    let file = file(text.as_bytes());
+    let format = format("rate_hz = 500.0\nposition = { columns = [0] }\ntorque = { columns = [1] }");
+    let differentiator = DifferentiatorSettings::Deviation {
+        reference: ReferenceSettings { joints: vec![path], start_s: 1.0, file: None },
+        smoother: Box::new(DifferentiatorSettings::Butterworth { order: 4, cutoff_hz: Some(8.0) }),
+        max_lag_s: None,
+    };
+    let settings = MotionSettings { differentiator, ..MotionSettings::default() };
+    let whole = settings.differentiator.build(1.0).unwrap();
+    let mut out = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
+    let [y, dq, ddq] = &mut out;
+    whole.differentiate(rate, &q, Derivatives { q: y, dq, ddq }).unwrap();
+    let mut stream = MotionStream::open(&format, file.path(), &["joint".to_owned()], &settings).unwrap();
+    let (mut block, mut at, mut blocks) = (MotionBlock::default(), 0, 0);
+    while stream.next_block(&mut block).unwrap() {
+        for (ours, whole) in [(&block.q, &out[0]), (&block.dq, &out[1]), (&block.ddq, &out[2])] {
+            for (i, value) in ours.iter().enumerate() {
+                // Speeds and accelerations of order one; the reference's time is rounded to 1e-14 s.
+                assert!((value - whole[at + i]).abs() < 1e-9, "sample {}", at + i);
+            }
+        }
+        (at, blocks) = (at + block.rows, blocks + 1);
+    }
+    assert!(at == n && blocks > 1, "{blocks}");
 }
 
 #[test]

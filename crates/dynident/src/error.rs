@@ -68,6 +68,9 @@ pub enum Error {
         /// What is wrong.
         source: Box<RecordingError>,
     },
+    /// A report that could not be put together.
+    #[error("report.html: {0}; this is a defect of the program: please tell its authors")]
+    Report(#[from] dynident_report::ReportError),
     /// A parallel filter that does not exist at the log's rate.
     #[error("log `{log}`, [parallel_filter]: {source}")]
     Filter {

@@ -19,6 +19,7 @@ use crate::result_sections::{
 use crate::rows::{JointRows, Pass, RawSamples, RowSink, motion_in_force};
 use crate::standard_parameters::{inertials, nearest_to_prior};
 use crate::study::{EstimatorMethod, Folders, Role, Study};
+use crate::torque_trace::{LogTrace, TraceSink};
 use crate::validate::{Tested, validate_log};
 use crate::written_urdf::written_urdf;
 use dynident_dynamics::Column;
@@ -47,6 +48,18 @@ pub struct Identification {
     pub inertials: Vec<InertialParameters>,
     /// The user's own URDF with the new values; without it, [`ResultFile::no_urdf`] says why.
     pub urdf: Option<String>,
+    /// Measured and predicted torque over time, training logs first: at most the first 20 000 samples of a log that was fitted to, the first 100 000 filtered rows of a held-out one.
+    pub traces: Vec<LogTrace>,
+}
+
+impl Identification {
+    /// The report as one self-contained HTML page: torque measured against predicted, residuals, parameters with error bars, friction, bodies, what was found in the logs, where the time went.
+    ///
+    /// # Errors
+    /// [`Error::Report`], which would be a defect of this program.
+    pub fn report(&self) -> Result<String, Error> {
+        crate::report::identification_report(self)
+    }
 }
 
 /// Fits a study's model to its logs and tests it on the held-out ones.
@@ -118,20 +131,23 @@ fn identified(
 
     let started = Instant::now();
     let joints = joint_names(machine);
-    let mut logs = Vec::new();
+    let (mut logs, mut traces) = (Vec::new(), Vec::new());
     for fit in fits {
         let mut summary = fit.summary.clone();
-        summary.torque_lag_s = training_lags(study, machine, &motion, fit.index, &files[fit.index], &estimate.values)?;
+        let (lags, trace) = second_look(study, machine, &motion, fit.index, &files[fit.index], &estimate.values)?;
+        summary.torque_lag_s = lags;
+        traces.push(trace);
         summary.model_findings.extend(lag::findings(&summary.torque_lag_s, &joints));
         logs.push(summary);
     }
     let mut validation = Vec::new();
     let uncertainty = Uncertainty::of(&estimate);
     for index in of_role(study, Role::Validate) {
-        let tested = Tested { theta: &estimate.values, physical, uncertainty: Some(&uncertainty) };
-        let (summary, figures) = validate_log(study, machine, &motion, index, &files[index], &tested, options)?;
+        let tested = Tested { theta: &estimate.values, physical, uncertainty: Some(&uncertainty), traced: true };
+        let (summary, figures, trace) = validate_log(study, machine, &motion, index, &files[index], &tested, options)?;
         logs.push(summary);
         validation.push(figures);
+        traces.extend(trace);
     }
     timings.validation = started.elapsed().as_secs_f64();
     timings.total = start.elapsed().as_secs_f64();
@@ -185,7 +201,7 @@ fn identified(
         no_urdf,
         timings_s: timings,
     };
-    Ok(Identification { result, estimate, inertials, urdf })
+    Ok(Identification { result, estimate, inertials, urdf, traces })
 }
 
 /// What fitting needs beside study and machine.
@@ -375,20 +391,39 @@ fn read_log(
     Ok(LogFit { index, factors: sink.factors, summary })
 }
 
-/// A second look at the first samples of a log, now that there is a model to predict them with.
-fn training_lags(
+/// What a second look gathers.
+struct SecondLook<'a> {
+    lag: LagCheck<'a>,
+    trace: TraceSink<'a>,
+}
+
+impl RowSink for SecondLook<'_> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), Error> {
+        self.trace.filtered(rows);
+        Ok(())
+    }
+
+    fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), Error> {
+        self.trace.raw(samples);
+        self.lag.raw(samples)
+    }
+}
+
+/// A second look at the first samples of a log, now that there is a model to predict them with: the torque's lags, and the torque over time.
+fn second_look(
     study: &Study,
     machine: &Machine,
     motion: &MotionSettings,
     index: usize,
     file: &Path,
     theta: &[f64],
-) -> Result<Vec<Option<f64>>, Error> {
-    let mut check = LagCheck::new(machine, theta);
+) -> Result<(Vec<Option<f64>>, LogTrace), Error> {
+    let mut look = SecondLook { lag: LagCheck::new(machine, theta), trace: TraceSink::new(machine, theta) };
     let most_samples = Some(LAG_SAMPLES as u64);
     let pass = Pass { study, machine, motion, index, file, reader_thread: false, most_samples, progress: &Silent };
-    let passed = pass.run(&mut check)?;
-    Ok(check.lags(passed.motion_cutoff_hz))
+    let passed = pass.run(&mut look)?;
+    let lags = look.lag.lags(passed.motion_cutoff_hz);
+    Ok((lags, look.trace.finished(study.log_name(index), "identify", passed.filtered_rate_hz)))
 }
 
 fn problem(

@@ -3,11 +3,12 @@
 use crate::error::Error;
 use crate::instruments::InstrumentSource;
 use crate::machine::Machine;
-use crate::rows::{PANEL_SAMPLES, Pass, decimation, in_model_order, named_cutoff};
+use crate::motion_log::motion_stream;
+use crate::rows::{PANEL_SAMPLES, Pass, decimation, in_model_order, motion_band_hz};
 use dynident_dynamics::{BatchWorkspace, Panels, regressor_panels};
 use dynident_estimation::{EstimationError, SegmentSettings, SegmentedFactor};
 use dynident_model::laws::JointMotion;
-use dynident_recording::{Decimator, MotionBlock, MotionStream};
+use dynident_recording::{Decimator, MotionBlock};
 
 /// The factors of one log's `[Z | W | τ]`, one for each joint.
 pub(crate) fn instrumented_factors(
@@ -19,9 +20,8 @@ pub(crate) fn instrumented_factors(
     let failed = |source| Error::recording(&log, source);
     let in_log = |source: EstimationError| Error::Estimation { path: pass.file.to_owned(), source };
     let Machine { model, layout, log_place, .. } = pass.machine;
-    let format = pass.study.format_of(pass.index);
-    let mut stream = MotionStream::open(&format, pass.file, &pass.machine.log_joints, pass.motion).map_err(failed)?;
-    let settings = decimation(&pass.study.parallel_filter, stream.rate_hz(), named_cutoff(pass.motion));
+    let mut stream = motion_stream(pass.study, pass.machine, pass.motion, pass.index, pass.file)?;
+    let settings = decimation(&pass.study.parallel_filter, stream.rate_hz(), motion_band_hz(pass.motion));
     let widths: Vec<usize> = (0..model.dof()).map(|joint| 2 * layout.joint_columns(joint).len()).collect();
     let mut decimators = settings
         .map(|settings| {

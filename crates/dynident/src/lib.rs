@@ -26,15 +26,18 @@ mod instruments;
 mod job;
 mod lag;
 mod machine;
+mod motion_log;
 mod output;
 mod physical;
 mod progress;
+mod report;
 mod residuals;
 mod result;
 mod result_sections;
 mod rows;
 mod standard_parameters;
 mod study;
+mod torque_trace;
 mod validate;
 mod written_urdf;
 
@@ -73,4 +76,5 @@ pub use study::{
     CoulombChoice, CouplingSection, DriveSection, EstimatorMethod, EstimatorSection, Folders, JointDrive, LogSection,
     ParallelFilterSection, RobotSection, Role, Study,
 };
+pub use torque_trace::{JointTrace, LogTrace};
 pub use validate::{VALIDATION_SCHEMA, ValidationFile, validate};

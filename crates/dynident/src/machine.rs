@@ -28,6 +28,8 @@ pub struct Machine {
     pub prior: Option<Vec<f64>>,
     /// For load-dependent friction: the bodies by an earlier estimate, one value per column of the layout. Without it such friction has a column of zeros.
     pub load_parameters: Option<Vec<f64>>,
+    /// Where the study's files are looked for.
+    pub(crate) folders: Folders,
 }
 
 impl Machine {
@@ -106,7 +108,18 @@ impl Machine {
         let base = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
         let layout = PanelLayout::new(&model, base.base_columns());
         let prior = model.bodies_without_prior().is_empty().then(|| base.values(&prior_parameters(&model, &laws)));
-        Ok(Self { robot, model, log_joints, log_place, laws, base, layout, prior, load_parameters: None })
+        Ok(Self {
+            robot,
+            model,
+            log_joints,
+            log_place,
+            laws,
+            base,
+            layout,
+            prior,
+            load_parameters: None,
+            folders: folders.clone(),
+        })
     }
 
     /// The machine with further laws behind its base columns, dependent or not: for choosing among them from one set of factors. `base` and `laws` stay as they are.

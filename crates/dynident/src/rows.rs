@@ -5,14 +5,14 @@
 
 use crate::error::Error;
 use crate::machine::Machine;
+use crate::motion_log::motion_stream;
 use crate::progress::Progress;
 use crate::study::{ParallelFilterSection, Study};
 use dynident_dynamics::{BatchWorkspace, LawHistory, PanelLayout, Panels, regressor_panels_following};
 use dynident_model::Model;
 use dynident_model::laws::JointMotion;
 use dynident_recording::{
-    DecimationSettings, Decimator, DifferentiatorSettings, FilterError, ImportReport, MotionBlock, MotionSettings,
-    MotionStream,
+    DecimationSettings, Decimator, FilterError, ImportReport, MotionBlock, MotionSettings, MotionStream,
 };
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -79,11 +79,9 @@ impl Pass<'_> {
     pub(crate) fn run(&self, sink: &mut dyn RowSink) -> Result<Passed, Error> {
         let log = self.study.log_name(self.index);
         let failed = |source| Error::recording(&log, source);
-        let format = self.study.format_of(self.index);
-        let mut stream =
-            MotionStream::open(&format, self.file, &self.machine.log_joints, self.motion).map_err(failed)?;
-        let motion_cutoff_hz = named_cutoff(self.motion);
-        let settings = decimation(&self.study.parallel_filter, stream.rate_hz(), motion_cutoff_hz);
+        let mut stream = motion_stream(self.study, self.machine, self.motion, self.index, self.file)?;
+        let motion_cutoff_hz = self.motion.differentiator.cutoff_hz();
+        let settings = decimation(&self.study.parallel_filter, stream.rate_hz(), motion_band_hz(self.motion));
         let Machine { model, layout, log_place, .. } = self.machine;
         let mut computer = Computer::new(
             model,
@@ -121,12 +119,10 @@ impl Pass<'_> {
     }
 }
 
-/// The cut-off that motion settings name; none for methods without one.
-pub(crate) fn named_cutoff(motion: &MotionSettings) -> Option<f64> {
-    match motion.differentiator {
-        DifferentiatorSettings::Butterworth { cutoff_hz, .. } => cutoff_hz,
-        _ => None,
-    }
+/// The frequency below which the whole motion lies; unknown for methods without a cut-off, and where only the deviation from a reference has one.
+pub(crate) fn motion_band_hz(motion: &MotionSettings) -> Option<f64> {
+    let way = &motion.differentiator;
+    way.cutoff_hz().filter(|_| way.reference().is_none())
 }
 
 /// The study's motion settings with one cut-off for all logs: the user's; or the one that a finished model was made with; or the highest that any of the training logs asks
@@ -139,20 +135,18 @@ pub(crate) fn motion_in_force(
     of_model_hz: Option<f64>,
 ) -> Result<MotionSettings, Error> {
     let mut motion = study.motion.clone();
-    let DifferentiatorSettings::Butterworth { cutoff_hz, .. } = &mut motion.differentiator else { return Ok(motion) };
-    if cutoff_hz.is_none() {
-        *cutoff_hz = of_model_hz;
+    if let Some(of_model_hz) = of_model_hz {
+        motion.differentiator = motion.differentiator.with_cutoff(of_model_hz);
     }
-    if cutoff_hz.is_some() {
+    if !motion.differentiator.wants_cutoff() {
         return Ok(motion);
     }
     let mut highest = 0.0_f64;
     for &index in training {
-        let stream = MotionStream::open(&study.format_of(index), &files[index], &machine.log_joints, &study.motion)
-            .map_err(|source| Error::recording(&study.log_name(index), source))?;
+        let stream = motion_stream(study, machine, &study.motion, index, &files[index])?;
         highest = highest.max(stream.cutoff().cutoff_hz);
     }
-    *cutoff_hz = Some(highest);
+    motion.differentiator = motion.differentiator.with_cutoff(highest);
     Ok(motion)
 }
 

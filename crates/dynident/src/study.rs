@@ -6,7 +6,7 @@ use crate::friction_section::{FrictionChoice, FrictionLaw};
 use crate::instruments::InstrumentSection;
 use dynident_estimation::{CovarianceMethod, EssentialSettings, RankSettings, SegmentSettings};
 use dynident_model::line_and_column;
-use dynident_recording::{LogFormat, MotionSettings};
+use dynident_recording::{LogFormat, MotionSettings, ReferenceSettings};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -335,6 +335,9 @@ pub struct LogSection {
     /// Its own format, in place of the study's.
     #[serde(default)]
     pub format: Option<LogFormat>,
+    /// The motion that was commanded, in place of the differentiator's own; for differentiators that need it.
+    #[serde(default)]
+    pub reference: Option<ReferenceSettings>,
     /// In place of the format's `rows`.
     #[serde(default, deserialize_with = "exactly")]
     pub rows: Option<[u64; 2]>,
@@ -421,6 +424,9 @@ impl Study {
         for (index, log) in self.log.iter().enumerate() {
             if log.format.is_none() && self.format.is_none() {
                 return Err(format!("[[log]] number {}: neither the log nor the study has a [format]", index + 1));
+            }
+            if let Some(reference) = &log.reference {
+                reference.validate().map_err(|error| format!("[[log]] number {}: reference: {error}", index + 1))?;
             }
             let ranges = [log.rows.is_some(), log.fraction.is_some(), log.time_range_s.is_some()];
             if ranges.into_iter().filter(|given| *given).count() > 1 {

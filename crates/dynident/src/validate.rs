@@ -8,8 +8,9 @@ use crate::lag::LagCheck;
 use crate::machine::Machine;
 use crate::residuals::{JointWatch, Uncertainty};
 use crate::result::{BaseParameterResult, LogSummary, LogValidation};
-use crate::rows::{JointRows, Pass, RawSamples, RowSink, estimated_rows, motion_in_force, named_cutoff};
+use crate::rows::{JointRows, Pass, RawSamples, RowSink, estimated_rows, motion_in_force};
 use crate::study::{Folders, Role, Study};
+use crate::torque_trace::{LogTrace, TraceSink};
 use dynident_estimation::Validation;
 use dynident_recording::MotionSettings;
 use serde::{Deserialize, Serialize};
@@ -71,7 +72,7 @@ pub fn validate(
     if chosen.is_empty() {
         chosen = (0..study.log.len()).collect();
     }
-    let of_model_hz = named_cutoff(&made_with);
+    let of_model_hz = made_with.differentiator.cutoff_hz();
     let motion = motion_in_force(study, &machine, &files, &chosen, of_model_hz)?;
     let mut file = ValidationFile {
         schema: VALIDATION_SCHEMA,
@@ -80,8 +81,8 @@ pub fn validate(
         logs: Vec::new(),
     };
     for index in chosen {
-        let tested = Tested { theta: &theta, physical: possible.as_deref(), uncertainty: None };
-        let (summary, figures) = validate_log(study, &machine, &motion, index, &files[index], &tested, options)?;
+        let tested = Tested { theta: &theta, physical: possible.as_deref(), uncertainty: None, traced: false };
+        let (summary, figures, _) = validate_log(study, &machine, &motion, index, &files[index], &tested, options)?;
         file.logs.push(summary);
         file.validation.push(figures);
     }
@@ -159,6 +160,7 @@ struct TestSink<'a> {
     prior: Option<(&'a [f64], Validation)>,
     evidence: Option<Evidence<'a>>,
     lag: LagCheck<'a>,
+    trace: Option<TraceSink<'a>>,
     buffer: Vec<f64>,
 }
 
@@ -183,6 +185,9 @@ impl RowSink for TestSink<'_> {
         if let Some(evidence) = &mut self.evidence {
             evidence.filtered(rows, &mut self.buffer);
         }
+        if let Some(trace) = &mut self.trace {
+            trace.filtered(rows);
+        }
         Ok(())
     }
 
@@ -194,6 +199,9 @@ impl RowSink for TestSink<'_> {
             predicted(panel, rows, columns, self.theta, &mut self.buffer);
             let added = self.raw.add_joint(joint, &panel[columns.len() * rows..], &self.buffer);
             added.map_err(|source| self.failed(source))?;
+        }
+        if let Some(trace) = &mut self.trace {
+            trace.raw(samples);
         }
         self.lag.raw(samples)
     }
@@ -207,9 +215,11 @@ pub(crate) struct Tested<'a> {
     pub(crate) physical: Option<&'a [f64]>,
     /// What the band of the predicted torque is made from.
     pub(crate) uncertainty: Option<&'a Uncertainty>,
+    /// Whether the torque over time is kept.
+    pub(crate) traced: bool,
 }
 
-/// Tests base parameters on one log, those of the possible set beside them; with their uncertainty also the band of the predicted torque.
+/// Tests base parameters on one log, those of the possible set beside them; with their uncertainty also the band of the predicted torque, and the torque over time if it is asked for.
 pub(crate) fn validate_log(
     study: &Study,
     machine: &Machine,
@@ -218,8 +228,8 @@ pub(crate) fn validate_log(
     file: &Path,
     tested: &Tested<'_>,
     options: &RunOptions<'_>,
-) -> Result<(LogSummary, LogValidation), Error> {
-    let Tested { theta, physical, uncertainty } = *tested;
+) -> Result<(LogSummary, LogValidation, Option<LogTrace>), Error> {
+    let Tested { theta, physical, uncertainty, traced } = *tested;
     let joints = joint_names(machine);
     let columns = (0..machine.model.dof()).map(|joint| machine.layout.joint_columns(joint)).collect();
     let mut sink = TestSink {
@@ -233,6 +243,7 @@ pub(crate) fn validate_log(
         prior: machine.prior.as_deref().map(|prior| (prior, Validation::new(joints.clone()))),
         evidence: machine.prior.as_deref().map(|prior| Evidence::new(columns, prior)),
         lag: LagCheck::new(machine, theta),
+        trace: traced.then(|| TraceSink::new(machine, theta)),
         buffer: Vec::new(),
     };
     options.progress.begin(&format!("testing on {}", study.log_name(index)), estimated_rows([file]));
@@ -264,5 +275,7 @@ pub(crate) fn validate_log(
             .map(|(watch, name)| watch.report(&study.log_name(index), name))
             .collect(),
     };
-    Ok((log_summary(study, index, passed, agreement, lags, &joints), figures))
+    let name = study.log_name(index);
+    let trace = sink.trace.map(|trace| trace.finished(name, "validate", passed.filtered_rate_hz));
+    Ok((log_summary(study, index, passed, agreement, lags, &joints), figures, trace))
 }

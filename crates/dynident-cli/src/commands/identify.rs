@@ -13,7 +13,7 @@ const URDF: &str = "identified.urdf";
 pub(crate) struct Options {
     /// The study file.
     study: PathBuf,
-    /// Folder for result.json and identified.urdf.
+    /// Folder for result.json, report.html and identified.urdf.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Folder of the recordings, in place of the study's own.
@@ -37,6 +37,8 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         let old = options.out.join(URDF);
         terminal::remark(&format!("{} is of an earlier run and does not belong to this result", old.display()));
     }
+    let report = identification.report().map_err(told)?;
+    write_whole(&options.out.join("report.html"), report.as_bytes()).map_err(told)?;
     // The result last: where it stands, everything stands.
     write_whole(&options.out.join("result.json"), &pretty_json(result)?).map_err(told)?;
     if context.json {

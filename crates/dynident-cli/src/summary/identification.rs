@@ -54,7 +54,7 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
         text,
         "\nwrote {}{} in {:.2} s",
         out.join("result.json").display(),
-        if urdf { " and identified.urdf" } else { "" },
+        if urdf { ", report.html and identified.urdf" } else { " and report.html" },
         r.timings_s.total
     );
     if let Some(reason) = &r.no_urdf {

@@ -6,12 +6,13 @@ use crate::cpu_time::cpu_seconds;
 use crate::error::Error;
 use crate::job::{RunOptions, joint_names};
 use crate::machine::Machine;
+use crate::motion_log::motion_stream;
 use crate::rows::motion_in_force;
 use crate::study::{Folders, Study};
 use dynident_excitation::check::{CHECK_RATE_HZ, LimitReport, check_limits};
 use dynident_excitation::families::Given;
 use dynident_excitation::{Family, Motion, grid};
-use dynident_recording::{MotionBlock, MotionStream};
+use dynident_recording::MotionBlock;
 use nalgebra::DMatrix;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -193,7 +194,7 @@ fn pieces(study: &Study, machine: &Machine, index: usize, file: &Path) -> Result
     let mut files = vec![PathBuf::new(); study.log.len()];
     file.clone_into(&mut files[index]);
     let motion = motion_in_force(study, machine, &files, &[index], None)?;
-    let mut stream = MotionStream::open(&study.format_of(index), file, &machine.log_joints, &motion).map_err(failed)?;
+    let mut stream = motion_stream(study, machine, &motion, index, file)?;
     let rate_hz = stream.rate_hz();
     // By piece: for q, dq, ddq and each joint of the model its samples.
     let mut found: Vec<Vec<Vec<f64>>> = Vec::new();

@@ -1,0 +1,179 @@
+//! Bars with error bars.
+
+use crate::error::ReportError;
+use crate::ticks::{short, ticks};
+use serde::Serialize;
+
+/// Letters of a label that are drawn; the whole label stands under the pointer.
+const LETTERS: usize = 44;
+/// Width of the picture, of the labels, of the figures, and height of a bar's row, px.
+const WIDTH: f64 = 760.0;
+const LABELS: f64 = 270.0;
+const FIGURES: f64 = 110.0;
+const ROW: f64 = 22.0;
+
+/// One bar.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bar {
+    /// What it is.
+    pub label: String,
+    /// Its length; a bar that is not finite is left empty.
+    pub value: f64,
+    /// Half the length of its error bar.
+    pub half_width: Option<f64>,
+    /// A value to compare with, drawn as a mark: a prior, a truth.
+    pub reference: Option<f64>,
+}
+
+/// Horizontal bars with error bars and marks to compare with, one below another.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BarPlot {
+    /// Headline.
+    pub title: String,
+    /// A sentence below it; may be empty.
+    pub note: String,
+    /// What is drawn, with its unit.
+    pub label: String,
+    /// What the marks are; may be empty.
+    pub reference_label: String,
+    /// The bars, from top to bottom.
+    pub bars: Vec<Bar>,
+}
+
+impl BarPlot {
+    /// A plot without bars.
+    pub fn new(title: impl Into<String>, label: impl Into<String>) -> Self {
+        Self {
+            title: title.into(),
+            note: String::new(),
+            label: label.into(),
+            reference_label: String::new(),
+            bars: Vec::new(),
+        }
+    }
+
+    /// A sentence below the headline.
+    #[must_use]
+    pub fn note(mut self, note: impl Into<String>) -> Self {
+        self.note = note.into();
+        self
+    }
+
+    /// What the marks are.
+    #[must_use]
+    pub fn reference_label(mut self, label: impl Into<String>) -> Self {
+        self.reference_label = label.into();
+        self
+    }
+
+    /// A further bar.
+    #[must_use]
+    pub fn bar(
+        mut self,
+        label: impl Into<String>,
+        value: f64,
+        half_width: Option<f64>,
+        reference: Option<f64>,
+    ) -> Self {
+        self.bars.push(Bar { label: label.into(), value, half_width, reference });
+        self
+    }
+
+    /// The plot as an SVG picture; its colours are those of the page around it, or the defaults written into it.
+    ///
+    /// # Errors
+    /// Only if the template fails.
+    pub fn svg(&self) -> Result<String, ReportError> {
+        let finite = |value: f64| value.is_finite() && value.abs() < 1e300;
+        let ends = self.bars.iter().filter(|bar| finite(bar.value)).flat_map(|bar| {
+            let half = bar.half_width.filter(|half| finite(*half)).unwrap_or(0.0);
+            [bar.value - half, bar.value + half].into_iter().chain(bar.reference.filter(|value| finite(*value)))
+        });
+        let [low, high] = ends.fold([0.0_f64, 0.0_f64], |[a, b], x| [a.min(x), b.max(x)]);
+        let high = if high > low { high } else { low + 1.0 };
+        let (left, right) = (LABELS + 8.0, WIDTH - FIGURES);
+        let at = |x: f64| ((left + (x - low) / (high - low) * (right - left)) * 10.0).round() / 10.0;
+        let bars = self.bars.iter().enumerate().map(|(k, bar)| {
+            let shown = finite(bar.value).then_some(bar.value);
+            let half = bar.half_width.filter(|half| finite(*half) && shown.is_some());
+            Drawn {
+                y: 26.0 + ROW * k as f64,
+                label: shortened(&bar.label),
+                whole: &bar.label,
+                from: at(shown.unwrap_or(0.0).min(0.0)),
+                length: (at(shown.unwrap_or(0.0).max(0.0)) - at(shown.unwrap_or(0.0).min(0.0))).max(0.0),
+                whisker: half.map(|half| [at(bar.value - half), at(bar.value + half)]),
+                mark: bar.reference.filter(|value| finite(*value)).map(at),
+                figure: match half {
+                    Some(half) => format!("{} ± {}", short(bar.value, 4), short(half, 2)),
+                    None => short(bar.value, 4),
+                },
+                reference: bar.reference.map(|value| short(value, 4)),
+            }
+        });
+        let view = Picture {
+            plot: self.label.as_str(),
+            title: &self.title,
+            width: WIDTH,
+            height: 26.0 + ROW * self.bars.len() as f64 + 8.0,
+            right,
+            labels: LABELS,
+            zero: at(0.0),
+            ticks: ticks(low, high, 5).into_iter().map(|x| (at(x), short(x, 3))).collect(),
+            bars: bars.collect(),
+        };
+        crate::page::rendered("bar_plot.svg", &view)
+    }
+}
+
+/// The first letters of a long label.
+fn shortened(label: &str) -> String {
+    if label.chars().count() <= LETTERS {
+        return label.to_owned();
+    }
+    label.chars().take(LETTERS - 1).chain(['…']).collect()
+}
+
+#[derive(Serialize)]
+struct Picture<'a> {
+    plot: &'a str,
+    title: &'a str,
+    width: f64,
+    height: f64,
+    right: f64,
+    labels: f64,
+    zero: f64,
+    ticks: Vec<(f64, String)>,
+    bars: Vec<Drawn<'a>>,
+}
+
+#[derive(Serialize)]
+struct Drawn<'a> {
+    y: f64,
+    label: String,
+    whole: &'a str,
+    from: f64,
+    length: f64,
+    whisker: Option<[f64; 2]>,
+    mark: Option<f64>,
+    figure: String,
+    reference: Option<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bars_stay_inside_the_picture_whatever_they_are() {
+        let plot = BarPlot::new("t", "kg")
+            .bar("a \"b\" <c>", 2.0, Some(0.5), Some(-1.0))
+            .bar("gap", f64::NAN, Some(1.0), None)
+            .bar("far", f64::INFINITY, None, Some(f64::NAN))
+            .bar("é".repeat(100), -3.0, None, None);
+        let svg = plot.svg().unwrap();
+        assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+        assert!(svg.contains("a &quot;b&quot; &lt;c&gt;") && svg.contains('…'));
+        assert!(!BarPlot::new("none", "").svg().unwrap().contains("NaN"));
+    }
+}

@@ -1,0 +1,125 @@
+//! How figures settle from run to run.
+
+use crate::error::ReportError;
+use crate::plot_data::{CurveData, PlotData, check_length, rounded};
+
+/// Figures by run (or iteration), with error bars where they are known.
+///
+/// ```
+/// use dynident_report::ConvergencePlot;
+/// let plot = ConvergencePlot::new("Tracking error", "rad").log_y().curve("joint 1", vec![0.6, 0.15, 1e-3]);
+/// assert_eq!(plot.curves.len(), 1);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct ConvergencePlot {
+    /// Headline.
+    pub title: String,
+    /// A sentence below it; may be empty.
+    pub note: String,
+    /// What is counted; `run` unless changed.
+    pub x_label: String,
+    /// What the y axis is, with its unit.
+    pub y_label: String,
+    /// Number of the first run; 1 unless changed.
+    pub first: u32,
+    /// Name, values by run (NaN where there is none) and half widths of the error bars (as many; or none) of each curve.
+    pub curves: Vec<(String, Vec<f64>, Vec<f64>)>,
+    /// Logarithmic y axis.
+    pub log_y: bool,
+}
+
+impl ConvergencePlot {
+    /// A plot without curves.
+    pub fn new(title: impl Into<String>, y_label: impl Into<String>) -> Self {
+        Self {
+            title: title.into(),
+            note: String::new(),
+            x_label: "run".to_owned(),
+            y_label: y_label.into(),
+            first: 1,
+            curves: Vec::new(),
+            log_y: false,
+        }
+    }
+
+    /// A sentence below the headline.
+    #[must_use]
+    pub fn note(mut self, note: impl Into<String>) -> Self {
+        self.note = note.into();
+        self
+    }
+
+    /// A further curve.
+    #[must_use]
+    pub fn curve(mut self, name: impl Into<String>, values: Vec<f64>) -> Self {
+        self.curves.push((name.into(), values, Vec::new()));
+        self
+    }
+
+    /// A further curve with error bars `value ± half_width`.
+    #[must_use]
+    pub fn curve_with_bars(mut self, name: impl Into<String>, values: Vec<f64>, half_widths: Vec<f64>) -> Self {
+        self.curves.push((name.into(), values, half_widths));
+        self
+    }
+
+    /// The y axis logarithmic.
+    #[must_use]
+    pub fn log_y(mut self) -> Self {
+        self.log_y = true;
+        self
+    }
+
+    pub(crate) fn data(&self) -> Result<String, ReportError> {
+        let runs = self.curves.iter().map(|(_, values, _)| values.len()).max().unwrap_or(0);
+        let drawn = |value: f64| rounded(value).filter(|value| !self.log_y || *value > 0.0);
+        let curves = self
+            .curves
+            .iter()
+            .map(|(name, values, half_widths)| {
+                if !half_widths.is_empty() {
+                    check_length(&self.title, name, half_widths.len(), values.len())?;
+                }
+                let mut y: Vec<Option<f64>> = values.iter().map(|value| drawn(*value)).collect();
+                y.resize(runs, None);
+                let ends = |sign: f64| -> Vec<Option<f64>> {
+                    let end = |(value, half): (&f64, &f64)| drawn(value + sign * half);
+                    let mut ends: Vec<_> = values.iter().zip(half_widths).map(end).collect();
+                    ends.resize(runs, None);
+                    ends
+                };
+                let bars = (!half_widths.is_empty()).then(|| [ends(-1.0), ends(1.0)]);
+                Ok(CurveData { name, y, dashed: false, points: true, bars })
+            })
+            .collect::<Result<Vec<_>, ReportError>>()?;
+        PlotData {
+            x: (0..runs).map(|run| f64::from(self.first) + run as f64).collect(),
+            curves,
+            x_label: &self.x_label,
+            y_label: &self.y_label,
+            log: self.log_y,
+            counts: true,
+        }
+        .embedded()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn curves_of_unequal_length_are_filled_with_gaps() {
+        let plot = ConvergencePlot::new("t", "y").curve("a", vec![1.0, 2.0, 3.0]).curve_with_bars(
+            "b",
+            vec![1.0, 4.0],
+            vec![0.5, 5.0],
+        );
+        let data = plot.data().unwrap();
+        assert!(data.contains("[1.0,4.0,null]") && data.contains("[0.5,-1.0,null]"), "{data}");
+        // Below zero there is no logarithm.
+        assert!(plot.clone().log_y().data().unwrap().contains("[0.5,null,null]"));
+        assert!(plot.curve_with_bars("c", vec![1.0], vec![1.0, 2.0]).data().is_err());
+        assert!(ConvergencePlot::new("none", "").data().is_ok());
+    }
+}

@@ -1,0 +1,51 @@
+//! **What came out?** Results as one HTML page that needs nothing else: no network, no other file.
+//!
+//! A [`Report`] is a list of typed sections, each a plain struct with its own template. Line plots are interactive ([uPlot](https://github.com/leeoniya/uPlot), embedded): values under the pointer, a
+//! stretch zoomed by dragging, curves switched by a click on the legend. Bars and heat maps are pictures with values under the pointer. Light and dark, wide and narrow screens.
+//! What a section is given is escaped: no name of a joint or file becomes markup or script.
+//!
+//! ```
+//! use dynident_report::{KeyFigures, LinePlot, Report, Table};
+//! let time: Vec<f64> = (0..5000).map(|i| f64::from(i) * 0.001).collect();
+//! let mut report = Report::new("Elbow & wrist");
+//! report.add(KeyFigures::new().figure("relative error", "2.7 %", "held-out log"));
+//! report.add(
+//!     LinePlot::new("Torque of the elbow", "s", "Nm", time.clone())
+//!         .line("measured", time.iter().map(|t| (3.0 * t).sin()).collect())
+//!         .line("predicted", time.iter().map(|t| 0.98 * (3.0 * t).sin()).collect()),
+//! );
+//! report.add(Table::new("Friction", ["joint", "viscous, Nm s"]).row(["elbow <1>", "2.10"]));
+//! let page = report.html()?;
+//! assert!(page.contains("Elbow &amp; wrist") && page.contains("elbow &lt;1&gt;"));
+//! # Ok::<(), dynident_report::ReportError>(())
+//! ```
+#![forbid(unsafe_code)]
+
+mod bar_plot;
+mod convergence_plot;
+mod decimation;
+mod error;
+mod heading;
+mod heat_map;
+mod key_figures;
+mod line_plot;
+mod page;
+mod plot_data;
+mod table;
+mod text;
+mod ticks;
+mod tone;
+
+pub use bar_plot::{Bar, BarPlot};
+pub use convergence_plot::ConvergencePlot;
+pub use decimation::kept_samples;
+pub use error::ReportError;
+pub use heading::Heading;
+pub use heat_map::HeatMap;
+pub use key_figures::{KeyFigure, KeyFigures};
+pub use line_plot::{Line, LinePlot};
+pub use page::{Report, Section};
+pub use table::{Cell, Table};
+pub use text::Text;
+pub use ticks::short;
+pub use tone::Tone;

@@ -1,0 +1,61 @@
+//! What the page's script is given for an interactive plot.
+
+use crate::error::ReportError;
+use serde::Serialize;
+
+/// One plot, decimated, gaps as null.
+#[derive(Serialize)]
+pub(crate) struct PlotData<'a> {
+    pub(crate) x: Vec<f64>,
+    pub(crate) curves: Vec<CurveData<'a>>,
+    pub(crate) x_label: &'a str,
+    pub(crate) y_label: &'a str,
+    pub(crate) log: bool,
+    /// Whole numbers on the x axis.
+    pub(crate) counts: bool,
+}
+
+/// One curve.
+#[derive(Serialize)]
+pub(crate) struct CurveData<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) y: Vec<Option<f64>>,
+    pub(crate) dashed: bool,
+    pub(crate) points: bool,
+    /// Lower and upper ends of error bars.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) bars: Option<[Vec<Option<f64>>; 2]>,
+}
+
+impl PlotData<'_> {
+    /// JSON that may stand inside a script element: without `<`, which alone could end it, and without `>` and `&` for readers who look for markup.
+    pub(crate) fn embedded(&self) -> Result<String, ReportError> {
+        let json = serde_json::to_string(self)?;
+        Ok(json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026"))
+    }
+}
+
+/// Seven significant digits: more than any screen shows, and half the page's size.
+pub(crate) fn rounded(value: f64) -> Option<f64> {
+    if !value.is_finite() {
+        return None;
+    }
+    format!("{value:.6e}").parse().ok()
+}
+
+/// The x axis must be finite and not decrease.
+pub(crate) fn check_axis(section: &str, x: &[f64]) -> Result<(), ReportError> {
+    let wrong = (0..x.len()).find(|&i| !x[i].is_finite() || (i > 0 && x[i] < x[i - 1]));
+    match wrong {
+        None => Ok(()),
+        Some(at) => Err(ReportError::Axis { section: section.to_owned(), at, value: x[at] }),
+    }
+}
+
+/// A list must have one entry for each point of the axis.
+pub(crate) fn check_length(section: &str, what: &str, found: usize, expected: usize) -> Result<(), ReportError> {
+    if found == expected {
+        return Ok(());
+    }
+    Err(ReportError::Shape { section: section.to_owned(), what: format!("`{what}`"), expected, found })
+}

@@ -1,0 +1,58 @@
+//! A study's log on its way to a motion: with the format, the filters and the commanded motion that the study names for it.
+
+use crate::error::Error;
+use crate::machine::Machine;
+use crate::study::Study;
+use dynident_recording::{FilterError, MotionSettings, MotionStream, RecordingError, Reference};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Opens log number `index`, whose file is `file`.
+///
+/// # Errors
+/// What reading the log and its reference can give.
+pub(crate) fn motion_stream(
+    study: &Study,
+    machine: &Machine,
+    motion: &MotionSettings,
+    index: usize,
+    file: &Path,
+) -> Result<MotionStream, Error> {
+    let failed = |source| Error::recording(&study.log_name(index), source);
+    let reference = reference(study, machine, motion, index)?;
+    MotionStream::open_following(&study.format_of(index), file, &machine.log_joints, motion, reference.as_ref())
+        .map_err(failed)
+}
+
+/// The commanded motion of a log, its joints in the order of the log's columns; `None` for differentiators that need none.
+fn reference(
+    study: &Study,
+    machine: &Machine,
+    motion: &MotionSettings,
+    index: usize,
+) -> Result<Option<Arc<Reference>>, Error> {
+    let Some(shared) = motion.differentiator.reference() else { return Ok(None) };
+    let settings = study.log[index].reference.as_ref().unwrap_or(shared);
+    let failed = |source| Error::recording(&study.log_name(index), source);
+    let filter = |source| failed(RecordingError::Filter(source));
+    let dof = machine.model.dof();
+    let reference = match (&settings.file, settings.closed_form().map_err(filter)?) {
+        (_, Some(closed)) => closed,
+        (Some(file), None) => {
+            let path = machine.folders.find(file, study.source.as_deref())?;
+            Reference::read(&path, dof).map_err(failed)?.starting_at(settings.start_s)
+        }
+        // The differentiator says that it needs one.
+        (None, None) => return Ok(None),
+    };
+    let mut order = vec![0; dof];
+    for (joint, &place) in machine.log_place.iter().enumerate() {
+        order[place] = joint;
+    }
+    let found = reference.joints();
+    let reordered = reference.reordered(&order).filter(|_| found == dof).ok_or_else(|| {
+        let problem = format!("it moves {found} joints, the robot has {dof}: give one for each, in the robot's order");
+        filter(FilterError::Reference { problem })
+    })?;
+    Ok(Some(Arc::new(reordered)))
+}
