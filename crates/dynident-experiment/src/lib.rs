@@ -9,6 +9,7 @@ mod closed_loop;
 pub mod controllers;
 mod error;
 mod feedback;
+pub mod iteration;
 mod per_joint;
 mod plant;
 mod record;

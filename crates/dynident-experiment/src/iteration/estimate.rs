@@ -1,0 +1,139 @@
+//! One run's identification.
+
+use super::error::IterationError;
+use super::leg::IterationTask;
+use super::motion::{MeasuredMotion, measured_motion};
+use super::physical::{PhysicalSource, possible_parameters};
+use super::record::ModelParameters;
+use super::rows::visit_rows;
+use super::settings::{RunIdentificationSettings, Scheme};
+use super::step_by_step::{least_squares, step_by_step};
+use crate::error::require_length;
+use crate::record::Record;
+use dynident_estimation::{LinearProblem, SegmentSettings, SegmentedFactor};
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// How closely given values are held, as a share of the largest of them.
+const HELD: f64 = 1e-6;
+
+/// What a run tells of the base parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunEstimate {
+    /// Base parameters.
+    pub values: Vec<f64>,
+    /// Their standard deviations; zero for what was given or is not told by the data.
+    pub std: Vec<f64>,
+    /// Their covariance, row by row.
+    pub covariance: Vec<Vec<f64>>,
+    /// Rows that it was made from.
+    pub rows: usize,
+    /// Standard deviation of each joint's residual, Nm (N).
+    pub joint_sigma: Vec<f64>,
+    /// Base parameters that the data do not tell: they have the prior's values.
+    pub fixed: Vec<usize>,
+    /// All parameters of the possible machine that fits best, ten for each body and one for each law, if it was asked for.
+    pub possible: Option<Vec<f64>>,
+    /// Why there is none although it was asked for.
+    pub impossible: Option<String>,
+}
+
+impl RunEstimate {
+    /// What a controller gets: the possible machine if it was asked for, else the estimate as it is. None where the possible machine was asked for and does not exist.
+    pub fn for_controller(&self) -> Option<ModelParameters> {
+        match (&self.possible, &self.impossible) {
+            (Some(parameters), _) => Some(ModelParameters::All(parameters.clone())),
+            (None, None) => Some(ModelParameters::Base(self.values.clone())),
+            (None, Some(_)) => None,
+        }
+    }
+}
+
+/// Base parameters from the records of one run, one record for each leg of the task: differentiate, make rows within the windows that count, fit all joints at once or step by step, and find the
+/// possible machine that fits the same rows best.
+///
+/// # Errors
+/// Records that do not belong to the task, a differentiator that cannot be applied, rows that do not carry an estimate. A possible machine that does not exist is part of the result.
+pub fn identify_run(
+    task: &IterationTask,
+    records: &[Record],
+    settings: &RunIdentificationSettings,
+) -> Result<RunEstimate, IterationError> {
+    require_length("records of the run's legs", task.legs.len(), records.len())?;
+    let joints: Vec<String> = task.machine.model().joints().iter().map(|joint| joint.name.clone()).collect();
+    let motions = task
+        .legs
+        .iter()
+        .zip(records)
+        .map(|(leg, record)| measured_motion(record, leg, settings))
+        .collect::<Result<Vec<_>, _>>()?;
+    let names = task.machine.base().expressions();
+    let fallback = task.machine.base().values(task.machine.prior());
+    let problem = all_rows(task, &motions, settings, &names, &joints, &fallback)?;
+    let count = names.len();
+    let (values, covariance, joint_sigma, fixed, rows) = match settings.scheme {
+        Scheme::AllJoints => {
+            let estimate = least_squares(&problem, settings)?;
+            let fixed = estimate.rank.fixed.iter().map(|fixed| fixed.column).collect();
+            let rows = problem.joint_rows().iter().sum();
+            (estimate.values, estimate.covariance, estimate.joint_sigma, fixed, rows)
+        }
+        Scheme::StepByStep => {
+            let steps = step_by_step(task, &motions, settings, &names, &joints, &fallback)?;
+            let given = task.known_values();
+            let fixed = (0..count).filter(|&k| !steps.found[k] && given[k].is_none()).collect();
+            (steps.values, steps.covariance, steps.joint_sigma, fixed, steps.rows)
+        }
+    };
+    let (possible, impossible) = if settings.physical {
+        let machine = &task.machine;
+        let (model, laws, base, prior) = (machine.model(), machine.laws(), machine.base(), machine.prior());
+        match possible_parameters(&PhysicalSource { model, laws, base, prior }, &problem, &joint_sigma) {
+            Ok(fit) => (Some(fit.parameters), None),
+            Err(reason) => (None, Some(reason)),
+        }
+    } else {
+        (None, None)
+    };
+    let std = (0..count).map(|k| covariance[(k, k)].max(0.0).sqrt()).collect();
+    let covariance = covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
+    Ok(RunEstimate { values, std, covariance, rows, joint_sigma, fixed, possible, impossible })
+}
+
+/// The problem of all rows that count; given values as a prior that holds them.
+fn all_rows(
+    task: &IterationTask,
+    motions: &[MeasuredMotion],
+    settings: &RunIdentificationSettings,
+    names: &[String],
+    joints: &[String],
+    fallback: &[f64],
+) -> Result<LinearProblem, IterationError> {
+    let layout = task.machine.layout();
+    let mut problem = LinearProblem::new(names.to_vec(), joints.to_vec()).with_fallback(fallback.to_vec())?;
+    for (number, (leg, motion)) in task.legs.iter().zip(motions).enumerate() {
+        let mut factors = (0..joints.len())
+            .map(|joint| SegmentedFactor::new(layout.joint_columns(joint).len(), SegmentSettings::default()))
+            .collect::<Result<Vec<_>, _>>()?;
+        visit_rows(task, leg, motion, settings.parallel_filter.as_ref(), |joint, rows, panel| {
+            factors[joint].absorb(panel, rows)?;
+            Ok(())
+        })?;
+        for (joint, factor) in factors.into_iter().enumerate().filter(|(_, factor)| factor.rows() > 0) {
+            problem.add(&format!("leg {}", number + 1), joint, layout.joint_columns(joint).to_vec(), factor)?;
+        }
+    }
+    if task.known.is_empty() {
+        return Ok(problem);
+    }
+    let largest = task.known.iter().fold(0.0_f64, |most, (_, value)| most.max(value.abs()));
+    let largest = if largest > 0.0 { largest } else { 1.0 };
+    let mut mean = vec![0.0; names.len()];
+    let mut information = DMatrix::zeros(task.known.len(), names.len());
+    for (row, (column, value)) in task.known.iter().enumerate() {
+        mean[*column] = *value;
+        information[(row, *column)] = 1.0 / (HELD * largest);
+    }
+    Ok(problem.with_prior(mean, information)?)
+}
+

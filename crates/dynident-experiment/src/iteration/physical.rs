@@ -1,0 +1,97 @@
+//! From the factors of an estimate to the parameters of a possible machine.
+
+use dynident_dynamics::BaseParameters;
+use dynident_estimation::LinearProblem;
+use dynident_estimation::physical::{
+    BaseMap, PhysicalBody, PhysicalFit, PhysicalProblem, PhysicalScalar, PhysicalSettings, physical_fit, rough_body,
+};
+use dynident_model::{InertialParameters, Model};
+use dynident_model::laws::Law;
+
+/// A joint's noise counts as at least this share of its torque's root mean square: no model is better, and with noise-free (simulated) torque the prior would
+/// otherwise vanish beside the data in double precision.
+const LEAST_RELATIVE_SIGMA: f64 = 1.0e-4;
+
+/// Share of a rough body that is mixed into a description's: bodies drawn as rods or plates have no extent at all in some direction.
+const ROUGH_SHARE: f64 = 1.0e-2;
+
+/// What a possible machine is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct PhysicalSource<'a> {
+    /// Links and bodies.
+    pub model: &'a Model,
+    /// The laws beside them.
+    pub laws: &'a [Law],
+    /// Base parameters of both.
+    pub base: &'a BaseParameters,
+    /// Ten parameters for each body, one for each law: what the data leave open is taken from here.
+    pub prior: &'a [f64],
+}
+
+/// The possible set of parameters that fits the data best, from the factors that an estimate was made from and the noise of its joints (standard deviations, Nm); otherwise the reason why there is
+/// none. See [`physical_fit`].
+///
+/// # Errors
+/// In words: constraints that exclude each other, numbers that are not finite.
+pub fn possible_parameters(
+    source: &PhysicalSource<'_>,
+    problem: &LinearProblem,
+    joint_sigma: &[f64],
+) -> Result<PhysicalFit, String> {
+    let said = |error: &dyn core::fmt::Display| error.to_string();
+    let PhysicalSource { model, laws, base, prior } = *source;
+    let mut squares = vec![0.0; problem.joints().len()];
+    for equation in problem.equations() {
+        squares[equation.joint] += equation.factor.total().torque_norm().powi(2);
+    }
+    let rows = problem.joint_rows();
+    let weights: Vec<f64> = joint_sigma
+        .iter()
+        .zip(squares.iter().zip(&rows))
+        .map(|(sigma, (square, &rows))| {
+            let least = LEAST_RELATIVE_SIGMA * (square / rows.max(1) as f64).sqrt();
+            let sigma = sigma.max(least);
+            if sigma > 0.0 { 1.0 / sigma } else { 1.0 }
+        })
+        .collect();
+    let factor = problem.combined(&weights).map_err(|error| said(&error))?;
+    let map = BaseMap::from_regrouping(base.independent(), base.dependent(), base.regrouping())
+        .map_err(|error| said(&error))?;
+    let length = typical_length_m(model);
+    let masses: Vec<f64> = (0..model.dof()).map(|body| prior[10 * body]).filter(|&mass| mass > 0.0).collect();
+    let mean_mass = if masses.is_empty() { 1.0 } else { masses.iter().sum::<f64>() / masses.len() as f64 };
+    let bodies = model.bodies().iter().enumerate().map(|(index, body)| {
+        let own = &prior[10 * index..10 * index + 10];
+        let stated = InertialParameters(core::array::from_fn(|k| own[k]));
+        let least = stated.pseudo_inertia().symmetric_eigenvalues().min();
+        let possible = stated.mass_kg() > 0.0 && least >= -1.0e-9 * stated.mass_kg();
+        let reference = if possible {
+            let rough = rough_body(own[0], length);
+            core::array::from_fn(|k| own[k] + ROUGH_SHARE * rough[k])
+        } else {
+            rough_body(mean_mass, length)
+        };
+        let name = body.name().to_owned();
+        PhysicalBody { name, reference, known: None, mass_kg: None, com_box_m: None, inside: None }
+    });
+    let scalars = laws.iter().zip(&prior[10 * model.dof()..]).map(|(law, &value)| {
+        let bounded = law.is_nonnegative();
+        let scale = if matches!(law, Law::DriveInertia(_)) { mean_mass * length * length } else { 1.0 };
+        PhysicalScalar {
+            name: law.symbol(),
+            lower: bounded.then_some(0.0),
+            upper: None,
+            prior: if bounded { value.max(0.0) } else { value },
+            scale,
+        }
+    });
+    let problem =
+        PhysicalProblem::new(map, bodies.collect(), scalars.collect(), &factor).map_err(|error| said(&error))?;
+    physical_fit(&problem, &PhysicalSettings::default()).map_err(|error| said(&error))
+}
+
+/// A length that the machine's links have: the mean distance between successive joints, at least a centimetre.
+pub fn typical_length_m(model: &Model) -> f64 {
+    let lengths: Vec<f64> = model.joints().iter().map(|joint| joint.placement.translation.norm()).collect();
+    (lengths.iter().sum::<f64>() / lengths.len().max(1) as f64).max(0.01)
+}

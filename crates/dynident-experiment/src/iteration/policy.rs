@@ -1,0 +1,156 @@
+//! What the next run is: a pure function of the records so far.
+
+use super::record::{ModelParameters, RunRecord};
+use super::settings::{IterationSettings, StartWith};
+use super::status::IterationStatus;
+use crate::controllers::{ControllerSettings, JointPdSettings, JointPidSettings};
+use crate::per_joint::PerJoint;
+
+/// What comes next.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Next {
+    /// A run.
+    Run(RunPlan),
+    /// Nothing.
+    Finished(IterationStatus),
+}
+
+/// A run to be made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunPlan {
+    /// Its number, from 1.
+    pub run: usize,
+    /// The model of its controller; none for the controller without a model.
+    pub model: Option<ModelParameters>,
+    /// Share of the step from the last good parameters to the new ones.
+    pub damping: f64,
+    /// Factor of the gains of the controller without a model.
+    pub stiffness: f64,
+}
+
+impl RunPlan {
+    fn with_model(run: usize, model: ModelParameters, damping: f64) -> Self {
+        Self { run, model: Some(model), damping, stiffness: 1.0 }
+    }
+
+    /// The controller's settings.
+    pub fn controller(&self, settings: &IterationSettings) -> ControllerSettings {
+        if self.model.is_some() {
+            return settings.controller.clone();
+        }
+        stiffened(&settings.model_free, self.stiffness)
+    }
+}
+
+/// The run after `records`, or how the iteration has ended. `prior` is what the machine is believed to be before any run.
+pub(super) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &[f64]) -> Next {
+    let run = records.len() + 1;
+    let model_free = |stiffness| Next::Run(RunPlan { run, model: None, damping: 1.0, stiffness });
+    let Some(last) = records.last() else {
+        return match settings.start {
+            StartWith::ModelFree => model_free(1.0),
+            StartWith::Prior => Next::Run(RunPlan::with_model(run, ModelParameters::All(prior.to_vec()), 1.0)),
+        };
+    };
+    let newest = last.estimate.as_ref().and_then(super::estimate::RunEstimate::for_controller);
+    if settled(records, settings) {
+        return Next::Finished(IterationStatus::Converged);
+    }
+    if !settings.reject {
+        return match newest {
+            _ if run > settings.max_runs => Next::Finished(IterationStatus::RunsUsedUp),
+            Some(model) if last.done => Next::Run(RunPlan::with_model(run, model, 1.0)),
+            _ => Next::Finished(IterationStatus::Refused { reason: failed(last) }),
+        };
+    }
+    let free_failures = records.iter().filter(|record| record.controller.model.is_none() && !record.accepted).count();
+    if free_failures >= settings.most_model_free {
+        return Next::Finished(IterationStatus::Refused { reason: failed(last) });
+    }
+    if run > settings.max_runs {
+        return Next::Finished(IterationStatus::RunsUsedUp);
+    }
+    if last.accepted
+        && let Some(model) = newest
+    {
+        return Next::Run(RunPlan::with_model(run, model, 1.0));
+    }
+    // Rejected: back towards the last good model, as long as there is one to go back to.
+    let since = records.iter().rposition(|record| record.accepted).map_or(0, |place| place + 1);
+    let rejected = &records[since..];
+    let good = records[..since].iter().rev().find_map(|record| record.controller.model.clone());
+    let new = rejected.first().and_then(|record| record.controller.model.clone());
+    let halvings = rejected.len();
+    if let (Some(good), Some(new)) = (good, new)
+        && halvings <= settings.most_halvings
+        && rejected.iter().all(|record| record.controller.model.is_some())
+    {
+        let share = 0.5_f64.powi(halvings as i32);
+        return Next::Run(RunPlan::with_model(run, ModelParameters::between(&good, &new, share), share));
+    }
+    let before = records.iter().filter(|record| record.controller.model.is_none()).count();
+    model_free(settings.stiffen.powi(before as i32))
+}
+
+/// Whether a run counts as good beside those before it, and why not.
+pub(super) fn verdict(record: &RunRecord, before: &[RunRecord], settings: &IterationSettings) -> Result<(), String> {
+    if !record.done {
+        return Err(record.outcome.clone());
+    }
+    let Some(estimate) = &record.estimate else {
+        return Err(record.reason.clone().unwrap_or_else(|| "it tells nothing of the parameters".to_owned()));
+    };
+    if let Some(reason) = &estimate.impossible {
+        return Err(format!("no possible machine fits it: {reason}"));
+    }
+    let Some(good) = before.iter().rev().find(|record| record.accepted) else { return Ok(()) };
+    let (now, then) = (record.tracking_error(), good.tracking_error());
+    let worst = (settings.worse_factor * then).max(settings.settled.tracking_tolerance);
+    // A controller without a model is what a bad one falls back to: its tracking is no reason to reject it.
+    if settings.reject && record.controller.model.is_some() && now > worst {
+        return Err(format!("it tracks worse: {now:.3e} rad after {then:.3e} rad"));
+    }
+    Ok(())
+}
+
+fn settled(records: &[RunRecord], settings: &IterationSettings) -> bool {
+    let [.., before, last] = records else { return false };
+    if !(before.accepted && last.accepted && last.controller.model.is_some() && last.controller.damping == 1.0) {
+        return false;
+    }
+    let (Some(old), Some(new)) = (&before.estimate, &last.estimate) else { return false };
+    let limits = &settings.settled;
+    let largest = new.values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    let parameters = new.values.iter().zip(&old.values).zip(new.std.iter().zip(&old.std));
+    let still = parameters.into_iter().all(|((new, old), (s, t))| {
+        (new - old).abs() <= limits.parameter_sigmas * s.hypot(*t) + limits.parameter_tolerance * largest
+    });
+    let (now, then) = (last.tracking_error(), before.tracking_error());
+    still && (now <= limits.tracking_tolerance || limits.tracking_ratio * now >= then)
+}
+
+fn failed(record: &RunRecord) -> String {
+    let reason = record.reason.clone().unwrap_or_else(|| record.outcome.clone());
+    format!("run {} under {}: {reason}", record.run, record.controller.name)
+}
+
+/// Stiffness grows as `factor`, damping as its root, so that the damping ratio stays.
+fn stiffened(settings: &ControllerSettings, factor: f64) -> ControllerSettings {
+    let times = |gains: &PerJoint, by: f64| match gains {
+        PerJoint::All(gain) => PerJoint::All(by * gain),
+        PerJoint::Each(gains) => PerJoint::Each(gains.iter().map(|gain| by * gain).collect()),
+    };
+    match settings {
+        ControllerSettings::JointPd(pd) => ControllerSettings::JointPd(JointPdSettings {
+            kp: times(&pd.kp, factor),
+            kd: times(&pd.kd, factor.sqrt()),
+        }),
+        ControllerSettings::JointPid(pid) => ControllerSettings::JointPid(JointPidSettings {
+            kp: times(&pid.kp, factor),
+            ki: times(&pid.ki, factor),
+            kd: times(&pid.kd, factor.sqrt()),
+            ..pid.clone()
+        }),
+        other => other.clone(),
+    }
+}

@@ -1,0 +1,41 @@
+//! How an iteration ended.
+
+use serde::{Deserialize, Serialize};
+
+/// How an iteration ended, or why it stands still.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "end", rename_all = "kebab-case")]
+pub enum IterationStatus {
+    /// Tracking and parameters have settled.
+    Converged,
+    /// All runs allowed were made.
+    RunsUsedUp,
+    /// No run can be made under any controller that is left to try.
+    Refused {
+        /// Why.
+        reason: String,
+    },
+    /// Somebody has to run the robot first; then the iteration goes on from here.
+    Waiting {
+        /// For what.
+        reason: String,
+    },
+}
+
+impl IterationStatus {
+    /// Whether all has settled.
+    pub fn is_converged(&self) -> bool {
+        *self == Self::Converged
+    }
+}
+
+impl core::fmt::Display for IterationStatus {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Converged => write!(f, "converged"),
+            Self::RunsUsedUp => write!(f, "not converged: all runs allowed were made"),
+            Self::Refused { reason } => write!(f, "refused: {reason}"),
+            Self::Waiting { reason } => write!(f, "waiting: {reason}"),
+        }
+    }
+}
