@@ -6,10 +6,11 @@ use nalgebra::{Matrix4, Vector4};
 /// The scaling of Nesterov and Todd for a pair `S, Z ≻ 0`: R with `R⁻¹ S R⁻ᵀ = Rᵀ Z R = diag(λ)`.
 ///
 /// Nesterov and Todd, SIAM J. Optimization 8 (1998) 324; computed as in Vandenberghe's CVXOPT notes (2010), section 5.3: with `S = L Lᵀ`,
-/// `Z = M Mᵀ` and `MᵀL = U diag(λ) Vᵀ`, `R⁻¹ = diag(λ)^{-1/2} Uᵀ Mᵀ`. Only R⁻¹ is ever needed.
+/// `Z = M Mᵀ` and `MᵀL = U diag(λ) Vᵀ`, `R = L V diag(λ)^{-1/2}` and `R⁻¹ = diag(λ)^{-1/2} Uᵀ Mᵀ`.
 #[derive(Clone, Debug)]
 pub(super) struct Scaling {
     pub(super) lambda: Vector4<f64>,
+    r: Matrix4<f64>,
     r_inverse: Matrix4<f64>,
 }
 
@@ -18,13 +19,57 @@ impl Scaling {
     pub(super) fn new(s: &Matrix4<f64>, z: &Matrix4<f64>) -> Option<Self> {
         let l = s.cholesky()?.l();
         let m = z.cholesky()?.l();
-        let (lambda, u) = singular_values(&(m.transpose() * l));
-        let root = lambda.map(f64::sqrt);
-        if !lambda.iter().all(|&value| value > 0.0 && value.is_finite()) {
-            return None;
-        }
-        let r_inverse = Matrix4::from_diagonal(&root.map(|value| 1.0 / value)) * u.transpose() * m.transpose();
-        Some(Self { lambda, r_inverse })
+        let (lambda, u, v) = singular_values(&(m.transpose() * l));
+        let root = positive_root(&lambda)?;
+        let inverse_root = root.map(|value| 1.0 / value);
+        Some(Self {
+            lambda,
+            r: l * v * Matrix4::from_diagonal(&inverse_root),
+            r_inverse: Matrix4::from_diagonal(&inverse_root) * u.transpose() * m.transpose(),
+        })
+    }
+
+    /// The scaling of the pair after a step, given in its own scaled coordinates: `S = R (diag(λ) + ΔS) Rᵀ`, `Z = R⁻ᵀ (diag(λ) + ΔZ) R⁻¹`. The pair itself is never formed, so that
+    /// small eigenvalues beside large ones keep their digits.
+    pub(super) fn moved(&self, ds: &Matrix4<f64>, dz: &Matrix4<f64>) -> Option<Self> {
+        let diagonal = Matrix4::from_diagonal(&self.lambda);
+        let l = (diagonal + ds).cholesky()?.l();
+        let m = (diagonal + dz).cholesky()?.l();
+        let (lambda, u, v) = singular_values(&(m.transpose() * l));
+        let root = positive_root(&lambda)?;
+        let inverse_root = root.map(|value| 1.0 / value);
+        let r = self.r * (l * v * Matrix4::from_diagonal(&inverse_root));
+        let carried = (Matrix4::from_diagonal(&inverse_root) * u.transpose() * m.transpose()) * self.r_inverse;
+        // A step of Newton and Schulz: many products would let the inverse drift away.
+        let r_inverse = carried + carried * (Matrix4::identity() - r * carried);
+        r.iter().chain(r_inverse.iter()).all(|value| value.is_finite()).then_some(Self { lambda, r, r_inverse })
+    }
+
+    /// `S = R diag(λ) Rᵀ`.
+    pub(super) fn primal(&self) -> Matrix4<f64> {
+        let half = self.r * Matrix4::from_diagonal(&self.lambda.map(f64::sqrt));
+        half * half.transpose()
+    }
+
+    /// `Z = R⁻ᵀ diag(λ) R⁻¹`.
+    pub(super) fn dual(&self) -> Matrix4<f64> {
+        let half = self.r_inverse.transpose() * Matrix4::from_diagonal(&self.lambda.map(f64::sqrt));
+        half * half.transpose()
+    }
+
+    /// The 10 × 10 matrix of `X ↦ R X Rᵀ` on vectors: from scaled coordinates to the body's own.
+    pub(super) fn frame(&self) -> Matrix10 {
+        congruence(&self.r)
+    }
+
+    /// The 10 × 10 matrix of `X ↦ R⁻¹ X R⁻ᵀ` on vectors.
+    pub(super) fn inverse_frame(&self) -> Matrix10 {
+        congruence(&self.r_inverse)
+    }
+
+    /// The 10 × 10 matrix of `X ↦ K X Kᵀ`, `K = R⁻¹ R'`: from another pair's scaled coordinates to these.
+    pub(super) fn from_frame_of(&self, other: &Self) -> Matrix10 {
+        congruence(&(self.r_inverse * other.r))
     }
 
     /// `R⁻¹ X R⁻ᵀ`: a primal direction, scaled.
@@ -35,11 +80,6 @@ impl Scaling {
     /// `R⁻ᵀ X R⁻¹`: from a scaled dual direction to the direction itself.
     pub(super) fn unscaled_dual(&self, x: &Matrix4<f64>) -> Matrix4<f64> {
         self.r_inverse.transpose() * x * self.r_inverse
-    }
-
-    /// The 10 × 10 matrix of `X ↦ W⁻¹ X W⁻¹` with `W = R Rᵀ`, on vectors.
-    pub(super) fn hessian(&self) -> Matrix10 {
-        congruence(&(self.r_inverse.transpose() * self.r_inverse))
     }
 
     /// D with `½ (diag(λ) D + D diag(λ)) = C`.
@@ -55,7 +95,7 @@ impl Scaling {
     }
 }
 
-/// The 10 × 10 matrix of `X ↦ V X V` on vectors, V symmetric.
+/// The 10 × 10 matrix of `X ↦ V X Vᵀ` on vectors.
 pub(super) fn congruence(v: &Matrix4<f64>) -> Matrix10 {
     let columns = PAIRS.map(|(a, b)| -> Vector10 {
         let (va, vb) = (v.column(a), v.column(b));
@@ -86,10 +126,15 @@ pub(super) fn inverse(matrix: &Matrix4<f64>) -> Option<Matrix4<f64>> {
     Some(matrix_of(&vector_of(&inverse)))
 }
 
-/// Singular values and left vectors of `A = U diag(σ) Vᵀ` by one-sided Jacobi rotations (Golub and Van Loan 8.6.3): small values come out with as many digits as
+/// Square roots of positive numbers, or none.
+fn positive_root(lambda: &Vector4<f64>) -> Option<Vector4<f64>> {
+    lambda.iter().all(|&value| value > 0.0 && value.is_finite()).then(|| lambda.map(f64::sqrt))
+}
+
+/// Singular values and both sets of vectors of `A = U diag(σ) Vᵀ` by one-sided Jacobi rotations (Golub and Van Loan 8.6.3): small values come out with as many digits as
 /// large ones, which a bidiagonal method does not give.
-fn singular_values(a: &Matrix4<f64>) -> (Vector4<f64>, Matrix4<f64>) {
-    let mut b = *a;
+fn singular_values(a: &Matrix4<f64>) -> (Vector4<f64>, Matrix4<f64>, Matrix4<f64>) {
+    let (mut b, mut v) = (*a, Matrix4::identity());
     // Six to eight sweeps settle a 4 × 4 matrix; the limit only guards the loop.
     for _ in 0..30 {
         let mut turned = false;
@@ -105,10 +150,12 @@ fn singular_values(a: &Matrix4<f64>) -> (Vector4<f64>, Matrix4<f64>) {
                 let t = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
                 let c = 1.0 / t.hypot(1.0);
                 let s = c * t;
-                for row in 0..4 {
-                    let (x, y) = (b[(row, p)], b[(row, q)]);
-                    b[(row, p)] = c * x - s * y;
-                    b[(row, q)] = s * x + c * y;
+                for turning in [&mut b, &mut v] {
+                    for row in 0..4 {
+                        let (x, y) = (turning[(row, p)], turning[(row, q)]);
+                        turning[(row, p)] = c * x - s * y;
+                        turning[(row, q)] = s * x + c * y;
+                    }
                 }
             }
         }
@@ -118,7 +165,7 @@ fn singular_values(a: &Matrix4<f64>) -> (Vector4<f64>, Matrix4<f64>) {
     }
     let sigma = Vector4::from_fn(|k, _| b.column(k).norm());
     let u = Matrix4::from_fn(|i, k| b[(i, k)] / sigma[k]);
-    (sigma, u)
+    (sigma, u, v)
 }
 
 #[cfg(test)]
@@ -140,6 +187,14 @@ mod tests {
             // The condition of S times rounding, with room.
             assert!((scaling.scaled_primal(&s) - diagonal).amax() < 1e-9);
             assert!((scaling.unscaled_dual(&diagonal) - z).amax() < 1e-9);
+            assert!((scaling.primal() - s).amax() < 1e-9 && (scaling.dual() - z).amax() < 1e-9);
+            // A step in scaled coordinates is the same as one of the matrices.
+            let ds = Matrix4::from_fn(|i, j| 0.1 * (scaling.lambda[i] * scaling.lambda[j]).sqrt() * f64::from(u8::from(i != j)));
+            let after = scaling.moved(&ds, &(ds * -1.0)).unwrap();
+            let r = scaling.frame();
+            let moved = s + matrix_of(&(r * vector_of(&ds)));
+            assert!((after.primal() - moved).amax() < 1e-9);
+            assert!((after.dual() - (z - scaling.unscaled_dual(&ds))).amax() < 1e-9);
         }
     }
 
