@@ -7,10 +7,18 @@ use nalgebra::{Matrix4, Vector4};
 ///
 /// Nesterov and Todd, SIAM J. Optimization 8 (1998) 324; computed as in Vandenberghe's CVXOPT notes (2010), section 5.3: with `S = L Lᵀ`,
 /// `Z = M Mᵀ` and `MᵀL = U diag(λ) Vᵀ`, `R = L V diag(λ)^{-1/2}` and `R⁻¹ = diag(λ)^{-1/2} Uᵀ Mᵀ`.
+///
+/// L is lower and M upper triangular, and both are carried from step to step by triangular factors near one: small eigenvalues beside large ones keep their digits. R itself
+/// mixes them (its columns may turn freely where the λ are alike), so that variables are seen in the frame of L.
 #[derive(Clone, Debug)]
 pub(super) struct Scaling {
     pub(super) lambda: Vector4<f64>,
-    r: Matrix4<f64>,
+    l: Matrix4<f64>,
+    m: Matrix4<f64>,
+    /// `MᵀL`.
+    product: Matrix4<f64>,
+    u: Matrix4<f64>,
+    v: Matrix4<f64>,
     r_inverse: Matrix4<f64>,
 }
 
@@ -18,48 +26,47 @@ impl Scaling {
     /// None when one of the two is not positive definite in double precision.
     pub(super) fn new(s: &Matrix4<f64>, z: &Matrix4<f64>) -> Option<Self> {
         let l = s.cholesky()?.l();
-        let m = z.cholesky()?.l();
-        let (lambda, u, v) = singular_values(&(m.transpose() * l));
-        let root = positive_root(&lambda)?;
-        let inverse_root = root.map(|value| 1.0 / value);
-        Some(Self {
-            lambda,
-            r: l * v * Matrix4::from_diagonal(&inverse_root),
-            r_inverse: Matrix4::from_diagonal(&inverse_root) * u.transpose() * m.transpose(),
-        })
+        let m = upper_factor(z)?;
+        Self::of(l, m, m.transpose() * l)
     }
 
-    /// The scaling of the pair after a step, given in its own scaled coordinates: `S = R (diag(λ) + ΔS) Rᵀ`, `Z = R⁻ᵀ (diag(λ) + ΔZ) R⁻¹`. The pair itself is never formed, so that
-    /// small eigenvalues beside large ones keep their digits.
+    fn of(l: Matrix4<f64>, m: Matrix4<f64>, product: Matrix4<f64>) -> Option<Self> {
+        let (lambda, u, v) = singular_values(&product);
+        let usable = lambda.iter().all(|&value| value > 0.0 && value.is_finite());
+        let inverse_root = lambda.map(|value| 1.0 / value.sqrt());
+        let r_inverse = Matrix4::from_diagonal(&inverse_root) * u.transpose() * m.transpose();
+        let finite = l.iter().chain(r_inverse.iter()).all(|value| value.is_finite());
+        (usable && finite).then_some(Self { lambda, l, m, product, u, v, r_inverse })
+    }
+
+    /// The scaling of the pair after a step, given in scaled coordinates: `S = R (diag(λ) + ΔS) Rᵀ`, `Z = R⁻ᵀ (diag(λ) + ΔZ) R⁻¹`. The pair itself is never formed.
     pub(super) fn moved(&self, ds: &Matrix4<f64>, dz: &Matrix4<f64>) -> Option<Self> {
-        let diagonal = Matrix4::from_diagonal(&self.lambda);
-        let l = (diagonal + ds).cholesky()?.l();
-        let m = (diagonal + dz).cholesky()?.l();
-        let (lambda, u, v) = singular_values(&(m.transpose() * l));
-        let root = positive_root(&lambda)?;
-        let inverse_root = root.map(|value| 1.0 / value);
-        let r = self.r * (l * v * Matrix4::from_diagonal(&inverse_root));
-        let carried = (Matrix4::from_diagonal(&inverse_root) * u.transpose() * m.transpose()) * self.r_inverse;
-        // A step of Newton and Schulz: many products would let the inverse drift away.
-        let r_inverse = carried + carried * (Matrix4::identity() - r * carried);
-        r.iter().chain(r_inverse.iter()).all(|value| value.is_finite()).then_some(Self { lambda, r, r_inverse })
+        let inverse_root = Matrix4::from_diagonal(&self.lambda.map(|value| 1.0 / value.sqrt()));
+        // Seen from L and M: one, and the change.
+        let (of_s, of_z) = (self.v * inverse_root, self.u * inverse_root);
+        let l = (Matrix4::identity() + of_s * ds * of_s.transpose()).cholesky()?.l();
+        let m = upper_factor(&(Matrix4::identity() + of_z * dz * of_z.transpose()))?;
+        Self::of(self.l * l, self.m * m, m.transpose() * self.product * l)
     }
 
-    /// `S = R diag(λ) Rᵀ`.
+    /// `S = L Lᵀ`.
     pub(super) fn primal(&self) -> Matrix4<f64> {
-        let half = self.r * Matrix4::from_diagonal(&self.lambda.map(f64::sqrt));
-        half * half.transpose()
+        self.l * self.l.transpose()
     }
 
-    /// `Z = R⁻ᵀ diag(λ) R⁻¹`.
+    /// `Z = M Mᵀ`.
     pub(super) fn dual(&self) -> Matrix4<f64> {
-        let half = self.r_inverse.transpose() * Matrix4::from_diagonal(&self.lambda.map(f64::sqrt));
-        half * half.transpose()
+        self.m * self.m.transpose()
     }
 
-    /// The 10 × 10 matrix of `X ↦ R X Rᵀ` on vectors: from scaled coordinates to the body's own.
+    /// The 10 × 10 matrix of `X ↦ L X Lᵀ` on vectors: from the frame to the body's own variables.
     pub(super) fn frame(&self) -> Matrix10 {
-        congruence(&self.r)
+        congruence(&self.l)
+    }
+
+    /// The 10 × 10 matrix from the frame to scaled coordinates, `X ↦ (R⁻¹L) X (R⁻¹L)ᵀ` with `R⁻¹L = diag(λ)^{1/2} Vᵀ`.
+    pub(super) fn from_own_frame(&self) -> Matrix10 {
+        congruence(&(Matrix4::from_diagonal(&self.lambda.map(f64::sqrt)) * self.v.transpose()))
     }
 
     /// The 10 × 10 matrix of `X ↦ R⁻¹ X R⁻ᵀ` on vectors.
@@ -67,9 +74,9 @@ impl Scaling {
         congruence(&self.r_inverse)
     }
 
-    /// The 10 × 10 matrix of `X ↦ K X Kᵀ`, `K = R⁻¹ R'`: from another pair's scaled coordinates to these.
+    /// The same from another pair's frame, whose L it is.
     pub(super) fn from_frame_of(&self, other: &Self) -> Matrix10 {
-        congruence(&(self.r_inverse * other.r))
+        congruence(&(self.r_inverse * other.l))
     }
 
     /// `R⁻¹ X R⁻ᵀ`: a primal direction, scaled.
@@ -126,9 +133,12 @@ pub(super) fn inverse(matrix: &Matrix4<f64>) -> Option<Matrix4<f64>> {
     Some(matrix_of(&vector_of(&inverse)))
 }
 
-/// Square roots of positive numbers, or none.
-fn positive_root(lambda: &Vector4<f64>) -> Option<Vector4<f64>> {
-    lambda.iter().all(|&value| value > 0.0 && value.is_finite()).then(|| lambda.map(f64::sqrt))
+/// Upper triangular U with `U Uᵀ = S`, or none.
+pub(super) fn upper_factor(s: &Matrix4<f64>) -> Option<Matrix4<f64>> {
+    // The Cholesky factor of the matrix read backwards.
+    let flipped = Matrix4::from_fn(|i, j| s[(3 - i, 3 - j)]);
+    let l = flipped.cholesky()?.l();
+    Some(Matrix4::from_fn(|i, j| l[(3 - i, 3 - j)]))
 }
 
 /// Singular values and both sets of vectors of `A = U diag(σ) Vᵀ` by one-sided Jacobi rotations (Golub and Van Loan 8.6.3): small values come out with as many digits as
@@ -189,10 +199,12 @@ mod tests {
             assert!((scaling.unscaled_dual(&diagonal) - z).amax() < 1e-9);
             assert!((scaling.primal() - s).amax() < 1e-9 && (scaling.dual() - z).amax() < 1e-9);
             // A step in scaled coordinates is the same as one of the matrices.
-            let ds = Matrix4::from_fn(|i, j| 0.1 * (scaling.lambda[i] * scaling.lambda[j]).sqrt() * f64::from(u8::from(i != j)));
+            let ds = Matrix4::from_fn(|i, j| {
+                0.1 * (scaling.lambda[i] * scaling.lambda[j]).sqrt() * f64::from(u8::from(i != j))
+            });
             let after = scaling.moved(&ds, &(ds * -1.0)).unwrap();
-            let r = scaling.frame();
-            let moved = s + matrix_of(&(r * vector_of(&ds)));
+            let in_frame = scaling.from_own_frame().try_inverse().unwrap() * vector_of(&ds);
+            let moved = s + matrix_of(&(scaling.frame() * in_frame));
             assert!((after.primal() - moved).amax() < 1e-9);
             assert!((after.dual() - (z - scaling.unscaled_dual(&ds))).amax() < 1e-9);
         }

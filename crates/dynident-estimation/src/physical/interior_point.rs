@@ -7,14 +7,15 @@
 //!     minimise ½‖A Δx − (b − A x)‖² + g·Δx + Σ ½‖R⁻¹ mat(M Δx) R⁻ᵀ − (D + Λ)‖² + Σ ½ (√(z/s) a·Δx − (t/s + z)/√(z/s))²
 //! ```
 //!
-//! A body is seen in its own scaling (`ΔS = R mat(u) Rᵀ`), where its cone's rows are the unit matrix, and R is carried from step to step by factors near one: eigenvalues
-//! of 1e-12 beside masses of 1e6 references keep their digits, which neither S nor Z could hold.
+//! A body is seen in the frame of its own factor (`ΔS = L mat(u) Lᵀ`), where its cone's rows are of the size of one, and the factors of S and Z are carried from step to step by
+//! triangular ones near one: eigenvalues of 1e-12 beside masses of 1e6 references keep their digits, which neither S nor Z could hold. An entropic prior is a pair that stays at its
+//! own weight γ from the beginning; it keeps no other barrier's place.
 
 use super::cone::Scaling;
 use super::conic::{Block, BlockMap, Certificate, Multipliers, Program, Slacks};
 use super::coordinates::{Vector10, matrix_of, vector_of};
 use super::precise::Precise;
-use super::stacked::{LocalRows, RightSide, Rows, StackedSystem};
+use super::stacked::{LocalRows, RightSide, Rows, Singles, StackedSystem};
 use nalgebra::{DMatrix, DVector, Matrix4};
 
 /// How a solver ended.
@@ -40,10 +41,18 @@ pub(super) struct Solved {
 /// How much of the way to the boundary a step may go.
 const FRACTION_TO_BOUNDARY: f64 = 0.99;
 
-/// No product of a pair may fall below this share of the mean.
+/// No step may leave a product of slack and multiplier below this share of their mean (an entropic block's: of its weight), if the step before did not: near the boundary the next
+/// one would be short.
 const WORST_BALANCE: f64 = 0.02;
+
+/// Below this share the next step does nothing but balance.
 const CENTRE_BELOW: f64 = 0.1;
+
+/// The relative gap at which multipliers must be in balance with the gradient before μ falls further. Bodies that data drive far from their references grow by a factor with every
+/// step while μ is large, and crawl once it is small: what is left of the start's imbalance holds them back like a weight on their trace.
 const HOLD_BELOW: f64 = 0.3;
+
+/// μ stops where the gap is this share of the tolerance.
 const LEAST_GAP: f64 = 0.3;
 
 /// Solves the program from a point strictly inside; none when `start` is not.
@@ -57,18 +66,15 @@ pub(super) fn interior_point(
     let mut best = state.solved(program, 0, Ending::Limit)?;
     let mut poor = 0;
     for iteration in 1..=max_iterations {
-        let Some(_step) = state.step(program, tolerance) else {
+        if state.step(program, tolerance).is_none() {
             best.ending = Ending::Stalled;
             break;
-        };
+        }
         let Some(now) = state.solved(program, iteration, Ending::Limit) else {
             best.ending = Ending::Stalled;
             break;
         };
         best.iterations = iteration;
-        if std::env::var("TRACE").is_ok() {
-            eprintln!("{iteration}: step {_step:.3e} st {:.2e} gap {:.2e} obj {:.6e}", now.certificate.stationarity, now.certificate.gap, now.certificate.objective);
-        }
         if now.certificate.residual() < 0.9 * best.certificate.residual() {
             poor = 0;
         } else {
@@ -140,6 +146,7 @@ struct Newton<'a> {
     system: StackedSystem,
     /// For every row of the program, its coefficients in the frame (not scaled).
     framed_rows: Vec<DVector<f64>>,
+    singles: Singles,
     /// `b − A x` and the same of the local squares.
     data_rest: DVector<f64>,
     local_rest: Vec<DVector<f64>>,
@@ -187,42 +194,36 @@ impl State {
         Some(Solved { x: self.x.high.clone(), multipliers, certificate, iterations, ending })
     }
 
-    /// One predictor and corrector; gives the step length taken, or none when double precision allows no further one.
-    fn step(&mut self, program: &Program, tolerance: f64) -> Option<f64> {
+    /// One step; gives whether there was one that double precision allows. Products out of balance are balanced first; then the multipliers are brought into balance with the
+    /// gradient while μ is still large; then predictor and corrector lower μ.
+    fn step(&mut self, program: &Program, tolerance: f64) -> Option<()> {
         let newton = Newton::new(program, self)?;
-        let balance = self.balance(program);
+        let (mu, balance) = (newton.excess(None), self.balance(program));
         if balance < CENTRE_BELOW {
-            let mu = newton.excess(None);
             let centring = newton.direction(&newton.targets(mu), 0.0)?;
-            if let Some((alpha, next)) = self.followed(program, &newton, &centring, (1.2 * balance).min(CENTRE_BELOW)) {
-                if std::env::var("TRACE").is_ok() { eprintln!("   centring {alpha:.2e} mu {mu:.2e} balance {balance:.2e} -> {:.2e}", next.balance(program)); }
+            if let Some((_, next)) = self.followed(program, &newton, &centring, (1.2 * balance).min(CENTRE_BELOW)) {
                 *self = next;
-                return Some(alpha);
+                return Some(());
             }
         }
-        let delta = newton.residual() / newton.excess(None).max(f64::MIN_POSITIVE).sqrt();
-        let mu = newton.excess(None);
-        let held = !self.balanced && delta > 0.3 && mu * newton.degree() < HOLD_BELOW * (1.0 + program.smooth_objective(&self.x).abs());
-        if held {
+        let scale = 1.0 + program.smooth_objective(&self.x).abs();
+        if !self.balanced && mu * newton.degree() < HOLD_BELOW * scale && newton.residual() > 0.3 * mu.sqrt() {
             let direction = newton.direction(&newton.targets(mu), 1.0)?;
             if let Some((alpha, next)) = self.followed(program, &newton, &direction, WORST_BALANCE) {
-                if std::env::var("TRACE").is_ok() { eprintln!("   held {alpha:.2e} mu {mu:.2e} delta {delta:.2e} balance {balance:.2e} -> {:.2e} xmax {:.1e}", next.balance(program), self.x.high.amax()); }
                 *self = next;
                 self.balanced |= alpha >= 1.0;
-                return Some(alpha);
+                return Some(());
             }
         }
         let affine = newton.direction(&newton.targets(0.0), 1.0)?;
-        let mu = newton.excess(None);
         let alpha = newton.longest(&affine).min(1.0);
         let after = newton.excess(Some((&affine, alpha)));
         let sigma = if mu > 0.0 { (after / mu).powi(3).clamp(0.0, 1.0) } else { 0.0 };
+        // Lower than the gap that is asked, slacks would only lose digits.
+        let least = LEAST_GAP * tolerance * scale / newton.degree();
+        let mut targets = newton.targets((sigma * mu).max(least));
         // The corrector's second-order term holds for full steps; scaled down it does no harm after short ones.
         let share = alpha * alpha;
-        // Lower than the gap that is asked, slacks would only lose digits.
-        let least = LEAST_GAP * tolerance * (1.0 + program.smooth_objective(&self.x).abs()) / newton.degree();
-        let goal = (sigma * mu).max(least);
-        let mut targets = newton.targets(goal);
         for (k, target) in targets.blocks.iter_mut().enumerate() {
             let product = affine.primal[k] * affine.dual[k];
             *target -= (product + product.transpose()) * (0.5 * share);
@@ -230,42 +231,30 @@ impl State {
         for (l, target) in targets.rows.iter_mut().enumerate() {
             *target -= share * affine.row_primal[l] * affine.row_dual[l];
         }
-        let worst = self.balance(program).min(WORST_BALANCE);
+        let worst = balance.min(WORST_BALANCE);
         let mut best = self.followed(program, &newton, &newton.direction(&targets, 1.0)?, worst);
         if best.as_ref().is_none_or(|(alpha, _)| *alpha < 0.3) {
             let centred = newton.direction(&newton.targets((sigma.max(0.5) * mu).max(least)), 1.0)?;
             let other = self.followed(program, &newton, &centred, worst);
-            if std::env::var("TRACE").is_ok() { eprintln!("   alternatives {:?} {:?}", best.as_ref().map(|b| b.0), other.as_ref().map(|b| b.0)); }
             if other.as_ref().map(|(alpha, _)| *alpha) > best.as_ref().map(|(alpha, _)| *alpha) {
                 best = other;
             }
         }
         let (alpha, next) = best?;
-        if std::env::var("TRACE").is_ok() {
-            eprintln!("   mu {mu:.2e} aff {:.2e} sigma {sigma:.2e} balance {:.2e} xmax {:.1e}", share.sqrt(), self.balance(program), self.x.high.amax());
-        }
         *self = next;
         self.balanced |= alpha >= 1.0;
-        Some(alpha)
+        Some(())
     }
 
     /// The longest part of a direction after which no product of a pair falls too far behind the others: to where the boundary is near, the next step would be short.
-    fn followed(&self, program: &Program, newton: &Newton<'_>, direction: &Direction, worst: f64) -> Option<(f64, Self)> {
+    fn followed(
+        &self,
+        program: &Program,
+        newton: &Newton<'_>,
+        direction: &Direction,
+        worst: f64,
+    ) -> Option<(f64, Self)> {
         let mut alpha = (FRACTION_TO_BOUNDARY * newton.longest(direction)).min(1.0);
-        if std::env::var("TRACE").is_ok() {
-            let mut v: Vec<(f64, String)> = vec![];
-            for (k, (cone, block)) in self.cones.iter().zip(&program.blocks).enumerate() {
-                let e = cone.scaling.primal().symmetric_eigenvalues(); let z = cone.scaling.dual().symmetric_eigenvalues();
-                v.push((cone.scaling.largest_step(&direction.primal[k]), format!("primal {k} ent {} S {:.1e}..{:.1e} Z {:.1e}..{:.1e} lam {:?}", block.entropy, e.min(), e.max(), z.min(), z.max(), cone.scaling.lambda.as_slice())));
-                v.push((cone.scaling.largest_step(&direction.dual[k]), format!("dual {k} ent {}", block.entropy)));
-            }
-            for (l, pair) in self.rows.iter().enumerate() {
-                if direction.row_primal[l] < 0.0 { v.push((-pair.slack/direction.row_primal[l], format!("row slack {l}"))); }
-                if direction.row_dual[l] < 0.0 { v.push((-pair.force/direction.row_dual[l], format!("row force {l}"))); }
-            }
-            v.sort_by(|a, b| a.0.total_cmp(&b.0));
-            eprintln!("   blocking {:.3?}", &v[..5]);
-        }
         let mut last = None;
         for _ in 0..30 {
             if let Some(next) = self.moved(program, newton, direction, alpha) {
@@ -350,7 +339,9 @@ impl<'a> Newton<'a> {
         for (block, cone) in program.blocks.iter().zip(&state.cones) {
             match (&block.map, cone.owner) {
                 (BlockMap::Own(first), Some(_)) => {
-                    rows.local.push(LocalRows { first: *first, matrix: DMatrix::identity(10, 10) });
+                    let matrix = cone.scaling.from_own_frame();
+                    let matrix = DMatrix::from_column_slice(10, 10, matrix.as_slice());
+                    rows.local.push(LocalRows { first: *first, matrix });
                 }
                 (BlockMap::Own(first), None) => {
                     let matrix = match frame_at(*first) {
@@ -362,29 +353,34 @@ impl<'a> Newton<'a> {
                 }
                 (BlockMap::General(map), _) => {
                     let framed = rows.framed(map);
-                    rows.wide.push(DMatrix::from_column_slice(10, 10, cone.scaling.inverse_frame().as_slice()) * framed);
+                    rows.wide
+                        .push(DMatrix::from_column_slice(10, 10, cone.scaling.inverse_frame().as_slice()) * framed);
                 }
             }
         }
-        let mut framed_rows = Vec::with_capacity(program.rows.len());
-        let mut wide = DMatrix::zeros(program.rows.len(), program.variables);
-        for (l, (row, pair)) in program.rows.iter().zip(&state.rows).enumerate() {
-            let mut dense = DVector::zeros(program.variables);
-            row.add_to(1.0, &mut dense);
-            let framed = rows.framed_gradient(&dense);
-            wide.row_mut(l).tr_copy_from(&(&framed * (pair.force / pair.slack).sqrt()));
-            framed_rows.push(framed);
-        }
-        rows.wide.push(wide);
+        let framed_rows: Vec<DVector<f64>> = program
+            .rows
+            .iter()
+            .map(|row| {
+                let mut dense = DVector::zeros(program.variables);
+                row.add_to(1.0, &mut dense);
+                rows.framed_gradient(&dense)
+            })
+            .collect();
+        let scaled = |(row, pair): (&DVector<f64>, &Pair)| row * (pair.force / pair.slack).sqrt();
+        let scaled: Vec<DVector<f64>> = framed_rows.iter().zip(&state.rows).map(scaled).collect();
+        let singles = rows.add_singles(&scaled);
         let linear = rows.framed_gradient(&program.linear);
         let system = StackedSystem::new(program.variables, rows)?;
-        let local_rest = program.local.iter().map(|term| {
-            &term.target - &term.matrix * state.x.high.rows(term.first, term.matrix.ncols())
-        });
+        let local_rest = program
+            .local
+            .iter()
+            .map(|term| &term.target - &term.matrix * state.x.high.rows(term.first, term.matrix.ncols()));
         Some(Self {
             program,
             state,
             framed_rows,
+            singles,
             data_rest: state.x.rest(&program.data, &program.target),
             local_rest: local_rest.collect(),
             linear,
@@ -403,22 +399,8 @@ impl<'a> Newton<'a> {
         let cones = &self.state.cones;
         let wanted: Vec<Matrix4<f64>> =
             cones.iter().zip(&targets.blocks).map(|(cone, target)| cone.scaling.divided(target)).collect();
-        let mut local: Vec<DVector<f64>> = self.local_rest.iter().map(|rest| rest * share).collect();
-        let mut wide = vec![&self.data_rest * share];
-        for ((block, wanted), cone) in self.program.blocks.iter().zip(&wanted).zip(cones) {
-            let kept = Matrix4::from_diagonal(&cone.scaling.lambda) * (1.0 - share);
-            let h = DVector::from_column_slice(vector_of(&(wanted - kept)).as_slice());
-            match block.map {
-                BlockMap::Own(_) => local.push(h),
-                BlockMap::General(_) => wide.push(h),
-            }
-        }
-        let of_rows = self.state.rows.iter().zip(&targets.rows).map(|(p, target)| {
-            let root = (p.slack * p.force).sqrt();
-            target / root - (1.0 - share) * root
-        });
-        wide.push(DVector::from_iterator(self.state.rows.len(), of_rows));
-        let u = self.system.solve(&RightSide { local, wide, direct: &self.linear * -share });
+        let right = self.right_side(&wanted, &targets.rows, share);
+        let u = self.system.solve(&right);
         if !u.iter().all(|value| value.is_finite()) {
             return None;
         }
@@ -429,7 +411,10 @@ impl<'a> Newton<'a> {
             .iter()
             .zip(cones)
             .map(|(block, cone)| match cone.owner {
-                Some(first) => matrix_of(&Vector10::from_column_slice(&u.as_slice()[first..first + 10])),
+                Some(first) => {
+                    let own = Vector10::from_column_slice(&u.as_slice()[first..first + 10]);
+                    matrix_of(&(cone.scaling.from_own_frame() * own))
+                }
                 None => cone.scaling.scaled_primal(&matrix_of(&block.linear_part(&x))),
             })
             .collect();
@@ -452,7 +437,8 @@ impl<'a> Newton<'a> {
 
     /// How far products stand above where they must end, on average.
     fn excess(&self, step: Option<(&Direction, f64)>) -> f64 {
-        let plain = || self.state.cones.iter().zip(&self.program.blocks).enumerate().filter(|(_, (_, b))| b.entropy == 0.0);
+        let plain =
+            || self.state.cones.iter().zip(&self.program.blocks).enumerate().filter(|(_, (_, b))| b.entropy == 0.0);
         let degree = (4 * plain().count() + self.state.rows.len()).max(1) as f64;
         let blocks = plain().map(|(k, (cone, _))| {
             let diagonal = Matrix4::from_diagonal(&cone.scaling.lambda);
@@ -468,20 +454,33 @@ impl<'a> Newton<'a> {
         (blocks.sum::<f64>() + rows.sum::<f64>()) / degree
     }
 
-    /// The dual residual as the frames see it.
-    fn residual(&self) -> f64 {
-        let mut local = self.local_rest.clone();
-        let mut wide = vec![self.data_rest.clone()];
-        for (block, cone) in self.program.blocks.iter().zip(&self.state.cones) {
-            let h = DVector::from_column_slice(vector_of(&Matrix4::from_diagonal(&cone.scaling.lambda)).as_slice());
+    /// What a direction is to do: `share` of the dual residual away, and products changed as `wanted` (scaled, `½ (Λ D + D Λ)` the new product) and `rows` say.
+    fn right_side(&self, wanted: &[Matrix4<f64>], rows: &[f64], share: f64) -> RightSide {
+        let mut local: Vec<DVector<f64>> = self.local_rest.iter().map(|rest| rest * share).collect();
+        let mut wide = vec![&self.data_rest * share];
+        for ((block, wanted), cone) in self.program.blocks.iter().zip(wanted).zip(&self.state.cones) {
+            let kept = Matrix4::from_diagonal(&cone.scaling.lambda) * (1.0 - share);
+            let h = DVector::from_column_slice(vector_of(&(wanted - kept)).as_slice());
             match block.map {
                 BlockMap::Own(_) => local.push(h),
                 BlockMap::General(_) => wide.push(h),
             }
         }
-        let of_rows = self.state.rows.iter().map(|p| (p.slack * p.force).sqrt());
-        wide.push(DVector::from_iterator(self.state.rows.len(), of_rows));
-        self.system.rows().transposed(&RightSide { local, wide, direct: -&self.linear }).amax()
+        let of_row = |(p, target): (&Pair, &f64)| {
+            let root = (p.slack * p.force).sqrt();
+            target / root - (1.0 - share) * root
+        };
+        let of_rows: Vec<f64> = self.state.rows.iter().zip(rows).map(of_row).collect();
+        self.singles.append(&of_rows, &mut local, &mut wide);
+        RightSide { local, wide, direct: &self.linear * -share }
+    }
+
+    /// The dual residual as the frames see it: over √μ, how far it alone would drive a point beside the room that the barrier leaves.
+    fn residual(&self) -> f64 {
+        let now: Vec<Matrix4<f64>> =
+            self.state.cones.iter().map(|cone| Matrix4::from_diagonal(&cone.scaling.lambda)).collect();
+        let rows: Vec<f64> = self.state.rows.iter().map(|p| p.slack * p.force).collect();
+        self.system.rows().transposed(&self.right_side(&now, &rows, 1.0)).amax()
     }
 
     /// How many products there are that μ is the mean of.

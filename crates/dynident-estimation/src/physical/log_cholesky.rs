@@ -18,7 +18,7 @@
 //! the gradient in x, which vanishes at the optimum, so steps become Newton's. Stiff data make curved valleys of straight ones; a long step may therefore also follow
 //! the straight line of S, `V Vᵀ = 1 + U⁻¹ ΔS U⁻ᵀ`, where the theory of self-concordant barriers promises progress (Boyd and Vandenberghe 9.6.4).
 
-use super::cone::{congruence, inverse, log_determinant};
+use super::cone::{congruence, inverse, log_determinant, upper_factor};
 use super::conic::{BlockMap, Certificate, Multipliers, Program, Slacks};
 use super::coordinates::{Matrix10, PAIRS, Vector10, vector_of};
 use super::interior_point::{Ending, Solved};
@@ -193,15 +193,9 @@ impl Point {
             rows.local.push(LocalRows { first, matrix: rows.framed_part(first, &square) });
             local.push(DVector::zeros(10));
         }
-        let mut coupled = DMatrix::zeros(program.rows.len(), program.variables);
-        for (l, (row, &s)) in program.rows.iter().zip(&self.rows).enumerate() {
+        for (row, &s) in program.rows.iter().zip(&self.rows) {
             row.add_to(mu / s, &mut outside);
-            let mut dense = DVector::zeros(program.variables);
-            row.add_to(mu.sqrt() / s, &mut dense);
-            coupled.row_mut(l).tr_copy_from(&rows.framed_gradient(&dense));
         }
-        rows.wide.push(coupled);
-        wide.push(DVector::zeros(program.rows.len()));
         for (first, _) in bodies {
             let mut place = outside.rows_mut(*first, 10);
             place.axpy(-pull, &vector_of(&Matrix4::identity()), 1.0);
@@ -217,6 +211,17 @@ impl Point {
                 direct[first + k] += 2.0 * mu * own(k);
             }
         }
+        let limits: Vec<DVector<f64>> = program
+            .rows
+            .iter()
+            .zip(&self.rows)
+            .map(|(row, &s)| {
+                let mut dense = DVector::zeros(program.variables);
+                row.add_to(mu.sqrt() / s, &mut dense);
+                rows.framed_gradient(&dense)
+            })
+            .collect();
+        rows.add_singles(&limits).append(&vec![0.0; limits.len()], &mut local, &mut wide);
         let right = RightSide { local, wide, direct };
         let system = StackedSystem::new(program.variables, rows)?;
         let step = system.solve(&right);
@@ -325,14 +330,6 @@ fn straight(n: &Vector10) -> Option<Change> {
     }
     let factor = upper_factor(&(Matrix4::identity() + difference))?;
     Some(Change { factor, difference })
-}
-
-/// Upper triangular U with `U Uᵀ = S`, or none.
-fn upper_factor(s: &Matrix4<f64>) -> Option<Matrix4<f64>> {
-    // The Cholesky factor of the matrix read backwards.
-    let flipped = Matrix4::from_fn(|i, j| s[(3 - i, 3 - j)]);
-    let l = flipped.cholesky()?.l();
-    Some(Matrix4::from_fn(|i, j| l[(3 - i, 3 - j)]))
 }
 
 /// `∂ vec(U V Vᵀ Uᵀ) / ∂ numbers of V` at V = 1.

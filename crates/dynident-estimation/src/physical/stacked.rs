@@ -30,6 +30,23 @@ pub(super) struct Rows {
     pub(super) wide: Vec<DMatrix<f64>>,
 }
 
+/// Where rows that came one by one went.
+#[derive(Clone, Debug)]
+pub(super) struct Singles {
+    /// Those that see one body or one variable only.
+    local: Vec<usize>,
+    /// The others, which are one matrix.
+    wide: Vec<usize>,
+}
+
+impl Singles {
+    /// Appends their right-hand sides, one number for each row.
+    pub(super) fn append(&self, h: &[f64], local: &mut Vec<DVector<f64>>, wide: &mut Vec<DVector<f64>>) {
+        local.extend(self.local.iter().map(|&row| DVector::from_element(1, h[row])));
+        wide.push(DVector::from_iterator(self.wide.len(), self.wide.iter().map(|&row| h[row])));
+    }
+}
+
 /// The triangle of a stack of rows.
 #[derive(Clone, Debug)]
 pub(super) struct StackedSystem {
@@ -79,6 +96,33 @@ impl Rows {
         framed
     }
 
+    /// Adds single rows, in the frame. They come after all others.
+    pub(super) fn add_singles(&mut self, rows: &[DVector<f64>]) -> Singles {
+        let mut singles = Singles { local: Vec::new(), wide: Vec::new() };
+        for (index, row) in rows.iter().enumerate() {
+            let mut seen = row.iter().enumerate().filter(|(_, value)| **value != 0.0).map(|(column, _)| column);
+            let least = seen.next().unwrap_or(0);
+            let greatest = seen.next_back().unwrap_or(least);
+            let (first, width) = self.group_of(least);
+            if greatest < first + width {
+                let matrix = DMatrix::from_iterator(1, width, row.rows(first, width).iter().copied());
+                self.local.push(LocalRows { first, matrix });
+                singles.local.push(index);
+            } else {
+                singles.wide.push(index);
+            }
+        }
+        let columns = rows.first().map_or(0, DVector::len);
+        self.wide.push(DMatrix::from_fn(singles.wide.len(), columns, |i, j| rows[singles.wide[i]][j]));
+        singles
+    }
+
+    /// First variable and number of those in one frame with this one.
+    fn group_of(&self, variable: usize) -> (usize, usize) {
+        let holds = |first: usize| first <= variable && variable < first + 10;
+        self.frames.iter().find(|(first, _)| holds(*first)).map_or((variable, 1), |(first, _)| (*first, 10))
+    }
+
     /// `C J` for columns that begin at `first` and end with that body or variable.
     pub(super) fn framed_part(&self, first: usize, matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let frame = self.frames.iter().find(|(at, _)| *at == first && matrix.ncols() == 10);
@@ -92,7 +136,7 @@ impl Rows {
             let mut place = sum.rows_mut(rows.first, rows.matrix.ncols());
             place.gemv_tr(1.0, &rows.matrix, h, 1.0);
         }
-        for (rows, h) in self.wide.iter().zip(&right.wide) {
+        for (rows, h) in self.wide.iter().zip(&right.wide).filter(|(rows, _)| rows.nrows() > 0) {
             sum.gemv_tr(1.0, rows, h, 1.0);
         }
         sum
@@ -104,7 +148,7 @@ impl Rows {
         for (rows, h) in self.local.iter().zip(&mut rest.local) {
             h.gemv(-1.0, &rows.matrix, &u.rows(rows.first, rows.matrix.ncols()), 1.0);
         }
-        for (rows, h) in self.wide.iter().zip(&mut rest.wide) {
+        for (rows, h) in self.wide.iter().zip(&mut rest.wide).filter(|(rows, _)| rows.nrows() > 0) {
             h.gemv(-1.0, rows, u, 1.0);
         }
         rest
@@ -124,7 +168,7 @@ impl StackedSystem {
                 *square += column.norm_squared();
             }
         }
-        for part in &rows.wide {
+        for part in rows.wide.iter().filter(|part| part.nrows() > 0) {
             for (column, square) in part.column_iter().zip(&mut squares) {
                 *square += column.norm_squared();
             }
@@ -208,7 +252,7 @@ fn reduced(size: usize, rows: &Rows, squares: &[f64], added: f64) -> Vec<f64> {
     let mut triangle = vec![0.0; row_start(size, size)];
     let mut at = 0;
     while at < size {
-        let width = if rows.frames.iter().any(|(first, _)| *first == at) { 10 } else { 1 };
+        let (_, width) = rows.group_of(at);
         let mine = || rows.local.iter().filter(|part| part.first == at && part.matrix.ncols() <= width);
         let height = mine().map(|part| part.matrix.nrows()).sum::<usize>() + width;
         let mut stack = DMatrix::zeros(height, width);
@@ -230,37 +274,28 @@ fn reduced(size: usize, rows: &Rows, squares: &[f64], added: f64) -> Vec<f64> {
         }
         at += width;
     }
-    let fits = |part: &LocalRows| {
-        let width = if rows.frames.iter().any(|(first, _)| *first == part.first) { 10 } else { 1 };
-        part.matrix.ncols() <= width
-    };
+    let fits = |part: &LocalRows| part.matrix.ncols() <= rows.group_of(part.first).1;
     let others: Vec<&LocalRows> = rows.local.iter().filter(|part| !fits(part)).collect();
-    let height = rows.wide.iter().map(DMatrix::nrows).sum::<usize>() + others.iter().map(|p| p.matrix.nrows()).sum::<usize>();
+    let height =
+        rows.wide.iter().map(DMatrix::nrows).sum::<usize>() + others.iter().map(|p| p.matrix.nrows()).sum::<usize>();
     let chunks = height.div_ceil(CHUNK_ROWS);
     if chunks == 0 {
         return triangle;
     }
     let mut panel = vec![Chunk::ZERO; size * chunks];
-    let mut place = |row: usize, column: usize, value: f64| {
-        panel[column * chunks + row / CHUNK_ROWS].0[row % CHUNK_ROWS] = value;
-    };
     let mut start = 0;
-    for part in &rows.wide {
-        for column in 0..size {
-            for row in 0..part.nrows() {
-                place(start + row, column, part[(row, column)]);
+    let mut place = |first: usize, part: &DMatrix<f64>| {
+        for (k, column) in part.column_iter().enumerate() {
+            let chunks = &mut panel[(first + k) * chunks..(first + k + 1) * chunks];
+            for (row, &value) in column.iter().enumerate() {
+                let at = start + row;
+                chunks[at / CHUNK_ROWS].0[at % CHUNK_ROWS] = value;
             }
         }
         start += part.nrows();
-    }
-    for part in others {
-        for column in 0..part.matrix.ncols() {
-            for row in 0..part.matrix.nrows() {
-                place(start + row, part.first + column, part.matrix[(row, column)]);
-            }
-        }
-        start += part.matrix.nrows();
-    }
+    };
+    rows.wide.iter().for_each(|part| place(0, part));
+    others.iter().for_each(|part| place(part.first, &part.matrix));
     dispatch(Level::detect(), TriangleOnPanel { triangle: &mut triangle, size, panel: &mut panel, chunks });
     triangle
 }
@@ -281,12 +316,18 @@ mod tests {
         let wide = matrix(6, size, 0.4) * scale;
         let local = LocalRows { first: 0, matrix: DMatrix::identity(10, 10) };
         let singles = (10..size).map(|first| LocalRows { first, matrix: DMatrix::identity(1, 1) });
-        let rows = Rows { frames: vec![(0, frame)], local: std::iter::once(local).chain(singles).collect(), wide: vec![wide.clone()] };
+        let rows = Rows {
+            frames: vec![(0, frame)],
+            local: std::iter::once(local).chain(singles).collect(),
+            wide: vec![wide.clone()],
+        };
         let system = StackedSystem::new(size, rows).unwrap();
         // With h = (A v, v) the answer is v.
         let v = DVector::from_fn(size, |i, _| (i as f64).cos());
         let right = RightSide {
-            local: std::iter::once(v.rows(0, 10).into_owned()).chain((10..size).map(|k| v.rows(k, 1).into_owned())).collect(),
+            local: std::iter::once(v.rows(0, 10).into_owned())
+                .chain((10..size).map(|k| v.rows(k, 1).into_owned()))
+                .collect(),
             wide: vec![&wide * &v],
             direct: DVector::zeros(size),
         };
@@ -305,7 +346,8 @@ mod tests {
         let system = StackedSystem::new(size, rows).unwrap();
         let gradient = DVector::from_fn(size, |i, _| (i as f64 * 0.9).sin());
         let framed = system.rows().framed_gradient(&gradient);
-        let right = RightSide { local: vec![DVector::zeros(4)], wide: vec![DVector::zeros(20)], direct: framed.clone() };
+        let right =
+            RightSide { local: vec![DVector::zeros(4)], wide: vec![DVector::zeros(20)], direct: framed.clone() };
         let u = system.solve(&right);
         let mut g = DMatrix::zeros(24, size);
         g.rows_mut(0, 20).copy_from(&system.rows().wide[0]);
