@@ -27,6 +27,7 @@ mod hausman;
 mod instrumental;
 mod instrumented;
 mod newey_west;
+mod noise_levels;
 mod nonnegative;
 mod ordinary;
 pub mod physical;
@@ -55,6 +56,7 @@ pub use generalized::{CrossProblem, GeneralizedEstimate, generalized_least_squar
 pub use hausman::{HausmanColumn, HausmanSettings, HausmanTest, HausmanVerdict, hausman_test};
 pub use instrumental::{InstrumentReport, InstrumentalEstimate, InstrumentalSettings, instrumental_variables};
 pub use instrumented::InstrumentedProblem;
+pub use noise_levels::{NoiseLevelSettings, NoiseWeightedEstimate, noise_weighted_least_squares};
 pub use ordinary::{OrdinarySettings, ordinary_least_squares};
 pub use problem::{JointRows, LinearProblem, Prior};
 pub use rank::{FixedColumn, RankReport, RankSettings};
