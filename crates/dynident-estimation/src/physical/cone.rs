@@ -65,7 +65,7 @@ impl Scaling {
     }
 
     /// The 10 × 10 matrix from the frame to scaled coordinates, `X ↦ (R⁻¹L) X (R⁻¹L)ᵀ` with `R⁻¹L = diag(λ)^{1/2} Vᵀ`.
-    pub(super) fn from_own_frame(&self) -> Matrix10 {
+    pub(super) fn scaled_frame(&self) -> Matrix10 {
         congruence(&(Matrix4::from_diagonal(&self.lambda.map(f64::sqrt)) * self.v.transpose()))
     }
 
@@ -75,7 +75,7 @@ impl Scaling {
     }
 
     /// The same from another pair's frame, whose L it is.
-    pub(super) fn from_frame_of(&self, other: &Self) -> Matrix10 {
+    pub(super) fn scaled_frame_of(&self, other: &Self) -> Matrix10 {
         congruence(&(self.r_inverse * other.l))
     }
 
@@ -203,7 +203,7 @@ mod tests {
                 0.1 * (scaling.lambda[i] * scaling.lambda[j]).sqrt() * f64::from(u8::from(i != j))
             });
             let after = scaling.moved(&ds, &(ds * -1.0)).unwrap();
-            let in_frame = scaling.from_own_frame().try_inverse().unwrap() * vector_of(&ds);
+            let in_frame = scaling.scaled_frame().try_inverse().unwrap() * vector_of(&ds);
             let moved = s + matrix_of(&(scaling.frame() * in_frame));
             assert!((after.primal() - moved).amax() < 1e-9);
             assert!((after.dual() - (z - scaling.unscaled_dual(&ds))).amax() < 1e-9);

@@ -296,12 +296,11 @@ impl State {
         let mut cones = Vec::with_capacity(self.cones.len());
         for (k, (cone, block)) in self.cones.iter().zip(&program.blocks).enumerate() {
             let (ds, dz) = (direction.primal[k] * alpha, direction.dual[k] * alpha);
-            let scaling = match cone.owner {
-                Some(_) => cone.scaling.moved(&ds, &dz)?,
-                None => {
-                    let z = cone.scaling.dual() + cone.scaling.unscaled_dual(&dz);
-                    Scaling::new(&block.value(&x.high), &matrix_of(&vector_of(&z)))?
-                }
+            let scaling = if cone.owner.is_some() {
+                cone.scaling.moved(&ds, &dz)?
+            } else {
+                let z = cone.scaling.dual() + cone.scaling.unscaled_dual(&dz);
+                Scaling::new(&block.value(&x.high), &matrix_of(&vector_of(&z)))?
             };
             cones.push(Cone { scaling, owner: cone.owner });
         }
@@ -339,13 +338,13 @@ impl<'a> Newton<'a> {
         for (block, cone) in program.blocks.iter().zip(&state.cones) {
             match (&block.map, cone.owner) {
                 (BlockMap::Own(first), Some(_)) => {
-                    let matrix = cone.scaling.from_own_frame();
+                    let matrix = cone.scaling.scaled_frame();
                     let matrix = DMatrix::from_column_slice(10, 10, matrix.as_slice());
                     rows.local.push(LocalRows { first: *first, matrix });
                 }
                 (BlockMap::Own(first), None) => {
                     let matrix = match frame_at(*first) {
-                        Some(owner) => cone.scaling.from_frame_of(&owner.scaling),
+                        Some(owner) => cone.scaling.scaled_frame_of(&owner.scaling),
                         None => cone.scaling.inverse_frame(),
                     };
                     let matrix = DMatrix::from_column_slice(10, 10, matrix.as_slice());
@@ -413,7 +412,7 @@ impl<'a> Newton<'a> {
             .map(|(block, cone)| match cone.owner {
                 Some(first) => {
                     let own = Vector10::from_column_slice(&u.as_slice()[first..first + 10]);
-                    matrix_of(&(cone.scaling.from_own_frame() * own))
+                    matrix_of(&(cone.scaling.scaled_frame() * own))
                 }
                 None => cone.scaling.scaled_primal(&matrix_of(&block.linear_part(&x))),
             })

@@ -172,8 +172,8 @@ impl Point {
 
     /// One step; gives the decrease that the model predicted, or none when no length of it goes down.
     fn step(&mut self, program: &Program, bodies: &[Body], mu: f64, pull: f64) -> Option<f64> {
-        let mut rows = Rows::default();
-        rows.frames = bodies.iter().zip(&self.factors).map(|((first, _), u)| (*first, jacobian(u))).collect();
+        let frames = bodies.iter().zip(&self.factors).map(|((first, _), u)| (*first, jacobian(u))).collect();
+        let mut rows = Rows { frames, ..Rows::default() };
         let mut outside = -&program.linear;
         let (mut local, mut wide) = (Vec::new(), vec![self.x.rest(&program.data, &program.target)]);
         rows.wide.push(rows.framed(&program.data));

@@ -294,8 +294,12 @@ fn reduced(size: usize, rows: &Rows, squares: &[f64], added: f64) -> Vec<f64> {
         }
         start += part.nrows();
     };
-    rows.wide.iter().for_each(|part| place(0, part));
-    others.iter().for_each(|part| place(part.first, &part.matrix));
+    for part in &rows.wide {
+        place(0, part);
+    }
+    for part in others {
+        place(part.first, &part.matrix);
+    }
     dispatch(Level::detect(), TriangleOnPanel { triangle: &mut triangle, size, panel: &mut panel, chunks });
     triangle
 }
