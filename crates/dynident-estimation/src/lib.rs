@@ -26,6 +26,7 @@ mod generalized;
 mod hausman;
 mod instrumental;
 mod instrumented;
+mod maximum_likelihood;
 mod newey_west;
 mod noise_levels;
 mod nonnegative;
@@ -56,6 +57,9 @@ pub use generalized::{CrossProblem, GeneralizedEstimate, generalized_least_squar
 pub use hausman::{HausmanColumn, HausmanSettings, HausmanTest, HausmanVerdict, hausman_test};
 pub use instrumental::{InstrumentReport, InstrumentalEstimate, InstrumentalSettings, instrumental_variables};
 pub use instrumented::InstrumentedProblem;
+pub use maximum_likelihood::{
+    InstantRows, InstantVisitor, MaximumLikelihoodEstimate, MaximumLikelihoodSettings, maximum_likelihood,
+};
 pub use noise_levels::{NoiseLevelSettings, NoiseWeightedEstimate, noise_weighted_least_squares};
 pub use ordinary::{OrdinarySettings, ordinary_least_squares};
 pub use problem::{JointRows, LinearProblem, Prior};

@@ -45,6 +45,7 @@ mod format;
 mod lag;
 mod lines;
 mod mapping;
+mod periods;
 mod reader;
 mod report;
 mod resampler;
@@ -70,6 +71,7 @@ pub use format::{
 };
 pub use lag::{Lag, best_lag};
 pub use lines::MAX_LINE_BYTES;
+pub use periods::{AveragedPeriods, averaged_periods};
 pub use reader::{BLOCK_ROWS, LinesDropped, LogReader, RawBlock};
 pub use report::{Finding, Gap, ImportReport, Level, Steps};
 pub use savitzky_golay::SavitzkyGolay;
