@@ -38,6 +38,7 @@ mod rank;
 mod reflect;
 mod robust;
 mod segments;
+mod simulated;
 mod total;
 mod validation;
 mod weighted;
@@ -66,6 +67,10 @@ pub use problem::{JointRows, LinearProblem, Prior};
 pub use rank::{FixedColumn, RankReport, RankSettings};
 pub use robust::{RobustEstimate, RobustSettings, RowBlock, RowVisitor, RowWeight, robust_least_squares};
 pub use segments::{SegmentScore, SegmentSettings, SegmentedFactor};
+pub use simulated::{
+    SimulatedCriterion, SimulatedEstimate, SimulatedMotion, SimulatedProblem, SimulatedRows, SimulatedSettings,
+    simulated_least_squares,
+};
 pub use total::{TotalEstimate, TotalSettings, total_least_squares};
 pub use validation::{JointValidation, Validation, ValidationReport};
 pub use weighted::{WeightedSettings, weighted_least_squares};
