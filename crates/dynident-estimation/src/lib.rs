@@ -26,7 +26,9 @@ mod generalized;
 mod hausman;
 mod instrumental;
 mod instrumented;
+mod maximum_likelihood;
 mod newey_west;
+mod noise_levels;
 mod nonnegative;
 mod ordinary;
 pub mod physical;
@@ -36,6 +38,7 @@ mod rank;
 mod reflect;
 mod robust;
 mod segments;
+mod simulated;
 mod total;
 mod validation;
 mod weighted;
@@ -55,11 +58,19 @@ pub use generalized::{CrossProblem, GeneralizedEstimate, generalized_least_squar
 pub use hausman::{HausmanColumn, HausmanSettings, HausmanTest, HausmanVerdict, hausman_test};
 pub use instrumental::{InstrumentReport, InstrumentalEstimate, InstrumentalSettings, instrumental_variables};
 pub use instrumented::InstrumentedProblem;
+pub use maximum_likelihood::{
+    InstantRows, InstantVisitor, MaximumLikelihoodEstimate, MaximumLikelihoodSettings, maximum_likelihood,
+};
+pub use noise_levels::{NoiseLevelSettings, NoiseWeightedEstimate, noise_weighted_least_squares};
 pub use ordinary::{OrdinarySettings, ordinary_least_squares};
 pub use problem::{JointRows, LinearProblem, Prior};
 pub use rank::{FixedColumn, RankReport, RankSettings};
 pub use robust::{RobustEstimate, RobustSettings, RowBlock, RowVisitor, RowWeight, robust_least_squares};
 pub use segments::{SegmentScore, SegmentSettings, SegmentedFactor};
+pub use simulated::{
+    SimulatedCriterion, SimulatedEstimate, SimulatedMotion, SimulatedProblem, SimulatedRows, SimulatedSettings,
+    simulated_least_squares,
+};
 pub use total::{TotalEstimate, TotalSettings, total_least_squares};
 pub use validation::{JointValidation, Validation, ValidationReport};
 pub use weighted::{WeightedSettings, weighted_least_squares};

@@ -352,7 +352,10 @@ fn gather<E: From<EstimationError>>(
 }
 
 /// The same problem over other factors; a prior stays.
-fn with_factors(problem: &LinearProblem, factors: Vec<SegmentedFactor>) -> Result<LinearProblem, EstimationError> {
+pub(crate) fn with_factors(
+    problem: &LinearProblem,
+    factors: Vec<SegmentedFactor>,
+) -> Result<LinearProblem, EstimationError> {
     let mut new = LinearProblem::new(problem.columns().to_vec(), problem.joints().to_vec())
         .with_fallback(problem.fallback().to_vec())?;
     if let Some(prior) = problem.prior() {
@@ -378,7 +381,7 @@ fn median_scale(mut residuals: Vec<f64>) -> f64 {
     median / MEDIAN_OF_NORMAL
 }
 
-fn scale_floors(problem: &LinearProblem) -> Vec<f64> {
+pub(crate) fn scale_floors(problem: &LinearProblem) -> Vec<f64> {
     let mut squares = vec![0.0; problem.joints().len()];
     for equation in problem.equations() {
         squares[equation.joint] += equation.factor.total().torque_norm().powi(2);

@@ -6,10 +6,19 @@ use nalgebra::{Matrix4, Vector4};
 /// The scaling of Nesterov and Todd for a pair `S, Z ≻ 0`: R with `R⁻¹ S R⁻ᵀ = Rᵀ Z R = diag(λ)`.
 ///
 /// Nesterov and Todd, SIAM J. Optimization 8 (1998) 324; computed as in Vandenberghe's CVXOPT notes (2010), section 5.3: with `S = L Lᵀ`,
-/// `Z = M Mᵀ` and `MᵀL = U diag(λ) Vᵀ`, `R⁻¹ = diag(λ)^{-1/2} Uᵀ Mᵀ`. Only R⁻¹ is ever needed.
+/// `Z = M Mᵀ` and `MᵀL = U diag(λ) Vᵀ`, `R = L V diag(λ)^{-1/2}` and `R⁻¹ = diag(λ)^{-1/2} Uᵀ Mᵀ`.
+///
+/// L is lower and M upper triangular, and both are carried from step to step by triangular factors near one: small eigenvalues beside large ones keep their digits. R itself
+/// mixes them (its columns may turn freely where the λ are alike), so that variables are seen in the frame of L.
 #[derive(Clone, Debug)]
 pub(super) struct Scaling {
     pub(super) lambda: Vector4<f64>,
+    l: Matrix4<f64>,
+    m: Matrix4<f64>,
+    /// `MᵀL`.
+    product: Matrix4<f64>,
+    u: Matrix4<f64>,
+    v: Matrix4<f64>,
     r_inverse: Matrix4<f64>,
 }
 
@@ -17,14 +26,57 @@ impl Scaling {
     /// None when one of the two is not positive definite in double precision.
     pub(super) fn new(s: &Matrix4<f64>, z: &Matrix4<f64>) -> Option<Self> {
         let l = s.cholesky()?.l();
-        let m = z.cholesky()?.l();
-        let (lambda, u) = singular_values(&(m.transpose() * l));
-        let root = lambda.map(f64::sqrt);
-        if !lambda.iter().all(|&value| value > 0.0 && value.is_finite()) {
-            return None;
-        }
-        let r_inverse = Matrix4::from_diagonal(&root.map(|value| 1.0 / value)) * u.transpose() * m.transpose();
-        Some(Self { lambda, r_inverse })
+        let m = upper_factor(z)?;
+        Self::of(l, m, m.transpose() * l)
+    }
+
+    fn of(l: Matrix4<f64>, m: Matrix4<f64>, product: Matrix4<f64>) -> Option<Self> {
+        let (lambda, u, v) = singular_values(&product);
+        let usable = lambda.iter().all(|&value| value > 0.0 && value.is_finite());
+        let inverse_root = lambda.map(|value| 1.0 / value.sqrt());
+        let r_inverse = Matrix4::from_diagonal(&inverse_root) * u.transpose() * m.transpose();
+        let finite = l.iter().chain(r_inverse.iter()).all(|value| value.is_finite());
+        (usable && finite).then_some(Self { lambda, l, m, product, u, v, r_inverse })
+    }
+
+    /// The scaling of the pair after a step, given in scaled coordinates: `S = R (diag(λ) + ΔS) Rᵀ`, `Z = R⁻ᵀ (diag(λ) + ΔZ) R⁻¹`. The pair itself is never formed.
+    pub(super) fn moved(&self, ds: &Matrix4<f64>, dz: &Matrix4<f64>) -> Option<Self> {
+        let inverse_root = Matrix4::from_diagonal(&self.lambda.map(|value| 1.0 / value.sqrt()));
+        // Seen from L and M: one, and the change.
+        let (of_s, of_z) = (self.v * inverse_root, self.u * inverse_root);
+        let l = (Matrix4::identity() + of_s * ds * of_s.transpose()).cholesky()?.l();
+        let m = upper_factor(&(Matrix4::identity() + of_z * dz * of_z.transpose()))?;
+        Self::of(self.l * l, self.m * m, m.transpose() * self.product * l)
+    }
+
+    /// `S = L Lᵀ`.
+    pub(super) fn primal(&self) -> Matrix4<f64> {
+        self.l * self.l.transpose()
+    }
+
+    /// `Z = M Mᵀ`.
+    pub(super) fn dual(&self) -> Matrix4<f64> {
+        self.m * self.m.transpose()
+    }
+
+    /// The 10 × 10 matrix of `X ↦ L X Lᵀ` on vectors: from the frame to the body's own variables.
+    pub(super) fn frame(&self) -> Matrix10 {
+        congruence(&self.l)
+    }
+
+    /// The 10 × 10 matrix from the frame to scaled coordinates, `X ↦ (R⁻¹L) X (R⁻¹L)ᵀ` with `R⁻¹L = diag(λ)^{1/2} Vᵀ`.
+    pub(super) fn scaled_frame(&self) -> Matrix10 {
+        congruence(&(Matrix4::from_diagonal(&self.lambda.map(f64::sqrt)) * self.v.transpose()))
+    }
+
+    /// The 10 × 10 matrix of `X ↦ R⁻¹ X R⁻ᵀ` on vectors.
+    pub(super) fn inverse_frame(&self) -> Matrix10 {
+        congruence(&self.r_inverse)
+    }
+
+    /// The same from another pair's frame, whose L it is.
+    pub(super) fn scaled_frame_of(&self, other: &Self) -> Matrix10 {
+        congruence(&(self.r_inverse * other.l))
     }
 
     /// `R⁻¹ X R⁻ᵀ`: a primal direction, scaled.
@@ -35,11 +87,6 @@ impl Scaling {
     /// `R⁻ᵀ X R⁻¹`: from a scaled dual direction to the direction itself.
     pub(super) fn unscaled_dual(&self, x: &Matrix4<f64>) -> Matrix4<f64> {
         self.r_inverse.transpose() * x * self.r_inverse
-    }
-
-    /// The 10 × 10 matrix of `X ↦ W⁻¹ X W⁻¹` with `W = R Rᵀ`, on vectors.
-    pub(super) fn hessian(&self) -> Matrix10 {
-        congruence(&(self.r_inverse.transpose() * self.r_inverse))
     }
 
     /// D with `½ (diag(λ) D + D diag(λ)) = C`.
@@ -55,7 +102,7 @@ impl Scaling {
     }
 }
 
-/// The 10 × 10 matrix of `X ↦ V X V` on vectors, V symmetric.
+/// The 10 × 10 matrix of `X ↦ V X Vᵀ` on vectors.
 pub(super) fn congruence(v: &Matrix4<f64>) -> Matrix10 {
     let columns = PAIRS.map(|(a, b)| -> Vector10 {
         let (va, vb) = (v.column(a), v.column(b));
@@ -86,10 +133,18 @@ pub(super) fn inverse(matrix: &Matrix4<f64>) -> Option<Matrix4<f64>> {
     Some(matrix_of(&vector_of(&inverse)))
 }
 
-/// Singular values and left vectors of `A = U diag(σ) Vᵀ` by one-sided Jacobi rotations (Golub and Van Loan 8.6.3): small values come out with as many digits as
+/// Upper triangular U with `U Uᵀ = S`, or none.
+pub(super) fn upper_factor(s: &Matrix4<f64>) -> Option<Matrix4<f64>> {
+    // The Cholesky factor of the matrix read backwards.
+    let flipped = Matrix4::from_fn(|i, j| s[(3 - i, 3 - j)]);
+    let l = flipped.cholesky()?.l();
+    Some(Matrix4::from_fn(|i, j| l[(3 - i, 3 - j)]))
+}
+
+/// Singular values and both sets of vectors of `A = U diag(σ) Vᵀ` by one-sided Jacobi rotations (Golub and Van Loan 8.6.3): small values come out with as many digits as
 /// large ones, which a bidiagonal method does not give.
-fn singular_values(a: &Matrix4<f64>) -> (Vector4<f64>, Matrix4<f64>) {
-    let mut b = *a;
+fn singular_values(a: &Matrix4<f64>) -> (Vector4<f64>, Matrix4<f64>, Matrix4<f64>) {
+    let (mut b, mut v) = (*a, Matrix4::identity());
     // Six to eight sweeps settle a 4 × 4 matrix; the limit only guards the loop.
     for _ in 0..30 {
         let mut turned = false;
@@ -105,10 +160,12 @@ fn singular_values(a: &Matrix4<f64>) -> (Vector4<f64>, Matrix4<f64>) {
                 let t = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
                 let c = 1.0 / t.hypot(1.0);
                 let s = c * t;
-                for row in 0..4 {
-                    let (x, y) = (b[(row, p)], b[(row, q)]);
-                    b[(row, p)] = c * x - s * y;
-                    b[(row, q)] = s * x + c * y;
+                for turning in [&mut b, &mut v] {
+                    for row in 0..4 {
+                        let (x, y) = (turning[(row, p)], turning[(row, q)]);
+                        turning[(row, p)] = c * x - s * y;
+                        turning[(row, q)] = s * x + c * y;
+                    }
                 }
             }
         }
@@ -118,7 +175,7 @@ fn singular_values(a: &Matrix4<f64>) -> (Vector4<f64>, Matrix4<f64>) {
     }
     let sigma = Vector4::from_fn(|k, _| b.column(k).norm());
     let u = Matrix4::from_fn(|i, k| b[(i, k)] / sigma[k]);
-    (sigma, u)
+    (sigma, u, v)
 }
 
 #[cfg(test)]
@@ -140,6 +197,16 @@ mod tests {
             // The condition of S times rounding, with room.
             assert!((scaling.scaled_primal(&s) - diagonal).amax() < 1e-9);
             assert!((scaling.unscaled_dual(&diagonal) - z).amax() < 1e-9);
+            assert!((scaling.primal() - s).amax() < 1e-9 && (scaling.dual() - z).amax() < 1e-9);
+            // A step in scaled coordinates is the same as one of the matrices.
+            let ds = Matrix4::from_fn(|i, j| {
+                0.1 * (scaling.lambda[i] * scaling.lambda[j]).sqrt() * f64::from(u8::from(i != j))
+            });
+            let after = scaling.moved(&ds, &(ds * -1.0)).unwrap();
+            let in_frame = scaling.scaled_frame().try_inverse().unwrap() * vector_of(&ds);
+            let moved = s + matrix_of(&(scaling.frame() * in_frame));
+            assert!((after.primal() - moved).amax() < 1e-9);
+            assert!((after.dual() - (z - scaling.unscaled_dual(&ds))).amax() < 1e-9);
         }
     }
 

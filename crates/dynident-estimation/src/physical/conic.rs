@@ -11,6 +11,7 @@
 
 use super::cone::log_determinant;
 use super::coordinates::{Vector10, matrix_of, vector_of};
+use super::precise::Precise;
 use nalgebra::{DMatrix, DVector, Matrix4};
 
 /// One positive semidefinite 4 × 4 block.
@@ -140,8 +141,9 @@ impl Program {
     }
 
     /// Gradient of the smooth part (without `−ln det`), and the largest magnitude of the terms that it is a sum of.
-    pub(super) fn gradient(&self, x: &DVector<f64>) -> (DVector<f64>, f64) {
-        let data = self.data.tr_mul(&(&self.data * x - &self.target));
+    pub(super) fn gradient(&self, x: &Precise) -> (DVector<f64>, f64) {
+        let data = self.data.tr_mul(&-x.rest(&self.data, &self.target));
+        let x = &x.high;
         let mut largest = data.amax().max(self.linear.amax());
         let mut gradient = data + &self.linear;
         for term in &self.local {
@@ -154,31 +156,14 @@ impl Program {
         (gradient, largest)
     }
 
-    /// The quadratic part's Hessian: the same everywhere.
-    pub(super) fn hessian(&self) -> DMatrix<f64> {
-        let mut hessian = self.data.tr_mul(&self.data);
-        for term in &self.local {
-            let size = term.matrix.ncols();
-            let mut place = hessian.view_mut((term.first, term.first), (size, size));
-            place += term.matrix.tr_mul(&term.matrix);
-        }
-        hessian
-    }
-
     /// The squares and linear terms of f.
-    pub(super) fn smooth_objective(&self, x: &DVector<f64>) -> f64 {
-        let data = 0.5 * (&self.data * x - &self.target).norm_squared();
+    pub(super) fn smooth_objective(&self, x: &Precise) -> f64 {
+        let data = 0.5 * x.rest(&self.data, &self.target).norm_squared();
+        let x = &x.high;
         let local = |term: &LocalSquares| {
             0.5 * (&term.matrix * x.rows(term.first, term.matrix.ncols()) - &term.target).norm_squared()
         };
         data + self.local.iter().map(local).sum::<f64>() + self.linear.dot(x)
-    }
-
-    /// What rounding leaves uncertain of the squares: rows `A x − b` are differences of numbers much larger than themselves.
-    pub(super) fn objective_noise(&self, x: &DVector<f64>) -> f64 {
-        let rest = (&self.data * x - &self.target).abs();
-        let size = self.data.abs() * x.abs() + self.target.abs();
-        4.0 * f64::EPSILON * rest.dot(&size)
     }
 
     /// Whether x lies strictly inside all constraints.
@@ -187,19 +172,10 @@ impl Program {
             && self.rows.iter().all(|row| row.value(x) > 0.0)
     }
 
-    /// Judges a point strictly inside with positive multipliers; the routes share nothing else.
-    pub(super) fn certificate(&self, x: &DVector<f64>, multipliers: &Multipliers) -> Option<Certificate> {
-        let slacks = Slacks {
-            blocks: self.blocks.iter().map(|block| block.value(x)).collect(),
-            rows: self.rows.iter().map(|row| row.value(x)).collect(),
-        };
-        self.certificate_of(x, &slacks, multipliers)
-    }
-
-    /// The same with slacks that are known better than the difference of x and its limits.
+    /// Judges a point strictly inside with positive multipliers; the routes share nothing else. Slacks are known better to a solver than as the difference of x and its limits.
     pub(super) fn certificate_of(
         &self,
-        x: &DVector<f64>,
+        x: &Precise,
         slacks: &Slacks,
         multipliers: &Multipliers,
     ) -> Option<Certificate> {

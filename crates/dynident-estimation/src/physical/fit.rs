@@ -46,7 +46,7 @@ pub struct PhysicalFit {
     pub status: PhysicalStatus,
     /// Iterations of the solver.
     pub iterations: usize,
-    /// Stationarity of the Lagrangian: largest entry over one plus the largest of its terms.
+    /// Stationarity of the Lagrangian: largest entry over one plus the largest of its terms. Of the solution as the solver holds it, with twice the digits of `parameters`.
     pub stationarity: f64,
     /// Duality gap over one plus the objective: how much the objective could still fall.
     pub duality_gap: f64,

@@ -1,19 +1,21 @@
 //! Route 1: a primal-dual path-following method on the 4 × 4 blocks.
 //!
-//! Every iterate is strictly inside the constraints: slacks are computed from x, never carried beside it. Newton's direction is that of Nesterov and Todd with
-//! Mehrotra's predictor and corrector (Mehrotra, SIAM J. Optimization 2 (1992) 575; Todd, Toh and Tütüncü, SIAM J. Optimization 8 (1998) 769), reduced
-//! to one positive definite system in x:
+//! Every iterate is strictly inside the constraints. Newton's direction is that of Nesterov and Todd with Mehrotra's predictor and corrector (Mehrotra, SIAM J.
+//! Optimization 2 (1992) 575; Todd, Toh and Tütüncü, SIAM J. Optimization 8 (1998) 769), reduced to least squares in x:
 //!
 //! ```text
-//!     (H + Σ Mᵀ (W⁻¹ ⊗ W⁻¹) M + Σ a (z/s) aᵀ) Δx = −r + Σ Mᵀ (R⁻ᵀ D R⁻¹) + Σ a d
+//!     minimise ½‖A Δx − (b − A x)‖² + g·Δx + Σ ½‖R⁻¹ mat(M Δx) R⁻ᵀ − (D + Λ)‖² + Σ ½ (√(z/s) a·Δx − (t/s + z)/√(z/s))²
 //! ```
 //!
-//! so that the cost of an iteration is one Cholesky factorisation of the size of x, and a block costs next to nothing.
+//! A body is seen in the frame of its own factor (`ΔS = L mat(u) Lᵀ`), where its cone's rows are of the size of one, and the factors of S and Z are carried from step to step by
+//! triangular ones near one: eigenvalues of 1e-12 beside masses of 1e6 references keep their digits, which neither S nor Z could hold. An entropic prior is a pair that stays at its
+//! own weight γ from the beginning; it keeps no other barrier's place.
 
 use super::cone::Scaling;
-use super::conic::{BlockMap, Certificate, Multipliers, Program};
-use super::coordinates::{Matrix10, matrix_of, vector_of};
-use super::linear_solver::DefiniteSystem;
+use super::conic::{Block, BlockMap, Certificate, Multipliers, Program, Slacks};
+use super::coordinates::{Vector10, matrix_of, vector_of};
+use super::precise::Precise;
+use super::stacked::{LocalRows, RightSide, Rows, Singles, StackedSystem};
 use nalgebra::{DMatrix, DVector, Matrix4};
 
 /// How a solver ended.
@@ -39,6 +41,20 @@ pub(super) struct Solved {
 /// How much of the way to the boundary a step may go.
 const FRACTION_TO_BOUNDARY: f64 = 0.99;
 
+/// No step may leave a product of slack and multiplier below this share of their mean (an entropic block's: of its weight), if the step before did not: near the boundary the next
+/// one would be short.
+const WORST_BALANCE: f64 = 0.02;
+
+/// Below this share the next step does nothing but balance.
+const CENTRE_BELOW: f64 = 0.1;
+
+/// The relative gap at which multipliers must be in balance with the gradient before μ falls further. Bodies that data drive far from their references grow by a factor with every
+/// step while μ is large, and crawl once it is small: what is left of the start's imbalance holds them back like a weight on their trace.
+const HOLD_BELOW: f64 = 0.3;
+
+/// μ stops where the gap is this share of the tolerance.
+const LEAST_GAP: f64 = 0.3;
+
 /// Solves the program from a point strictly inside; none when `start` is not.
 pub(super) fn interior_point(
     program: &Program,
@@ -46,17 +62,14 @@ pub(super) fn interior_point(
     tolerance: f64,
     max_iterations: usize,
 ) -> Option<Solved> {
-    let hessian = program.hessian();
     let mut state = State::new(program, start)?;
     let mut best = state.solved(program, 0, Ending::Limit)?;
-    let mut last_step = 1.0;
     let mut poor = 0;
     for iteration in 1..=max_iterations {
-        let Some(step) = state.step(program, &hessian, last_step) else {
+        if state.step(program, tolerance).is_none() {
             best.ending = Ending::Stalled;
             break;
-        };
-        last_step = step;
+        }
         let Some(now) = state.solved(program, iteration, Ending::Limit) else {
             best.ending = Ending::Stalled;
             break;
@@ -87,10 +100,28 @@ pub(super) fn interior_point(
     Some(best)
 }
 
+/// A block and its multiplier, in scaled coordinates.
+#[derive(Clone, Debug)]
+struct Cone {
+    scaling: Scaling,
+    /// The body whose variables S is, but for a constant: its scaling is the frame of those variables.
+    owner: Option<usize>,
+}
+
+/// A row's slack and multiplier.
+#[derive(Clone, Copy, Debug)]
+struct Pair {
+    slack: f64,
+    force: f64,
+}
+
+#[derive(Clone, Debug)]
 struct State {
-    x: DVector<f64>,
-    blocks: Vec<Matrix4<f64>>,
-    rows: Vec<f64>,
+    x: Precise,
+    cones: Vec<Cone>,
+    rows: Vec<Pair>,
+    /// Whether a whole step was taken: the multipliers then balance the gradient, and keep doing so, to rounding.
+    balanced: bool,
 }
 
 /// A direction in scaled coordinates, block by block and row by row.
@@ -102,182 +133,374 @@ struct Direction {
     row_dual: Vec<f64>,
 }
 
+/// Where the products of slacks and multipliers are to go.
+struct Targets {
+    blocks: Vec<Matrix4<f64>>,
+    rows: Vec<f64>,
+}
+
+/// A Newton system with what is needed to build its right-hand sides.
+struct Newton<'a> {
+    program: &'a Program,
+    state: &'a State,
+    system: StackedSystem,
+    /// For every row of the program, its coefficients in the frame (not scaled).
+    framed_rows: Vec<DVector<f64>>,
+    singles: Singles,
+    /// `b − A x` and the same of the local squares.
+    data_rest: DVector<f64>,
+    local_rest: Vec<DVector<f64>>,
+    linear: DVector<f64>,
+}
+
 impl State {
     /// Multipliers on the central path of the start at about the size of the gradient there.
     fn new(program: &Program, x: DVector<f64>) -> Option<Self> {
-        let (gradient, _) = program.gradient(&x);
+        let (gradient, _) = program.gradient(&Precise::new(x.clone()));
         let mu = (gradient.amax()).clamp(1.0e-3, 1.0e12);
-        let blocks = program
+        let mut owned = Vec::new();
+        let cones = program
             .blocks
             .iter()
-            .map(|block| super::cone::inverse(&block.value(&x)).map(|inverse| inverse * mu.max(block.entropy)))
+            .map(|block| {
+                let s = block.value(&x);
+                let z = super::cone::inverse(&s)? * if block.entropy > 0.0 { block.entropy } else { mu };
+                let owner = match block.map {
+                    BlockMap::Own(first) if block.entropy == 0.0 && !owned.contains(&first) => Some(first),
+                    _ => None,
+                };
+                owned.extend(owner);
+                Some(Cone { scaling: Scaling::new(&s, &z)?, owner })
+            })
             .collect::<Option<Vec<_>>>()?;
         let rows = program
             .rows
             .iter()
-            .map(|row| Some(row.value(&x)).filter(|&s| s > 0.0).map(|s| mu / s))
+            .map(|row| Some(row.value(&x)).filter(|&s| s > 0.0).map(|slack| Pair { slack, force: mu / slack }))
             .collect::<Option<Vec<_>>>()?;
-        Some(Self { x, blocks, rows })
+        Some(Self { x: Precise::new(x), cones, rows, balanced: false })
     }
 
     fn solved(&self, program: &Program, iterations: usize, ending: Ending) -> Option<Solved> {
-        let multipliers = Multipliers { blocks: self.blocks.clone(), rows: self.rows.clone() };
-        let certificate = program.certificate(&self.x, &multipliers)?;
-        Some(Solved { x: self.x.clone(), multipliers, certificate, iterations, ending })
+        let multipliers = Multipliers {
+            blocks: self.cones.iter().map(|cone| cone.scaling.dual()).collect(),
+            rows: self.rows.iter().map(|pair| pair.force).collect(),
+        };
+        let slacks = Slacks {
+            blocks: self.cones.iter().map(|cone| cone.scaling.primal()).collect(),
+            rows: self.rows.iter().map(|pair| pair.slack).collect(),
+        };
+        let certificate = program.certificate_of(&self.x, &slacks, &multipliers)?;
+        Some(Solved { x: self.x.high.clone(), multipliers, certificate, iterations, ending })
     }
 
-    /// One predictor and corrector; gives the step length taken, or none when double precision allows no further one.
-    fn step(&mut self, program: &Program, hessian: &DMatrix<f64>, last_step: f64) -> Option<f64> {
-        let scalings = program
-            .blocks
-            .iter()
-            .zip(&self.blocks)
-            .map(|(block, z)| Scaling::new(&block.value(&self.x), z))
-            .collect::<Option<Vec<_>>>()?;
-        let slacks: Vec<f64> = program.rows.iter().map(|row| row.value(&self.x)).collect();
-        let mut matrix = hessian.clone();
-        for (block, scaling) in program.blocks.iter().zip(&scalings) {
-            add_block(&mut matrix, &block.map, &scaling.hessian());
-        }
-        for ((row, &z), &s) in program.rows.iter().zip(&self.rows).zip(&slacks) {
-            for &(i, a) in &row.entries {
-                for &(j, b) in &row.entries {
-                    matrix[(i, j)] += a * b * z / s;
-                }
+    /// One step; gives whether there was one that double precision allows. Products out of balance are balanced first; then the multipliers are brought into balance with the
+    /// gradient while μ is still large; then predictor and corrector lower μ.
+    fn step(&mut self, program: &Program, tolerance: f64) -> Option<()> {
+        let newton = Newton::new(program, self)?;
+        let (mu, balance) = (newton.excess(None), self.balance(program));
+        if balance < CENTRE_BELOW {
+            let centring = newton.direction(&newton.targets(mu), 0.0)?;
+            if let Some((_, next)) = self.followed(program, &newton, &centring, (1.2 * balance).min(CENTRE_BELOW)) {
+                *self = next;
+                return Some(());
             }
         }
-        let system = DefiniteSystem::new(matrix)?;
-        let mut residual = program.gradient(&self.x).0;
-        for (block, z) in program.blocks.iter().zip(&self.blocks) {
-            block.add_transposed(&vector_of(z), -1.0, &mut residual);
+        let scale = 1.0 + program.smooth_objective(&self.x).abs();
+        if !self.balanced && mu * newton.degree() < HOLD_BELOW * scale && newton.residual() > 0.3 * mu.sqrt() {
+            let direction = newton.direction(&newton.targets(mu), 1.0)?;
+            if let Some((alpha, next)) = self.followed(program, &newton, &direction, WORST_BALANCE) {
+                *self = next;
+                self.balanced |= alpha >= 1.0;
+                return Some(());
+            }
         }
-        for (row, &z) in program.rows.iter().zip(&self.rows) {
-            row.add_to(-z, &mut residual);
-        }
-        let floors: Vec<f64> = program.blocks.iter().map(|block| block.entropy).collect();
-        let squares: Vec<Matrix4<f64>> =
-            scalings.iter().map(|scaling| Matrix4::from_diagonal(&scaling.lambda.map(|l| l * l))).collect();
-        let target = |mu: f64| -> Vec<Matrix4<f64>> {
-            squares.iter().zip(&floors).map(|(square, &floor)| Matrix4::identity() * mu.max(floor) - square).collect()
-        };
-        let row_target = |mu: f64| -> Vec<f64> { slacks.iter().zip(&self.rows).map(|(&s, &z)| mu - s * z).collect() };
-        let direction = |targets: &[Matrix4<f64>], row_targets: &[f64]| -> Option<Direction> {
-            let mut right = -residual.clone();
-            let wanted: Vec<Matrix4<f64>> =
-                scalings.iter().zip(targets).map(|(scaling, target)| scaling.divided(target)).collect();
-            for ((block, scaling), d) in program.blocks.iter().zip(&scalings).zip(&wanted) {
-                block.add_transposed(&vector_of(&scaling.unscaled_dual(d)), 1.0, &mut right);
-            }
-            for ((row, target), &s) in program.rows.iter().zip(row_targets).zip(&slacks) {
-                row.add_to(target / s, &mut right);
-            }
-            let x = system.solve(&right);
-            if !x.iter().all(|v| v.is_finite()) {
-                return None;
-            }
-            let primal: Vec<Matrix4<f64>> = program
-                .blocks
-                .iter()
-                .zip(&scalings)
-                .map(|(block, scaling)| scaling.scaled_primal(&matrix_of(&block.linear_part(&x))))
-                .collect();
-            let dual = wanted.iter().zip(&primal).map(|(d, p)| d - p).collect();
-            let row_primal: Vec<f64> = program.rows.iter().map(|row| row.linear_part(&x)).collect();
-            let row_dual = row_targets
-                .iter()
-                .zip(&row_primal)
-                .zip(slacks.iter().zip(&self.rows))
-                .map(|((target, ds), (s, z))| (target - z * ds) / s)
-                .collect();
-            Some(Direction { x, primal, dual, row_primal, row_dual })
-        };
-        // How far products stand above where they must end, on average.
-        let degree = (4 * scalings.len() + slacks.len()).max(1) as f64;
-        let excess = |direction: Option<(&Direction, f64)>| -> f64 {
-            let (d, alpha) = direction.map_or((None, 0.0), |(d, alpha)| (Some(d), alpha));
-            let blocks = (0..scalings.len()).map(|k| {
-                let diagonal = Matrix4::from_diagonal(&scalings[k].lambda);
-                let (s, z) =
-                    d.map_or((diagonal, diagonal), |d| (diagonal + d.primal[k] * alpha, diagonal + d.dual[k] * alpha));
-                (s.dot(&z) - 4.0 * floors[k]).max(0.0)
-            });
-            let rows = (0..slacks.len()).map(|l| {
-                let (ds, dz) = d.map_or((0.0, 0.0), |d| (d.row_primal[l], d.row_dual[l]));
-                ((slacks[l] + alpha * ds) * (self.rows[l] + alpha * dz)).max(0.0)
-            });
-            (blocks.sum::<f64>() + rows.sum::<f64>()) / degree
-        };
-        let longest = |d: &Direction| -> f64 {
-            let mut alpha = f64::INFINITY;
-            for (k, scaling) in scalings.iter().enumerate() {
-                alpha = alpha.min(scaling.largest_step(&d.primal[k])).min(scaling.largest_step(&d.dual[k]));
-            }
-            for l in 0..slacks.len() {
-                if d.row_primal[l] < 0.0 {
-                    alpha = alpha.min(-slacks[l] / d.row_primal[l]);
-                }
-                if d.row_dual[l] < 0.0 {
-                    alpha = alpha.min(-self.rows[l] / d.row_dual[l]);
-                }
-            }
-            alpha
-        };
-        let affine = direction(&target(0.0), &row_target(0.0))?;
-        let mu = excess(None);
-        let alpha = longest(&affine).min(1.0);
-        let after = excess(Some((&affine, alpha)));
-        // After a short step the products are out of balance: centre before going on.
-        let least = if last_step < 0.1 { 0.5 } else { 0.0 };
-        let sigma = if mu > 0.0 { (after / mu).powi(3).clamp(least, 1.0) } else { 0.0 };
-        let mut targets = target(sigma * mu);
-        let mut row_targets = row_target(sigma * mu);
+        let affine = newton.direction(&newton.targets(0.0), 1.0)?;
+        let alpha = newton.longest(&affine).min(1.0);
+        let after = newton.excess(Some((&affine, alpha)));
+        let sigma = if mu > 0.0 { (after / mu).powi(3).clamp(0.0, 1.0) } else { 0.0 };
+        // Lower than the gap that is asked, slacks would only lose digits.
+        let least = LEAST_GAP * tolerance * scale / newton.degree();
+        let mut targets = newton.targets((sigma * mu).max(least));
         // The corrector's second-order term holds for full steps; scaled down it does no harm after short ones.
         let share = alpha * alpha;
-        for (k, target) in targets.iter_mut().enumerate() {
+        for (k, target) in targets.blocks.iter_mut().enumerate() {
             let product = affine.primal[k] * affine.dual[k];
             *target -= (product + product.transpose()) * (0.5 * share);
         }
-        for (l, target) in row_targets.iter_mut().enumerate() {
+        for (l, target) in targets.rows.iter_mut().enumerate() {
             *target -= share * affine.row_primal[l] * affine.row_dual[l];
         }
-        let corrected = direction(&targets, &row_targets)?;
-        let mut alpha = (FRACTION_TO_BOUNDARY * longest(&corrected)).min(1.0);
-        // Rounding may put a point outside that lies on the boundary but for it.
-        for _ in 0..30 {
-            if let Some(next) = self.moved(program, &scalings, &corrected, alpha) {
-                *self = next;
-                return Some(alpha);
+        let worst = balance.min(WORST_BALANCE);
+        let mut best = self.followed(program, &newton, &newton.direction(&targets, 1.0)?, worst);
+        if best.as_ref().is_none_or(|(alpha, _)| *alpha < 0.3) {
+            let centred = newton.direction(&newton.targets((sigma.max(0.5) * mu).max(least)), 1.0)?;
+            let other = self.followed(program, &newton, &centred, worst);
+            if other.as_ref().map(|(alpha, _)| *alpha) > best.as_ref().map(|(alpha, _)| *alpha) {
+                best = other;
             }
-            alpha *= 0.7;
         }
-        None
+        let (alpha, next) = best?;
+        *self = next;
+        self.balanced |= alpha >= 1.0;
+        Some(())
     }
 
-    fn moved(&self, program: &Program, scalings: &[Scaling], direction: &Direction, alpha: f64) -> Option<Self> {
-        let x = &self.x + &direction.x * alpha;
-        if !program.strictly_inside(&x) {
-            return None;
+    /// The longest part of a direction after which no product of a pair falls too far behind the others: to where the boundary is near, the next step would be short.
+    fn followed(
+        &self,
+        program: &Program,
+        newton: &Newton<'_>,
+        direction: &Direction,
+        worst: f64,
+    ) -> Option<(f64, Self)> {
+        let mut alpha = (FRACTION_TO_BOUNDARY * newton.longest(direction)).min(1.0);
+        let mut last = None;
+        for _ in 0..30 {
+            if let Some(next) = self.moved(program, newton, direction, alpha) {
+                if next.balance(program) >= worst {
+                    return Some((alpha, next));
+                }
+                last = Some((alpha, next));
+            }
+            alpha *= 0.8;
         }
-        let blocks: Vec<Matrix4<f64>> = self
-            .blocks
+        last
+    }
+
+    /// The smallest product of slack and multiplier over their mean; of entropic blocks over where they must end.
+    fn balance(&self, program: &Program) -> f64 {
+        let (mut sum, mut count, mut least, mut entropic) = (0.0, 0, f64::INFINITY, f64::INFINITY);
+        let mut plain = |product: f64| {
+            sum += product;
+            count += 1;
+            least = product.min(least);
+        };
+        for (cone, block) in self.cones.iter().zip(&program.blocks) {
+            for lambda in &cone.scaling.lambda {
+                let product = lambda * lambda;
+                if block.entropy > 0.0 {
+                    entropic = (product / block.entropy).min(entropic);
+                } else {
+                    plain(product);
+                }
+            }
+        }
+        self.rows.iter().for_each(|pair| plain(pair.slack * pair.force));
+        (least * f64::from(count.max(1)) / sum).min(entropic)
+    }
+
+    fn moved(&self, program: &Program, newton: &Newton<'_>, direction: &Direction, alpha: f64) -> Option<Self> {
+        let mut x = self.x.clone();
+        x.add(&(newton.system.rows().unframed(&direction.x) * alpha));
+        let mut cones = Vec::with_capacity(self.cones.len());
+        for (k, (cone, block)) in self.cones.iter().zip(&program.blocks).enumerate() {
+            let (ds, dz) = (direction.primal[k] * alpha, direction.dual[k] * alpha);
+            let scaling = if cone.owner.is_some() {
+                cone.scaling.moved(&ds, &dz)?
+            } else {
+                let z = cone.scaling.dual() + cone.scaling.unscaled_dual(&dz);
+                Scaling::new(&block.value(&x.high), &matrix_of(&vector_of(&z)))?
+            };
+            cones.push(Cone { scaling, owner: cone.owner });
+        }
+        let rows = self
+            .rows
             .iter()
-            .zip(scalings)
-            .zip(&direction.dual)
-            .map(|((z, scaling), d)| matrix_of(&vector_of(&(z + scaling.unscaled_dual(d) * alpha))))
-            .collect();
-        let rows: Vec<f64> = self.rows.iter().zip(&direction.row_dual).map(|(z, d)| z + alpha * d).collect();
-        let inside = blocks.iter().all(|z| z.cholesky().is_some()) && rows.iter().all(|&z| z > 0.0);
-        inside.then_some(Self { x, blocks, rows })
+            .zip(&program.rows)
+            .enumerate()
+            .map(|(l, (pair, row))| {
+                let (ds, dz) = (alpha * direction.row_primal[l], alpha * direction.row_dual[l]);
+                // A small slack is known better by its changes than as a difference of large numbers.
+                let slack = if ds.abs() < 0.999 * pair.slack { pair.slack + ds } else { row.value(&x.high) };
+                let force = pair.force + dz;
+                (slack > 0.0 && force > 0.0 && slack.is_finite() && force.is_finite()).then_some(Pair { slack, force })
+            })
+            .collect::<Option<Vec<_>>>()?;
+        x.high.iter().all(|value| value.is_finite()).then_some(Self { x, cones, rows, balanced: self.balanced })
     }
 }
 
-/// Adds `Mᵀ C M`.
-pub(super) fn add_block(matrix: &mut DMatrix<f64>, map: &BlockMap, block: &Matrix10) {
-    match map {
-        BlockMap::Own(first) => {
-            let mut place = matrix.fixed_view_mut::<10, 10>(*first, *first);
-            place += block;
+impl<'a> Newton<'a> {
+    fn new(program: &'a Program, state: &'a State) -> Option<Self> {
+        let mut rows = Rows::default();
+        for cone in &state.cones {
+            if let Some(first) = cone.owner {
+                rows.frames.push((first, cone.scaling.frame()));
+            }
         }
-        BlockMap::General(map) => *matrix += map.tr_mul(&(block * map)),
+        let frame_at = |first: usize| state.cones.iter().find(|cone| cone.owner == Some(first));
+        rows.wide.push(rows.framed(&program.data));
+        for term in &program.local {
+            let framed = rows.framed_part(term.first, &term.matrix);
+            rows.local.push(LocalRows { first: term.first, matrix: framed });
+        }
+        for (block, cone) in program.blocks.iter().zip(&state.cones) {
+            match (&block.map, cone.owner) {
+                (BlockMap::Own(first), Some(_)) => {
+                    let matrix = cone.scaling.scaled_frame();
+                    let matrix = DMatrix::from_column_slice(10, 10, matrix.as_slice());
+                    rows.local.push(LocalRows { first: *first, matrix });
+                }
+                (BlockMap::Own(first), None) => {
+                    let matrix = match frame_at(*first) {
+                        Some(owner) => cone.scaling.scaled_frame_of(&owner.scaling),
+                        None => cone.scaling.inverse_frame(),
+                    };
+                    let matrix = DMatrix::from_column_slice(10, 10, matrix.as_slice());
+                    rows.local.push(LocalRows { first: *first, matrix });
+                }
+                (BlockMap::General(map), _) => {
+                    let framed = rows.framed(map);
+                    rows.wide
+                        .push(DMatrix::from_column_slice(10, 10, cone.scaling.inverse_frame().as_slice()) * framed);
+                }
+            }
+        }
+        let framed_rows: Vec<DVector<f64>> = program
+            .rows
+            .iter()
+            .map(|row| {
+                let mut dense = DVector::zeros(program.variables);
+                row.add_to(1.0, &mut dense);
+                rows.framed_gradient(&dense)
+            })
+            .collect();
+        let scaled = |(row, pair): (&DVector<f64>, &Pair)| row * (pair.force / pair.slack).sqrt();
+        let scaled: Vec<DVector<f64>> = framed_rows.iter().zip(&state.rows).map(scaled).collect();
+        let singles = rows.add_singles(&scaled);
+        let linear = rows.framed_gradient(&program.linear);
+        let system = StackedSystem::new(program.variables, rows)?;
+        let local_rest = program
+            .local
+            .iter()
+            .map(|term| &term.target - &term.matrix * state.x.high.rows(term.first, term.matrix.ncols()));
+        Some(Self {
+            program,
+            state,
+            framed_rows,
+            singles,
+            data_rest: state.x.rest(&program.data, &program.target),
+            local_rest: local_rest.collect(),
+            linear,
+            system,
+        })
+    }
+
+    /// Products at μ, an entropic block's at no less than its own weight.
+    fn targets(&self, mu: f64) -> Targets {
+        let goal = |block: &Block| if block.entropy > 0.0 { block.entropy } else { mu };
+        let blocks = self.program.blocks.iter().map(|block| Matrix4::identity() * goal(block)).collect();
+        Targets { blocks, rows: vec![mu; self.state.rows.len()] }
+    }
+
+    fn direction(&self, targets: &Targets, share: f64) -> Option<Direction> {
+        let cones = &self.state.cones;
+        let wanted: Vec<Matrix4<f64>> =
+            cones.iter().zip(&targets.blocks).map(|(cone, target)| cone.scaling.divided(target)).collect();
+        let right = self.right_side(&wanted, &targets.rows, share);
+        let u = self.system.solve(&right);
+        if !u.iter().all(|value| value.is_finite()) {
+            return None;
+        }
+        let x = self.system.rows().unframed(&u);
+        let primal: Vec<Matrix4<f64>> = self
+            .program
+            .blocks
+            .iter()
+            .zip(cones)
+            .map(|(block, cone)| match cone.owner {
+                Some(first) => {
+                    let own = Vector10::from_column_slice(&u.as_slice()[first..first + 10]);
+                    matrix_of(&(cone.scaling.scaled_frame() * own))
+                }
+                None => cone.scaling.scaled_primal(&matrix_of(&block.linear_part(&x))),
+            })
+            .collect();
+        let dual = wanted
+            .iter()
+            .zip(&primal)
+            .zip(cones)
+            .map(|((wanted, primal), cone)| wanted - Matrix4::from_diagonal(&cone.scaling.lambda) - primal)
+            .collect();
+        let row_primal: Vec<f64> = self.framed_rows.iter().map(|row| row.dot(&u)).collect();
+        let row_dual = targets
+            .rows
+            .iter()
+            .zip(&row_primal)
+            .zip(&self.state.rows)
+            .map(|((target, ds), p)| (target - p.force * ds) / p.slack - p.force)
+            .collect();
+        Some(Direction { x: u, primal, dual, row_primal, row_dual })
+    }
+
+    /// How far products stand above where they must end, on average.
+    fn excess(&self, step: Option<(&Direction, f64)>) -> f64 {
+        let plain =
+            || self.state.cones.iter().zip(&self.program.blocks).enumerate().filter(|(_, (_, b))| b.entropy == 0.0);
+        let degree = (4 * plain().count() + self.state.rows.len()).max(1) as f64;
+        let blocks = plain().map(|(k, (cone, _))| {
+            let diagonal = Matrix4::from_diagonal(&cone.scaling.lambda);
+            let (s, z) = step.map_or((diagonal, diagonal), |(d, alpha)| {
+                (diagonal + d.primal[k] * alpha, diagonal + d.dual[k] * alpha)
+            });
+            s.dot(&z).max(0.0)
+        });
+        let rows = self.state.rows.iter().enumerate().map(|(l, p)| {
+            let (ds, dz) = step.map_or((0.0, 0.0), |(d, alpha)| (alpha * d.row_primal[l], alpha * d.row_dual[l]));
+            ((p.slack + ds) * (p.force + dz)).max(0.0)
+        });
+        (blocks.sum::<f64>() + rows.sum::<f64>()) / degree
+    }
+
+    /// What a direction is to do: `share` of the dual residual away, and products changed as `wanted` (scaled, `½ (Λ D + D Λ)` the new product) and `rows` say.
+    fn right_side(&self, wanted: &[Matrix4<f64>], rows: &[f64], share: f64) -> RightSide {
+        let mut local: Vec<DVector<f64>> = self.local_rest.iter().map(|rest| rest * share).collect();
+        let mut wide = vec![&self.data_rest * share];
+        for ((block, wanted), cone) in self.program.blocks.iter().zip(wanted).zip(&self.state.cones) {
+            let kept = Matrix4::from_diagonal(&cone.scaling.lambda) * (1.0 - share);
+            let h = DVector::from_column_slice(vector_of(&(wanted - kept)).as_slice());
+            match block.map {
+                BlockMap::Own(_) => local.push(h),
+                BlockMap::General(_) => wide.push(h),
+            }
+        }
+        let of_row = |(p, target): (&Pair, &f64)| {
+            let root = (p.slack * p.force).sqrt();
+            target / root - (1.0 - share) * root
+        };
+        let of_rows: Vec<f64> = self.state.rows.iter().zip(rows).map(of_row).collect();
+        self.singles.append(&of_rows, &mut local, &mut wide);
+        RightSide { local, wide, direct: &self.linear * -share }
+    }
+
+    /// The dual residual as the frames see it: over √μ, how far it alone would drive a point beside the room that the barrier leaves.
+    fn residual(&self) -> f64 {
+        let now: Vec<Matrix4<f64>> =
+            self.state.cones.iter().map(|cone| Matrix4::from_diagonal(&cone.scaling.lambda)).collect();
+        let rows: Vec<f64> = self.state.rows.iter().map(|p| p.slack * p.force).collect();
+        self.system.rows().transposed(&self.right_side(&now, &rows, 1.0)).amax()
+    }
+
+    /// How many products there are that μ is the mean of.
+    fn degree(&self) -> f64 {
+        let plain = self.program.blocks.iter().filter(|b| b.entropy == 0.0).count();
+        (4 * plain + self.state.rows.len()).max(1) as f64
+    }
+
+    /// How far a direction can be followed.
+    fn longest(&self, d: &Direction) -> f64 {
+        let mut alpha = f64::INFINITY;
+        for (k, cone) in self.state.cones.iter().enumerate() {
+            alpha = alpha.min(cone.scaling.largest_step(&d.primal[k])).min(cone.scaling.largest_step(&d.dual[k]));
+        }
+        for (l, pair) in self.state.rows.iter().enumerate() {
+            for (value, change) in [(pair.slack, d.row_primal[l]), (pair.force, d.row_dual[l])] {
+                if change < 0.0 {
+                    alpha = alpha.min(-value / change);
+                }
+            }
+        }
+        alpha
     }
 }

@@ -18,17 +18,21 @@
 //! the gradient in x, which vanishes at the optimum, so steps become Newton's. Stiff data make curved valleys of straight ones; a long step may therefore also follow
 //! the straight line of S, `V Vᵀ = 1 + U⁻¹ ΔS U⁻ᵀ`, where the theory of self-concordant barriers promises progress (Boyd and Vandenberghe 9.6.4).
 
-use super::cone::{congruence, inverse, log_determinant};
+use super::cone::{congruence, inverse, log_determinant, upper_factor};
 use super::conic::{BlockMap, Certificate, Multipliers, Program, Slacks};
 use super::coordinates::{Matrix10, PAIRS, Vector10, vector_of};
-use super::interior_point::{Ending, Solved, add_block};
-use super::linear_solver::DefiniteSystem;
+use super::interior_point::{Ending, Solved};
+use super::precise::Precise;
+use super::stacked::{LocalRows, RightSide, Rows, StackedSystem};
 use nalgebra::{DMatrix, DVector, Matrix4};
 
 /// μ falls by a factor from stage to stage: by this one at first, then by less after a stage that took many steps and by more after a short one.
 const REDUCTION: f64 = 0.1;
 const SLOWEST_REDUCTION: f64 = 0.7;
 const FASTEST_REDUCTION: f64 = 0.02;
+
+/// μ times the number of constraints, over the objective, at which the pull towards the references is let go.
+const RELEASE: f64 = 0.3;
 
 /// Steps of the last stage without progress of the certificate.
 const PATIENCE: usize = 25;
@@ -52,21 +56,21 @@ pub(super) fn log_cholesky(
         .collect::<Option<Vec<Body>>>()?;
     let mut point = Point {
         factors: plain().map(|block| upper_factor(&block.value(start))).collect::<Option<Vec<_>>>()?,
-        x: start.clone(),
+        x: Precise::new(start.clone()),
         rows: program.rows.iter().map(|row| row.value(start)).collect(),
     };
-    let hessian = program.hessian();
     let degree = (4 * bodies.len() + program.rows.len()).max(1) as f64;
-    let mut mu = program.gradient(start).0.amax().clamp(1.0e-3, 1.0e12);
+    let mut mu = program.gradient(&Precise::new(start.clone())).0.amax().clamp(1.0e-3, 1.0e12);
     let mut best: Option<Solved> = None;
     let (mut stage, mut idle, mut iterations) = (0, 0, 0);
+    let mut pull = mu;
     let (mut ending, mut reduction) = (Ending::Limit, REDUCTION);
     while iterations < max_iterations {
         iterations += 1;
         let (multipliers, certificate) = point.certified(program, mu)?;
         idle += 1;
         if best.as_ref().is_none_or(|b| certificate.residual() < b.certificate.residual()) {
-            let x = point.x.clone();
+            let x = point.x.high.clone();
             best = Some(Solved { x, multipliers, certificate, iterations, ending: Ending::Limit });
             idle = 0;
         }
@@ -76,8 +80,7 @@ pub(super) fn log_cholesky(
         }
         let scale = 1.0 + certificate.objective.abs();
         let last = mu * degree <= tolerance * scale;
-        let pull = if last { 0.0 } else { mu };
-        let predicted = point.step(program, &hessian, &bodies, mu, pull);
+        let predicted = point.step(program, &bodies, mu, pull);
         stage += 1;
         if last {
             if predicted.is_none() || idle > PATIENCE && stage > PATIENCE {
@@ -91,8 +94,15 @@ pub(super) fn log_cholesky(
                 5..9 => reduction,
                 _ => reduction.sqrt().min(SLOWEST_REDUCTION),
             };
-            mu = (mu * reduction).max(0.8 * tolerance * scale / degree);
             stage = 0;
+            // A pull that fell with μ would hold bodies back that must grow by powers of ten, and let them go when steps are short: it goes while μ is large.
+            if pull > 0.0 && mu * degree <= RELEASE * scale {
+                let held = pull * point.factors.iter().map(Matrix4::norm_squared).sum::<f64>();
+                pull = if held <= 0.01 * mu { 0.0 } else { 0.1 * pull };
+            } else {
+                mu = (mu * reduction).max(0.8 * tolerance * scale / degree);
+                pull = if pull > 0.0 { mu } else { 0.0 };
+            }
         }
     }
     let mut best = best?;
@@ -104,7 +114,7 @@ pub(super) fn log_cholesky(
 struct Point {
     /// U, one per body.
     factors: Vec<Matrix4<f64>>,
-    x: DVector<f64>,
+    x: Precise,
     /// Slacks of the rows.
     rows: Vec<f64>,
 }
@@ -114,7 +124,7 @@ impl Point {
         let mut factors = self.factors.iter();
         let blocks = program.blocks.iter().map(|block| match block.entropy {
             0.0 => factors.next().map_or_else(Matrix4::zeros, |u| u * u.transpose()),
-            _ => block.value(&self.x),
+            _ => block.value(&self.x.high),
         });
         Slacks { blocks: blocks.collect(), rows: self.rows.clone() }
     }
@@ -145,7 +155,7 @@ impl Point {
     fn barrier(&self, program: &Program, mu: f64, pull: f64) -> Option<f64> {
         let mut sum = program.smooth_objective(&self.x);
         for block in program.blocks.iter().filter(|block| block.entropy > 0.0) {
-            sum -= block.entropy * log_determinant(&block.value(&self.x))?;
+            sum -= block.entropy * log_determinant(&block.value(&self.x.high))?;
         }
         for u in &self.factors {
             sum -= 2.0 * mu * (0..4).map(|k| u[(k, k)].ln()).sum::<f64>();
@@ -161,46 +171,66 @@ impl Point {
     }
 
     /// One step; gives the decrease that the model predicted, or none when no length of it goes down.
-    fn step(&mut self, program: &Program, hessian: &DMatrix<f64>, bodies: &[Body], mu: f64, pull: f64) -> Option<f64> {
-        let mut gradient = program.gradient(&self.x).0;
-        let mut matrix = hessian.clone();
+    fn step(&mut self, program: &Program, bodies: &[Body], mu: f64, pull: f64) -> Option<f64> {
+        let frames = bodies.iter().zip(&self.factors).map(|((first, _), u)| (*first, jacobian(u))).collect();
+        let mut rows = Rows { frames, ..Rows::default() };
+        let mut outside = -&program.linear;
+        let (mut local, mut wide) = (Vec::new(), vec![self.x.rest(&program.data, &program.target)]);
+        rows.wide.push(rows.framed(&program.data));
+        for term in &program.local {
+            let size = term.matrix.ncols();
+            let framed = rows.framed_part(term.first, &term.matrix);
+            rows.local.push(LocalRows { first: term.first, matrix: framed });
+            local.push(&term.target - &term.matrix * self.x.high.rows(term.first, size));
+        }
         for block in program.blocks.iter().filter(|block| block.entropy > 0.0) {
-            let inverse = inverse(&block.value(&self.x))?;
-            block.add_transposed(&vector_of(&inverse), -block.entropy, &mut gradient);
-            add_block(&mut matrix, &block.map, &(congruence(&inverse) * block.entropy));
+            let BlockMap::Own(first) = block.map else { return None };
+            let value = block.value(&self.x.high);
+            block.add_transposed(&vector_of(&inverse(&value)?), block.entropy, &mut outside);
+            // Rows whose squares are γ Q⁻¹ ⊗ Q⁻¹.
+            let half = value.cholesky()?.l().solve_lower_triangular(&Matrix4::identity())?;
+            let square = DMatrix::from_column_slice(10, 10, congruence(&half).as_slice()) * block.entropy.sqrt();
+            rows.local.push(LocalRows { first, matrix: rows.framed_part(first, &square) });
+            local.push(DVector::zeros(10));
         }
         for (row, &s) in program.rows.iter().zip(&self.rows) {
-            row.add_to(-mu / s, &mut gradient);
-            for &(i, a) in &row.entries {
-                for &(j, b) in &row.entries {
-                    matrix[(i, j)] += a * b * mu / (s * s);
-                }
+            row.add_to(mu / s, &mut outside);
+        }
+        for (first, _) in bodies {
+            let mut place = outside.rows_mut(*first, 10);
+            place.axpy(-pull, &vector_of(&Matrix4::identity()), 1.0);
+        }
+        let mut direct = rows.framed_gradient(&outside);
+        // The bodies' own barrier is exact in these coordinates. Of −ln det V Vᵀ only the logarithms on the diagonal count, and tr(G²) is 4 for them and 2 for the others.
+        for (first, _) in bodies {
+            let own = |k: usize| f64::from(PAIRS[k].0 == PAIRS[k].1);
+            let matrix = DMatrix::from_fn(10, 10, |i, j| if i == j { ((2.0 + 2.0 * own(i)) * mu).sqrt() } else { 0.0 });
+            rows.local.push(LocalRows { first: *first, matrix });
+            local.push(DVector::zeros(10));
+            for k in 0..10 {
+                direct[first + k] += 2.0 * mu * own(k);
             }
         }
-        // Into the numbers' coordinates, ten columns and rows at a time; the bodies' own barrier is exact there.
-        for ((first, _), u) in bodies.iter().zip(&self.factors) {
-            let jacobian = jacobian(u);
-            let columns = matrix.columns(*first, 10) * jacobian;
-            matrix.columns_mut(*first, 10).copy_from(&columns);
-            let rows = jacobian.transpose() * matrix.rows(*first, 10);
-            matrix.rows_mut(*first, 10).copy_from(&rows);
-            let outside = gradient.rows(*first, 10) + vector_of(&Matrix4::identity()) * pull;
-            let mut part = jacobian.tr_mul(&outside);
-            for (k, (i, j)) in PAIRS.into_iter().enumerate() {
-                // Of −ln det V Vᵀ: only the logarithms on the diagonal count, and tr(G²) is 4 for them and 2 for the others.
-                let diagonal = f64::from(i == j);
-                part[k] -= 2.0 * diagonal * mu;
-                matrix[(first + k, first + k)] += (2.0 + 2.0 * diagonal) * mu;
-            }
-            gradient.rows_mut(*first, 10).copy_from(&part);
-        }
-        let step = DefiniteSystem::new(matrix)?.solve(&-gradient.clone());
-        let predicted = -0.5 * gradient.dot(&step);
+        let limits: Vec<DVector<f64>> = program
+            .rows
+            .iter()
+            .zip(&self.rows)
+            .map(|(row, &s)| {
+                let mut dense = DVector::zeros(program.variables);
+                row.add_to(mu.sqrt() / s, &mut dense);
+                rows.framed_gradient(&dense)
+            })
+            .collect();
+        rows.add_singles(&limits).append(&vec![0.0; limits.len()], &mut local, &mut wide);
+        let right = RightSide { local, wide, direct };
+        let system = StackedSystem::new(program.variables, rows)?;
+        let step = system.solve(&right);
+        let predicted = 0.5 * system.rows().transposed(&right).dot(&step);
         if predicted.is_nan() || predicted <= 0.0 {
             return None;
         }
         let now = self.barrier(program, mu, pull)?;
-        let slack = 4.0e-15 * (1.0 + now.abs()) + program.objective_noise(&self.x);
+        let slack = 4.0e-15 * (1.0 + now.abs());
         // Armijo's rule: a tenth of the fall that the slope promises.
         let better = |candidate: Option<Self>, alpha: f64, best: &mut Option<(f64, Self)>| {
             if let Some(candidate) = candidate
@@ -237,16 +267,15 @@ impl Point {
         step: &DVector<f64>,
         way: fn(&Vector10) -> Option<Change>,
     ) -> Option<Self> {
-        let mut x = &self.x + step;
         let mut changes = step.clone();
         let mut factors = Vec::with_capacity(bodies.len());
-        for ((first, offset), u) in bodies.iter().zip(&self.factors) {
+        for ((first, _), u) in bodies.iter().zip(&self.factors) {
             let change = way(&Vector10::from_column_slice(&step.as_slice()[*first..first + 10]))?;
-            let next = u * change.factor;
             changes.rows_mut(*first, 10).copy_from(&vector_of(&(u * change.difference * u.transpose())));
-            x.rows_mut(*first, 10).copy_from(&(vector_of(&(next * next.transpose())) - offset));
-            factors.push(next);
+            factors.push(u * change.factor);
         }
+        let mut x = self.x.clone();
+        x.add(&changes);
         self.checked(program, factors, x, &changes)
     }
 
@@ -254,7 +283,7 @@ impl Point {
         &self,
         program: &Program,
         factors: Vec<Matrix4<f64>>,
-        x: DVector<f64>,
+        x: Precise,
         changes: &DVector<f64>,
     ) -> Option<Self> {
         let rows: Vec<f64> = program
@@ -264,10 +293,10 @@ impl Point {
             .map(|(row, &old)| {
                 // A small slack is known better by its changes than as a difference of large numbers.
                 let change = row.linear_part(changes);
-                if change.abs() < 0.5 * old { old + change } else { row.value(&x) }
+                if change.abs() < 0.5 * old { old + change } else { row.value(&x.high) }
             })
             .collect();
-        let finite = x.iter().all(|v| v.is_finite()) && rows.iter().all(|&s| s > 0.0);
+        let finite = x.high.iter().all(|v| v.is_finite()) && rows.iter().all(|&s| s > 0.0);
         finite.then_some(Self { factors, x, rows })
     }
 }
@@ -301,14 +330,6 @@ fn straight(n: &Vector10) -> Option<Change> {
     }
     let factor = upper_factor(&(Matrix4::identity() + difference))?;
     Some(Change { factor, difference })
-}
-
-/// Upper triangular U with `U Uᵀ = S`, or none.
-fn upper_factor(s: &Matrix4<f64>) -> Option<Matrix4<f64>> {
-    // The Cholesky factor of the matrix read backwards.
-    let flipped = Matrix4::from_fn(|i, j| s[(3 - i, 3 - j)]);
-    let l = flipped.cholesky()?.l();
-    Some(Matrix4::from_fn(|i, j| l[(3 - i, 3 - j)]))
 }
 
 /// `∂ vec(U V Vᵀ Uᵀ) / ∂ numbers of V` at V = 1.

@@ -14,10 +14,11 @@ mod error;
 mod feasibility;
 mod fit;
 mod interior_point;
-mod linear_solver;
 mod log_cholesky;
+mod precise;
 mod priors;
 mod settings;
+mod stacked;
 
 pub use description::{BaseMap, Ellipsoid, Limits, PhysicalBody, PhysicalProblem, PhysicalScalar, rough_body};
 pub use error::PhysicalError;

@@ -30,7 +30,7 @@ pub struct PhysicalSettings {
     pub margin: f64,
     /// Largest certificate (stationarity and duality gap, both relative) at which a fit counts as solved. Default 5e-8.
     pub tolerance: f64,
-    /// Most iterations. Default 2000; the interior point takes 15 to 40, log-Cholesky 60 to 400.
+    /// Most iterations. Default 2000; the interior point takes 15 to 80, log-Cholesky 60 to 350.
     pub max_iterations: usize,
 }
 
