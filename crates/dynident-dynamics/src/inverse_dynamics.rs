@@ -108,8 +108,14 @@ impl Kernel for Batch<'_> {
 /// The recursion over any scalar: from `q`, `dq`, `ddq` of the scratch to its `tau`.
 #[inline(always)]
 pub(crate) fn newton_euler<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
+    scratch.place(model.maps());
+    newton_euler_placed(model, scratch);
+}
+
+/// The recursion with the transforms in place.
+#[inline(always)]
+pub(crate) fn newton_euler_placed<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     let maps = model.maps();
-    scratch.place(maps);
     outward(model, scratch);
     let inertials = model.inertials();
     for (body, inertial) in scratch.bodies.iter_mut().zip(inertials) {

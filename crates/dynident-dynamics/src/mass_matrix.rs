@@ -41,8 +41,14 @@ impl Kernel for Single<'_> {
 /// From `q` of the scratch to its first matrix.
 #[inline(always)]
 pub(crate) fn composite_rigid_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
+    scratch.place(model.maps());
+    composite_rigid_bodies_placed(model, scratch);
+}
+
+/// The same with the transforms in place.
+#[inline(always)]
+pub(crate) fn composite_rigid_bodies_placed<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     let (maps, dof) = (model.maps(), model.dof());
-    scratch.place(maps);
     for (composite, inertial) in scratch.composites.iter_mut().zip(model.inertials()) {
         *composite = Composite::of(inertial);
     }

@@ -5,7 +5,7 @@
 use dynident_dynamics::{
     BatchWorkspace, PanelLayout, Panels, Workspace, all_columns, body_placements, forward_dynamics, gravity_torque,
     inverse_dynamics, inverse_dynamics_batch, inverse_dynamics_derivatives, kinetic_energy, mass_matrix,
-    potential_energy, regressor_panels, torque_regressor,
+    mass_matrix_and_bias, potential_energy, regressor_panels, torque_regressor,
 };
 use dynident_lanes::Level;
 use dynident_model::laws::{CoulombShape, Coupling, CouplingEffect, DriveChoice, JointMotion, Law, laws_per_joint};
@@ -78,6 +78,7 @@ fn one_sample_at_a_time_allocates_nothing() {
             check("inverse dynamics", &mut |w| use_up(inverse_dynamics(&model, w, &q, &dq, &ddq)[0]));
             check("gravity", &mut |w| use_up(gravity_torque(&model, w, &q)[0]));
             check("mass matrix", &mut |w| use_up(mass_matrix(&model, w, &q)[0]));
+            check("equation of motion", &mut |w| use_up(mass_matrix_and_bias(&model, w, &q, &dq).1[0]));
             check("forward dynamics", &mut |w| use_up(forward_dynamics(&model, w, &q, &dq, &ddq)[0]));
             check("regressor", &mut |w| use_up(torque_regressor(&model, w, &q, &dq, &ddq)[0]));
             check("derivatives", &mut |w| {

@@ -3,7 +3,7 @@
 use dynident_dynamics::{
     BatchWorkspace, PanelLayout, Panels, Workspace, all_columns, body_placements, forward_dynamics, gravity_torque,
     inverse_dynamics, inverse_dynamics_batch, inverse_dynamics_derivatives, kinetic_energy, mass_matrix,
-    potential_energy, regressor_panels, torque_regressor,
+    mass_matrix_and_bias, potential_energy, regressor_panels, torque_regressor,
 };
 use dynident_lanes::Level;
 use dynident_model::Model;
@@ -289,4 +289,25 @@ fn a_workspace_of_another_tree_is_refused_not_misread() {
     let mut workspace = Workspace::new(&model);
     let zeros = [0.0; 6];
     let _ = torque_regressor(&other, &mut workspace, &zeros, &zeros, &zeros);
+}
+
+/// Mass matrix and bias of one call are those of two, bit for bit: the same operations on the same numbers.
+#[test]
+fn the_equation_of_motion_is_its_parts() {
+    for seed in 0..10 {
+        let model = random_tree(seed, 1 + seed as usize);
+        let dof = model.dof();
+        for level in Level::available() {
+            let mut workspace = Workspace::with_level(&model, level);
+            let mut random = Random::new(seed);
+            let mut vector = || (0..dof).map(|_| random.uniform(-2.0, 2.0)).collect::<Vec<f64>>();
+            let (q, dq) = (vector(), vector());
+            // Something else in the scratch before.
+            inverse_dynamics(&model, &mut workspace, &dq, &q, &q);
+            let (matrix, bias) = mass_matrix_and_bias(&model, &mut workspace, &q, &dq);
+            let (matrix, bias) = (matrix.to_vec(), bias.to_vec());
+            assert_eq!(matrix, mass_matrix(&model, &mut workspace, &q));
+            assert_eq!(bias, inverse_dynamics(&model, &mut workspace, &q, &dq, &vec![0.0; dof]));
+        }
+    }
 }

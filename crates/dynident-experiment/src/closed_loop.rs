@@ -5,9 +5,10 @@ use crate::error::{ExperimentError, require_length};
 use crate::feedback::Feedback;
 use crate::per_joint::PerJoint;
 use crate::plant::{Integrator, Plant};
-use crate::reference::{Reference, ReferenceSample};
+use crate::reference::Reference;
 use crate::run::{Divergence, LimitedQuantity, Run, RunStatus};
 use crate::sensors::SensorSettings;
+use crate::tape::{Arrays, ReferenceTape, Row, Tape};
 use dynident_model::Model;
 use serde::{Deserialize, Serialize};
 
@@ -161,8 +162,8 @@ pub fn closed_loop(
     require_length("joints of the reference", joints, reference.joints())?;
     require_length("joints of the controller", joints, controller.joints())?;
     let samples = reference.samples();
-    let mut target = ReferenceSample::new(joints);
-    target.take(reference, 0);
+    let mut target = ReferenceTape::new(reference);
+    target.go_to(0);
     match &settings.start {
         Start::Reference => plant.set_state(0.0, target.target().q, target.target().dq),
         Start::AtRest => plant.set_state(0.0, target.target().q, &vec![0.0; joints]),
@@ -178,7 +179,7 @@ pub fn closed_loop(
         rate_hz: reference.rate_hz(),
         samples,
         status: RunStatus::Done,
-        reference: reference.motion().clone(),
+        reference: reference.shared(),
         q: zeros(),
         dq: zeros(),
         ddq: if settings.accelerations { zeros() } else { Vec::new() },
@@ -192,11 +193,12 @@ pub fn closed_loop(
     };
     let mut feedback = Feedback::new(&settings.sensors, plant, reference.rate_hz());
     let (mut tau, mut ddq) = (vec![0.0; joints], vec![0.0; joints]);
+    let mut tape = Tape::new(joints);
     let mut kept = 0;
     for sample in 0..samples {
         let time_s = run.time_s(sample);
         plant.set_time_s(time_s);
-        target.take(reference, sample);
+        target.go_to(sample);
         if let Some(status) = verdict(plant, &limits, target.target().q, time_s, &run.joints) {
             run.status = status;
             break;
@@ -213,15 +215,13 @@ pub fn closed_loop(
                 tau[joint] = limits.torque[joint].copysign(tau[joint]);
                 run.saturated[joint] += 1;
             }
-            let at = joint * samples + sample;
-            run.q[at] = plant.q()[joint];
-            run.dq[at] = plant.dq()[joint];
-            run.tau[at] = tau[joint];
-            run.measured_q[at] = measured.q[joint];
-            run.measured_dq[at] = measured.dq[joint];
             let error = (target.target().q[joint] - plant.q()[joint]).abs();
             run.max_error[joint] = run.max_error[joint].max(error);
             run.rms_error[joint] += error * error;
+        }
+        let row = Row { q: plant.q(), dq: plant.dq(), tau: &tau, measured_q: measured.q, measured_dq: measured.dq };
+        if tape.push(row) {
+            tape.flush(arrays(&mut run), samples);
         }
         if settings.accelerations {
             if let Err(fault) = plant.accelerations(&tau, &mut ddq) {
@@ -240,12 +240,17 @@ pub fn closed_loop(
             break;
         }
     }
+    tape.flush(arrays(&mut run), samples);
     for error in &mut run.rms_error {
         *error = (*error / kept.max(1) as f64).sqrt();
     }
     run.unsettled_steps = plant.unsettled_steps();
     run.cut(kept);
     Ok(run)
+}
+
+fn arrays(run: &mut Run) -> Arrays<'_> {
+    [&mut run.q, &mut run.dq, &mut run.tau, &mut run.measured_q, &mut run.measured_dq]
 }
 
 /// Why the run must stop here, if it must.

@@ -17,6 +17,7 @@ mod reference;
 pub mod robot;
 mod run;
 mod sensors;
+mod tape;
 
 pub use closed_loop::{LoopSettings, RunLimits, Start, closed_loop};
 pub use controllers::{Controller, ControllerModel, ControllerSettings, FrictionCompensation};

@@ -3,6 +3,7 @@
 use crate::controllers::Target;
 use crate::error::{ExperimentError, require, require_length};
 use dynident_excitation::{Family, Motion};
+use std::sync::Arc;
 
 /// Most samples of a run: beyond this a setting is a slip (28 hours at 1 kHz).
 const MOST_SAMPLES: f64 = 1e8;
@@ -11,7 +12,8 @@ const MOST_SAMPLES: f64 = 1e8;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
     rate_hz: f64,
-    motion: Motion,
+    /// Shared with the runs that follow it.
+    motion: Arc<Motion>,
 }
 
 impl Reference {
@@ -32,7 +34,7 @@ impl Reference {
                 require(value.is_finite(), what, value, "give finite numbers")?;
             }
         }
-        Ok(Self { rate_hz, motion })
+        Ok(Self { rate_hz, motion: Arc::new(motion) })
     }
 
     /// A trajectory of a family over its whole duration, or over `duration_s` of it.
@@ -84,12 +86,13 @@ impl Reference {
     pub fn with_joint_held(mut self, joint: usize, position: f64) -> Result<Self, ExperimentError> {
         require(joint < self.joints(), "joint held", joint as f64, "there is no such joint")?;
         require(position.is_finite(), "position held", position, "give a finite position")?;
-        let own = self.motion.of(joint);
-        self.motion.q[own.clone()].fill(position);
-        self.motion.dq[own.clone()].fill(0.0);
-        self.motion.ddq[own.clone()].fill(0.0);
-        if self.motion.dddq.len() == self.motion.q.len() {
-            self.motion.dddq[own].fill(0.0);
+        let motion = Arc::make_mut(&mut self.motion);
+        let own = motion.of(joint);
+        motion.q[own.clone()].fill(position);
+        motion.dq[own.clone()].fill(0.0);
+        motion.ddq[own.clone()].fill(0.0);
+        if motion.dddq.len() == motion.q.len() {
+            motion.dddq[own].fill(0.0);
         }
         Ok(self)
     }
@@ -102,6 +105,11 @@ impl Reference {
     /// The samples, joint-major.
     pub fn motion(&self) -> &Motion {
         &self.motion
+    }
+
+    /// The same samples, shared.
+    pub(crate) fn shared(&self) -> Arc<Motion> {
+        Arc::clone(&self.motion)
     }
 
     /// Number of joints.
@@ -135,7 +143,7 @@ impl ReferenceSample {
 
     #[inline]
     pub(crate) fn take(&mut self, reference: &Reference, sample: usize) {
-        let Motion { samples, q, dq, ddq, .. } = &reference.motion;
+        let Motion { samples, q, dq, ddq, .. } = &*reference.motion;
         for joint in 0..self.q.len() {
             let at = joint * samples + sample;
             (self.q[joint], self.dq[joint], self.ddq[joint]) = (q[at], dq[at], ddq[at]);

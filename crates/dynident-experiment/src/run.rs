@@ -3,6 +3,7 @@
 use crate::plant::PlantFault;
 use dynident_excitation::Motion;
 use serde::Serialize;
+use std::sync::Arc;
 
 /// How a run ended.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -125,7 +126,7 @@ pub struct Run {
     /// How it ended.
     pub status: RunStatus,
     /// What was to be followed, up to the run's end.
-    pub reference: Motion,
+    pub reference: Arc<Motion>,
     /// True positions, rad (m).
     pub q: Vec<f64>,
     /// True speeds.
@@ -170,7 +171,9 @@ impl Run {
         if samples == before {
             return;
         }
-        let Motion { q, dq, ddq, dddq, .. } = &mut self.reference;
+        let reference = Arc::make_mut(&mut self.reference);
+        reference.samples = samples;
+        let Motion { q, dq, ddq, dddq, .. } = reference;
         let own =
             [&mut self.q, &mut self.dq, &mut self.ddq, &mut self.tau, &mut self.measured_q, &mut self.measured_dq];
         for values in own.into_iter().chain([q, dq, ddq, dddq]) {
@@ -181,6 +184,6 @@ impl Run {
                 values.truncate(joints * samples);
             }
         }
-        (self.samples, self.reference.samples) = (samples, samples);
+        self.samples = samples;
     }
 }

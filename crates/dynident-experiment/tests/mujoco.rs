@@ -67,3 +67,26 @@ fn ten_seconds_of_panda_agree() {
         assert!(worst[0] < PROMISE, "{run}: {:e} rad", worst[0]);
     }
 }
+
+/// The free frictionless Panda arm falls for 5 s and keeps its energy: within some thousand times the tight integrator's tolerance of 1e-10, and within RK4's error of order 4 (light wrist joints spin at
+/// tens of rad/s: with four steps a millisecond a thousandth of a joule).
+#[test]
+fn the_free_panda_keeps_its_energy() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let model = load_robot(root.join("robots/panda_arm7.urdf")).unwrap().model;
+    let mut plant = Plant::new(&model, &[], &[]).unwrap();
+    for (integrator, allowed) in [
+        (Integrator::Adaptive { relative_tolerance: 1e-10, absolute_tolerance: 1e-10 }, 1e-6),
+        (Integrator::Rk4 { steps_per_sample: 4 }, 1e-3),
+    ] {
+        plant.set_state(0.0, &[0.1, 0.4, -0.3, -1.2, 0.5, 1.5, 0.2], &[0.0; 7]);
+        let before = plant.energy_j();
+        let mut worst = 0.0_f64;
+        for _ in 0..5000 {
+            plant.advance(&[0.0; 7], 1e-3, integrator).unwrap();
+            worst = worst.max((plant.energy_j() - before).abs());
+        }
+        println!("{integrator:?}: {worst:.1e} J of {before:.1} J");
+        assert!(worst < allowed, "{integrator:?}: {worst:e} J");
+    }
+}

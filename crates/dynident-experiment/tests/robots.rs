@@ -180,6 +180,12 @@ fn a_folder_waits_for_its_log() {
     let done = run(&mut robot);
     assert!(done.status.is_done());
     assert_eq!(done.record, simulated.record);
+    // The log of another trajectory is not taken for this one's.
+    let other = Reference::standing(&[-0.4, 0.31], 500.0, 0.4).unwrap();
+    let controller = pd();
+    let request = RunRequest { run: 1, reference: &other, controller: &controller, model: None };
+    let refused = robot.run(&request).unwrap().status;
+    assert!(matches!(refused, RobotStatus::Failed { .. }) && refused.to_string().contains("another run"), "{refused}");
     std::fs::write(&log, &half).unwrap();
     std::fs::write(own.join("stopped.txt"), "protective stop\n").unwrap();
     let stopped = run(&mut robot);

@@ -6,7 +6,7 @@ use super::drives::Drives;
 use super::factor::{eliminate, factor, solve};
 use super::friction_solver::FrictionSolver;
 use super::friction_unit::FrictionUnit;
-use dynident_dynamics::{Workspace, inverse_dynamics, mass_matrix};
+use dynident_dynamics::{Workspace, mass_matrix_and_bias};
 use dynident_model::Model;
 
 /// What a friction unit does during an explicit step.
@@ -35,7 +35,6 @@ pub(super) struct Equations {
     pub(super) locked: Vec<bool>,
     pub(super) any_locked: bool,
     workspace: Workspace,
-    zeros: Vec<f64>,
     /// Mass matrix, then its factor.
     matrix: Vec<f64>,
     /// Right-hand side, then accelerations.
@@ -64,7 +63,6 @@ impl Equations {
             disturbances: Vec::new(),
             locked: vec![false; n],
             any_locked: false,
-            zeros: zeros(n),
             matrix: zeros(n * n),
             acceleration: zeros(n),
             load: zeros(n),
@@ -87,10 +85,10 @@ impl Equations {
     /// Mass matrix `M + implicit · F_v` and right-hand side without friction by speed.
     #[inline]
     pub(super) fn assemble(&mut self, at: At<'_>, implicit: f64) {
-        let n = self.zeros.len();
-        let Self { model, workspace, drives, matrix, acceleration, zeros, load, .. } = self;
-        matrix.copy_from_slice(mass_matrix(model, workspace, at.q));
-        let bias = inverse_dynamics(model, workspace, at.q, at.dq, zeros);
+        let n = self.acceleration.len();
+        let Self { model, workspace, drives, matrix, acceleration, load, .. } = self;
+        let (mass_matrix, bias) = mass_matrix_and_bias(model, workspace, at.q, at.dq);
+        matrix.copy_from_slice(mass_matrix);
         if drives.by_load {
             // The accelerations of the evaluation before.
             for j in 0..n {
@@ -148,7 +146,7 @@ impl Equations {
     /// Accelerations without the friction of units that were not taken off.
     #[inline]
     pub(super) fn factor_and_solve(&mut self) -> Result<(), PlantFault> {
-        let n = self.zeros.len();
+        let n = self.acceleration.len();
         if !factor(&mut self.matrix, n) {
             return Err(PlantFault::MassMatrix);
         }
@@ -169,7 +167,7 @@ impl Equations {
 
     /// `M⁻¹ c_u` of the chosen units and their compliance `C M⁻¹ Cᵀ`.
     fn couple(&mut self) {
-        let (n, count) = (self.zeros.len(), self.chosen.len());
+        let (n, count) = (self.acceleration.len(), self.chosen.len());
         for (place, &index) in self.chosen.iter().enumerate() {
             let response = &mut self.responses[place * n..(place + 1) * n];
             response.fill(0.0);
@@ -204,7 +202,7 @@ impl Equations {
 
     /// Takes what the chosen units' torques do off the accelerations.
     fn push_back(&mut self) {
-        let n = self.zeros.len();
+        let n = self.acceleration.len();
         for place in 0..self.chosen.len() {
             let torque = self.solver.torque[place];
             let response = &self.responses[place * n..(place + 1) * n];

@@ -21,7 +21,8 @@ pub struct FolderSettings {
 /// A folder in which a person finds `run_k/trajectory.csv` and `run_k/controller.json`, and drops `run_k/log.csv` (`t_s, q1.., tau1..`). Where the robot was stopped early, `run_k/stopped.txt` says
 /// why, and the log may be short.
 ///
-/// A log is taken once it is complete: its last line ends, and it reaches the trajectory's end. Files that are there are not written again unless they differ, so that a second look disturbs nobody.
+/// A log is taken once it is complete: its last line ends, and it reaches the trajectory's end. Files that are there are not written again unless they differ, so that a second look disturbs nobody; where they differ and a log is
+/// there, that log belongs to another run, and is refused.
 #[derive(Debug)]
 pub struct FolderRobot {
     settings: FolderSettings,
@@ -49,6 +50,16 @@ impl FolderRobot {
     fn exchange(&self, request: &RunRequest<'_>, folder: &Path) -> Result<RobotRun, RobotFault> {
         let fault = |error: std::io::Error| RobotFault::File { path: folder.to_owned(), reason: error.to_string() };
         std::fs::create_dir_all(folder).map_err(fault)?;
+        let log = folder.join("log.csv");
+        if log.exists()
+            && let Some(path) = handover::other(request, &self.joints, folder)?
+        {
+            let reason = format!(
+                "it is not this run's, so that {} is of another run: move both away",
+                log.file_name().unwrap_or_default().to_string_lossy()
+            );
+            return Err(RobotFault::File { path, reason });
+        }
         handover::write(request, &self.joints, folder)?;
         let ends = Instant::now() + Duration::from_secs_f64(self.settings.wait_s);
         loop {

@@ -87,16 +87,29 @@ fn model_json(model: &ControllerModel) -> Value {
     })
 }
 
-/// Writes `trajectory.csv` and `controller.json` into a folder, each whole or not at all.
-pub(super) fn write(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<[PathBuf; 2], RobotFault> {
-    let trajectory = folder.join("trajectory.csv");
-    write_whole(&trajectory, &trajectory_csv(request.reference, request.model))?;
-    let controller = folder.join("controller.json");
+/// The two files of a request: where they go, and what is in them.
+fn files(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<[(PathBuf, String); 2], RobotFault> {
+    let [trajectory, controller] = ["trajectory.csv", "controller.json"].map(|name| folder.join(name));
     let mut text = serde_json::to_string_pretty(&controller_json(request, joints))
         .map_err(|error| RobotFault::File { path: controller.clone(), reason: error.to_string() })?;
     text.push('\n');
-    write_whole(&controller, &text)?;
-    Ok([trajectory, controller])
+    Ok([(trajectory, trajectory_csv(request.reference, request.model)), (controller, text)])
+}
+
+/// Writes `trajectory.csv` and `controller.json` into a folder, each whole or not at all.
+pub(super) fn write(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<[PathBuf; 2], RobotFault> {
+    let [trajectory, controller] = files(request, joints, folder)?;
+    write_whole(&trajectory.0, &trajectory.1)?;
+    write_whole(&controller.0, &controller.1)?;
+    Ok([trajectory.0, controller.0])
+}
+
+/// The first file in the folder that is there and is another one.
+pub(super) fn other(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<Option<PathBuf>, RobotFault> {
+    let differs = |(path, text): &(PathBuf, String)| {
+        path.exists() && !std::fs::read_to_string(path).is_ok_and(|there| there == *text)
+    };
+    Ok(files(request, joints, folder)?.into_iter().find(differs).map(|(path, _)| path))
 }
 
 /// Writes under another name in the same folder, then renames; what is there already with the same text stays.

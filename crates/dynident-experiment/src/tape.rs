@@ -1,0 +1,109 @@
+//! Blocks of samples between the loop, which goes from sample to sample, and arrays that are joint-major. Written straight, every sample would touch a page for each joint of each array, more than a
+//! processor keeps addresses of; in blocks it is one page in 32 samples.
+
+use crate::controllers::Target;
+use crate::reference::Reference;
+
+/// Samples in a block: with 35 numbers each, nine kilobytes.
+const BLOCK: usize = 32;
+
+/// What the loop writes of one sample.
+#[derive(Clone, Copy)]
+pub(crate) struct Row<'a> {
+    pub(crate) q: &'a [f64],
+    pub(crate) dq: &'a [f64],
+    pub(crate) tau: &'a [f64],
+    pub(crate) measured_q: &'a [f64],
+    pub(crate) measured_dq: &'a [f64],
+}
+
+/// The arrays in the order of [`Row`].
+pub(crate) type Arrays<'a> = [&'a mut Vec<f64>; 5];
+
+#[derive(Debug)]
+pub(crate) struct Tape {
+    joints: usize,
+    rows: Vec<f64>,
+    filled: usize,
+    /// The sample of the first row.
+    first: usize,
+}
+
+impl Tape {
+    pub(crate) fn new(joints: usize) -> Self {
+        Self { joints, rows: vec![0.0; 5 * joints * BLOCK], filled: 0, first: 0 }
+    }
+
+    /// True once the block must be given to [`flush`](Self::flush).
+    #[inline]
+    pub(crate) fn push(&mut self, row: Row<'_>) -> bool {
+        let n = self.joints;
+        let to = &mut self.rows[self.filled * 5 * n..][..5 * n];
+        to[..n].copy_from_slice(row.q);
+        to[n..2 * n].copy_from_slice(row.dq);
+        to[2 * n..3 * n].copy_from_slice(row.tau);
+        to[3 * n..4 * n].copy_from_slice(row.measured_q);
+        to[4 * n..].copy_from_slice(row.measured_dq);
+        self.filled += 1;
+        self.filled == BLOCK
+    }
+
+    /// Writes the rows into arrays of `samples` samples a joint.
+    pub(crate) fn flush(&mut self, arrays: Arrays<'_>, samples: usize) {
+        let width = 5 * self.joints;
+        for (place, array) in arrays.into_iter().enumerate() {
+            for joint in 0..self.joints {
+                let column = place * self.joints + joint;
+                let to = &mut array[joint * samples + self.first..][..self.filled];
+                for (row, to) in to.iter_mut().enumerate() {
+                    *to = self.rows[row * width + column];
+                }
+            }
+        }
+        self.first += self.filled;
+        self.filled = 0;
+    }
+}
+
+/// A reference, read block by block.
+#[derive(Debug)]
+pub(crate) struct ReferenceTape<'a> {
+    reference: &'a Reference,
+    rows: Vec<f64>,
+    at: usize,
+}
+
+impl<'a> ReferenceTape<'a> {
+    pub(crate) fn new(reference: &'a Reference) -> Self {
+        Self { reference, rows: vec![0.0; 3 * reference.joints() * BLOCK], at: 0 }
+    }
+
+    /// Goes to a sample.
+    #[inline]
+    pub(crate) fn go_to(&mut self, sample: usize) {
+        self.at = sample % BLOCK;
+        if self.at == 0 {
+            self.fill(sample);
+        }
+    }
+
+    fn fill(&mut self, first: usize) {
+        let motion = self.reference.motion();
+        let (joints, samples) = (motion.joints, motion.samples);
+        let count = BLOCK.min(samples - first);
+        for (place, array) in [&motion.q, &motion.dq, &motion.ddq].into_iter().enumerate() {
+            for joint in 0..joints {
+                for (row, value) in array[joint * samples + first..][..count].iter().enumerate() {
+                    self.rows[(row * 3 + place) * joints + joint] = *value;
+                }
+            }
+        }
+    }
+
+    #[inline]
+    pub(crate) fn target(&self) -> Target<'_> {
+        let n = self.reference.joints();
+        let row = &self.rows[self.at * 3 * n..][..3 * n];
+        Target { q: &row[..n], dq: &row[n..2 * n], ddq: &row[2 * n..] }
+    }
+}
