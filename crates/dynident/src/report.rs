@@ -133,14 +133,15 @@ fn torques(page: &mut Report, joints: &[String], traces: &[LogTrace]) {
         let part = if trace.cut || trace.role == "identify" { "; the first samples" } else { "" };
         let rows = trace.joints.iter().map(|joint| joint.measured_nm.len()).min().unwrap_or(0);
         let time: Vec<f64> = (0..rows).map(|row| row as f64 / trace.rate_hz).collect();
-        let mut residuals = LinePlot::new(format!("Residual: {} ({role})", trace.log), "s", "Nm (N)", time.clone())
-            .note("measured less predicted; gaps of the log are closed up");
+        let mut residuals =
+            LinePlot::new(format!("Residual: {} ({role})", trace.log), "t, s", "torque, Nm (N)", time.clone())
+                .note("measured less predicted; gaps of the log are closed up");
         for (name, joint) in joints.iter().zip(&trace.joints) {
             let (measured, predicted) = (joint.measured_nm[..rows].to_vec(), joint.predicted_nm[..rows].to_vec());
             let residual = measured.iter().zip(&predicted).map(|(measured, predicted)| measured - predicted).collect();
             residuals = residuals.line(name, residual);
             page.add(
-                LinePlot::new(format!("{name}: {} ({role})", trace.log), "s", "Nm (N)", time.clone())
+                LinePlot::new(format!("{name}: {} ({role})", trace.log), "t, s", "torque, Nm (N)", time.clone())
                     .note(format!("filtered at {} Hz{part}", short(trace.rate_hz, 4)))
                     .line("measured", measured)
                     .line("predicted", predicted),
