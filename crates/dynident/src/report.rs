@@ -54,6 +54,11 @@ pub(crate) fn identification_report(found: &Identification) -> Result<String, Er
     Ok(page.html()?)
 }
 
+/// A unit that is not broken, with raised exponents.
+fn unit(unit: &str) -> String {
+    unit.replace(' ', "\u{a0}").replace("^2", "²")
+}
+
 fn percent(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{} %", short(value, 3)))
 }
@@ -159,11 +164,11 @@ fn parameters(page: &mut Report, r: &ResultFile) {
             units.push(&parameter.unit);
         }
     }
-    for unit in units {
-        let mut plot = BarPlot::new(format!("Base parameters in {unit}"), unit)
+    for of_unit in units {
+        let mut plot = BarPlot::new(format!("Base parameters in {}", unit(of_unit)), unit(of_unit))
             .note("with 95 % error bars")
             .reference_label("by the description");
-        for p in r.base_parameters.iter().filter(|parameter| parameter.unit == unit) {
+        for p in r.base_parameters.iter().filter(|parameter| parameter.unit == of_unit) {
             let half_width = p.excited.then_some(p.half_width_95);
             plot = plot.bar(&p.expression, if p.excited { p.value } else { f64::NAN }, half_width, p.prior);
         }
@@ -181,7 +186,7 @@ fn parameters(page: &mut Report, r: &ResultFile) {
             Cell::judged(relative, if p.excited { tone } else { Tone::Bad }),
             optional(p.physical),
             optional(p.prior),
-            Cell::from(&p.unit),
+            Cell::from(unit(&p.unit)),
         ]
     };
     let columns = ["expression", "value", "std", "std, %", "possible set", "description", "unit"];
@@ -208,7 +213,7 @@ fn friction(page: &mut Report, r: &ResultFile) {
     for (name, laws) in owned.chain(coupled) {
         for law in laws {
             let std = law.std.map_or_else(String::new, |std| short(std, 3));
-            table = table.row([name.to_owned(), law.symbol.clone(), short(law.value, 5), std, law.unit.clone()]);
+            table = table.row([name.to_owned(), law.symbol.clone(), short(law.value, 5), std, unit(&law.unit)]);
         }
     }
     page.add(table);
