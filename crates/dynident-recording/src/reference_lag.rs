@@ -36,23 +36,29 @@ pub fn stroke_lags(
     q: &[f64],
     max_lag_s: f64,
 ) -> Result<Vec<StrokeLag>, FilterError> {
-    check_max_lag(max_lag_s)?;
-    check_joint(reference, place)?;
-    let strokes = reference.strokes(place.joint);
-    // The whole piece first: where a stroke's samples lie depends on the lag.
-    let everything = 0..q.len();
-    let (common, ..) = best(reference, place, q, everything, [-max_lag_s, max_lag_s]);
-    Ok(strokes
-        .into_iter()
-        .map(|stroke| {
-            let samples = samples_of(&stroke, common, place, q.len());
-            if samples.is_empty() {
-                return StrokeLag { stroke, lag_s: 0.0, rms: 0.0, at_limit: false };
-            }
-            let (lag_s, rms, at_limit) = best(reference, place, q, samples, [-max_lag_s, max_lag_s]);
-            StrokeLag { stroke, lag_s, rms, at_limit }
-        })
-        .collect())
+    lags(reference, place, q, max_lag_s).map(|(_, lags)| lags)
+}
+
+/// The lag of the whole piece, which says where each stroke's samples lie, and those of the strokes.
+///
+/// # Errors
+/// As [`stroke_lags`].
+pub(crate) fn lags(
+    reference: &Reference,
+    place: Place,
+    q: &[f64],
+    max_lag_s: f64,
+) -> Result<(f64, Vec<StrokeLag>), FilterError> {
+    let (common, _) = piece_lag(reference, place, q, max_lag_s)?;
+    let strokes = reference.strokes(place.joint).into_iter().map(|stroke| {
+        let samples = samples_of(&stroke, common, place, q.len());
+        if samples.is_empty() {
+            return StrokeLag { stroke, lag_s: 0.0, rms: 0.0, at_limit: false };
+        }
+        let (lag_s, rms, at_limit) = best(reference, place, q, samples, [-max_lag_s, max_lag_s]);
+        StrokeLag { stroke, lag_s, rms, at_limit }
+    });
+    Ok((common, strokes.collect()))
 }
 
 /// The lag of the whole piece.

@@ -91,3 +91,54 @@ impl ReferenceSettings {
         Ok(Some(Reference::logistic(&self.joints)?.starting_at(self.start_s)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::DifferentiatorSettings;
+
+    /// A result stores its settings as JSON, and `validate` reads them back.
+    #[test]
+    fn settings_survive_json() {
+        for text in [
+            "method = \"time-warp\"\nreference = \"a.csv\"",
+            "method = \"logistic-map\"\nreference = { start_s = -1.5, joints = [{ amplitude = 1.0, omega = 1.0, offset = 0.0, period_s = 40.0 }] }",
+            "method = \"deviation\"\nmax_lag_s = 0.1\nreference = { file = \"a.csv\", start_s = 2.0 }\nsmoother = { method = \"savitzky-golay\", window = 21 }",
+            "method = \"frequency-domain\"\nends = \"periodic\"",
+        ] {
+            let settings: DifferentiatorSettings = toml::from_str(text).unwrap();
+            settings.validate().unwrap();
+            let json = serde_json::to_string(&settings).unwrap();
+            assert_eq!(serde_json::from_str::<DifferentiatorSettings>(&json).unwrap(), settings, "{json}");
+        }
+    }
+
+    #[test]
+    fn contradictions_and_misspelt_keys_are_refused() {
+        for text in [
+            "method = \"time-warp\"\nreference = { fle = \"a.csv\" }",
+            "method = \"time-warp\"\nrefrence = \"a.csv\"",
+            "method = \"time-warp\"\nreference = 3",
+        ] {
+            assert!(toml::from_str::<DifferentiatorSettings>(text).is_err(), "{text}");
+        }
+        for text in [
+            "method = \"time-warp\"\nmax_lag_s = 0.0",
+            "method = \"time-warp\"\nreference = { start_s = inf }",
+            "method = \"time-warp\"\nreference = { file = \"a.csv\", joints = [{ amplitude = 1.0, omega = 1.0, offset = 0.0, period_s = 40.0 }] }",
+            "method = \"deviation\"\nsmoother = { method = \"time-warp\" }",
+        ] {
+            let settings: DifferentiatorSettings = toml::from_str(text).unwrap();
+            assert!(settings.validate().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_cutoff_left_to_the_data_is_filled_in_wherever_it_stands() {
+        let settings: DifferentiatorSettings = toml::from_str("method = \"deviation\"").unwrap();
+        assert!(settings.wants_cutoff());
+        let settings = settings.with_cutoff(3.0).with_cutoff(5.0);
+        assert_eq!((settings.wants_cutoff(), settings.cutoff_hz()), (false, Some(3.0)));
+        let none: DifferentiatorSettings = toml::from_str("method = \"savitzky-golay\"\nwindow = 5").unwrap();
+        assert_eq!((none.wants_cutoff(), none.with_cutoff(3.0).cutoff_hz()), (false, None));
+    }
+}

@@ -73,6 +73,11 @@ pub struct MotionBlock {
 }
 
 impl MotionBlock {
+    /// The torques to fit to: smoothed like the positions if that was asked for, otherwise as logged.
+    pub fn fitted_tau(&self) -> &[f64] {
+        if self.tau_smooth.is_empty() { &self.tau } else { &self.tau_smooth }
+    }
+
     /// One joint's part of `values` (one of this block's own fields).
     pub fn joint<'a>(&self, values: &'a [f64], joint: usize) -> &'a [f64] {
         &values[joint * self.rows..(joint + 1) * self.rows]

@@ -3,7 +3,7 @@
 use crate::differentiator::{Derivatives, Differentiator, Place, add_sample};
 use crate::error::FilterError;
 use crate::reference::Reference;
-use crate::reference_lag::{check_joint, check_max_lag, piece_lag, samples_of, stroke_lags};
+use crate::reference_lag::{check_joint, check_max_lag, lags, samples_of};
 use core::ops::Range;
 use std::sync::Arc;
 
@@ -57,8 +57,8 @@ impl Differentiator for TimeWarp {
         out.dq[..q.len()].fill(0.0);
         out.ddq[..q.len()].fill(0.0);
         let mut marked = Vec::new();
-        let (common, _) = piece_lag(&self.reference, place, q, self.max_lag_s)?;
-        for lag in stroke_lags(&self.reference, place, q, self.max_lag_s)? {
+        let (common, strokes) = lags(&self.reference, place, q, self.max_lag_s)?;
+        for lag in strokes {
             for i in samples_of(&lag.stroke, common, place, q.len()) {
                 let time_s = place.time_s(i) - lag.lag_s;
                 if lag.at_limit || !self.reference.covers(place.joint, time_s) {

@@ -7,9 +7,9 @@ use serde::Serialize;
 /// Letters of a label that are drawn; the whole label stands under the pointer.
 const LETTERS: usize = 44;
 /// Width of the picture, of the labels, of the figures, and height of a bar's row, px.
-const WIDTH: f64 = 760.0;
+const WIDTH: f64 = 800.0;
 const LABELS: f64 = 270.0;
-const FIGURES: f64 = 110.0;
+const FIGURES: f64 = 140.0;
 const ROW: f64 = 22.0;
 
 /// One bar.

@@ -6,9 +6,10 @@ use serde::Serialize;
 
 /// Most cells that carry a text under the pointer: beyond, the page would grow too large.
 const MOST_TEXTS: usize = 4096;
-/// Width of the cells together, of the labels, px.
+/// Width of the cells together, px; letters of a name that are drawn, and their width.
 const CELLS: f64 = 560.0;
-const LABELS: f64 = 150.0;
+const LETTERS: usize = 22;
+const LETTER: f64 = 6.5;
 
 /// A matrix in colours: blue below zero, red above, as strong as the value against the largest; gaps stay empty. The value stands under the pointer.
 #[derive(Clone, Debug, PartialEq)]
@@ -76,6 +77,8 @@ impl HeatMap {
         let largest = finite.fold(0.0_f64, |largest, value| largest.max(value.abs()));
         let limit = self.limit.filter(|limit| limit.is_finite() && *limit > 0.0).unwrap_or(largest);
         let side = (CELLS / self.columns.len().max(1) as f64).clamp(4.0, 36.0);
+        let longest = self.rows.iter().chain(&self.columns).map(|name| name.chars().count().min(LETTERS)).max();
+        let labels = 14.0 + LETTER * longest.unwrap_or(0) as f64;
         let texts = self.columns.len() * self.rows.len() <= MOST_TEXTS;
         let cells = self.values.iter().enumerate().flat_map(|(row, values)| {
             values
@@ -85,8 +88,8 @@ impl HeatMap {
                 .map(move |(column, value)| (row, column, *value))
         });
         let cells = cells.map(|(row, column, value)| Drawn {
-            x: LABELS + side * column as f64,
-            y: LABELS + side * row as f64,
+            x: labels + side * column as f64,
+            y: labels + side * row as f64,
             colour: if value < 0.0 { "#0072b2" } else { "#d55e00" },
             strength: if limit > 0.0 { ((value.abs() / limit).min(1.0) * 100.0).round() / 100.0 } else { 0.0 },
             text: texts.then(|| format!("{} × {}: {}", self.rows[row], self.columns[column], short(value, 4))),
@@ -95,13 +98,13 @@ impl HeatMap {
         let every = (11.0 / side).ceil().max(1.0) as usize;
         let names = |names: &[String]| -> Vec<(f64, String)> {
             let shown = names.iter().enumerate().step_by(every);
-            shown.map(|(k, name)| (LABELS + side * (k as f64 + 0.5), name.chars().take(22).collect())).collect()
+            shown.map(|(k, name)| (labels + side * (k as f64 + 0.5), name.chars().take(LETTERS).collect())).collect()
         };
         let view = Picture {
             title: &self.title,
-            width: LABELS + side * self.columns.len() as f64 + 8.0,
-            height: LABELS + side * self.rows.len() as f64 + 8.0,
-            labels: LABELS,
+            width: labels + side * self.columns.len() as f64 + 8.0,
+            height: labels + side * self.rows.len() as f64 + 8.0,
+            labels,
             side,
             columns: names(&self.columns),
             rows: names(&self.rows),

@@ -71,7 +71,7 @@ pub(crate) fn instrumented_factors(
                 panel.clear();
                 panel.extend_from_slice(&instruments.joint(joint)[..width]);
                 panel.extend_from_slice(&regressors.joint(joint)[..width]);
-                panel.extend_from_slice(&measured.joint(&measured.tau, place)[from..from + samples]);
+                panel.extend_from_slice(&measured.joint(measured.fitted_tau(), place)[from..from + samples]);
                 let (rows, panel) = match &mut decimators {
                     Some(decimators) => (decimators[joint].push(&panel, samples, &mut out), &out),
                     None => (samples, &panel),

@@ -54,6 +54,11 @@ pub(crate) fn identification_report(found: &Identification) -> Result<String, Er
     Ok(page.html()?)
 }
 
+/// A unit that is not broken, with raised exponents.
+fn unit(unit: &str) -> String {
+    unit.replace(' ', "\u{a0}").replace("^2", "²")
+}
+
 fn percent(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{} %", short(value, 3)))
 }
@@ -133,14 +138,15 @@ fn torques(page: &mut Report, joints: &[String], traces: &[LogTrace]) {
         let part = if trace.cut || trace.role == "identify" { "; the first samples" } else { "" };
         let rows = trace.joints.iter().map(|joint| joint.measured_nm.len()).min().unwrap_or(0);
         let time: Vec<f64> = (0..rows).map(|row| row as f64 / trace.rate_hz).collect();
-        let mut residuals = LinePlot::new(format!("Residual: {} ({role})", trace.log), "s", "Nm (N)", time.clone())
-            .note("measured less predicted; gaps of the log are closed up");
+        let mut residuals =
+            LinePlot::new(format!("Residual: {} ({role})", trace.log), "t, s", "torque, Nm (N)", time.clone())
+                .note("measured less predicted; gaps of the log are closed up");
         for (name, joint) in joints.iter().zip(&trace.joints) {
             let (measured, predicted) = (joint.measured_nm[..rows].to_vec(), joint.predicted_nm[..rows].to_vec());
             let residual = measured.iter().zip(&predicted).map(|(measured, predicted)| measured - predicted).collect();
             residuals = residuals.line(name, residual);
             page.add(
-                LinePlot::new(format!("{name}: {} ({role})", trace.log), "s", "Nm (N)", time.clone())
+                LinePlot::new(format!("{name}: {} ({role})", trace.log), "t, s", "torque, Nm (N)", time.clone())
                     .note(format!("filtered at {} Hz{part}", short(trace.rate_hz, 4)))
                     .line("measured", measured)
                     .line("predicted", predicted),
@@ -158,11 +164,11 @@ fn parameters(page: &mut Report, r: &ResultFile) {
             units.push(&parameter.unit);
         }
     }
-    for unit in units {
-        let mut plot = BarPlot::new(format!("Base parameters in {unit}"), unit)
+    for of_unit in units {
+        let mut plot = BarPlot::new(format!("Base parameters in {}", unit(of_unit)), unit(of_unit))
             .note("with 95 % error bars")
             .reference_label("by the description");
-        for p in r.base_parameters.iter().filter(|parameter| parameter.unit == unit) {
+        for p in r.base_parameters.iter().filter(|parameter| parameter.unit == of_unit) {
             let half_width = p.excited.then_some(p.half_width_95);
             plot = plot.bar(&p.expression, if p.excited { p.value } else { f64::NAN }, half_width, p.prior);
         }
@@ -180,7 +186,7 @@ fn parameters(page: &mut Report, r: &ResultFile) {
             Cell::judged(relative, if p.excited { tone } else { Tone::Bad }),
             optional(p.physical),
             optional(p.prior),
-            Cell::from(&p.unit),
+            Cell::from(unit(&p.unit)),
         ]
     };
     let columns = ["expression", "value", "std", "std, %", "possible set", "description", "unit"];
@@ -207,7 +213,7 @@ fn friction(page: &mut Report, r: &ResultFile) {
     for (name, laws) in owned.chain(coupled) {
         for law in laws {
             let std = law.std.map_or_else(String::new, |std| short(std, 3));
-            table = table.row([name.to_owned(), law.symbol.clone(), short(law.value, 5), std, law.unit.clone()]);
+            table = table.row([name.to_owned(), law.symbol.clone(), short(law.value, 5), std, unit(&law.unit)]);
         }
     }
     page.add(table);

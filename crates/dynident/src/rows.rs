@@ -42,7 +42,7 @@ pub(crate) struct RawSamples<'a> {
 pub(crate) trait RowSink {
     /// Rows as they leave the parallel filter.
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), Error>;
-    /// The same samples before the filter (panels with the torque as logged).
+    /// The same samples before the filter (panels with the torque as logged, or as smoothed with `smooth_torque`).
     fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), Error>;
 }
 
@@ -269,7 +269,7 @@ impl<'a> Computer<'a> {
                 &mut self.panels,
             );
             for (joint, &place) in log_place.iter().enumerate() {
-                let tau = &block.joint(&block.tau, place)[from..from + samples];
+                let tau = &block.joint(block.fitted_tau(), place)[from..from + samples];
                 self.panels.torque_mut(joint).copy_from_slice(tau);
             }
             sink.raw(&RawSamples { segment: block.segment, rate_hz: block.rate_hz, panels: &self.panels })?;

@@ -25,7 +25,7 @@
     }));
   }
 
-  const short = (value) => (value == null ? "–" : Math.abs(value) >= 1e5 || (value !== 0 && Math.abs(value) < 1e-3) ? value.toExponential(3) : String(+value.toPrecision(5)));
+  const short = (value) => (value == null ? "–" : Math.abs(value) >= 1e5 || (value !== 0 && Math.abs(value) < 1e-3) ? (+value.toPrecision(4)).toExponential() : String(+value.toPrecision(5)));
   const style = (name) => getComputedStyle(root).getPropertyValue(name).trim();
 
   // Error bars, drawn over the curves.

@@ -1,0 +1,64 @@
+//! Every kind of section on one page, written to the file that is named: for looking at.
+//!
+//! `cargo run -p dynident-report --example gallery -- gallery.html`
+
+use dynident_report::{
+    BarPlot, Cell, ConvergencePlot, Heading, HeatMap, KeyFigures, LinePlot, Report, Table, Text, Tone,
+};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let path = std::env::args().nth(1).unwrap_or_else(|| "gallery.html".to_owned());
+    let time: Vec<f64> = (0..200_000).map(|i| f64::from(i) * 1e-3).collect();
+    let torque = |scale: f64| -> Vec<f64> {
+        // A gap of ten seconds, and a spike of one sample.
+        let value = |t: f64| {
+            if (60.0..70.0).contains(&t) { f64::NAN } else { scale * (20.0 * (0.6 * t).sin() + 5.0 * (2.3 * t).cos()) }
+        };
+        time.iter().enumerate().map(|(i, t)| if i == 123_456 { 60.0 } else { value(*t) }).collect()
+    };
+    let mut page = Report::new("Gallery <of sections>").subtitle("what a page can hold; data made up");
+    page.add(Heading::new("Figures and words"));
+    page.add(
+        KeyFigures::new()
+            .judged("held-out torque error", "2.7 %", "second run", Tone::Good)
+            .judged("parameters identified", "52 of 54", "two are not excited", Tone::Warning)
+            .judged("physically possible", "no", "", Tone::Bad)
+            .figure("condition number", "48.6", ""),
+    );
+    page.add(Text::new("A paragraph.").point(Tone::Plain, "a point").point(Tone::Bad, "a bad one & its reason"));
+    page.add(Table::new("A table", ["joint", "viscous, Nm s", "verdict"]).note("click a name to sort").rows([
+        vec!["elbow".into(), "2.10".into(), Cell::judged("fine", Tone::Good)],
+        vec!["wrist".into(), "0.31".into(), Cell::judged("doubtful", Tone::Warning)],
+    ]));
+    page.add(Heading::new("Plots"));
+    page.add(
+        LinePlot::new("Torque of the elbow", "t, s", "Nm", time.clone())
+            .note("200 000 samples, a gap and a spike")
+            .line("measured", torque(1.0))
+            .dashed("predicted", torque(0.97)),
+    );
+    page.add(
+        ConvergencePlot::new("Tracking error", "rad")
+            .log_y()
+            .curve("joint 1", vec![0.6, 0.15, 2e-3, 4e-5])
+            .curve("joint 2", vec![0.2, 0.01, 1e-3, 5e-5]),
+    );
+    page.add(
+        ConvergencePlot::new("Parameters by run", "kg m²")
+            .curve_with_bars("θ4", vec![0.4, 1.1, 0.99], vec![0.3, 0.1, 0.02])
+            .curve_with_bars("θ5", vec![0.9, 0.8, 1.0], vec![0.2, 0.1, 0.02]),
+    );
+    page.add(
+        BarPlot::new("Base parameters", "kg m²")
+            .reference_label("by the description")
+            .bar("Izz1 + 0.0488149 m2 + 0.441882 my2 + Izz2 + 0.0024 m3", 0.91, Some(0.02), Some(0.95))
+            .bar("Ixy2", -0.4, Some(0.2), Some(-0.1))
+            .bar("not excited", f64::NAN, None, None),
+    );
+    let names: Vec<String> = (1..=12).map(|k| format!("θ{k}")).collect();
+    let value = |i: usize, j: usize| if i == j { 1.0 } else { ((i * 7 + j * 7) as f64).sin() * 0.8 };
+    let values = (0..12).map(|i| (0..12).map(|j| value(i, j)).collect()).collect();
+    page.add(HeatMap::new("Correlation", names.clone(), names, values).limit(1.0));
+    std::fs::write(path, page.html()?)?;
+    Ok(())
+}
