@@ -5,7 +5,8 @@ use dynident_dynamics::{Workspace, mass_matrix};
 use dynident_excitation::Motion;
 use dynident_experiment::controllers::{FiniteTimeSettings, JointPdSettings};
 use dynident_experiment::{
-    ControllerModel, ControllerSettings, ExperimentError, Integrator, LoopSettings, Plant, Reference, Start, closed_loop,
+    ControllerModel, ControllerSettings, ExperimentError, Integrator, LoopSettings, Plant, Reference, Start,
+    closed_loop,
 };
 use dynident_model::Model;
 use dynident_model::sample::Random;

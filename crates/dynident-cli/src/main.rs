@@ -56,6 +56,8 @@ enum Command {
     Identify(commands::identify::Options),
     /// Test a finished model on other logs.
     Validate(commands::validate::Options),
+    /// Reproduce the paper behind this program: every table and figure, as a page to look at.
+    Reproduce(commands::reproduce::Options),
     /// Compare estimators on simulated recordings with known truth: error over the Cramér-Rao bound, coverage of error bars.
     Benchmark(commands::benchmark::Options),
 }
@@ -89,6 +91,7 @@ fn main() -> ExitCode {
         Command::Design(options) => commands::design::run(&options, &context),
         Command::Identify(options) => commands::identify::run(&options, &context),
         Command::Validate(options) => commands::validate::run(&options, &context),
+        Command::Reproduce(options) => commands::reproduce::run(&options, &context),
         Command::Benchmark(options) => commands::benchmark::run(&options, &context),
     });
     match outcome {

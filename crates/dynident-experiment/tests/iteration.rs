@@ -58,9 +58,13 @@ fn worst(values: &[f64]) -> f64 {
 fn probe() {
     for scheme in [Scheme::AllJoints, Scheme::StepByStep] {
         let (reference, windows) = reference(&[1, 0], 1000.0);
-        let task = IterationTask { machine: machine(), legs: vec![Leg::windowed(reference, windows).unwrap()], known: vec![] };
+        let task =
+            IterationTask { machine: machine(), legs: vec![Leg::windowed(reference, windows).unwrap()], known: vec![] };
         let mut settings = IterationSettings {
-            model_free: ControllerSettings::JointPd(JointPdSettings { kp: vec![100.0, 16.0].into(), kd: vec![60.0, 8.0].into() }),
+            model_free: ControllerSettings::JointPd(JointPdSettings {
+                kp: vec![100.0, 16.0].into(),
+                kd: vec![60.0, 8.0].into(),
+            }),
             controller: ControllerSettings::FiniteTime(FiniteTimeSettings::with_gains(vec![2.0, 4.0], vec![20.0, 4.0])),
             max_runs: 6,
             ..IterationSettings::default()
@@ -72,9 +76,18 @@ fn probe() {
         let mut robot = robot(exact());
         let start = std::time::Instant::now();
         let outcome = iterate(&iteration, &mut [&mut robot], None, &mut |record, _| {
-            println!("{} {:?} acc {} {:?} err {:?} worst {:.2e} {:?}", record.run, record.controller.name, record.accepted, record.reason,
-                record.max_tracking_error_rad, record.estimate.as_ref().map_or(9.0, |e| worst(&e.values)), record.estimate.as_ref().map(|e| (&e.std, &e.fixed, &e.impossible)));
-        }).unwrap();
+            println!(
+                "{} {:?} acc {} {:?} err {:?} worst {:.2e} {:?}",
+                record.run,
+                record.controller.name,
+                record.accepted,
+                record.reason,
+                record.max_tracking_error_rad,
+                record.estimate.as_ref().map_or(9.0, |e| worst(&e.values)),
+                record.estimate.as_ref().map(|e| (&e.std, &e.fixed, &e.impossible))
+            );
+        })
+        .unwrap();
         println!("{:?} {:?}", outcome.status, start.elapsed());
     }
 }

@@ -31,6 +31,7 @@ mod output;
 mod physical;
 mod progress;
 mod report;
+mod reproduce;
 mod residuals;
 mod result;
 mod result_sections;
@@ -66,6 +67,7 @@ pub use job::RunOptions;
 pub use machine::Machine;
 pub use output::{check_writable, write_whole};
 pub use progress::{Progress, Silent};
+pub use reproduce::{Cell, Deviation, PAPER_SCHEMA, PaperFigure, PaperFile, PaperTable, Reached, reproduce};
 pub use residuals::{JointResiduals, TorqueBand};
 pub use result::{
     BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, LogValidation, MethodSummary,

@@ -5,6 +5,7 @@ pub(crate) mod design;
 pub(crate) mod evaluate;
 pub(crate) mod identify;
 pub(crate) mod inspect;
+pub(crate) mod reproduce;
 pub(crate) mod validate;
 
 use crate::progress::Bar;

@@ -6,6 +6,7 @@ mod findings;
 mod identification;
 mod inspection;
 mod noise;
+mod reproduction;
 mod text;
 mod validation;
 
@@ -13,4 +14,5 @@ pub(crate) use benchmark::benchmark;
 pub(crate) use design::design;
 pub(crate) use identification::identification;
 pub(crate) use inspection::inspection;
+pub(crate) use reproduction::reproduction;
 pub(crate) use validation::validation;

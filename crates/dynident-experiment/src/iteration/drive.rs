@@ -68,9 +68,7 @@ impl Iteration {
     pub fn controller_model(&self, parameters: &ModelParameters) -> Result<ControllerModel, ExperimentError> {
         let machine = &self.task.machine;
         match parameters {
-            ModelParameters::All(values) => {
-                ControllerModel::from_parameters(machine.model(), machine.laws(), values)
-            }
+            ModelParameters::All(values) => ControllerModel::from_parameters(machine.model(), machine.laws(), values),
             ModelParameters::Base(values) => {
                 ControllerModel::from_columns(machine.model(), &machine.base().base_columns(), values)
             }

@@ -136,4 +136,3 @@ fn all_rows(
     }
     Ok(problem.with_prior(mean, information)?)
 }
-

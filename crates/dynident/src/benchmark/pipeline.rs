@@ -23,8 +23,7 @@ pub(super) fn differentiated(record: &Record, cutoff_hz: f64) -> Result<MotionBl
 
 /// The record's motion by a Fourier series of the excitation's own frequencies, fitted to the positions: what is known of a periodic motion before the run.
 pub(super) fn periodic(record: &Record) -> Result<MotionBlock, FilterError> {
-    let settings =
-        DifferentiatorSettings::FourierFit { base_hz: 1.0 / DURATION_S, harmonics: HARMONICS, trend: false };
+    let settings = DifferentiatorSettings::FourierFit { base_hz: 1.0 / DURATION_S, harmonics: HARMONICS, trend: false };
     differentiated_by(&settings, record, 1.0)
 }
 

@@ -1,0 +1,31 @@
+//! `dynident reproduce --out DIR`.
+
+use super::{Context, json, pretty_json, told};
+use crate::{Verdict, summary, terminal};
+use dynident::{RunOptions, reproduce, write_whole};
+use std::path::PathBuf;
+
+/// Options of `reproduce`.
+#[derive(clap::Args)]
+pub(crate) struct Options {
+    /// Folder for paper.json, report.html, the pictures and the studies behind them.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Seed of the genetic algorithm and of random starts.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
+    let progress = context.progress();
+    let run = RunOptions { data: None, threads: context.threads, progress: &*progress };
+    let file = reproduce(&options.out, options.seed, &run).map_err(told)?;
+    // The JSON last: where it stands, everything stands.
+    write_whole(&options.out.join("paper.json"), &pretty_json(&file)?).map_err(told)?;
+    if context.json {
+        terminal::print(&json(&file)?);
+    } else if !context.quiet {
+        terminal::print(&summary::reproduction(&file, &options.out));
+    }
+    Ok(if file.reached.iter().all(|goal| goal.met) { Verdict::Good } else { Verdict::Negative })
+}
