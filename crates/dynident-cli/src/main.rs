@@ -21,6 +21,7 @@ use std::process::ExitCode;
         3. dynident identify study.toml --out R  fit, test on held-out logs, write R/result.json and R/identified.urdf\n  \
         4. dynident validate R/result.json --study other.toml\n  \
         5. load R/identified.urdf into your controller or simulator\n\n\
+        dynident iterate runs a robot again and again, each time with the better model; simulate runs it once.\n\
         dynident benchmark compares the estimators on simulated recordings with known truth."
 )]
 struct Arguments {
@@ -56,6 +57,10 @@ enum Command {
     Identify(commands::identify::Options),
     /// Test a finished model on other logs.
     Validate(commands::validate::Options),
+    /// Let a simulated robot run a trajectory under a controller: a log, and the truth beside it.
+    Simulate(commands::simulate::Options),
+    /// Run, identify, load the better model and run again, until all has settled.
+    Iterate(commands::iterate::Options),
     /// Reproduce the paper behind this program: every table and figure, as a page to look at.
     Reproduce(commands::reproduce::Options),
     /// Compare estimators on simulated recordings with known truth: error over the Cramér-Rao bound, coverage of error bars.
@@ -91,6 +96,8 @@ fn main() -> ExitCode {
         Command::Design(options) => commands::design::run(&options, &context),
         Command::Identify(options) => commands::identify::run(&options, &context),
         Command::Validate(options) => commands::validate::run(&options, &context),
+        Command::Simulate(options) => commands::simulate::run(&options, &context),
+        Command::Iterate(options) => commands::iterate::run(&options, &context),
         Command::Reproduce(options) => commands::reproduce::run(&options, &context),
         Command::Benchmark(options) => commands::benchmark::run(&options, &context),
     });

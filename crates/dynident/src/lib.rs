@@ -23,6 +23,7 @@ mod identify;
 mod inspect;
 mod instrument_rows;
 mod instruments;
+mod iterate;
 mod job;
 mod lag;
 mod machine;
@@ -36,6 +37,8 @@ mod residuals;
 mod result;
 mod result_sections;
 mod rows;
+mod simulate;
+mod simulation;
 mod standard_parameters;
 mod study;
 mod torque_trace;
@@ -45,6 +48,7 @@ mod written_urdf;
 pub use dynident_dynamics as dynamics;
 pub use dynident_estimation as estimation;
 pub use dynident_excitation as excitation;
+pub use dynident_experiment as experiment;
 pub use dynident_model as model;
 pub use dynident_recording as recording;
 
@@ -63,6 +67,10 @@ pub use friction_section::{FrictionChoice, FrictionLaw};
 pub use identify::{Identification, identify, identify_with_instruments};
 pub use inspect::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary, inspect};
 pub use instruments::{InstrumentSection, InstrumentSource, SmoothedMotion};
+pub use iterate::{
+    ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationSection, IterationWatch, IterationsFile, PriorChoice,
+    RobotChoice, iterate_study,
+};
 pub use job::RunOptions;
 pub use machine::Machine;
 pub use output::{check_writable, write_whole};
@@ -74,6 +82,8 @@ pub use result::{
     PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, Timings,
     TrainingJoint, TrainingResult,
 };
+pub use simulate::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, Simulation, SimulationFile, simulate_study};
+pub use simulation::{SimulatedTruth, SimulationSection};
 pub use study::{
     CoulombChoice, CouplingSection, DriveSection, EstimatorMethod, EstimatorSection, Folders, JointDrive, LogSection,
     ParallelFilterSection, RobotSection, Role, Study,

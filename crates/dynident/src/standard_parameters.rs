@@ -1,6 +1,7 @@
 //! From base parameters back to a full set: one of the many that give the same torque, as near to the prior as can be.
 
 use dynident_dynamics::{BaseParameters, Column};
+use dynident_experiment::iteration::typical_length_m;
 use dynident_model::laws::Law;
 use dynident_model::{InertialParameters, Model};
 use nalgebra::{DMatrix, DVector};
@@ -37,12 +38,6 @@ pub(crate) fn nearest_to_prior(model: &Model, base: &BaseParameters, theta: &[f6
     let multipliers = gram.cholesky().map_or_else(|| gap.clone(), |factor| factor.solve(&gap));
     let change = weighted * multipliers;
     prior.iter().zip(change.iter()).map(|(prior, change)| prior + change).collect()
-}
-
-/// A length that the machine's links have: the mean distance between successive joints, at least a centimetre.
-pub(crate) fn typical_length_m(model: &Model) -> f64 {
-    let lengths: Vec<f64> = model.joints().iter().map(|joint| joint.placement.translation.norm()).collect();
-    (lengths.iter().sum::<f64>() / lengths.len().max(1) as f64).max(0.01)
 }
 
 /// The bodies' share of a full parameter vector.

@@ -4,7 +4,10 @@ use crate::design::DesignSection;
 use crate::error::Error;
 use crate::friction_section::{FrictionChoice, FrictionLaw};
 use crate::instruments::InstrumentSection;
+use crate::iterate::IterationSection;
+use crate::simulation::SimulationSection;
 use dynident_estimation::{CovarianceMethod, EssentialSettings, RankSettings, SegmentSettings};
+use dynident_experiment::ControllerSettings;
 use dynident_model::line_and_column;
 use dynident_recording::{LogFormat, MotionSettings, ReferenceSettings};
 use serde::{Deserialize, Serialize};
@@ -71,6 +74,15 @@ pub struct Study {
     /// The excitation trajectory that `design` looks for.
     #[serde(default)]
     pub design: Option<DesignSection>,
+    /// The controller of `simulate`, and of `iterate` once there is a model.
+    #[serde(default)]
+    pub controller: Option<ControllerSettings>,
+    /// The robot that `simulate` and `iterate` simulate.
+    #[serde(default)]
+    pub simulation: Option<SimulationSection>,
+    /// How `iterate` goes about it.
+    #[serde(default)]
+    pub iteration: Option<IterationSection>,
     /// The logs; only `design` needs none.
     #[serde(default)]
     pub log: Vec<LogSection>,

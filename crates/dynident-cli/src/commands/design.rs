@@ -1,10 +1,9 @@
 //! `dynident design STUDY.toml --out DIR`.
 
+use super::search::Search;
 use super::{Context, json, pretty_json, told, told_in};
 use crate::{Verdict, summary, terminal};
 use clap::ValueEnum;
-use core::ops::ControlFlow;
-use core::sync::atomic::{AtomicBool, Ordering};
 use dynident::excitation::DesignProgress;
 use dynident::excitation::export::{
     Preview, Sampled, UrScriptSettings, fitness_csv, fitness_svg, path_svg, preview_svg, ros2_joint_trajectory,
@@ -13,14 +12,10 @@ use dynident::excitation::export::{
 use dynident::{
     DesignOutcome, RunOptions, Study, check_log, check_trajectory, check_writable, design_study, write_whole,
 };
-use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 
 /// Rate of the picture, Hz.
 const PICTURE_RATE_HZ: f64 = 100.0;
-
-/// Set by Ctrl-C: the search ends with the best so far.
-static STOP: AtomicBool = AtomicBool::new(false);
 
 /// Options of `design`.
 #[derive(clap::Args)]
@@ -71,32 +66,18 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         study.design.get_or_insert_default().search.seed = seed;
     }
     check_writable(&options.out).map_err(told)?;
-    // Without a handler Ctrl-C ends the program as ever.
-    let _ = ctrlc::set_handler(|| {
-        if STOP.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    });
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
-    let line = (!context.quiet && terminal::watched()).then(line);
-    let watch = |at: &DesignProgress| {
-        if let Some(line) = &line {
-            line.set_message(state(at));
-            line.tick();
-        }
-        if STOP.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    };
+    let search = Search::new(context);
+    let watch = |at: &DesignProgress| search.hear(at);
     let outcome = match (&options.check, &options.check_log) {
         (Some(trajectory), _) => check_trajectory(&study, &options.study, trajectory, &run),
         (None, Some(log)) => check_log(&study, &options.study, log, &run),
         (None, None) => design_study(&study, &options.study, &run, watch),
     };
     let outcome = outcome.map_err(told_in(&options.study))?;
-    if let Some(line) = line {
-        line.finish_and_clear();
-    }
-    if STOP.load(Ordering::Relaxed) {
+    search.end();
+    if Search::stopped() {
         terminal::remark("stopped: this is the best motion so far");
     }
     let files = files(&outcome, options)?;
@@ -163,22 +144,4 @@ fn files(outcome: &DesignOutcome, options: &Options) -> Result<Vec<(&'static str
         });
     }
     Ok(files)
-}
-
-/// The line that a person watches.
-fn line() -> ProgressBar {
-    let line = ProgressBar::new_spinner();
-    if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {wide_msg}") {
-        line.set_style(style);
-    }
-    line
-}
-
-fn state(at: &DesignProgress) -> String {
-    let limits = if at.violation <= 1e-6 {
-        "inside all limits".to_owned()
-    } else {
-        format!("{:.2} % over a limit", 100.0 * at.violation)
-    };
-    format!("{}: criterion {:.4}, {limits}; Ctrl-C keeps the best", at.round, at.value)
 }

@@ -5,6 +5,9 @@ pub(crate) mod design;
 pub(crate) mod evaluate;
 pub(crate) mod identify;
 pub(crate) mod inspect;
+pub(crate) mod iterate;
+mod search;
+pub(crate) mod simulate;
 pub(crate) mod reproduce;
 pub(crate) mod validate;
 

@@ -71,6 +71,10 @@ pub fn identify_run(
     let fallback = task.machine.base().values(task.machine.prior());
     let problem = all_rows(task, &motions, settings, &names, &joints, &fallback)?;
     let count = names.len();
+    if problem.joint_rows().iter().sum::<usize>() == 0 {
+        let problem = "no sample counts: the differentiator applies nowhere in the windows; look at its settings and at the tracking error".to_owned();
+        return Err(IterationError::Record { joints, problem });
+    }
     let (values, covariance, joint_sigma, fixed, rows) = match settings.scheme {
         Scheme::AllJoints => {
             let estimate = least_squares(&problem, settings)?;

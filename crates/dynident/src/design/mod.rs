@@ -20,6 +20,7 @@ pub use optimiser::OptimiserChoice;
 pub use prior::PriorSection;
 pub use section::{CriterionChoice, DesignSection, FamilyChoice, TorqueNoise};
 pub use start_posture::StartPosture;
+pub(crate) use table::trajectory as trajectory_table;
 pub use windows::{GivenStroke, StrokeFile, StrokeLimitFile, WindowedCondition, WindowedFile, WindowedProblem};
 
 use crate::cpu_time::cpu_seconds;
@@ -60,6 +61,11 @@ pub struct DesignOutcome {
 }
 
 impl DesignOutcome {
+    /// The family of the motion; its parameters are the file's.
+    pub fn family(&self) -> &dyn Family {
+        &*self.family
+    }
+
     /// The times `0, 1/rate, ..` up to the end, which stands last even if the rate does not divide the duration, and the motion there; of a log with gaps that of its longest piece.
     pub fn sampled(&self, rate_hz: f64) -> (Vec<f64>, Motion) {
         let duration_s = self.family.duration_s();

@@ -1,0 +1,54 @@
+//! `dynident iterate STUDY.toml --out DIR`.
+
+use super::search::Search;
+use super::{Context, json, told, told_in};
+use crate::{Verdict, summary, terminal};
+use dynident::{IterationWatch, RunOptions, Study, check_writable, iterate_study};
+use std::path::PathBuf;
+
+/// Options of `iterate`.
+#[derive(clap::Args)]
+pub(crate) struct Options {
+    /// The study file.
+    study: PathBuf,
+    /// Folder for iterations.json, trajectory.json and runs/.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Make every run anew: by default runs that are in the folder already are not made again.
+    #[arg(long)]
+    fresh: bool,
+    /// Seed of the simulated sensors' noise, in place of the study's.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Folder of the robot description, in place of the study's own.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+}
+
+pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
+    let mut study = Study::load(&options.study).map_err(told)?;
+    if let Some(seed) = options.seed {
+        study.simulation.get_or_insert_default().sensors.seed = seed;
+    }
+    check_writable(&options.out).map_err(told)?;
+    let progress = context.progress();
+    let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
+    let search = Search::new(context);
+    let most = study.iteration.as_ref().map_or_else(
+        || dynident::IterationSection::default().max_runs,
+        |section| section.max_runs,
+    );
+    progress.begin("runs", Some(most as u64));
+    let mut hear = |_: &_, _: &[_]| progress.advance(1);
+    let mut watch = IterationWatch { design: &|at| search.hear(at), run: &mut hear };
+    let file = iterate_study(&study, &options.study, &options.out, !options.fresh, &run, &mut watch);
+    progress.end();
+    let file = file.map_err(told_in(&options.study))?;
+    search.end();
+    if context.json {
+        terminal::print(&json(&file)?);
+    } else if !context.quiet {
+        terminal::print(&summary::iteration(&file, &options.out));
+    }
+    Ok(if file.converged { Verdict::Good } else { Verdict::Negative })
+}

@@ -1,0 +1,46 @@
+//! `dynident simulate STUDY.toml --out DIR`.
+
+use super::search::Search;
+use super::{Context, json, pretty_json, told, told_in};
+use crate::{Verdict, summary, terminal};
+use dynident::{RunOptions, Study, check_writable, simulate_study, write_whole};
+use std::path::PathBuf;
+
+/// Options of `simulate`.
+#[derive(clap::Args)]
+pub(crate) struct Options {
+    /// The study file.
+    study: PathBuf,
+    /// Folder for log.csv and truth.json.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Seed of the sensors' noise, in place of the study's.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Folder of the robot description, in place of the study's own.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+}
+
+pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
+    let mut study = Study::load(&options.study).map_err(told)?;
+    if let Some(seed) = options.seed {
+        study.simulation.get_or_insert_default().sensors.seed = seed;
+    }
+    check_writable(&options.out).map_err(told)?;
+    let progress = context.progress();
+    let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
+    let search = Search::new(context);
+    let simulation =
+        simulate_study(&study, &options.study, &run, &|at| search.hear(at)).map_err(told_in(&options.study))?;
+    search.end();
+    write_whole(&options.out.join("log.csv"), simulation.log.as_bytes()).map_err(told)?;
+    // The truth last: where it stands, everything stands.
+    write_whole(&options.out.join("truth.json"), &pretty_json(&simulation.file)?).map_err(told)?;
+    if context.json {
+        terminal::print(&json(&simulation.file)?);
+    } else if !context.quiet {
+        terminal::print(&summary::simulation(&simulation.file, &options.out));
+    }
+    Ok(if simulation.file.done { Verdict::Good } else { Verdict::Negative })
+}

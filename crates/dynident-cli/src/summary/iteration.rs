@@ -1,0 +1,79 @@
+//! The summaries of `iterate` and `simulate`.
+
+use super::text::{table, wrapped};
+use dynident::{IterationRun, IterationsFile, SimulationFile};
+use std::path::Path;
+
+/// An iteration: its verdict, run by run, and where the files are.
+pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
+    let runs = file.runs.len();
+    let mut text = wrapped(&format!("{}: {} ({runs} runs of {:.1} s)", file.name, file.reason, file.duration_s), 4);
+    text.push('\n');
+    let header = ["run", "controller", "tracking", "change", "error", "verdict"].map(str::to_owned);
+    let rows = file.runs.iter().enumerate().map(|(place, run)| row(run, place.checked_sub(1).map(|k| &file.runs[k])));
+    text += &table(&header, 2..5, rows.collect());
+    text += "  tracking: largest distance from the trajectory, rad (m); change: of the\n  parameters, in error bars; error: largest, where the truth is known\n\n";
+    for run in file.runs.iter().filter(|run| !run.accepted) {
+        if let Some(reason) = &run.reason {
+            text += &wrapped(&format!("run {} does not count: {reason}", run.run), 4);
+        }
+    }
+    if let Some(improvement) = file.tracking_improvement {
+        text += &wrapped(&format!("Tracking error down by a factor of {improvement:.1}."), 4);
+    }
+    if let Some(ratio) = file.error_over_bound {
+        text += &wrapped(
+            &format!("Last estimate: error over the Cramér-Rao bound {ratio:.2} (root mean square over parameters)."),
+            4,
+        );
+    }
+    text += &wrapped(&format!("Written: {}", out.join("iterations.json").display()), 4);
+    text
+}
+
+fn row(run: &IterationRun, before: Option<&IterationRun>) -> Vec<String> {
+    let tracking = run.max_tracking_error_rad.iter().fold(0.0_f64, |most, error| most.max(*error));
+    let change = before.filter(|before| before.parameters.len() == run.parameters.len() && !run.parameters.is_empty());
+    let change = change.map(|before| {
+        let pairs = run.parameters.iter().zip(&before.parameters);
+        let each = pairs.filter_map(|(new, old)| {
+            let bar = new.std?.hypot(old.std?);
+            (bar > 0.0).then(|| (new.value - old.value).abs() / bar)
+        });
+        each.fold(0.0, f64::max)
+    });
+    let errors = run.parameters.iter().filter_map(|parameter| parameter.error.map(f64::abs));
+    let error = errors.fold(None, |most: Option<f64>, error| Some(most.map_or(error, |most| most.max(error))));
+    let damped = if run.damping < 1.0 { format!(" ({:.3} step)", run.damping) } else { String::new() };
+    let dash = || "-".to_owned();
+    vec![
+        run.run.to_string(),
+        format!("{}{damped}", run.controller),
+        format!("{tracking:.2e}"),
+        change.map_or_else(dash, |change| format!("{change:.1}")),
+        error.map_or_else(dash, |error| format!("{error:.2e}")),
+        if run.accepted { "good".to_owned() } else { "rejected".to_owned() },
+    ]
+}
+
+/// A simulated run.
+pub(crate) fn simulation(file: &SimulationFile, out: &Path) -> String {
+    let mut text = wrapped(
+        &format!(
+            "{}: {}, {} samples at {} Hz under {}",
+            file.name, file.status, file.samples, file.rate_hz, file.controller
+        ),
+        4,
+    );
+    text.push('\n');
+    let header = ["joint", "tracking error", "torque cut"].map(str::to_owned);
+    let rows = file.joints.iter().zip(&file.max_tracking_error_rad).zip(&file.saturated_samples);
+    let rows = rows.map(|((joint, error), cut)| vec![super::text::name(joint), format!("{error:.2e}"), cut.to_string()]);
+    text += &table(&header, 1..3, rows.collect());
+    text += "  tracking error: largest, rad (m); torque cut: samples at the effort limit\n\n";
+    text += &wrapped(
+        &format!("Written: {}, {}", out.join("log.csv").display(), out.join("truth.json").display()),
+        4,
+    );
+    text
+}

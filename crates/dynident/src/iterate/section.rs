@@ -1,0 +1,166 @@
+//! `[iteration]`: how a study's robot is run, identified and run again.
+
+use crate::study::{EstimatorMethod, Study};
+use dynident_experiment::ControllerSettings;
+use dynident_experiment::iteration::{
+    IterationSettings, RunEstimator, RunIdentificationSettings, Scheme, SettledSettings, StartWith,
+};
+use dynident_experiment::robot::{FolderSettings, ProcessSettings};
+use dynident_recording::{DecimationSettings, DifferentiatorSettings};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// Which robot runs the trajectories.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum RobotChoice {
+    /// The simulator, as `[simulation]` says.
+    #[default]
+    Simulation,
+    /// Another program over the line protocol.
+    Process(ProcessSettings),
+    /// A person: files out, a log in.
+    Folder(FolderSettings),
+}
+
+/// What is believed of the bodies before any run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PriorChoice {
+    /// What the description says.
+    #[default]
+    Description,
+    /// Nothing.
+    None,
+}
+
+/// `[iteration]`, all of it optional.
+///
+/// ```
+/// let section: dynident::IterationSection = toml::from_str(
+///     r#"
+///     scheme = "step-by-step"
+///     prior = "none"
+///     model_free = { kind = "joint-pd", kp = [100.0, 16.0], kd = [60.0, 8.0] }
+///     max_runs = 6
+///     differentiator = { method = "deviation", smoother = { method = "butterworth", cutoff_hz = 5.0 } }
+///     settled = { tracking_tolerance = 1e-3 }
+///     "#,
+/// )?;
+/// assert_eq!(section.max_runs, 6);
+/// # Ok::<(), toml::de::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct IterationSection {
+    /// A trajectory to run (`t_s, q1.., dq1.., ddq1..`), in place of the one that `[design]` leads to.
+    pub trajectory: Option<PathBuf>,
+    /// Which robot runs it; the simulator by default.
+    pub robot: RobotChoice,
+    /// What is believed of the bodies before any run; what the description says by default.
+    pub prior: PriorChoice,
+    /// Under what the first run is: `"model-free"` (the default) or `"prior"`.
+    pub start: StartWith,
+    /// All joints at once, or step by step.
+    pub scheme: Scheme,
+    /// The paper's scheme as it stands: no possible machine is asked for and nothing is rejected. False by default.
+    pub literal: bool,
+    /// From positions to speeds and accelerations; `deviation` from the trajectory by default.
+    pub differentiator: DifferentiatorSettings,
+    /// Low-pass and decimation of torque and regressor alike; none by default.
+    pub parallel_filter: Option<DecimationSettings>,
+    /// Whether recorded torques are held from sample to sample; true by default.
+    pub held_torque: bool,
+    /// The controller without a model; joint PD.
+    pub model_free: ControllerSettings,
+    /// Tracking this many times worse than that of the last good run rejects a run.
+    pub worse_factor: f64,
+    /// How often a step is halved before the controller without a model comes back.
+    pub most_halvings: usize,
+    /// By how much its gains grow each time.
+    pub stiffen: f64,
+    /// Failed runs without a model before the robot counts as one that cannot follow.
+    pub most_model_free: usize,
+    /// Most runs.
+    pub max_runs: usize,
+    /// When all has settled.
+    pub settled: SettledSettings,
+}
+
+impl Default for IterationSection {
+    fn default() -> Self {
+        let IterationSettings {
+            identification,
+            start,
+            model_free,
+            worse_factor,
+            most_halvings,
+            stiffen,
+            most_model_free,
+            max_runs,
+            settled,
+            ..
+        } = IterationSettings::default();
+        Self {
+            trajectory: None,
+            robot: RobotChoice::default(),
+            prior: PriorChoice::default(),
+            start,
+            scheme: identification.scheme,
+            literal: false,
+            differentiator: identification.differentiator,
+            parallel_filter: identification.parallel_filter,
+            held_torque: identification.held_torque,
+            model_free,
+            worse_factor,
+            most_halvings,
+            stiffen,
+            most_model_free,
+            max_runs,
+            settled,
+        }
+    }
+}
+
+impl IterationSection {
+    /// The settings of the iteration, with the study's `[controller]` and `[estimator]`.
+    ///
+    /// # Errors
+    /// In words: an estimator that a run cannot be identified with.
+    pub(crate) fn settings(&self, study: &Study) -> Result<IterationSettings, String> {
+        let estimator = match study.estimator.method {
+            EstimatorMethod::Ordinary => RunEstimator::Ordinary,
+            EstimatorMethod::Weighted => RunEstimator::Weighted,
+            other => {
+                return Err(format!(
+                    "[estimator] method = \"{}\": an iteration takes \"ordinary\" or \"weighted\"",
+                    other.name()
+                ));
+            }
+        };
+        self.differentiator.validate().map_err(|error| format!("[iteration] differentiator: {error}"))?;
+        let default = IterationSettings::default();
+        Ok(IterationSettings {
+            identification: RunIdentificationSettings {
+                scheme: self.scheme,
+                differentiator: self.differentiator.clone(),
+                parallel_filter: self.parallel_filter.clone(),
+                held_torque: self.held_torque,
+                estimator,
+                covariance: study.estimator.covariance,
+                rank: study.estimator.rank,
+                physical: study.estimator.physical && !self.literal,
+            },
+            start: self.start,
+            model_free: self.model_free.clone(),
+            controller: study.controller.clone().unwrap_or(default.controller),
+            reject: !self.literal,
+            worse_factor: self.worse_factor,
+            most_halvings: self.most_halvings,
+            stiffen: self.stiffen,
+            most_model_free: self.most_model_free,
+            max_runs: self.max_runs,
+            settled: self.settled.clone(),
+        })
+    }
+}

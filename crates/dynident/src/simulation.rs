@@ -1,0 +1,204 @@
+//! `[simulation]`: the robot that is simulated, where it differs from its description, its sensors and limits.
+
+use crate::machine::Machine;
+use dynident_experiment::{
+    ExperimentError, Integrator, LoopSettings, PerJoint, Plant, RunLimits, SensorSettings, SimulatedRobot, Start,
+    with_length_errors,
+};
+use dynident_model::laws::Law;
+use dynident_model::sample::Random;
+use dynident_model::{InertialParameters, Model};
+use nalgebra::Matrix4;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Spread of the lengths of a body whose mass is off by one: mass distributions differ in shape as well, by a third of that.
+const SHAPE_SHARE: f64 = 1.0 / 3.0;
+
+/// `[simulation]`, all of it optional: a robot as described, without friction, with perfect sensors.
+///
+/// ```
+/// let section: dynident::SimulationSection = toml::from_str(
+///     "off_percent = 30.0\nviscous = 5.0\ncoulomb = [8.0, 8.0]\nsensors = { position_std = 1.7e-5, torque_std = 0.05 }",
+/// )?;
+/// assert!(section.validate(2).is_ok() && section.validate(3).is_err());
+/// # Ok::<(), toml::de::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SimulationSection {
+    /// Samples a second of the controller; 1000 by default.
+    pub rate_hz: f64,
+    /// By how many percent the bodies differ from the description: every mass is that much larger or smaller, and lengths within bodies by up to a third of it; always possible bodies. 0 by default.
+    pub off_percent: f64,
+    /// Viscous friction of the joints, Nm s/rad (N s/m); 0 by default. It is there if `[drive]` has it, as are the following.
+    pub viscous: PerJoint,
+    /// Coulomb friction, Nm (N); 0 by default.
+    pub coulomb: PerJoint,
+    /// Drive inertia, kg m² (kg); 0 by default.
+    pub drive_inertia: PerJoint,
+    /// Constant torques, Nm (N); 0 by default.
+    pub offset: PerJoint,
+    /// Parameters of laws by their symbols (`fs1 = 2.0`), in place of the above.
+    pub laws: BTreeMap<String, f64>,
+    /// Standard deviation of the joints' true places from the described ones, m; 0 by default.
+    pub length_std_m: f64,
+    /// The same of their axes, rad.
+    pub angle_std_rad: f64,
+    /// How the robot is integrated; semi-implicit Euler with one step a sample by default.
+    pub integrator: Integrator,
+    /// Where a run starts; on the reference by default.
+    pub start: Start,
+    /// Whether torques are cut at the description's effort limits; true by default.
+    pub effort_limits: bool,
+    /// Further limits, in place of the description's.
+    pub limits: RunLimits,
+    /// Sensors; perfect by default.
+    pub sensors: SensorSettings,
+    /// Seed of what differs from the description; 1 by default. Noise has its own in `sensors`.
+    pub seed: u64,
+}
+
+impl Default for SimulationSection {
+    fn default() -> Self {
+        Self {
+            rate_hz: 1000.0,
+            off_percent: 0.0,
+            viscous: 0.0.into(),
+            coulomb: 0.0.into(),
+            drive_inertia: 0.0.into(),
+            offset: 0.0.into(),
+            laws: BTreeMap::new(),
+            length_std_m: 0.0,
+            angle_std_rad: 0.0,
+            integrator: Integrator::default(),
+            start: Start::default(),
+            effort_limits: true,
+            limits: RunLimits::default(),
+            sensors: SensorSettings::default(),
+            seed: 1,
+        }
+    }
+}
+
+/// The simulated robot and its true parameters.
+#[derive(Debug)]
+pub struct SimulatedTruth {
+    /// The robot.
+    pub robot: SimulatedRobot,
+    /// Its bodies.
+    pub model: Model,
+    /// All parameters: ten for each body, one for each law.
+    pub parameters: Vec<f64>,
+    /// The same in the base parameters that the study looks for.
+    pub base_values: Vec<f64>,
+}
+
+impl SimulationSection {
+    /// Checks the numbers for so many joints.
+    ///
+    /// # Errors
+    /// In words, with the key and the mend.
+    pub fn validate(&self, joints: usize) -> Result<(), String> {
+        let said = |error: ExperimentError| error.to_string();
+        if !(1.0..=1e6).contains(&self.rate_hz) {
+            return Err(format!("rate_hz = {}: give 1 to 1e6 samples a second", self.rate_hz));
+        }
+        if !(0.0..=90.0).contains(&self.off_percent) {
+            return Err(format!("off_percent = {}: give 0 to 90", self.off_percent));
+        }
+        for (what, values) in
+            [("viscous", &self.viscous), ("coulomb", &self.coulomb), ("drive_inertia", &self.drive_inertia)]
+        {
+            values
+                .values(what, joints, "give zero or a finite positive number", |x| x >= 0.0 && x.is_finite())
+                .map_err(said)?;
+        }
+        self.offset.values("offset", joints, "give a finite number", f64::is_finite).map_err(said)?;
+        self.loop_settings(None).validate(joints).map_err(said)
+    }
+
+    fn loop_settings(&self, model: Option<&Model>) -> LoopSettings {
+        let mut limits = self.limits.clone();
+        if let Some(model) = model.filter(|_| self.effort_limits && limits.torque.is_none()) {
+            limits.torque = RunLimits::of_model(model).torque;
+        }
+        LoopSettings {
+            integrator: self.integrator,
+            start: self.start.clone(),
+            limits,
+            sensors: self.sensors.clone(),
+            accelerations: false,
+        }
+    }
+
+    /// The robot that a machine's description becomes.
+    ///
+    /// # Errors
+    /// In words: numbers that do not fit, bodies without inertials, laws without a parameter, a robot that cannot be simulated.
+    pub fn truth(&self, machine: &Machine) -> Result<SimulatedTruth, String> {
+        let described = &machine.model;
+        self.validate(described.dof())?;
+        let unknown = described.bodies_without_prior();
+        if !unknown.is_empty() {
+            return Err(format!("the description has no inertial of {}: a simulation needs them", unknown.join(", ")));
+        }
+        let said = |error: ExperimentError| error.to_string();
+        let bodies = self.bodies(described);
+        let model = described.with_inertials(&bodies).map_err(|error| error.to_string())?;
+        let model = with_length_errors(&model, self.length_std_m, self.angle_std_rad, self.seed).map_err(said)?;
+        let symbols: Vec<String> = machine.laws.iter().map(Law::symbol).collect();
+        if let Some(other) = self.laws.keys().find(|symbol| !symbols.contains(symbol)) {
+            return Err(format!("laws.{other}: [drive] has no such law; it has {}", symbols.join(", ")));
+        }
+        let law_parameters = machine
+            .laws
+            .iter()
+            .zip(&symbols)
+            .map(|(law, symbol)| match (self.laws.get(symbol), law) {
+                (Some(value), _) => Ok(*value),
+                (None, Law::Viscous(law)) => Ok(self.viscous.of(law.joint)),
+                (None, Law::Coulomb(law)) => Ok(self.coulomb.of(law.joint)),
+                (None, Law::DriveInertia(law)) => Ok(self.drive_inertia.of(law.joint)),
+                (None, Law::Offset(law)) => Ok(self.offset.of(law.joint)),
+                (None, _) => Err(format!("laws: say what {symbol} is ({symbol} = ...)")),
+            })
+            .collect::<Result<Vec<f64>, _>>()?;
+        let mut parameters = model.parameter_vector();
+        parameters.extend_from_slice(&law_parameters);
+        let plant = Plant::new(&model, &machine.laws, &law_parameters).map_err(said)?;
+        let robot = SimulatedRobot::new(plant, self.loop_settings(Some(described))).map_err(said)?;
+        let base_values = machine.base.values(&parameters);
+        Ok(SimulatedTruth { robot, model, parameters, base_values })
+    }
+
+    /// The bodies as they truly are. The pseudo-inertia P becomes s D P D with a diagonal D: still a mass distribution.
+    fn bodies(&self, model: &Model) -> Vec<InertialParameters> {
+        let mut random = Random::new(self.seed);
+        let off = 0.01 * self.off_percent;
+        let stretched = |inertial: &InertialParameters, random: &mut Random| {
+            let sign = if random.bits() & 1 == 0 { 1.0 } else { -1.0 };
+            let mut stretch = Matrix4::identity();
+            for axis in 0..3 {
+                stretch[(axis, axis)] = 1.0 + SHAPE_SHARE * random.uniform(-off, off);
+            }
+            let p = (1.0 + sign * off) * stretch * inertial.pseudo_inertia() * stretch;
+            // From second moments back to inertia: I = tr(S) 1 - S.
+            let trace = p[(0, 0)] + p[(1, 1)] + p[(2, 2)];
+            InertialParameters([
+                p[(3, 3)],
+                p[(0, 3)],
+                p[(1, 3)],
+                p[(2, 3)],
+                trace - p[(0, 0)],
+                -p[(0, 1)],
+                -p[(0, 2)],
+                trace - p[(1, 1)],
+                -p[(1, 2)],
+                trace - p[(2, 2)],
+            ])
+        };
+        let bodies = model.inertials().iter();
+        if off == 0.0 { bodies.copied().collect() } else { bodies.map(|body| stretched(body, &mut random)).collect() }
+    }
+}
