@@ -4,7 +4,7 @@ use crate::error::{FilterError, RecordingError};
 use crate::format::{ChannelGroup, ColumnRef, Columns, LogFormat, TimeColumn};
 use crate::logistic_path::LogisticPath;
 use crate::reader::{LogReader, RawBlock};
-use crate::stroke::{Stroke, strokes_of};
+use crate::stroke::{Stroke, between, share_rests, strokes_of};
 use std::path::Path;
 
 /// Most samples of a sampled reference.
@@ -167,6 +167,25 @@ impl Reference {
         self
     }
 
+    /// The same with strokes between successive `boundaries_s` (seconds after its own start) in place of those between rests: for motions that turn without resting. Joints that never move keep none.
+    ///
+    /// # Errors
+    /// [`FilterError::Reference`] for fewer than two boundaries, or boundaries that are not finite or do not increase.
+    pub fn with_boundaries(mut self, boundaries_s: &[f64]) -> Result<Self, FilterError> {
+        check_boundaries(boundaries_s)?;
+        let start_s = core::mem::take(&mut self.start_s);
+        for joint in 0..self.joints.len() {
+            if self.joints[joint].peak[0] > 0.0 {
+                let stroke = |ends: &[f64]| between(ends[0], ends[1], |t| (self.at(joint, t)[1], self.rests(joint, t)));
+                let mut strokes: Vec<Stroke> = boundaries_s.windows(2).map(stroke).collect();
+                share_rests(&mut strokes);
+                self.joints[joint].strokes = strokes;
+            }
+        }
+        self.start_s = start_s;
+        Ok(self)
+    }
+
     /// The same for joints in another order: joint `j` of the new reference is joint `order[j]` of this one; `None` if there is no such joint.
     pub fn reordered(&self, order: &[usize]) -> Option<Self> {
         let joints = order.iter().map(|&joint| self.joints.get(joint).cloned()).collect::<Option<Vec<_>>>()?;
@@ -236,6 +255,15 @@ impl Reference {
     }
 }
 
+/// Two times or more that increase.
+pub(crate) fn check_boundaries(boundaries_s: &[f64]) -> Result<(), FilterError> {
+    let finite = boundaries_s.iter().all(|t| t.is_finite());
+    if boundaries_s.len() >= 2 && finite && boundaries_s.windows(2).all(|pair| pair[1] > pair[0]) {
+        return Ok(());
+    }
+    Err(FilterError::Reference { problem: "strokes_s needs two times or more, in seconds, that increase".to_owned() })
+}
+
 fn rests(value: &[f64; 3], peak: [f64; 2]) -> bool {
     value[1].abs() <= RESTING[0] * peak[0] && value[2].abs() <= RESTING[1] * peak[1]
 }
@@ -298,6 +326,24 @@ mod tests {
         }
         // It moves at both ends, so nothing is known beyond them.
         assert!(!reference.covers(0, 0.5) && reference.covers(0, 1.0) && !reference.covers(0, 6.5));
+    }
+
+    #[test]
+    fn given_boundaries_make_strokes_of_a_motion_that_never_rests() {
+        let w = core::f64::consts::PI;
+        let (times, columns) = sine(401, 0.01, w);
+        let reference = Reference::sampled(&times, &[columns]).unwrap();
+        assert_eq!(reference.strokes(0).len(), 1);
+        // The sine turns at 0.5, 1.5, ..: between turns it goes one way.
+        let cut = reference.clone().with_boundaries(&[0.5, 1.5, 2.5]).unwrap().starting_at(2.0);
+        let strokes = cut.strokes(0);
+        assert_eq!(
+            strokes.iter().map(|s| (s.from_s, s.to_s, s.monotone)).collect::<Vec<_>>(),
+            [(2.5, 3.5, true), (3.5, 4.5, true)]
+        );
+        assert_eq!(strokes[0].owns_to_s, 3.5);
+        assert!(!reference.clone().with_boundaries(&[0.0, 1.0]).unwrap().strokes(0)[0].monotone);
+        assert!(reference.with_boundaries(&[1.0, 1.0]).is_err());
     }
 
     #[test]

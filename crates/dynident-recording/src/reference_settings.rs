@@ -2,7 +2,7 @@
 
 use crate::error::FilterError;
 use crate::logistic_path::LogisticPath;
-use crate::reference::Reference;
+use crate::reference::{Reference, check_boundaries};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -30,6 +30,9 @@ pub struct ReferenceSettings {
     /// In place of a table: one spliced logistic function for each joint, in the same order.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<LogisticPath>,
+    /// Where strokes begin and end, seconds after the motion's start, for all joints; by default they are what lies between rests.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub strokes_s: Vec<f64>,
     /// When it begins, in seconds after the log's first row; 0 by default.
     pub start_s: f64,
 }
@@ -53,11 +56,13 @@ impl<'de> Deserialize<'de> for ReferenceSettings {
             #[serde(default)]
             joints: Vec<LogisticPath>,
             #[serde(default)]
+            strokes_s: Vec<f64>,
+            #[serde(default)]
             start_s: f64,
         }
         Ok(match Written::deserialize(deserializer)? {
             Written::File(file) => Self { file: Some(file), ..Self::default() },
-            Written::Table(Table { file, joints, start_s }) => Self { file, joints, start_s },
+            Written::Table(Table { file, joints, strokes_s, start_s }) => Self { file, joints, strokes_s, start_s },
         })
     }
 }
@@ -76,6 +81,9 @@ impl ReferenceSettings {
                 problem: "file and joints are both given: keep one of them".to_owned(),
             });
         }
+        if !self.strokes_s.is_empty() {
+            check_boundaries(&self.strokes_s)?;
+        }
         self.joints.iter().try_for_each(LogisticPath::validate)
     }
 
@@ -88,7 +96,17 @@ impl ReferenceSettings {
         if self.joints.is_empty() {
             return Ok(None);
         }
-        Ok(Some(Reference::logistic(&self.joints)?.starting_at(self.start_s)))
+        self.placed(Reference::logistic(&self.joints)?).map(Some)
+    }
+
+    /// A motion with the strokes and the start that the settings name.
+    ///
+    /// # Errors
+    /// [`FilterError::Reference`] if the strokes' boundaries do not increase.
+    pub fn placed(&self, reference: Reference) -> Result<Reference, FilterError> {
+        let reference =
+            if self.strokes_s.is_empty() { reference } else { reference.with_boundaries(&self.strokes_s)? };
+        Ok(reference.starting_at(self.start_s))
     }
 }
 
@@ -102,7 +120,7 @@ mod tests {
         for text in [
             "method = \"time-warp\"\nreference = \"a.csv\"",
             "method = \"logistic-map\"\nreference = { start_s = -1.5, joints = [{ amplitude = 1.0, omega = 1.0, offset = 0.0, period_s = 40.0 }] }",
-            "method = \"deviation\"\nmax_lag_s = 0.1\nreference = { file = \"a.csv\", start_s = 2.0 }\nsmoother = { method = \"savitzky-golay\", window = 21 }",
+            "method = \"deviation\"\nmax_lag_s = 0.1\nreference = { file = \"a.csv\", start_s = 2.0, strokes_s = [0.0, 1.5] }\nsmoother = { method = \"savitzky-golay\", window = 21 }",
             "method = \"frequency-domain\"\nends = \"periodic\"",
         ] {
             let settings: DifferentiatorSettings = toml::from_str(text).unwrap();
@@ -124,6 +142,8 @@ mod tests {
         for text in [
             "method = \"time-warp\"\nmax_lag_s = 0.0",
             "method = \"time-warp\"\nreference = { start_s = inf }",
+            "method = \"time-warp\"\nreference = { strokes_s = [1.0] }",
+            "method = \"time-warp\"\nreference = { strokes_s = [1.0, 0.5] }",
             "method = \"time-warp\"\nreference = { file = \"a.csv\", joints = [{ amplitude = 1.0, omega = 1.0, offset = 0.0, period_s = 40.0 }] }",
             "method = \"deviation\"\nsmoother = { method = \"time-warp\" }",
         ] {

@@ -61,6 +61,18 @@ pub(crate) fn strokes_of(times_s: &[f64], values: &[[f64; 3]], resting: &[bool])
     strokes
 }
 
+/// Samples of a given stroke that are looked at for turns.
+const LOOKS: u32 = 500;
+
+/// The stroke between two given times; `motion` tells speed and rest at a time.
+pub(crate) fn between(from_s: f64, to_s: f64, motion: impl Fn(f64) -> (f64, bool)) -> Stroke {
+    let looks = (0..LOOKS).map(|k| motion(from_s + (to_s - from_s) * (f64::from(k) + 0.5) / f64::from(LOOKS)));
+    let speeds: Vec<f64> = looks.filter(|(_, rests)| !rests).map(|(speed, _)| speed).collect();
+    let sign = speeds.iter().sum::<f64>().signum();
+    let monotone = speeds.iter().all(|speed| speed * sign > 0.0);
+    Stroke { owns_from_s: f64::NEG_INFINITY, owns_to_s: f64::INFINITY, from_s, to_s, monotone }
+}
+
 /// Cuts the rests between strokes at their middles.
 pub(crate) fn share_rests(strokes: &mut [Stroke]) {
     for i in 1..strokes.len() {

@@ -166,7 +166,7 @@ fn a_deviation_is_the_same_in_pieces_as_at_once() {
     let file = file(text.as_bytes());
     let format = format("rate_hz = 500.0\nposition = { columns = [0] }\ntorque = { columns = [1] }");
     let differentiator = DifferentiatorSettings::Deviation {
-        reference: ReferenceSettings { joints: vec![path], start_s: 1.0, file: None },
+        reference: ReferenceSettings { joints: vec![path], start_s: 1.0, ..ReferenceSettings::default() },
         smoother: Box::new(DifferentiatorSettings::Butterworth { order: 4, cutoff_hz: Some(8.0) }),
         max_lag_s: None,
     };

@@ -40,7 +40,7 @@ fn reference(
         (_, Some(closed)) => closed,
         (Some(file), None) => {
             let path = machine.folders.find(file, study.source.as_deref())?;
-            Reference::read(&path, dof).map_err(failed)?.starting_at(settings.start_s)
+            settings.placed(Reference::read(&path, dof).map_err(failed)?).map_err(filter)?
         }
         // The differentiator says that it needs one.
         (None, None) => return Ok(None),
