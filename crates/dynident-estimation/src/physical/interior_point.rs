@@ -53,7 +53,7 @@ const CENTRE_BELOW: f64 = 0.1;
 const HOLD_BELOW: f64 = 0.3;
 
 /// μ stops where the gap is this share of the tolerance.
-const LEAST_GAP: f64 = 0.3;
+const LEAST_GAP: f64 = 0.7;
 
 /// Solves the program from a point strictly inside; none when `start` is not.
 pub(super) fn interior_point(

@@ -309,7 +309,8 @@ mod tests {
     use super::*;
 
     fn matrix(rows: usize, columns: usize, seed: f64) -> DMatrix<f64> {
-        DMatrix::from_fn(rows, columns, |i, j| ((i * 13 + j * 7) as f64 * 0.37 + seed).sin())
+        // Of full rank: the phase is no sum of a row's and a column's.
+        DMatrix::from_fn(rows, columns, |i, j| ((i * i * 5 + j * 3 + i * j * j * 2) as f64 * 0.37 + seed).sin())
     }
 
     #[test]
