@@ -9,6 +9,7 @@ use dynident_experiment::{
     closed_loop,
 };
 use dynident_model::Model;
+use dynident_model::laws::{Coulomb, CoulombShape, Law};
 use dynident_model::sample::Random;
 use std::hint::black_box;
 
@@ -17,7 +18,7 @@ const SAMPLES: usize = 5000;
 const EULER: Integrator = Integrator::SemiImplicitEuler { steps_per_sample: 1 };
 const RK4: Integrator = Integrator::Rk4 { steps_per_sample: 1 };
 
-/// Times one step of 1 ms under joint PD towards zero (gains 100 and 20 times the mass matrix' diagonal at zero) by both fixed-step integrators, and 10 s of the paper's controller at 1 kHz along sines.
+/// Times one step of 1 ms under joint PD towards zero (gains 100 and 20 times the mass matrix' diagonal at zero) by both fixed-step integrators, the same with dry friction, and 10 s of the paper's controller at 1 kHz along sines.
 /// Always at this processor's best level.
 pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), ExperimentError> {
     let dof = model.dof();
@@ -39,6 +40,15 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), Experim
             let _ = black_box(closed_loop(&mut plant, controller.as_mut(), &reference, &settings));
         });
     }
+    // Dry friction in every joint, as many Nm as the mass matrix' diagonal at zero has kg m²: some joints stick, some slide.
+    let shape = CoulombShape::Sign { dead_band: 0.0 };
+    let laws: Vec<Law> = (0..dof).map(|joint| Law::Coulomb(Coulomb { joint, shape })).collect();
+    let mut rough = Plant::new(model, &laws, &scaled(1.0))?;
+    let settings = LoopSettings { integrator: EULER, start, ..LoopSettings::default() };
+    closed_loop(&mut rough, controller.as_mut(), &reference, &settings)?;
+    report.time("pd_step_euler_friction", SAMPLES, || {
+        let _ = black_box(closed_loop(&mut rough, controller.as_mut(), &reference, &settings));
+    });
     let mut motion = Motion::default();
     motion.reset(dof, 10_001);
     for joint in 0..dof {

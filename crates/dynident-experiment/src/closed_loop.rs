@@ -55,16 +55,16 @@ pub struct RunLimits {
 }
 
 impl RunLimits {
-    /// Position, speed and torque limits of the description; infinite where it has none.
+    /// Position, speed and torque limits of the description; where it has none, the largest number there is (infinity has no place in JSON).
     pub fn of_model(model: &Model) -> Self {
         let each = |of: fn(&dynident_model::JointLimits) -> Option<f64>, none: f64| {
             Some(PerJoint::Each(model.joints().iter().map(|joint| of(&joint.limits).unwrap_or(none)).collect()))
         };
         Self {
-            torque: each(|limits| limits.effort, f64::INFINITY),
-            lower: each(|limits| limits.lower, f64::NEG_INFINITY),
-            upper: each(|limits| limits.upper, f64::INFINITY),
-            speed: each(|limits| limits.velocity, f64::INFINITY),
+            torque: each(|limits| limits.effort, f64::MAX),
+            lower: each(|limits| limits.lower, f64::MIN),
+            upper: each(|limits| limits.upper, f64::MAX),
+            speed: each(|limits| limits.velocity, f64::MAX),
             tracking_error: None,
         }
     }

@@ -1,6 +1,6 @@
 //! **Run it.** Controllers at a fixed rate, a simulated robot with friction that sticks, sensors as robots have them, and the closed loop of the three.
 //!
-//! [`closed_loop()`] runs a [`Controller`](controllers::Controller) on a [`Plant`] along a [`Reference`] and gives a [`Run`]: what truly was, what the controller saw, how well the joints followed,
+//! [`closed_loop()`] runs a [`Controller`] on a [`Plant`] along a [`Reference`] and gives a [`Run`]: what truly was, what the controller saw, how well the joints followed,
 //! and a [`RunStatus`]. [`SensorSettings::record`] makes of it what a log would hold. A [`Robot`] is the same from outside: the simulator, another program, or a person with a folder.
 
 #![forbid(unsafe_code)]

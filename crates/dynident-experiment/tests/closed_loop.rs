@@ -244,6 +244,27 @@ fn feedback_by_encoders_and_late() {
     assert_eq!(seen[..4], [truth[0]; 4]);
 }
 
+/// Settings go through TOML and JSON unchanged, those of a description with and without limits too.
+#[test]
+fn settings_can_be_stored() {
+    let ur10 = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/ur10.urdf");
+    let models = [dynident_model::load_robot(ur10).unwrap().model, plant().model().clone()];
+    for model in models {
+        let settings = LoopSettings {
+            limits: RunLimits::of_model(&model),
+            integrator: Integrator::Adaptive { relative_tolerance: 1e-9, absolute_tolerance: 1e-8 },
+            sensors: SensorSettings::birdy_standard(4),
+            start: Start::At { q: vec![0.1], dq: vec![0.2] },
+            accelerations: true,
+        };
+        let json = serde_json::to_string(&settings).unwrap();
+        assert_eq!(serde_json::from_str::<LoopSettings>(&json).unwrap(), settings);
+        let text = toml::to_string(&settings).unwrap();
+        assert_eq!(toml::from_str::<LoopSettings>(&text).unwrap(), settings);
+        settings.validate(model.dof()).unwrap();
+    }
+}
+
 #[test]
 fn bad_settings_are_named() {
     let bad = [
