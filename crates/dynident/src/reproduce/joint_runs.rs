@@ -8,7 +8,7 @@ use dynident_excitation::families::{SplicedLogistic, SplicedLogisticSettings};
 use dynident_excitation::paper_problem::{PaperProblem, Stroke};
 use dynident_experiment::controllers::{FiniteTimeSettings, JointPdSettings};
 use dynident_experiment::iteration::{
-    IteratedMachine, Iteration, IterationError, IterationSettings, IterationTask, Leg, iterate,
+    IteratedMachine, Iteration, IterationError, IterationSettings, IterationTask, Leg, Scheme, iterate,
 };
 use dynident_experiment::{ControllerSettings, Integrator, LoopSettings, Plant, Reference, Robot, Run, SimulatedRobot};
 use dynident_report::LinePlot;
@@ -25,7 +25,7 @@ pub(super) struct JointRuns {
 }
 
 /// How a joint's runs are made.
-struct Scheme {
+struct Kind {
     rate_hz: f64,
     steps_per_sample: usize,
     runs: usize,
@@ -63,19 +63,19 @@ const SHOWN: usize = 3;
 
 /// Both schemes, both joints: the paper's own with its Table 3, and ours inside the limits (18).
 pub(super) fn joint_runs(arm: &Arm, optimum: &[Stroke; 2]) -> Result<JointRuns, Error> {
-    let paper = Scheme {
+    let paper = Kind {
         rate_hz: 100.0,
         steps_per_sample: 10,
         runs: SHOWN,
         strokes: PaperProblem::table_3(100.0),
         literal: true,
     };
-    let ours = Scheme { rate_hz: 1000.0, steps_per_sample: 1, runs: 6, strokes: *optimum, literal: false };
-    let [as_paper, own] = [&paper, &ours].map(|scheme| -> Result<[Runs; 2], Error> {
-        let two = one_joint(arm, scheme, 1, &[]).map_err(|why| failed(&arm.description, &why))?;
+    let ours = Kind { rate_hz: 1000.0, steps_per_sample: 1, runs: 6, strokes: *optimum, literal: false };
+    let [as_paper, own] = [&paper, &ours].map(|kind| -> Result<[Runs; 2], Error> {
+        let two = one_joint(arm, kind, 1, &[]).map_err(|why| failed(&arm.description, &why))?;
         let last = two.values.last().copied().unwrap_or_default();
         let known: Vec<(usize, f64)> = (3..).zip(last).map(|(place, value)| (COLUMNS[place], value)).collect();
-        let one = one_joint(arm, scheme, 0, &known).map_err(|why| failed(&arm.description, &why))?;
+        let one = one_joint(arm, kind, 0, &known).map_err(|why| failed(&arm.description, &why))?;
         Ok([one, two])
     });
     let (as_paper, own) = (as_paper?, own?);
@@ -105,25 +105,25 @@ fn error(joint: usize, values: &[f64; 3]) -> f64 {
 }
 
 /// The runs of one joint while the other is locked at zero.
-fn one_joint(arm: &Arm, scheme: &Scheme, joint: usize, known: &[(usize, f64)]) -> Result<Runs, IterationError> {
-    let stroke = scheme.strokes[joint];
+fn one_joint(arm: &Arm, kind: &Kind, joint: usize, known: &[(usize, f64)]) -> Result<Runs, IterationError> {
+    let stroke = kind.strokes[joint];
     let period_s = 40.0 / stroke.steepness_per_s;
     let settings = SplicedLogisticSettings { offsets: Some(vec![0.0; 2]), ..SplicedLogisticSettings::default() };
     let family = SplicedLogistic::new(2, period_s, &settings)
         .map_err(|why| IterationError::State { path: "the paper's stroke".into(), problem: why.to_string() })?;
     let parameters = [stroke.amplitude_rad, stroke.steepness_per_s, stroke.amplitude_rad, stroke.steepness_per_s];
     let reference =
-        Reference::of_family(&family, &parameters, scheme.rate_hz, None)?.with_joint_held(1 - joint, 0.0)?;
+        Reference::of_family(&family, &parameters, kind.rate_hz, None)?.with_joint_held(1 - joint, 0.0)?;
     let mut windows = vec![Vec::new(); 2];
     windows[joint] =
         [0.25, 0.75].map(|share| [share * period_s - stroke.window_s, share * period_s + stroke.window_s]).to_vec();
     let leg = Leg::windowed(reference, windows)?;
-    let machine = IteratedMachine::new(&arm.model, &[], Some(prior(scheme.literal)))?;
+    let machine = IteratedMachine::new(&arm.model, &[], Some(prior(kind.literal)))?;
     let task = IterationTask { machine, legs: vec![leg], known: known.to_vec() };
-    let iteration = Iteration::new(task, iteration_settings(scheme))?;
+    let iteration = Iteration::new(task, iteration_settings(kind))?;
     let resting = arm.model.joints()[1 - joint].name.clone();
     let plant = Plant::new(&arm.model, &[], &[])?.with_locked(&[resting])?;
-    let integrator = Integrator::Rk4 { steps_per_sample: scheme.steps_per_sample };
+    let integrator = Integrator::Rk4 { steps_per_sample: kind.steps_per_sample };
     let mut robot = SimulatedRobot::new(plant, LoopSettings { integrator, ..LoopSettings::default() })?;
     let mut runs = Vec::new();
     let outcome = iterate(&iteration, &mut [&mut robot as &mut dyn Robot], None, &mut |_, made| {
@@ -153,12 +153,14 @@ pub(super) fn first_gains() -> ControllerSettings {
     ControllerSettings::JointPd(JointPdSettings { kp: kp.into(), kd: kd.into() })
 }
 
-fn iteration_settings(scheme: &Scheme) -> IterationSettings {
+fn iteration_settings(kind: &Kind) -> IterationSettings {
     let mut settings =
-        if scheme.literal { IterationSettings::literal(LONGEST_LAG_S) } else { IterationSettings::default() };
+        if kind.literal { IterationSettings::literal(LONGEST_LAG_S) } else { IterationSettings::default() };
+    // Only one joint's rows count.
+    settings.identification.scheme = Scheme::StepByStep;
     settings.model_free = first_gains();
     settings.controller = model_based();
-    settings.max_runs = scheme.runs;
+    settings.max_runs = kind.runs;
     // All runs are made, so that there is something to show.
     settings.settled.parameter_sigmas = 0.0;
     settings.settled.parameter_tolerance = 0.0;
