@@ -139,8 +139,8 @@ fn known_parameters_are_held() {
         settings.identification.scheme = scheme;
         let iteration = Iteration::new(task, settings).unwrap();
         let outcome = iterate(&iteration, &mut [&mut robot(exact())], None, &mut |_, _| {}).unwrap();
+        println!("{scheme:?} {:?}", outcome.runs[0].reason);
         let estimate = outcome.runs[1].estimate.as_ref().unwrap();
-        println!("{scheme:?} {:?}", estimate.values);
         assert!(worst(&estimate.values) < 1e-4, "{scheme:?}: {:?}", estimate.values);
     }
 }
