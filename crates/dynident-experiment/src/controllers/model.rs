@@ -176,6 +176,12 @@ impl ControllerModel {
         }
     }
 
+    /// The torques that a motion asks for, with all laws.
+    pub(crate) fn reference_torque(&mut self, q: &[f64], dq: &[f64], ddq: &[f64], tau: &mut [f64]) {
+        let (measured, target) = (Measured { q, dq }, Target { q, dq, ddq });
+        self.torque(measured, target, ddq, FrictionCompensation::Reference, tau);
+    }
+
     /// `ĝ(q)` and constant torques.
     pub(crate) fn gravity(&mut self, q: &[f64], out: &mut [f64]) {
         out.copy_from_slice(gravity_torque(&self.model, &mut self.workspace, q));

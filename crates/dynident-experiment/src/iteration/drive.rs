@@ -13,6 +13,9 @@ use crate::error::{ExperimentError, require_length};
 use crate::record::Record;
 use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest};
 
+/// A torque this much above a limit is no matter of rounding or of the model's last digits.
+const BEYOND: f64 = 1.001;
+
 /// A task with its settings: what [`iterate()`] does.
 #[derive(Clone, Debug)]
 pub struct Iteration {
@@ -58,7 +61,42 @@ impl Iteration {
 
     /// What comes after these records: it depends on nothing else.
     pub fn next(&self, records: &[RunRecord]) -> Next {
-        policy::next(records, &self.settings, self.task.machine.prior())
+        let next = policy::next(records, &self.settings, self.task.machine.prior());
+        if let Next::Finished(IterationStatus::Converged | IterationStatus::RunsUsedUp) = next
+            && let Some(reason) = self.beyond_torque(records)
+        {
+            return Next::Finished(IterationStatus::Refused { reason });
+        }
+        next
+    }
+
+    /// Where the trajectories ask for more torque than the joints have, by the last good model.
+    fn beyond_torque(&self, records: &[RunRecord]) -> Option<String> {
+        let limits = self.task.torque_limits.as_ref()?;
+        let estimate = records.iter().rev().find(|record| record.accepted)?.estimate.as_ref()?;
+        let mut model = self.controller_model(&estimate.for_controller()?).ok()?;
+        let dof = self.task.machine.dof();
+        let mut tau = vec![0.0; dof];
+        for leg in &self.task.legs {
+            let (motion, rate_hz) = (leg.reference().motion(), leg.reference().rate_hz());
+            for sample in 0..motion.samples {
+                let at = |values: &[f64]| -> Vec<f64> {
+                    (0..dof).map(|joint| values[joint * motion.samples + sample]).collect()
+                };
+                model.reference_torque(&at(&motion.q), &at(&motion.dq), &at(&motion.ddq), &mut tau);
+                for (joint, (tau, limit)) in tau.iter().zip(limits).enumerate() {
+                    if tau.abs() > limit * BEYOND {
+                        let name = &self.task.machine.model().joints()[joint].name;
+                        return Some(format!(
+                            "the trajectory asks joint {name} for {:.3} Nm at {:.2} s by the model found, its limit is {limit:.3} Nm: give another trajectory",
+                            tau.abs(),
+                            sample as f64 / rate_hz
+                        ));
+                    }
+                }
+            }
+        }
+        None
     }
 
     /// The model of a controller with these parameters.

@@ -69,7 +69,7 @@ pub fn identify_run(
         .collect::<Result<Vec<_>, _>>()?;
     let names = task.machine.base().expressions();
     let fallback = task.machine.base().values(task.machine.prior());
-    let problem = all_rows(task, &motions, settings, &names, &joints, &fallback)?;
+    let Rows { problem, joints: with_rows } = all_rows(task, &motions, settings, &names, &joints, &fallback)?;
     let count = names.len();
     if problem.joint_rows().iter().sum::<usize>() == 0 {
         let problem = "no sample counts: the differentiator applies nowhere in the windows; look at its settings and at the tracking error".to_owned();
@@ -80,7 +80,9 @@ pub fn identify_run(
             let estimate = least_squares(&problem, settings)?;
             let fixed = estimate.rank.fixed.iter().map(|fixed| fixed.column).collect();
             let rows = problem.joint_rows().iter().sum();
-            (estimate.values, estimate.covariance, estimate.joint_sigma, fixed, rows)
+            let mut joint_sigma = vec![0.0; joints.len()];
+            with_rows.iter().zip(&estimate.joint_sigma).for_each(|(&joint, sigma)| joint_sigma[joint] = *sigma);
+            (estimate.values, estimate.covariance, joint_sigma, fixed, rows)
         }
         Scheme::StepByStep => {
             let steps = step_by_step(task, &motions, settings, &names, &joints, &fallback)?;
@@ -92,7 +94,8 @@ pub fn identify_run(
     let (possible, impossible) = if settings.physical {
         let machine = &task.machine;
         let (model, laws, base, prior) = (machine.model(), machine.laws(), machine.base(), machine.prior());
-        match possible_parameters(&PhysicalSource { model, laws, base, prior }, &problem, &joint_sigma) {
+        let own_sigma: Vec<f64> = with_rows.iter().map(|&joint| joint_sigma[joint]).collect();
+        match possible_parameters(&PhysicalSource { model, laws, base, prior }, &problem, &own_sigma) {
             Ok(fit) => (Some(fit.parameters), None),
             Err(reason) => (None, Some(reason)),
         }
@@ -104,7 +107,13 @@ pub fn identify_run(
     Ok(RunEstimate { values, std, covariance, rows, joint_sigma, fixed, possible, impossible })
 }
 
-/// The problem of all rows that count; given values as a prior that holds them.
+/// Rows, and which joints have any.
+struct Rows {
+    problem: LinearProblem,
+    joints: Vec<usize>,
+}
+
+/// The problem of all rows that count, over the joints that have any; given values as a prior that holds them.
 fn all_rows(
     task: &IterationTask,
     motions: &[MeasuredMotion],
@@ -112,10 +121,10 @@ fn all_rows(
     names: &[String],
     joints: &[String],
     fallback: &[f64],
-) -> Result<LinearProblem, IterationError> {
+) -> Result<Rows, IterationError> {
     let layout = task.machine.layout();
-    let mut problem = LinearProblem::new(names.to_vec(), joints.to_vec()).with_fallback(fallback.to_vec())?;
-    for (number, (leg, motion)) in task.legs.iter().zip(motions).enumerate() {
+    let mut all = Vec::new();
+    for (leg, motion) in task.legs.iter().zip(motions) {
         let mut factors = (0..joints.len())
             .map(|joint| SegmentedFactor::new(layout.joint_columns(joint).len(), SegmentSettings::default()))
             .collect::<Result<Vec<_>, _>>()?;
@@ -123,12 +132,20 @@ fn all_rows(
             factors[joint].absorb(panel, rows)?;
             Ok(())
         })?;
+        all.push(factors);
+    }
+    let has_rows = |joint: usize| all.iter().any(|factors| factors[joint].rows() > 0);
+    let with_rows: Vec<usize> = (0..joints.len()).filter(|&joint| has_rows(joint)).collect();
+    let own_names = with_rows.iter().map(|&joint| joints[joint].clone()).collect();
+    let mut problem = LinearProblem::new(names.to_vec(), own_names).with_fallback(fallback.to_vec())?;
+    for (number, factors) in all.into_iter().enumerate() {
         for (joint, factor) in factors.into_iter().enumerate().filter(|(_, factor)| factor.rows() > 0) {
-            problem.add(&format!("leg {}", number + 1), joint, layout.joint_columns(joint).to_vec(), factor)?;
+            let Some(place) = with_rows.iter().position(|&other| other == joint) else { continue };
+            problem.add(&format!("leg {}", number + 1), place, layout.joint_columns(joint).to_vec(), factor)?;
         }
     }
     if task.known.is_empty() {
-        return Ok(problem);
+        return Ok(Rows { problem, joints: with_rows });
     }
     let largest = task.known.iter().fold(0.0_f64, |most, (_, value)| most.max(value.abs()));
     let largest = if largest > 0.0 { largest } else { 1.0 };
@@ -138,5 +155,5 @@ fn all_rows(
         mean[*column] = *value;
         information[(row, *column)] = 1.0 / (HELD * largest);
     }
-    Ok(problem.with_prior(mean, information)?)
+    Ok(Rows { problem: problem.with_prior(mean, information)?, joints: with_rows })
 }

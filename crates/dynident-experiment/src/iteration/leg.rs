@@ -72,6 +72,8 @@ pub struct IterationTask {
     pub legs: Vec<Leg>,
     /// Base columns whose values are given: (place among the base columns, value). Of the paper's joint 1: what joint 2 has shown.
     pub known: Vec<(usize, f64)>,
+    /// The largest torque of each joint, Nm (N); infinite where there is none. A trajectory that asks for more by the model found is refused in the end: tracking it is not a matter of the model.
+    pub torque_limits: Option<Vec<f64>>,
 }
 
 impl IterationTask {
@@ -80,7 +82,7 @@ impl IterationTask {
     /// # Errors
     /// A reference of one sample only.
     pub fn new(machine: IteratedMachine, reference: Reference) -> Result<Self, FilterError> {
-        Ok(Self { machine, legs: vec![Leg::whole(reference)?], known: Vec::new() })
+        Ok(Self { machine, legs: vec![Leg::whole(reference)?], known: Vec::new(), torque_limits: None })
     }
 
     /// Checks that legs and known columns belong to the machine.
@@ -97,6 +99,12 @@ impl IterationTask {
                 for [from, to] in windows.iter().flatten() {
                     require(from < to, "window", *from, "give its begin and a later end")?;
                 }
+            }
+        }
+        if let Some(limits) = &self.torque_limits {
+            require_length("torque limits", dof, limits.len())?;
+            for &limit in limits {
+                require(limit > 0.0, "torque limit", limit, "give a positive torque")?;
             }
         }
         for (column, value) in &self.known {

@@ -36,7 +36,8 @@ impl RunPlan {
     /// The controller's settings.
     pub fn controller(&self, settings: &IterationSettings) -> ControllerSettings {
         if self.model.is_some() {
-            return settings.controller.clone();
+            let first = settings.first.as_ref().filter(|_| self.run == 1);
+            return first.unwrap_or(&settings.controller).clone();
         }
         stiffened(&settings.model_free, self.stiffness)
     }

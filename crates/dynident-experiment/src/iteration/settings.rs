@@ -110,6 +110,8 @@ pub struct IterationSettings {
     pub identification: RunIdentificationSettings,
     /// What controls the first run; default a controller without a model.
     pub start: StartWith,
+    /// The controller of the first run where that has the prior as its model: a poor model asks for less trust than a good one. Default [`controller`](Self::controller).
+    pub first: Option<ControllerSettings>,
     /// The controller without a model: joint PD (16 and 8) by default. It is also what a bad model falls back to.
     pub model_free: ControllerSettings,
     /// The controller with the model so far: the paper's finite-time law with its gains of joint 2 (4 and 4) by default.
@@ -135,6 +137,7 @@ impl Default for IterationSettings {
         Self {
             identification: RunIdentificationSettings::default(),
             start: StartWith::default(),
+            first: None,
             model_free: ControllerSettings::JointPd(JointPdSettings { kp: 16.0.into(), kd: 8.0.into() }),
             controller: ControllerSettings::FiniteTime(FiniteTimeSettings::with_gains(4.0, 4.0)),
             reject: true,
@@ -175,6 +178,7 @@ impl IterationSettings {
     pub fn validate(&self, joints: usize) -> Result<(), ExperimentError> {
         self.model_free.validate(joints)?;
         self.controller.validate(joints)?;
+        self.first.as_ref().map_or(Ok(()), |first| first.validate(joints))?;
         if self.model_free.needs_model() {
             return Err(ExperimentError::NoModel { controller: self.model_free.name() });
         }

@@ -71,7 +71,9 @@ pub fn iterate_study(
     let iterated = IteratedMachine::new(&machine.model, &machine.laws, Some(prior));
     let iterated = iterated.map_err(|why| wrong("iteration", &why))?;
     let leg = trajectory.leg().map_err(|why| wrong("iteration", &why))?;
-    let task = IterationTask { machine: iterated, legs: vec![leg], known: Vec::new() };
+    let efforts = machine.model.joints().iter().map(|joint| joint.limits.effort.unwrap_or(f64::INFINITY)).collect();
+    let torque_limits = simulation.effort_limits.then_some(efforts);
+    let task = IterationTask { machine: iterated, legs: vec![leg], known: Vec::new(), torque_limits };
     let iteration = Iteration::new(task, settings).map_err(|why| wrong("iteration", &why))?;
 
     let mut outside = outside(&section.robot, &machine).map_err(|why| wrong("iteration.robot", &why))?;

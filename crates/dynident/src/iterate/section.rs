@@ -61,6 +61,8 @@ pub struct IterationSection {
     pub prior: PriorChoice,
     /// Under what the first run is: `"model-free"` (the default) or `"prior"`.
     pub start: StartWith,
+    /// The controller of a first run with the prior, in place of `[controller]`.
+    pub first: Option<ControllerSettings>,
     /// All joints at once, or step by step.
     pub scheme: Scheme,
     /// The paper's scheme as it stands: no possible machine is asked for and nothing is rejected. False by default.
@@ -92,6 +94,7 @@ impl Default for IterationSection {
         let IterationSettings {
             identification,
             start,
+            first,
             model_free,
             worse_factor,
             most_halvings,
@@ -106,6 +109,7 @@ impl Default for IterationSection {
             robot: RobotChoice::default(),
             prior: PriorChoice::default(),
             start,
+            first,
             scheme: identification.scheme,
             literal: false,
             differentiator: identification.differentiator,
@@ -152,6 +156,7 @@ impl IterationSection {
                 physical: study.estimator.physical && !self.literal,
             },
             start: self.start,
+            first: self.first.clone(),
             model_free: self.model_free.clone(),
             controller: study.controller.clone().unwrap_or(default.controller),
             reject: !self.literal,
