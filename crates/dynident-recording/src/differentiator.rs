@@ -7,6 +7,7 @@ use crate::error::FilterError;
 use crate::five_point_cubic::FivePointCubic;
 use crate::fourier_fit::FourierFit;
 use crate::frequency_domain::{Ends, FrequencyDomain};
+use crate::literal_map::LiteralMap;
 use crate::low_pass::LowPass;
 use crate::position_map::PositionMap;
 use crate::reference::Reference;
@@ -203,6 +204,12 @@ pub enum DifferentiatorSettings {
         #[serde(default = "half")]
         max_lag_s: f64,
     },
+    /// [`LiteralMap`]: the paper's map to the letter, right or wrong: to show what it does.
+    LiteralMap {
+        /// The commanded strokes in closed form.
+        #[serde(default)]
+        reference: ReferenceSettings,
+    },
     /// [`TimeWarp`]: the reference at a shifted time, one lag a stroke.
     TimeWarp {
         /// The commanded motion; a log may have its own.
@@ -263,6 +270,7 @@ impl DifferentiatorSettings {
                 reference.validate()?;
                 check_max_lag(*max_lag_s)
             }
+            Self::LiteralMap { reference } => reference.validate(),
             Self::Deviation { reference, smoother, max_lag_s } => {
                 reference.validate()?;
                 max_lag_s.map_or(Ok(()), check_max_lag)?;
@@ -280,6 +288,7 @@ impl DifferentiatorSettings {
     pub fn reference(&self) -> Option<&ReferenceSettings> {
         match self {
             Self::PositionMap { reference, .. }
+            | Self::LiteralMap { reference }
             | Self::TimeWarp { reference, .. }
             | Self::Deviation { reference, .. } => Some(reference),
             _ => None,
@@ -361,6 +370,7 @@ impl DifferentiatorSettings {
             Self::PositionMap { reference, max_lag_s } => {
                 Box::new(PositionMap::new(motion(reference, "position-map")?, *max_lag_s)?)
             }
+            Self::LiteralMap { reference } => Box::new(LiteralMap::new(motion(reference, "literal-map")?)),
             Self::TimeWarp { reference, max_lag_s } => {
                 Box::new(TimeWarp::new(motion(reference, "time-warp")?, *max_lag_s)?)
             }

@@ -103,6 +103,17 @@ impl LogisticPath {
         Some([if there { dq } else { -dq }, ddq])
     }
 
+    /// Eqs. 15 and 16 at any position, outside the stroke as well, where the sign is wrong. A joint that stands still (A = 0) has neither speed nor acceleration.
+    pub(crate) fn rates_as_written(&self, q: f64, there: bool) -> [f64; 2] {
+        let Self { amplitude, omega, offset, .. } = *self;
+        if amplitude == 0.0 {
+            return [0.0; 2];
+        }
+        let (gone, left) = (q - offset, amplitude - (q - offset));
+        let dq = omega / amplitude * gone * left;
+        [if there { dq } else { -dq }, omega * omega / (amplitude * amplitude) * gone * left * (left - gone)]
+    }
+
     /// Whether the joint goes there (or back) at a time: the branch of Eq. 15.
     pub fn goes_there(&self, time_s: f64) -> bool {
         time_s.rem_euclid(self.period_s) < 0.5 * self.period_s

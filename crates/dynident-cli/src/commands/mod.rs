@@ -6,9 +6,9 @@ pub(crate) mod evaluate;
 pub(crate) mod identify;
 pub(crate) mod inspect;
 pub(crate) mod iterate;
+pub(crate) mod reproduce;
 mod search;
 pub(crate) mod simulate;
-pub(crate) mod reproduce;
 pub(crate) mod validate;
 
 use crate::progress::Bar;

@@ -41,6 +41,13 @@ impl Leg {
         Ok(Self { reference, commanded, windows })
     }
 
+    /// The same with the commanded motion as differentiators are to know it: strokes in closed form in place of samples.
+    #[must_use]
+    pub fn with_commanded(mut self, commanded: dynident_recording::Reference) -> Self {
+        self.commanded = Arc::new(commanded);
+        self
+    }
+
     /// What is followed.
     pub fn reference(&self) -> &Reference {
         &self.reference

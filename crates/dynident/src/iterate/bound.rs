@@ -35,8 +35,7 @@ pub(super) fn cramer_rao(
         part.reset(dof, samples);
         for joint in 0..dof {
             let (to, at) = (part.of(joint), joint * whole.samples + from);
-            for (to_values, values) in
-                [(&mut part.q, &whole.q), (&mut part.dq, &whole.dq), (&mut part.ddq, &whole.ddq)]
+            for (to_values, values) in [(&mut part.q, &whole.q), (&mut part.dq, &whole.dq), (&mut part.ddq, &whole.ddq)]
             {
                 to_values[to.clone()].copy_from_slice(&values[at..at + samples]);
             }

@@ -126,9 +126,9 @@ fn write_file(path: &Path, file: &IterationsFile) -> Result<(), Error> {
 /// Everything that runs depend on, in one number: study, robot, and the version of the program (FNV-1a, 64 bits).
 fn fingerprint(study: &Study, machine: &Machine, options: &RunOptions<'_>) -> String {
     let text = format!("{study:?} {:?} {:?} {}", machine.model, options.data, env!("CARGO_PKG_VERSION"));
-    let hash = text.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    });
+    let hash = text
+        .bytes()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
     format!("{hash:016x}")
 }
 

@@ -11,6 +11,7 @@ use dynident_experiment::iteration::{
     IteratedMachine, Iteration, IterationError, IterationSettings, IterationTask, Leg, Scheme, iterate,
 };
 use dynident_experiment::{ControllerSettings, Integrator, LoopSettings, Plant, Reference, Robot, Run, SimulatedRobot};
+use dynident_recording::{DifferentiatorSettings, LogisticPath, ReferenceSettings};
 use dynident_report::LinePlot;
 use std::path::Path;
 
@@ -54,9 +55,6 @@ const PAPER: [[[f64; 3]; 3]; 2] = [
 
 /// The paper's largest tracking errors of joint 2, Fig. 12.
 const FIGURE_12: [f64; 3] = [0.6, 0.15, 0.0];
-
-/// The longest lag at which the map's branch is looked for, s: the arm follows within a fraction of a stroke.
-const LONGEST_LAG_S: f64 = 2.0;
 
 /// Runs that the paper shows.
 const SHOWN: usize = 3;
@@ -112,14 +110,22 @@ fn one_joint(arm: &Arm, kind: &Kind, joint: usize, known: &[(usize, f64)]) -> Re
     let family = SplicedLogistic::new(2, period_s, &settings)
         .map_err(|why| IterationError::State { path: "the paper's stroke".into(), problem: why.to_string() })?;
     let parameters = [stroke.amplitude_rad, stroke.steepness_per_s, stroke.amplitude_rad, stroke.steepness_per_s];
-    let reference =
-        Reference::of_family(&family, &parameters, kind.rate_hz, None)?.with_joint_held(1 - joint, 0.0)?;
+    let reference = Reference::of_family(&family, &parameters, kind.rate_hz, None)?.with_joint_held(1 - joint, 0.0)?;
     let mut windows = vec![Vec::new(); 2];
     windows[joint] =
         [0.25, 0.75].map(|share| [share * period_s - stroke.window_s, share * period_s + stroke.window_s]).to_vec();
-    let leg = Leg::windowed(reference, windows)?;
+    let path = LogisticPath {
+        amplitude: stroke.amplitude_rad,
+        omega: stroke.steepness_per_s,
+        offset: 0.0,
+        period_s,
+        repetitions: 1,
+    };
+    let mut paths = [LogisticPath { amplitude: 0.0, ..path }; 2];
+    paths[joint] = path;
+    let leg = Leg::windowed(reference, windows)?.with_commanded(dynident_recording::Reference::logistic(&paths)?);
     let machine = IteratedMachine::new(&arm.model, &[], Some(prior(kind.literal)))?;
-    let task = IterationTask { machine, legs: vec![leg], known: known.to_vec() };
+    let task = IterationTask { machine, legs: vec![leg], known: known.to_vec(), torque_limits: None };
     let iteration = Iteration::new(task, iteration_settings(kind))?;
     let resting = arm.model.joints()[1 - joint].name.clone();
     let plant = Plant::new(&arm.model, &[], &[])?.with_locked(&[resting])?;
@@ -154,8 +160,12 @@ pub(super) fn first_gains() -> ControllerSettings {
 }
 
 fn iteration_settings(kind: &Kind) -> IterationSettings {
-    let mut settings =
-        if kind.literal { IterationSettings::literal(LONGEST_LAG_S) } else { IterationSettings::default() };
+    let mut settings = IterationSettings::default();
+    if kind.literal {
+        settings = IterationSettings::literal(0.5);
+        settings.identification.differentiator =
+            DifferentiatorSettings::LiteralMap { reference: ReferenceSettings::default() };
+    }
     // Only one joint's rows count.
     settings.identification.scheme = Scheme::StepByStep;
     settings.model_free = first_gains();
