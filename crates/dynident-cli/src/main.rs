@@ -22,7 +22,7 @@ use std::process::ExitCode;
         4. dynident validate R/result.json --study other.toml\n  \
         5. load R/identified.urdf into your controller or simulator\n\n\
         dynident iterate runs a robot again and again, each time with the better model; simulate runs it once.\n\
-        dynident benchmark compares the estimators on simulated recordings with known truth."
+        dynident reproduce works through the paper behind this program; dynident benchmark compares estimators."
 )]
 struct Arguments {
     #[command(flatten)]
