@@ -8,9 +8,7 @@ use dynident_experiment::iteration::{
     IteratedMachine, Iteration, IterationSettings, IterationStatus, IterationTask, Leg, ModelParameters, Scheme,
     iterate,
 };
-use dynident_experiment::{
-    ControllerSettings, Integrator, LoopSettings, Plant, Reference, RunLimits, SimulatedRobot,
-};
+use dynident_experiment::{ControllerSettings, Integrator, LoopSettings, Plant, Reference, RunLimits, SimulatedRobot};
 use dynident_model::sample::planar_2r;
 use dynident_model::{InertialParameters, Model};
 
@@ -76,7 +74,12 @@ fn never_settled(mut settings: IterationSettings, max_runs: usize) -> IterationS
 
 fn one_leg(rate_hz: f64) -> IterationTask {
     let (reference, windows) = reference(&[1, 0], rate_hz);
-    IterationTask { machine: machine(), legs: vec![Leg::windowed(reference, windows).unwrap()], known: vec![], torque_limits: None }
+    IterationTask {
+        machine: machine(),
+        legs: vec![Leg::windowed(reference, windows).unwrap()],
+        known: vec![],
+        torque_limits: None,
+    }
 }
 
 /// The goal: 0.007 after three runs, 1e-6 after six, inside the limits (18).
@@ -134,7 +137,8 @@ fn known_parameters_are_held() {
     for scheme in [Scheme::AllJoints, Scheme::StepByStep] {
         let (reference, windows) = reference(&[0], 200.0);
         let legs = vec![Leg::windowed(reference, windows).unwrap()];
-        let task = IterationTask { machine: machine(), legs, known: vec![(3, 1.0), (4, 0.0), (5, 1.0)], torque_limits: None };
+        let task =
+            IterationTask { machine: machine(), legs, known: vec![(3, 1.0), (4, 0.0), (5, 1.0)], torque_limits: None };
         let mut settings = never_settled(IterationSettings::default(), 2);
         settings.identification.scheme = scheme;
         let iteration = Iteration::new(task, settings).unwrap();

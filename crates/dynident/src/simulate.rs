@@ -90,9 +90,10 @@ pub fn simulate_study(
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let machine = Machine::new(study, study_path, &folders)?;
     let mut truth = simulation.truth(&machine).map_err(|why| wrong("simulation", &why))?;
-    let controller = study.controller.clone().unwrap_or_else(|| {
-        ControllerSettings::JointPd(JointPdSettings { kp: 100.0.into(), kd: 20.0.into() })
-    });
+    let controller = study
+        .controller
+        .clone()
+        .unwrap_or_else(|| ControllerSettings::JointPd(JointPdSettings { kp: 100.0.into(), kd: 20.0.into() }));
     controller.validate(machine.model.dof()).map_err(|why| wrong("controller", &why))?;
     let trajectory = Trajectory::of_study(study, study_path, &machine, simulation.rate_hz, options, watch)?;
     let reference = trajectory.reference().map_err(|why| wrong("iteration", &why))?;

@@ -34,10 +34,10 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let search = Search::new(context);
-    let most = study.iteration.as_ref().map_or_else(
-        || dynident::IterationSection::default().max_runs,
-        |section| section.max_runs,
-    );
+    let most = study
+        .iteration
+        .as_ref()
+        .map_or_else(|| dynident::IterationSection::default().max_runs, |section| section.max_runs);
     progress.begin("runs", Some(most as u64));
     let mut hear = |_: &_, _: &[_]| progress.advance(1);
     let mut watch = IterationWatch { design: &|at| search.hear(at), run: &mut hear };

@@ -68,12 +68,10 @@ pub(crate) fn simulation(file: &SimulationFile, out: &Path) -> String {
     text.push('\n');
     let header = ["joint", "tracking error", "torque cut"].map(str::to_owned);
     let rows = file.joints.iter().zip(&file.max_tracking_error_rad).zip(&file.saturated_samples);
-    let rows = rows.map(|((joint, error), cut)| vec![super::text::name(joint), format!("{error:.2e}"), cut.to_string()]);
+    let rows =
+        rows.map(|((joint, error), cut)| vec![super::text::name(joint), format!("{error:.2e}"), cut.to_string()]);
     text += &table(&header, 1..3, rows.collect());
     text += "  tracking error: largest, rad (m); torque cut: samples at the effort limit\n\n";
-    text += &wrapped(
-        &format!("Written: {}, {}", out.join("log.csv").display(), out.join("truth.json").display()),
-        4,
-    );
+    text += &wrapped(&format!("Written: {}, {}", out.join("log.csv").display(), out.join("truth.json").display()), 4);
     text
 }

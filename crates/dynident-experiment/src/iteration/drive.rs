@@ -106,9 +106,7 @@ impl Iteration {
     pub fn controller_model(&self, parameters: &ModelParameters) -> Result<ControllerModel, ExperimentError> {
         let machine = &self.task.machine;
         match parameters {
-            ModelParameters::All(values) => {
-                ControllerModel::from_parameters(machine.model(), machine.laws(), values)
-            }
+            ModelParameters::All(values) => ControllerModel::from_parameters(machine.model(), machine.laws(), values),
             ModelParameters::Base(values) => {
                 ControllerModel::from_columns(machine.model(), &machine.base().base_columns(), values)
             }
@@ -149,7 +147,7 @@ impl Iteration {
                 break;
             }
         }
-        let mut record = self.recorded(plan, &controller.name().to_owned(), &runs);
+        let mut record = self.recorded(plan, controller.name(), &runs);
         if record.done {
             let records: Vec<Record> = runs.iter().map(|run| run.record.clone()).collect();
             match identify_run(&self.task, &records, &self.settings.identification) {

@@ -157,4 +157,3 @@ fn all_rows(
     }
     Ok(Rows { problem: problem.with_prior(mean, information)?, joints: with_rows })
 }
-

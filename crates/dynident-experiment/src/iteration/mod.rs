@@ -28,8 +28,6 @@ pub use motion::{MeasuredMotion, measured_motion};
 pub use physical::{PhysicalSource, possible_parameters, typical_length_m};
 pub use policy::{Next, RunPlan};
 pub use record::{ModelParameters, RunRecord, UsedController};
-pub use settings::{
-    IterationSettings, RunEstimator, RunIdentificationSettings, Scheme, SettledSettings, StartWith,
-};
+pub use settings::{IterationSettings, RunEstimator, RunIdentificationSettings, Scheme, SettledSettings, StartWith};
 pub use status::IterationStatus;
 pub use store::IterationStore;

@@ -5,8 +5,8 @@ use dynident_estimation::LinearProblem;
 use dynident_estimation::physical::{
     BaseMap, PhysicalBody, PhysicalFit, PhysicalProblem, PhysicalScalar, PhysicalSettings, physical_fit, rough_body,
 };
-use dynident_model::{InertialParameters, Model};
 use dynident_model::laws::Law;
+use dynident_model::{InertialParameters, Model};
 
 /// A joint's noise counts as at least this share of its torque's root mean square: no model is better, and with noise-free (simulated) torque the prior would
 /// otherwise vanish beside the data in double precision.

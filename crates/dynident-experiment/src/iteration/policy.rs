@@ -142,10 +142,9 @@ fn stiffened(settings: &ControllerSettings, factor: f64) -> ControllerSettings {
         PerJoint::Each(gains) => PerJoint::Each(gains.iter().map(|gain| by * gain).collect()),
     };
     match settings {
-        ControllerSettings::JointPd(pd) => ControllerSettings::JointPd(JointPdSettings {
-            kp: times(&pd.kp, factor),
-            kd: times(&pd.kd, factor.sqrt()),
-        }),
+        ControllerSettings::JointPd(pd) => {
+            ControllerSettings::JointPd(JointPdSettings { kp: times(&pd.kp, factor), kd: times(&pd.kd, factor.sqrt()) })
+        }
         ControllerSettings::JointPid(pid) => ControllerSettings::JointPid(JointPidSettings {
             kp: times(&pid.kp, factor),
             ki: times(&pid.ki, factor),

@@ -95,11 +95,8 @@ impl IterationStore {
             let name = if leg == 0 { "log.csv".to_owned() } else { format!("log_{}.csv", leg + 1) };
             write_synced(&fresh.path().join(name), run.record.csv().as_bytes())?;
         }
-        let file = RunFile {
-            schema: RUN_SCHEMA.to_owned(),
-            fingerprint: self.fingerprint.clone(),
-            record: record.clone(),
-        };
+        let file =
+            RunFile { schema: RUN_SCHEMA.to_owned(), fingerprint: self.fingerprint.clone(), record: record.clone() };
         let path = fresh.path().join("run.json");
         let text = serde_json::to_string_pretty(&file)
             .map_err(|error| IterationError::State { path: path.clone(), problem: error.to_string() })?;

@@ -77,12 +77,10 @@ pub fn iterate_study(
     let iteration = Iteration::new(task, settings).map_err(|why| wrong("iteration", &why))?;
 
     let mut outside = outside(&section.robot, &machine).map_err(|why| wrong("iteration.robot", &why))?;
-    let told = Told { study, study_path, machine: &machine, trajectory: &trajectory, truth: None };
-    let mut told = told;
-    let bound = truth.as_ref().and_then(|truth| {
-        bound::cramer_rao(&machine, &trajectory, &simulation.sensors, iteration.task().legs[0].windows(), truth)
-    });
-    told.truth = truth.as_ref().map(|truth| truth.base_values.clone());
+    let true_values = truth.as_ref().map(|truth| truth.base_values.clone());
+    let told = Told { study, study_path, machine: &machine, trajectory: &trajectory, truth: true_values };
+    let windows = iteration.task().legs[0].windows();
+    let bound = truth.as_ref().and_then(|_| bound::cramer_rao(&machine, &trajectory, &simulation.sensors, windows));
     let robot: &mut dyn Robot = match (&mut truth, &mut outside) {
         (Some(SimulatedTruth { robot, .. }), _) => robot,
         (None, Some(robot)) => robot.as_mut(),
@@ -126,9 +124,9 @@ fn write_file(path: &Path, file: &IterationsFile) -> Result<(), Error> {
 /// Everything that runs depend on, in one number: study, robot, and the version of the program (FNV-1a, 64 bits).
 fn fingerprint(study: &Study, machine: &Machine, options: &RunOptions<'_>) -> String {
     let text = format!("{study:?} {:?} {:?} {}", machine.model, options.data, env!("CARGO_PKG_VERSION"));
-    let hash = text.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    });
+    let hash = text
+        .bytes()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
     format!("{hash:016x}")
 }
 

@@ -47,8 +47,7 @@ impl Trajectory {
             let folders = Folders::new(study, study_path, options.data.as_deref());
             let path = folders.find(file, None)?;
             let table = trajectory_table(&path, &joint_names(machine), &study.motion)?;
-            let reference =
-                Reference::of_family(&table.given, &[], rate_hz, None).map_err(|error| wrong(&error))?;
+            let reference = Reference::of_family(&table.given, &[], rate_hz, None).map_err(|error| wrong(&error))?;
             return Ok(Self::new(&reference, None));
         }
         if study.design.is_none() {
@@ -121,4 +120,3 @@ impl Trajectory {
         }
     }
 }
-
