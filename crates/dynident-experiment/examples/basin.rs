@@ -46,7 +46,13 @@ enum Verdict {
     Lost,
 }
 
-fn reference(order: &[usize]) -> Result<(Reference, Vec<Vec<[f64; 2]>>), Box<dyn Error>> {
+/// Windows of each joint: from, to; s.
+type Windows = Vec<Vec<[f64; 2]>>;
+
+/// A scheme's verdict on a start, and how many runs it took.
+type Scheme = fn(&Start) -> Result<(Verdict, usize), Box<dyn Error>>;
+
+fn reference(order: &[usize]) -> Result<(Reference, Windows), Box<dyn Error>> {
     let period_s = 40.0 / STROKE[1];
     let steps: Vec<Step> = order.iter().map(|&joint| Step { joint, period_s }).collect();
     let family = StepWiseLogistic::new(&[0.0; 2], &steps, &SplicedLogisticSettings::default())?;
@@ -84,7 +90,7 @@ fn start(seed: u64) -> Result<Start, Box<dyn Error>> {
     let (path, _) = reference(&[1, 0])?;
     let motion = path.motion();
     let mut workspace = Workspace::new(&arm);
-    let mut peak = vec![0.0_f64; 2];
+    let mut peak = [0.0_f64; 2];
     for sample in 0..motion.samples {
         let at = |values: &[f64]| [values[sample], values[motion.samples + sample]];
         let tau = inverse_dynamics(&arm, &mut workspace, &at(&motion.q), &at(&motion.dq), &at(&motion.ddq));
@@ -122,7 +128,7 @@ fn verdict(start: &Start, outcome: &IterationOutcome, machine: &IteratedMachine)
     let found = last.is_some_and(|estimate| {
         estimate.values.iter().zip(&truth).all(|(value, truth)| (value - truth).abs() <= FOUND * largest)
     });
-    if found && outcome.status.is_converged() { Verdict::Found } else { Verdict::Lost }
+    if found { Verdict::Found } else { Verdict::Lost }
 }
 
 fn with_controllers(start: &Start, settings: IterationSettings) -> IterationSettings {
@@ -157,7 +163,8 @@ fn literal(start: &Start) -> Result<(Verdict, usize), Box<dyn Error>> {
     }
     let task = IterationTask { machine: machine.clone(), legs, known: Vec::new(), torque_limits: None };
     let mut settings = with_controllers(start, IterationSettings::literal(0.5));
-    settings.settled.parameter_tolerance = 1e-3;
+    // It is given all its runs: its error bars know nothing of the map's bias.
+    settings.settled.parameter_sigmas = 0.0;
     let iteration = Iteration::new(task, settings)?;
     let (mut second, mut first) = (robot(start, Some(0))?, robot(start, Some(1))?);
     let robots: &mut [&mut dyn Robot] = &mut [&mut second, &mut first];
@@ -168,8 +175,7 @@ fn literal(start: &Start) -> Result<(Verdict, usize), Box<dyn Error>> {
 fn main() -> Result<(), Box<dyn Error>> {
     let numbers: Vec<u64> = std::env::args().skip(1).map(|text| text.parse()).collect::<Result<_, _>>()?;
     let (arms, first) = (numbers.first().copied().unwrap_or(1000), numbers.get(1).copied().unwrap_or(1));
-    let schemes: [(&str, fn(&Start) -> Result<(Verdict, usize), Box<dyn Error>>); 2] =
-        [("ours", ours), ("literal", literal)];
+    let schemes: [(&str, Scheme); 2] = [("ours", ours), ("literal", literal)];
     // Scheme, start possible or not: found, refused, lost.
     let mut counts = [[[0_usize; 3]; 2]; 2];
     let mut runs = [0_usize; 2];

@@ -147,7 +147,7 @@ impl Iteration {
                 break;
             }
         }
-        let mut record = self.recorded(plan, &controller.name().to_owned(), &runs);
+        let mut record = self.recorded(plan, controller.name(), &runs);
         if record.done {
             let records: Vec<Record> = runs.iter().map(|run| run.record.clone()).collect();
             match identify_run(&self.task, &records, &self.settings.identification) {

@@ -2,7 +2,6 @@
 
 use super::trajectory::Trajectory;
 use crate::machine::Machine;
-use crate::simulation::SimulatedTruth;
 use dynident_excitation::Information;
 use dynident_excitation::Motion;
 use dynident_experiment::SensorSettings;
@@ -18,7 +17,6 @@ pub(super) fn cramer_rao(
     trajectory: &Trajectory,
     sensors: &SensorSettings,
     windows: Option<&[Vec<[f64; 2]>]>,
-    _truth: &SimulatedTruth,
 ) -> Option<Vec<f64>> {
     let dof = machine.model.dof();
     let std: Vec<f64> = (0..dof).map(|joint| sensors.torque_std.of(joint)).collect();

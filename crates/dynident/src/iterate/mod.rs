@@ -77,12 +77,10 @@ pub fn iterate_study(
     let iteration = Iteration::new(task, settings).map_err(|why| wrong("iteration", &why))?;
 
     let mut outside = outside(&section.robot, &machine).map_err(|why| wrong("iteration.robot", &why))?;
-    let told = Told { study, study_path, machine: &machine, trajectory: &trajectory, truth: None };
-    let mut told = told;
-    let bound = truth.as_ref().and_then(|truth| {
-        bound::cramer_rao(&machine, &trajectory, &simulation.sensors, iteration.task().legs[0].windows(), truth)
-    });
-    told.truth = truth.as_ref().map(|truth| truth.base_values.clone());
+    let true_values = truth.as_ref().map(|truth| truth.base_values.clone());
+    let told = Told { study, study_path, machine: &machine, trajectory: &trajectory, truth: true_values };
+    let windows = iteration.task().legs[0].windows();
+    let bound = truth.as_ref().and_then(|_| bound::cramer_rao(&machine, &trajectory, &simulation.sensors, windows));
     let robot: &mut dyn Robot = match (&mut truth, &mut outside) {
         (Some(SimulatedTruth { robot, .. }), _) => robot,
         (None, Some(robot)) => robot.as_mut(),
