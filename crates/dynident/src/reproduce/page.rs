@@ -12,7 +12,7 @@ pub(super) fn page(file: &PaperFile, tables: &[PaperTable], figures: &[PaperFigu
     let mut key = KeyFigures::new();
     for figure in &file.reached {
         let tone = if figure.met { Tone::Good } else { Tone::Bad };
-        key = key.judged(figure.what, &shown(figure.value), &format!("goal: at most {}", shown(figure.goal)), tone);
+        key = key.judged(figure.what, shown(figure.value), format!("goal: at most {}", shown(figure.goal)), tone);
     }
     page.add(key);
     for (title, table_numbers, figure_numbers) in CHAPTERS {

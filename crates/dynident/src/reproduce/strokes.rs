@@ -47,7 +47,7 @@ pub(super) fn figure_4() -> PaperFigure {
     let mut plot = LinePlot::new("Different ω at T = 80", "t, s", "q, rad", grid(80.0, POINTS));
     for omega in [0.6, 0.8, 1.0, 1.5] {
         let (q, _) = spliced(omega, 80.0, 80.0).unwrap_or_default();
-        plot = plot.line(&format!("ω = {omega}"), q);
+        plot = plot.line(format!("ω = {omega}"), q);
     }
     PaperFigure::new(4, plot, "the paper does not say which values it draws")
 }
@@ -60,7 +60,7 @@ pub(super) fn figure_5() -> PaperFigure {
         let (q, _) = spliced(0.6, period, period).unwrap_or_default();
         // The stroke's own grid ends at T.
         let at = |t: f64| if t <= period { sampled(&q, t / period) } else { f64::NAN };
-        plot = plot.line(&format!("T = {period}"), times.iter().map(|&t| at(t)).collect());
+        plot = plot.line(format!("T = {period}"), times.iter().map(|&t| at(t)).collect());
     }
     PaperFigure::new(5, plot, "the paper does not say which values it draws")
 }

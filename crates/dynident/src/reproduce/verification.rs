@@ -3,7 +3,6 @@
 use super::arm::{Arm, TRUTH};
 use super::base_parameters::COLUMNS;
 use super::piece::PaperFigure;
-use crate::error::Error;
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, Workspace, torque_regressor};
 use dynident_excitation::grid;
 use dynident_report::LinePlot;
@@ -13,7 +12,7 @@ const DURATION_S: f64 = 10.0;
 const SAMPLES: usize = 1001;
 
 /// Driving torques along q1 = sin t, q2 = sin(-t), and those predicted from the six parameters by either method.
-pub(super) fn figures_16_and_17(arm: &Arm, logistic: &[f64; 6], fourier: &[f64; 6]) -> Result<Vec<PaperFigure>, Error> {
+pub(super) fn figures_16_and_17(arm: &Arm, logistic: &[f64; 6], fourier: &[f64; 6]) -> Vec<PaperFigure> {
     let times = grid(DURATION_S, SAMPLES);
     let base = BaseParameters::new(&arm.model, &[], &BaseParameterSettings::default());
     let mut workspace = Workspace::new(&arm.model);
@@ -31,7 +30,7 @@ pub(super) fn figures_16_and_17(arm: &Arm, logistic: &[f64; 6], fourier: &[f64; 
             }
         }
     }
-    Ok((16..)
+    (16..)
         .zip(torque)
         .enumerate()
         .map(|(joint, (number, [driving, logistic, fourier]))| {
@@ -47,5 +46,5 @@ pub(super) fn figures_16_and_17(arm: &Arm, logistic: &[f64; 6], fourier: &[f64; 
                 .value("largest_deviation_logistic_nm", by_logistic)
                 .value("largest_deviation_fourier_nm", by_fourier)
         })
-        .collect())
+        .collect()
 }
