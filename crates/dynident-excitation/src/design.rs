@@ -175,8 +175,19 @@ pub fn design(
         // Around the best, by noise that shrinks: most of a family's good basins lie near each other.
         let size = RESTART_NOISE[round % RESTART_NOISE.len()];
         let scales = joint_scales(&best.state.x, task.family.joints());
-        let moved = |_| {
-            let noise = best.state.x.iter().zip(&scales).map(|(p, scale)| p + size * scale * random.normal());
+        let joints = task.family.joints().max(1);
+        let each = (best.state.x.len() / joints).max(1);
+        let moved = |restart: usize| {
+            // One restart near all of the best, the next with one of its joints moving otherwise.
+            let one = (restart % 2 == 1).then(|| (random.uniform(0.0, joints as f64) as usize).min(joints - 1));
+            let noise = best.state.x.iter().zip(&scales).enumerate().map(|(k, (p, scale))| {
+                let size = match one {
+                    None => size,
+                    Some(joint) if k / each == joint => ONE_JOINT_NOISE,
+                    Some(_) => 0.02,
+                };
+                p + size * scale * random.normal()
+            });
             noise.collect::<Vec<f64>>().into()
         };
         starts = core::iter::once(best.state.clone()).chain((0..(settings.starts / 2).max(2)).map(moved)).collect();
@@ -232,6 +243,9 @@ pub fn design(
 
 /// Noise of the restarts, as shares of each joint's root mean square, round after round.
 const RESTART_NOISE: [f64; 3] = [0.3, 0.15, 0.08];
+
+/// Noise of the restarts in which one joint moves otherwise.
+const ONE_JOINT_NOISE: f64 = 1.0;
 
 /// Polishes at most.
 const POLISHES: usize = 6;
