@@ -184,7 +184,7 @@ pub fn design(
                 let size = match one {
                     None => size,
                     Some(joint) if k / each == joint => ONE_JOINT_NOISE,
-                    Some(_) => 0.02,
+                    Some(_) => OTHER_JOINTS_NOISE,
                 };
                 p + size * scale * random.normal()
             });
@@ -246,6 +246,8 @@ const RESTART_NOISE: [f64; 3] = [0.3, 0.15, 0.08];
 
 /// Noise of the restarts in which one joint moves otherwise.
 const ONE_JOINT_NOISE: f64 = 1.0;
+/// Noise of the other joints in them.
+const OTHER_JOINTS_NOISE: f64 = 0.02;
 
 /// Polishes at most.
 const POLISHES: usize = 6;

@@ -93,14 +93,8 @@ impl LogisticPath {
     /// Speed and acceleration by position alone, Eqs. 15 and 16: `dq = ±(ω/A)(q - h)(A - q + h)`, plus on the way `there`,
     /// `ddq = (ω²/A²)(q - h)(A - q + h)(A - 2q + 2h)`. `None` outside the stroke, where the formulas give the wrong sign.
     pub fn rates(&self, q: f64, there: bool) -> Option<[f64; 2]> {
-        let Self { amplitude, omega, offset, .. } = *self;
-        let (gone, left) = (q - offset, amplitude - (q - offset));
-        if !(gone / amplitude > 0.0 && left / amplitude > 0.0) {
-            return None;
-        }
-        let dq = omega / amplitude * gone * left;
-        let ddq = omega * omega / (amplitude * amplitude) * gone * left * (left - gone);
-        Some([if there { dq } else { -dq }, ddq])
+        let gone = (q - self.offset) / self.amplitude;
+        (gone > 0.0 && gone < 1.0).then(|| self.rates_as_written(q, there))
     }
 
     /// Eqs. 15 and 16 at any position, outside the stroke as well, where the sign is wrong. A joint that stands still (A = 0) has neither speed nor acceleration.

@@ -75,7 +75,7 @@ pub use job::RunOptions;
 pub use machine::Machine;
 pub use output::{check_writable, write_whole};
 pub use progress::{Progress, Silent};
-pub use reproduce::{Cell, Deviation, PAPER_SCHEMA, PaperFigure, PaperFile, PaperTable, Reached, reproduce};
+pub use reproduce::{Deviation, PAPER_SCHEMA, PaperCell, PaperFigure, PaperFile, PaperTable, Reached, reproduce};
 pub use residuals::{JointResiduals, TorqueBand};
 pub use result::{
     BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, LogValidation, MethodSummary,

@@ -1,7 +1,7 @@
 //! Table 2 and Eqs. 6, 7: the base parameters and the observation matrix of the planar arm, by the general algorithm.
 
 use super::arm::{A1, Arm, GRAVITY, TRUTH};
-use super::piece::{Cell, PaperTable};
+use super::piece::{PaperCell, PaperTable};
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, Workspace, torque_regressor};
 use dynident_model::sample::Random;
 
@@ -30,9 +30,9 @@ pub(super) fn table_2(arm: &Arm) -> (PaperTable, f64) {
     let expressions = base.expressions();
     for (place, paper) in PAPER.iter().enumerate() {
         table.row([
-            Cell::Text(theta(place)),
+            PaperCell::Text(theta(place)),
             (*paper).into(),
-            expressions.get(COLUMNS[place]).map_or(Cell::None, |expression| Cell::Text(expression.clone())),
+            expressions.get(COLUMNS[place]).map_or(PaperCell::None, |expression| PaperCell::Text(expression.clone())),
             TRUTH[place].into(),
         ]);
     }

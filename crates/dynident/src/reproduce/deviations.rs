@@ -22,7 +22,7 @@ pub(super) const DEVIATIONS: &[Deviation] = &[
     Deviation {
         place: "Eqs. 15, 16",
         trouble: "the branch changes at half a period although a lagging arm is still on the other one, and a position outside (h, h + A) is mapped to a speed of the wrong sign",
-        here: "in the columns 'as in the paper' the map is used literally; our own columns take only samples inside the stroke",
+        here: "in the columns 'as in the paper' the map is used literally; our own columns differentiate the deviation from the commanded stroke instead",
     },
     Deviation {
         place: "Table 3",

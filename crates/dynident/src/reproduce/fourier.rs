@@ -3,7 +3,7 @@
 use super::arm::{Arm, TRUTH};
 use super::base_parameters::{COLUMNS, theta};
 use super::joint_runs::{failed, first_gains, model_based, prior};
-use super::piece::{Cell, PaperFigure, PaperTable};
+use super::piece::{PaperCell, PaperFigure, PaperTable};
 use crate::design::design_study;
 use crate::error::Error;
 use crate::job::RunOptions;
@@ -87,8 +87,8 @@ pub(super) fn fourier(arm: &Arm, out: &Path, seed: u64, options: &RunOptions<'_>
     );
     for place in 0..6 {
         let truth = TRUTH[place];
-        let both = |value: f64| [Cell::from(value), (value - truth).abs().into()];
-        let head = [Cell::Text(theta(place)), truth.into()];
+        let both = |value: f64| [PaperCell::from(value), (value - truth).abs().into()];
+        let head = [PaperCell::Text(theta(place)), truth.into()];
         table.row(head.into_iter().chain(both(PAPER[place])).chain(both(values[place])));
     }
     Ok(FourierRuns { figure_15: PaperFigure::new(15, plot, &note), table_6: table, values })

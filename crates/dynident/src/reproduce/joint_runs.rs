@@ -2,7 +2,7 @@
 
 use super::arm::{Arm, TRUTH};
 use super::base_parameters::{COLUMNS, theta};
-use super::piece::{Cell, PaperFigure, PaperTable};
+use super::piece::{PaperCell, PaperFigure, PaperTable};
 use crate::error::Error;
 use dynident_excitation::families::{SplicedLogistic, SplicedLogisticSettings};
 use dynident_excitation::paper_problem::{PaperProblem, Stroke};
@@ -26,7 +26,7 @@ pub(super) struct JointRuns {
 }
 
 /// How a joint's runs are made.
-struct Kind {
+struct Protocol {
     rate_hz: f64,
     steps_per_sample: usize,
     runs: usize,
@@ -61,19 +61,19 @@ const SHOWN: usize = 3;
 
 /// Both schemes, both joints: the paper's own with its Table 3, and ours inside the limits (18).
 pub(super) fn joint_runs(arm: &Arm, optimum: &[Stroke; 2]) -> Result<JointRuns, Error> {
-    let paper = Kind {
+    let paper = Protocol {
         rate_hz: 100.0,
         steps_per_sample: 10,
         runs: SHOWN,
         strokes: PaperProblem::table_3(100.0),
         literal: true,
     };
-    let ours = Kind { rate_hz: 1000.0, steps_per_sample: 1, runs: 6, strokes: *optimum, literal: false };
-    let [as_paper, own] = [&paper, &ours].map(|kind| -> Result<[Runs; 2], Error> {
-        let two = one_joint(arm, kind, 1, &[]).map_err(|why| failed(&arm.description, &why))?;
+    let ours = Protocol { rate_hz: 1000.0, steps_per_sample: 1, runs: 6, strokes: *optimum, literal: false };
+    let [as_paper, own] = [&paper, &ours].map(|protocol| -> Result<[Runs; 2], Error> {
+        let two = one_joint(arm, protocol, 1, &[]).map_err(|why| failed(&arm.description, &why))?;
         let last = two.values.last().copied().unwrap_or_default();
         let known: Vec<(usize, f64)> = (3..).zip(last).map(|(place, value)| (COLUMNS[place], value)).collect();
-        let one = one_joint(arm, kind, 0, &known).map_err(|why| failed(&arm.description, &why))?;
+        let one = one_joint(arm, protocol, 0, &known).map_err(|why| failed(&arm.description, &why))?;
         Ok([one, two])
     });
     let (as_paper, own) = (as_paper?, own?);
@@ -103,14 +103,15 @@ fn error(joint: usize, values: &[f64; 3]) -> f64 {
 }
 
 /// The runs of one joint while the other is locked at zero.
-fn one_joint(arm: &Arm, kind: &Kind, joint: usize, known: &[(usize, f64)]) -> Result<Runs, IterationError> {
-    let stroke = kind.strokes[joint];
+fn one_joint(arm: &Arm, protocol: &Protocol, joint: usize, known: &[(usize, f64)]) -> Result<Runs, IterationError> {
+    let stroke = protocol.strokes[joint];
     let period_s = 40.0 / stroke.steepness_per_s;
     let settings = SplicedLogisticSettings { offsets: Some(vec![0.0; 2]), ..SplicedLogisticSettings::default() };
     let family = SplicedLogistic::new(2, period_s, &settings)
         .map_err(|why| IterationError::State { path: "the paper's stroke".into(), problem: why.to_string() })?;
     let parameters = [stroke.amplitude_rad, stroke.steepness_per_s, stroke.amplitude_rad, stroke.steepness_per_s];
-    let reference = Reference::of_family(&family, &parameters, kind.rate_hz, None)?.with_joint_held(1 - joint, 0.0)?;
+    let reference =
+        Reference::of_family(&family, &parameters, protocol.rate_hz, None)?.with_joint_held(1 - joint, 0.0)?;
     let mut windows = vec![Vec::new(); 2];
     windows[joint] =
         [0.25, 0.75].map(|share| [share * period_s - stroke.window_s, share * period_s + stroke.window_s]).to_vec();
@@ -124,12 +125,12 @@ fn one_joint(arm: &Arm, kind: &Kind, joint: usize, known: &[(usize, f64)]) -> Re
     let mut paths = [LogisticPath { amplitude: 0.0, ..path }; 2];
     paths[joint] = path;
     let leg = Leg::windowed(reference, windows)?.with_commanded(dynident_recording::Reference::logistic(&paths)?);
-    let machine = IteratedMachine::new(&arm.model, &[], Some(prior(kind.literal)))?;
+    let machine = IteratedMachine::new(&arm.model, &[], Some(prior(protocol.literal)))?;
     let task = IterationTask { machine, legs: vec![leg], known: known.to_vec(), torque_limits: None };
-    let iteration = Iteration::new(task, iteration_settings(kind))?;
+    let iteration = Iteration::new(task, iteration_settings(protocol))?;
     let resting = arm.model.joints()[1 - joint].name.clone();
     let plant = Plant::new(&arm.model, &[], &[])?.with_locked(&[resting])?;
-    let integrator = Integrator::Rk4 { steps_per_sample: kind.steps_per_sample };
+    let integrator = Integrator::Rk4 { steps_per_sample: protocol.steps_per_sample };
     let mut robot = SimulatedRobot::new(plant, LoopSettings { integrator, ..LoopSettings::default() })?;
     let mut runs = Vec::new();
     let outcome = iterate(&iteration, &mut [&mut robot as &mut dyn Robot], None, &mut |_, made| {
@@ -159,9 +160,9 @@ pub(super) fn first_gains() -> ControllerSettings {
     ControllerSettings::JointPd(JointPdSettings { kp: kp.into(), kd: kd.into() })
 }
 
-fn iteration_settings(kind: &Kind) -> IterationSettings {
+fn iteration_settings(protocol: &Protocol) -> IterationSettings {
     let mut settings = IterationSettings::default();
-    if kind.literal {
+    if protocol.literal {
         settings = IterationSettings::literal(0.5);
         settings.identification.differentiator =
             DifferentiatorSettings::LiteralMap { reference: ReferenceSettings::default() };
@@ -170,7 +171,7 @@ fn iteration_settings(kind: &Kind) -> IterationSettings {
     settings.identification.scheme = Scheme::StepByStep;
     settings.model_free = first_gains();
     settings.controller = model_based();
-    settings.max_runs = kind.runs;
+    settings.max_runs = protocol.runs;
     // All runs are made, so that there is something to show.
     settings.settled.parameter_sigmas = 0.0;
     settings.settled.parameter_tolerance = 0.0;
@@ -193,25 +194,25 @@ fn table(number: usize, joint: usize, as_paper: &Runs, own: &Runs) -> PaperTable
     for place in 0..3 {
         let truth = TRUTH[3 * joint + place];
         table.row([
-            Cell::Text(theta(3 * joint + place)),
+            PaperCell::Text(theta(3 * joint + place)),
             "initial".into(),
             0.0.into(),
             truth.into(),
             0.0.into(),
             truth.into(),
-            Cell::None,
-            Cell::None,
+            PaperCell::None,
+            PaperCell::None,
         ]);
         for run in 0..own.values.len() {
             let both = |value: Option<f64>| {
-                value.map_or([Cell::None, Cell::None], |value| [value.into(), (value - truth).abs().into()])
+                value.map_or([PaperCell::None, PaperCell::None], |value| [value.into(), (value - truth).abs().into()])
             };
             let cells = [
                 both(PAPER[joint].get(run).map(|values| values[place])),
                 both(as_paper.values.get(run).map(|values| values[place])),
                 both(own.values.get(run).map(|values| values[place])),
             ];
-            let head = [Cell::Text(theta(3 * joint + place)), Cell::Text((run + 1).to_string())];
+            let head = [PaperCell::Text(theta(3 * joint + place)), PaperCell::Text((run + 1).to_string())];
             table.row(head.into_iter().chain(cells.into_iter().flatten()));
         }
     }

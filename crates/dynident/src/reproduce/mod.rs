@@ -11,7 +11,7 @@ mod piece;
 mod strokes;
 mod verification;
 
-pub use piece::{Cell, Deviation, PaperFigure, PaperTable};
+pub use piece::{Deviation, PaperCell, PaperFigure, PaperTable};
 
 use crate::error::Error;
 use crate::job::RunOptions;

@@ -1,7 +1,7 @@
 //! Fig. 7 and Table 3: the paper's genetic algorithm on the paper's problem, and the optimum beside it.
 
 use super::arm::Arm;
-use super::piece::{Cell, PaperFigure, PaperTable};
+use super::piece::{PaperCell, PaperFigure, PaperTable};
 use crate::design::{StrokeFile, WindowedFile, design_study};
 use crate::error::Error;
 use crate::job::RunOptions;
@@ -79,7 +79,7 @@ fn table_3(file: &WindowedFile, optimum: [Stroke; 2], genetic: [Stroke; 2]) -> P
     for joint in 0..2 {
         let index = ["₁", "₂"][joint];
         let mut row = |name: String, of: &dyn Fn(&Stroke) -> f64| {
-            table.row(core::iter::once(Cell::Text(name)).chain(all.map(|strokes| of(&strokes[joint]).into())));
+            table.row(core::iter::once(PaperCell::Text(name)).chain(all.map(|strokes| of(&strokes[joint]).into())));
         };
         row(format!("A{index}, rad"), &|stroke| stroke.amplitude_rad);
         row(format!("ω{index}, 1/s"), &|stroke| stroke.steepness_per_s);

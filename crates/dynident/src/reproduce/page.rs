@@ -1,7 +1,7 @@
 //! `report.html` of the reproduction.
 
 use super::PaperFile;
-use super::piece::{Cell, PaperFigure, PaperTable};
+use super::piece::{PaperCell, PaperFigure, PaperTable};
 use crate::error::Error;
 use dynident_report::{Heading, KeyFigures, Report, Table, Text, Tone};
 
@@ -54,7 +54,7 @@ fn section(table: &PaperTable) -> Table {
     let mut section = Table::new(format!("Table {}: {}", table.number, table.title), table.columns.iter().cloned())
         .note(table.note.clone());
     for row in &table.rows {
-        section = section.row(row.iter().map(Cell::shown).collect::<Vec<String>>());
+        section = section.row(row.iter().map(PaperCell::shown).collect::<Vec<String>>());
     }
     section
 }
@@ -67,5 +67,5 @@ fn note(figure: &PaperFigure) -> String {
 }
 
 fn shown(value: f64) -> String {
-    Cell::from(value).shown()
+    PaperCell::from(value).shown()
 }

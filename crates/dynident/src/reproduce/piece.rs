@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 /// What a cell of a table holds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
-pub enum Cell {
+pub enum PaperCell {
     /// A number.
     Number(f64),
     /// A word or an expression.
@@ -16,7 +16,7 @@ pub enum Cell {
     None,
 }
 
-impl Cell {
+impl PaperCell {
     /// As a person reads it: four digits.
     pub(super) fn shown(&self) -> String {
         match self {
@@ -30,13 +30,13 @@ impl Cell {
     }
 }
 
-impl From<f64> for Cell {
+impl From<f64> for PaperCell {
     fn from(value: f64) -> Self {
         if value.is_finite() { Self::Number(value) } else { Self::None }
     }
 }
 
-impl From<&str> for Cell {
+impl From<&str> for PaperCell {
     fn from(text: &str) -> Self {
         Self::Text(text.to_owned())
     }
@@ -53,7 +53,7 @@ pub struct PaperTable {
     /// Heads of the columns.
     pub columns: Vec<String>,
     /// Rows, as wide as the heads.
-    pub rows: Vec<Vec<Cell>>,
+    pub rows: Vec<Vec<PaperCell>>,
     /// What to know when reading it.
     pub note: String,
 }
@@ -64,7 +64,7 @@ impl PaperTable {
         Self { number, title: title.to_owned(), columns, rows: Vec::new(), note: note.to_owned() }
     }
 
-    pub(super) fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
+    pub(super) fn row(&mut self, cells: impl IntoIterator<Item = PaperCell>) {
         self.rows.push(cells.into_iter().collect());
     }
 }
