@@ -1,12 +1,12 @@
 //! What fitting and testing share: how a job runs, which files it needs, what is told of a log.
 
 use crate::error::Error;
-use crate::evidence::{PriorAgreement, findings};
-use crate::lag;
+use crate::identify::result::LogSummary;
 use crate::machine::Machine;
+use crate::measured::evidence::{PriorAgreement, findings};
+use crate::measured::lag;
+use crate::measured::rows::Passed;
 use crate::progress::Progress;
-use crate::result::LogSummary;
-use crate::rows::Passed;
 use crate::study::{Folders, Role, Study};
 use std::path::{Path, PathBuf};
 

@@ -13,37 +13,18 @@ mod cpu_time;
 mod design;
 mod error;
 mod evaluate;
-mod evidence;
-mod fit;
-mod friction_candidates;
-mod friction_choice;
-mod friction_section;
-mod further_passes;
 mod identify;
 mod inspect;
-mod instrument_rows;
-mod instruments;
 mod iterate;
 mod job;
-mod lag;
 mod machine;
-mod motion_log;
+mod measured;
 mod output;
-mod physical;
 mod progress;
-mod report;
 mod reproduce;
-mod residuals;
-mod result;
-mod result_sections;
-mod rows;
 mod simulate;
-mod simulation;
-mod standard_parameters;
 mod study;
-mod torque_trace;
 mod validate;
-mod written_urdf;
 
 pub use dynident_dynamics as dynamics;
 pub use dynident_estimation as estimation;
@@ -60,33 +41,33 @@ pub use design::{
 };
 pub use error::Error;
 pub use evaluate::{Quantity, evaluate};
-pub use evidence::PriorAgreement;
-pub use fit::{GrossErrors, NoiseInRegressor};
-pub use friction_choice::{FrictionCandidate, JointFriction};
-pub use friction_section::{FrictionChoice, FrictionLaw};
+pub use identify::fit::{GrossErrors, NoiseInRegressor};
+pub use identify::friction_choice::{FrictionCandidate, JointFriction};
+pub use identify::instruments::{InstrumentSection, InstrumentSource, SmoothedMotion};
+pub use identify::result::{
+    BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, LogValidation, MethodSummary,
+    PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, Timings,
+    TrainingJoint, TrainingResult,
+};
 pub use identify::{Identification, identify, identify_with_instruments};
 pub use inspect::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary, inspect};
-pub use instruments::{InstrumentSection, InstrumentSource, SmoothedMotion};
 pub use iterate::{
     ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationSection, IterationWatch, IterationsFile, PriorChoice,
     RobotChoice, iterate_study,
 };
 pub use job::RunOptions;
 pub use machine::Machine;
+pub use measured::evidence::PriorAgreement;
+pub use measured::residuals::{JointResiduals, TorqueBand};
+pub use measured::torque_trace::{JointTrace, LogTrace};
 pub use output::{check_writable, write_whole};
 pub use progress::{Progress, Silent};
 pub use reproduce::{Deviation, PAPER_SCHEMA, PaperCell, PaperFigure, PaperFile, PaperTable, Reached, reproduce};
-pub use residuals::{JointResiduals, TorqueBand};
-pub use result::{
-    BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, LogValidation, MethodSummary,
-    PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, Timings,
-    TrainingJoint, TrainingResult,
-};
+pub use simulate::section::{SimulatedTruth, SimulationSection};
 pub use simulate::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, Simulation, SimulationFile, simulate_study};
-pub use simulation::{SimulatedTruth, SimulationSection};
+pub use study::friction::{FrictionChoice, FrictionLaw};
 pub use study::{
     CoulombChoice, CouplingSection, DriveSection, EstimatorMethod, EstimatorSection, Folders, JointDrive, LogSection,
     ParallelFilterSection, RobotSection, Role, Study,
 };
-pub use torque_trace::{JointTrace, LogTrace};
 pub use validate::{VALIDATION_SCHEMA, ValidationFile, validate};

@@ -1,16 +1,16 @@
 //! A model against logs that were not used for its fit.
 
 use crate::error::Error;
-use crate::evidence::{Evidence, predicted};
-use crate::friction_choice::{JointFriction, with_friction};
+use crate::identify::friction_choice::{JointFriction, with_friction};
+use crate::identify::result::{BaseParameterResult, LogSummary, LogValidation};
 use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
-use crate::lag::LagCheck;
 use crate::machine::Machine;
-use crate::residuals::{JointWatch, Uncertainty};
-use crate::result::{BaseParameterResult, LogSummary, LogValidation};
-use crate::rows::{JointRows, Pass, RawSamples, RowSink, estimated_rows, motion_in_force};
+use crate::measured::evidence::{Evidence, predicted};
+use crate::measured::lag::LagCheck;
+use crate::measured::residuals::{JointWatch, Uncertainty};
+use crate::measured::rows::{JointRows, Pass, RawSamples, RowSink, estimated_rows, motion_in_force};
+use crate::measured::torque_trace::{LogTrace, TraceSink};
 use crate::study::{Folders, Role, Study};
-use crate::torque_trace::{LogTrace, TraceSink};
 use dynident_estimation::Validation;
 use dynident_recording::MotionSettings;
 use serde::{Deserialize, Serialize};
@@ -95,8 +95,8 @@ fn read_model(path: &Path) -> Result<StoredModel, Error> {
     let stored: StoredModel = serde_json::from_slice(&bytes).map_err(|error| {
         wrong(format!("line {}, column {}: not a result of `identify`: {error}", error.line(), error.column()))
     })?;
-    if stored.schema != crate::result::RESULT_SCHEMA {
-        let expected = crate::result::RESULT_SCHEMA;
+    if stored.schema != crate::identify::result::RESULT_SCHEMA {
+        let expected = crate::identify::result::RESULT_SCHEMA;
         return Err(wrong(format!("schema `{}`, not `{expected}`: identify again with this version", stored.schema)));
     }
     for joint in &stored.friction_choice {

@@ -3,8 +3,8 @@
 use super::BenchmarkError;
 use super::scenario::{DURATION_S, HARMONICS, RATE_HZ, Record, Scenario};
 use crate::error::Error;
+use crate::measured::rows::{Computer, JointRows, RawSamples, RowSink, decimation};
 use crate::progress::Silent;
-use crate::rows::{Computer, JointRows, RawSamples, RowSink, decimation};
 use crate::study::{EstimatorSection, ParallelFilterSection};
 use dynident_estimation::{LinearProblem, SegmentedFactor};
 use dynident_recording::{Derivatives, DifferentiatorSettings, FilterError, MotionBlock, cutoff};

@@ -171,7 +171,7 @@ fn torque(model: &Model, layout: &PanelLayout, motion: &Motion, theta: &[f64]) -
     let mut buffer = Vec::new();
     for joint in 0..model.dof() {
         let columns = layout.joint_columns(joint);
-        crate::evidence::predicted(panels.joint(joint), motion.samples, columns, theta, &mut buffer);
+        crate::measured::evidence::predicted(panels.joint(joint), motion.samples, columns, theta, &mut buffer);
         tau.extend_from_slice(&buffer);
     }
     tau

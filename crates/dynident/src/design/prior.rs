@@ -1,8 +1,8 @@
 //! `[design.prior]`: what is known before the motion, so that the next one looks for what is not.
 
 use crate::error::Error;
+use crate::identify::result::{BaseParameterResult, RESULT_SCHEMA};
 use crate::machine::Machine;
-use crate::result::{BaseParameterResult, RESULT_SCHEMA};
 use crate::study::Folders;
 use dynident_dynamics::Column;
 use dynident_model::laws::Law;

@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::job::{RunOptions, joint_names, study_name};
 use crate::machine::{Machine, prior_parameters};
 use crate::output::write_whole;
-use crate::simulation::SimulatedTruth;
+use crate::simulate::section::SimulatedTruth;
 use crate::study::{Folders, Study};
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;

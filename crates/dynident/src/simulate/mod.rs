@@ -1,5 +1,7 @@
 //! A simulated robot runs a study's trajectory under a controller.
 
+pub(crate) mod section;
+
 use crate::error::Error;
 use crate::iterate::Trajectory;
 use crate::job::{RunOptions, joint_names, study_name};

@@ -2,7 +2,7 @@
 //!
 //! Least squares fits either sign equally well (all parameters change sign), so only a prior can tell.
 
-use crate::rows::JointRows;
+use crate::measured::rows::JointRows;
 use dynident_recording::{Finding, Level};
 use serde::Serialize;
 

@@ -1,8 +1,8 @@
 //! Estimators that need more than the joints' factors: another pass over the rows, or the joints side by side.
 
 use crate::error::Error;
-use crate::fit::Logs;
-use crate::rows::{JointRows, RawSamples, RowSink};
+use crate::identify::fit::Logs;
+use crate::measured::rows::{JointRows, RawSamples, RowSink};
 use dynident_estimation::{
     CrossProblem, EstimationError, GeneralizedEstimate, LinearProblem, RobustEstimate, RobustSettings, RowBlock,
     RowVisitor, RowWeight, SegmentedFactor, WeightedSettings, generalized_least_squares, robust_least_squares,

@@ -1,9 +1,9 @@
 //! What `identify` writes: the schema of `result.json`.
 
-use crate::evidence::PriorAgreement;
-use crate::fit::{GrossErrors, NoiseInRegressor};
-use crate::friction_choice::JointFriction;
-use crate::residuals::{JointResiduals, TorqueBand};
+use crate::identify::fit::{GrossErrors, NoiseInRegressor};
+use crate::identify::friction_choice::JointFriction;
+use crate::measured::evidence::PriorAgreement;
+use crate::measured::residuals::{JointResiduals, TorqueBand};
 use dynident_estimation::{CorrelatedPair, EssentialReport, ValidationReport};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};

@@ -1,27 +1,40 @@
 //! Logs to a model: the main job.
 
+pub(crate) mod fit;
+pub(crate) mod friction_candidates;
+pub(crate) mod friction_choice;
+pub(crate) mod further_passes;
+pub(crate) mod instrument_rows;
+pub(crate) mod instruments;
+pub(crate) mod physical;
+pub(crate) mod report;
+pub(crate) mod result;
+pub(crate) mod result_sections;
+pub(crate) mod standard_parameters;
+pub(crate) mod written_urdf;
+
 use crate::error::Error;
-use crate::evidence::Evidence;
-use crate::fit::{Fitted, Logs};
-use crate::friction_candidates::{candidate_columns, joints_to_choose};
-use crate::friction_choice::{JointFriction, choose_friction, with_friction};
-use crate::instruments::InstrumentSource;
-use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
-use crate::lag::{self, LAG_SAMPLES, LagCheck};
-use crate::machine::{Machine, prior_parameters};
-use crate::physical::{physical_fit_result, possible_parameters};
-use crate::progress::Silent;
-use crate::residuals::Uncertainty;
-use crate::result::{LogSummary, RESULT_SCHEMA, ResultFile, Timings};
-use crate::result_sections::{
+use crate::identify::fit::{Fitted, Logs};
+use crate::identify::friction_candidates::{candidate_columns, joints_to_choose};
+use crate::identify::friction_choice::{JointFriction, choose_friction, with_friction};
+use crate::identify::instruments::InstrumentSource;
+use crate::identify::physical::{physical_fit_result, possible_parameters};
+use crate::identify::result::{LogSummary, RESULT_SCHEMA, ResultFile, Timings};
+use crate::identify::result_sections::{
     base_parameters, bodies, joint_results, law_results, method_summary, robot_summary, training_result, verdict,
 };
-use crate::rows::{JointRows, Pass, RawSamples, RowSink, motion_in_force};
-use crate::standard_parameters::{inertials, nearest_to_prior};
+use crate::identify::standard_parameters::{inertials, nearest_to_prior};
+use crate::identify::written_urdf::written_urdf;
+use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
+use crate::machine::{Machine, prior_parameters};
+use crate::measured::evidence::Evidence;
+use crate::measured::lag::{self, LAG_SAMPLES, LagCheck};
+use crate::measured::residuals::Uncertainty;
+use crate::measured::rows::{JointRows, Pass, RawSamples, RowSink, motion_in_force};
+use crate::measured::torque_trace::{LogTrace, TraceSink};
+use crate::progress::Silent;
 use crate::study::{EstimatorMethod, Folders, Role, Study};
-use crate::torque_trace::{LogTrace, TraceSink};
 use crate::validate::{Tested, validate_log};
-use crate::written_urdf::written_urdf;
 use dynident_dynamics::Column;
 use dynident_estimation::{
     Estimate, LinearProblem, OrdinarySettings, SegmentedFactor, WeightedSettings, essential, ordinary_least_squares,
@@ -58,7 +71,7 @@ impl Identification {
     /// # Errors
     /// [`Error::Report`], which would be a defect of this program.
     pub fn report(&self) -> Result<String, Error> {
-        crate::report::identification_report(self)
+        crate::identify::report::identification_report(self)
     }
 }
 
@@ -110,7 +123,7 @@ fn identified(
         Logs { study, path: study_path, machine, motion: &motion, files: &files, training: &training, options };
     let started = Instant::now();
     let Fitted { estimate, noise_in_regressor, gross_errors, noise_correlation } =
-        crate::fit::fitted(&passes, problem, source)?;
+        crate::identify::fit::fitted(&passes, problem, source)?;
     let (estimate, dropped) = match &study.estimator.essential {
         Some(settings) => {
             essential(&estimate, settings).map(|(rest, report)| (rest, Some(report))).map_err(in_study)?
@@ -340,7 +353,9 @@ fn read_logs(
     training: &[usize],
     options: &RunOptions<'_>,
 ) -> Result<Vec<LogFit>, Error> {
-    options.progress.begin("logs to factors", crate::rows::estimated_rows(training.iter().map(|&i| &*files[i])));
+    options
+        .progress
+        .begin("logs to factors", crate::measured::rows::estimated_rows(training.iter().map(|&i| &*files[i])));
     // Logs side by side, or one log with its reader on a second thread; results stand in the study's order either way.
     let one = |index: &usize| read_log(study, machine, motion, *index, &files[*index], training.len() == 1, options);
     let fits = if training.len() > 1 && options.threads > 1 {

@@ -1,10 +1,10 @@
 //! A log's rows with their instruments, `[Z | W | τ]`: two motions through the same regressor and the same parallel filter.
 
 use crate::error::Error;
-use crate::instruments::InstrumentSource;
+use crate::identify::instruments::InstrumentSource;
 use crate::machine::Machine;
-use crate::motion_log::motion_stream;
-use crate::rows::{PANEL_SAMPLES, Pass, decimation, in_model_order, motion_band_hz};
+use crate::measured::motion_log::motion_stream;
+use crate::measured::rows::{PANEL_SAMPLES, Pass, decimation, in_model_order, motion_band_hz};
 use dynident_dynamics::{BatchWorkspace, Panels, regressor_panels};
 use dynident_estimation::{EstimationError, SegmentSettings, SegmentedFactor};
 use dynident_model::laws::JointMotion;

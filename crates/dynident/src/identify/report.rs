@@ -2,8 +2,8 @@
 
 use crate::error::Error;
 use crate::identify::Identification;
-use crate::result::{BaseParameterResult, LogSummary, LogValidation, ResultFile};
-use crate::torque_trace::LogTrace;
+use crate::identify::result::{BaseParameterResult, LogSummary, LogValidation, ResultFile};
+use crate::measured::torque_trace::LogTrace;
 use dynident_recording::Level;
 use dynident_report::{BarPlot, Cell, Heading, HeatMap, KeyFigures, LinePlot, Report, Table, Text, Tone, short};
 

@@ -1,8 +1,8 @@
 //! Measured and predicted torque over time, for the report.
 
-use crate::evidence::predicted;
 use crate::machine::Machine;
-use crate::rows::{JointRows, RawSamples};
+use crate::measured::evidence::predicted;
+use crate::measured::rows::{JointRows, RawSamples};
 
 /// Rows of one joint that are kept at most: pictures need no more, and memory stays bounded.
 const MOST_ROWS: usize = 100_000;

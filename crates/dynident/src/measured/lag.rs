@@ -4,9 +4,9 @@
 //! figure is a lower bound.
 
 use crate::error::Error;
-use crate::evidence::predicted;
 use crate::machine::Machine;
-use crate::rows::{JointRows, RawSamples, RowSink};
+use crate::measured::evidence::predicted;
+use crate::measured::rows::{JointRows, RawSamples, RowSink};
 use dynident_recording::{DecimationSettings, Decimator, Finding, Level, best_lag};
 
 /// Samples that are looked at: some tens of seconds of any log.

@@ -5,7 +5,7 @@
 //! standard error of the least (Hastie, Tibshirani and Friedman, *The Elements of Statistical Learning*, 7.10; the standard error is that of the difference, block by block,
 //! because blocks differ among themselves far more than candidates do).
 
-use crate::friction_candidates::{CandidateColumn, Term, stated};
+use crate::identify::friction_candidates::{CandidateColumn, Term, stated};
 use crate::machine::Machine;
 use crate::study::{JointDrive, Study};
 use dynident_dynamics::Column;

@@ -5,7 +5,7 @@
 
 use crate::error::Error;
 use crate::machine::Machine;
-use crate::motion_log::motion_stream;
+use crate::measured::motion_log::motion_stream;
 use crate::progress::Progress;
 use crate::study::{ParallelFilterSection, Study};
 use dynident_dynamics::{BatchWorkspace, LawHistory, PanelLayout, Panels, regressor_panels_following};

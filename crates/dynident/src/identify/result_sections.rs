@@ -1,11 +1,11 @@
 //! From an estimate to the sections of `result.json`.
 
-use crate::job::joint_names;
-use crate::machine::Machine;
-use crate::result::{
+use crate::identify::result::{
     BaseParameterResult, BodyResult, JointResult, LawResult, MethodSummary, PhysicalVerdict, RobotSummary,
     TrainingJoint, TrainingResult,
 };
+use crate::job::joint_names;
+use crate::machine::Machine;
 use crate::study::Study;
 use dynident_estimation::{Estimate, EstimateStatus, LinearProblem};
 use dynident_model::laws::Law;

@@ -1,12 +1,12 @@
 //! From the study's choice of an estimator to an estimate: some need the logs once more.
 
 use crate::error::Error;
-use crate::further_passes::{generalized, robust};
-use crate::instrument_rows::instrumented_factors;
-use crate::instruments::{InstrumentSection, InstrumentSource, SmoothedMotion};
+use crate::identify::further_passes::{generalized, robust};
+use crate::identify::instrument_rows::instrumented_factors;
+use crate::identify::instruments::{InstrumentSection, InstrumentSource, SmoothedMotion};
 use crate::job::RunOptions;
 use crate::machine::Machine;
-use crate::rows::{Pass, estimated_rows};
+use crate::measured::rows::{Pass, estimated_rows};
 use crate::study::{EstimatorMethod, EstimatorSection, Study};
 use dynident_estimation::{
     Estimate, EstimationError, HausmanSettings, HausmanTest, InstrumentReport, InstrumentalEstimate,

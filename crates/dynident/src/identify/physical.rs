@@ -1,7 +1,7 @@
 //! From an estimate to the bodies of a possible machine, and what is told of it.
 
+use crate::identify::result::{PhysicalBodyResult, PhysicalFitResult};
 use crate::machine::Machine;
-use crate::result::{PhysicalBodyResult, PhysicalFitResult};
 use dynident_estimation::physical::{PhysicalFit, PhysicalStatus};
 use dynident_estimation::{Estimate, LinearProblem};
 use dynident_experiment::iteration::PhysicalSource;

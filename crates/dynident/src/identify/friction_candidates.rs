@@ -1,7 +1,7 @@
 //! The friction that a joint may have when the data choose: terms, and for each term a grid of its constants, every one a column.
 
-use crate::friction_section::{FrictionChoice, FrictionLaw};
 use crate::machine::{Machine, drive_choice};
+use crate::study::friction::{FrictionChoice, FrictionLaw};
 use crate::study::{CoulombChoice, JointDrive, Study};
 use dynident_model::laws::{Coulomb, CoulombShape, Law, Viscous};
 

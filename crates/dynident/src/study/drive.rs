@@ -1,0 +1,146 @@
+//! `[drive]` and `[[coupling]]`: friction, offsets and drive inertia.
+
+use super::arrays::two;
+use super::friction::{FrictionChoice, FrictionLaw};
+use super::numbers::{not_negative, positive};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// How a Coulomb step looks near zero speed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CoulombChoice {
+    /// No Coulomb friction.
+    None,
+    /// The sign of the speed.
+    Sign,
+    /// `tanh(speed / width)`.
+    Smooth,
+}
+
+/// `[drive]`: the laws of every joint, and exceptions by joint.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DriveSection {
+    /// Inertia of rotor and gear as seen from the joint. Off by default: where torque is measured at the link it does not show.
+    pub drive_inertia: bool,
+    /// Viscous friction. On by default.
+    pub viscous: bool,
+    /// Coulomb friction. `"smooth"` by default.
+    pub coulomb: CoulombChoice,
+    /// Width of the smooth step, rad/s or m/s; 0.02 by default.
+    pub coulomb_width: f64,
+    /// Speed below which the sign counts as zero, rad/s or m/s; 0 by default.
+    pub coulomb_dead_band: f64,
+    /// A constant torque. On by default.
+    pub offset: bool,
+    /// Further laws of friction. None by default.
+    pub laws: Vec<FrictionLaw>,
+    /// Whether the keys above say which friction there is (`"stated"`, the default), or the training logs (`"auto"`).
+    pub friction: FrictionChoice,
+    /// Exceptions, by joint name.
+    pub joints: BTreeMap<String, JointDrive>,
+}
+
+impl Default for DriveSection {
+    fn default() -> Self {
+        Self {
+            drive_inertia: false,
+            viscous: true,
+            coulomb: CoulombChoice::Smooth,
+            coulomb_width: 0.02,
+            coulomb_dead_band: 0.0,
+            offset: true,
+            laws: Vec::new(),
+            friction: FrictionChoice::Stated,
+            joints: BTreeMap::new(),
+        }
+    }
+}
+
+/// What one joint has in place of `[drive]`.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct JointDrive {
+    /// In place of `drive.drive_inertia`.
+    pub drive_inertia: Option<bool>,
+    /// In place of `drive.viscous`.
+    pub viscous: Option<bool>,
+    /// In place of `drive.coulomb`.
+    pub coulomb: Option<CoulombChoice>,
+    /// In place of `drive.coulomb_width`.
+    pub coulomb_width: Option<f64>,
+    /// In place of `drive.coulomb_dead_band`.
+    pub coulomb_dead_band: Option<f64>,
+    /// In place of `drive.offset`.
+    pub offset: Option<bool>,
+    /// In place of `drive.laws`.
+    pub laws: Option<Vec<FrictionLaw>>,
+    /// In place of `drive.friction`.
+    pub friction: Option<FrictionChoice>,
+}
+
+/// `[[coupling]]`: a drive whose speed is `ratios[0] · q̇_first + ratios[1] · q̇_second`.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct CouplingSection {
+    /// Name of the drive in the parameters' symbols.
+    pub name: String,
+    /// The two joints.
+    #[serde(deserialize_with = "two")]
+    pub joints: [String; 2],
+    /// Drive speed per joint speed; 1 and 1 by default.
+    #[serde(default = "one_one", deserialize_with = "two")]
+    pub ratios: [f64; 2],
+    /// Cross inertia. On by default.
+    #[serde(default = "yes")]
+    pub inertia: bool,
+    /// Cross viscous friction. On by default.
+    #[serde(default = "yes")]
+    pub viscous: bool,
+    /// Coulomb friction on the drive's own speed; by default as `drive.coulomb`.
+    #[serde(default)]
+    pub coulomb: Option<CoulombChoice>,
+}
+
+impl DriveSection {
+    pub(crate) fn validate(&self) -> Result<(), String> {
+        positive(self.coulomb_width, "drive.coulomb_width")?;
+        not_negative(self.coulomb_dead_band, "drive.coulomb_dead_band")?;
+        for (index, law) in self.laws.iter().enumerate() {
+            law.validate(&format!("drive.laws number {}", index + 1))?;
+        }
+        for (joint, drive) in &self.joints {
+            for (index, law) in drive.laws.iter().flatten().enumerate() {
+                law.validate(&format!("drive.joints.{joint}.laws number {}", index + 1))?;
+            }
+            if let Some(width) = drive.coulomb_width {
+                positive(width, &format!("drive.joints.{joint}.coulomb_width"))?;
+            }
+            if let Some(band) = drive.coulomb_dead_band {
+                not_negative(band, &format!("drive.joints.{joint}.coulomb_dead_band"))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl CouplingSection {
+    pub(crate) fn validate(&self) -> Result<(), String> {
+        if self.ratios.iter().any(|ratio| !ratio.is_finite() || *ratio == 0.0) {
+            return Err(format!("coupling `{}`: ratios must be finite and not zero", self.name));
+        }
+        if self.joints[0] == self.joints[1] {
+            return Err(format!("coupling `{}`: name two different joints", self.name));
+        }
+        Ok(())
+    }
+}
+
+fn one_one() -> [f64; 2] {
+    [1.0, 1.0]
+}
+
+fn yes() -> bool {
+    true
+}

@@ -1,0 +1,99 @@
+//! `[estimator]`: how the parameters are estimated, and how far they are trusted.
+
+use super::numbers::positive;
+use crate::identify::instruments::InstrumentSection;
+use dynident_estimation::{CovarianceMethod, EssentialSettings, RankSettings, SegmentSettings};
+use serde::{Deserialize, Serialize};
+
+/// Estimators that are linear in the parameters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EstimatorMethod {
+    /// Ordinary least squares: every joint's newton metre counts alike.
+    Ordinary,
+    /// Weighted least squares: every joint counts by its own noise.
+    #[default]
+    Weighted,
+    /// Generalised least squares: errors of the joints at one instant are correlated.
+    Generalized,
+    /// Iteratively reweighted with Huber's weights: rows far off count less.
+    Huber,
+    /// Iteratively reweighted with Tukey's weights: rows far off do not count.
+    Tukey,
+    /// Instrumental variables: noise in the regressor does not bias the estimate.
+    Instrumental,
+}
+
+impl EstimatorMethod {
+    /// The name in the study file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ordinary => "ordinary",
+            Self::Weighted => "weighted",
+            Self::Generalized => "generalized",
+            Self::Huber => "huber",
+            Self::Tukey => "tukey",
+            Self::Instrumental => "instrumental",
+        }
+    }
+}
+
+/// `[estimator]`.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct EstimatorSection {
+    /// The method; weighted by default.
+    pub method: EstimatorMethod,
+    /// The covariance that error bars come from; `"jackknife"`, which accounts for coloured residuals and judges each time segment by the fit without it, by default.
+    pub covariance: CovarianceMethod,
+    /// Whether the bodies, friction and drives written are those of a possible machine that fit the logs best (true by default), or the set nearest to the
+    /// description that has exactly the estimated base parameters.
+    pub physical: bool,
+    /// When a column counts as excited.
+    pub rank: RankSettings,
+    /// How logs are cut into segments for the covariance.
+    pub segments: SegmentSettings,
+    /// Hold parameters that the data hardly tell at zero; not by default.
+    pub essential: Option<EssentialSettings>,
+    /// Instruments for `method = "instrumental"`. With another method they only test whether noise in the regressor biases it.
+    pub instruments: Option<InstrumentSection>,
+}
+
+impl Default for EstimatorSection {
+    fn default() -> Self {
+        Self {
+            method: EstimatorMethod::default(),
+            covariance: CovarianceMethod::default(),
+            physical: true,
+            rank: RankSettings::default(),
+            segments: SegmentSettings::default(),
+            essential: None,
+            instruments: None,
+        }
+    }
+}
+
+impl EstimatorSection {
+    pub(crate) fn validate(&self) -> Result<(), String> {
+        self.rank.validate().map_err(|error| format!("[estimator.rank]: {error}"))?;
+        let instruments = self.instruments.clone().unwrap_or_default();
+        crate::identify::fit::instrumental_settings(self, &instruments)
+            .validate()
+            .map_err(|error| format!("[estimator.instruments]: {error}"))?;
+        crate::identify::fit::hausman_settings(self, &instruments)
+            .validate()
+            .map_err(|error| format!("[estimator.instruments], test_level: {error}"))?;
+        if let Some(cutoff) = instruments.cutoff_hz {
+            positive(cutoff, "estimator.instruments.cutoff_hz").map_err(|_| {
+                format!(
+                    "estimator.instruments.cutoff_hz = {cutoff}: give a positive frequency, below the motion's cut-off"
+                )
+            })?;
+        }
+        self.segments.validate().map_err(|error| format!("[estimator.segments]: {error}"))?;
+        if let Some(essential) = &self.essential {
+            essential.validate().map_err(|error| format!("[estimator.essential]: {error}"))?;
+        }
+        Ok(())
+    }
+}

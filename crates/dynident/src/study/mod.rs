@@ -1,0 +1,230 @@
+//! The study file: a robot, its drives, its logs and how to fit them, without code.
+
+mod arrays;
+mod drive;
+mod estimator;
+mod folders;
+pub(crate) mod friction;
+mod log;
+mod numbers;
+mod parallel_filter;
+mod robot;
+
+pub use drive::{CoulombChoice, CouplingSection, DriveSection, JointDrive};
+pub use estimator::{EstimatorMethod, EstimatorSection};
+pub use folders::Folders;
+pub use log::{LogSection, Role};
+pub use parallel_filter::ParallelFilterSection;
+pub use robot::RobotSection;
+
+use crate::design::DesignSection;
+use crate::error::Error;
+use crate::iterate::IterationSection;
+use crate::simulate::section::SimulationSection;
+use dynident_experiment::ControllerSettings;
+use dynident_model::line_and_column;
+use dynident_recording::{LogFormat, MotionSettings};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// A study, as written in TOML. Unknown keys are errors, so that a slip of the pen does not silently change a fit.
+///
+/// ```
+/// let study = dynident::Study::parse(
+///     r#"
+///     [robot]
+///     file = "arm.urdf"
+///
+///     [format]
+///     time = { column = "t_s" }
+///     position = { columns = "q{1..6}_rad" }
+///     torque = { columns = "tau{1..6}_Nm" }
+///
+///     [[log]]
+///     file = "first.csv"
+///
+///     [[log]]
+///     file = "second.csv"
+///     role = "validate"
+///     "#,
+///     std::path::Path::new("study.toml"),
+/// )
+/// .unwrap();
+/// assert_eq!(study.log.len(), 2);
+/// ```
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Study {
+    /// What the study is called in reports; the file's name by default.
+    #[serde(default)]
+    pub name: Option<String>,
+    /// Where the recordings can be had.
+    #[serde(default)]
+    pub source: Option<String>,
+    /// Folder of the recordings, relative to the study file, used unless the command line names one.
+    #[serde(default)]
+    pub data: Option<PathBuf>,
+    /// The machine.
+    pub robot: RobotSection,
+    /// Friction, offsets and drive inertia.
+    #[serde(default)]
+    pub drive: DriveSection,
+    /// Drives that turn with two joints.
+    #[serde(default)]
+    pub coupling: Vec<CouplingSection>,
+    /// How all logs are written; a log may have its own `format`.
+    #[serde(default)]
+    pub format: Option<LogFormat>,
+    /// From positions to velocities and accelerations.
+    #[serde(default)]
+    pub motion: MotionSettings,
+    /// The low-pass and decimation that torque and regressor go through alike.
+    #[serde(default)]
+    pub parallel_filter: ParallelFilterSection,
+    /// The estimator.
+    #[serde(default)]
+    pub estimator: EstimatorSection,
+    /// The excitation trajectory that `design` looks for.
+    #[serde(default)]
+    pub design: Option<DesignSection>,
+    /// The controller of `simulate`, and of `iterate` once there is a model.
+    #[serde(default)]
+    pub controller: Option<ControllerSettings>,
+    /// The robot that `simulate` and `iterate` simulate.
+    #[serde(default)]
+    pub simulation: Option<SimulationSection>,
+    /// How `iterate` goes about it.
+    #[serde(default)]
+    pub iteration: Option<IterationSection>,
+    /// The logs; only `design` needs none.
+    #[serde(default)]
+    pub log: Vec<LogSection>,
+}
+
+/// Largest study file, bytes.
+const MAX_STUDY_BYTES: u64 = 4 << 20;
+
+impl Study {
+    /// Reads a study from a file.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or as [`parse`](Study::parse).
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        let cannot = |source| Error::File { path: path.to_owned(), source };
+        let size = std::fs::metadata(path).map_err(cannot)?.len();
+        if size > MAX_STUDY_BYTES {
+            return Err(Error::study(path, format!("larger than {} MiB: name a study file", MAX_STUDY_BYTES >> 20)));
+        }
+        let bytes = std::fs::read(path).map_err(cannot)?;
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let good = error.utf8_error().valid_up_to();
+            let before = String::from_utf8_lossy(&error.as_bytes()[..good]).into_owned();
+            let (line, column) = line_and_column(&before, before.len());
+            Error::StudyAt {
+                path: path.to_owned(),
+                line,
+                column,
+                message: "not UTF-8 text: save the study as UTF-8".to_owned(),
+            }
+        })?;
+        Self::parse(&text, path)
+    }
+
+    /// Reads a study from its text; `path` is only named in messages.
+    ///
+    /// # Errors
+    /// If the text is no TOML, a key is unknown or of the wrong kind, or sections contradict each other; the message names file, line and column.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, Error> {
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        if text.trim().is_empty() {
+            return Err(Error::study(
+                path,
+                "the file is empty: a study needs at least [robot] and, to identify, one [[log]]".to_owned(),
+            ));
+        }
+        let study: Self = toml::from_str(text).map_err(|error| {
+            let (line, column) = error.span().map_or((1, 1), |span| line_and_column(text, span.start));
+            let message = format!("{}; docs/src/study.md lists every key", error.message().trim().replace('\n', " "));
+            Error::StudyAt { path: path.to_owned(), line, column, message }
+        })?;
+        study.check().map_err(|message| Error::study(path, message))?;
+        Ok(study)
+    }
+
+    /// That there is a log, as fitting and testing need; a study for `design` may have none.
+    pub(crate) fn require_log(&self, path: &Path) -> Result<(), Error> {
+        if self.log.is_empty() {
+            return Err(Error::study(path, "no [[log]]: name at least one log with `file = \"...\"`".to_owned()));
+        }
+        Ok(())
+    }
+
+    /// That there is a log to fit to.
+    pub(crate) fn require_training_log(&self, path: &Path) -> Result<(), Error> {
+        self.require_log(path)?;
+        if !self.log.iter().any(|log| log.role == Role::Identify) {
+            let message = "no log has the role \"identify\": there is nothing to fit to".to_owned();
+            return Err(Error::study(path, message));
+        }
+        Ok(())
+    }
+
+    fn check(&self) -> Result<(), String> {
+        for (index, log) in self.log.iter().enumerate() {
+            if log.format.is_none() && self.format.is_none() {
+                return Err(format!("[[log]] number {}: neither the log nor the study has a [format]", index + 1));
+            }
+            log.validate().map_err(|error| format!("[[log]] number {}: {error}", index + 1))?;
+        }
+        self.drive.validate()?;
+        for (index, coupling) in self.coupling.iter().enumerate() {
+            if self.coupling[..index].iter().any(|other| other.name == coupling.name) {
+                return Err(format!("coupling `{}` stands twice: give each drive a name of its own", coupling.name));
+            }
+            coupling.validate()?;
+        }
+        self.robot.validate()?;
+        self.parallel_filter.validate()?;
+        if let Some(design) = &self.design {
+            design.validate().map_err(|error| format!("[design]: {error}"))?;
+        }
+        self.motion.validate().map_err(|error| format!("[motion]: {error}"))?;
+        self.estimator.validate()?;
+        Ok(())
+    }
+
+    /// The format of log number `index`, with its own range in force.
+    ///
+    /// # Panics
+    /// If there is no such log. That every log has a format was checked when the study was read.
+    pub fn format_of(&self, index: usize) -> LogFormat {
+        let log = &self.log[index];
+        let mut format = log.format.clone().or_else(|| self.format.clone()).expect("checked when the study was read");
+        if log.rows.is_some() || log.fraction.is_some() || log.time_range_s.is_some() {
+            (format.rows, format.fraction, format.time_range_s) = (log.rows, log.fraction, log.time_range_s);
+        }
+        format
+    }
+
+    /// What log number `index` is called: its name, or its file's, with its range so that two parts of one file can be told apart.
+    ///
+    /// # Panics
+    /// If there is no such log.
+    pub fn log_name(&self, index: usize) -> String {
+        let log = &self.log[index];
+        if let Some(name) = &log.name {
+            return name.clone();
+        }
+        let file =
+            log.file.file_stem().map_or_else(|| log.file.display().to_string(), |s| s.to_string_lossy().into_owned());
+        if let Some([from, to]) = log.fraction {
+            format!("{file} [{:.0} % .. {:.0} %]", 100.0 * from, 100.0 * to)
+        } else if let Some([from, to]) = log.rows {
+            format!("{file} [rows {from} .. {to}]")
+        } else if let Some([from, to]) = log.time_range_s {
+            format!("{file} [{from} s .. {to} s]")
+        } else {
+            file
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! `[robot]`: which machine, and how it stands.
+
+use super::arrays::exactly;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// `[robot]`: which machine, and how it stands.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct RobotSection {
+    /// URDF, or D-H table in TOML.
+    pub file: PathBuf,
+    /// The joints that the log holds, in the order of its columns; every other joint is locked. By default all joints of the description
+    /// that `lock` does not name, in the order of the tree.
+    #[serde(default)]
+    pub joints: Option<Vec<String>>,
+    /// Joints that are held, and where (rad, m).
+    #[serde(default)]
+    pub lock: BTreeMap<String, f64>,
+    /// Gravitational acceleration in the world, m/s²; (0, 0, -9.81), or the D-H table's own, by default.
+    #[serde(default, deserialize_with = "exactly")]
+    pub gravity_m_s2: Option<[f64; 3]>,
+    /// How the base is mounted in the world: roll, pitch, yaw about fixed axes, rad.
+    #[serde(default, deserialize_with = "exactly")]
+    pub base_rpy_rad: Option<[f64; 3]>,
+    /// The same in degrees; give one of the two.
+    #[serde(default, deserialize_with = "exactly")]
+    pub base_rpy_deg: Option<[f64; 3]>,
+}
+
+/// Largest component of gravity: beyond it the unit must be wrong, and numbers run away.
+const MAX_GRAVITY_M_S2: f64 = 1000.0;
+
+impl RobotSection {
+    pub(crate) fn validate(&self) -> Result<(), String> {
+        if let Some(gravity) = self.gravity_m_s2
+            && gravity.iter().any(|g| g.abs().is_nan() || g.abs() > MAX_GRAVITY_M_S2)
+        {
+            return Err(format!(
+                "robot.gravity_m_s2 = {gravity:?}: give finite numbers in m/s^2, at most {MAX_GRAVITY_M_S2} in size"
+            ));
+        }
+        if self.base_rpy_rad.is_some() && self.base_rpy_deg.is_some() {
+            return Err("robot.base_rpy_rad and robot.base_rpy_deg are both given: keep one".to_owned());
+        }
+        Ok(())
+    }
+}
