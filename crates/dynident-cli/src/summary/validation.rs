@@ -56,7 +56,40 @@ pub(super) fn residuals(log: &LogValidation) -> String {
     } else {
         format!("; the 95 % band holds {:.1} % of the torque", mean(&covered))
     };
-    wrapped(&format!("  residuals: coloured in {coloured} of {all} joints, not normal in {odd}{reversal}{band}"), 4)
+    let mut text = wrapped(
+        &format!("  residuals: coloured in {coloured} of {all} joints, not normal in {odd}{reversal}{band}"),
+        4,
+    );
+    text += &at_rest(log);
+    text
+}
+
+/// Share of the squared error from which on a joint at rest is worth a line.
+const WORTH_TELLING: f64 = 0.3;
+
+/// Says so when one joint at rest makes up much of the error: there stiction holds a share of the torque that positions do not tell.
+fn at_rest(log: &LogValidation) -> String {
+    let all: f64 = log.model.joints.iter().map(|joint| joint.samples as f64 * joint.rmse_nm.powi(2)).sum();
+    let most = log
+        .residuals
+        .iter()
+        .filter_map(|joint| {
+            let regimes = joint.regimes?;
+            let (rest, fast) = (regimes.at_rest.rmse_nm?, regimes.fast.rmse_nm?);
+            Some((regimes.at_rest.samples as f64 * rest.powi(2) / all, rest, fast, &joint.name))
+        })
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    match most {
+        Some((share, rest, fast, name)) if share > WORTH_TELLING => wrapped(
+            &format!(
+                "  {:.0} % of the squared error is {} at rest ({rest:.2} Nm, in motion {fast:.2} Nm): stiction holds a part of the torque there that positions do not tell",
+                100.0 * share,
+                self::name(name)
+            ),
+            4,
+        ),
+        _ => String::new(),
+    }
 }
 
 fn row(log: &LogValidation, joint: Option<usize>) -> Vec<String> {

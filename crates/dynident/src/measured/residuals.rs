@@ -17,7 +17,7 @@ pub struct JointResiduals {
     pub whiteness: Option<WhitenessReport>,
     /// Jarque and Bera's test; none for a short log.
     pub normality: Option<NormalityReport>,
-    /// Residual by speed; none where the speed is not among the model's columns (no viscous friction).
+    /// Residual by speed; none where the speed is not among the model's columns (no viscous friction, nor both directions of it).
     pub regimes: Option<RegimesReport>,
     /// The predicted torque's 95 % band; none where the covariance is not at hand. Written as `torque_band` of a result, for a finished model's test has none.
     #[serde(skip)]
@@ -61,8 +61,8 @@ pub(crate) struct JointWatch {
     /// The joint's columns among all.
     own: DMatrix<f64>,
     sigma: Option<(f64, f64)>,
-    /// Place of the speed among the panel's columns.
-    speed: Option<usize>,
+    /// Places among the panel's columns whose sum is the speed: viscous friction, or its two directions. None where there are no such columns.
+    speed: Vec<usize>,
     whiteness: Whiteness,
     normality: Normality,
     regimes: Regimes,
@@ -75,7 +75,15 @@ impl JointWatch {
     pub(crate) fn new(layout: &PanelLayout, joint: usize, uncertainty: Option<&Uncertainty>) -> Self {
         let columns = layout.joint_columns(joint);
         let all = layout.columns();
-        let is_speed = |column: &usize| matches!(&all[*column], Column::Law(Law::Viscous(law)) if law.joint == joint);
+        let places = |is: &dyn Fn(&Law) -> bool| -> Vec<usize> {
+            let own = columns.iter().enumerate();
+            own.filter(|(_, column)| matches!(&all[**column], Column::Law(law) if is(law)))
+                .map(|(place, _)| place)
+                .collect()
+        };
+        let viscous = places(&|law| matches!(law, Law::Viscous(law) if law.joint == joint));
+        let directions = places(&|law| matches!(law, Law::DirectionalViscous(law) if law.joint == joint));
+        let speed = if viscous.is_empty() && directions.len() == 2 { directions } else { viscous };
         // V = L Lᵀ of the joint's columns: the variance of a prediction w is ‖Lᵀ w‖². Covariances from few segments are singular, so by eigenvalues.
         let own = uncertainty.map_or_else(
             || DMatrix::zeros(0, columns.len()),
@@ -89,7 +97,7 @@ impl JointWatch {
         Self {
             own,
             sigma: uncertainty.map(|uncertainty| (uncertainty.joint_sigma[joint], uncertainty.width)),
-            speed: columns.iter().position(is_speed),
+            speed,
             whiteness: Whiteness::default(),
             normality: Normality::default(),
             regimes: Regimes::default(),
@@ -107,8 +115,8 @@ impl JointWatch {
             self.samples += 1;
             self.whiteness.add(residual);
             self.normality.add(residual);
-            if let Some(speed) = self.speed {
-                self.regimes.add(panel[speed * rows + row], residual);
+            if !self.speed.is_empty() {
+                self.regimes.add(self.speed.iter().map(|column| panel[column * rows + row]).sum(), residual);
             }
             if let Some((sigma, width)) = self.sigma {
                 let variance: f64 = (0..self.own.nrows())
@@ -128,7 +136,7 @@ impl JointWatch {
             name: name.to_owned(),
             whiteness: self.whiteness.report(),
             normality: self.normality.report(),
-            regimes: self.speed.map(|_| self.regimes.report()),
+            regimes: (!self.speed.is_empty()).then(|| self.regimes.report()),
             band: counted.then(|| TorqueBand {
                 log: log.to_owned(),
                 joint: name.to_owned(),
