@@ -14,6 +14,7 @@ mod error;
 mod feasibility;
 mod fit;
 mod interior_point;
+mod intervals;
 mod log_cholesky;
 mod precise;
 mod priors;
@@ -24,5 +25,6 @@ pub use description::{BaseMap, Ellipsoid, Limits, PhysicalBody, PhysicalProblem,
 pub use error::PhysicalError;
 pub use feasibility::{BaseFeasibility, BaseVerdict, SeparatingSum, base_feasibility, nearest_feasible};
 pub use fit::{PhysicalBodyFit, PhysicalFit, PhysicalStatus, physical_fit};
+pub use intervals::{IntervalEnd, IntervalSettings, PossibleInterval, PossibleIntervals};
 pub use priors::PhysicalPrior;
 pub use settings::{PhysicalRoute, PhysicalSettings};
