@@ -127,6 +127,13 @@ pub struct SimulatedEstimate {
     pub status: EstimateStatus,
     /// Rank decisions at the last point.
     pub rank: RankReport,
+    /// What the outputs do with the parameters at the last point, shape (rows, parameters): W of the simulated motion for DIDIM, J for CLIE and CLOE.
+    #[serde(skip)]
+    pub jacobian: DMatrix<f64>,
+    /// What was measured there less `W θ` (DIDIM) or less the simulation's output, so that `jacobian · (θ' - values) ≈ residual` is the problem of the next step: what error bars for coloured residuals
+    /// can be made from.
+    #[serde(skip)]
+    pub residual: DVector<f64>,
 }
 
 /// Parameters with which the simulated experiment looks like the recorded one, by the method of Gauss and Newton:
@@ -155,6 +162,7 @@ pub fn simulated_least_squares<S: SimulatedMotion>(
     let mut now = run.simulated(&theta)?.ok_or(EstimationError::NoSimulation)?;
     let (mut iterations, mut converged) = (0, false);
     let (mut triangle, mut choice);
+    let (mut last_jacobian, mut last_residual);
     loop {
         let jacobian = match settings.criterion {
             SimulatedCriterion::Didim => {
@@ -174,6 +182,7 @@ pub fn simulated_least_squares<S: SimulatedMotion>(
             .flat_map(|column| column.iter().zip(&problem.noise_std).map(|(v, s)| v / s).collect::<Vec<_>>())
             .chain(residual.iter().zip(&problem.noise_std).map(|(v, s)| v / s))
             .collect();
+        (last_jacobian, last_residual) = (jacobian, residual);
         triangle = TriangularFactor::new(columns);
         triangle.absorb_with(&mut FactorWorkspace::default(), &panel, rows)?;
         choice = split(&triangle, &settings.rank);
@@ -237,6 +246,8 @@ pub fn simulated_least_squares<S: SimulatedMotion>(
         simulations,
         status,
         rank,
+        jacobian: last_jacobian,
+        residual: last_residual,
     })
 }
 

@@ -197,6 +197,21 @@ impl Reference {
         self.joints.len()
     }
 
+    /// After how many seconds it begins anew if it is run again and again: the length of its table, or the period that all closed forms share; none where their periods differ.
+    pub fn period_s(&self) -> Option<f64> {
+        let period = |joint: &JointReference| match &joint.path {
+            JointPath::Sampled(sampled) => sampled.times_s[sampled.times_s.len() - 1] - sampled.times_s[0],
+            JointPath::Logistic(path) => path.period_s,
+        };
+        let first = self.joints.first().map(period)?;
+        self.joints.iter().all(|joint| period(joint) == first).then_some(first)
+    }
+
+    /// When it begins, in seconds after the log's first row.
+    pub fn start_s(&self) -> f64 {
+        self.start_s
+    }
+
     /// q, dq and ddq of a joint at a time in seconds after the log's first row.
     ///
     /// # Panics

@@ -99,6 +99,16 @@ pub enum Error {
         /// What is wrong.
         source: EstimationError,
     },
+    /// A log or study that lacks what the estimator chosen needs.
+    #[error("{}: estimator.method = \"{method}\": {message}", path.display())]
+    Method {
+        /// The study file.
+        path: PathBuf,
+        /// The method.
+        method: &'static str,
+        /// What is wrong, and the mend.
+        message: String,
+    },
     /// Instruments that do not belong to the log.
     #[error("log `{log}`, instruments: {message}")]
     Instruments {

@@ -42,6 +42,9 @@ pub use design::{
 pub use error::Error;
 pub use evaluate::{Quantity, evaluate};
 pub use identify::fit::{GrossErrors, NoiseInRegressor};
+pub use identify::periodic::PeriodicFit;
+pub use identify::sign::SignEvidence;
+pub use identify::simulated::SimulatedFit;
 pub use identify::friction_choice::{FrictionCandidate, JointFriction};
 pub use identify::instruments::{InstrumentSection, InstrumentSource, SmoothedMotion};
 pub use identify::result::{
@@ -68,6 +71,7 @@ pub use simulate::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, Simulation, Sim
 pub use study::friction::{FrictionChoice, FrictionLaw};
 pub use study::{
     CoulombChoice, CouplingSection, DriveSection, EstimatorMethod, EstimatorSection, Folders, JointDrive, LogSection,
-    ParallelFilterSection, RobotSection, Role, Study,
+    NoiseLevelSection, ParallelFilterSection, PeriodSection, PhysicalChoice, RobotSection, Role, SimulatedSection,
+    SimulationStart, Study,
 };
 pub use validate::{VALIDATION_SCHEMA, ValidationFile, validate};

@@ -47,7 +47,7 @@ fn every_estimator_drive_inertia_and_the_butterworth_filter() {
     let folder = tempfile::tempdir().unwrap();
     let truth = Truth::near(&repository("robots/ur10.urdf"), 0.2, true);
     one_log(folder.path(), &truth);
-    for method in ["ordinary", "weighted", "generalized", "huber", "tukey", "instrumental"] {
+    for method in ["ordinary", "weighted", "generalized", "huber", "tukey", "noise-weighted", "instrumental"] {
         // At a fortieth of the cut-off a two-way filter of order 4 passes all but 1e-13.
         let text = format!(
             "robot.file = {:?}\nlog = [{{ file = \"log.csv\" }}]\ndrive.drive_inertia = true\nestimator.method = \"{method}\"\n\

@@ -12,6 +12,7 @@ mod machine;
 mod motion;
 mod physical;
 mod policy;
+mod possible_settings;
 mod record;
 mod rows;
 mod settings;
@@ -25,8 +26,11 @@ pub use estimate::{RunEstimate, identify_run};
 pub use leg::{IterationTask, Leg};
 pub use machine::IteratedMachine;
 pub use motion::{MeasuredMotion, measured_motion};
-pub use physical::{PhysicalSource, possible_parameters, typical_length_m};
+pub use physical::{
+    PhysicalSource, impossible_priors, nearest_possible_parameters, possible_parameters, typical_length_m,
+};
 pub use policy::{Next, RunPlan};
+pub use possible_settings::{BodyKnowledge, EllipsoidSettings, PossibleSettings};
 pub use record::{ModelParameters, RunRecord, UsedController};
 pub use settings::{IterationSettings, RunEstimator, RunIdentificationSettings, Scheme, SettledSettings, StartWith};
 pub use status::IterationStatus;

@@ -1,9 +1,10 @@
 //! From the factors of an estimate to the parameters of a possible machine.
 
+use super::possible_settings::{EllipsoidSettings, PossibleSettings};
 use dynident_dynamics::BaseParameters;
 use dynident_estimation::LinearProblem;
 use dynident_estimation::physical::{
-    BaseMap, PhysicalBody, PhysicalFit, PhysicalProblem, PhysicalScalar, PhysicalSettings, physical_fit, rough_body,
+    BaseMap, Ellipsoid, PhysicalBody, PhysicalFit, PhysicalProblem, PhysicalScalar, physical_fit, rough_body,
 };
 use dynident_model::laws::Law;
 use dynident_model::{InertialParameters, Model};
@@ -32,14 +33,64 @@ pub struct PhysicalSource<'a> {
 /// none. See [`physical_fit`].
 ///
 /// # Errors
-/// In words: constraints that exclude each other, numbers that are not finite.
+/// In words: limits that exclude each other, a prior that is no possible body, names that are not there, numbers that are not finite.
 pub fn possible_parameters(
     source: &PhysicalSource<'_>,
     problem: &LinearProblem,
     joint_sigma: &[f64],
+    settings: &PossibleSettings,
 ) -> Result<PhysicalFit, String> {
+    let problem = described(source, problem, joint_sigma, settings)?;
+    physical_fit(&problem, &settings.fit()).map_err(|error| error.to_string())
+}
+
+/// The possible set of parameters whose base parameters are nearest to `theta` in the data's own metric: for estimates that are not those of least squares on the same factors.
+///
+/// # Errors
+/// As [`possible_parameters`].
+pub fn nearest_possible_parameters(
+    source: &PhysicalSource<'_>,
+    problem: &LinearProblem,
+    joint_sigma: &[f64],
+    settings: &PossibleSettings,
+    theta: &[f64],
+) -> Result<PhysicalFit, String> {
+    let problem = described(source, problem, joint_sigma, settings)?;
+    let around = problem.around(theta).map_err(|error| error.to_string())?;
+    physical_fit(&around, &settings.fit()).map_err(|error| error.to_string())
+}
+
+/// Bodies that the description says are impossible: a rough body stands in for each as a prior unless the settings name another. Names with the least eigenvalue of the pseudo-inertia, kg m².
+pub fn impossible_priors(source: &PhysicalSource<'_>, settings: &PossibleSettings) -> Vec<(String, f64)> {
+    let bodies = source.model.bodies().iter().enumerate();
+    let stated = bodies.filter(|(_, body)| {
+        let own = settings.bodies.get(body.name());
+        body.prior().is_some() && own.is_none_or(|own| own.prior.is_none() && own.known.is_none())
+    });
+    stated
+        .filter_map(|(index, body)| {
+            let (possible, least) = judged(&source.prior[10 * index..10 * index + 10]);
+            (!possible).then(|| (body.name().to_owned(), least))
+        })
+        .collect()
+}
+
+/// Whether ten parameters are those of a possible body, or of one that is as thin as a plate; and the least eigenvalue of their pseudo-inertia.
+fn judged(own: &[f64]) -> (bool, f64) {
+    let stated = InertialParameters(core::array::from_fn(|k| own[k]));
+    let least = stated.pseudo_inertia().symmetric_eigenvalues().min();
+    (stated.mass_kg() > 0.0 && least >= -1.0e-9 * stated.mass_kg(), least)
+}
+
+fn described(
+    source: &PhysicalSource<'_>,
+    problem: &LinearProblem,
+    joint_sigma: &[f64],
+    settings: &PossibleSettings,
+) -> Result<PhysicalProblem, String> {
     let said = |error: &dyn core::fmt::Display| error.to_string();
     let PhysicalSource { model, laws, base, prior } = *source;
+    settings.check_names(model, laws)?;
     let mut squares = vec![0.0; problem.joints().len()];
     for equation in problem.equations() {
         squares[equation.joint] += equation.factor.total().torque_norm().powi(2);
@@ -62,32 +113,47 @@ pub fn possible_parameters(
     let mean_mass = if masses.is_empty() { 1.0 } else { masses.iter().sum::<f64>() / masses.len() as f64 };
     let bodies = model.bodies().iter().enumerate().map(|(index, body)| {
         let own = &prior[10 * index..10 * index + 10];
-        let stated = InertialParameters(core::array::from_fn(|k| own[k]));
-        let least = stated.pseudo_inertia().symmetric_eigenvalues().min();
-        let possible = stated.mass_kg() > 0.0 && least >= -1.0e-9 * stated.mass_kg();
-        let reference = if possible {
-            let rough = rough_body(own[0], length);
-            core::array::from_fn(|k| own[k] + ROUGH_SHARE * rough[k])
-        } else {
-            rough_body(mean_mass, length)
+        let knowledge = settings.bodies.get(body.name()).cloned().unwrap_or_default();
+        let reference = knowledge.prior.unwrap_or_else(|| {
+            if judged(own).0 {
+                let rough = rough_body(own[0], length);
+                core::array::from_fn(|k| own[k] + ROUGH_SHARE * rough[k])
+            } else {
+                rough_body(mean_mass, length)
+            }
+        });
+        let inside = |ellipsoid: EllipsoidSettings| Ellipsoid {
+            centre_m: ellipsoid.centre_m,
+            semi_axes_m: ellipsoid.semi_axes_m,
         };
-        let name = body.name().to_owned();
-        PhysicalBody { name, reference, known: None, mass_kg: None, com_box_m: None, inside: None }
+        PhysicalBody {
+            name: body.name().to_owned(),
+            reference,
+            known: knowledge.known,
+            mass_kg: knowledge.mass_kg,
+            com_box_m: knowledge.com_box_m,
+            inside: knowledge.inside.map(inside),
+        }
     });
     let scalars = laws.iter().zip(&prior[10 * model.dof()..]).map(|(law, &value)| {
         let bounded = law.is_nonnegative();
+        let own = settings.laws.get(&law.symbol());
         let scale = if matches!(law, Law::DriveInertia(_)) { mean_mass * length * length } else { 1.0 };
+        let lower = own.map(|limits| limits[0]);
         PhysicalScalar {
             name: law.symbol(),
-            lower: bounded.then_some(0.0),
-            upper: None,
+            lower: if bounded { Some(lower.unwrap_or(0.0).max(0.0)) } else { lower },
+            upper: own.map(|limits| limits[1]),
             prior: if bounded { value.max(0.0) } else { value },
             scale,
         }
     });
-    let problem =
+    let described =
         PhysicalProblem::new(map, bodies.collect(), scalars.collect(), &factor).map_err(|error| said(&error))?;
-    physical_fit(&problem, &PhysicalSettings::default()).map_err(|error| said(&error))
+    match settings.total_mass_kg {
+        Some(limits) => described.with_total_mass_kg(limits).map_err(|error| said(&error)),
+        None => Ok(described),
+    }
 }
 
 /// A length that the machine's links have: the mean distance between successive joints, at least a centimetre.

@@ -1,5 +1,6 @@
 //! Settings of an iteration.
 
+use super::possible_settings::PossibleSettings;
 use crate::controllers::{ControllerSettings, FiniteTimeSettings, JointPdSettings};
 use crate::error::{ExperimentError, require};
 use dynident_estimation::{CovarianceMethod, RankSettings};
@@ -48,6 +49,8 @@ pub struct RunIdentificationSettings {
     pub rank: RankSettings,
     /// Whether the controller gets the possible machine that fits best (true by default) or the estimate as it is.
     pub physical: bool,
+    /// What is known of that machine's bodies, and how it is found.
+    pub possible: PossibleSettings,
 }
 
 impl Default for RunIdentificationSettings {
@@ -65,6 +68,7 @@ impl Default for RunIdentificationSettings {
             covariance: CovarianceMethod::default(),
             rank: RankSettings::default(),
             physical: true,
+            possible: PossibleSettings::default(),
         }
     }
 }

@@ -1,9 +1,11 @@
 //! From the study's choice of an estimator to an estimate: some need the logs once more.
 
 use crate::error::Error;
-use crate::identify::further_passes::{generalized, robust};
+use crate::identify::further_passes::{generalized, noise_weighted, robust};
 use crate::identify::instrument_rows::instrumented_factors;
 use crate::identify::instruments::{InstrumentSection, InstrumentSource, SmoothedMotion};
+use crate::identify::periodic::{PeriodicFit, periodic};
+use crate::identify::simulated::{SimulatedFit, simulated};
 use crate::job::RunOptions;
 use crate::machine::Machine;
 use crate::measured::rows::{Pass, estimated_rows};
@@ -43,6 +45,9 @@ pub(crate) struct Fitted {
     pub(crate) noise_in_regressor: Option<NoiseInRegressor>,
     pub(crate) gross_errors: Option<GrossErrors>,
     pub(crate) noise_correlation: Option<Vec<Vec<f64>>>,
+    pub(crate) noise_levels: Option<Vec<[f64; 2]>>,
+    pub(crate) periodic: Option<PeriodicFit>,
+    pub(crate) simulated: Option<SimulatedFit>,
 }
 
 /// The logs behind a fit, for estimators that pass them again.
@@ -104,7 +109,8 @@ pub(crate) fn fitted(
         None
     };
     let (by_instruments, noise_in_regressor) = instrumented.unzip();
-    let (mut gross_errors, mut noise_correlation) = (None, None);
+    let (mut gross_errors, mut noise_correlation, mut noise_levels) = (None, None, None);
+    let (mut by_periods, mut by_simulation) = (None, None);
     let estimate = match section.method {
         EstimatorMethod::Ordinary => {
             ordinary_least_squares(problem, &OrdinarySettings { rank, covariance }).map_err(in_study)?
@@ -124,12 +130,35 @@ pub(crate) fn fitted(
             noise_correlation = Some(rows.map(|row| row.iter().copied().collect()).collect());
             found.estimate
         }
+        EstimatorMethod::NoiseWeighted => {
+            let found = noise_weighted(logs, problem)?;
+            noise_levels = Some(found.level_range);
+            found.estimate
+        }
+        EstimatorMethod::MaximumLikelihood => {
+            let (estimate, found) = periodic(logs, problem)?;
+            by_periods = Some(found);
+            estimate
+        }
+        EstimatorMethod::Didim | EstimatorMethod::Clie | EstimatorMethod::Cloe => {
+            let (estimate, found) = simulated(logs, problem)?;
+            by_simulation = Some(found);
+            estimate
+        }
         EstimatorMethod::Weighted => {
             let settings = WeightedSettings { rank, covariance, ..WeightedSettings::default() };
             weighted_least_squares(problem, &settings).map_err(in_study)?
         }
     };
-    Ok(Fitted { estimate, noise_in_regressor, gross_errors, noise_correlation })
+    Ok(Fitted {
+        estimate,
+        noise_in_regressor,
+        gross_errors,
+        noise_correlation,
+        noise_levels,
+        periodic: by_periods,
+        simulated: by_simulation,
+    })
 }
 
 /// The instrumental estimate and the test, with instruments from any source.

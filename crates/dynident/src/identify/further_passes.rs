@@ -4,12 +4,13 @@ use crate::error::Error;
 use crate::identify::fit::Logs;
 use crate::measured::rows::{JointRows, RawSamples, RowSink};
 use dynident_estimation::{
-    CrossProblem, EstimationError, GeneralizedEstimate, LinearProblem, RobustEstimate, RobustSettings, RowBlock,
-    RowVisitor, RowWeight, SegmentedFactor, WeightedSettings, generalized_least_squares, robust_least_squares,
+    CrossProblem, EstimationError, GeneralizedEstimate, LinearProblem, NoiseWeightedEstimate, RobustEstimate,
+    RobustSettings, RowBlock, RowVisitor, RowWeight, SegmentedFactor, WeightedSettings, generalized_least_squares,
+    noise_weighted_least_squares, robust_least_squares,
 };
 
-/// What stops a pass: the estimator, or the log.
-enum Stop {
+/// What stops an estimator that comes back to the logs: itself, or what reads or simulates them.
+pub(crate) enum Stop {
     Estimator(EstimationError),
     Log(Error),
 }
@@ -17,6 +18,16 @@ enum Stop {
 impl From<EstimationError> for Stop {
     fn from(error: EstimationError) -> Self {
         Self::Estimator(error)
+    }
+}
+
+impl Stop {
+    /// As an error of the study.
+    pub(crate) fn of(self, logs: &Logs<'_>) -> Error {
+        match self {
+            Self::Estimator(source) => logs.in_study(source),
+            Self::Log(error) => error,
+        }
     }
 }
 
@@ -41,27 +52,34 @@ impl RowSink for Visiting<'_, '_> {
     }
 }
 
+/// One pass: every row of every training log.
+fn every_row(logs: &Logs<'_>, visit: &mut RowVisitor<'_>) -> Result<(), Stop> {
+    logs.begin("reweighting rows");
+    for (log, &index) in logs.training.iter().enumerate() {
+        let mut sink = Visiting { log, visit: &mut *visit, refused: None };
+        logs.pass(index).run(&mut sink).map_err(Stop::Log)?;
+        if let Some(refused) = sink.refused {
+            return Err(refused.into());
+        }
+    }
+    logs.options.progress.end();
+    Ok(())
+}
+
 /// Iteratively reweighted least squares: the logs are read once for every pass.
 pub(crate) fn robust(logs: &Logs<'_>, problem: &LinearProblem, weight: RowWeight) -> Result<RobustEstimate, Error> {
     let section = &logs.study.estimator;
     let settings =
         RobustSettings { weight, rank: section.rank, covariance: section.covariance, ..RobustSettings::default() };
-    let found = robust_least_squares::<Stop>(problem, &settings, |visit| {
-        logs.begin("reweighting rows");
-        for (log, &index) in logs.training.iter().enumerate() {
-            let mut sink = Visiting { log, visit: &mut *visit, refused: None };
-            logs.pass(index).run(&mut sink).map_err(Stop::Log)?;
-            if let Some(refused) = sink.refused {
-                return Err(refused.into());
-            }
-        }
-        logs.options.progress.end();
-        Ok(())
-    });
-    found.map_err(|stop| match stop {
-        Stop::Estimator(source) => logs.in_study(source),
-        Stop::Log(error) => error,
-    })
+    robust_least_squares::<Stop>(problem, &settings, |visit| every_row(logs, visit)).map_err(|stop| stop.of(logs))
+}
+
+/// Reweighting by the noise around each row: the logs are read once for every pass.
+pub(crate) fn noise_weighted(logs: &Logs<'_>, problem: &LinearProblem) -> Result<NoiseWeightedEstimate, Error> {
+    let section = &logs.study.estimator;
+    let settings = section.noise_levels.settings(section);
+    noise_weighted_least_squares::<Stop>(problem, &settings, |visit| every_row(logs, visit))
+        .map_err(|stop| stop.of(logs))
 }
 
 /// Puts the joints' rows of the same instants side by side.

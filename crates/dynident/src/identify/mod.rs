@@ -6,10 +6,14 @@ pub(crate) mod friction_choice;
 pub(crate) mod further_passes;
 pub(crate) mod instrument_rows;
 pub(crate) mod instruments;
+pub(crate) mod periodic;
 pub(crate) mod physical;
 pub(crate) mod report;
 pub(crate) mod result;
 pub(crate) mod result_sections;
+pub(crate) mod sign;
+pub(crate) mod simulated;
+mod simulated_loop;
 pub(crate) mod standard_parameters;
 pub(crate) mod written_urdf;
 
@@ -18,11 +22,12 @@ use crate::identify::fit::{Fitted, Logs};
 use crate::identify::friction_candidates::{candidate_columns, joints_to_choose};
 use crate::identify::friction_choice::{JointFriction, choose_friction, with_friction};
 use crate::identify::instruments::InstrumentSource;
-use crate::identify::physical::{physical_fit_result, possible_parameters};
+use crate::identify::physical::{physical_fit_result, possible_parameters, source_of};
 use crate::identify::result::{LogSummary, RESULT_SCHEMA, ResultFile, Timings};
 use crate::identify::result_sections::{
     base_parameters, bodies, joint_results, law_results, method_summary, robot_summary, training_result, verdict,
 };
+use crate::identify::sign::{sign_evidence, sign_findings};
 use crate::identify::standard_parameters::{inertials, nearest_to_prior};
 use crate::identify::written_urdf::written_urdf;
 use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
@@ -33,6 +38,7 @@ use crate::measured::residuals::Uncertainty;
 use crate::measured::rows::{JointRows, Pass, RawSamples, RowSink, motion_in_force};
 use crate::measured::torque_trace::{LogTrace, TraceSink};
 use crate::progress::Silent;
+use crate::study::friction::FrictionChoice;
 use crate::study::{EstimatorMethod, Folders, Role, Study};
 use crate::validate::{Tested, validate_log};
 use dynident_dynamics::Column;
@@ -40,6 +46,7 @@ use dynident_estimation::{
     Estimate, LinearProblem, OrdinarySettings, SegmentedFactor, WeightedSettings, essential, ordinary_least_squares,
     strongest_correlations, weighted_least_squares,
 };
+use dynident_experiment::iteration::impossible_priors;
 use dynident_model::InertialParameters;
 use dynident_model::laws::Law;
 use dynident_recording::MotionSettings;
@@ -109,6 +116,16 @@ fn identified(
     study.require_training_log(study_path)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let machine = Machine::new(study, study_path, &folders)?;
+    let possible_settings = study.estimator.physical.settings();
+    if let Some(settings) = &possible_settings {
+        let mut named = settings.clone();
+        if study.drive.friction == FrictionChoice::Auto {
+            // Laws that the logs are to choose are not there yet.
+            named.laws.clear();
+        }
+        let checked = named.check_names(&machine.model, &machine.laws);
+        checked.map_err(|error| Error::study(study_path, format!("[estimator.physical]: {error}")))?;
+    }
     let mut timings = Timings { machine: start.elapsed().as_secs_f64(), ..Timings::default() };
     let files = log_files(study, &folders)?;
 
@@ -122,8 +139,15 @@ fn identified(
     let passes =
         Logs { study, path: study_path, machine, motion: &motion, files: &files, training: &training, options };
     let started = Instant::now();
-    let Fitted { estimate, noise_in_regressor, gross_errors, noise_correlation } =
-        crate::identify::fit::fitted(&passes, problem, source)?;
+    let Fitted {
+        estimate,
+        noise_in_regressor,
+        gross_errors,
+        noise_correlation,
+        noise_levels,
+        periodic,
+        simulated,
+    } = crate::identify::fit::fitted(&passes, problem, source)?;
     let (estimate, dropped) = match &study.estimator.essential {
         Some(settings) => {
             essential(&estimate, settings).map(|(rest, report)| (rest, Some(report))).map_err(in_study)?
@@ -131,14 +155,17 @@ fn identified(
         None => (estimate, None),
     };
     let prior = prior_parameters(&machine.model, &machine.laws);
-    let (possible, failure) = if study.estimator.physical {
-        match possible_parameters(machine, problem, &estimate, &prior) {
-            Ok(fit) => (Some(fit), None),
-            Err(reason) => (None, Some(reason)),
+    let (possible, failure) = match &possible_settings {
+        Some(settings) => {
+            let asked = (study.estimator.method, settings);
+            match possible_parameters(machine, problem, &estimate, &prior, asked) {
+                Ok(fit) => (Some(fit), None),
+                Err(reason) => (None, Some(reason)),
+            }
         }
-    } else {
-        (None, None)
+        None => (None, None),
     };
+    let sign = sign_evidence(machine, problem, &estimate);
     let physical = possible.as_ref().map(|fit| &fit.base_values[..]);
     timings.estimation += started.elapsed().as_secs_f64();
 
@@ -151,6 +178,7 @@ fn identified(
         summary.torque_lag_s = lags;
         traces.push(trace);
         summary.model_findings.extend(lag::findings(&summary.torque_lag_s, &joints));
+        summary.model_findings.extend(sign.as_ref().and_then(sign_findings));
         logs.push(summary);
     }
     let mut validation = Vec::new();
@@ -177,8 +205,16 @@ fn identified(
             "of the possible set that fits the logs best; the base parameters above it are the unconstrained estimate";
     }
     verdict.failure = failure;
+    verdict.sign = sign;
+    if let Some(settings) = &possible_settings {
+        let impossible = impossible_priors(&source_of(machine, &prior), settings);
+        verdict.impossible_priors = impossible
+            .into_iter()
+            .map(|(body, least)| format!("{body}: least eigenvalue of the pseudo-inertia {least:.2e}"))
+            .collect();
+    }
     // Parameters that URDF cannot express leave a result without one; it is no reason to lose the result.
-    let written = if study.estimator.physical && !verdict.consistent {
+    let written = if possible_settings.is_some() && (verdict.failure.is_some() || !verdict.consistent) {
         let reason = verdict.failure.clone().unwrap_or_else(|| verdict.violations.join("; "));
         Err(format!(
             "the bodies are not physically possible: {reason} (estimator.physical = false writes them as they are)"
@@ -198,6 +234,9 @@ fn identified(
         noise_in_regressor,
         gross_errors,
         noise_correlation,
+        noise_levels,
+        periodic,
+        simulated,
         base_parameters: base_parameters(machine, &estimate, physical),
         base_parameter_covariance: estimate.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
         bodies: bodies(machine, &inertials),

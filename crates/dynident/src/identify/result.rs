@@ -2,6 +2,9 @@
 
 use crate::identify::fit::{GrossErrors, NoiseInRegressor};
 use crate::identify::friction_choice::JointFriction;
+use crate::identify::periodic::PeriodicFit;
+use crate::identify::sign::SignEvidence;
+use crate::identify::simulated::SimulatedFit;
 use crate::measured::evidence::PriorAgreement;
 use crate::measured::residuals::{JointResiduals, TorqueBand};
 use dynident_estimation::{CorrelatedPair, EssentialReport, ValidationReport};
@@ -28,6 +31,12 @@ pub struct ResultFile {
     pub gross_errors: Option<GrossErrors>,
     /// Correlations of the joints' errors at one instant, in the order of `robot.joints`; none unless the estimator is `generalized`.
     pub noise_correlation: Option<Vec<Vec<f64>>>,
+    /// For each joint the smallest and the largest noise level of its rows over its mean one; none unless the estimator is `noise-weighted`.
+    pub noise_levels: Option<Vec<[f64; 2]>>,
+    /// Periods and their noise; none unless the estimator is `maximum-likelihood`.
+    pub periodic: Option<PeriodicFit>,
+    /// The simulated loop; none unless the estimator is `didim`, `clie` or `cloe`.
+    pub simulated: Option<SimulatedFit>,
     /// The base parameters, in the order of the tree.
     pub base_parameters: Vec<BaseParameterResult>,
     /// Covariance of the base parameters by the method's own account, rows and columns in their order, symmetric; zero where a parameter is not excited.
@@ -239,6 +248,10 @@ pub struct PhysicalVerdict {
     pub fit: Option<PhysicalFitResult>,
     /// Why it failed.
     pub failure: Option<String>,
+    /// Bodies whose description is no possible body, so that a rough one of ordinary mass stands in as their prior.
+    pub impossible_priors: Vec<String>,
+    /// Which sign of the torque a possible machine explains; none without a possible machine for either.
+    pub sign: Option<SignEvidence>,
 }
 
 /// A physically consistent fit.

@@ -201,6 +201,8 @@ pub(crate) fn verdict(machine: &Machine, inertials: &[InertialParameters], param
         violations,
         fit: None,
         failure: None,
+        impossible_priors: Vec::new(),
+        sign: None,
         note: "of the full set nearest to the prior; plain least squares does not enforce it, and another set with the same torques may pass",
     }
 }

@@ -144,6 +144,7 @@ impl IterationSection {
         };
         self.differentiator.validate().map_err(|error| format!("[iteration] differentiator: {error}"))?;
         let default = IterationSettings::default();
+        let possible = study.estimator.physical.settings();
         Ok(IterationSettings {
             identification: RunIdentificationSettings {
                 scheme: self.scheme,
@@ -153,7 +154,8 @@ impl IterationSection {
                 estimator,
                 covariance: study.estimator.covariance,
                 rank: study.estimator.rank,
-                physical: study.estimator.physical && !self.literal,
+                physical: possible.is_some() && !self.literal,
+                possible: possible.unwrap_or_default(),
             },
             start: self.start,
             first: self.first.clone(),

@@ -31,8 +31,30 @@ fn reference(
     motion: &MotionSettings,
     index: usize,
 ) -> Result<Option<Arc<Reference>>, Error> {
-    let Some(shared) = motion.differentiator.reference() else { return Ok(None) };
-    let settings = study.log[index].reference.as_ref().unwrap_or(shared);
+    if motion.differentiator.reference().is_none() {
+        return Ok(None);
+    }
+    // The differentiator says that it needs one.
+    let Some(reference) = commanded(study, machine, motion, index)? else { return Ok(None) };
+    let mut order = vec![0; machine.model.dof()];
+    for (joint, &place) in machine.log_place.iter().enumerate() {
+        order[place] = joint;
+    }
+    Ok(reference.reordered(&order).map(Arc::new))
+}
+
+/// The motion that was commanded in a log, its joints in the model's order: the log's own `reference`, or the differentiator's; `None` if neither is given.
+///
+/// # Errors
+/// What reading it can give, and one for another number of joints.
+pub(crate) fn commanded(
+    study: &Study,
+    machine: &Machine,
+    motion: &MotionSettings,
+    index: usize,
+) -> Result<Option<Reference>, Error> {
+    let own = study.log[index].reference.as_ref();
+    let Some(settings) = own.or_else(|| motion.differentiator.reference()) else { return Ok(None) };
     let failed = |source| Error::recording(&study.log_name(index), source);
     let filter = |source| failed(RecordingError::Filter(source));
     let dof = machine.model.dof();
@@ -42,17 +64,12 @@ fn reference(
             let path = machine.folders.find(file, study.source.as_deref())?;
             settings.placed(Reference::read(&path, dof).map_err(failed)?).map_err(filter)?
         }
-        // The differentiator says that it needs one.
         (None, None) => return Ok(None),
     };
-    let mut order = vec![0; dof];
-    for (joint, &place) in machine.log_place.iter().enumerate() {
-        order[place] = joint;
-    }
     let found = reference.joints();
-    let reordered = reference.reordered(&order).filter(|_| found == dof).ok_or_else(|| {
+    if found != dof {
         let problem = format!("it moves {found} joints, the robot has {dof}: give one for each, in the robot's order");
-        filter(FilterError::Reference { problem })
-    })?;
-    Ok(Some(Arc::new(reordered)))
+        return Err(filter(FilterError::Reference { problem }));
+    }
+    Ok(Some(reference))
 }

@@ -118,7 +118,8 @@ impl SimulationSection {
         self.loop_settings(None).validate(joints).map_err(said)
     }
 
-    fn loop_settings(&self, model: Option<&Model>) -> LoopSettings {
+    /// How runs are made, with the effort limits of `model`.
+    pub(crate) fn loop_settings(&self, model: Option<&Model>) -> LoopSettings {
         let mut limits = self.limits.clone();
         if let Some(model) = model.filter(|_| self.effort_limits && limits.torque.is_none()) {
             limits.torque = RunLimits::of_model(model).torque;

@@ -1,11 +1,15 @@
 //! `[estimator]`: how the parameters are estimated, and how far they are trusted.
 
+use super::noise_levels::NoiseLevelSection;
 use super::numbers::positive;
+use super::periods::PeriodSection;
+use super::physical::PhysicalChoice;
+use super::simulated::SimulatedSection;
 use crate::identify::instruments::InstrumentSection;
 use dynident_estimation::{CovarianceMethod, EssentialSettings, RankSettings, SegmentSettings};
 use serde::{Deserialize, Serialize};
 
-/// Estimators that are linear in the parameters.
+/// How base parameters are estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EstimatorMethod {
@@ -20,8 +24,18 @@ pub enum EstimatorMethod {
     Huber,
     /// Iteratively reweighted with Tukey's weights: rows far off do not count.
     Tukey,
+    /// Reweighted by the noise around every row: noisy stretches of a joint count less.
+    NoiseWeighted,
     /// Instrumental variables: noise in the regressor does not bias the estimate.
     Instrumental,
+    /// Maximum likelihood for a motion that repeats: noise of motion and torque from how the periods differ.
+    MaximumLikelihood,
+    /// Regression on the motion of the simulated closed loop: no measured position enters the regressor.
+    Didim,
+    /// The simulated closed loop's torque fitted to the measured one (closed-loop input error).
+    Clie,
+    /// The simulated closed loop's positions fitted to the measured ones (closed-loop output error).
+    Cloe,
 }
 
 impl EstimatorMethod {
@@ -33,8 +47,18 @@ impl EstimatorMethod {
             Self::Generalized => "generalized",
             Self::Huber => "huber",
             Self::Tukey => "tukey",
+            Self::NoiseWeighted => "noise-weighted",
             Self::Instrumental => "instrumental",
+            Self::MaximumLikelihood => "maximum-likelihood",
+            Self::Didim => "didim",
+            Self::Clie => "clie",
+            Self::Cloe => "cloe",
         }
+    }
+
+    /// Whether its values are those of least squares on the rows as they are, with one weight for each joint.
+    pub(crate) fn is_plain(self) -> bool {
+        matches!(self, Self::Ordinary | Self::Weighted)
     }
 }
 
@@ -47,8 +71,8 @@ pub struct EstimatorSection {
     /// The covariance that error bars come from; `"jackknife"`, which accounts for coloured residuals and judges each time segment by the fit without it, by default.
     pub covariance: CovarianceMethod,
     /// Whether the bodies, friction and drives written are those of a possible machine that fit the logs best (true by default), or the set nearest to the
-    /// description that has exactly the estimated base parameters.
-    pub physical: bool,
+    /// description that has exactly the estimated base parameters. A table in place of `true` says what else is known of the bodies.
+    pub physical: PhysicalChoice,
     /// When a column counts as excited.
     pub rank: RankSettings,
     /// How logs are cut into segments for the covariance.
@@ -57,6 +81,12 @@ pub struct EstimatorSection {
     pub essential: Option<EssentialSettings>,
     /// Instruments for `method = "instrumental"`. With another method they only test whether noise in the regressor biases it.
     pub instruments: Option<InstrumentSection>,
+    /// How `method = "noise-weighted"` finds the noise around a row.
+    pub noise_levels: NoiseLevelSection,
+    /// The repeated motion of `method = "maximum-likelihood"`.
+    pub periods: PeriodSection,
+    /// How the loop is simulated for `method = "didim"`, `"clie"` and `"cloe"`.
+    pub simulated: SimulatedSection,
 }
 
 impl Default for EstimatorSection {
@@ -64,11 +94,14 @@ impl Default for EstimatorSection {
         Self {
             method: EstimatorMethod::default(),
             covariance: CovarianceMethod::default(),
-            physical: true,
+            physical: PhysicalChoice::default(),
             rank: RankSettings::default(),
             segments: SegmentSettings::default(),
             essential: None,
             instruments: None,
+            noise_levels: NoiseLevelSection::default(),
+            periods: PeriodSection::default(),
+            simulated: SimulatedSection::default(),
         }
     }
 }
@@ -90,6 +123,13 @@ impl EstimatorSection {
                 )
             })?;
         }
+        self.noise_levels
+            .settings(self)
+            .validate()
+            .map_err(|error| format!("[estimator.noise_levels]: {error}"))?;
+        self.periods.validate().map_err(|error| format!("[estimator.periods]: {error}"))?;
+        self.simulated.validate(self).map_err(|error| format!("[estimator.simulated]: {error}"))?;
+        self.physical.validate().map_err(|error| format!("[estimator.physical]: {error}"))?;
         self.segments.validate().map_err(|error| format!("[estimator.segments]: {error}"))?;
         if let Some(essential) = &self.essential {
             essential.validate().map_err(|error| format!("[estimator.essential]: {error}"))?;

@@ -6,16 +6,24 @@ mod estimator;
 mod folders;
 pub(crate) mod friction;
 mod log;
+mod noise_levels;
 mod numbers;
 mod parallel_filter;
+mod periods;
+mod physical;
 mod robot;
+mod simulated;
 
 pub use drive::{CoulombChoice, CouplingSection, DriveSection, JointDrive};
 pub use estimator::{EstimatorMethod, EstimatorSection};
 pub use folders::Folders;
 pub use log::{LogSection, Role};
+pub use noise_levels::NoiseLevelSection;
 pub use parallel_filter::ParallelFilterSection;
+pub use periods::PeriodSection;
+pub use physical::PhysicalChoice;
 pub use robot::RobotSection;
+pub use simulated::{SimulatedSection, SimulationStart};
 
 use crate::design::DesignSection;
 use crate::error::Error;

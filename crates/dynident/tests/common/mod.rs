@@ -197,6 +197,13 @@ impl Job {
         Self { study: Study::load(&path).unwrap_or_else(|error| panic!("{error}\n{text}")), path }
     }
 
+    /// What is said of a study file that cannot be read.
+    pub(crate) fn new_error(folder: &Path, text: &str) -> String {
+        let path = folder.join("study.toml");
+        std::fs::write(&path, text).unwrap();
+        Study::load(&path).unwrap_err().to_string()
+    }
+
     pub(crate) fn options(threads: usize) -> RunOptions<'static> {
         RunOptions { data: None, threads, progress: &Silent }
     }

@@ -20,6 +20,7 @@ pub enum PhysicalPrior {
     #[default]
     Entropic,
     /// `½ tr[(P0⁻¹(P − P0))²]`: the affine-invariant metric held constant at the prior.
+    #[serde(alias = "constant-pullback")]
     Pullback,
     /// `½ Σ_k ((π_k − π0_k)/u_k)²`, parameter by parameter in units of the prior's mass m, m ℓ and m ℓ², `ℓ = √(tr Σ/m)`.
     Euclidean,

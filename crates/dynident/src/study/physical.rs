@@ -1,0 +1,66 @@
+//! `[estimator.physical]`: whether the machine written is a possible one, and what is known of its bodies.
+
+use dynident_experiment::iteration::PossibleSettings;
+use serde::de::value::MapAccessDeserializer;
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// `true`, `false`, or a table of [`PossibleSettings`], which stands for `true`.
+///
+/// ```
+/// use dynident::{EstimatorSection, PhysicalChoice};
+/// let off: EstimatorSection = toml::from_str("physical = false")?;
+/// assert_eq!(off.physical, PhysicalChoice::Switch(false));
+/// let known: EstimatorSection = toml::from_str("[physical]\nprior = \"pullback\"\nbodies.forearm.mass_kg = [1.0, 3.0]")?;
+/// assert_eq!(known.physical.settings().unwrap().bodies["forearm"].mass_kg, Some([1.0, 3.0]));
+/// # Ok::<(), toml::de::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum PhysicalChoice {
+    /// With the defaults, or not at all.
+    Switch(bool),
+    /// With what is known of the machine.
+    Known(Box<PossibleSettings>),
+}
+
+impl Default for PhysicalChoice {
+    fn default() -> Self {
+        Self::Switch(true)
+    }
+}
+
+impl PhysicalChoice {
+    /// The settings of the fit; none when it is switched off.
+    pub fn settings(&self) -> Option<PossibleSettings> {
+        match self {
+            Self::Switch(true) => Some(PossibleSettings::default()),
+            Self::Switch(false) => None,
+            Self::Known(settings) => Some((**settings).clone()),
+        }
+    }
+
+    pub(crate) fn validate(&self) -> Result<(), String> {
+        self.settings().map_or(Ok(()), |settings| settings.validate().map_err(|error| error.to_string()))
+    }
+}
+
+impl<'de> Deserialize<'de> for PhysicalChoice {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visitor;
+        // An untagged enum would lose which key of the table is wrong.
+        impl<'de> serde::de::Visitor<'de> for Visitor {
+            type Value = PhysicalChoice;
+            fn expecting(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                f.write_str("true, false, or a table of what is known of the bodies")
+            }
+            fn visit_bool<E>(self, switch: bool) -> Result<Self::Value, E> {
+                Ok(PhysicalChoice::Switch(switch))
+            }
+            fn visit_map<A: serde::de::MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+                let settings = PossibleSettings::deserialize(MapAccessDeserializer::new(map))?;
+                Ok(PhysicalChoice::Known(Box::new(settings)))
+            }
+        }
+        deserializer.deserialize_any(Visitor)
+    }
+}
