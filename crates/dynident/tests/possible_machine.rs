@@ -10,7 +10,11 @@ use dynident::{Identification, RunOptions, Silent, Study, identify};
 use std::path::Path;
 
 fn study(robot: &Path, further: &str) -> String {
-    format!("robot.file = {:?}\nlog = [{{ file = \"log.csv\" }}]\n{}\n{further}", robot.display().to_string(), format(2))
+    format!(
+        "robot.file = {:?}\nlog = [{{ file = \"log.csv\" }}]\n{}\n{further}",
+        robot.display().to_string(),
+        format(2)
+    )
 }
 
 fn arm() -> std::path::PathBuf {
@@ -184,7 +188,10 @@ fn the_lbr_med_torque_is_reversed_by_physics_alone() {
     for (text, reversed) in [(as_logged, true), (text, false)] {
         let path = folder.path().join("study.toml");
         let options = RunOptions { data: Some(data.clone()), threads: 2, progress: &Silent };
-        let text = text.replace("file = \"bare.urdf\"", &format!("file = {:?}", folder.path().join("bare.urdf").display().to_string()));
+        let text = text.replace(
+            "file = \"bare.urdf\"",
+            &format!("file = {:?}", folder.path().join("bare.urdf").display().to_string()),
+        );
         let found = identify(&Study::parse(&text, &path).unwrap(), &path, &options).unwrap();
         println!("{:?}", found.result.physical.sign);
         assert_eq!(called_reversed(&found), reversed, "{:?}", found.result.physical.sign);
@@ -204,8 +211,11 @@ fn essential_parameters_and_the_torques_band_through_a_study() {
             q.iter().copied().chain((0..2).map(|j| tau[j] + sigma[j] * random.normal())).collect()
         });
     }
-    let text = study(&arm(), "[parallel_filter]\nenabled = false\n[estimator]\nessential = { ratio = 30.0, significance = 0.05 }")
-        .replace("[{ file = \"log.csv\" }]", "[{ file = \"log.csv\" }, { file = \"other.csv\", role = \"validate\" }]");
+    let text = study(
+        &arm(),
+        "[parallel_filter]\nenabled = false\n[estimator]\nessential = { ratio = 30.0, significance = 0.05 }",
+    )
+    .replace("[{ file = \"log.csv\" }]", "[{ file = \"log.csv\" }, { file = \"other.csv\", role = \"validate\" }]");
     let found = Job::new(folder.path(), &text).identify();
     let report = found.result.essential.as_ref().unwrap();
     assert_eq!(report.kept + report.dropped.len(), found.result.base_parameters.len());

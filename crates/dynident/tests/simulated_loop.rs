@@ -87,7 +87,14 @@ fn all_three_find_the_truth_where_least_squares_is_biased() {
         let (simulated, least_squares) = (score(&found, &truth, bars), score(&plain, &truth, bars));
         println!("{method}: {simulated:.2} and {least_squares:.2}; {fit:?}");
         for (i, t) in truth.iter().enumerate() {
-            println!("  {} {t:.4} {:.4} +- {:.4} plain {:.4} +- {:.4}", found.result.base_parameters[i].expression, found.estimate.values[i], bars[i], plain.estimate.values[i], plain.estimate.std[i]);
+            println!(
+                "  {} {t:.4} {:.4} +- {:.4} plain {:.4} +- {:.4}",
+                found.result.base_parameters[i].expression,
+                found.estimate.values[i],
+                bars[i],
+                plain.estimate.values[i],
+                plain.estimate.std[i]
+            );
         }
         assert_eq!((&found.result.method.estimator[..], &found.result.method.status[..]), (method, "complete"));
         // Ten or so squares of mean one: their root mean square is below 1.8 by four deviations; the jackknife is cautious.
@@ -114,9 +121,11 @@ fn what_cannot_be_simulated_is_said() {
         let wild = study(method, &wild).replace("off_percent", "effort_limits = false\noff_percent");
         let message = refused(folder.path(), &wild);
         assert!(message.contains("diverged") && message.contains("does not get through"), "{message}");
-        let message = refused(folder.path(), &study(method, CONTROLLER).replace("reference = \"trajectory.csv\"\n", "\n"));
+        let message =
+            refused(folder.path(), &study(method, CONTROLLER).replace("reference = \"trajectory.csv\"\n", "\n"));
         assert!(message.contains("reference = ") && message.contains("log `log`"), "{message}");
-        let message = refused(folder.path(), &study(method, &CONTROLLER.replace("kp = [200.0, 60.0]", "kp = [1.0, 2.0, 3.0]")));
+        let message =
+            refused(folder.path(), &study(method, &CONTROLLER.replace("kp = [200.0, 60.0]", "kp = [1.0, 2.0, 3.0]")));
         assert!(message.contains("[controller]") && message.contains("kp"), "{message}");
     }
 }

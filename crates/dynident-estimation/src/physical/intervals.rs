@@ -15,7 +15,7 @@ pub struct IntervalSettings {
     pub level: f64,
     /// The solver, its margin and its prior. The prior only chooses among bodies that the data and the pull leave alike; its weight is far below that of a fit: 1e-5 by default.
     pub physical: PhysicalSettings,
-    /// An end counts as open beyond this many times the size of the reference (the body's own moments, a scalar's `scale`). Default 1000.
+    /// An end counts as open beyond this many times the size of the reference (the body's own moments, a scalar's `scale`). Default 100.
     pub open_beyond: f64,
     /// Most physical fits for one end. Default 20; three or four are usual.
     pub max_fits: usize,
@@ -24,7 +24,7 @@ pub struct IntervalSettings {
 impl Default for IntervalSettings {
     fn default() -> Self {
         let physical = PhysicalSettings { prior_weight: 1.0e-5, ..PhysicalSettings::default() };
-        Self { level: 0.95, physical, open_beyond: 1.0e3, max_fits: 20 }
+        Self { level: 0.95, physical, open_beyond: 100.0, max_fits: 20 }
     }
 }
 
@@ -55,7 +55,7 @@ impl IntervalSettings {
 pub enum IntervalEnd {
     /// Beyond it the data are fitted too badly.
     Data,
-    /// Beyond it nothing is possible, whatever the data say.
+    /// Beyond it nothing is possible that the data allow: the body's cone or a limit stops it before the data's cost reaches its threshold.
     Constraint,
     /// Neither holds it: the value can be as large as one likes.
     Open,
@@ -180,52 +180,61 @@ impl PossibleIntervals {
     fn end(&self, index: usize, side: f64) -> Result<(Option<f64>, IntervalEnd), PhysicalError> {
         let (value, size) = (self.best.parameters[index], self.sizes[index]);
         let far = self.settings.open_beyond * size;
-        let deviation = self.deviations[index].clamp(1.0e-9 * size, far);
-        let stiffness = 1.0 / deviation.min(size);
+        // Where data say little the spring is as soft as the reference is large, so that no fit starts far outside of what is possible.
+        let softness = self.deviations[index].clamp(1.0e-9 * size, size);
         let guess = self.quantile * self.mean_inflation.sqrt();
-        // Unconstrained, the parameter gives way by deviation² times the force.
-        let mut reach = guess * (deviation + 1.0 / (deviation * stiffness * stiffness));
+        // Unconstrained, a parameter with this deviation gives way by half of it.
+        let mut reach = 2.0 * guess * softness;
         let mut wanted = None;
         let mut below = Point { reach: 0.0, root: 0.0, parameter: value };
         let mut above: Option<Point> = None;
+        // Where the solver gave up: a pull so strong that doubles cannot tell the cost beside it.
+        let mut hopeless = f64::INFINITY;
         for _ in 0..self.settings.max_fits {
-            let (parameter, moved) = self.pulled(index, stiffness, value + side * reach)?;
+            let Some((parameter, moved)) = self.pulled(index, 1.0 / softness, value + side * reach)? else {
+                hopeless = reach;
+                if hopeless < 1.2 * below.reach {
+                    break;
+                }
+                reach = 0.5 * (below.reach + hopeless);
+                continue;
+            };
             let root = (2.0 * (self.cost(&moved) - self.best.data_objective).max(0.0)).sqrt();
             let wanted = *wanted.get_or_insert_with(|| self.quantile * self.inflation(&moved).sqrt());
             let point = Point { reach, root, parameter };
             if (root - wanted).abs() <= CLOSE * wanted {
                 return Ok((Some(parameter), IntervalEnd::Data));
             }
+            let distance = (parameter - value).abs();
             if root > wanted {
                 above = Some(point);
             } else {
-                let still = (parameter - below.parameter).abs() <= STILL * (parameter - value).abs().max(size);
-                let pulled_farther = reach >= 2.0 * below.reach && below.reach > 0.0;
+                let still = (parameter - below.parameter).abs() <= STILL * distance.max(softness);
                 let last = std::mem::replace(&mut below, point);
-                if above.is_none() && (parameter - value).abs() >= far {
+                if above.is_none() && distance >= far {
                     return Ok((None, IntervalEnd::Open));
                 }
-                if above.is_none() && still && pulled_farther && root - last.root <= STILL * wanted {
+                if above.is_none() && still && last.reach > 0.0 && reach >= 2.0 * last.reach {
                     return Ok((Some(parameter), IntervalEnd::Constraint));
                 }
             }
             reach = match above {
-                // Nothing but a constraint makes the cost rise without the parameter moving.
-                Some(above) if (above.parameter - below.parameter).abs() <= STILL * (below.parameter - value).abs() => {
-                    return Ok((Some(below.parameter), IntervalEnd::Data));
+                Some(above) if (above.parameter - below.parameter).abs() <= CLOSE * (above.parameter - value).abs() => {
+                    return Ok((Some(between(below, above, wanted, |point| point.parameter)), IntervalEnd::Data));
                 }
                 Some(above) => between(below, above, wanted, |point| point.reach),
                 None if root > 0.1 * wanted => (reach * 1.1 * wanted / root).clamp(2.0 * reach, GROWTH * reach),
                 None => GROWTH * reach,
             };
+            reach = reach.min(0.5 * (below.reach + hopeless));
         }
         let parameter = above
             .map_or(below.parameter, |above| between(below, above, wanted.unwrap_or(guess), |point| point.parameter));
         Ok((Some(parameter), IntervalEnd::Unsettled))
     }
 
-    /// The parameter and the shift of the base parameters from the best set, when a spring pulls.
-    fn pulled(&self, index: usize, stiffness: f64, target: f64) -> Result<(f64, DVector<f64>), PhysicalError> {
+    /// The parameter and the shift of the base parameters from the best set, when a spring pulls; none when the solver did not reach an optimum.
+    fn pulled(&self, index: usize, stiffness: f64, target: f64) -> Result<Option<(f64, DVector<f64>)>, PhysicalError> {
         let Self { problem, best, .. } = self;
         let (base, rows) = (problem.base.matrix(), problem.triangle.nrows());
         let (own, all) = base.shape();
@@ -240,7 +249,7 @@ impl PossibleIntervals {
         let problem = PhysicalProblem { base: BaseMap::new(matrix)?, triangle, rotated, ..problem.clone() };
         let fit = physical_fit(&problem, &self.settings.physical)?;
         let moved = DVector::from_fn(own, |k, _| fit.base_values[k] - best.base_values[k]);
-        Ok((fit.parameters[index], moved))
+        Ok((fit.kkt_residual() <= SOLVED).then(|| (fit.parameters[index], moved)))
     }
 
     /// `½‖R₁ θ − ρ₁‖²` at a shift of the base parameters from the best set.
@@ -266,6 +275,8 @@ impl PossibleIntervals {
 const CLOSE: f64 = 0.01;
 /// A parameter that moves by less than this share while it is pulled twice as far is held by a constraint.
 const STILL: f64 = 1.0e-3;
+/// Largest certificate of a fit that counts: the pull's energy is a few thousand, the cost's rise a few units.
+const SOLVED: f64 = 1.0e-6;
 /// Largest growth of the pull from one fit to the next.
 const GROWTH: f64 = 8.0;
 
@@ -394,13 +405,28 @@ mod tests {
         let measured = [(0, 2.0, 1e-4), (1, 0.0, 1e-4), (2, 0.6, 1e-4), (3, 0.0, 1e-4), (10, 0.5, 0.1)];
         let found = intervals(&measured, None);
         let interval = found.of(4).unwrap();
-        assert_eq!(interval.held_by, [IntervalEnd::Data, IntervalEnd::Open], "{interval:?}");
+        assert_eq!(interval.held_by, [IntervalEnd::Constraint, IntervalEnd::Open], "{interval:?}");
         // Ixx ≥ (m ry)²/m = 0.18; mass and moment give way by their own errors, of which Ixx has √((0.6 · 1e-4)² + (0.09 · 1e-4)²). The margin of 1e-4 reference
         // bodies lies above it, and an end is as exact as a thousandth of the half width: 2e-4 in all.
         let expected = 0.18 - T * 6.07e-5;
         assert!((interval.lower.unwrap() - expected).abs() < 2e-4, "{interval:?}");
         // A product of inertia nobody measured is open on both sides.
         assert_eq!(found.of(5).unwrap().held_by, [IntervalEnd::Open; 2]);
+    }
+
+    /// Only Ixx measured: of a body with Ixx = Σyy + Σzz, |Σyz| is at most half of it, and the sums are no less than the margin; what involves x is open.
+    #[test]
+    fn one_moment_holds_what_it_contains() {
+        let found = intervals(&[(4, 0.02, 1e-6), (10, 0.5, 0.1)], None);
+        let product = found.of(8).unwrap();
+        assert_eq!(product.held_by, [IntervalEnd::Constraint; 2]);
+        for end in [-product.lower.unwrap(), product.upper.unwrap()] {
+            // A prior of weight 1e-5 and the margin keep it off the boundary by less than a hundredth.
+            assert!((end - 0.01).abs() < 1e-4, "{product:?}");
+        }
+        let mass = found.of(0).unwrap();
+        assert_eq!(mass.held_by, [IntervalEnd::Constraint, IntervalEnd::Open], "{mass:?}");
+        assert!((0.0..1e-3).contains(&mass.lower.unwrap()), "{mass:?}");
     }
 
     #[test]

@@ -27,7 +27,8 @@ pub use leg::{IterationTask, Leg};
 pub use machine::IteratedMachine;
 pub use motion::{MeasuredMotion, measured_motion};
 pub use physical::{
-    PhysicalSource, impossible_priors, nearest_possible_parameters, possible_parameters, typical_length_m,
+    PhysicalSource, impossible_priors, nearest_possible_parameters, possible_parameters, possible_problem,
+    typical_length_m,
 };
 pub use policy::{Next, RunPlan};
 pub use possible_settings::{BodyKnowledge, EllipsoidSettings, PossibleSettings};

@@ -40,7 +40,7 @@ pub fn possible_parameters(
     joint_sigma: &[f64],
     settings: &PossibleSettings,
 ) -> Result<PhysicalFit, String> {
-    let problem = described(source, problem, joint_sigma, settings)?;
+    let problem = possible_problem(source, problem, joint_sigma, settings)?;
     physical_fit(&problem, &settings.fit()).map_err(|error| error.to_string())
 }
 
@@ -55,7 +55,7 @@ pub fn nearest_possible_parameters(
     settings: &PossibleSettings,
     theta: &[f64],
 ) -> Result<PhysicalFit, String> {
-    let problem = described(source, problem, joint_sigma, settings)?;
+    let problem = possible_problem(source, problem, joint_sigma, settings)?;
     let around = problem.around(theta).map_err(|error| error.to_string())?;
     physical_fit(&around, &settings.fit()).map_err(|error| error.to_string())
 }
@@ -82,7 +82,11 @@ fn judged(own: &[f64]) -> (bool, f64) {
     (stated.mass_kg() > 0.0 && least >= -1.0e-9 * stated.mass_kg(), least)
 }
 
-fn described(
+/// What is asked of the machine's bodies and laws: what [`possible_parameters`] solves.
+///
+/// # Errors
+/// As [`possible_parameters`].
+pub fn possible_problem(
     source: &PhysicalSource<'_>,
     problem: &LinearProblem,
     joint_sigma: &[f64],

@@ -6,6 +6,7 @@ pub(crate) mod friction_choice;
 pub(crate) mod further_passes;
 pub(crate) mod instrument_rows;
 pub(crate) mod instruments;
+pub(crate) mod intervals;
 pub(crate) mod periodic;
 pub(crate) mod physical;
 pub(crate) mod report;
@@ -22,6 +23,7 @@ use crate::identify::fit::{Fitted, Logs};
 use crate::identify::friction_candidates::{candidate_columns, joints_to_choose};
 use crate::identify::friction_choice::{JointFriction, choose_friction, with_friction};
 use crate::identify::instruments::InstrumentSource;
+use crate::identify::intervals::{Asked, possible_intervals};
 use crate::identify::physical::{physical_fit_result, possible_parameters, source_of};
 use crate::identify::result::{LogSummary, RESULT_SCHEMA, ResultFile, Timings};
 use crate::identify::result_sections::{
@@ -139,15 +141,8 @@ fn identified(
     let passes =
         Logs { study, path: study_path, machine, motion: &motion, files: &files, training: &training, options };
     let started = Instant::now();
-    let Fitted {
-        estimate,
-        noise_in_regressor,
-        gross_errors,
-        noise_correlation,
-        noise_levels,
-        periodic,
-        simulated,
-    } = crate::identify::fit::fitted(&passes, problem, source)?;
+    let Fitted { estimate, noise_in_regressor, gross_errors, noise_correlation, noise_levels, periodic, simulated } =
+        crate::identify::fit::fitted(&passes, problem, source)?;
     let (estimate, dropped) = match &study.estimator.essential {
         Some(settings) => {
             essential(&estimate, settings).map(|(rest, report)| (rest, Some(report))).map_err(in_study)?
@@ -167,6 +162,16 @@ fn identified(
     };
     let sign = sign_evidence(machine, problem, &estimate);
     let physical = possible.as_ref().map(|fit| &fit.base_values[..]);
+    let possible_intervals = match &possible_settings {
+        // Where there is no possible machine, `physical.failure` says why.
+        Some(settings) if study.estimator.intervals && possible.is_some() => {
+            let method = study.estimator.method;
+            let asked = Asked { machine, problem, estimate: &estimate, prior: &prior, method, settings };
+            let found = possible_intervals(&asked, options.progress);
+            Some(found.map_err(|reason| Error::study(study_path, format!("estimator.intervals: {reason}")))?)
+        }
+        _ => None,
+    };
     timings.estimation += started.elapsed().as_secs_f64();
 
     let started = Instant::now();
@@ -240,6 +245,7 @@ fn identified(
         base_parameters: base_parameters(machine, &estimate, physical),
         base_parameter_covariance: estimate.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
         bodies: bodies(machine, &inertials),
+        possible_intervals,
         essential: dropped,
         correlations: strongest_correlations(&estimate, CORRELATIONS),
         joints: joint_results(machine, &estimate, &parameters),

@@ -2,6 +2,7 @@
 
 use crate::identify::fit::{GrossErrors, NoiseInRegressor};
 use crate::identify::friction_choice::JointFriction;
+use crate::identify::intervals::PossibleIntervalResult;
 use crate::identify::periodic::PeriodicFit;
 use crate::identify::sign::SignEvidence;
 use crate::identify::simulated::SimulatedFit;
@@ -43,6 +44,8 @@ pub struct ResultFile {
     pub base_parameter_covariance: Vec<Vec<f64>>,
     /// The bodies: one of the full sets that give these base parameters, the nearest to the prior.
     pub bodies: Vec<BodyResult>,
+    /// How far every parameter of a body or law could go in a possible machine that the data do not reject; none unless asked for.
+    pub possible_intervals: Option<Vec<PossibleIntervalResult>>,
     /// What was held at zero because the data hardly tell it; none unless asked for.
     pub essential: Option<EssentialReport>,
     /// The strongest correlations between estimates, strongest first.

@@ -92,7 +92,8 @@ pub(crate) fn simulated(logs: &Logs<'_>, problem: &LinearProblem) -> Result<(Est
     let mut simulated =
         SimulatedLoop { machine, controller, controller_model, settings, compared, logs: loop_logs, failure: None };
 
-    let weighted = WeightedSettings { rank: section.rank, covariance: section.covariance, ..WeightedSettings::default() };
+    let weighted =
+        WeightedSettings { rank: section.rank, covariance: section.covariance, ..WeightedSettings::default() };
     let plain = weighted_least_squares(problem, &weighted).map_err(|source| logs.in_study(source))?;
     let measured = simulated.measured();
     let mut begun: Option<Begun> = None;
@@ -225,7 +226,12 @@ fn no_simulation(why: &str) -> String {
 }
 
 /// Standard deviation of each joint's share of `residual`.
-fn deviations(simulated: &SimulatedLoop<'_>, residual: &DVector<f64>, measured: &DVector<f64>, free: usize) -> Vec<f64> {
+fn deviations(
+    simulated: &SimulatedLoop<'_>,
+    residual: &DVector<f64>,
+    measured: &DVector<f64>,
+    free: usize,
+) -> Vec<f64> {
     let joints = simulated.machine.model.dof();
     let (mut squares, mut signal, mut count) = (vec![0.0; joints], vec![0.0; joints], vec![0_usize; joints]);
     let mut at = 0;

@@ -73,6 +73,8 @@ pub struct EstimatorSection {
     /// Whether the bodies, friction and drives written are those of a possible machine that fit the logs best (true by default), or the set nearest to the
     /// description that has exactly the estimated base parameters. A table in place of `true` says what else is known of the bodies.
     pub physical: PhysicalChoice,
+    /// Intervals for every parameter of bodies and laws over all possible machines that the data do not reject; some thousand physical fits, so not by default. Needs `physical`.
+    pub intervals: bool,
     /// When a column counts as excited.
     pub rank: RankSettings,
     /// How logs are cut into segments for the covariance.
@@ -95,6 +97,7 @@ impl Default for EstimatorSection {
             method: EstimatorMethod::default(),
             covariance: CovarianceMethod::default(),
             physical: PhysicalChoice::default(),
+            intervals: false,
             rank: RankSettings::default(),
             segments: SegmentSettings::default(),
             essential: None,
@@ -123,13 +126,13 @@ impl EstimatorSection {
                 )
             })?;
         }
-        self.noise_levels
-            .settings(self)
-            .validate()
-            .map_err(|error| format!("[estimator.noise_levels]: {error}"))?;
+        self.noise_levels.settings(self).validate().map_err(|error| format!("[estimator.noise_levels]: {error}"))?;
         self.periods.validate().map_err(|error| format!("[estimator.periods]: {error}"))?;
         self.simulated.validate(self).map_err(|error| format!("[estimator.simulated]: {error}"))?;
         self.physical.validate().map_err(|error| format!("[estimator.physical]: {error}"))?;
+        if self.intervals && self.physical.settings().is_none() {
+            return Err("estimator.intervals = true needs the possible machine: take out physical = false".to_owned());
+        }
         self.segments.validate().map_err(|error| format!("[estimator.segments]: {error}"))?;
         if let Some(essential) = &self.essential {
             essential.validate().map_err(|error| format!("[estimator.essential]: {error}"))?;
