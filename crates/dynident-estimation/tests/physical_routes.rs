@@ -97,7 +97,8 @@ fn check(worst: &Worst) {
 /// that want bodies a million times as heavy as their references.
 #[test]
 fn both_routes_find_the_same_optimum_of_problems_that_were_hard() {
-    check(&run_all([1081, 1110, 1113].into_iter().map(|seed| (seed, 2 + (seed % 29) as usize))));
+    // At 1757 and 1766 the interior point stalls at 5e-7 and 2e-7 and the other route has to finish.
+    check(&run_all([1081, 1110, 1113, 1757, 1766].into_iter().map(|seed| (seed, 2 + (seed % 29) as usize))));
 }
 
 #[test]
@@ -106,7 +107,7 @@ fn both_routes_find_the_same_optimum_of_150_problems() {
     check(&run(0..150, |seed| if seed % 30 == 7 { 12 } else { 2 + (seed % 4) as usize }));
 }
 
-/// What is asked for: a quarter of an hour in the release profile, which is more than `.ci/run` has. Not yet run to its end with the solver as it is (2026-11-21): run it before relying on it.
+/// What is asked for: a quarter of an hour in the release profile, which is more than `.ci/run` has.
 /// `cargo test --release -p dynident-estimation --test physical_routes -- --ignored --nocapture`
 #[test]
 #[ignore = "takes a quarter of an hour in the release profile"]

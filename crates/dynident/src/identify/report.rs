@@ -2,8 +2,10 @@
 
 use crate::error::Error;
 use crate::identify::Identification;
+use crate::identify::intervals::PossibleIntervalResult;
 use crate::identify::result::{BaseParameterResult, LogSummary, LogValidation, ResultFile};
 use crate::measured::torque_trace::LogTrace;
+use dynident_estimation::physical::IntervalEnd;
 use dynident_recording::Level;
 use dynident_report::{BarPlot, Cell, Heading, HeatMap, KeyFigures, LinePlot, Report, Table, Text, Tone, short};
 
@@ -262,6 +264,39 @@ fn bodies(page: &mut Report, r: &ResultFile) {
     });
     let note = "centre of mass and inertia (kg m²) in the body's own frame, inertia about its origin; least eigenvalue of the pseudo-inertia";
     page.add(Table::new("Bodies", columns).note(note).rows(rows));
+    if let Some(found) = &r.possible_intervals {
+        page.add(intervals(found));
+    }
+}
+
+/// How far every parameter could go.
+fn intervals(found: &[PossibleIntervalResult]) -> Table {
+    let end = |end: Option<f64>| Cell::from(end.map_or_else(|| "open".to_owned(), |end| short(end, 4)));
+    let holder = |end: IntervalEnd| match end {
+        IntervalEnd::Data => "data",
+        IntervalEnd::Constraint => "physics",
+        IntervalEnd::Open => "–",
+        IntervalEnd::Unsettled => "not settled",
+    };
+    let rows = found.iter().map(|interval| {
+        vec![
+            Cell::from(&interval.symbol),
+            interval.of.clone().unwrap_or_default().into(),
+            unit(&interval.unit).into(),
+            short(interval.value, 4).into(),
+            end(interval.lower),
+            end(interval.upper),
+            holder(interval.held_by[0]).into(),
+            holder(interval.held_by[1]).into(),
+        ]
+    });
+    let note = "every value in an interval belongs to a possible machine that the data do not reject at 95 %; the ends are held by the data, by what is possible, or not at all";
+    Table::new(
+        "How far each parameter could go",
+        ["parameter", "of", "unit", "best fit", "from", "to", "held below by", "held above by"],
+    )
+    .note(note)
+    .rows(rows)
 }
 
 fn log_text(log: &LogSummary) -> Text {
