@@ -9,8 +9,8 @@ use dynident::{Error, Identification, identify, simulate_study};
 use std::fmt::Write;
 use std::path::Path;
 
-const RATE_HZ: f64 = 500.0;
-const SECONDS: f64 = 12.0;
+const RATE_HZ: f64 = 1000.0;
+const SECONDS: f64 = 8.0;
 
 /// The commanded motion, as `design` writes it.
 fn write_trajectory(path: &Path) {
@@ -24,7 +24,7 @@ fn write_trajectory(path: &Path) {
     std::fs::write(path, text + "\n").unwrap();
 }
 
-/// A study that simulates and identifies the planar arm. Positions are read to 2e-3 rad, so that accelerations below 30 Hz are mostly noise.
+/// A study that simulates and identifies the planar arm. Positions are read to 1e-3 rad, so that accelerations below 30 Hz are mostly noise.
 fn study(method: &str, controller: &str) -> String {
     format!(
         r#"
@@ -35,9 +35,9 @@ fn study(method: &str, controller: &str) -> String {
         [simulation]
         rate_hz = {RATE_HZ:?}
         off_percent = 20.0
-        viscous = 2.0
-        coulomb = [3.0, 2.0]
-        sensors = {{ position_std = 2e-3, torque_std = 0.5, seed = 5 }}
+        viscous = 1.0
+        coulomb = [1.5, 1.0]
+        sensors = {{ position_std = 1e-3, torque_std = 0.3, record_rate_hz = 250.0, seed = 5 }}
         [iteration]
         trajectory = "trajectory.csv"
         [motion]
@@ -55,7 +55,7 @@ fn study(method: &str, controller: &str) -> String {
     )
 }
 
-const CONTROLLER: &str = "[controller]\nkind = \"joint-pd\"\nkp = [200.0, 60.0]\nkd = [40.0, 5.0]";
+const CONTROLLER: &str = "[controller]\nkind = \"joint-pd\"\nkp = [200.0, 60.0]\nkd = [40.0, 3.0]";
 
 /// Writes trajectory and log; gives the true base parameters.
 fn recorded(folder: &Path) -> Vec<f64> {
@@ -109,8 +109,8 @@ fn what_cannot_be_simulated_is_said() {
     for method in ["didim", "clie", "cloe"] {
         let message = refused(folder.path(), &study(method, ""));
         assert!(message.contains("[controller]") && message.contains(method), "{message}");
-        // Sampled at 500 Hz, a damping of 80000 Nm s/rad blows up.
-        let wild = CONTROLLER.replace("kd = [40.0, 5.0]", "kd = 80000.0");
+        // Sampled at 1 kHz, a damping of 80000 Nm s/rad blows up.
+        let wild = CONTROLLER.replace("kd = [40.0, 3.0]", "kd = 80000.0");
         let wild = study(method, &wild).replace("off_percent", "effort_limits = false\noff_percent");
         let message = refused(folder.path(), &wild);
         assert!(message.contains("diverged") && message.contains("does not get through"), "{message}");
