@@ -42,16 +42,16 @@ pub use design::{
 pub use error::Error;
 pub use evaluate::{Quantity, evaluate};
 pub use identify::fit::{GrossErrors, NoiseInRegressor};
-pub use identify::periodic::PeriodicFit;
-pub use identify::sign::SignEvidence;
-pub use identify::simulated::SimulatedFit;
 pub use identify::friction_choice::{FrictionCandidate, JointFriction};
 pub use identify::instruments::{InstrumentSection, InstrumentSource, SmoothedMotion};
+pub use identify::periodic::PeriodicFit;
 pub use identify::result::{
     BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, LogValidation, MethodSummary,
     PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, Timings,
     TrainingJoint, TrainingResult,
 };
+pub use identify::sign::SignEvidence;
+pub use identify::simulated::SimulatedFit;
 pub use identify::{Identification, identify, identify_with_instruments};
 pub use inspect::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary, inspect};
 pub use iterate::{

@@ -62,7 +62,8 @@ fn rows_count_by_the_noise_around_them() {
         let sigma = if row < 2000 { 0.02 } else { 1.0 };
         q.iter().copied().chain(tau.iter().map(|t| t + sigma * random.normal())).collect()
     });
-    let further = "parallel_filter.enabled = false\nmotion.differentiator = { method = \"central-differences\", order = 8 }";
+    let further =
+        "parallel_filter.enabled = false\nmotion.differentiator = { method = \"central-differences\", order = 8 }";
     let plain = run(folder.path(), &study("weighted", further)).unwrap();
     let text = study("noise-weighted", further) + "noise_levels = { window_rows = 41, pooled_share = 1e-4 }";
     let job = Job::new(folder.path(), &text);
@@ -95,7 +96,8 @@ fn periods_tell_the_noise_and_undo_its_bias() {
     let (folder, truth) = (tempfile::tempdir().unwrap(), truth());
     write_periods(folder.path(), &truth, 10.2);
     let plain = run(folder.path(), &study("weighted", NOISY)).unwrap();
-    let job = Job::new(folder.path(), &(study("maximum-likelihood", NOISY) + &format!("periods.period_s = {PERIOD_S}")));
+    let job =
+        Job::new(folder.path(), &(study("maximum-likelihood", NOISY) + &format!("periods.period_s = {PERIOD_S}")));
     let found = job.identify();
     let values = truth.base_values(&job.machine());
     let fit = found.result.periodic.as_ref().unwrap();
@@ -142,7 +144,11 @@ fn the_period_may_come_from_the_commanded_motion() {
 }
 
 /// Studies of the new methods on any log that `write` makes; the simulated ones follow `reference.csv`.
-fn with_each_new_method(folder: &Path, reference: &dyn Fn(f64) -> [[f64; 2]; 3], mut check: impl FnMut(&str, Result<Identification, Error>)) {
+fn with_each_new_method(
+    folder: &Path,
+    reference: &dyn Fn(f64) -> [[f64; 2]; 3],
+    mut check: impl FnMut(&str, Result<Identification, Error>),
+) {
     let mut table = "t_s,q1,q2,dq1,dq2,ddq1,ddq2".to_owned();
     for k in 0..=1000 {
         let t = f64::from(k) * 0.004;
@@ -155,7 +161,7 @@ fn with_each_new_method(folder: &Path, reference: &dyn Fn(f64) -> [[f64; 2]; 3],
                        motion.differentiator = { method = \"central-differences\", order = 2 }\nparallel_filter.enabled = false";
         let text = study(method, further)
             .replace("file = \"log.csv\"", "file = \"log.csv\"\nreference = \"reference.csv\"")
-            + "periods.period_s = 1.0";
+            + "periods.period_s = 1.0\nsimulated.max_iterations = 4";
         check(method, run(folder, &text));
     }
 }
@@ -224,7 +230,11 @@ fn a_joint_that_does_not_move_leaves_its_parameters_named() {
             return;
         }
         assert_eq!(found.result.method.status, "not-all-excited", "{method}");
-        assert!(found.result.method.not_excited.iter().any(|name| name.contains("fv2")), "{method}: {:?}", found.result.method.not_excited);
+        assert!(
+            found.result.method.not_excited.iter().any(|name| name.contains("fv2")),
+            "{method}: {:?}",
+            found.result.method.not_excited
+        );
     });
 }
 

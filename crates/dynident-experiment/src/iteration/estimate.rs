@@ -95,7 +95,12 @@ pub fn identify_run(
         let machine = &task.machine;
         let (model, laws, base, prior) = (machine.model(), machine.laws(), machine.base(), machine.prior());
         let own_sigma: Vec<f64> = with_rows.iter().map(|&joint| joint_sigma[joint]).collect();
-        match possible_parameters(&PhysicalSource { model, laws, base, prior }, &problem, &own_sigma, &settings.possible) {
+        match possible_parameters(
+            &PhysicalSource { model, laws, base, prior },
+            &problem,
+            &own_sigma,
+            &settings.possible,
+        ) {
             Ok(fit) => (Some(fit.parameters), None),
             Err(reason) => (None, Some(reason)),
         }

@@ -139,15 +139,8 @@ fn identified(
     let passes =
         Logs { study, path: study_path, machine, motion: &motion, files: &files, training: &training, options };
     let started = Instant::now();
-    let Fitted {
-        estimate,
-        noise_in_regressor,
-        gross_errors,
-        noise_correlation,
-        noise_levels,
-        periodic,
-        simulated,
-    } = crate::identify::fit::fitted(&passes, problem, source)?;
+    let Fitted { estimate, noise_in_regressor, gross_errors, noise_correlation, noise_levels, periodic, simulated } =
+        crate::identify::fit::fitted(&passes, problem, source)?;
     let (estimate, dropped) = match &study.estimator.essential {
         Some(settings) => {
             essential(&estimate, settings).map(|(rest, report)| (rest, Some(report))).map_err(in_study)?

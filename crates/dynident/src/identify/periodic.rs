@@ -160,7 +160,8 @@ fn mean_period(
     while stream.next_block(&mut block).map_err(failed)? {
         if *segment.get_or_insert(block.segment) != block.segment {
             return Err(wrong(
-                "the log has a gap, and periods are counted without one: cut the longest piece out with time_range_s".to_owned(),
+                "the log has a gap, and periods are counted without one: cut the longest piece out with time_range_s"
+                    .to_owned(),
             ));
         }
         if channels[0].is_empty() {
@@ -224,10 +225,7 @@ fn at_phases(channels: &[Vec<f64>], from: f64, step: f64) -> Vec<Vec<f64>> {
             - c * (u + 1.0) * u * (u - 2.0) / 2.0
             + d * (u + 1.0) * u * (u - 1.0) / 6.0
     };
-    channels
-        .iter()
-        .map(|channel| (0..count).map(|k| value(channel, first + k as f64 * step)).collect())
-        .collect()
+    channels.iter().map(|channel| (0..count).map(|k| value(channel, first + k as f64 * step)).collect()).collect()
 }
 
 /// Regressors of single instants and their derivatives by the motion.
@@ -262,14 +260,7 @@ impl<'a> Instants<'a> {
             let [q, dq, ddq] = &states;
             let motion = JointMotion { samples, q, dq, ddq };
             let mut history = LawHistory::new(None);
-            regressor_panels_following(
-                model,
-                &mut self.workspace,
-                layout,
-                &motion,
-                &mut history,
-                &mut self.panels,
-            );
+            regressor_panels_following(model, &mut self.workspace, layout, &motion, &mut history, &mut self.panels);
             let mut regressor = DMatrix::zeros(dof, columns);
             let mut by_motion = vec![DMatrix::zeros(dof, columns); variables];
             for joint in 0..dof {

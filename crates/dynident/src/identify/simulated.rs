@@ -92,7 +92,8 @@ pub(crate) fn simulated(logs: &Logs<'_>, problem: &LinearProblem) -> Result<(Est
     let mut simulated =
         SimulatedLoop { machine, controller, controller_model, settings, compared, logs: loop_logs, failure: None };
 
-    let weighted = WeightedSettings { rank: section.rank, covariance: section.covariance, ..WeightedSettings::default() };
+    let weighted =
+        WeightedSettings { rank: section.rank, covariance: section.covariance, ..WeightedSettings::default() };
     let plain = weighted_least_squares(problem, &weighted).map_err(|source| logs.in_study(source))?;
     let measured = simulated.measured();
     let (mut begun, mut refused) = (Vec::new(), Vec::new());
@@ -202,8 +203,7 @@ fn settled(
     };
     let (mut iterations, mut simulations) = (0, 0);
     for round in 1..=ROUNDS {
-        let found =
-            simulated_least_squares(&asked, simulated, &settings).map_err(|stop| stop.of(logs))?;
+        let found = simulated_least_squares(&asked, simulated, &settings).map_err(|stop| stop.of(logs))?;
         iterations += found.iterations;
         simulations += found.simulations;
         let next = deviations(simulated, &found.residual, measured, found.rank.rank);
@@ -238,12 +238,11 @@ fn start_values(
         }
     }
     if choice != SimulationStart::Estimate {
-        match &machine.prior {
-            Some(prior) => starts.push((prior.clone(), "description")),
-            None => {
-                let unknown = machine.model.bodies_without_prior().join(", ");
-                why.push(format!("the description, which could be started from, has no inertial of {unknown}"));
-            }
+        if let Some(prior) = &machine.prior {
+            starts.push((prior.clone(), "description"));
+        } else {
+            let unknown = machine.model.bodies_without_prior().join(", ");
+            why.push(format!("the description, which could be started from, has no inertial of {unknown}"));
         }
     }
     if starts.is_empty() { Err(why.join("; ")) } else { Ok(starts) }
@@ -260,7 +259,12 @@ fn no_simulation(why: &str) -> String {
 }
 
 /// Standard deviation of each joint's share of `residual`.
-fn deviations(simulated: &SimulatedLoop<'_>, residual: &DVector<f64>, measured: &DVector<f64>, free: usize) -> Vec<f64> {
+fn deviations(
+    simulated: &SimulatedLoop<'_>,
+    residual: &DVector<f64>,
+    measured: &DVector<f64>,
+    free: usize,
+) -> Vec<f64> {
     let joints = simulated.machine.model.dof();
     let (mut squares, mut signal, mut count) = (vec![0.0; joints], vec![0.0; joints], vec![0_usize; joints]);
     let mut at = 0;

@@ -9,9 +9,7 @@ use crate::measured::rows::{Computer, JointRows, RawSamples, RowSink, decimation
 use crate::progress::Silent;
 use dynident_estimation::{SimulatedMotion, SimulatedRows};
 use dynident_excitation::Motion;
-use dynident_experiment::{
-    ControllerModel, ControllerSettings, LoopSettings, Plant, Reference, Run, closed_loop,
-};
+use dynident_experiment::{ControllerModel, ControllerSettings, LoopSettings, Plant, Reference, Run, closed_loop};
 use dynident_model::laws::Law;
 use dynident_recording::{DecimationSettings, Decimator, FilterError, MotionBlock};
 use nalgebra::{DMatrix, DVector};
@@ -98,7 +96,8 @@ impl LoopLog {
             return Err(Error::NothingLeft { log: name, rows: samples as u64, needed: outputs.needed() });
         }
         let begins_s = commanded.start_s().min(0.0);
-        let ends_s = pieces.iter().map(|piece| piece.first_time_s + piece.rows as f64 / log_rate_hz).fold(0.0, f64::max);
+        let ends_s =
+            pieces.iter().map(|piece| piece.first_time_s + piece.rows as f64 / log_rate_hz).fold(0.0, f64::max);
         let count = ((ends_s - begins_s) * rate_hz).ceil() as usize + 2;
         let mut told = Motion::default();
         told.reset(dof, count);
@@ -235,10 +234,8 @@ impl SimulatedMotion for SimulatedLoop<'_> {
                 let message = format!("the closed loop cannot be simulated: {error}");
                 Stop::Log(Error::Instruments { log: log.name.clone(), message })
             };
-            let mut controller =
-                self.controller.build(plant.dof(), self.controller_model.as_ref()).map_err(in_loop)?;
-            let run =
-                closed_loop(&mut plant, controller.as_mut(), &log.reference, &self.settings).map_err(in_loop)?;
+            let mut controller = self.controller.build(plant.dof(), self.controller_model.as_ref()).map_err(in_loop)?;
+            let run = closed_loop(&mut plant, controller.as_mut(), &log.reference, &self.settings).map_err(in_loop)?;
             if !run.status.is_done() {
                 self.failure = Some(format!("log `{}`: {}", log.name, run.status));
                 return Ok(None);

@@ -63,7 +63,7 @@ impl EstimatorMethod {
 }
 
 /// `[estimator]`.
-#[derive(Clone, Debug, Deserialize, Serialize)]
+#[derive(Clone, Debug, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct EstimatorSection {
     /// The method; weighted by default.
@@ -89,23 +89,6 @@ pub struct EstimatorSection {
     pub simulated: SimulatedSection,
 }
 
-impl Default for EstimatorSection {
-    fn default() -> Self {
-        Self {
-            method: EstimatorMethod::default(),
-            covariance: CovarianceMethod::default(),
-            physical: PhysicalChoice::default(),
-            rank: RankSettings::default(),
-            segments: SegmentSettings::default(),
-            essential: None,
-            instruments: None,
-            noise_levels: NoiseLevelSection::default(),
-            periods: PeriodSection::default(),
-            simulated: SimulatedSection::default(),
-        }
-    }
-}
-
 impl EstimatorSection {
     pub(crate) fn validate(&self) -> Result<(), String> {
         self.rank.validate().map_err(|error| format!("[estimator.rank]: {error}"))?;
@@ -123,10 +106,7 @@ impl EstimatorSection {
                 )
             })?;
         }
-        self.noise_levels
-            .settings(self)
-            .validate()
-            .map_err(|error| format!("[estimator.noise_levels]: {error}"))?;
+        self.noise_levels.settings(self).validate().map_err(|error| format!("[estimator.noise_levels]: {error}"))?;
         self.periods.validate().map_err(|error| format!("[estimator.periods]: {error}"))?;
         self.simulated.validate(self).map_err(|error| format!("[estimator.simulated]: {error}"))?;
         self.physical.validate().map_err(|error| format!("[estimator.physical]: {error}"))?;
