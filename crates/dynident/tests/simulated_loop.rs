@@ -87,7 +87,6 @@ fn all_three_find_the_truth_where_least_squares_is_biased() {
         let (simulated, least_squares) = (score(&found, &truth, bars), score(&plain, &truth, bars));
         assert_eq!((&found.result.method.estimator[..], &found.result.method.status[..]), (method, "complete"));
         // Twelve squares of mean one: their root mean square is below 1.8 by four deviations; the jackknife is cautious.
-        println!("ZZ {method} {simulated} {least_squares} {}", fit.simulations);
         assert!(simulated < 1.8, "{method}: {simulated}");
         assert!(least_squares > 3.0 * simulated, "{method}: {least_squares} and {simulated}");
     }
@@ -114,6 +113,13 @@ fn what_cannot_be_simulated_is_said() {
         let message =
             refused(folder.path(), &study(method, CONTROLLER).replace("reference = \"trajectory.csv\"\n", "\n"));
         assert!(message.contains("reference = ") && message.contains("log `log`"), "{message}");
+        let elsewhere = "off_percent = 20.0\nstart = { kind = \"at\", q = [0.0], dq = [0.0] }";
+        let message = refused(folder.path(), &study(method, CONTROLLER).replace("off_percent = 20.0", elsewhere));
+        assert!(message.contains("cannot be simulated") && message.contains("start positions"), "{message}");
+        let late = "reference = { file = \"trajectory.csv\", start_s = 2.0 }";
+        let message =
+            refused(folder.path(), &study(method, CONTROLLER).replace("reference = \"trajectory.csv\"", late));
+        assert!(message.contains("has not begun or is over") && message.contains("start_s"), "{message}");
         let message =
             refused(folder.path(), &study(method, &CONTROLLER.replace("kp = [1500.0, 250.0]", "kp = [1.0, 2.0, 3.0]")));
         assert!(message.contains("[controller]") && message.contains("kp"), "{message}");

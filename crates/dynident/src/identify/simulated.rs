@@ -19,6 +19,8 @@ use serde::Serialize;
 
 /// Noise of the compared signal counts as at least this share of the signal's root mean square, so that noise-free data have weights.
 const LEAST_RELATIVE_SIGMA: f64 = 1e-4;
+/// Rows times columns that are held in memory, of 8 bytes each.
+const MOST_ENTRIES: usize = 100_000_000;
 /// The noise of the joints is judged anew so often at most, until no joint's changes by more than a tenth.
 const ROUNDS: usize = 3;
 const SETTLED: f64 = 0.1;
@@ -89,8 +91,24 @@ pub(crate) fn simulated(logs: &Logs<'_>, problem: &LinearProblem) -> Result<(Est
     let read = |&index: &usize| LoopLog::read(logs, index, compared, simulation.rate_hz, &wrong);
     let loop_logs = logs.training.iter().map(read).collect::<Result<Vec<_>, _>>()?;
     logs.options.progress.end();
-    let mut simulated =
-        SimulatedLoop { machine, controller, controller_model, settings, compared, logs: loop_logs, failure: None };
+    let mut simulated = SimulatedLoop {
+        machine,
+        controller,
+        controller_model,
+        settings,
+        compared,
+        logs: loop_logs,
+        wrong: &wrong,
+        failure: None,
+    };
+    let entries = simulated.rows() * problem.columns().len();
+    if entries > MOST_ENTRIES {
+        return Err(wrong(format!(
+            "{} rows of {} columns are too many to hold at once: give parallel_filter.factor, or a shorter part of the log",
+            simulated.rows(),
+            problem.columns().len()
+        )));
+    }
 
     let weighted =
         WeightedSettings { rank: section.rank, covariance: section.covariance, ..WeightedSettings::default() };
