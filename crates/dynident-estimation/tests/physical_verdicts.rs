@@ -187,6 +187,18 @@ fn contradictions_are_named() {
     assert!(!error.to_string().contains("along y"), "{error}");
 }
 
+/// A start inside is looked for without the data, so nothing but the constraints holds a variable there: an offset has none.
+#[test]
+fn limits_away_from_the_prior_are_met_beside_a_scalar_without_any() {
+    let mut heavy = body("link");
+    let least = 2.0 * heavy.reference[0];
+    heavy.mass_kg = Some([least, 1.2 * least]);
+    let offset = PhysicalScalar { name: "off1".into(), lower: None, upper: None, prior: 0.3, scale: 1.0 };
+    let fit = physical_fit(&seen(vec![heavy], vec![offset]), &PhysicalSettings::default()).unwrap();
+    assert!((least - 1e-9..=1.2 * least + 1e-9).contains(&fit.parameters[0]), "{:?}", fit.parameters);
+    assert_eq!(fit.status, PhysicalStatus::Solved);
+}
+
 #[test]
 fn bodies_given_as_known_stay_and_bodies_without_mass_are_allowed() {
     let (mut arm, mut tool) = (body("arm"), body("tool"));

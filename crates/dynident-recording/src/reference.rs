@@ -259,8 +259,11 @@ impl Reference {
         }
     }
 
-    /// Whether the motion is known at this time: inside its samples, or at an end at which it stands still.
-    pub(crate) fn covers(&self, joint: usize, time_s: f64) -> bool {
+    /// Whether the motion is known at this time (seconds after the log's first row): inside its samples, or at an end at which it stands still.
+    ///
+    /// # Panics
+    /// If there is no such joint.
+    pub fn covers(&self, joint: usize, time_s: f64) -> bool {
         let time_s = time_s - self.start_s;
         let JointReference { path, peak, .. } = &self.joints[joint];
         let JointPath::Sampled(sampled) = path else { return true };
@@ -384,6 +387,7 @@ mod tests {
         assert_eq!(reference.at(1, 0.3), [1.0, 0.0, 0.0]);
         assert!(reference.reordered(&[2]).is_none());
         assert!(reference.strokes(1).is_empty());
+        assert_eq!((reference.period_s(), reference.clone().starting_at(2.0).start_s()), (Some(1.0), 2.0));
         assert!(Reference::read(file.path(), 3).is_err());
     }
 }

@@ -37,8 +37,15 @@ differentiator = { method = "butterworth", order = 4, cutoff_hz = 8.0 }
 [parallel_filter]
 factor = 5
 [estimator]
-method = "weighted"
+method = "noise-weighted"
 covariance = "segments"
+noise_levels = { window_rows = 21, pooled_share = 0.01 }
+periods = { period_s = 5.0, skip_s = 1.0 }
+simulated = { start = "description", max_iterations = 9 }
+[estimator.physical]
+prior = "euclidean"
+total_mass_kg = [10.0, 40.0]
+bodies.forearm_link = { mass_kg = [1.0, 9.0], inside = { centre_m = [0.0, 0.0, 0.2], semi_axes_m = [0.2, 0.2, 0.5] } }
 [[log]]
 file = "one.csv"
 rows = [10, 900]

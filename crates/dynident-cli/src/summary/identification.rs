@@ -70,6 +70,8 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
 fn estimator(name: &str) -> String {
     match name {
         "instrumental" => "instrumental variables".to_owned(),
+        "maximum-likelihood" => "maximum likelihood".to_owned(),
+        "didim" | "clie" | "cloe" => format!("{} with the simulated closed loop", name.to_uppercase()),
         "huber" | "tukey" => format!("reweighted least squares ({name})"),
         other => format!("{other} least squares"),
     }

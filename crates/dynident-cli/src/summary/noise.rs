@@ -4,7 +4,7 @@ use super::text::{percent, wrapped};
 use dynident::estimation::HausmanVerdict;
 use dynident::{NoiseInRegressor, ResultFile};
 
-/// Whether noise in the regressor shows, and how many rows a robust estimator gave little weight; empty when the study asks for neither.
+/// Whether noise in the regressor shows, how many rows a robust estimator gave little weight, and what the study's estimator alone can tell; empty when that is nothing.
 pub(crate) fn noise(r: &ResultFile) -> String {
     let mut text = String::new();
     if let Some(noise) = &r.noise_in_regressor {
@@ -27,8 +27,41 @@ pub(crate) fn noise(r: &ResultFile) -> String {
             format!("gross errors: at most {share}\u{a0}% of a joint's rows lost half their weight or more ({joint})");
         text += &wrapped(&most, 2);
     }
+    text += &loops(r);
     if !text.is_empty() {
         text.push('\n');
+    }
+    text
+}
+
+/// What the estimators that repeat or simulate the motion found, and whether the estimator settled at all.
+fn loops(r: &ResultFile) -> String {
+    let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
+    let mut text = String::new();
+    if let Some(levels) = &r.noise_levels {
+        let most = largest(&mut levels.iter().map(|[least, most]| most / least.max(1e-12)));
+        text += &wrapped(&format!("noise of a joint differs by at most a factor of {most:.1} along the logs"), 2);
+    }
+    if let Some(fit) = &r.periodic {
+        let periods: usize = fit.periods.iter().sum();
+        let (motion, torque) =
+            (largest(&mut fit.motion_std.iter().map(|std| std[0])), largest(&mut fit.torque_std.iter().copied()));
+        let ratio = fit.cost / (fit.degrees_of_freedom as f64).max(1.0);
+        let line = format!(
+            "{periods} periods of {} s: noise of positions at most {motion:.1e} rad, of torques {torque:.2e} Nm; residuals of the mean period are {ratio:.2} times what that explains (1 for a right model)",
+            fit.period_s
+        );
+        text += &wrapped(&line, 2);
+    }
+    if let Some(fit) = &r.simulated {
+        let line = format!(
+            "{} steps from the {} with {} simulations under {} at {} Hz",
+            fit.iterations, fit.start, fit.simulations, fit.controller, fit.rate_hz
+        );
+        text += &wrapped(&line, 2);
+    }
+    if r.method.status == "iteration-limit" {
+        text += &wrapped("NOT settled: the estimator stopped before its values did; take them for what they are", 2);
     }
     text
 }

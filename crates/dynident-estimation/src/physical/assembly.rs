@@ -194,11 +194,16 @@ impl RoomProgram {
         let count = constrained.variables;
         let mut program = Program::new(count + 1);
         let mut least = 1.0_f64;
+        // What nothing constrains (an offset) stays where it is: without data nothing else would hold it.
+        let mut held = vec![true; count];
         for block in constrained.blocks.iter().filter(|block| block.entropy == 0.0) {
             let mut map = DMatrix::zeros(10, count + 1);
             match &block.map {
                 BlockMap::Own(first) => map.view_mut((0, *first), (10, 10)).fill_with_identity(),
                 BlockMap::General(general) => map.columns_mut(0, count).copy_from(general),
+            }
+            for (held, column) in held.iter_mut().zip(map.column_iter()) {
+                *held &= column.amax() == 0.0;
             }
             let unit = vector_of(&Matrix4::identity());
             let trace = map.tr_mul(&unit);
@@ -217,9 +222,14 @@ impl RoomProgram {
         }
         for row in &constrained.rows {
             least = least.min(row.value(x));
+            row.entries.iter().for_each(|&(column, _)| held[column] = false);
             let mut row = row.clone();
             row.entries.push((count, -1.0));
             program.rows.push(row);
+        }
+        for first in (0..count).filter(|&column| held[column]) {
+            let (matrix, target) = (DMatrix::from_element(1, 1, 1.0), DVector::from_element(1, x[first]));
+            program.local.push(LocalSquares { first, matrix, target });
         }
         program.rows.push(Row { entries: vec![(count, -1.0)], offset: 1.0, label: usize::MAX });
         program.linear[count] = -1.0;

@@ -122,7 +122,7 @@ impl PossibleSettings {
                     body = body.name()
                 ));
             }
-            let known: Vec<&str> = model.bodies().iter().map(|body| body.name()).collect();
+            let known: Vec<&str> = model.bodies().iter().map(dynident_model::Body::name).collect();
             return Err(format!("bodies.{name}: there is no such moving link; there are {}", known.join(", ")));
         }
         let symbols: Vec<String> = laws.iter().map(Law::symbol).collect();

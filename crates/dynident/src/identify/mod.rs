@@ -206,8 +206,11 @@ fn identified(
     let mut verdict = verdict(machine, &inertials, &parameters);
     if let Some(fit) = &possible {
         verdict.fit = Some(physical_fit_result(fit, &estimate));
-        verdict.note =
-            "of the possible set that fits the logs best; the base parameters above it are the unconstrained estimate";
+        verdict.note = if study.estimator.method.is_plain() {
+            "of the possible set that fits the logs best; the base parameters above it are the unconstrained estimate"
+        } else {
+            "of the possible set nearest to the estimate; the base parameters above it are that unconstrained estimate"
+        };
     }
     verdict.failure = failure;
     verdict.sign = sign;

@@ -2,12 +2,12 @@
 
 use crate::error::Error;
 use crate::identify::fit::Logs;
-use crate::identify::further_passes::Stop;
 use crate::identify::physical::source_of;
 use crate::identify::simulated_loop::{Compared, LoopLog, SimulatedLoop};
 use crate::job::joint_names;
 use crate::machine::prior_parameters;
 use crate::study::{EstimatorMethod, SimulationStart};
+use dynident_dynamics::Column;
 use dynident_estimation::{
     Estimate, EstimateStatus, EstimationError, LinearProblem, SegmentedFactor, SimulatedEstimate, SimulatedMotion,
     SimulatedProblem, WeightedSettings, simulated_least_squares, weighted_least_squares,
@@ -19,6 +19,8 @@ use serde::Serialize;
 
 /// Noise of the compared signal counts as at least this share of the signal's root mean square, so that noise-free data have weights.
 const LEAST_RELATIVE_SIGMA: f64 = 1e-4;
+/// Rows times columns that are held in memory, of 8 bytes each.
+const MOST_ENTRIES: usize = 100_000_000;
 /// The noise of the joints is judged anew so often at most, until no joint's changes by more than a tenth.
 const ROUNDS: usize = 3;
 const SETTLED: f64 = 0.1;
@@ -89,61 +91,62 @@ pub(crate) fn simulated(logs: &Logs<'_>, problem: &LinearProblem) -> Result<(Est
     let read = |&index: &usize| LoopLog::read(logs, index, compared, simulation.rate_hz, &wrong);
     let loop_logs = logs.training.iter().map(read).collect::<Result<Vec<_>, _>>()?;
     logs.options.progress.end();
-    let mut simulated =
-        SimulatedLoop { machine, controller, controller_model, settings, compared, logs: loop_logs, failure: None };
+    let mut simulated = SimulatedLoop {
+        machine,
+        controller,
+        controller_model,
+        settings,
+        compared,
+        logs: loop_logs,
+        wrong: &wrong,
+        failure: None,
+    };
+    let entries = simulated.rows() * problem.columns().len();
+    if entries > MOST_ENTRIES {
+        return Err(wrong(format!(
+            "{} rows of {} columns are too many to hold at once: give parallel_filter.factor, or a shorter part of the log",
+            simulated.rows(),
+            problem.columns().len()
+        )));
+    }
 
     let weighted =
         WeightedSettings { rank: section.rank, covariance: section.covariance, ..WeightedSettings::default() };
     let plain = weighted_least_squares(problem, &weighted).map_err(|source| logs.in_study(source))?;
     let measured = simulated.measured();
-    let mut begun: Option<Begun> = None;
-    let mut refused = Vec::new();
+    let (mut begun, mut refused) = (Vec::new(), Vec::new());
     for (values, name) in start_values(logs, problem, &plain).map_err(&wrong)? {
         match simulated.simulate(&values).map_err(|stop| stop.of(logs))? {
             Some(rows) => {
                 let sigma = deviations(&simulated, &(&measured - &rows.output), &measured, 0);
-                let log_sigma: f64 = sigma.iter().map(|sigma| sigma.ln()).sum();
-                if begun.as_ref().is_none_or(|best| log_sigma < best.log_sigma) {
-                    begun = Some(Begun { values, name, sigma, log_sigma });
-                }
+                begun.push(Begun { values, name, sigma });
             }
             None => refused.push(format!("of the {name} ({})", failure(&simulated))),
         }
     }
-    let Some(Begun { values: start, name: start_name, mut sigma, .. }) = begun else {
+    if begun.is_empty() {
         return Err(wrong(no_simulation(&refused.join(", nor "))));
-    };
-    let largest = start.iter().fold(0.0_f64, |most, value| most.max(value.abs())).max(1e-9);
-    let scale = start.iter().zip(&plain.std).map(|(value, std)| value.abs().max(*std).max(1e-3 * largest)).collect();
-    let mut asked = SimulatedProblem {
-        names: problem.columns().to_vec(),
-        start,
-        scale,
-        noise_std: by_row(&simulated, &sigma),
-        measured,
-    };
-    let (mut iterations, mut simulations) = (0, 0);
+    }
+    begun.sort_by(|a, b| log_sum(&a.sigma).total_cmp(&log_sum(&b.sigma)));
     logs.options.progress.begin("simulating the closed loop", None);
-    let mut rounds = 0;
-    let found = loop {
-        let settings = section.simulated.settings(section);
-        let found = simulated_least_squares(&asked, &mut simulated, &settings).map_err(|stop| match stop {
-            Stop::Estimator(EstimationError::NoSimulation) => wrong(no_simulation(&failure(&simulated))),
-            stop => stop.of(logs),
-        })?;
-        iterations += found.iterations;
-        simulations += found.simulations;
-        rounds += 1;
-        let next = deviations(&simulated, &found.residual, &asked.measured, found.rank.rank);
-        let changed = next.iter().zip(&sigma).any(|(new, old)| (new / old - 1.0).abs() > SETTLED);
-        sigma = next;
-        if !changed || rounds == ROUNDS || found.status == EstimateStatus::IterationLimit {
-            break found;
+    let mut best: Option<Settled> = None;
+    let (mut iterations, mut simulations) = (0, 0);
+    for start in begun {
+        let settled = settled(logs, &mut simulated, start, (&measured, &plain.std))?;
+        iterations += settled.iterations;
+        simulations += settled.simulations;
+        let done = settled.found.status != EstimateStatus::IterationLimit;
+        if best.as_ref().is_none_or(|best| log_sum(&settled.sigma) < log_sum(&best.sigma)) {
+            best = Some(settled);
         }
-        asked.noise_std = by_row(&simulated, &sigma);
-        asked.start.clone_from(&found.values);
-    };
+        if done {
+            break;
+        }
+    }
     logs.options.progress.end();
+    let Some(Settled { found, start: start_name, .. }) = best else {
+        return Err(logs.in_study(EstimationError::NoSimulation));
+    };
     let rows = linearised(logs, problem, &simulated, &found).map_err(|source| logs.in_study(source))?;
     let mut estimate = weighted_least_squares(&rows, &weighted).map_err(|source| logs.in_study(source))?;
     estimate.iterations = iterations;
@@ -182,7 +185,56 @@ struct Begun {
     values: Vec<f64>,
     name: &'static str,
     sigma: Vec<f64>,
-    log_sigma: f64,
+}
+
+/// What came of one start.
+struct Settled {
+    found: SimulatedEstimate,
+    start: &'static str,
+    sigma: Vec<f64>,
+    iterations: usize,
+    simulations: usize,
+}
+
+fn log_sum(sigma: &[f64]) -> f64 {
+    sigma.iter().map(|sigma| sigma.ln()).sum()
+}
+
+/// Iterates from one start; the joints' noise, which weighs their rows, is judged anew by what is left.
+fn settled(
+    logs: &Logs<'_>,
+    simulated: &mut SimulatedLoop<'_>,
+    start: Begun,
+    (measured, std): (&DVector<f64>, &[f64]),
+) -> Result<Settled, Error> {
+    let section = &logs.study.estimator;
+    let settings = section.simulated.settings(section);
+    let Begun { values, name, mut sigma } = start;
+    let largest = values.iter().fold(0.0_f64, |most, value| most.max(value.abs())).max(1e-9);
+    let scale = values.iter().zip(std).map(|(value, std)| value.abs().max(*std).max(1e-3 * largest)).collect();
+    let mut asked = SimulatedProblem {
+        names: logs.machine.layout.columns().iter().map(Column::symbol).collect(),
+        start: values,
+        scale,
+        noise_std: by_row(simulated, &sigma),
+        measured: measured.clone(),
+    };
+    let (mut iterations, mut simulations) = (0, 0);
+    for round in 1..=ROUNDS {
+        let found = simulated_least_squares(&asked, simulated, &settings).map_err(|stop| stop.of(logs))?;
+        iterations += found.iterations;
+        simulations += found.simulations;
+        let next = deviations(simulated, &found.residual, measured, found.rank.rank);
+        let changed = next.iter().zip(&sigma).any(|(new, old)| (new / old - 1.0).abs() > SETTLED);
+        sigma = next;
+        if !changed || round == ROUNDS || found.status == EstimateStatus::IterationLimit {
+            return Ok(Settled { found, start: name, sigma, iterations, simulations });
+        }
+        asked.noise_std = by_row(simulated, &sigma);
+        asked.start.clone_from(&found.values);
+    }
+    // The last round returns.
+    Err(logs.in_study(EstimationError::NoSimulation))
 }
 
 /// Where the iteration may begin, and what each is called.
@@ -204,12 +256,11 @@ fn start_values(
         }
     }
     if choice != SimulationStart::Estimate {
-        match &machine.prior {
-            Some(prior) => starts.push((prior.clone(), "description")),
-            None => {
-                let unknown = machine.model.bodies_without_prior().join(", ");
-                why.push(format!("the description, which could be started from, has no inertial of {unknown}"));
-            }
+        if let Some(prior) = &machine.prior {
+            starts.push((prior.clone(), "description"));
+        } else {
+            let unknown = machine.model.bodies_without_prior().join(", ");
+            why.push(format!("the description, which could be started from, has no inertial of {unknown}"));
         }
     }
     if starts.is_empty() { Err(why.join("; ")) } else { Ok(starts) }

@@ -56,6 +56,8 @@ pub(crate) struct SimulatedLoop<'a> {
     pub(crate) settings: LoopSettings,
     pub(crate) compared: Compared,
     pub(crate) logs: Vec<LoopLog>,
+    /// Makes an error of the study from what is wrong.
+    pub(crate) wrong: &'a dyn Fn(String) -> Error,
     /// Why the last simulation that did not get through did not.
     pub(crate) failure: Option<String>,
 }
@@ -98,6 +100,19 @@ impl LoopLog {
         let begins_s = commanded.start_s().min(0.0);
         let ends_s =
             pieces.iter().map(|piece| piece.first_time_s + piece.rows as f64 / log_rate_hz).fold(0.0, f64::max);
+<<<<<<< HEAD
+=======
+        let over = |piece: &Piece| {
+            let last_s = piece.first_time_s + (piece.rows - 1) as f64 / log_rate_hz;
+            let ends = [piece.first_time_s, last_s];
+            ends.into_iter().find(|&time_s| (0..dof).any(|joint| !commanded.covers(joint, time_s)))
+        };
+        if let Some(time_s) = pieces.iter().filter(|piece| piece.rows > 0).find_map(over) {
+            return Err(wrong(format!(
+                "log `{name}`: at {time_s:.3} s of the log its reference has not begun or is over while it still moves; cut the log with time_range_s, or mend the reference's start_s"
+            )));
+        }
+>>>>>>> study
         let count = ((ends_s - begins_s) * rate_hz).ceil() as usize + 2;
         let mut told = Motion::default();
         told.reset(dof, count);
@@ -231,8 +246,7 @@ impl SimulatedMotion for SimulatedLoop<'_> {
         };
         for log in &self.logs {
             let in_loop = |error: dynident_experiment::ExperimentError| {
-                let message = format!("the closed loop cannot be simulated: {error}");
-                Stop::Log(Error::Instruments { log: log.name.clone(), message })
+                Stop::Log((self.wrong)(format!("log `{}`: the closed loop cannot be simulated: {error}", log.name)))
             };
             let mut controller = self.controller.build(plant.dof(), self.controller_model.as_ref()).map_err(in_loop)?;
             let run = closed_loop(&mut plant, controller.as_mut(), &log.reference, &self.settings).map_err(in_loop)?;

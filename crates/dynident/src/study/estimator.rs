@@ -63,7 +63,7 @@ impl EstimatorMethod {
 }
 
 /// `[estimator]`.
-#[derive(Clone, Debug, Deserialize, Serialize)]
+#[derive(Clone, Debug, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct EstimatorSection {
     /// The method; weighted by default.
@@ -91,6 +91,7 @@ pub struct EstimatorSection {
     pub simulated: SimulatedSection,
 }
 
+<<<<<<< HEAD
 impl Default for EstimatorSection {
     fn default() -> Self {
         Self {
@@ -109,6 +110,8 @@ impl Default for EstimatorSection {
     }
 }
 
+=======
+>>>>>>> study
 impl EstimatorSection {
     pub(crate) fn validate(&self) -> Result<(), String> {
         self.rank.validate().map_err(|error| format!("[estimator.rank]: {error}"))?;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SimulationStart {
-    /// At the one of the two below whose simulation is nearer to the record.
+    /// At the one of the two below whose simulation is nearer to the record; at the other if that leads nowhere.
     #[default]
     Nearer,
     /// The possible machine that fits the measured rows best: a simulation with negative masses would get nowhere.
