@@ -44,10 +44,7 @@ pub use evaluate::{Quantity, evaluate};
 pub use identify::fit::{GrossErrors, NoiseInRegressor};
 pub use identify::friction_choice::{FrictionCandidate, JointFriction};
 pub use identify::instruments::{InstrumentSection, InstrumentSource, SmoothedMotion};
-<<<<<<< HEAD
 pub use identify::intervals::PossibleIntervalResult;
-=======
->>>>>>> study
 pub use identify::periodic::PeriodicFit;
 pub use identify::result::{
     BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, LogValidation, MethodSummary,

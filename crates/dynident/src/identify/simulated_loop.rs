@@ -100,8 +100,6 @@ impl LoopLog {
         let begins_s = commanded.start_s().min(0.0);
         let ends_s =
             pieces.iter().map(|piece| piece.first_time_s + piece.rows as f64 / log_rate_hz).fold(0.0, f64::max);
-<<<<<<< HEAD
-=======
         let over = |piece: &Piece| {
             let last_s = piece.first_time_s + (piece.rows - 1) as f64 / log_rate_hz;
             let ends = [piece.first_time_s, last_s];
@@ -112,7 +110,6 @@ impl LoopLog {
                 "log `{name}`: at {time_s:.3} s of the log its reference has not begun or is over while it still moves; cut the log with time_range_s, or mend the reference's start_s"
             )));
         }
->>>>>>> study
         let count = ((ends_s - begins_s) * rate_hz).ceil() as usize + 2;
         let mut told = Motion::default();
         told.reset(dof, count);

@@ -91,27 +91,6 @@ pub struct EstimatorSection {
     pub simulated: SimulatedSection,
 }
 
-<<<<<<< HEAD
-impl Default for EstimatorSection {
-    fn default() -> Self {
-        Self {
-            method: EstimatorMethod::default(),
-            covariance: CovarianceMethod::default(),
-            physical: PhysicalChoice::default(),
-            intervals: false,
-            rank: RankSettings::default(),
-            segments: SegmentSettings::default(),
-            essential: None,
-            instruments: None,
-            noise_levels: NoiseLevelSection::default(),
-            periods: PeriodSection::default(),
-            simulated: SimulatedSection::default(),
-        }
-    }
-}
-
-=======
->>>>>>> study
 impl EstimatorSection {
     pub(crate) fn validate(&self) -> Result<(), String> {
         self.rank.validate().map_err(|error| format!("[estimator.rank]: {error}"))?;
