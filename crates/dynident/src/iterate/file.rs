@@ -43,6 +43,8 @@ pub struct IterationRun {
     pub controller: String,
     /// Whether it had a model.
     pub model_based: bool,
+    /// Of which run the possible machine (or the estimate) was its model; none for the description, a step between two runs' machines, or no model.
+    pub model_of_run: Option<usize>,
     /// Share of the step from the last good parameters that was taken.
     pub damping: f64,
     /// Factor of the gains of the controller without a model.

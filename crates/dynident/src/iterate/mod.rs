@@ -2,6 +2,7 @@
 
 mod bound;
 mod file;
+mod report;
 mod section;
 mod trajectory;
 
@@ -18,11 +19,14 @@ use crate::study::{Folders, Study};
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
 use dynident_experiment::iteration::{
-    IteratedMachine, Iteration, IterationError, IterationStatus, IterationStore, IterationTask, RunRecord, iterate,
+    IteratedMachine, Iteration, IterationError, IterationStatus, IterationStore, IterationTask, RunEstimate, RunRecord,
+    iterate,
 };
 use dynident_experiment::robot::{FolderRobot, ProcessRobot};
 use dynident_experiment::{ExperimentError, Robot, RobotRun};
+use report::{RunTrace, TimeSpent};
 use std::path::Path;
+use std::time::Instant;
 
 /// What hears of an iteration's progress.
 pub struct IterationWatch<'a> {
@@ -32,8 +36,8 @@ pub struct IterationWatch<'a> {
     pub run: &'a mut dyn FnMut(&RunRecord, &[RobotRun]),
 }
 
-/// Iterates a study's robot. What is found stands in `out`: `trajectory.json` (the trajectory at the controller's rate), `runs/run_k/` (each run whole or not at all) and `iterations.json` after every
-/// run. With `resume`, runs that are there already are not made again: who is killed at any moment goes on to the same result.
+/// Iterates a study's robot. What is found stands in `out`: `trajectory.json` (the trajectory at the controller's rate), `runs/run_k/` (each run whole or not at all), `iterations.json` after every
+/// run and `report.html` in the end. With `resume`, runs that are there already are not made again: who is killed at any moment goes on to the same result.
 ///
 /// # Errors
 /// Files, study, settings, and files of another study's iteration in `out`. How the robot and the iteration did is in the file.
@@ -51,6 +55,7 @@ pub fn iterate_study(
         IterationError::State { path, problem } => Error::Result { path, message: problem },
         other => wrong("iteration", &other),
     };
+    let begin = Instant::now();
     let section = study.iteration.clone().unwrap_or_default();
     let simulation = study.simulation.clone().unwrap_or_default();
     let settings = section.settings(study).map_err(|why| Error::study(study_path, why))?;
@@ -88,6 +93,7 @@ pub fn iterate_study(
     };
     let target = out.join("iterations.json");
     let mut so_far = store.records().map_err(in_iteration)?;
+    let (designed_s, runs_before) = (begin.elapsed().as_secs_f64(), so_far.len());
     let mut unwritten = None;
     let run = &mut *watch.run;
     let outcome = iterate(&iteration, &mut [robot], Some(&store), &mut |record, runs| {
@@ -102,6 +108,12 @@ pub fn iterate_study(
     }
     let file = told.file(&outcome.runs, &outcome.status, bound.as_deref());
     write_file(&target, &file)?;
+    let leg = &iteration.task().legs[0];
+    let traces: Vec<RunTrace> =
+        outcome.runs.iter().map(|record| RunTrace::new(record.run, &store, leg.reference(), &file.joints)).collect();
+    let all_s = begin.elapsed().as_secs_f64();
+    let time = TimeSpent { before_runs_s: designed_s, all_s, runs: outcome.runs.len() - runs_before };
+    write_whole(&out.join("report.html"), report::iteration_report(&file, &traces, &time)?.as_bytes())?;
     Ok(file)
 }
 
@@ -161,6 +173,16 @@ fn kept(
     Ok(kept.trajectory)
 }
 
+/// The newest run before `record` whose machine its controller had.
+fn model_of_run(record: &RunRecord, records: &[RunRecord]) -> Option<usize> {
+    let model = record.controller.model.as_ref()?;
+    let told = |before: &&RunRecord| {
+        before.run < record.run
+            && before.estimate.as_ref().and_then(RunEstimate::for_controller).as_ref() == Some(model)
+    };
+    records.iter().rfind(told).map(|before| before.run)
+}
+
 /// What the file is made from.
 struct Told<'a> {
     study: &'a Study,
@@ -192,6 +214,7 @@ impl Told<'_> {
                 run: record.run,
                 controller: record.controller.name.clone(),
                 model_based: record.controller.model.is_some(),
+                model_of_run: model_of_run(record, records),
                 damping: record.controller.damping,
                 stiffness: record.controller.stiffness,
                 accepted: record.accepted,
