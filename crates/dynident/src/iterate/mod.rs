@@ -75,7 +75,7 @@ pub fn iterate_study(
     };
     let iterated = IteratedMachine::new(&machine.model, &machine.laws, Some(prior));
     let iterated = iterated.map_err(|why| wrong("iteration", &why))?;
-    let leg = trajectory.leg().map_err(|why| wrong("iteration", &why))?;
+    let leg = trajectory.leg(section.every_sample).map_err(|why| wrong("iteration", &why))?;
     let efforts = machine.model.joints().iter().map(|joint| joint.limits.effort.unwrap_or(f64::INFINITY)).collect();
     let torque_limits = simulation.effort_limits.then_some(efforts);
     let task = IterationTask { machine: iterated, legs: vec![leg], known: Vec::new(), torque_limits };

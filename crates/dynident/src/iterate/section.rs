@@ -65,6 +65,8 @@ pub struct IterationSection {
     pub first: Option<ControllerSettings>,
     /// All joints at once, or step by step.
     pub scheme: Scheme,
+    /// Every sample of every joint counts, also where a windowed design names windows; false by default.
+    pub every_sample: bool,
     /// The paper's scheme as it stands: no possible machine is asked for and nothing is rejected. False by default.
     pub literal: bool,
     /// From positions to speeds and accelerations; `deviation` from the trajectory by default.
@@ -111,6 +113,7 @@ impl Default for IterationSection {
             start,
             first,
             scheme: identification.scheme,
+            every_sample: false,
             literal: false,
             differentiator: identification.differentiator,
             parallel_filter: identification.parallel_filter,

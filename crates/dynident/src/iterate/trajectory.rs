@@ -98,10 +98,10 @@ impl Trajectory {
         Reference::new(self.rate_hz, motion)
     }
 
-    /// As the leg of every run.
-    pub(crate) fn leg(&self) -> Result<Leg, String> {
+    /// As the leg of every run; its windows count unless every sample does.
+    pub(crate) fn leg(&self, every_sample: bool) -> Result<Leg, String> {
         let reference = self.reference().map_err(|error| error.to_string())?;
-        match &self.windows {
+        match self.windows.as_ref().filter(|_| !every_sample) {
             None => Leg::whole(reference),
             Some(windows) => Leg::windowed(reference, windows.clone()),
         }
