@@ -1,50 +1,43 @@
 //! The least that the errors of one run can be.
 
-use super::trajectory::Trajectory;
 use crate::machine::Machine;
 use dynident_excitation::Information;
 use dynident_excitation::Motion;
 use dynident_experiment::SensorSettings;
+use dynident_experiment::iteration::Leg;
 use nalgebra::DMatrix;
 
 /// Samples whose regressor is held at once.
 const SAMPLES_AT_ONCE: usize = 4096;
 
-/// The Cramér-Rao bound of every base parameter: `√ diag (Σ Wᵀ Σ_τ⁻¹ W)⁻¹` over the recorded samples along the trajectory that count, for white torque noise and exact positions; none without torque noise,
+/// The Cramér-Rao bound of every base parameter: `√ diag (Σ Wᵀ Σ_τ⁻¹ W)⁻¹` over the recorded samples along the trajectories that count, for white torque noise and exact positions; none without torque noise,
 /// with correlated noise, or where a parameter is not excited.
-pub(super) fn cramer_rao(
-    machine: &Machine,
-    trajectory: &Trajectory,
-    sensors: &SensorSettings,
-    windows: Option<&[Vec<[f64; 2]>]>,
-) -> Option<Vec<f64>> {
+pub(super) fn cramer_rao(machine: &Machine, legs: &[Leg], sensors: &SensorSettings) -> Option<Vec<f64>> {
     let dof = machine.model.dof();
     let std: Vec<f64> = (0..dof).map(|joint| sensors.torque_std.of(joint)).collect();
     if sensors.torque_correlation != 0.0 || std.iter().any(|std| *std <= 0.0) {
         return None;
     }
-    let whole = trajectory.motion();
-    let mut sum = match windows {
-        None => information(machine, &whole, &std, &(0..whole.samples).collect::<Vec<usize>>()),
-        Some(windows) => {
-            let count = machine.layout.columns().len();
-            let mut sum = DMatrix::zeros(count, count);
-            for (joint, own) in windows.iter().enumerate() {
-                let inside = |sample: &usize| {
-                    let time_s = *sample as f64 / trajectory.rate_hz;
-                    own.iter().any(|[from, to]| (*from..=*to).contains(&time_s))
-                };
+    let columns = machine.layout.columns().len();
+    let mut sum = DMatrix::zeros(columns, columns);
+    for leg in legs {
+        let (whole, rate_hz) = (leg.reference().motion(), leg.reference().rate_hz());
+        let mut own = DMatrix::zeros(columns, columns);
+        if leg.windows().is_none() {
+            own += information(machine, whole, &std, &(0..whole.samples).collect::<Vec<usize>>());
+        } else {
+            for joint in 0..dof {
+                let inside = |sample: &usize| leg.counts(joint, *sample as f64 / rate_hz);
                 let samples: Vec<usize> = (0..whole.samples).filter(inside).collect();
                 // The others' torque tells nothing there.
                 let mut alone = vec![f64::INFINITY; dof];
                 alone[joint] = std[joint];
-                sum += information(machine, &whole, &alone, &samples);
+                own += information(machine, whole, &alone, &samples);
             }
-            sum
         }
-    };
-    // Samples a second that are recorded, of those that are controlled.
-    sum *= sensors.record_rate_hz.unwrap_or(trajectory.rate_hz) / trajectory.rate_hz;
+        // Samples a second that are recorded, of those that are controlled.
+        sum += own * (sensors.record_rate_hz.unwrap_or(rate_hz) / rate_hz);
+    }
     let count = sum.nrows();
     let scale: Vec<f64> = (0..count).map(|k| sum[(k, k)].sqrt()).collect();
     if scale.iter().any(|scale| *scale <= 0.0 || !scale.is_finite()) {

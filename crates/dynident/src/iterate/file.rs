@@ -20,7 +20,7 @@ pub struct IterationsFile {
     pub reason: String,
     /// Names of the joints.
     pub joints: Vec<String>,
-    /// Length of each run, s.
+    /// Length of each run, s; of legs one after another, of all of them once.
     pub duration_s: f64,
     /// The runs.
     pub runs: Vec<IterationRun>,
@@ -39,6 +39,8 @@ pub struct IterationsFile {
 pub struct IterationRun {
     /// Its number, from 1.
     pub run: usize,
+    /// Which leg it belongs to, from 1, where each has an iteration of its own; none otherwise.
+    pub leg: Option<usize>,
     /// The controller.
     pub controller: String,
     /// Whether it had a model.

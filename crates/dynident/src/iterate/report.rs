@@ -15,10 +15,20 @@ const HALF_WIDTH_95: f64 = 1.96;
 /// Curves of one plot: more cannot be told apart.
 const CURVES: usize = 6;
 
-/// How far a run was from its trajectory.
-pub(super) struct RunTrace {
+/// Which trajectory of which run.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) struct RunName {
     /// The run's number.
     pub(super) run: usize,
+    /// The leg's number, where there are several.
+    pub(super) leg: Option<usize>,
+    /// Place of the leg within the run, from 0.
+    pub(super) place: usize,
+}
+
+/// How far a run was from its trajectory.
+pub(super) struct RunTrace {
+    name: RunName,
     /// Times of the trajectory, s.
     pub(super) times_s: Vec<f64>,
     /// For each joint the desired less the measured position at these times; NaN where the run had ended.
@@ -27,10 +37,11 @@ pub(super) struct RunTrace {
 
 impl RunTrace {
     /// From the log that was kept of the run. A log that cannot be read draws nothing: the page is to be written all the same.
-    pub(super) fn new(run: usize, store: &IterationStore, reference: &Reference, joints: &[String]) -> Self {
+    pub(super) fn new(name: RunName, store: &IterationStore, reference: &Reference, joints: &[String]) -> Self {
+        let log = if name.place == 0 { "log.csv".to_owned() } else { format!("log_{}.csv", name.place + 1) };
         let (motion, rate_hz) = (reference.motion(), reference.rate_hz());
         let times_s: Vec<f64> = (0..motion.samples).map(|sample| sample as f64 / rate_hz).collect();
-        let record = read_log_table(&store.run_folder(run).join("log.csv"), joints, rate_hz).ok();
+        let record = read_log_table(&store.run_folder(name.run).join(log), joints, rate_hz).ok();
         let error = (0..joints.len()).map(|joint| {
             let target = &motion.q[motion.of(joint)];
             let Some(record) = &record else { return vec![f64::NAN; motion.samples] };
@@ -38,7 +49,7 @@ impl RunTrace {
             let measured = times_s.iter().map(|time_s| between(&record.times_s, own, *time_s));
             target.iter().zip(measured).map(|(target, measured)| target - measured).collect()
         });
-        Self { run, error: error.collect(), times_s }
+        Self { name, error: error.collect(), times_s }
     }
 }
 
@@ -72,7 +83,7 @@ pub(super) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time:
     page.add(figures(file));
     page.add(Heading::new("Runs"));
     page.add(runs(file));
-    let rejected = file.runs.iter().filter_map(|run| run.reason.as_ref().map(|reason| (run.run, reason)));
+    let rejected = file.runs.iter().filter_map(|run| run.reason.as_ref().map(|reason| (run_name(run), reason)));
     let points: Vec<(Tone, String)> =
         rejected.map(|(run, reason)| (Tone::Warning, format!("run {run}: {reason}"))).collect();
     if !points.is_empty() {
@@ -145,6 +156,11 @@ fn figures(file: &IterationsFile) -> KeyFigures {
     figures
 }
 
+/// A run's number, with its leg where each has an iteration of its own.
+fn run_name(run: &IterationRun) -> String {
+    run.leg.map_or_else(|| run.run.to_string(), |leg| format!("{} of leg {leg}", run.run))
+}
+
 /// What controlled a run, in words.
 fn model(run: &IterationRun) -> String {
     match (run.model_based, run.model_of_run) {
@@ -174,7 +190,7 @@ fn runs(file: &IterationsFile) -> Table {
         let verdict = if run.accepted { ("good", Tone::Good) } else { ("rejected", Tone::Warning) };
         let widest = run.parameters.iter().filter_map(|parameter| parameter.std).reduce(f64::max);
         let mut row = vec![
-            Cell::from(run.run.to_string()),
+            Cell::from(run_name(run)),
             Cell::from(&run.controller),
             Cell::from(model(run)),
             Cell::judged(verdict.0, verdict.1),
@@ -196,18 +212,26 @@ fn tracking(page: &mut Report, file: &IterationsFile, traces: &[RunTrace]) {
         settling = settling.curve(name, file.runs.iter().map(of).collect());
     }
     page.add(settling);
-    let Some(longest) = traces.iter().max_by_key(|trace| trace.times_s.len()) else { return };
-    for (joint, name) in file.joints.iter().enumerate() {
-        let mut plot = LinePlot::new(format!("{name}: tracking error"), "t, s", "rad (m)", longest.times_s.clone())
-            .note("desired less measured position");
-        // The first runs and the last: what lies between differs little from either.
-        let shown = |place: usize| place + 2 < CURVES || place + 2 >= traces.len();
-        for trace in traces.iter().enumerate().filter(|(place, _)| shown(*place)).map(|(_, trace)| trace) {
-            let mut error = trace.error[joint].clone();
-            error.resize(longest.times_s.len(), f64::NAN);
-            plot = plot.line(format!("run {}", trace.run), error);
+    let mut legs: Vec<Option<usize>> = traces.iter().map(|trace| trace.name.leg).collect();
+    legs.sort_unstable();
+    legs.dedup();
+    for leg in legs {
+        let own: Vec<&RunTrace> = traces.iter().filter(|trace| trace.name.leg == leg).collect();
+        let Some(longest) = own.iter().max_by_key(|trace| trace.times_s.len()) else { continue };
+        for (joint, name) in file.joints.iter().enumerate() {
+            let of_leg = leg.map_or_else(String::new, |leg| format!(", leg {leg}"));
+            let title = format!("{name}: tracking error{of_leg}");
+            let mut plot =
+                LinePlot::new(title, "t, s", "rad (m)", longest.times_s.clone()).note("desired less measured position");
+            // The first runs and the last: what lies between differs little from either.
+            let shown = |place: usize| place + 2 < CURVES || place + 2 >= own.len();
+            for trace in own.iter().enumerate().filter(|(place, _)| shown(*place)).map(|(_, trace)| trace) {
+                let mut error = trace.error[joint].clone();
+                error.resize(longest.times_s.len(), f64::NAN);
+                plot = plot.line(format!("run {}", trace.name.run), error);
+            }
+            page.add(plot);
         }
-        page.add(plot);
     }
 }
 
@@ -314,7 +338,7 @@ fn by_run(
 
 fn table(file: &IterationsFile, last: &IterationRun, known: bool) -> Table {
     let mut columns = vec!["expression".to_owned(), "unit".to_owned()];
-    columns.extend(file.runs.iter().map(|run| format!("run {}", run.run)));
+    columns.extend(file.runs.iter().map(|run| format!("run {}", run_name(run))));
     columns.push(format!("std, run {}", last.run));
     if known {
         columns.extend(["truth".to_owned(), "error in bars".to_owned()]);

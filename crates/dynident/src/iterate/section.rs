@@ -1,5 +1,6 @@
 //! `[iteration]`: how a study's robot is run, identified and run again.
 
+use super::legs::{LegOrder, LegSection};
 use crate::study::{EstimatorMethod, Study};
 use dynident_experiment::ControllerSettings;
 use dynident_experiment::iteration::{
@@ -50,11 +51,15 @@ pub enum PriorChoice {
 /// assert_eq!(section.max_runs, 6);
 /// # Ok::<(), toml::de::Error>(())
 /// ```
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct IterationSection {
     /// A trajectory to run (`t_s, q1.., dq1.., ddq1..`), in place of the one that `[design]` leads to.
     pub trajectory: Option<PathBuf>,
+    /// Several trajectories, some with joints that are held, in place of one; each takes the study's trajectory or design unless it has its own.
+    pub leg: Vec<LegSection>,
+    /// Whether every run has all legs (`"together"`, the default), or each an iteration of its own, with what those before it have found held (`"one-after-another"`).
+    pub order: LegOrder,
     /// Which robot runs it; the simulator by default.
     pub robot: RobotChoice,
     /// What is believed of the bodies before any run; what the description says by default.
@@ -108,6 +113,8 @@ impl Default for IterationSection {
         } = IterationSettings::default();
         Self {
             trajectory: None,
+            leg: Vec::new(),
+            order: LegOrder::default(),
             robot: RobotChoice::default(),
             prior: PriorChoice::default(),
             start,
