@@ -42,6 +42,7 @@ fn the_papers_example_converges_and_resumes() {
         assert!(!parameter["expression"].as_str().unwrap().is_empty());
         assert!(parameter["error"].as_f64().unwrap().abs() < 1e-6, "{parameter}");
     }
+    assert!(std::fs::read_to_string(out.path().join("report.html")).unwrap().contains("converged"));
     // Without its last run and its summary it comes to the same files.
     let whole = std::fs::read(&file).unwrap();
     std::fs::remove_file(&file).unwrap();

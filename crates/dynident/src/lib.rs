@@ -56,8 +56,8 @@ pub use identify::simulated::SimulatedFit;
 pub use identify::{Identification, identify, identify_with_instruments};
 pub use inspect::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary, inspect};
 pub use iterate::{
-    ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationSection, IterationWatch, IterationsFile, PriorChoice,
-    RobotChoice, iterate_study,
+    ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationSection, IterationWatch, IterationsFile, LegOrder,
+    LegSection, PriorChoice, RobotChoice, iterate_study,
 };
 pub use job::RunOptions;
 pub use machine::Machine;

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 pub(crate) struct Options {
     /// The study file.
     study: PathBuf,
-    /// Folder for iterations.json, trajectory.json and runs/.
+    /// Folder for iterations.json, report.html, trajectory.json and runs/.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Make every run anew: by default runs that are in the folder already are not made again.

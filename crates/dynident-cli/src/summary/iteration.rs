@@ -27,7 +27,10 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
             4,
         );
     }
-    text += &wrapped(&format!("Written: {}", out.join("iterations.json").display()), 4);
+    text += &wrapped(
+        &format!("Written: {}, {}", out.join("iterations.json").display(), out.join("report.html").display()),
+        4,
+    );
     text
 }
 

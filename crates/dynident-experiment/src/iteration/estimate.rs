@@ -47,6 +47,14 @@ impl RunEstimate {
             (None, Some(_)) => None,
         }
     }
+
+    /// How many times wider its error bars are than another's: the geometric mean over the parameters that both tell; 1 where there is none.
+    pub(super) fn wider_than(&self, other: &Self) -> f64 {
+        let pairs = self.std.iter().zip(&other.std).filter(|(own, other)| **own > 0.0 && **other > 0.0);
+        let (sum, count) =
+            pairs.fold((0.0, 0.0_f64), |(sum, count), (own, other)| (sum + (own / other).ln(), count + 1.0));
+        (sum / count.max(1.0)).exp()
+    }
 }
 
 /// Base parameters from the records of one run, one record for each leg of the task: differentiate, make rows within the windows that count, fit all joints at once or step by step, and find the

@@ -1,10 +1,17 @@
 //! What the next run is: a pure function of the records so far.
 
+use super::estimate::RunEstimate;
 use super::record::{ModelParameters, RunRecord};
 use super::settings::{IterationSettings, StartWith};
 use super::status::IterationStatus;
 use crate::controllers::{ControllerSettings, JointPdSettings, JointPidSettings};
 use crate::per_joint::PerJoint;
+
+/// A good run's estimate with error bars this many times wider than an earlier one's does not take its place.
+const FAR_WIDER: f64 = 3.0;
+
+/// A rejected run's estimate takes the place of a good one's where its error bars are this many times as wide.
+const CLEARLY_NARROWER: f64 = 0.5;
 
 /// What comes next.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,7 +60,7 @@ pub(super) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
             StartWith::Prior => Next::Run(RunPlan::with_model(run, ModelParameters::All(prior.to_vec()), 1.0)),
         };
     };
-    let newest = last.estimate.as_ref().and_then(super::estimate::RunEstimate::for_controller);
+    let newest = model_of(last);
     if settled(records, settings) {
         return Next::Finished(IterationStatus::Converged);
     }
@@ -71,9 +78,12 @@ pub(super) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
     if run > settings.max_runs {
         return Next::Finished(IterationStatus::RunsUsedUp);
     }
-    if last.accepted
-        && let Some(model) = newest
-    {
+    // A model that was tried and rejected is not tried again.
+    let untried = |model: &ModelParameters| {
+        !records.iter().any(|record| !record.accepted && record.controller.model.as_ref() == Some(model))
+    };
+    let trusted = most_trusted(records).and_then(model_of);
+    if let Some(model) = trusted.into_iter().chain(newest.filter(|_| last.accepted)).find(untried) {
         return Next::Run(RunPlan::with_model(run, model, 1.0));
     }
     // Rejected: back towards the last good model, as long as there is one to go back to.
@@ -91,6 +101,21 @@ pub(super) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
     }
     let before = records.iter().filter(|record| record.controller.model.is_none()).count();
     model_free(settings.stiffen.powi(before as i32))
+}
+
+/// What a controller gets from a run.
+fn model_of(record: &RunRecord) -> Option<ModelParameters> {
+    record.estimate.as_ref().and_then(RunEstimate::for_controller)
+}
+
+/// The run whose estimate is worth most: the newest good one, unless its error bars are far wider than those of an earlier run; and a rejected one where its error bars are clearly narrower. Bad tracking
+/// says that the model which the run was made with is bad, not that the run tells little: a joint that is thrown about may tell more than one that hardly moves.
+fn most_trusted(records: &[RunRecord]) -> Option<&RunRecord> {
+    records.iter().filter(|record| model_of(record).is_some()).reduce(|best, record| {
+        let most = if record.accepted { FAR_WIDER } else { CLEARLY_NARROWER };
+        let (Some(old), Some(new)) = (&best.estimate, &record.estimate) else { return best };
+        if new.wider_than(old) <= most { record } else { best }
+    })
 }
 
 /// Whether a run counts as good beside those before it, and why not.
@@ -124,7 +149,9 @@ fn settled(records: &[RunRecord], settings: &IterationSettings) -> bool {
     let largest = new.values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     let parameters = new.values.iter().zip(&old.values).zip(new.std.iter().zip(&old.std));
     let still = parameters.into_iter().all(|((new, old), (s, t))| {
-        (new - old).abs() <= limits.parameter_sigmas * s.hypot(*t) + limits.parameter_tolerance * largest
+        // Nothing can be said to stand still that is hardly known.
+        s.max(*t) <= limits.most_uncertain * largest
+            && (new - old).abs() <= limits.parameter_sigmas * s.hypot(*t) + limits.parameter_tolerance * largest
     });
     let (now, then) = (last.tracking_error(), before.tracking_error());
     still && (now <= limits.tracking_tolerance || limits.tracking_ratio * now >= then)

@@ -85,8 +85,8 @@ pub enum StartWith {
 }
 
 /// When an iteration has settled. A run of the model-based controller must follow an accepted run, with
-/// `|θ_k - θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance · max|θ|` for every parameter, and a tracking error that is below `tracking_tolerance` or fell by less than
-/// `tracking_ratio`.
+/// `|θ_k - θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance · max|θ|` and `s ≤ most_uncertain · max|θ|` for every parameter, and a tracking error that is below
+/// `tracking_tolerance` or fell by less than `tracking_ratio`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SettledSettings {
@@ -94,6 +94,8 @@ pub struct SettledSettings {
     pub parameter_sigmas: f64,
     /// Share of the largest parameter within which a change counts as none. Default 1e-6.
     pub parameter_tolerance: f64,
+    /// Widest error bar (one standard deviation) as a share of the largest parameter: what is known worse than that cannot be said to stand still. Default 0.1.
+    pub most_uncertain: f64,
     /// Tracking error that is good enough, rad (m). Default 1e-4.
     pub tracking_tolerance: f64,
     /// Tracking that falls by less than this factor from a run to the next has settled. Default 1.5.
@@ -102,7 +104,13 @@ pub struct SettledSettings {
 
 impl Default for SettledSettings {
     fn default() -> Self {
-        Self { parameter_sigmas: 3.0, parameter_tolerance: 1e-6, tracking_tolerance: 1e-4, tracking_ratio: 1.5 }
+        Self {
+            parameter_sigmas: 3.0,
+            parameter_tolerance: 1e-6,
+            most_uncertain: 0.1,
+            tracking_tolerance: 1e-4,
+            tracking_ratio: 1.5,
+        }
     }
 }
 
@@ -197,6 +205,7 @@ impl IterationSettings {
         let settled = &self.settled;
         within("settled.parameter_sigmas", settled.parameter_sigmas, 0.0, 1e3, "give 0 to 1000")?;
         within("settled.parameter_tolerance", settled.parameter_tolerance, 0.0, 1.0, "give 0 to 1")?;
+        within("settled.most_uncertain", settled.most_uncertain, 0.0, 1e6, "give 0 or a positive share")?;
         within("settled.tracking_tolerance", settled.tracking_tolerance, 0.0, 1e3, "give 0 or a positive distance")?;
         within("settled.tracking_ratio", settled.tracking_ratio, 1.0, 1e6, "give 1 or more")
     }

@@ -24,6 +24,14 @@ impl SimulatedRobot {
         Ok(Self { plant, settings, joints })
     }
 
+    /// The same with the named joints locked where a run begins, as [`Plant::with_locked`].
+    ///
+    /// # Errors
+    /// A joint that does not exist.
+    pub fn with_locked(self, joints: &[String]) -> Result<Self, ExperimentError> {
+        Ok(Self { plant: self.plant.with_locked(joints)?, ..self })
+    }
+
     /// The simulated robot.
     pub fn plant(&self) -> &Plant {
         &self.plant

@@ -1,47 +1,44 @@
 //! The least that the errors of one run can be.
 
-use super::trajectory::Trajectory;
 use crate::machine::Machine;
 use dynident_excitation::Information;
 use dynident_excitation::Motion;
 use dynident_experiment::SensorSettings;
+use dynident_experiment::iteration::Leg;
 use nalgebra::DMatrix;
 
 /// Samples whose regressor is held at once.
 const SAMPLES_AT_ONCE: usize = 4096;
 
-/// The Cramér-Rao bound of every base parameter: `√ diag (Σ Wᵀ Σ_τ⁻¹ W)⁻¹` over the recorded samples along the trajectory, for white torque noise and exact positions; none without torque noise, with
-/// correlated noise, where only parts of the trajectory count, or where a parameter is not excited.
-pub(super) fn cramer_rao(
-    machine: &Machine,
-    trajectory: &Trajectory,
-    sensors: &SensorSettings,
-    windows: Option<&[Vec<[f64; 2]>]>,
-) -> Option<Vec<f64>> {
+/// The Cramér-Rao bound of every base parameter: `√ diag (Σ Wᵀ Σ_τ⁻¹ W)⁻¹` over the recorded samples along the trajectories that count, for white torque noise and exact positions; none without torque noise,
+/// with correlated noise, or where a parameter is not excited.
+pub(super) fn cramer_rao(machine: &Machine, legs: &[Leg], sensors: &SensorSettings) -> Option<Vec<f64>> {
     let dof = machine.model.dof();
     let std: Vec<f64> = (0..dof).map(|joint| sensors.torque_std.of(joint)).collect();
-    if windows.is_some() || sensors.torque_correlation != 0.0 || std.iter().any(|std| *std <= 0.0) {
+    if sensors.torque_correlation != 0.0 || std.iter().any(|std| *std <= 0.0) {
         return None;
     }
-    let mut gatherer = Information::new(&machine.model, &machine.layout, &std, None);
-    let count = machine.layout.columns().len();
-    let mut sum = DMatrix::zeros(count, count);
-    let whole = trajectory.motion();
-    for from in (0..whole.samples).step_by(SAMPLES_AT_ONCE) {
-        let samples = SAMPLES_AT_ONCE.min(whole.samples - from);
-        let mut part = Motion::default();
-        part.reset(dof, samples);
-        for joint in 0..dof {
-            let (to, at) = (part.of(joint), joint * whole.samples + from);
-            for (to_values, values) in [(&mut part.q, &whole.q), (&mut part.dq, &whole.dq), (&mut part.ddq, &whole.ddq)]
-            {
-                to_values[to.clone()].copy_from_slice(&values[at..at + samples]);
+    let columns = machine.layout.columns().len();
+    let mut sum = DMatrix::zeros(columns, columns);
+    for leg in legs {
+        let (whole, rate_hz) = (leg.reference().motion(), leg.reference().rate_hz());
+        let mut own = DMatrix::zeros(columns, columns);
+        if leg.windows().is_none() {
+            own += information(machine, whole, &std, &(0..whole.samples).collect::<Vec<usize>>());
+        } else {
+            for joint in 0..dof {
+                let inside = |sample: &usize| leg.counts(joint, *sample as f64 / rate_hz);
+                let samples: Vec<usize> = (0..whole.samples).filter(inside).collect();
+                // The others' torque tells nothing there.
+                let mut alone = vec![f64::INFINITY; dof];
+                alone[joint] = std[joint];
+                own += information(machine, whole, &alone, &samples);
             }
         }
-        sum += gatherer.of(&part, 1.0);
+        // Samples a second that are recorded, of those that are controlled.
+        sum += own * (sensors.record_rate_hz.unwrap_or(rate_hz) / rate_hz);
     }
-    // Samples a second that are recorded, of those that are controlled.
-    sum *= sensors.record_rate_hz.unwrap_or(trajectory.rate_hz) / trajectory.rate_hz;
+    let count = sum.nrows();
     let scale: Vec<f64> = (0..count).map(|k| sum[(k, k)].sqrt()).collect();
     if scale.iter().any(|scale| *scale <= 0.0 || !scale.is_finite()) {
         return None;
@@ -49,4 +46,27 @@ pub(super) fn cramer_rao(
     let scaled = DMatrix::from_fn(count, count, |row, column| sum[(row, column)] / (scale[row] * scale[column]));
     let inverse = scaled.cholesky()?.inverse();
     Some((0..count).map(|k| inverse[(k, k)].sqrt() / scale[k]).collect())
+}
+
+/// `Σ Wᵀ Σ_τ⁻¹ W` over some samples of a motion.
+fn information(machine: &Machine, whole: &Motion, std: &[f64], samples: &[usize]) -> DMatrix<f64> {
+    let dof = machine.model.dof();
+    let mut gatherer = Information::new(&machine.model, &machine.layout, std, None);
+    let count = machine.layout.columns().len();
+    let mut sum = DMatrix::zeros(count, count);
+    for some in samples.chunks(SAMPLES_AT_ONCE) {
+        let mut part = Motion::default();
+        part.reset(dof, some.len());
+        for joint in 0..dof {
+            let (to, from) = (part.of(joint), joint * whole.samples);
+            for (to_values, values) in [(&mut part.q, &whole.q), (&mut part.dq, &whole.dq), (&mut part.ddq, &whole.ddq)]
+            {
+                for (to, sample) in to_values[to.clone()].iter_mut().zip(some) {
+                    *to = values[from + sample];
+                }
+            }
+        }
+        sum += gatherer.of(&part, 1.0);
+    }
+    sum
 }

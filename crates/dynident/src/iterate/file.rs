@@ -20,7 +20,7 @@ pub struct IterationsFile {
     pub reason: String,
     /// Names of the joints.
     pub joints: Vec<String>,
-    /// Length of each run, s.
+    /// Length of each run, s; of legs one after another, of all of them once.
     pub duration_s: f64,
     /// The runs.
     pub runs: Vec<IterationRun>,
@@ -39,10 +39,14 @@ pub struct IterationsFile {
 pub struct IterationRun {
     /// Its number, from 1.
     pub run: usize,
+    /// Which leg it belongs to, from 1, where each has an iteration of its own; none otherwise.
+    pub leg: Option<usize>,
     /// The controller.
     pub controller: String,
     /// Whether it had a model.
     pub model_based: bool,
+    /// Of which run the possible machine (or the estimate) was its model; none for the description, a step between two runs' machines, or no model.
+    pub model_of_run: Option<usize>,
     /// Share of the step from the last good parameters that was taken.
     pub damping: f64,
     /// Factor of the gains of the controller without a model.

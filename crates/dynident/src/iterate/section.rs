@@ -1,5 +1,6 @@
 //! `[iteration]`: how a study's robot is run, identified and run again.
 
+use super::legs::{LegOrder, LegSection};
 use crate::study::{EstimatorMethod, Study};
 use dynident_experiment::ControllerSettings;
 use dynident_experiment::iteration::{
@@ -50,11 +51,15 @@ pub enum PriorChoice {
 /// assert_eq!(section.max_runs, 6);
 /// # Ok::<(), toml::de::Error>(())
 /// ```
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct IterationSection {
     /// A trajectory to run (`t_s, q1.., dq1.., ddq1..`), in place of the one that `[design]` leads to.
     pub trajectory: Option<PathBuf>,
+    /// Several trajectories, some with joints that are held, in place of one; each takes the study's trajectory or design unless it has its own.
+    pub leg: Vec<LegSection>,
+    /// Whether every run has all legs (`"together"`, the default), or each an iteration of its own, with what those before it have found held (`"one-after-another"`).
+    pub order: LegOrder,
     /// Which robot runs it; the simulator by default.
     pub robot: RobotChoice,
     /// What is believed of the bodies before any run; what the description says by default.
@@ -65,6 +70,8 @@ pub struct IterationSection {
     pub first: Option<ControllerSettings>,
     /// All joints at once, or step by step.
     pub scheme: Scheme,
+    /// Every sample of every joint counts, also where a windowed design names windows; false by default.
+    pub every_sample: bool,
     /// The paper's scheme as it stands: no possible machine is asked for and nothing is rejected. False by default.
     pub literal: bool,
     /// From positions to speeds and accelerations; `deviation` from the trajectory by default.
@@ -106,11 +113,14 @@ impl Default for IterationSection {
         } = IterationSettings::default();
         Self {
             trajectory: None,
+            leg: Vec::new(),
+            order: LegOrder::default(),
             robot: RobotChoice::default(),
             prior: PriorChoice::default(),
             start,
             first,
             scheme: identification.scheme,
+            every_sample: false,
             literal: false,
             differentiator: identification.differentiator,
             parallel_filter: identification.parallel_filter,

@@ -8,7 +8,6 @@ use crate::study::{Folders, Study};
 use core::ops::ControlFlow;
 use dynident_excitation::{DesignProgress, Motion};
 use dynident_experiment::Reference;
-use dynident_experiment::iteration::Leg;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -29,6 +28,20 @@ pub(crate) struct Trajectory {
     pub(crate) ddq: Vec<f64>,
     /// For each joint the times (from, to; s) whose rows count; everything without it.
     pub(crate) windows: Option<Vec<Vec<[f64; 2]>>>,
+    /// Of a step-wise design, which joint moves when.
+    #[serde(default)]
+    pub(crate) strokes: Vec<StrokeSpan>,
+}
+
+/// When one joint makes its stroke.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct StrokeSpan {
+    /// The joint.
+    pub(crate) joint: usize,
+    /// Begin, s.
+    pub(crate) from_s: f64,
+    /// End, s.
+    pub(crate) to_s: f64,
 }
 
 impl Trajectory {
@@ -54,6 +67,7 @@ impl Trajectory {
             return Err(wrong(&"no trajectory: name a file with trajectory = \"...\", or give a [design]"));
         }
         let outcome = design_study(study, study_path, options, watch)?;
+        let mut strokes = Vec::new();
         let windows = outcome.file.windowed.as_ref().map(|windowed| {
             let mut windows = vec![Vec::new(); machine.model.dof()];
             let mut start_s = 0.0;
@@ -63,13 +77,14 @@ impl Trajectory {
                     let centre = start_s + middle * stroke.period_s;
                     windows[joint].push([centre - stroke.window_s, centre + stroke.window_s]);
                 }
+                strokes.push(StrokeSpan { joint, from_s: start_s, to_s: start_s + stroke.period_s });
                 start_s += stroke.period_s;
             }
             windows
         });
         let reference = Reference::of_family(outcome.family(), &outcome.file.parameters, rate_hz, None)
             .map_err(|error| wrong(&error))?;
-        Ok(Self::new(&reference, windows))
+        Ok(Self { strokes, ..Self::new(&reference, windows) })
     }
 
     fn new(reference: &Reference, windows: Option<Vec<Vec<[f64; 2]>>>) -> Self {
@@ -82,6 +97,7 @@ impl Trajectory {
             dq: motion.dq.clone(),
             ddq: motion.ddq.clone(),
             windows,
+            strokes: Vec::new(),
         }
     }
 
@@ -98,25 +114,35 @@ impl Trajectory {
         Reference::new(self.rate_hz, motion)
     }
 
-    /// As the leg of every run.
-    pub(crate) fn leg(&self) -> Result<Leg, String> {
-        let reference = self.reference().map_err(|error| error.to_string())?;
-        match &self.windows {
-            None => Leg::whole(reference),
-            Some(windows) => Leg::windowed(reference, windows.clone()),
+    /// The part in which the joints that are not held make their strokes, if it is made of strokes; everything otherwise.
+    pub(crate) fn without(&self, held: &[Option<f64>]) -> Result<Self, String> {
+        if self.strokes.is_empty() || held.iter().all(Option::is_none) {
+            return Ok(self.clone());
         }
-        .map_err(|error| error.to_string())
-    }
-
-    /// As a motion with room for jerk, which nobody looks at.
-    pub(crate) fn motion(&self) -> Motion {
-        Motion {
-            samples: self.samples,
+        let own = self.strokes.iter().filter(|stroke| held.get(stroke.joint).is_none_or(Option::is_none));
+        let span = own.fold([f64::INFINITY, 0.0_f64], |[from, to], s| [from.min(s.from_s), to.max(s.to_s)]);
+        let at = |time_s: f64| (time_s * self.rate_hz).round() as usize;
+        if span[0] > span[1] || at(span[1]) <= at(span[0]) {
+            return Err("no joint that is not held has a stroke in the design".to_owned());
+        }
+        let (first, last) = (at(span[0]), at(span[1]).min(self.samples - 1));
+        let samples = last + 1 - first;
+        let part = |values: &[f64]| -> Vec<f64> {
+            values.chunks_exact(self.samples).flat_map(|own| own[first..=last].iter().copied()).collect()
+        };
+        let start_s = first as f64 / self.rate_hz;
+        let earlier = |windows: &[[f64; 2]]| -> Vec<[f64; 2]> {
+            windows.iter().map(|[from, to]| [from - start_s, to - start_s]).filter(|[_, to]| *to > 0.0).collect()
+        };
+        Ok(Self {
+            rate_hz: self.rate_hz,
             joints: self.joints,
-            q: self.q.clone(),
-            dq: self.dq.clone(),
-            ddq: self.ddq.clone(),
-            dddq: vec![0.0; self.q.len()],
-        }
+            samples,
+            q: part(&self.q),
+            dq: part(&self.dq),
+            ddq: part(&self.ddq),
+            windows: self.windows.as_ref().map(|windows| windows.iter().map(|own| earlier(own)).collect()),
+            strokes: Vec::new(),
+        })
     }
 }

@@ -1,0 +1,131 @@
+//! From records to what `iterations.json` holds.
+
+use super::file::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile};
+use crate::job::{joint_names, study_name};
+use crate::machine::Machine;
+use crate::study::Study;
+use dynident_experiment::iteration::{IterationStatus, RunEstimate, RunRecord};
+use std::path::Path;
+
+/// The newest run before `record` whose machine its controller had.
+fn model_of_run(record: &RunRecord, records: &[RunRecord]) -> Option<usize> {
+    let model = record.controller.model.as_ref()?;
+    let told = |before: &&RunRecord| {
+        before.run < record.run
+            && before.estimate.as_ref().and_then(RunEstimate::for_controller).as_ref() == Some(model)
+    };
+    records.iter().rfind(told).map(|before| before.run)
+}
+
+/// What the file is made from.
+pub(super) struct Told<'a> {
+    pub(super) study: &'a Study,
+    pub(super) study_path: &'a Path,
+    pub(super) machine: &'a Machine,
+    /// Length of a run with all its legs, s.
+    pub(super) duration_s: f64,
+    /// True base parameters, where they are known.
+    pub(super) truth: Option<Vec<f64>>,
+    /// The Cramér-Rao bound of a run.
+    pub(super) bound: Option<Vec<f64>>,
+}
+
+/// One iteration of legs that are identified together, so far.
+pub(super) struct Stage<'a> {
+    /// The leg's number from 1, where each has an iteration of its own.
+    pub(super) leg: Option<usize>,
+    pub(super) records: &'a [RunRecord],
+    pub(super) status: &'a IterationStatus,
+    /// For each base parameter the error bar by an earlier leg, if that told it.
+    pub(super) known_std: &'a [Option<f64>],
+}
+
+impl Told<'_> {
+    pub(super) fn file(&self, stage: &Stage<'_>) -> IterationsFile {
+        let Stage { leg, records, status, known_std } = *stage;
+        let bound = self.bound.as_deref();
+        let columns = self.machine.layout.columns();
+        let expressions = self.machine.base.expressions();
+        let parameters = |record: &RunRecord| {
+            let Some(estimate) = &record.estimate else { return Vec::new() };
+            let one = |k: usize| IterationParameter {
+                symbol: columns[k].symbol(),
+                expression: expressions[k].clone(),
+                unit: columns[k].unit(),
+                value: estimate.values[k],
+                std: known_std[k].or_else(|| (!estimate.fixed.contains(&k)).then_some(estimate.std[k])),
+                error: self.truth.as_ref().map(|truth| estimate.values[k] - truth[k]),
+            };
+            (0..columns.len()).map(one).collect()
+        };
+        let runs: Vec<IterationRun> = records
+            .iter()
+            .map(|record| IterationRun {
+                run: record.run,
+                leg,
+                controller: record.controller.name.clone(),
+                model_based: record.controller.model.is_some(),
+                model_of_run: model_of_run(record, records),
+                damping: record.controller.damping,
+                stiffness: record.controller.stiffness,
+                accepted: record.accepted,
+                outcome: record.outcome.clone(),
+                reason: record.reason.clone(),
+                max_tracking_error_rad: record.max_tracking_error_rad.clone(),
+                parameters: parameters(record),
+            })
+            .collect();
+        let good: Vec<&RunRecord> = records.iter().filter(|record| record.accepted).collect();
+        let tracking_improvement = match good[..] {
+            [first, .., last] if last.tracking_error() > 0.0 => Some(first.tracking_error() / last.tracking_error()),
+            _ => None,
+        };
+        let last = good.last().and_then(|record| record.estimate.as_ref());
+        let error_over_bound = last.zip(self.truth.as_ref()).zip(bound).and_then(|((estimate, truth), bound)| {
+            let ratios: Vec<f64> = (0..bound.len())
+                .filter(|&k| bound[k] > 0.0 && !estimate.fixed.contains(&k))
+                .map(|k| ((estimate.values[k] - truth[k]) / bound[k]).powi(2))
+                .collect();
+            (!ratios.is_empty()).then(|| (ratios.iter().sum::<f64>() / ratios.len() as f64).sqrt())
+        });
+        IterationsFile {
+            schema: ITERATIONS_SCHEMA,
+            name: study_name(self.study, self.study_path),
+            converged: status.is_converged(),
+            status: match status {
+                IterationStatus::Converged => "converged",
+                IterationStatus::RunsUsedUp => "runs-used-up",
+                IterationStatus::Refused { .. } => "refused",
+                IterationStatus::Waiting { .. } => "waiting",
+            },
+            reason: status.to_string(),
+            joints: joint_names(self.machine),
+            duration_s: self.duration_s,
+            runs,
+            tracking_improvement,
+            error_over_bound,
+            bound: bound.map(<[f64]>::to_vec),
+            possible_parameters: last.and_then(|estimate| estimate.possible.clone()),
+        }
+    }
+}
+
+/// Iterations of one leg after another as one: converged if all are, with the verdict of the last.
+pub(super) fn joined(stages: Vec<IterationsFile>) -> Option<IterationsFile> {
+    let converged = stages.iter().all(|stage| stage.converged);
+    let improvement = stages.iter().filter_map(|stage| stage.tracking_improvement).reduce(f64::min);
+    let unsettled = stages.iter().find(|stage| !stage.converged).map(|stage| (stage.status, stage.reason.clone()));
+    let mut runs = Vec::new();
+    let mut last = None;
+    for stage in stages {
+        let IterationsFile { runs: own, .. } = &stage;
+        runs.extend(own.iter().cloned());
+        last = Some(stage);
+    }
+    let last = last?;
+    let (status, reason) = match (last.converged, unsettled) {
+        (true, Some(unsettled)) => unsettled,
+        _ => (last.status, last.reason.clone()),
+    };
+    Some(IterationsFile { converged, status, reason, runs, tracking_improvement: improvement, ..last })
+}
