@@ -120,9 +120,6 @@ pub const ESTIMATORS: &[BenchmarkEstimator] = &[
         let periodic = trial.shared.periodic(trial)?;
         noise_weighted(&periodic.rows, &periodic.problem)
     }),
-    entry("generalized-fourier-all-rows", "generalised least squares on those rows", |trial| {
-        generalized(&trial.shared.periodic(trial)?.rows)
-    }),
     entry("physical", "the possible machine that fits those rows best", physical),
     entry(
         "simultaneous",
