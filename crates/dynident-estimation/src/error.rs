@@ -112,6 +112,14 @@ pub enum EstimationError {
         "the simulation does not get through with the starting values; start from a description or an estimate that is a possible machine"
     )]
     NoSimulation,
+    /// Unknowns of the motion, or parameters beside it, that the rows leave open.
+    #[error(
+        "the rows do not tell {name} from the unknowns before it; leave it out, give the motion fewer unknowns, or a longer or livelier log"
+    )]
+    Undetermined {
+        /// The unknown.
+        name: String,
+    },
     /// The problem has no equations.
     #[error("no rows of any joint: absorb a log before estimating")]
     Empty,

@@ -8,11 +8,12 @@
 //! 3. [`ordinary_least_squares`] or [`weighted_least_squares`] gives an [`Estimate`]: values, a covariance that accounts for
 //!    residuals correlated in time, the noise of every joint, and what was decided about columns that the data do not excite.
 //!    [`generalized_least_squares`] lets errors of joints be correlated, [`robust_least_squares`] sets gross errors aside, [`total_least_squares`] and
-//!    [`instrumental_variables`] account for errors in the columns, and [`hausman_test`] says whether those matter.
+//!    [`instrumental_variables`] account for errors in the columns, [`simultaneous_least_squares`] estimates the motion as well, and [`hausman_test`] says whether those matter.
 //! 4. [`Validation`] compares predicted with measured torque, on data that were not used for the fit.
 
 #![forbid(unsafe_code)]
 
+mod autoregression;
 mod bootstrap;
 mod covariance;
 mod cross_validation;
@@ -39,6 +40,8 @@ mod reflect;
 mod robust;
 mod segments;
 mod simulated;
+mod simultaneous;
+mod simultaneous_rows;
 mod total;
 mod validation;
 mod weighted;
@@ -70,6 +73,10 @@ pub use segments::{SegmentScore, SegmentSettings, SegmentedFactor};
 pub use simulated::{
     SimulatedCriterion, SimulatedEstimate, SimulatedMotion, SimulatedProblem, SimulatedRows, SimulatedSettings,
     simulated_least_squares,
+};
+pub use simultaneous::{
+    ChannelNoise, ChannelRows, SimultaneousEstimate, SimultaneousModel, SimultaneousSettings, simultaneous_bound,
+    simultaneous_least_squares,
 };
 pub use total::{TotalEstimate, TotalSettings, total_least_squares};
 pub use validation::{JointValidation, Validation, ValidationReport};

@@ -413,7 +413,7 @@ fn finished(mut estimate: Estimate, tally: &[Tally], method: CovarianceMethod) -
         scale(&mut estimate.covariance);
         scale(&mut estimate.covariance_white);
         let root = correction.sqrt();
-        estimate.std.iter_mut().for_each(|std| *std *= root);
+        estimate.std.iter_mut().chain(&mut estimate.half_width_95).for_each(|width| *width *= root);
         estimate.relative_std_percent.iter_mut().flatten().for_each(|percent| *percent *= root);
     }
     estimate.covariance_method = method;

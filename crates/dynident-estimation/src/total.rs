@@ -1,6 +1,7 @@
 //! Total least squares: errors of known size in the columns as well as in the torque.
 
 use crate::covariance::CovarianceMethod;
+use crate::distributions::student_half_width;
 use crate::error::EstimationError;
 use crate::estimate::{Estimate, Fitted, joint_freedom};
 use crate::factor::{FactorWorkspace, TriangularFactor};
@@ -128,6 +129,7 @@ pub fn total_least_squares(
             return Err(EstimationError::Overflow { name: problem.columns()[row].clone() });
         }
         estimate.std[row] = std;
+        estimate.half_width_95[row] = student_half_width(0.95, estimate.std_freedom[row]) * std;
         estimate.relative_std_percent[row] = (std > 0.0 && values[row] != 0.0).then(|| 100.0 * std / values[row].abs());
     }
     Ok(TotalEstimate { estimate, error_scale: (lambda / degrees).sqrt() / reference })

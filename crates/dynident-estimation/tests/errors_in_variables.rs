@@ -9,7 +9,7 @@ use dynident_estimation::{
     CovarianceMethod, CrossProblem, EstimateStatus, EstimationError, HausmanSettings, HausmanVerdict,
     InstrumentalSettings, InstrumentedProblem, LinearProblem, RankSettings, RobustSettings, RowBlock, RowWeight,
     SegmentSettings, SegmentedFactor, TotalSettings, WeightedSettings, generalized_least_squares, hausman_test,
-    instrumental_variables, robust_least_squares, total_least_squares, weighted_least_squares,
+    instrumental_variables, robust_least_squares, student_half_width, total_least_squares, weighted_least_squares,
 };
 
 const THETA: [f64; 2] = [2.0, -1.0];
@@ -260,6 +260,9 @@ fn total_least_squares_is_consistent_where_the_errors_are_known() {
         for c in 0..3 {
             mean[c] += found.estimate.values[c] / f64::from(runs);
             covered += i32::from((found.estimate.values[c] - truth[c]).abs() < 1.96 * found.estimate.std[c]);
+            // The interval is that of the standard deviation reported, to the last bit but one.
+            let half_width = student_half_width(0.95, found.estimate.std_freedom[c]) * found.estimate.std[c];
+            assert!((found.estimate.half_width_95[c] / half_width - 1.0).abs() < 1e-12);
         }
         // Errors as large as the column itself leave nothing.
         let absurd = TotalSettings { column_std: vec![50.0, 0.2, 0.0], ..settings };

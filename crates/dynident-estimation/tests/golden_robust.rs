@@ -6,6 +6,7 @@ use dynident_estimation::{
     CovarianceMethod, CrossProblem, EstimationError, HausmanSettings, HausmanVerdict, InstrumentalSettings,
     InstrumentedProblem, LinearProblem, RobustSettings, RowBlock, RowWeight, SegmentSettings, SegmentedFactor,
     WeightedSettings, generalized_least_squares, hausman_test, instrumental_variables, robust_least_squares,
+    student_half_width,
 };
 use serde_json::Value;
 
@@ -63,6 +64,9 @@ fn robust_estimates_agree_with_statsmodels() {
         // The oracle stops when its coefficients change by 1e-13; its convergence is linear with a factor well below 0.9, so it is within 1e-12.
         close_all(name, &found.estimate.values, &numbers(&data[name]["values"]), RELATIVE);
         close_all("scale", &found.estimate.joint_sigma, &[data[name]["scale"].as_f64().unwrap()], RELATIVE);
+        let widths = found.estimate.std.iter().zip(&found.estimate.std_freedom);
+        let widths: Vec<f64> = widths.map(|(std, freedom)| student_half_width(0.95, *freedom) * std).collect();
+        close_all("half width", &found.estimate.half_width_95, &widths, RELATIVE);
         // Twelve of 240 rows are off.
         assert!((0.03..0.08).contains(&found.outlier_share[0]), "{:?}", found.outlier_share);
     }

@@ -1,12 +1,13 @@
 //! What the benchmark compares. **To add an estimator, add one line to [`ESTIMATORS`].**
 
-use super::pipeline;
-use super::scenario::{Record, Scenario};
-use dynident_estimation::{
-    CovarianceMethod, Estimate, EstimateStatus, EstimationError, LinearProblem, OrdinarySettings, WeightedSettings,
-    ordinary_least_squares, weighted_least_squares,
+use super::answers::{
+    generalized, instrumental, noise_weighted, ordinary, physical, robust, simultaneous, total, true_motion, weighted,
+    wide,
 };
-use dynident_excitation::Motion;
+use super::rows::Rows;
+use super::scenario::{Record, Scenario};
+use super::shared::Shared;
+use dynident_estimation::{CovarianceMethod, EstimationError, LinearProblem, RowWeight};
 use dynident_recording::MotionBlock;
 
 /// One simulated experiment, as estimators see it.
@@ -20,10 +21,16 @@ pub struct Trial<'a> {
     pub motion: &'a MotionBlock,
     /// The cut-off chosen from the record.
     pub cutoff_hz: f64,
-    /// The pipeline's filtered rows as triangular factors.
+    /// The pipeline's filtered rows.
+    pub rows: &'a Rows<'a>,
+    /// The same as triangular factors.
     pub problem: &'a LinearProblem,
     /// Where an iterative estimator starts: the true base parameters with 15 % Gaussian error.
     pub start: &'a [f64],
+    /// A drawing office's idea of the machine: every body's ten true parameters times a common factor with 15 % Gaussian error, no friction and no drives.
+    pub prior: &'a [f64],
+    /// What several estimators need, made once.
+    pub(super) shared: &'a Shared<'a>,
 }
 
 /// What an estimator says.
@@ -57,23 +64,21 @@ const fn entry(
 
 /// The registry: one line for each estimator, or for each kind of error bar of one.
 pub const ESTIMATORS: &[BenchmarkEstimator] = &[
-    entry("ordinary", "ordinary least squares, jackknife error bars", |trial| {
-        ordinary(trial, CovarianceMethod::Jackknife)
-    }),
+    entry("ordinary", "ordinary least squares, jackknife error bars", |trial| ordinary(trial.problem)),
     entry("weighted", "weighted least squares, jackknife error bars", |trial| {
-        weighted(trial, CovarianceMethod::Jackknife)
+        weighted(trial.problem, CovarianceMethod::Jackknife)
     }),
     entry("weighted-white", "the same, error bars for white residuals", |trial| {
-        weighted(trial, CovarianceMethod::White)
+        weighted(trial.problem, CovarianceMethod::White)
     }),
     entry("weighted-segments", "the same, error bars from segments (CR1)", |trial| {
-        weighted(trial, CovarianceMethod::Segments)
+        weighted(trial.problem, CovarianceMethod::Segments)
     }),
     entry("weighted-newey-west", "the same, error bars by Newey and West", |trial| {
-        weighted(trial, CovarianceMethod::NeweyWest)
+        weighted(trial.problem, CovarianceMethod::NeweyWest)
     }),
     entry("weighted-bootstrap", "the same, error bars by block bootstrap", |trial| {
-        weighted(trial, CovarianceMethod::Bootstrap)
+        weighted(trial.problem, CovarianceMethod::Bootstrap)
     }),
     entry(
         "weighted-wide",
@@ -81,57 +86,44 @@ pub const ESTIMATORS: &[BenchmarkEstimator] = &[
         wide,
     ),
     entry(
-        "weighted-fourier",
-        "weighted least squares, motion by a Fourier fit at the excitation's own frequencies",
-        |trial| periodic(trial, Some(trial.cutoff_hz)),
-    ),
-    entry("weighted-fourier-all-rows", "the same on all rows, neither filtered nor decimated", |trial| {
-        periodic(trial, None)
-    }),
-    entry(
         "weighted-true-motion",
         "weighted least squares on the true motion, which no one knows: what decimation costs",
         true_motion,
     ),
+    entry("huber", "reweighted least squares with Huber's weights on the pipeline's rows", |trial| {
+        robust(trial.rows, trial.problem, RowWeight::huber())
+    }),
+    entry("tukey", "the same with Tukey's weights", |trial| robust(trial.rows, trial.problem, RowWeight::tukey())),
+    entry("noise-weighted", "rows weighted by the noise around them (Feng)", |trial| {
+        noise_weighted(trial.rows, trial.problem)
+    }),
+    entry("generalized", "generalised least squares: joints' errors correlated", |trial| generalized(trial.rows)),
+    entry("total-least-squares", "total least squares, columns' errors by propagation of the positions' noise", total),
+    entry("instrumental", "instrumental variables, instruments from the reference motion", instrumental),
+    entry(
+        "weighted-fourier",
+        "weighted least squares, motion by a Fourier fit at the excitation's own frequencies",
+        |trial| weighted(&trial.shared.periodic_filtered(trial)?, CovarianceMethod::Jackknife),
+    ),
+    entry("weighted-fourier-all-rows", "the same on all rows, neither filtered nor decimated", |trial| {
+        weighted(&trial.shared.periodic(trial)?.problem, CovarianceMethod::Jackknife)
+    }),
+    entry("huber-fourier-all-rows", "Huber's weights on those rows", |trial| {
+        let periodic = trial.shared.periodic(trial)?;
+        robust(&periodic.rows, &periodic.problem, RowWeight::huber())
+    }),
+    entry("tukey-fourier-all-rows", "Tukey's weights on those rows", |trial| {
+        let periodic = trial.shared.periodic(trial)?;
+        robust(&periodic.rows, &periodic.problem, RowWeight::tukey())
+    }),
+    entry("noise-weighted-fourier-all-rows", "those rows weighted by the noise around them", |trial| {
+        let periodic = trial.shared.periodic(trial)?;
+        noise_weighted(&periodic.rows, &periodic.problem)
+    }),
+    entry("physical", "the possible machine that fits those rows best", physical),
+    entry(
+        "simultaneous",
+        "Fourier series of the motion and parameters from one likelihood, torque noise autoregressive",
+        simultaneous,
+    ),
 ];
-
-fn ordinary(trial: &Trial<'_>, covariance: CovarianceMethod) -> Result<Answer, EstimationError> {
-    ordinary_least_squares(trial.problem, &OrdinarySettings { covariance, ..OrdinarySettings::default() }).map(answer)
-}
-
-fn weighted(trial: &Trial<'_>, covariance: CovarianceMethod) -> Result<Answer, EstimationError> {
-    weighted_least_squares(trial.problem, &WeightedSettings { covariance, ..WeightedSettings::default() }).map(answer)
-}
-
-/// The fit to the record filtered at twice the automatic cut-off.
-fn wide(trial: &Trial<'_>) -> Result<Answer, EstimationError> {
-    let cutoff_hz = 2.0 * trial.cutoff_hz;
-    let motion = pipeline::differentiated(trial.record, cutoff_hz).map_err(|_| EstimationError::Empty)?;
-    refitted(trial, &motion, Some(cutoff_hz))
-}
-
-/// The fit with the motion of a Fourier series: the excitation is periodic, and its frequencies are known.
-fn periodic(trial: &Trial<'_>, cutoff_hz: Option<f64>) -> Result<Answer, EstimationError> {
-    let motion = pipeline::periodic(trial.record).map_err(|_| EstimationError::Empty)?;
-    refitted(trial, &motion, cutoff_hz)
-}
-
-/// The fit with the regressor of the true motion: an oracle that separates what differentiation costs from what decimation costs.
-fn true_motion(trial: &Trial<'_>) -> Result<Answer, EstimationError> {
-    let Motion { q, dq, ddq, .. } = trial.scenario.motion.clone();
-    refitted(trial, &MotionBlock { q, dq, ddq, ..trial.motion.clone() }, Some(trial.cutoff_hz))
-}
-
-fn refitted(trial: &Trial<'_>, motion: &MotionBlock, cutoff_hz: Option<f64>) -> Result<Answer, EstimationError> {
-    // A pipeline that fails is a failure of the estimator; the figure does not need the reason.
-    let problem = pipeline::problem(trial.scenario, motion, cutoff_hz).map_err(|_| EstimationError::Empty)?;
-    weighted_least_squares(&problem, &WeightedSettings::default()).map(answer)
-}
-
-fn answer(estimate: Estimate) -> Answer {
-    Answer {
-        converged: estimate.status != EstimateStatus::IterationLimit,
-        half_width_95: Some(estimate.half_width_95),
-        values: estimate.values,
-    }
-}

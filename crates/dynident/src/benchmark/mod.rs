@@ -2,19 +2,29 @@
 //!
 //! The registries are [`ESTIMATORS`], [`NOISE_LEVELS`] and [`ROBOTS`]: one line each adds to the benchmark.
 
+mod answers;
+mod bound_with_motion;
 mod estimators;
 mod figures;
 mod noise;
+mod periodic_model;
 mod pipeline;
 mod robots;
+mod rows;
 mod scenario;
+mod shared;
 
 pub use estimators::{Answer, BenchmarkEstimator, ESTIMATORS, Trial};
 pub use figures::{CellFigures, ParameterFigures, cells_csv};
 pub use noise::{NOISE_LEVELS, NoiseLevel};
 pub use robots::{BenchmarkRobot, ROBOTS};
+pub use rows::Rows;
 pub use scenario::{DURATION_S, HARMONICS, RATE_HZ, Record, Scenario};
 
+use bound_with_motion::BoundWithMotion;
+use shared::Shared;
+
+use crate::cpu_time::thread_seconds;
 use crate::error::Error;
 use crate::progress::Progress;
 use dynident_estimation::EstimationError;
@@ -23,7 +33,6 @@ use dynident_model::sample::Random;
 use dynident_recording::FilterError;
 use rayon::prelude::*;
 use serde::Serialize;
-use std::time::Instant;
 use thiserror::Error as ThisError;
 
 /// Name and version of the schema of [`BenchmarkFile`].
@@ -194,16 +203,21 @@ pub fn benchmark(settings: &BenchmarkSettings, progress: &dyn Progress) -> Resul
     for robot in &robots {
         let scenario = Scenario::new(robot, settings.seed)?;
         let symbols: Vec<String> = scenario.layout.columns().iter().map(dynident_dynamics::Column::symbol).collect();
+        let bounds = BoundWithMotion::new(&scenario, &symbols)
+            .map_err(|_| BenchmarkError::NoBound { robot: robot.name.to_owned() })?;
         for level in &levels {
-            let bound =
-                scenario.bound(level).ok_or_else(|| BenchmarkError::NoBound { robot: robot.name.to_owned() })?;
+            let no_bound = || BenchmarkError::NoBound { robot: robot.name.to_owned() };
+            let bound = scenario.bound(level).ok_or_else(no_bound)?;
+            let bound_with_motion = bounds.of(level).map_err(|_| no_bound())?;
             let runs: Vec<Run> = (0..settings.runs)
                 .into_par_iter()
                 .map(|run| {
                     // A generator for each run: the order in which threads take them does not matter.
                     let place = format!("{} {} {run}", robot.name, level.name);
                     let mut random = Random::new(settings.seed ^ hash(place.as_bytes()));
-                    let done = one_run(&scenario, level, &estimators, &bound, &mut random);
+                    let mut of_prior = Random::new(settings.seed ^ hash(format!("{place} prior").as_bytes()));
+                    let prior = scenario.prior(&mut of_prior, START_SPREAD);
+                    let done = one_run(&scenario, level, &estimators, &bound, &prior, &mut random);
                     progress.advance(1);
                     done
                 })
@@ -218,6 +232,7 @@ pub fn benchmark(settings: &BenchmarkSettings, progress: &dyn Progress) -> Resul
                     symbols: &symbols,
                     truth: &scenario.truth,
                     bound: &bound,
+                    bound_with_motion: &bound_with_motion,
                 };
                 cells.push(figures::figures(&cell, &answers, time_ms));
             }
@@ -241,20 +256,34 @@ fn one_run(
     level: &NoiseLevel,
     estimators: &[BenchmarkEstimator],
     bound: &[f64],
+    prior: &[f64],
     random: &mut Random,
 ) -> Result<Run, BenchmarkError> {
     let start: Vec<f64> = scenario.truth.iter().map(|value| value * (1.0 + START_SPREAD * random.normal())).collect();
     let record = scenario.record(level, random);
     let (motion, cutoff_hz) = pipeline::motion(&record)
         .map_err(|source| BenchmarkError::Filter { robot: scenario.robot.to_owned(), source })?;
-    let problem = pipeline::problem(scenario, &motion, Some(cutoff_hz))?;
-    let trial = Trial { scenario, record: &record, motion: &motion, cutoff_hz, problem: &problem, start: &start };
+    let rows = Rows::new(scenario, &motion, Some(cutoff_hz))?;
+    let problem =
+        rows.problem().map_err(|source| BenchmarkError::Estimation { robot: scenario.robot.to_owned(), source })?;
+    let shared = Shared::default();
+    let trial = Trial {
+        scenario,
+        record: &record,
+        motion: &motion,
+        cutoff_hz,
+        rows: &rows,
+        problem: &problem,
+        start: &start,
+        prior,
+        shared: &shared,
+    };
     Ok(estimators
         .iter()
         .map(|estimator| {
-            let started = Instant::now();
+            let (started_s, before_s) = (thread_seconds(), shared.spent_s());
             let answer = (estimator.answer)(&trial).ok();
-            let time_s = started.elapsed().as_secs_f64();
+            let time_s = thread_seconds() - started_s - (shared.spent_s() - before_s);
             (answer.filter(|answer| figures::usable(answer, &scenario.truth, &start, bound)), time_s)
         })
         .collect())

@@ -15,10 +15,30 @@ pub struct NoiseLevel {
     pub torque_std_nm: f64,
     /// Correlation of a torque's noise from one sample to the next at 1 kHz: AR(1), 0 for white noise.
     pub torque_correlation: f64,
+    /// Share of torque samples with a gross error beside it,
+    pub outlier_share: f64,
+    /// of this size, either sign, in standard deviations of the torque's noise.
+    pub outlier_size: f64,
+}
+
+impl NoiseLevel {
+    /// Standard deviation of a position as the encoder tells it, rad: noise, and rounding to its steps.
+    pub(super) fn position_std_rad(&self) -> f64 {
+        let step = self.encoder_steps.map_or(0.0, |steps| core::f64::consts::TAU / f64::from(steps));
+        self.position_std_deg.to_radians().hypot(step / 12.0_f64.sqrt())
+    }
 }
 
 const fn white(name: &'static str, position_std_deg: f64, torque_std_nm: f64) -> NoiseLevel {
-    NoiseLevel { name, position_std_deg, encoder_steps: None, torque_std_nm, torque_correlation: 0.0 }
+    NoiseLevel {
+        name,
+        position_std_deg,
+        encoder_steps: None,
+        torque_std_nm,
+        torque_correlation: 0.0,
+        outlier_share: 0.0,
+        outlier_size: 0.0,
+    }
 }
 
 /// The registry: one line for each level. The first five are BIRDy's (Leboutet et al., Applied Sciences 11 (2021) 4303).
@@ -31,4 +51,5 @@ pub const NOISE_LEVELS: &[NoiseLevel] = &[
     NoiseLevel { torque_correlation: 0.9, ..white("coloured", 1e-3, 0.05) },
     NoiseLevel { torque_correlation: 0.99, ..white("long-coloured", 1e-3, 0.05) },
     NoiseLevel { encoder_steps: Some(1 << 17), ..white("quantised", 0.0, 0.05) },
+    NoiseLevel { outlier_share: 0.05, outlier_size: 20.0, ..white("outliers", 1e-3, 0.05) },
 ];

@@ -1,12 +1,6 @@
-//! The pipeline's own way from a record to triangular factors, in memory.
+//! The pipeline's own way from a record to a motion, in memory.
 
-use super::BenchmarkError;
-use super::scenario::{DURATION_S, HARMONICS, RATE_HZ, Record, Scenario};
-use crate::error::Error;
-use crate::measured::rows::{Computer, JointRows, RawSamples, RowSink, decimation};
-use crate::progress::Silent;
-use crate::study::{EstimatorSection, ParallelFilterSection};
-use dynident_estimation::{LinearProblem, SegmentedFactor};
+use super::scenario::{DURATION_S, HARMONICS, RATE_HZ, Record};
 use dynident_recording::{Derivatives, DifferentiatorSettings, FilterError, MotionBlock, cutoff};
 
 /// The record's motion, by the default differentiator with the cut-off that the record itself suggests, and that cut-off.
@@ -51,48 +45,4 @@ fn differentiated_by(
         differentiator.differentiate(RATE_HZ, q, out)?;
     }
     Ok(block)
-}
-
-struct Factors(Vec<SegmentedFactor>);
-
-impl RowSink for Factors {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), Error> {
-        self.0[rows.joint]
-            .absorb(rows.panel, rows.rows)
-            .map_err(|source| Error::Estimation { path: "benchmark".into(), source })
-    }
-
-    fn raw(&mut self, _samples: &RawSamples<'_>) -> Result<(), Error> {
-        Ok(())
-    }
-}
-
-/// Filtered rows of the motion as a problem; filter and decimation follow from the cut-off as in `identify`. Without a cut-off every sample as it is.
-pub(super) fn problem(
-    scenario: &Scenario,
-    motion: &MotionBlock,
-    cutoff_hz: Option<f64>,
-) -> Result<LinearProblem, BenchmarkError> {
-    let (model, layout) = (&scenario.model, &scenario.layout);
-    let segments = EstimatorSection::default().segments;
-    let joints: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
-    let estimation = |source| BenchmarkError::Estimation { robot: scenario.robot.to_owned(), source };
-    let factors = (0..model.dof())
-        .map(|joint| SegmentedFactor::new(layout.joint_columns(joint).len(), segments))
-        .collect::<Result<Vec<_>, _>>()
-        .map_err(estimation)?;
-    let filter =
-        cutoff_hz.and_then(|cutoff| decimation(&ParallelFilterSection::default(), motion.rate_hz, Some(cutoff)));
-    let places: Vec<usize> = (0..model.dof()).collect();
-    let mut sink = Factors(factors);
-    Computer::new(model, layout, &places, motion.rate_hz, filter.as_ref(), None, &Silent)
-        .map_err(|source| BenchmarkError::Filter { robot: scenario.robot.to_owned(), source })?
-        .take(motion, &mut sink)
-        .map_err(|source| BenchmarkError::Pipeline(Box::new(source)))?;
-    let symbols = layout.columns().iter().map(dynident_dynamics::Column::symbol).collect();
-    let mut problem = LinearProblem::new(symbols, joints);
-    for (joint, factor) in sink.0.into_iter().enumerate() {
-        problem.add("run", joint, layout.joint_columns(joint).to_vec(), factor).map_err(estimation)?;
-    }
-    Ok(problem)
 }

@@ -108,14 +108,30 @@ impl Scenario {
             let mut error = noise.torque_std_nm * random.normal();
             for tau in joint {
                 *tau += error;
+                if noise.outlier_share > 0.0 && random.uniform(0.0, 1.0) < noise.outlier_share {
+                    let sign = if random.uniform(-1.0, 1.0) < 0.0 { -1.0 } else { 1.0 };
+                    *tau += sign * noise.outlier_size * noise.torque_std_nm;
+                }
                 error = noise.torque_correlation * error + fresh * random.normal();
             }
         }
         Record { samples, q, tau }
     }
 
+    /// What a drawing office knows: bodies with a wrong density, no drives.
+    pub(super) fn prior(&self, random: &mut Random, spread: f64) -> Vec<f64> {
+        let mut prior = self.model.parameter_vector();
+        for body in prior.chunks_exact_mut(10) {
+            // Four standard deviations below, a body would weigh less than nothing.
+            let factor = (1.0 + spread * random.normal()).max(0.25);
+            body.iter_mut().for_each(|value| *value *= factor);
+        }
+        prior.extend(vec![0.0; self.laws.len()]);
+        prior
+    }
+
     /// The Cramér-Rao bound on every base parameter's standard deviation: the diagonal of `(Σ_j Y_jᵀ Ω⁻¹ Y_j)^(-1/2)` for the motion known exactly and torque noise of covariance Ω (AR(1), whitened
-    /// by `y_t - ρ y_{t-1}`). What position noise hides is not in it, so it is a bound for every estimator, and one that cannot quite be reached.
+    /// by `y_t - ρ y_{t-1}`). What position noise hides is not in it, so it is a bound for every estimator, and one that cannot quite be reached. Outliers do not count: they are there to be set aside.
     pub(super) fn bound(&self, noise: &NoiseLevel) -> Option<Vec<f64>> {
         let (count, samples) = (self.truth.len(), self.motion.samples);
         let mut panels = Panels::default();

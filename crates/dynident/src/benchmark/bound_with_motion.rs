@@ -1,0 +1,38 @@
+//! The Cramér-Rao bound for estimators that are not told the motion.
+
+use super::noise::NoiseLevel;
+use super::periodic_model::PeriodicModel;
+use super::scenario::{DURATION_S, HARMONICS, Scenario};
+use dynident_estimation::{ChannelNoise, ChannelRows, EstimationError, SimultaneousModel, simultaneous_bound};
+
+/// Rows of positions and torques at the truth, sample by sample.
+pub(super) struct BoundWithMotion<'a> {
+    names: &'a [String],
+    motion: usize,
+    joints: usize,
+    rows: Vec<ChannelRows>,
+}
+
+impl<'a> BoundWithMotion<'a> {
+    pub(super) fn new(scenario: &Scenario, names: &'a [String]) -> Result<Self, EstimationError> {
+        let record = (&scenario.motion.q[..], &scenario.torque[..]);
+        let mut model = PeriodicModel::new(scenario, record, (DURATION_S, HARMONICS), 1);
+        let motion = model.fitted_motion().ok_or(EstimationError::Empty)?;
+        let rows = model.linearised(&motion, &scenario.truth)?;
+        Ok(Self { names, motion: motion.len(), joints: scenario.model.dof(), rows })
+    }
+
+    /// The bound on every base parameter's standard deviation: the motion is a Fourier series of the excitation's frequencies with unknown coefficients.
+    pub(super) fn of(&self, level: &NoiseLevel) -> Result<Vec<f64>, EstimationError> {
+        let rho = level.torque_correlation;
+        let position = ChannelNoise { std: level.position_std_rad(), autoregression: Vec::new() };
+        let torque = ChannelNoise {
+            std: level.torque_std_nm * (1.0 - rho * rho).sqrt(),
+            autoregression: if rho == 0.0 { Vec::new() } else { vec![rho] },
+        };
+        let mut noise = vec![position; self.joints];
+        noise.extend(vec![torque; self.joints]);
+        let covariance = simultaneous_bound(self.names, self.motion, &self.rows, &noise)?;
+        Ok(covariance.diagonal().iter().map(|variance: &f64| variance.sqrt()).collect())
+    }
+}
