@@ -58,6 +58,7 @@ pub use iterate::{
 pub use job::RunOptions;
 pub use machine::Machine;
 pub use measured::evidence::PriorAgreement;
+pub use measured::lag::TorqueLag;
 pub use measured::residuals::{JointResiduals, TorqueBand};
 pub use measured::torque_trace::{JointTrace, LogTrace};
 pub use output::{check_writable, write_whole};

@@ -188,6 +188,7 @@ impl RowSink for TestSink<'_> {
         if let Some(trace) = &mut self.trace {
             trace.filtered(rows);
         }
+        self.lag.filtered(rows);
         Ok(())
     }
 
@@ -203,7 +204,8 @@ impl RowSink for TestSink<'_> {
         if let Some(trace) = &mut self.trace {
             trace.raw(samples);
         }
-        self.lag.raw(samples)
+        self.lag.raw(samples);
+        Ok(())
     }
 }
 
@@ -261,7 +263,7 @@ pub(crate) fn validate_log(
     options.progress.end();
     let passed = passed?;
     let agreement = sink.evidence.as_ref().map(|evidence| evidence.agreement(&joints));
-    let lags = sink.lag.lags(passed.motion_cutoff_hz);
+    let lags = sink.lag.lags(study, motion);
     let figures = LogValidation {
         log: study.log_name(index),
         model: sink.model.report(),
@@ -277,5 +279,5 @@ pub(crate) fn validate_log(
     };
     let name = study.log_name(index);
     let trace = sink.trace.map(|trace| trace.finished(name, "validate", passed.filtered_rate_hz));
-    Ok((log_summary(study, index, passed, agreement, lags, &joints), figures, trace))
+    Ok((log_summary(study, index, passed, agreement, &lags, &joints), figures, trace))
 }

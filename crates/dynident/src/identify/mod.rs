@@ -25,10 +25,10 @@ use crate::identify::result_sections::{
 };
 use crate::identify::standard_parameters::{inertials, nearest_to_prior};
 use crate::identify::written_urdf::written_urdf;
-use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
+use crate::job::{RunOptions, joint_names, log_files, log_summary, note_lags, of_role, study_name};
 use crate::machine::{Machine, prior_parameters};
 use crate::measured::evidence::Evidence;
-use crate::measured::lag::{self, LAG_SAMPLES, LagCheck};
+use crate::measured::lag::{self, LAG_SAMPLES, LagCheck, TorqueLag};
 use crate::measured::residuals::Uncertainty;
 use crate::measured::rows::{JointRows, Pass, RawSamples, RowSink, motion_in_force};
 use crate::measured::torque_trace::{LogTrace, TraceSink};
@@ -145,14 +145,19 @@ fn identified(
     let started = Instant::now();
     let joints = joint_names(machine);
     let (mut logs, mut traces) = (Vec::new(), Vec::new());
+    let mut lags_by_joint = vec![Vec::new(); joints.len()];
     for fit in fits {
         let mut summary = fit.summary.clone();
         let (lags, trace) = second_look(study, machine, &motion, fit.index, &files[fit.index], &estimate.values)?;
-        summary.torque_lag_s = lags;
+        note_lags(&mut summary, &lags);
         traces.push(trace);
-        summary.model_findings.extend(lag::findings(&summary.torque_lag_s, &joints));
+        summary.model_findings.extend(lag::findings(&lags, &joints));
+        for (all, lag) in lags_by_joint.iter_mut().zip(lags) {
+            all.extend(lag);
+        }
         logs.push(summary);
     }
+    let lags: Vec<Option<TorqueLag>> = lags_by_joint.iter().map(|lags| lag::pooled(lags)).collect();
     let mut validation = Vec::new();
     let uncertainty = Uncertainty::of(&estimate);
     for index in of_role(study, Role::Validate) {
@@ -203,7 +208,7 @@ fn identified(
         bodies: bodies(machine, &inertials),
         essential: dropped,
         correlations: strongest_correlations(&estimate, CORRELATIONS),
-        joints: joint_results(machine, &estimate, &parameters),
+        joints: joint_results(machine, &estimate, &parameters, &lags),
         friction_choice: fitted.friction_choice,
         couplings: law_results(machine, &estimate, &parameters, |law| matches!(law, Law::Coupling(_))),
         training: training_result(study, machine, problem, &training, &estimate).map_err(in_study)?,
@@ -402,7 +407,7 @@ fn read_log(
     let passed = pass.run(&mut sink)?;
     let joints = joint_names(machine);
     let agreement = sink.evidence.as_ref().map(|evidence| evidence.agreement(&joints));
-    let summary = log_summary(study, index, passed, agreement, Vec::new(), &joints);
+    let summary = log_summary(study, index, passed, agreement, &[], &joints);
     Ok(LogFit { index, factors: sink.factors, summary })
 }
 
@@ -415,12 +420,14 @@ struct SecondLook<'a> {
 impl RowSink for SecondLook<'_> {
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), Error> {
         self.trace.filtered(rows);
+        self.lag.filtered(rows);
         Ok(())
     }
 
     fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), Error> {
         self.trace.raw(samples);
-        self.lag.raw(samples)
+        self.lag.raw(samples);
+        Ok(())
     }
 }
 
@@ -432,12 +439,12 @@ fn second_look(
     index: usize,
     file: &Path,
     theta: &[f64],
-) -> Result<(Vec<Option<f64>>, LogTrace), Error> {
+) -> Result<(Vec<Option<TorqueLag>>, LogTrace), Error> {
     let mut look = SecondLook { lag: LagCheck::new(machine, theta), trace: TraceSink::new(machine, theta) };
     let most_samples = Some(LAG_SAMPLES as u64);
     let pass = Pass { study, machine, motion, index, file, reader_thread: false, most_samples, progress: &Silent };
     let passed = pass.run(&mut look)?;
-    let lags = look.lag.lags(passed.motion_cutoff_hz);
+    let lags = look.lag.lags(study, motion);
     Ok((lags, look.trace.finished(study.log_name(index), "identify", passed.filtered_rate_hz)))
 }
 

@@ -3,6 +3,7 @@
 use crate::identify::fit::{GrossErrors, NoiseInRegressor};
 use crate::identify::friction_choice::JointFriction;
 use crate::measured::evidence::PriorAgreement;
+use crate::measured::lag::TorqueLag;
 use crate::measured::residuals::{JointResiduals, TorqueBand};
 use dynident_estimation::{CorrelatedPair, EssentialReport, ValidationReport};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
@@ -182,6 +183,8 @@ pub struct JointResult {
     pub residual_std_nm: f64,
     /// How strongly its residual is correlated in time: the lag-1 correlation that matters for the error bars.
     pub residual_correlation: Option<f64>,
+    /// Lag of its torque behind the motion by all training logs; none where they do not tell. The model itself is fitted to the torque as logged.
+    pub torque_lag: Option<TorqueLag>,
 }
 
 /// Figures of the fit on its own data.
@@ -292,8 +295,12 @@ pub struct LogSummary {
     pub filtered_rows: u64,
     /// The log against the description's own inertials.
     pub prior_agreement: Option<PriorAgreement>,
-    /// Lag of torque behind motion by joint, seconds, by the fitted model; none where the motion does not tell.
+    /// Lag of torque behind motion by joint, seconds, estimated together with the model from this log alone; none where the log does not tell.
     pub torque_lag_s: Vec<Option<f64>>,
+    /// Standard deviations of the lags.
+    pub torque_lag_std_s: Vec<Option<f64>>,
+    /// Half the widths of their 95 % intervals.
+    pub torque_lag_half_width_95_s: Vec<Option<f64>>,
     /// What follows from both.
     pub model_findings: Vec<Finding>,
 }

@@ -6,6 +6,7 @@ use crate::identify::result::{
 };
 use crate::job::joint_names;
 use crate::machine::Machine;
+use crate::measured::lag::TorqueLag;
 use crate::study::Study;
 use dynident_estimation::{Estimate, EstimateStatus, LinearProblem};
 use dynident_model::laws::Law;
@@ -128,7 +129,12 @@ pub(crate) fn law_results(
     machine.laws.iter().enumerate().filter(|(_, law)| wanted(law)).map(of_law).collect()
 }
 
-pub(crate) fn joint_results(machine: &Machine, estimate: &Estimate, parameters: &[f64]) -> Vec<JointResult> {
+pub(crate) fn joint_results(
+    machine: &Machine,
+    estimate: &Estimate,
+    parameters: &[f64],
+    lags: &[Option<TorqueLag>],
+) -> Vec<JointResult> {
     machine
         .model
         .joints()
@@ -141,6 +147,7 @@ pub(crate) fn joint_results(machine: &Machine, estimate: &Estimate, parameters: 
             }),
             residual_std_nm: estimate.joint_sigma[index],
             residual_correlation: estimate.effective_lag1.get(index).copied().filter(|rho| rho.is_finite()),
+            torque_lag: lags[index],
         })
         .collect()
 }
