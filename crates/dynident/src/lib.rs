@@ -17,6 +17,7 @@ mod identify;
 mod inspect;
 mod iterate;
 mod job;
+mod load;
 mod machine;
 mod measured;
 mod output;
@@ -45,7 +46,7 @@ pub use identify::fit::{GrossErrors, NoiseInRegressor};
 pub use identify::friction_choice::{FrictionCandidate, JointFriction};
 pub use identify::instruments::{InstrumentSection, InstrumentSource, SmoothedMotion};
 pub use identify::result::{
-    BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, LogValidation, MethodSummary,
+    BaseParameterResult, BodyResult, JointResult, LawResult, LogOffset, LogSummary, LogValidation, MethodSummary,
     PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, Timings,
     TrainingJoint, TrainingResult,
 };
@@ -56,6 +57,8 @@ pub use iterate::{
     RobotChoice, iterate_study,
 };
 pub use job::RunOptions;
+pub use load::gains::DriveGain;
+pub use load::payload_result::{Measured, PayloadParameter, PayloadResult, PossiblePayload};
 pub use machine::Machine;
 pub use measured::evidence::PriorAgreement;
 pub use measured::lag::TorqueLag;
@@ -68,7 +71,7 @@ pub use simulate::section::{SimulatedTruth, SimulationSection};
 pub use simulate::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, Simulation, SimulationFile, simulate_study};
 pub use study::friction::{FrictionChoice, FrictionLaw};
 pub use study::{
-    CoulombChoice, CouplingSection, DriveSection, EstimatorMethod, EstimatorSection, Folders, JointDrive, LogSection,
-    ParallelFilterSection, RobotSection, Role, Study,
+    ArmSection, CoulombChoice, CouplingSection, DriveSection, EstimatorMethod, EstimatorSection, Folders, GainChoice,
+    JointDrive, LogSection, ParallelFilterSection, PayloadSection, Refit, RobotSection, Role, Study,
 };
 pub use validate::{VALIDATION_SCHEMA, ValidationFile, validate};

@@ -28,6 +28,8 @@ pub struct Machine {
     pub prior: Option<Vec<f64>>,
     /// For load-dependent friction: the bodies by an earlier estimate, one value per column of the layout. Without it such friction has a column of zeros.
     pub load_parameters: Option<Vec<f64>>,
+    /// What logged torque is multiplied by, joint by joint, where gains were found and not stated; empty otherwise.
+    pub torque_gains: Vec<f64>,
     /// Where the study's files are looked for.
     pub(crate) folders: Folders,
 }
@@ -118,6 +120,7 @@ impl Machine {
             layout,
             prior,
             load_parameters: None,
+            torque_gains: Vec::new(),
             folders: folders.clone(),
         })
     }

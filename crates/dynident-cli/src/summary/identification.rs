@@ -39,6 +39,7 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
         text += &residuals(log);
     }
     text += &lags(r);
+    text += &super::load::loads(r);
     text.push('\n');
     if !r.friction_choice.is_empty() {
         text += &friction(r);

@@ -45,6 +45,13 @@ pub(crate) struct Fitted {
     pub(crate) noise_correlation: Option<Vec<Vec<f64>>>,
 }
 
+impl Fitted {
+    /// An estimate that was made elsewhere.
+    pub(crate) fn alone(estimate: Estimate) -> Self {
+        Self { estimate, noise_in_regressor: None, gross_errors: None, noise_correlation: None }
+    }
+}
+
 /// The logs behind a fit, for estimators that pass them again.
 pub(crate) struct Logs<'a> {
     pub(crate) study: &'a Study,

@@ -21,11 +21,16 @@ use crate::identify::instruments::InstrumentSource;
 use crate::identify::physical::{physical_fit_result, possible_parameters};
 use crate::identify::result::{LogSummary, RESULT_SCHEMA, ResultFile, Timings};
 use crate::identify::result_sections::{
-    base_parameters, bodies, joint_results, law_results, method_summary, robot_summary, training_result, verdict,
+    base_parameters, bodies, joint_results, law_results, method_summary, offset_results, robot_summary,
+    training_result, verdict,
 };
 use crate::identify::standard_parameters::{inertials, nearest_to_prior};
 use crate::identify::written_urdf::written_urdf;
 use crate::job::{RunOptions, joint_names, log_files, log_summary, note_lags, of_role, study_name};
+use crate::load::arm::KnownArm;
+use crate::load::columns::LoadColumns;
+use crate::load::gains::{DriveGain, Gains, drive_gains};
+use crate::load::payload_result::payload_results;
 use crate::machine::{Machine, prior_parameters};
 use crate::measured::evidence::Evidence;
 use crate::measured::lag::{self, LAG_SAMPLES, LagCheck, TorqueLag};
@@ -33,8 +38,8 @@ use crate::measured::residuals::Uncertainty;
 use crate::measured::rows::{JointRows, Pass, RawSamples, RowSink, motion_in_force};
 use crate::measured::torque_trace::{LogTrace, TraceSink};
 use crate::progress::Silent;
-use crate::study::{EstimatorMethod, Folders, Role, Study};
-use crate::validate::{Tested, validate_log};
+use crate::study::{EstimatorMethod, Folders, GainChoice, Role, Study};
+use crate::validate::{Tested, read_model, validate_log};
 use dynident_dynamics::Column;
 use dynident_estimation::{
     Estimate, LinearProblem, OrdinarySettings, SegmentedFactor, WeightedSettings, essential, ordinary_least_squares,
@@ -108,22 +113,35 @@ fn identified(
     let start = Instant::now();
     study.require_training_log(study_path)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
+    let stored = study.arm.as_ref().map(|arm| folders.find(&arm.result, None)).transpose()?;
+    let stored = stored.map(|path| read_model(&path).map(|model| (path, model))).transpose()?;
+    // With the friction that was chosen when the arm was identified.
+    let with_arm = stored.as_ref().map(|(_, arm)| with_friction(study, &arm.friction_choice));
+    let study = with_arm.as_ref().unwrap_or(study);
     let machine = Machine::new(study, study_path, &folders)?;
+    let arm = stored.as_ref().map(|(path, arm)| KnownArm::new(path, arm, &machine)).transpose()?;
+    let arm_cutoff_hz = stored.as_ref().and_then(|(_, arm)| arm.method.motion.differentiator.cutoff_hz());
     let mut timings = Timings { machine: start.elapsed().as_secs_f64(), ..Timings::default() };
     let files = log_files(study, &folders)?;
 
     let training: Vec<usize> = of_role(study, Role::Identify);
-    let motion = motion_in_force(study, &machine, &files, &training, None)?;
+    let motion = motion_in_force(study, &machine, &files, &training, arm_cutoff_hz)?;
     let job = Training { study_path, folders: &folders, motion: &motion, files: &files, logs: &training, options };
-    let fitted = job.fit(study, machine, &mut timings)?;
-    let (study, machine) = (&fitted.study, &fitted.machine);
+    let mut fitted = job.fit(study, machine, &mut timings)?;
+    let gains = job.gains(&mut fitted)?;
+    let (study, machine, columns) = (&fitted.study, &fitted.machine, &fitted.columns);
     let (fits, problem) = (&fitted.fits, &fitted.problem);
     let in_study = |source| Error::Estimation { path: study_path.to_owned(), source };
     let passes =
         Logs { study, path: study_path, machine, motion: &motion, files: &files, training: &training, options };
     let started = Instant::now();
-    let Fitted { estimate, noise_in_regressor, gross_errors, noise_correlation } =
-        crate::identify::fit::fitted(&passes, problem, source)?;
+    let Fitted { estimate, noise_in_regressor, gross_errors, noise_correlation } = match (&arm, &study.arm, &gains) {
+        (Some(arm), Some(section), _) => {
+            Fitted::alone(arm.estimate(section, machine, columns, problem, &study.estimator).map_err(in_study)?)
+        }
+        (_, _, Some((estimate, _))) => Fitted::alone(estimate.clone()),
+        _ => crate::identify::fit::fitted(&passes, problem, source)?,
+    };
     let (estimate, dropped) = match &study.estimator.essential {
         Some(settings) => {
             essential(&estimate, settings).map(|(rest, report)| (rest, Some(report))).map_err(in_study)?
@@ -131,8 +149,13 @@ fn identified(
         None => (estimate, None),
     };
     let prior = prior_parameters(&machine.model, &machine.laws);
-    let (possible, failure) = if study.estimator.physical {
-        match possible_parameters(machine, problem, &estimate, &prior) {
+    let theta = &estimate.values[..columns.base()];
+    let (possible, failure) = if arm.is_some() {
+        (None, Some("the arm is known from an earlier result, which has its bodies and its URDF".to_owned()))
+    } else if study.estimator.physical {
+        let alone = (!columns.is_plain()).then(|| columns.arm_problem(problem, &estimate.values)).transpose();
+        let alone = alone.map_err(in_study)?;
+        match possible_parameters(machine, alone.as_ref().unwrap_or(problem), &estimate, &prior) {
             Ok(fit) => (Some(fit), None),
             Err(reason) => (None, Some(reason)),
         }
@@ -148,7 +171,8 @@ fn identified(
     let mut lags_by_joint = vec![Vec::new(); joints.len()];
     for fit in fits {
         let mut summary = fit.summary.clone();
-        let (lags, trace) = second_look(study, machine, &motion, fit.index, &files[fit.index], &estimate.values)?;
+        let theta = columns.base_values(fit.index, &estimate.values);
+        let (lags, trace) = second_look(study, machine, &motion, fit.index, &files[fit.index], &theta)?;
         note_lags(&mut summary, &lags);
         traces.push(trace);
         summary.model_findings.extend(lag::findings(&lags, &joints));
@@ -159,9 +183,13 @@ fn identified(
     }
     let lags: Vec<Option<TorqueLag>> = lags_by_joint.iter().map(|lags| lag::pooled(lags)).collect();
     let mut validation = Vec::new();
-    let uncertainty = Uncertainty::of(&estimate);
     for index in of_role(study, Role::Validate) {
-        let tested = Tested { theta: &estimate.values, physical, uncertainty: Some(&uncertainty), traced: true };
+        let theta = columns.base_values(index, &estimate.values);
+        let uncertainty = Uncertainty::of(&estimate, columns.base_covariance(index, &estimate.covariance));
+        let physical =
+            physical.map(|values| columns.base_values(index, &[values, &estimate.values[columns.base()..]].concat()));
+        let tested =
+            Tested { theta: &theta, physical: physical.as_deref(), uncertainty: Some(&uncertainty), traced: true };
         let (summary, figures, trace) = validate_log(study, machine, &motion, index, &files[index], &tested, options)?;
         logs.push(summary);
         validation.push(figures);
@@ -170,10 +198,9 @@ fn identified(
     timings.validation = started.elapsed().as_secs_f64();
     timings.total = start.elapsed().as_secs_f64();
 
-    let parameters = possible.as_ref().map_or_else(
-        || nearest_to_prior(&machine.model, &machine.base, &estimate.values, &prior),
-        |fit| fit.parameters.clone(),
-    );
+    let parameters = possible
+        .as_ref()
+        .map_or_else(|| nearest_to_prior(&machine.model, &machine.base, theta, &prior), |fit| fit.parameters.clone());
     let inertials = inertials(&machine.model, &parameters);
     let mut verdict = verdict(machine, &inertials, &parameters);
     if let Some(fit) = &possible {
@@ -183,7 +210,9 @@ fn identified(
     }
     verdict.failure = failure;
     // Parameters that URDF cannot express leave a result without one; it is no reason to lose the result.
-    let written = if study.estimator.physical && !verdict.consistent {
+    let written = if arm.is_some() {
+        Err(verdict.failure.clone().unwrap_or_default())
+    } else if study.estimator.physical && !verdict.consistent {
         let reason = verdict.failure.clone().unwrap_or_else(|| verdict.violations.join("; "));
         Err(format!(
             "the bodies are not physically possible: {reason} (estimator.physical = false writes them as they are)"
@@ -195,6 +224,7 @@ fn identified(
         Ok(urdf) => (Some(urdf), None),
         Err(reason) => (None, Some(reason)),
     };
+    let covariance = estimate.covariance.view((0, 0), (columns.base(), columns.base())).into_owned();
     let result = ResultFile {
         schema: RESULT_SCHEMA,
         name: study_name(study, study_path),
@@ -204,12 +234,15 @@ fn identified(
         gross_errors,
         noise_correlation,
         base_parameters: base_parameters(machine, &estimate, physical),
-        base_parameter_covariance: estimate.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        base_parameter_covariance: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
         bodies: bodies(machine, &inertials),
         essential: dropped,
         correlations: strongest_correlations(&estimate, CORRELATIONS),
         joints: joint_results(machine, &estimate, &parameters, &lags),
         friction_choice: fitted.friction_choice,
+        payloads: payload_results(study, &training, columns, &estimate),
+        offsets: offset_results(study, machine, &training, columns, &estimate),
+        drive_gains: gains.map(|(_, gains)| gains),
         couplings: law_results(machine, &estimate, &parameters, |law| matches!(law, Law::Coupling(_))),
         training: training_result(study, machine, problem, &training, &estimate).map_err(in_study)?,
         torque_band: validation.iter().flat_map(|log| &log.residuals).filter_map(|joint| joint.band.clone()).collect(),
@@ -240,6 +273,7 @@ struct TrainingFit {
     fits: Vec<LogFit>,
     problem: LinearProblem,
     estimate: Estimate,
+    columns: LoadColumns,
     friction_choice: Vec<JointFriction>,
 }
 
@@ -266,7 +300,8 @@ impl Training<'_> {
         let fits = read_logs(study, &wide, self.motion, self.files, self.logs, self.options)?;
         timings.logs += started.elapsed().as_secs_f64();
         let started = Instant::now();
-        let wide_problem = problem(study, &wide, &fits).map_err(in_study)?;
+        let columns_of = |study: &Study, machine: &Machine| LoadColumns::new(study, self.study_path, machine);
+        let wide_problem = problem(study, &wide, &columns_of(study, &wide)?, &fits).map_err(in_study)?;
         let friction_choice =
             choose_friction(study, &first.machine, &wide, &wide_problem, &choose, &columns, &first.estimate)
                 .map_err(in_study)?;
@@ -275,22 +310,36 @@ impl Training<'_> {
             Machine::new(&study, self.study_path, self.folders)?.with_load_of(&first.machine, &first.estimate.values);
         let fits =
             fits.into_iter().map(|fit| fit.of(&wide, &machine)).collect::<Result<Vec<_>, _>>().map_err(in_study)?;
-        let problem = problem(&study, &machine, &fits).map_err(in_study)?;
+        let load = columns_of(&study, &machine)?;
+        let problem = problem(&study, &machine, &load, &fits).map_err(in_study)?;
         let estimate = estimate(&study, &problem).map_err(in_study)?;
         timings.estimation += started.elapsed().as_secs_f64();
-        Ok(TrainingFit { study, machine, fits, problem, estimate, friction_choice })
+        Ok(TrainingFit { study, machine, fits, problem, estimate, columns: load, friction_choice })
     }
 
     fn fit_once(&self, study: Study, machine: Machine, timings: &mut Timings) -> Result<TrainingFit, Error> {
+        let columns = LoadColumns::new(&study, self.study_path, &machine)?;
         let started = Instant::now();
         let fits = read_logs(&study, &machine, self.motion, self.files, self.logs, self.options)?;
         timings.logs += started.elapsed().as_secs_f64();
         let started = Instant::now();
         let in_study = |source| Error::Estimation { path: self.study_path.to_owned(), source };
-        let problem = problem(&study, &machine, &fits).map_err(in_study)?;
+        let problem = problem(&study, &machine, &columns, &fits).map_err(in_study)?;
         let estimate = estimate(&study, &problem).map_err(in_study)?;
         timings.estimation += started.elapsed().as_secs_f64();
-        Ok(TrainingFit { study, machine, fits, problem, estimate, friction_choice: Vec::new() })
+        Ok(TrainingFit { study, machine, fits, problem, estimate, columns, friction_choice: Vec::new() })
+    }
+
+    /// Where the study asks for gains: the estimate with them. The machine then has them, and the problem is in newton metres.
+    fn gains(&self, fitted: &mut TrainingFit) -> Result<Option<(Estimate, Vec<DriveGain>)>, Error> {
+        if fitted.study.drive.gains == GainChoice::Stated {
+            return Ok(None);
+        }
+        let Gains { gains, estimate, problem } =
+            drive_gains(&fitted.study, self.study_path, &fitted.columns, &fitted.problem, self.logs)?;
+        fitted.machine.torque_gains = gains.iter().map(|gain| gain.gain).collect();
+        fitted.problem = problem;
+        Ok(Some((estimate, gains)))
     }
 }
 
@@ -391,7 +440,12 @@ fn read_log(
     let mut sink = FitSink {
         file: file.display().to_string(),
         factors,
-        evidence: machine.prior.as_ref().map(|prior| Evidence::new(columns, prior)),
+        // Torque in a unit that nobody knows says nothing about the description.
+        evidence: machine
+            .prior
+            .as_ref()
+            .filter(|_| study.drive.gains == GainChoice::Stated)
+            .map(|prior| Evidence::new(columns, prior)),
         buffer: Vec::new(),
     };
     let pass = Pass {
@@ -451,19 +505,25 @@ fn second_look(
 fn problem(
     study: &Study,
     machine: &Machine,
+    columns: &LoadColumns,
     fits: &[LogFit],
 ) -> Result<LinearProblem, dynident_estimation::EstimationError> {
-    let symbols = machine.layout.columns().iter().map(Column::symbol).collect();
-    let mut problem = LinearProblem::new(symbols, joint_names(machine));
+    let mut problem = LinearProblem::new(columns.symbols(machine), joint_names(machine));
     for fit in fits {
         // Two logs may share a name; their numbers keep them apart.
         let log = format!("{} ({})", study.log_name(fit.index), fit.index + 1);
         for (joint, factor) in fit.factors.iter().enumerate() {
-            problem.add(&log, joint, machine.layout.joint_columns(joint).to_vec(), factor.clone())?;
+            let own = machine.layout.joint_columns(joint);
+            let keep_known = study.drive.gains == GainChoice::Unknown;
+            columns.add(&mut problem, (fit.index, &log), joint, (own, factor), keep_known)?;
         }
     }
     match &machine.prior {
-        Some(prior) => problem.with_fallback(prior.clone()),
+        Some(prior) => {
+            let mut prior = prior.clone();
+            prior.resize(columns.count(), 0.0);
+            problem.with_fallback(prior)
+        }
         None => Ok(problem),
     }
 }

@@ -32,6 +32,7 @@ pub(crate) fn identification_report(found: &Identification) -> Result<String, Er
     parameters(&mut page, r);
     page.add(Heading::new("Friction and drives"));
     friction(&mut page, r);
+    crate::load::report::loads(&mut page, r);
     page.add(Heading::new("Bodies"));
     bodies(&mut page, r);
     page.add(Heading::new("Logs"));

@@ -2,6 +2,8 @@
 
 use crate::identify::fit::{GrossErrors, NoiseInRegressor};
 use crate::identify::friction_choice::JointFriction;
+use crate::load::gains::DriveGain;
+use crate::load::payload_result::PayloadResult;
 use crate::measured::evidence::PriorAgreement;
 use crate::measured::lag::TorqueLag;
 use crate::measured::residuals::{JointResiduals, TorqueBand};
@@ -43,6 +45,12 @@ pub struct ResultFile {
     pub joints: Vec<JointResult>,
     /// How friction was chosen, for the joints where the study asks for it.
     pub friction_choice: Vec<JointFriction>,
+    /// Payloads that were estimated.
+    pub payloads: Vec<PayloadResult>,
+    /// Offsets log by log; empty unless the study asks for them. The base parameters hold their mean.
+    pub offsets: Vec<LogOffset>,
+    /// Drive gains, joint by joint; none unless the study says that they are unknown.
+    pub drive_gains: Option<Vec<DriveGain>>,
     /// Drives that turn with two joints.
     pub couplings: Vec<LawResult>,
     /// The fit on the logs that it was made from.
@@ -185,6 +193,19 @@ pub struct JointResult {
     pub residual_correlation: Option<f64>,
     /// Lag of its torque behind the motion by all training logs; none where they do not tell. The model itself is fitted to the torque as logged.
     pub torque_lag: Option<TorqueLag>,
+}
+
+/// The offset of one joint in one log.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LogOffset {
+    /// The log.
+    pub log: String,
+    /// The joint.
+    pub joint: String,
+    /// What it differs from the mean over the training logs, Nm (N).
+    pub deviation_nm: f64,
+    /// The deviation's standard deviation.
+    pub std_nm: f64,
 }
 
 /// Figures of the fit on its own data.

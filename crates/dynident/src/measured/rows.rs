@@ -93,6 +93,7 @@ impl Pass<'_> {
             self.progress,
         )
         .map_err(|source| Error::Filter { log: log.clone(), source })?;
+        computer.torque_gains.clone_from(&self.machine.torque_gains);
         if self.reader_thread && self.most_samples.is_none() {
             read_beside(&mut stream, |block| computer.take(block, sink)).map_err(|error| error.named(&log))?;
         } else {
@@ -198,6 +199,7 @@ pub(crate) struct Computer<'a> {
     panels: Panels,
     history: LawHistory,
     decimators: Option<Vec<Decimator>>,
+    torque_gains: Vec<f64>,
     segment: usize,
     motion: [Vec<f64>; 3],
     out: Vec<f64>,
@@ -232,6 +234,7 @@ impl<'a> Computer<'a> {
             panels: Panels::default(),
             history: LawHistory::new(load_parameters),
             decimators,
+            torque_gains: Vec::new(),
             segment: 0,
             motion: [Vec::new(), Vec::new(), Vec::new()],
             out: Vec::new(),
@@ -270,7 +273,11 @@ impl<'a> Computer<'a> {
             );
             for (joint, &place) in log_place.iter().enumerate() {
                 let tau = &block.joint(block.fitted_tau(), place)[from..from + samples];
-                self.panels.torque_mut(joint).copy_from_slice(tau);
+                let torque = self.panels.torque_mut(joint);
+                torque.copy_from_slice(tau);
+                if let Some(gain) = self.torque_gains.get(joint) {
+                    torque.iter_mut().for_each(|torque| *torque *= gain);
+                }
             }
             sink.raw(&RawSamples { segment: block.segment, rate_hz: block.rate_hz, panels: &self.panels })?;
             let mut rows = samples;

@@ -18,6 +18,17 @@ pub enum CoulombChoice {
     Smooth,
 }
 
+/// Who says what a unit of logged torque is worth in newton metres.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GainChoice {
+    /// Unit and scale of the log's format.
+    #[default]
+    Stated,
+    /// Training logs without and with a payload that is known: one gain for each joint is estimated with the parameters.
+    Unknown,
+}
+
 /// `[drive]`: the laws of every joint, and exceptions by joint.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
@@ -34,6 +45,10 @@ pub struct DriveSection {
     pub coulomb_dead_band: f64,
     /// A constant torque. On by default.
     pub offset: bool,
+    /// Whether each training log has offsets of its own; the base parameters then hold their mean. Off by default.
+    pub offset_per_log: bool,
+    /// Who says what a unit of logged torque is worth. The format (`"stated"`) by default.
+    pub gains: GainChoice,
     /// Further laws of friction. None by default.
     pub laws: Vec<FrictionLaw>,
     /// Whether the keys above say which friction there is (`"stated"`, the default), or the training logs (`"auto"`).
@@ -51,6 +66,8 @@ impl Default for DriveSection {
             coulomb_width: 0.02,
             coulomb_dead_band: 0.0,
             offset: true,
+            offset_per_log: false,
+            gains: GainChoice::Stated,
             laws: Vec::new(),
             friction: FrictionChoice::Stated,
             joints: BTreeMap::new(),

@@ -8,13 +8,15 @@ pub(crate) mod friction;
 mod log;
 mod numbers;
 mod parallel_filter;
+mod payload;
 mod robot;
 
-pub use drive::{CoulombChoice, CouplingSection, DriveSection, JointDrive};
+pub use drive::{CoulombChoice, CouplingSection, DriveSection, GainChoice, JointDrive};
 pub use estimator::{EstimatorMethod, EstimatorSection};
 pub use folders::Folders;
 pub use log::{LogSection, Role};
 pub use parallel_filter::ParallelFilterSection;
+pub use payload::{ArmSection, PayloadSection, Refit};
 pub use robot::RobotSection;
 
 use crate::design::DesignSection;
@@ -72,6 +74,12 @@ pub struct Study {
     /// Drives that turn with two joints.
     #[serde(default)]
     pub coupling: Vec<CouplingSection>,
+    /// What logs were recorded with.
+    #[serde(default)]
+    pub payload: Vec<PayloadSection>,
+    /// An arm that is known already.
+    #[serde(default)]
+    pub arm: Option<ArmSection>,
     /// How all logs are written; a log may have its own `format`.
     #[serde(default)]
     pub format: Option<LogFormat>,
@@ -182,6 +190,12 @@ impl Study {
                 return Err(format!("coupling `{}` stands twice: give each drive a name of its own", coupling.name));
             }
             coupling.validate()?;
+        }
+        for (index, payload) in self.payload.iter().enumerate() {
+            if self.payload[..index].iter().any(|other| other.name == payload.name) {
+                return Err(format!("payload `{}` stands twice: give each a name of its own", payload.name));
+            }
+            payload.validate()?;
         }
         self.robot.validate()?;
         self.parallel_filter.validate()?;
