@@ -72,6 +72,6 @@ pub use simulate::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, Simulation, Sim
 pub use study::friction::{FrictionChoice, FrictionLaw};
 pub use study::{
     ArmSection, CoulombChoice, CouplingSection, DriveSection, EstimatorMethod, EstimatorSection, Folders, GainChoice,
-    JointDrive, LogSection, ParallelFilterSection, PayloadSection, Refit, RobotSection, Role, Study,
+    JointDrive, LogSection, OffsetChoice, ParallelFilterSection, PayloadSection, Refit, RobotSection, Role, Study,
 };
 pub use validate::{VALIDATION_SCHEMA, ValidationFile, validate};

@@ -213,7 +213,7 @@ fn offsets_differ_from_log_to_log() {
     }
     truth.drive.iter_mut().zip(&mean).for_each(|(drive, mean)| drive[3] = *mean);
     let text = format!(
-        "robot.file = {:?}\ndrive.offset_per_log = true\nparallel_filter.factor = 4\nlog = [{logs}]\n{}",
+        "robot.file = {:?}\ndrive.offsets = \"per-log\"\nparallel_filter.factor = 4\nlog = [{logs}]\n{}",
         ur10(),
         format(6)
     );

@@ -335,7 +335,7 @@ impl Training<'_> {
         if fitted.study.drive.gains == GainChoice::Stated {
             return Ok(None);
         }
-        let Gains { gains, estimate, problem } =
+        let Gains { of_joints: gains, estimate, problem } =
             drive_gains(&fitted.study, self.study_path, &fitted.columns, &fitted.problem, self.logs)?;
         fitted.machine.torque_gains = gains.iter().map(|gain| gain.gain).collect();
         fitted.problem = problem;

@@ -6,7 +6,7 @@
 use crate::error::Error;
 use crate::job::{joint_names, of_role};
 use crate::machine::Machine;
-use crate::study::{EstimatorMethod, GainChoice, Refit, Role, Study};
+use crate::study::{EstimatorMethod, GainChoice, OffsetChoice, Refit, Role, Study};
 use dynident_dynamics::{Column, independent_columns};
 use dynident_estimation::{EstimationError, LinearProblem, SegmentedFactor};
 use dynident_model::laws::{Law, Offset};
@@ -97,7 +97,7 @@ impl LoadColumns {
             payloads.push(columns);
         }
         let mut offsets = Vec::new();
-        if study.drive.offset_per_log {
+        if per_log(study) {
             let joints = joint_names(machine);
             let with_offset = |joint: &usize| machine.laws.contains(&Law::Offset(Offset { joint: *joint }));
             // The last log's are the others' with the opposite sign: the base parameters hold the mean.
@@ -265,6 +265,10 @@ impl PayloadColumns {
     }
 }
 
+fn per_log(study: &Study) -> bool {
+    study.drive.offsets == OffsetChoice::PerLog
+}
+
 /// What the study asks for and payloads cannot be with.
 fn check(study: &Study, machine: &Machine) -> Result<(), String> {
     for log in &study.log {
@@ -280,7 +284,7 @@ fn check(study: &Study, machine: &Machine) -> Result<(), String> {
     }
     let loaded = study.log.iter().any(|log| log.payload.is_some());
     let unknown_gains = study.drive.gains == GainChoice::Unknown;
-    let special = loaded || study.drive.offset_per_log || study.arm.is_some() || unknown_gains;
+    let special = loaded || per_log(study) || study.arm.is_some() || unknown_gains;
     if !special {
         return Ok(());
     }
@@ -288,7 +292,7 @@ fn check(study: &Study, machine: &Machine) -> Result<(), String> {
         let to_estimate = |name: &String| study.payload.iter().any(|p| p.name == *name && p.mass_kg.is_none());
         let carried =
             study.log.iter().any(|log| log.role == Role::Identify && log.payload.as_ref().is_some_and(to_estimate));
-        if !carried && arm.refit == Refit::Nothing && !study.drive.offset_per_log {
+        if !carried && arm.refit == Refit::Nothing && !per_log(study) {
             return Err("[arm]: the arm is held and nothing is left to estimate: describe a [[payload]] without mass_kg and let a [[log]] carry it, or say what to `refit`".to_owned());
         }
         if unknown_gains {

@@ -32,7 +32,7 @@ pub struct DriveGain {
 
 /// What a fit with unknown gains found.
 pub(crate) struct Gains {
-    pub(crate) gains: Vec<DriveGain>,
+    pub(crate) of_joints: Vec<DriveGain>,
     /// Over the columns of the problem, in SI units.
     pub(crate) estimate: Estimate,
     /// The problem with its torque in newton metres and without the known payloads' torque.
@@ -64,7 +64,7 @@ pub(crate) fn drive_gains(
     let scale: Vec<f64> = found.gains.iter().map(|gain| gain.gain).collect();
     let problem = in_newton_metres(rows, &known, &scale).map_err(in_study)?;
     let estimate = without_gains(found.estimate, rows.columns().len(), &scale);
-    Ok(Gains { gains: found.gains.into_iter().map(judged).collect(), estimate, problem })
+    Ok(Gains { of_joints: found.gains.into_iter().map(judged).collect(), estimate, problem })
 }
 
 fn judged(gain: JointGain) -> DriveGain {

@@ -71,9 +71,8 @@ pub(crate) fn possible_body(name: &str, columns: &PayloadColumns, estimate: &Est
     // V = L Lᵀ: rows L⁻¹ φ = L⁻¹ φ̂ have unit noise.
     let lower = covariance.cholesky().ok_or_else(|| "its covariance is not positive definite".to_owned())?.l();
     let values = DVector::from_iterator(told.len(), told.iter().map(|&place| value(place)));
-    let (rows, target) = match (lower.clone().try_inverse(), lower.solve_lower_triangular(&values)) {
-        (Some(rows), Some(target)) => (rows, target),
-        _ => return Err("its covariance is not positive definite".to_owned()),
+    let (Some(rows), Some(target)) = (lower.clone().try_inverse(), lower.solve_lower_triangular(&values)) else {
+        return Err("its covariance is not positive definite".to_owned());
     };
     let mut panel = vec![0.0; (n + 1) * told.len()];
     for (i, &place) in told.iter().enumerate() {

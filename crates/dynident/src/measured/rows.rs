@@ -276,7 +276,9 @@ impl<'a> Computer<'a> {
                 let torque = self.panels.torque_mut(joint);
                 torque.copy_from_slice(tau);
                 if let Some(gain) = self.torque_gains.get(joint) {
-                    torque.iter_mut().for_each(|torque| *torque *= gain);
+                    for torque in torque {
+                        *torque *= gain;
+                    }
                 }
             }
             sink.raw(&RawSamples { segment: block.segment, rate_hz: block.rate_hz, panels: &self.panels })?;

@@ -18,6 +18,17 @@ pub enum CoulombChoice {
     Smooth,
 }
 
+/// Which logs share the joints' offsets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OffsetChoice {
+    /// All.
+    #[default]
+    Shared,
+    /// None: each training log has its own, and the base parameters hold their mean.
+    PerLog,
+}
+
 /// Who says what a unit of logged torque is worth in newton metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -45,8 +56,8 @@ pub struct DriveSection {
     pub coulomb_dead_band: f64,
     /// A constant torque. On by default.
     pub offset: bool,
-    /// Whether each training log has offsets of its own; the base parameters then hold their mean. Off by default.
-    pub offset_per_log: bool,
+    /// Whether training logs share their offsets (`"shared"`, the default).
+    pub offsets: OffsetChoice,
     /// Who says what a unit of logged torque is worth. The format (`"stated"`) by default.
     pub gains: GainChoice,
     /// Further laws of friction. None by default.
@@ -66,7 +77,7 @@ impl Default for DriveSection {
             coulomb_width: 0.02,
             coulomb_dead_band: 0.0,
             offset: true,
-            offset_per_log: false,
+            offsets: OffsetChoice::Shared,
             gains: GainChoice::Stated,
             laws: Vec::new(),
             friction: FrictionChoice::Stated,

@@ -11,7 +11,7 @@ mod parallel_filter;
 mod payload;
 mod robot;
 
-pub use drive::{CoulombChoice, CouplingSection, DriveSection, GainChoice, JointDrive};
+pub use drive::{CoulombChoice, CouplingSection, DriveSection, GainChoice, JointDrive, OffsetChoice};
 pub use estimator::{EstimatorMethod, EstimatorSection};
 pub use folders::Folders;
 pub use log::{LogSection, Role};
