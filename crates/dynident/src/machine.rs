@@ -137,6 +137,24 @@ impl Machine {
         wide
     }
 
+    /// That a log has the temperature, if friction depends on it.
+    ///
+    /// # Errors
+    /// [`Error::NoTemperature`].
+    pub(crate) fn check_temperature(&self, study: &Study, log: usize) -> Result<(), Error> {
+        let columns = self.layout.columns().iter();
+        let needing = columns.filter_map(|column| match column {
+            Column::Law(law) if law.needs_temperature() => law.joints().first().copied(),
+            _ => None,
+        });
+        match needing.min() {
+            Some(joint) if study.format_of(log).temperature.is_none() => {
+                Err(Error::NoTemperature { log: study.log_name(log), joint: self.model.joints()[joint].name.clone() })
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// The machine with the bodies of an estimate of `other`, where load-dependent friction needs them.
     pub(crate) fn with_load_of(mut self, other: &Self, values: &[f64]) -> Self {
         if self.layout.columns().iter().any(|column| matches!(column, Column::Law(Law::Load(_)))) {

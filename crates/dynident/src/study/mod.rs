@@ -185,6 +185,7 @@ impl Study {
             log.validate().map_err(|error| format!("[[log]] number {}: {error}", index + 1))?;
         }
         self.drive.validate()?;
+        self.check_temperature()?;
         for (index, coupling) in self.coupling.iter().enumerate() {
             if self.coupling[..index].iter().any(|other| other.name == coupling.name) {
                 return Err(format!("coupling `{}` stands twice: give each drive a name of its own", coupling.name));
@@ -204,6 +205,22 @@ impl Study {
         }
         self.motion.validate().map_err(|error| format!("[motion]: {error}"))?;
         self.estimator.validate()?;
+        Ok(())
+    }
+
+    /// That friction which depends on the temperature is asked for where it can be had.
+    fn check_temperature(&self) -> Result<(), String> {
+        let laws = self.drive.joints.values().filter_map(|own| own.laws.as_ref()).chain([&self.drive.laws]).flatten();
+        if !laws.into_iter().any(|law| matches!(law, friction::FrictionLaw::Temperature { .. })) {
+            return Ok(());
+        }
+        let own = self.drive.joints.values().filter_map(|own| own.friction);
+        if own.chain([self.drive.friction]).any(|choice| choice == friction::FrictionChoice::Auto) {
+            return Err("drive: friction = \"auto\" does not go with the law `temperature`: let the logs choose friction without it, then state what they chose beside it".to_owned());
+        }
+        if self.estimator.method == EstimatorMethod::Instrumental || self.estimator.instruments.is_some() {
+            return Err("drive: the law `temperature` does not go with instruments: use another estimator.method and leave out estimator.instruments".to_owned());
+        }
         Ok(())
     }
 
