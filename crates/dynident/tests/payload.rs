@@ -6,6 +6,7 @@ mod common;
 use common::{Job, Motion, Random, Truth, assert_recovered, format, header, plain, repository, write_log};
 use dynident::model::{InertialParameters, Mat3, Vec3};
 use dynident::{Measured, validate};
+use std::fmt::Write;
 use std::path::Path;
 
 /// As in the tests of noise-free logs without payload.
@@ -209,7 +210,7 @@ fn offsets_differ_from_log_to_log() {
         let file = format!("log{number}.csv");
         let motion = Motion::new(6, 1 + number as u64);
         write_log(&folder.path().join(&file), &truth, &motion, (400.0, 6.0), &header(6), plain);
-        logs += &format!("{{ file = \"{file}\" }},");
+        write!(logs, "{{ file = \"{file}\" }},").unwrap();
     }
     truth.drive.iter_mut().zip(&mean).for_each(|(drive, mean)| drive[3] = *mean);
     let text = format!(

@@ -233,10 +233,10 @@ impl Law {
             }
             Self::MaxwellSlip(law) => law.column(motion.q_of(row), input.memory, out),
             Self::TemperatureViscous(law) => {
-                by_temperature(row, motion, input.temperature_c, out, |t, dq| law.value(t, dq))
+                by_temperature(row, motion, input.temperature_c, out, |t, dq| law.value(t, dq));
             }
             Self::TemperatureCoulomb(law) => {
-                by_temperature(row, motion, input.temperature_c, out, |t, dq| law.value(t, dq))
+                by_temperature(row, motion, input.temperature_c, out, |t, dq| law.value(t, dq));
             }
             Self::Offset(law) => law.column(out),
             Self::DriveInertia(law) => law.column(motion, out),
