@@ -11,6 +11,8 @@ pub struct LawHistory {
     pub(crate) load_parameters: Option<Vec<f64>>,
     /// The load of one joint.
     pub(crate) load: Vec<f64>,
+    /// Temperatures of the next block, joint-major, °C; empty without.
+    pub(crate) temperature_c: Vec<f64>,
 }
 
 impl LawHistory {
@@ -18,6 +20,12 @@ impl LawHistory {
     /// ask of it, `τ_load = Σ_body columns W_j θ`, Nm (N). Values at the laws' columns are not read. Without them, load-dependent friction has a column of zeros.
     pub fn new(load_parameters: Option<Vec<f64>>) -> Self {
         Self { load_parameters, ..Self::default() }
+    }
+
+    /// Says how warm the joints are in the next block, °C, joint-major like its motion; without it laws that depend on the temperature have columns of zeros.
+    pub fn set_temperature(&mut self, temperature_c: &[f64]) {
+        self.temperature_c.clear();
+        self.temperature_c.extend_from_slice(temperature_c);
     }
 
     /// Forgets the motion so far: the next block starts a recording.

@@ -199,10 +199,10 @@ pub fn regressor_panels(
     regressor_panels_following(model, workspace, layout, motion, &mut LawHistory::default(), panels);
 }
 
-/// [`regressor_panels`](regressor_panels()) of a block that follows others of the same recording: laws with memory go on where `history` left them, load-dependent ones know their load.
+/// [`regressor_panels`](regressor_panels()) of a block that follows others of the same recording: laws with memory go on where `history` left them, load-dependent ones know their load, and others their temperature.
 ///
 /// # Panics
-/// As [`regressor_panels`](regressor_panels()), or if the history has load parameters of another number than the layout's columns.
+/// As [`regressor_panels`](regressor_panels()), or if the history has load parameters of another number than the layout's columns. Temperatures of another number than joints × samples count as none.
 pub fn regressor_panels_following(
     model: &Model,
     workspace: &mut BatchWorkspace,
@@ -218,6 +218,9 @@ pub fn regressor_panels_following(
     let BatchWorkspace { level, scratch, .. } = workspace;
     dispatch(*level, Fill { model, scratch, layout, motion, panels });
     let samples = motion.samples;
+    if history.temperature_c.len() != layout.dof() * samples {
+        history.temperature_c.clear();
+    }
     for (joint, panel) in layout.joints.iter().enumerate() {
         let mut load_is_known = false;
         for &(place, global) in &panel.laws {
@@ -232,7 +235,8 @@ pub fn regressor_panels_following(
             }
             let mut none = LawMemory::default();
             let memory = history.memories.get_mut(global).unwrap_or(&mut none);
-            let mut input = LawInput { load: load_is_known.then_some(&history.load[..]), memory };
+            let temperature_c = history.temperature_c.get(joint * samples..(joint + 1) * samples);
+            let mut input = LawInput { load: load_is_known.then_some(&history.load[..]), temperature_c, memory };
             law.column_following(joint, motion, &mut input, &mut columns[place * samples..(place + 1) * samples]);
         }
     }

@@ -27,6 +27,8 @@ mod generalized;
 mod hausman;
 mod instrumental;
 mod instrumented;
+mod joint_gains;
+mod known_columns;
 mod maximum_likelihood;
 mod newey_west;
 mod noise_levels;
@@ -61,6 +63,8 @@ pub use generalized::{CrossProblem, GeneralizedEstimate, generalized_least_squar
 pub use hausman::{HausmanColumn, HausmanSettings, HausmanTest, HausmanVerdict, hausman_test};
 pub use instrumental::{InstrumentReport, InstrumentalEstimate, InstrumentalSettings, instrumental_variables};
 pub use instrumented::InstrumentedProblem;
+pub use joint_gains::{GainEstimate, GainProblem, JointGain, joint_gains};
+pub use known_columns::{KnownColumns, weighted_least_squares_with_known};
 pub use maximum_likelihood::{
     InstantRows, InstantVisitor, MaximumLikelihoodEstimate, MaximumLikelihoodSettings, maximum_likelihood,
 };

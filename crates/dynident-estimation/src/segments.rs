@@ -2,6 +2,7 @@
 
 use crate::error::EstimationError;
 use crate::factor::{FactorWorkspace, TriangularFactor, check_columns, check_panel};
+use crate::problem::expect;
 use core::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -207,6 +208,44 @@ impl SegmentedFactor {
             total.append(self.columns, &mut workspace, segment);
         }
         total.factor(self.columns, &mut workspace)
+    }
+
+    /// The rows `[W | τ] C` in the same segments: other columns, and another torque, made of these. C has shape (columns + 1, new columns + 1), its last column makes the torque. A load whose
+    /// columns are sums of others, a torque less a known part, or a unit of one joint need no second pass over the log.
+    ///
+    /// ```
+    /// use dynident_estimation::{SegmentSettings, SegmentedFactor};
+    /// use nalgebra::DMatrix;
+    /// let mut log = SegmentedFactor::new(1, SegmentSettings::default())?;
+    /// log.absorb(&[1.0, 2.0, 5.0, 9.0], 2)?; // w = 1, 2 and τ = 5, 9
+    /// // One column 2 w; torque τ - w = 4, 7.
+    /// let other = log.mapped(&DMatrix::from_row_slice(2, 2, &[2.0, -1.0, 0.0, 1.0]))?;
+    /// assert!((other.total().residual_sum_of_squares(&[1.5])? - 2.0).abs() < 1e-12);
+    /// # Ok::<(), dynident_estimation::EstimationError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] unless C has one row for each column and one for the torque, and at least one column; [`EstimationError::Setting`] for an entry that is not finite.
+    pub fn mapped(&self, map: &DMatrix<f64>) -> Result<Self, EstimationError> {
+        expect("rows of a map of columns", self.columns + 1, map.nrows())?;
+        if map.ncols() == 0 {
+            return Err(EstimationError::Mismatch {
+                what: "columns of a map of columns".into(),
+                expected: 1,
+                found: 0,
+            });
+        }
+        if let Some(&value) = map.iter().find(|value| !value.is_finite()) {
+            return Err(EstimationError::Setting { setting: "map of columns", value, mend: "give finite numbers" });
+        }
+        Ok(self.transformed(core::slice::from_ref(map)))
+    }
+
+    /// The same rows as one segment: all that values need, and little work for those who solve again and again.
+    #[must_use]
+    pub fn as_one_segment(&self) -> Self {
+        let segments = vec![Segment::Factor(self.total())];
+        Self { segments, length_rows: self.rows.max(1), workspace: FactorWorkspace::default(), ..*self }
     }
 
     /// The same columns and segments without their rows, for another pass over the same log.

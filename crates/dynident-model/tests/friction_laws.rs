@@ -110,7 +110,7 @@ fn friction_by_load() {
     law.column_following(
         0,
         &motion,
-        &mut LawInput { load: Some(&[-5.0, -7.0, 9.0]), memory: &mut LawMemory::default() },
+        &mut LawInput { load: Some(&[-5.0, -7.0, 9.0]), temperature_c: None, memory: &mut LawMemory::default() },
         &mut out,
     );
     assert_eq!(out, [5.0, -7.0, 0.0]);
@@ -137,10 +137,47 @@ fn a_slipping_spring_makes_the_loop_of_masing_and_remembers_across_blocks() {
         for range in [0..split, split..q.len()] {
             let samples = range.len();
             let motion = JointMotion { samples, q: &q[range.clone()], dq: &zeros[..samples], ddq: &zeros[..samples] };
-            law.column_following(0, &motion, &mut LawInput { load: None, memory: &mut memory }, &mut parts[range]);
+            law.column_following(
+                0,
+                &motion,
+                &mut LawInput { load: None, temperature_c: None, memory: &mut memory },
+                &mut parts[range],
+            );
         }
         assert_eq!(parts, whole);
         memory.restart();
         assert_eq!(memory, LawMemory::default());
+    }
+}
+
+#[test]
+fn friction_changes_with_the_temperature_about_its_reference() {
+    use dynident_model::laws::{TemperatureCoulomb, TemperatureViscous};
+    let (speeds, temperature) = ([0.4, -0.4, 0.0, 1.0], [25.0, 35.0, 35.0, 15.0]);
+    let motion = JointMotion { samples: 4, q: &[0.0; 4], dq: &speeds, ddq: &[0.0; 4] };
+    let shape = CoulombShape::Sign { dead_band: 0.0 };
+    let viscous = Law::TemperatureViscous(TemperatureViscous { joint: 0, reference_c: 25.0 });
+    let coulomb = Law::TemperatureCoulomb(TemperatureCoulomb { joint: 0, reference_c: 25.0, shape });
+    for (law, expected) in [(&viscous, [0.0, -4.0, 0.0, -10.0]), (&coulomb, [0.0, -10.0, 0.0, -10.0])] {
+        let mut out = [1.0; 4];
+        let mut input = LawInput { load: None, temperature_c: Some(&temperature), memory: &mut LawMemory::default() };
+        law.column_following(0, &motion, &mut input, &mut out);
+        assert_eq!(out, expected, "{}", law.symbol());
+        // Without a temperature the joint is at its reference.
+        law.column(0, &motion, &mut out);
+        assert_eq!(out, [0.0; 4]);
+        assert!(law.needs_temperature() && law.is_joint_friction() && !law.is_nonnegative());
+    }
+    assert_eq!((&viscous.symbol()[..], viscous.unit()), ("fvT1", "Nm s/(rad K)"));
+    assert_eq!((&coulomb.symbol()[..], coulomb.unit()), ("fcT1", "Nm/K"));
+    // Slopes against central differences: h² of curvature, rounding over h.
+    let smooth = TemperatureCoulomb { joint: 0, reference_c: 25.0, shape: CoulombShape::Smooth { width: 0.1 } };
+    let linear = TemperatureViscous { joint: 0, reference_c: 25.0 };
+    for dq in [-0.13, 0.02, 0.3] {
+        let h = 1e-6;
+        let slope = (smooth.value(31.0, dq + h) - smooth.value(31.0, dq - h)) / (2.0 * h);
+        assert!((smooth.slope(31.0, dq) - slope).abs() < 1e-7);
+        let slope = (linear.value(31.0, dq + h) - linear.value(31.0, dq - h)) / (2.0 * h);
+        assert!((linear.slope(31.0) - slope).abs() < 1e-7);
     }
 }

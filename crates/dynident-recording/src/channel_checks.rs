@@ -9,7 +9,7 @@ const SATURATED_RUN: u64 = 20;
 /// What was seen of one channel of one joint.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChannelReport {
-    /// `position`, `velocity`, `acceleration` or `torque`.
+    /// `position`, `velocity`, `acceleration`, `torque` or `temperature`.
     pub channel: &'static str,
     /// The joint.
     pub joint: String,
@@ -104,6 +104,7 @@ impl ChannelCheck {
                 Quantity::Velocity => "velocity",
                 Quantity::Acceleration => "acceleration",
                 Quantity::Torque => "torque",
+                Quantity::Temperature => "temperature",
             },
             joint: self.joint.clone(),
             min: -self.low.value,

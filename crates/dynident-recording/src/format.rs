@@ -261,6 +261,9 @@ pub struct LogFormat {
     pub acceleration: Option<ChannelGroup>,
     /// Joint torques or motor currents.
     pub torque: ChannelGroup,
+    /// Temperatures of the joints, °C, for friction that depends on them. Any other unit by `scale` and `offset`; several joints may name the same column.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<ChannelGroup>,
     /// Data rows `[first, end)`, 0-based, header and comments not counted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rows: Option<[u64; 2]>,
@@ -379,6 +382,7 @@ impl LogFormat {
         groups.extend(self.velocity.as_ref().map(|group| ("velocity", group, Quantity::Velocity)));
         groups.extend(self.acceleration.as_ref().map(|group| ("acceleration", group, Quantity::Acceleration)));
         groups.push(("torque", &self.torque, Quantity::Torque));
+        groups.extend(self.temperature.as_ref().map(|group| ("temperature", group, Quantity::Temperature)));
         groups
     }
 }

@@ -43,6 +43,7 @@ pub(crate) fn part(block: &MotionBlock, run: &Range<usize>) -> MotionBlock {
         ddq: some(&block.ddq),
         tau: some(&block.tau),
         tau_smooth: some(&block.tau_smooth),
+        temperature_c: some(&block.temperature_c),
     }
 }
 

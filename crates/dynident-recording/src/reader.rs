@@ -27,6 +27,8 @@ pub struct RawBlock {
     pub ddq: Vec<Vec<f64>>,
     /// Torques (N m, N).
     pub tau: Vec<Vec<f64>>,
+    /// Temperatures (°C); empty without a `temperature` group.
+    pub temperature_c: Vec<Vec<f64>>,
 }
 
 impl RawBlock {
@@ -178,12 +180,13 @@ impl LogReader {
         while !self.finished && block.row.len() < BLOCK_ROWS {
             self.next_row_into(block)?;
         }
-        for group in ["position", "velocity", "acceleration", "torque"] {
+        for group in ["position", "velocity", "acceleration", "torque", "temperature"] {
             let (out, finite) = match group {
                 "position" => (&mut block.q, "position"),
                 "velocity" => (&mut block.dq, "velocity"),
                 "acceleration" => (&mut block.ddq, "acceleration"),
-                _ => (&mut block.tau, "torque"),
+                "torque" => (&mut block.tau, "torque"),
+                _ => (&mut block.temperature_c, "temperature"),
             };
             let Some(group) = self.groups.iter().find(|candidate| candidate.key == group) else {
                 out.clear();

@@ -132,6 +132,7 @@ impl Reference {
             acceleration: Some(columns("ddq")),
             // A log has a torque; a reference has none, and its positions stand in.
             torque: columns("q"),
+            temperature: None,
             rows: None,
             fraction: None,
             time_range_s: None,

@@ -70,6 +70,8 @@ pub struct MotionBlock {
     pub tau: Vec<f64>,
     /// Torques smoothed like the positions; empty unless asked for.
     pub tau_smooth: Vec<f64>,
+    /// Temperatures of the joints on the uniform clock, unfiltered (°C); empty without a `temperature` group.
+    pub temperature_c: Vec<f64>,
 }
 
 impl MotionBlock {
@@ -103,7 +105,7 @@ pub struct MotionStream {
     /// Samples on either side of a chunk that enter it; `None`: the whole segment.
     context: Option<usize>,
     segmenter: Segmenter,
-    /// Channels on the uniform clock: positions, torques, logged velocities, logged accelerations.
+    /// Channels on the uniform clock: positions, torques, logged velocities, logged accelerations, temperatures.
     uniform: Vec<Vec<f64>>,
     /// Samples of `uniform` that were given out and stay as context.
     done: usize,
@@ -197,7 +199,8 @@ impl MotionStream {
         };
         let (velocity, acceleration) =
             (comparisons(format.velocity.is_some()), comparisons(format.acceleration.is_some()));
-        let channels = 2 * joints.len() + velocity.len() + acceleration.len();
+        let temperature = if format.temperature.is_some() { joints.len() } else { 0 };
+        let channels = 2 * joints.len() + velocity.len() + acceleration.len() + temperature;
         Ok(Self {
             reader: LogReader::open(format, file, joints)?,
             raw: RawBlock::default(),
@@ -318,14 +321,15 @@ impl MotionStream {
                 self.time_check.see(*row, *time_s);
             }
             // In the order of LogFormat::groups.
-            let logged = self.raw.q.iter().chain(&self.raw.dq).chain(&self.raw.ddq).chain(&self.raw.tau);
+            let raw = &self.raw;
+            let logged = raw.q.iter().chain(&raw.dq).chain(&raw.ddq).chain(&raw.tau).chain(&raw.temperature_c);
             for (check, values) in self.checks.iter_mut().zip(logged) {
                 check.see(values);
             }
         }
         let raw = &self.raw;
         self.raw_at = self.segmenter.feed(&raw.row, &raw.time_s, self.raw_at, &mut self.uniform, || {
-            raw.q.iter().chain(&raw.tau).chain(&raw.dq).chain(&raw.ddq)
+            raw.q.iter().chain(&raw.tau).chain(&raw.dq).chain(&raw.ddq).chain(&raw.temperature_c)
         });
         Ok(())
     }
@@ -367,7 +371,8 @@ impl MotionStream {
         block.first_time_s = self.segmenter.first_time_s() + (self.passed as f64 + from as f64) / rate;
         block.rows = rows;
         block.joints = joints;
-        for values in [&mut block.q, &mut block.dq, &mut block.ddq, &mut block.tau, &mut block.tau_smooth] {
+        let MotionBlock { q, dq, ddq, tau, tau_smooth, temperature_c, .. } = block;
+        for values in [q, dq, ddq, tau, tau_smooth, temperature_c] {
             values.clear();
         }
         let mut marked = Vec::new();
@@ -391,6 +396,10 @@ impl MotionStream {
                 if self.smooth_torque {
                     self.differentiator.smooth(rate, &tau[window_from..window_to], other)?;
                     block.tau_smooth.extend_from_slice(&other[inside.clone()]);
+                }
+                let first = 2 * joints + self.velocity.len() + self.acceleration.len();
+                if let Some(temperature) = self.uniform.get(first + joint) {
+                    block.temperature_c.extend_from_slice(&temperature[from..end]);
                 }
                 let channel = 2 * joints + joint;
                 if let Some(comparison) = self.velocity.get_mut(joint) {

@@ -11,6 +11,8 @@ pub enum Quantity {
     Acceleration,
     /// Torque or force (N m, N), or a current that `scale` turns into one.
     Torque,
+    /// Temperature, °C.
+    Temperature,
 }
 
 /// Name, quantity, factor to SI.
@@ -39,9 +41,10 @@ const UNITS: &[(&str, Quantity, f64)] = &[
     ("mA", Quantity::Torque, 1e-3),
     ("%", Quantity::Torque, 1e-2),
     ("raw", Quantity::Torque, 1.0),
+    ("degC", Quantity::Temperature, 1.0),
 ];
 
-/// The factor that turns a value in `unit` into SI: rad, m, their rates, N m, N, and A (times `scale` in N m/A).
+/// The factor that turns a value in `unit` into SI: rad, m, their rates, N m, N, °C, and A (times `scale` in N m/A).
 /// `None` if `unit` is no unit of `quantity`.
 pub fn si_factor(unit: &str, quantity: Quantity) -> Option<f64> {
     UNITS.iter().find(|(name, of, _)| *name == unit && *of == quantity).map(|(_, _, factor)| *factor)

@@ -79,6 +79,16 @@ pub enum Error {
         /// What is wrong.
         source: FilterError,
     },
+    /// A log without the temperature that friction depends on.
+    #[error(
+        "log `{log}`: friction of joint `{joint}` depends on the temperature, which the log has not; give its columns as temperature of the format, or leave out the law `temperature`"
+    )]
+    NoTemperature {
+        /// The log.
+        log: String,
+        /// The first joint that needs it.
+        joint: String,
+    },
     /// A log that leaves no rows after filtering.
     #[error(
         "log `{log}`: {rows} samples leave nothing behind the parallel filter, which needs {needed}; give a longer part of the log, a higher cut-off, or parallel_filter.enabled = false"

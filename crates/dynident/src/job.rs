@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::identify::result::LogSummary;
 use crate::machine::Machine;
 use crate::measured::evidence::{PriorAgreement, findings};
-use crate::measured::lag;
+use crate::measured::lag::{self, TorqueLag};
 use crate::measured::rows::Passed;
 use crate::progress::Progress;
 use crate::study::{Folders, Role, Study};
@@ -44,12 +44,12 @@ pub(crate) fn log_summary(
     index: usize,
     passed: Passed,
     prior_agreement: Option<PriorAgreement>,
-    torque_lag_s: Vec<Option<f64>>,
+    lags: &[Option<TorqueLag>],
     joints: &[String],
 ) -> LogSummary {
     let mut model_findings = prior_agreement.as_ref().map_or_else(Vec::new, findings);
-    model_findings.extend(lag::findings(&torque_lag_s, joints));
-    LogSummary {
+    model_findings.extend(lag::findings(lags, joints));
+    let mut summary = LogSummary {
         log: study.log_name(index),
         role: match study.log[index].role {
             Role::Identify => "identify",
@@ -60,8 +60,19 @@ pub(crate) fn log_summary(
         filtered_rate_hz: passed.filtered_rate_hz,
         filtered_rows: passed.filtered_rows,
         model_findings,
-        torque_lag_s,
+        torque_lag_s: Vec::new(),
+        torque_lag_std_s: Vec::new(),
+        torque_lag_half_width_95_s: Vec::new(),
         prior_agreement,
         import: passed.report,
-    }
+    };
+    note_lags(&mut summary, lags);
+    summary
+}
+
+/// Writes a log's lags into its summary.
+pub(crate) fn note_lags(summary: &mut LogSummary, lags: &[Option<TorqueLag>]) {
+    summary.torque_lag_s = lags.iter().map(|lag| lag.map(|lag| lag.lag_s)).collect();
+    summary.torque_lag_std_s = lags.iter().map(|lag| lag.map(|lag| lag.std_s)).collect();
+    summary.torque_lag_half_width_95_s = lags.iter().map(|lag| lag.map(|lag| lag.half_width_95_s)).collect();
 }

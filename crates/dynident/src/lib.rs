@@ -17,6 +17,7 @@ mod identify;
 mod inspect;
 mod iterate;
 mod job;
+mod load;
 mod machine;
 mod measured;
 mod output;
@@ -47,7 +48,7 @@ pub use identify::instruments::{InstrumentSection, InstrumentSource, SmoothedMot
 pub use identify::intervals::PossibleIntervalResult;
 pub use identify::periodic::PeriodicFit;
 pub use identify::result::{
-    BaseParameterResult, BodyResult, JointResult, LawResult, LogSummary, LogValidation, MethodSummary,
+    BaseParameterResult, BodyResult, JointResult, LawResult, LogOffset, LogSummary, LogValidation, MethodSummary,
     PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, Timings,
     TrainingJoint, TrainingResult,
 };
@@ -60,8 +61,11 @@ pub use iterate::{
     LegSection, PriorChoice, RobotChoice, iterate_study,
 };
 pub use job::RunOptions;
+pub use load::gains::DriveGain;
+pub use load::payload_result::{Measured, PayloadParameter, PayloadResult, PossiblePayload};
 pub use machine::Machine;
 pub use measured::evidence::PriorAgreement;
+pub use measured::lag::TorqueLag;
 pub use measured::residuals::{JointResiduals, TorqueBand};
 pub use measured::torque_trace::{JointTrace, LogTrace};
 pub use output::{check_writable, write_whole};
@@ -71,8 +75,8 @@ pub use simulate::section::{SimulatedTruth, SimulationSection};
 pub use simulate::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, Simulation, SimulationFile, simulate_study};
 pub use study::friction::{FrictionChoice, FrictionLaw};
 pub use study::{
-    CoulombChoice, CouplingSection, DriveSection, EstimatorMethod, EstimatorSection, Folders, JointDrive, LogSection,
-    NoiseLevelSection, ParallelFilterSection, PeriodSection, PhysicalChoice, RobotSection, Role, SimulatedSection,
-    SimulationStart, Study,
+    ArmSection, CoulombChoice, CouplingSection, DriveSection, EstimatorMethod, EstimatorSection, Folders, GainChoice,
+    JointDrive, LogSection, NoiseLevelSection, OffsetChoice, ParallelFilterSection, PayloadSection, PeriodSection,
+    PhysicalChoice, Refit, RobotSection, Role, SimulatedSection, SimulationStart, Study,
 };
 pub use validate::{VALIDATION_SCHEMA, ValidationFile, validate};

@@ -28,6 +28,8 @@ pub struct Machine {
     pub prior: Option<Vec<f64>>,
     /// For load-dependent friction: the bodies by an earlier estimate, one value per column of the layout. Without it such friction has a column of zeros.
     pub load_parameters: Option<Vec<f64>>,
+    /// What logged torque is multiplied by, joint by joint, where gains were found and not stated; empty otherwise.
+    pub torque_gains: Vec<f64>,
     /// Where the study's files are looked for.
     pub(crate) folders: Folders,
 }
@@ -118,6 +120,7 @@ impl Machine {
             layout,
             prior,
             load_parameters: None,
+            torque_gains: Vec::new(),
             folders: folders.clone(),
         })
     }
@@ -132,6 +135,24 @@ impl Machine {
         }
         wide.layout = PanelLayout::new(&self.model, columns);
         wide
+    }
+
+    /// That a log has the temperature, if friction depends on it.
+    ///
+    /// # Errors
+    /// [`Error::NoTemperature`].
+    pub(crate) fn check_temperature(&self, study: &Study, log: usize) -> Result<(), Error> {
+        let columns = self.layout.columns().iter();
+        let needing = columns.filter_map(|column| match column {
+            Column::Law(law) if law.needs_temperature() => law.joints().first().copied(),
+            _ => None,
+        });
+        match needing.min() {
+            Some(joint) if study.format_of(log).temperature.is_none() => {
+                Err(Error::NoTemperature { log: study.log_name(log), joint: self.model.joints()[joint].name.clone() })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The machine with the bodies of an estimate of `other`, where load-dependent friction needs them.

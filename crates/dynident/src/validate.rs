@@ -4,6 +4,8 @@ use crate::error::Error;
 use crate::identify::friction_choice::{JointFriction, with_friction};
 use crate::identify::result::{BaseParameterResult, LogSummary, LogValidation};
 use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
+use crate::load::columns::known_payloads;
+use crate::load::payload_result::StoredPayload;
 use crate::machine::Machine;
 use crate::measured::evidence::{Evidence, predicted};
 use crate::measured::lag::LagCheck;
@@ -34,17 +36,29 @@ pub struct ValidationFile {
 
 /// The part of `result.json` that a model is.
 #[derive(Deserialize)]
-struct StoredModel {
+pub(crate) struct StoredModel {
     schema: String,
-    method: StoredMethod,
+    pub(crate) method: StoredMethod,
     #[serde(default)]
-    friction_choice: Vec<JointFriction>,
+    pub(crate) friction_choice: Vec<JointFriction>,
     base_parameters: Vec<BaseParameterResult>,
+    #[serde(default)]
+    pub(crate) base_parameter_covariance: Vec<Vec<f64>>,
+    #[serde(default)]
+    payloads: Vec<StoredPayload>,
+    #[serde(default)]
+    pub(crate) drive_gains: Option<Vec<StoredGain>>,
+}
+
+/// The part of a stored gain that a model needs.
+#[derive(Deserialize)]
+pub(crate) struct StoredGain {
+    gain: f64,
 }
 
 #[derive(Deserialize)]
-struct StoredMethod {
-    motion: MotionSettings,
+pub(crate) struct StoredMethod {
+    pub(crate) motion: MotionSettings,
     #[serde(default)]
     load_parameters: Option<Vec<f64>>,
 }
@@ -66,6 +80,7 @@ pub fn validate(
     let chosen = with_friction(study, &stored.friction_choice);
     let study = &chosen;
     let machine = Machine::new(study, study_path, &folders)?;
+    let loads = StoredLoads::new(result_path, study, study_path, &stored, &machine)?;
     let (theta, possible, made_with, machine) = stored_model(result_path, stored, machine)?;
     let files = log_files(study, &folders)?;
     let mut chosen = of_role(study, Role::Validate);
@@ -81,6 +96,8 @@ pub fn validate(
         logs: Vec::new(),
     };
     for index in chosen {
+        let theta = loads.base_values(study, index, &theta);
+        let possible = possible.as_ref().map(|values| loads.base_values(study, index, values));
         let tested = Tested { theta: &theta, physical: possible.as_deref(), uncertainty: None, traced: false };
         let (summary, figures, _) = validate_log(study, &machine, &motion, index, &files[index], &tested, options)?;
         file.logs.push(summary);
@@ -89,7 +106,7 @@ pub fn validate(
     Ok(file)
 }
 
-fn read_model(path: &Path) -> Result<StoredModel, Error> {
+pub(crate) fn read_model(path: &Path) -> Result<StoredModel, Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
     let stored: StoredModel = serde_json::from_slice(&bytes).map_err(|error| {
@@ -115,6 +132,28 @@ type Stored = (Vec<f64>, Option<Vec<f64>>, MotionSettings, Machine);
 /// The base parameters of a stored result, in the machine's order, the motion settings that they were found with, and the machine with its load.
 fn stored_model(path: &Path, stored: StoredModel, mut machine: Machine) -> Result<Stored, Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
+    let values = same_machine(path, &stored, &machine)?;
+    let possible: Option<Vec<f64>> = stored.base_parameters.iter().map(|stored| stored.physical).collect();
+    if possible.as_ref().is_some_and(|values| values.iter().any(|value| !value.is_finite())) {
+        return Err(wrong("a physical value of a base parameter is not a finite number".to_owned()));
+    }
+    if let Some(load) = &stored.method.load_parameters
+        && (load.len() != values.len() || load.iter().any(|value| !value.is_finite()))
+    {
+        return Err(wrong("load_parameters are not one finite number per base parameter: identify again".to_owned()));
+    }
+    machine.load_parameters = stored.method.load_parameters;
+    machine.torque_gains = stored.drive_gains.iter().flatten().map(|stored| stored.gain).collect();
+    let usable = machine.torque_gains.iter().all(|gain| gain.is_finite());
+    if !(machine.torque_gains.is_empty() || machine.torque_gains.len() == machine.model.dof() && usable) {
+        return Err(wrong("drive_gains are not one finite number for each joint: identify again".to_owned()));
+    }
+    Ok((values, possible, stored.method.motion, machine))
+}
+
+/// The base parameters of a stored result, which must be those of this machine.
+pub(crate) fn same_machine(path: &Path, stored: &StoredModel, machine: &Machine) -> Result<Vec<f64>, Error> {
+    let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     let expressions = machine.base.expressions();
     if stored.base_parameters.len() != expressions.len() {
         return Err(wrong(format!(
@@ -136,17 +175,48 @@ fn stored_model(path: &Path, stored: StoredModel, mut machine: Machine) -> Resul
         }
         values.push(stored.value);
     }
-    let possible: Option<Vec<f64>> = stored.base_parameters.iter().map(|stored| stored.physical).collect();
-    if possible.as_ref().is_some_and(|values| values.iter().any(|value| !value.is_finite())) {
-        return Err(wrong("a physical value of a base parameter is not a finite number".to_owned()));
+    Ok(values)
+}
+
+/// What payloads add to the base parameters: those of the result, and those that the study knows.
+struct StoredLoads {
+    added: Vec<(String, Vec<f64>)>,
+}
+
+impl StoredLoads {
+    fn new(
+        path: &Path,
+        study: &Study,
+        study_path: &Path,
+        stored: &StoredModel,
+        machine: &Machine,
+    ) -> Result<Self, Error> {
+        let mut added = known_payloads(study, study_path, machine)?;
+        for payload in &stored.payloads {
+            let values = &payload.base_parameters_added;
+            if values.len() != machine.layout.columns().len() || values.iter().any(|value| !value.is_finite()) {
+                let message = format!("payload `{}`: not one finite number per base parameter", payload.name);
+                return Err(Error::Result { path: path.to_owned(), message });
+            }
+            added.push((payload.name.clone(), values.clone()));
+        }
+        let carried = study.log.iter().filter_map(|log| log.payload.as_ref());
+        for name in carried {
+            if added.iter().all(|(known, _)| known != name) {
+                let message = format!(
+                    "payload `{name}`, which a [[log]] carries, is not among its payloads: give its mass_kg and com_m in the study, or identify it"
+                );
+                return Err(Error::Result { path: path.to_owned(), message });
+            }
+        }
+        Ok(Self { added })
     }
-    if let Some(load) = &stored.method.load_parameters
-        && (load.len() != values.len() || load.iter().any(|value| !value.is_finite()))
-    {
-        return Err(wrong("load_parameters are not one finite number per base parameter: identify again".to_owned()));
+
+    fn base_values(&self, study: &Study, log: usize, theta: &[f64]) -> Vec<f64> {
+        let carried = study.log[log].payload.as_ref();
+        let added = self.added.iter().find(|(name, _)| Some(name) == carried);
+        theta.iter().enumerate().map(|(k, value)| value + added.map_or(0.0, |(_, added)| added[k])).collect()
     }
-    machine.load_parameters = stored.method.load_parameters;
-    Ok((values, possible, stored.method.motion, machine))
 }
 
 struct TestSink<'a> {
@@ -188,6 +258,7 @@ impl RowSink for TestSink<'_> {
         if let Some(trace) = &mut self.trace {
             trace.filtered(rows);
         }
+        self.lag.filtered(rows);
         Ok(())
     }
 
@@ -203,7 +274,8 @@ impl RowSink for TestSink<'_> {
         if let Some(trace) = &mut self.trace {
             trace.raw(samples);
         }
-        self.lag.raw(samples)
+        self.lag.raw(samples);
+        Ok(())
     }
 }
 
@@ -261,7 +333,7 @@ pub(crate) fn validate_log(
     options.progress.end();
     let passed = passed?;
     let agreement = sink.evidence.as_ref().map(|evidence| evidence.agreement(&joints));
-    let lags = sink.lag.lags(passed.motion_cutoff_hz);
+    let lags = sink.lag.lags(study, motion);
     let figures = LogValidation {
         log: study.log_name(index),
         model: sink.model.report(),
@@ -277,5 +349,5 @@ pub(crate) fn validate_log(
     };
     let name = study.log_name(index);
     let trace = sink.trace.map(|trace| trace.finished(name, "validate", passed.filtered_rate_hz));
-    Ok((log_summary(study, index, passed, agreement, lags, &joints), figures, trace))
+    Ok((log_summary(study, index, passed, agreement, &lags, &joints), figures, trace))
 }

@@ -38,6 +38,8 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
     for log in &r.validation {
         text += &residuals(log);
     }
+    text += &lags(r);
+    text += &super::load::loads(r);
     text.push('\n');
     if !r.friction_choice.is_empty() {
         text += &friction(r);
@@ -142,6 +144,23 @@ fn joints(r: &ResultFile) -> String {
         let _ = writeln!(text, "  {} more held-out logs in result.json", r.validation.len() - COLUMNS);
     }
     text
+}
+
+/// How late the torque comes, where it matters at any joint; else that it does not.
+fn lags(r: &ResultFile) -> String {
+    let known = || r.joints.iter().filter_map(|joint| joint.torque_lag.map(|lag| (&joint.name, lag)));
+    if known().next().is_none() {
+        return String::new();
+    }
+    if known().all(|(_, lag)| !lag.matters) {
+        return "\n  torque lag: none that matters at any joint (result.json has them)\n".to_owned();
+    }
+    let header = ["torque lag behind motion", "ms", "+- (95 %)"].map(str::to_owned);
+    let rows = known().map(|(joint, lag)| {
+        let [value, half] = with_deviation(1e3 * lag.lag_s, 1e3 * lag.half_width_95_s);
+        vec![name(joint), value, half]
+    });
+    format!("\n{}", table(&header, 1..3, rows.collect()))
 }
 
 /// What friction the training logs chose, against the plain one.

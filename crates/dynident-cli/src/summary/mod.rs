@@ -6,6 +6,7 @@ mod findings;
 mod identification;
 mod inspection;
 mod iteration;
+mod load;
 mod noise;
 mod reproduction;
 mod text;

@@ -16,7 +16,7 @@
 use crate::inverse_dynamics::inertial_wrench;
 use dynident_model::laws::{
     Coulomb, Coupling, CouplingEffect, Direction, DirectionalCoulomb, DirectionalViscous, Law, LoadFriction,
-    MaxwellSlip, Power, Sigmoid, Stribeck,
+    MaxwellSlip, Power, Sigmoid, Stribeck, TemperatureCoulomb, TemperatureViscous,
 };
 use dynident_model::{InertialParameters, Joint, Model, Transform, Vec3};
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, SVector};
@@ -250,6 +250,8 @@ fn friction_functions(law: &Law) -> Vec<(String, f64)> {
         | Law::Sigmoid(Sigmoid { joint, .. })
         | Law::Power(Power { joint, .. })
         | Law::Load(LoadFriction { joint, .. })
+        | Law::TemperatureViscous(TemperatureViscous { joint, .. })
+        | Law::TemperatureCoulomb(TemperatureCoulomb { joint, .. })
         | Law::MaxwellSlip(MaxwellSlip { joint, .. }) => vec![(key(*joint, law), 1.0)],
         Law::Coupling(Coupling { effect: CouplingEffect::Viscous, first, second, ratios, .. }) => {
             let cross = ratios[0] * ratios[1];

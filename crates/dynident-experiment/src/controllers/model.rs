@@ -169,7 +169,8 @@ impl ControllerModel {
                 if law.acts_on(joint) {
                     let mut column = [0.0];
                     let load = core::slice::from_ref(&load[joint]);
-                    law.column_following(joint, &motion, &mut LawInput { load: Some(load), memory }, &mut column);
+                    let mut input = LawInput { load: Some(load), temperature_c: None, memory };
+                    law.column_following(joint, &motion, &mut input, &mut column);
                     tau[joint] += value * column[0];
                 }
             }

@@ -129,7 +129,12 @@ impl SlotineLi {
             for joint in 0..joints {
                 if law.acts_on(joint) {
                     let entry = &mut regressor[joint * columns + bodies + place..][..1];
-                    law.column_following(joint, &motion, &mut LawInput { load: None, memory }, entry);
+                    law.column_following(
+                        joint,
+                        &motion,
+                        &mut LawInput { load: None, temperature_c: None, memory },
+                        entry,
+                    );
                 }
             }
         }

@@ -85,6 +85,8 @@ impl Drives {
                         }
                     }
                 }
+                // Simulated drives are at their reference temperature.
+                Law::TemperatureViscous(_) | Law::TemperatureCoulomb(_) => {}
                 Law::Coulomb(_)
                 | Law::DirectionalViscous(_)
                 | Law::DirectionalCoulomb(_)
@@ -131,6 +133,6 @@ fn deflection(law: &Law, joint: usize, q: &[f64], memory: &mut LawMemory) -> f64
     let mut out = [0.0];
     // Only positions count.
     let motion = JointMotion { samples: 1, q, dq: q, ddq: q };
-    law.column_following(joint, &motion, &mut LawInput { load: None, memory }, &mut out);
+    law.column_following(joint, &motion, &mut LawInput { load: None, temperature_c: None, memory }, &mut out);
     out[0]
 }

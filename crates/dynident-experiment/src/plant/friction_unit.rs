@@ -206,6 +206,8 @@ fn at_first_joint(law: &Law) -> Law {
         Law::Power(law) => law.joint = 0,
         Law::Load(law) => law.joint = 0,
         Law::MaxwellSlip(law) => law.joint = 0,
+        Law::TemperatureViscous(law) => law.joint = 0,
+        Law::TemperatureCoulomb(law) => law.joint = 0,
         Law::Offset(law) => law.joint = 0,
         Law::DriveInertia(law) => law.joint = 0,
         Law::Coupling(_) => {}

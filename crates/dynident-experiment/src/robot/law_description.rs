@@ -29,6 +29,12 @@ pub(super) fn describe(model: &Model, law: &Law, value: f64) -> Value {
         }),
         Law::Load(law) => json!({ "kind": "load", "shape": shape(law.shape) }),
         Law::MaxwellSlip(law) => json!({ "kind": "maxwell-slip", "yield_displacement": law.yield_displacement }),
+        Law::TemperatureViscous(law) => {
+            json!({ "kind": "temperature-viscous", "reference_c": law.reference_c })
+        }
+        Law::TemperatureCoulomb(law) => json!({
+            "kind": "temperature-coulomb", "reference_c": law.reference_c, "shape": shape(law.shape),
+        }),
         Law::Offset(_) => json!({ "kind": "offset" }),
         Law::DriveInertia(_) => json!({ "kind": "drive-inertia" }),
         Law::Coupling(law) => {

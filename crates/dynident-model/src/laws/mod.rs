@@ -11,6 +11,7 @@ mod power;
 mod sigmoid;
 mod slip;
 mod stribeck;
+mod temperature;
 mod viscous;
 
 pub use coulomb::{Coulomb, CoulombShape};
@@ -23,10 +24,12 @@ pub use power::{Power, PowerExponent};
 pub use sigmoid::Sigmoid;
 pub use slip::{LawMemory, MaxwellSlip};
 pub use stribeck::Stribeck;
+pub use temperature::{TemperatureCoulomb, TemperatureViscous};
 pub use viscous::Viscous;
 
 use crate::tree::Model;
 use directional::by_speed;
+use temperature::by_temperature;
 
 /// Joint motion of a block of samples, joint-major: joint `j`, sample `s` stands at `j * samples + s`.
 #[derive(Clone, Copy, Debug)]
@@ -46,6 +49,8 @@ pub struct JointMotion<'a> {
 pub struct LawInput<'a> {
     /// The load of the law's joint sample by sample, Nm (N), where it is known.
     pub load: Option<&'a [f64]>,
+    /// The temperature of the law's joint sample by sample, °C, where it was measured.
+    pub temperature_c: Option<&'a [f64]>,
     /// What the law remembers of earlier samples; afterwards, of this block as well.
     pub memory: &'a mut LawMemory,
 }
@@ -88,6 +93,10 @@ pub enum Law {
     Load(LoadFriction),
     /// A spring that slips: hysteresis.
     MaxwellSlip(MaxwellSlip),
+    /// Viscous friction's change with the temperature.
+    TemperatureViscous(TemperatureViscous),
+    /// Coulomb friction's change with the temperature.
+    TemperatureCoulomb(TemperatureCoulomb),
     /// A constant torque.
     Offset(Offset),
     /// Inertia of a drive that turns with its joint only.
@@ -110,6 +119,8 @@ impl Law {
             Self::Power(Power { joint, exponent: PowerExponent::Quadratic, .. }) => format!("fq{}", joint + 1),
             Self::Load(law) => format!("fl{}", law.joint + 1),
             Self::MaxwellSlip(law) => format!("slip{}_{}", law.joint + 1, law.yield_displacement),
+            Self::TemperatureViscous(law) => format!("fvT{}", law.joint + 1),
+            Self::TemperatureCoulomb(law) => format!("fcT{}", law.joint + 1),
             Self::Offset(law) => format!("off{}", law.joint + 1),
             Self::DriveInertia(law) => format!("Ia{}", law.joint + 1),
             Self::Coupling(law) => law.symbol(),
@@ -125,6 +136,8 @@ impl Law {
             Self::Power(Power { exponent: PowerExponent::CubeRoot, .. }) => "Nm (s/rad)^(1/3)",
             Self::Power(Power { exponent: PowerExponent::Quadratic, .. }) => "Nm (s/rad)^2",
             Self::Load(_) => "1",
+            Self::TemperatureViscous(_) => "Nm s/(rad K)",
+            Self::TemperatureCoulomb(_) => "Nm/K",
             Self::Coulomb(_)
             | Self::DirectionalCoulomb(_)
             | Self::Stribeck(_)
@@ -148,6 +161,8 @@ impl Law {
             Self::Power(law) => law.joint,
             Self::Load(law) => law.joint,
             Self::MaxwellSlip(law) => law.joint,
+            Self::TemperatureViscous(law) => law.joint,
+            Self::TemperatureCoulomb(law) => law.joint,
             Self::Offset(law) => law.joint,
             Self::DriveInertia(law) => law.joint,
             Self::Coupling(_) => return None,
@@ -170,10 +185,15 @@ impl Law {
         }
     }
 
-    /// True when a negative parameter is not possible: friction takes power from the motion at every speed, inertia is positive. An offset may have either sign; a coupling's
+    /// True when a negative parameter is not possible: friction takes power from the motion at every speed, inertia is positive. An offset may have either sign, and so may a change with temperature; a coupling's
     /// cross terms are judged with their drive.
     pub fn is_nonnegative(&self) -> bool {
-        !matches!(self, Self::Offset(_) | Self::Coupling(_))
+        !matches!(self, Self::Offset(_) | Self::Coupling(_) | Self::TemperatureViscous(_) | Self::TemperatureCoulomb(_))
+    }
+
+    /// True when the column needs the joint's temperature.
+    pub fn needs_temperature(&self) -> bool {
+        matches!(self, Self::TemperatureViscous(_) | Self::TemperatureCoulomb(_))
     }
 
     /// True for friction of one joint: all but offset, drive inertia and couplings.
@@ -182,21 +202,23 @@ impl Law {
     }
 
     /// The regressor column of this parameter in the row of joint `row`: `out[s] = ∂τ_row/∂parameter` at sample `s`. The block counts as a recording of its own, without known
-    /// load: see [`column_following`](Law::column_following).
+    /// load or temperature: see [`column_following`](Law::column_following).
     ///
     /// # Panics
     /// If `row` is not one of [`joints`](Law::joints) or `out` is not one value per sample.
     pub fn column(&self, row: usize, motion: &JointMotion<'_>, out: &mut [f64]) {
-        self.column_following(row, motion, &mut LawInput { load: None, memory: &mut LawMemory::default() }, out);
+        let mut input = LawInput { load: None, temperature_c: None, memory: &mut LawMemory::default() };
+        self.column_following(row, motion, &mut input, out);
     }
 
     /// The regressor column as [`column`](Law::column), of a block that follows others: with one sample a block, what a simulation needs.
     ///
     /// # Panics
-    /// If `row` is not one of [`joints`](Law::joints), or `out` or the load are not one value per sample.
+    /// If `row` is not one of [`joints`](Law::joints), or `out`, the load or the temperature are not one value per sample.
     pub fn column_following(&self, row: usize, motion: &JointMotion<'_>, input: &mut LawInput<'_>, out: &mut [f64]) {
         assert_eq!(out.len(), motion.samples);
         assert!(self.acts_on(row), "joint {row} does not feel {}", self.symbol());
+        assert!(input.temperature_c.is_none_or(|t| t.len() == motion.samples), "one temperature per sample");
         match self {
             Self::Viscous(law) => law.column(motion, out),
             Self::Coulomb(law) => law.column(motion, out),
@@ -210,6 +232,12 @@ impl Law {
                 law.column(motion, input.load, out);
             }
             Self::MaxwellSlip(law) => law.column(motion.q_of(row), input.memory, out),
+            Self::TemperatureViscous(law) => {
+                by_temperature(row, motion, input.temperature_c, out, |t, dq| law.value(t, dq));
+            }
+            Self::TemperatureCoulomb(law) => {
+                by_temperature(row, motion, input.temperature_c, out, |t, dq| law.value(t, dq));
+            }
             Self::Offset(law) => law.column(out),
             Self::DriveInertia(law) => law.column(motion, out),
             Self::Coupling(law) => law.column(row, motion, out),
@@ -244,8 +272,12 @@ impl Law {
             Self::Stribeck(law) => slopes(&|dq| law.slope(dq), by_dq),
             Self::Sigmoid(law) => slopes(&|dq| law.slope(dq), by_dq),
             Self::Power(law) => slopes(&|dq| law.slope(dq), by_dq),
-            // Without a load the column is zero.
-            Self::Load(_) | Self::MaxwellSlip(_) | Self::Offset(_) => {}
+            // Without a load or a temperature the column is zero.
+            Self::Load(_)
+            | Self::TemperatureViscous(_)
+            | Self::TemperatureCoulomb(_)
+            | Self::MaxwellSlip(_)
+            | Self::Offset(_) => {}
             Self::DriveInertia(law) => {
                 by_ddq[range(law.joint)].iter_mut().zip(weights).for_each(|(to, w)| *to += w);
             }

@@ -13,7 +13,7 @@ use dynident_estimation::{
     weighted_least_squares,
 };
 use dynident_excitation::Motion;
-use dynident_experiment::iteration::{PhysicalSource, possible_parameters};
+use dynident_experiment::iteration::{PhysicalSource, PossibleSettings, possible_parameters};
 use dynident_model::sample::Random;
 use dynident_recording::MotionBlock;
 
@@ -114,7 +114,8 @@ pub(super) fn physical(trial: &Trial<'_>) -> Result<Answer, EstimationError> {
     let scenario = trial.scenario;
     let source =
         PhysicalSource { model: &scenario.model, laws: &scenario.laws, base: &scenario.base, prior: trial.prior };
-    let fit = possible_parameters(&source, problem, &sigma).map_err(|_| EstimationError::Empty)?;
+    let settings = PossibleSettings::default();
+    let fit = possible_parameters(&source, problem, &sigma, &settings).map_err(|_| EstimationError::Empty)?;
     Ok(Answer { values: fit.base_values, half_width_95: None, converged: true })
 }
 

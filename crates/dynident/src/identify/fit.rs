@@ -50,6 +50,21 @@ pub(crate) struct Fitted {
     pub(crate) simulated: Option<SimulatedFit>,
 }
 
+impl Fitted {
+    /// An estimate that was made elsewhere.
+    pub(crate) fn alone(estimate: Estimate) -> Self {
+        Self {
+            estimate,
+            noise_in_regressor: None,
+            gross_errors: None,
+            noise_correlation: None,
+            noise_levels: None,
+            periodic: None,
+            simulated: None,
+        }
+    }
+}
+
 /// The logs behind a fit, for estimators that pass them again.
 pub(crate) struct Logs<'a> {
     pub(crate) study: &'a Study,

@@ -27,22 +27,27 @@ use crate::identify::intervals::{Asked, possible_intervals};
 use crate::identify::physical::{physical_fit_result, possible_parameters, source_of};
 use crate::identify::result::{LogSummary, RESULT_SCHEMA, ResultFile, Timings};
 use crate::identify::result_sections::{
-    base_parameters, bodies, joint_results, law_results, method_summary, robot_summary, training_result, verdict,
+    base_parameters, bodies, joint_results, law_results, method_summary, offset_results, robot_summary,
+    training_result, verdict,
 };
 use crate::identify::sign::{sign_evidence, sign_findings};
 use crate::identify::standard_parameters::{inertials, nearest_to_prior};
 use crate::identify::written_urdf::written_urdf;
-use crate::job::{RunOptions, joint_names, log_files, log_summary, of_role, study_name};
+use crate::job::{RunOptions, joint_names, log_files, log_summary, note_lags, of_role, study_name};
+use crate::load::arm::KnownArm;
+use crate::load::columns::LoadColumns;
+use crate::load::gains::{DriveGain, Gains, drive_gains};
+use crate::load::payload_result::payload_results;
 use crate::machine::{Machine, prior_parameters};
 use crate::measured::evidence::Evidence;
-use crate::measured::lag::{self, LAG_SAMPLES, LagCheck};
+use crate::measured::lag::{self, LAG_SAMPLES, LagCheck, TorqueLag};
 use crate::measured::residuals::Uncertainty;
 use crate::measured::rows::{JointRows, Pass, RawSamples, RowSink, motion_in_force};
 use crate::measured::torque_trace::{LogTrace, TraceSink};
 use crate::progress::Silent;
 use crate::study::friction::FrictionChoice;
-use crate::study::{EstimatorMethod, Folders, Role, Study};
-use crate::validate::{Tested, validate_log};
+use crate::study::{EstimatorMethod, Folders, GainChoice, Role, Study};
+use crate::validate::{Tested, read_model, validate_log};
 use dynident_dynamics::Column;
 use dynident_estimation::{
     Estimate, LinearProblem, OrdinarySettings, SegmentedFactor, WeightedSettings, essential, ordinary_least_squares,
@@ -117,7 +122,14 @@ fn identified(
     let start = Instant::now();
     study.require_training_log(study_path)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
+    let stored = study.arm.as_ref().map(|arm| folders.find(&arm.result, None)).transpose()?;
+    let stored = stored.map(|path| read_model(&path).map(|model| (path, model))).transpose()?;
+    // With the friction that was chosen when the arm was identified.
+    let with_arm = stored.as_ref().map(|(_, arm)| with_friction(study, &arm.friction_choice));
+    let study = with_arm.as_ref().unwrap_or(study);
     let machine = Machine::new(study, study_path, &folders)?;
+    let arm = stored.as_ref().map(|(path, arm)| KnownArm::new(path, arm, &machine)).transpose()?;
+    let arm_cutoff_hz = stored.as_ref().and_then(|(_, arm)| arm.method.motion.differentiator.cutoff_hz());
     let possible_settings = study.estimator.physical.settings();
     if let Some(settings) = &possible_settings {
         let mut named = settings.clone();
@@ -132,17 +144,25 @@ fn identified(
     let files = log_files(study, &folders)?;
 
     let training: Vec<usize> = of_role(study, Role::Identify);
-    let motion = motion_in_force(study, &machine, &files, &training, None)?;
+    let motion = motion_in_force(study, &machine, &files, &training, arm_cutoff_hz)?;
     let job = Training { study_path, folders: &folders, motion: &motion, files: &files, logs: &training, options };
-    let fitted = job.fit(study, machine, &mut timings)?;
-    let (study, machine) = (&fitted.study, &fitted.machine);
+    let mut fitted = job.fit(study, machine, &mut timings)?;
+    let gains = job.gains(&mut fitted)?;
+    let (study, machine, columns) = (&fitted.study, &fitted.machine, &fitted.columns);
     let (fits, problem) = (&fitted.fits, &fitted.problem);
     let in_study = |source| Error::Estimation { path: study_path.to_owned(), source };
     let passes =
         Logs { study, path: study_path, machine, motion: &motion, files: &files, training: &training, options };
     let started = Instant::now();
+    let fitted_parts = match (&arm, &study.arm, &gains) {
+        (Some(arm), Some(section), _) => {
+            Fitted::alone(arm.estimate(section, machine, columns, problem, &study.estimator).map_err(in_study)?)
+        }
+        (_, _, Some((estimate, _))) => Fitted::alone(estimate.clone()),
+        _ => crate::identify::fit::fitted(&passes, problem, source)?,
+    };
     let Fitted { estimate, noise_in_regressor, gross_errors, noise_correlation, noise_levels, periodic, simulated } =
-        crate::identify::fit::fitted(&passes, problem, source)?;
+        fitted_parts;
     let (estimate, dropped) = match &study.estimator.essential {
         Some(settings) => {
             essential(&estimate, settings).map(|(rest, report)| (rest, Some(report))).map_err(in_study)?
@@ -150,23 +170,32 @@ fn identified(
         None => (estimate, None),
     };
     let prior = prior_parameters(&machine.model, &machine.laws);
+    let theta = &estimate.values[..columns.base()];
+    // Without the columns of payloads and offsets of single logs.
+    let alone = (arm.is_none() && !columns.is_plain()).then(|| columns.arm_problem(problem, &estimate.values));
+    let alone = alone.transpose().map_err(in_study)?;
+    let (arm_problem, arm_estimate) = (alone.as_ref().unwrap_or(problem), columns.arm_estimate(&estimate));
     let (possible, failure) = match &possible_settings {
+        _ if arm.is_some() => {
+            (None, Some("the arm is known from an earlier result, which has its bodies and its URDF".to_owned()))
+        }
         Some(settings) => {
             let asked = (study.estimator.method, settings);
-            match possible_parameters(machine, problem, &estimate, &prior, asked) {
+            match possible_parameters(machine, arm_problem, &arm_estimate, &prior, asked) {
                 Ok(fit) => (Some(fit), None),
                 Err(reason) => (None, Some(reason)),
             }
         }
         None => (None, None),
     };
-    let sign = sign_evidence(machine, problem, &estimate);
+    let sign = if arm.is_some() { None } else { sign_evidence(machine, arm_problem, &arm_estimate) };
     let physical = possible.as_ref().map(|fit| &fit.base_values[..]);
     let possible_intervals = match &possible_settings {
         // Where there is no possible machine, `physical.failure` says why.
         Some(settings) if study.estimator.intervals && possible.is_some() => {
             let method = study.estimator.method;
-            let asked = Asked { machine, problem, estimate: &estimate, prior: &prior, method, settings };
+            let asked =
+                Asked { machine, problem: arm_problem, estimate: &arm_estimate, prior: &prior, method, settings };
             let found = possible_intervals(&asked, options.progress);
             Some(found.map_err(|reason| Error::study(study_path, format!("estimator.intervals: {reason}")))?)
         }
@@ -177,19 +206,29 @@ fn identified(
     let started = Instant::now();
     let joints = joint_names(machine);
     let (mut logs, mut traces) = (Vec::new(), Vec::new());
+    let mut lags_by_joint = vec![Vec::new(); joints.len()];
     for fit in fits {
         let mut summary = fit.summary.clone();
-        let (lags, trace) = second_look(study, machine, &motion, fit.index, &files[fit.index], &estimate.values)?;
-        summary.torque_lag_s = lags;
+        let theta = columns.base_values(fit.index, &estimate.values);
+        let (lags, trace) = second_look(study, machine, &motion, fit.index, &files[fit.index], &theta)?;
+        note_lags(&mut summary, &lags);
         traces.push(trace);
-        summary.model_findings.extend(lag::findings(&summary.torque_lag_s, &joints));
+        summary.model_findings.extend(lag::findings(&lags, &joints));
         summary.model_findings.extend(sign.as_ref().and_then(sign_findings));
+        for (all, lag) in lags_by_joint.iter_mut().zip(lags) {
+            all.extend(lag);
+        }
         logs.push(summary);
     }
+    let lags: Vec<Option<TorqueLag>> = lags_by_joint.iter().map(|lags| lag::pooled(lags)).collect();
     let mut validation = Vec::new();
-    let uncertainty = Uncertainty::of(&estimate);
     for index in of_role(study, Role::Validate) {
-        let tested = Tested { theta: &estimate.values, physical, uncertainty: Some(&uncertainty), traced: true };
+        let theta = columns.base_values(index, &estimate.values);
+        let uncertainty = Uncertainty::of(&estimate, columns.base_covariance(index, &estimate.covariance));
+        let physical =
+            physical.map(|values| columns.base_values(index, &[values, &estimate.values[columns.base()..]].concat()));
+        let tested =
+            Tested { theta: &theta, physical: physical.as_deref(), uncertainty: Some(&uncertainty), traced: true };
         let (summary, figures, trace) = validate_log(study, machine, &motion, index, &files[index], &tested, options)?;
         logs.push(summary);
         validation.push(figures);
@@ -198,14 +237,13 @@ fn identified(
     timings.validation = started.elapsed().as_secs_f64();
     timings.total = start.elapsed().as_secs_f64();
 
-    let parameters = possible.as_ref().map_or_else(
-        || nearest_to_prior(&machine.model, &machine.base, &estimate.values, &prior),
-        |fit| fit.parameters.clone(),
-    );
+    let parameters = possible
+        .as_ref()
+        .map_or_else(|| nearest_to_prior(&machine.model, &machine.base, theta, &prior), |fit| fit.parameters.clone());
     let inertials = inertials(&machine.model, &parameters);
     let mut verdict = verdict(machine, &inertials, &parameters);
     if let Some(fit) = &possible {
-        verdict.fit = Some(physical_fit_result(fit, &estimate));
+        verdict.fit = Some(physical_fit_result(fit, &arm_estimate));
         verdict.note = if study.estimator.method.is_plain() {
             "of the possible set that fits the logs best; the base parameters above it are the unconstrained estimate"
         } else {
@@ -222,7 +260,9 @@ fn identified(
             .collect();
     }
     // Parameters that URDF cannot express leave a result without one; it is no reason to lose the result.
-    let written = if possible_settings.is_some() && (verdict.failure.is_some() || !verdict.consistent) {
+    let written = if arm.is_some() {
+        Err(verdict.failure.clone().unwrap_or_default())
+    } else if possible_settings.is_some() && (verdict.failure.is_some() || !verdict.consistent) {
         let reason = verdict.failure.clone().unwrap_or_else(|| verdict.violations.join("; "));
         Err(format!(
             "the bodies are not physically possible: {reason} (estimator.physical = false writes them as they are)"
@@ -234,6 +274,7 @@ fn identified(
         Ok(urdf) => (Some(urdf), None),
         Err(reason) => (None, Some(reason)),
     };
+    let covariance = estimate.covariance.view((0, 0), (columns.base(), columns.base())).into_owned();
     let result = ResultFile {
         schema: RESULT_SCHEMA,
         name: study_name(study, study_path),
@@ -246,13 +287,16 @@ fn identified(
         periodic,
         simulated,
         base_parameters: base_parameters(machine, &estimate, physical),
-        base_parameter_covariance: estimate.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        base_parameter_covariance: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
         bodies: bodies(machine, &inertials),
         possible_intervals,
         essential: dropped,
         correlations: strongest_correlations(&estimate, CORRELATIONS),
-        joints: joint_results(machine, &estimate, &parameters),
+        joints: joint_results(machine, &estimate, &parameters, &lags),
         friction_choice: fitted.friction_choice,
+        payloads: payload_results(study, &training, columns, &estimate),
+        offsets: offset_results(study, machine, &training, columns, &estimate),
+        drive_gains: gains.map(|(_, gains)| gains),
         couplings: law_results(machine, &estimate, &parameters, |law| matches!(law, Law::Coupling(_))),
         training: training_result(study, machine, problem, &training, &estimate).map_err(in_study)?,
         torque_band: validation.iter().flat_map(|log| &log.residuals).filter_map(|joint| joint.band.clone()).collect(),
@@ -283,6 +327,7 @@ struct TrainingFit {
     fits: Vec<LogFit>,
     problem: LinearProblem,
     estimate: Estimate,
+    columns: LoadColumns,
     friction_choice: Vec<JointFriction>,
 }
 
@@ -309,7 +354,8 @@ impl Training<'_> {
         let fits = read_logs(study, &wide, self.motion, self.files, self.logs, self.options)?;
         timings.logs += started.elapsed().as_secs_f64();
         let started = Instant::now();
-        let wide_problem = problem(study, &wide, &fits).map_err(in_study)?;
+        let columns_of = |study: &Study, machine: &Machine| LoadColumns::new(study, self.study_path, machine);
+        let wide_problem = problem(study, &wide, &columns_of(study, &wide)?, &fits).map_err(in_study)?;
         let friction_choice =
             choose_friction(study, &first.machine, &wide, &wide_problem, &choose, &columns, &first.estimate)
                 .map_err(in_study)?;
@@ -318,22 +364,36 @@ impl Training<'_> {
             Machine::new(&study, self.study_path, self.folders)?.with_load_of(&first.machine, &first.estimate.values);
         let fits =
             fits.into_iter().map(|fit| fit.of(&wide, &machine)).collect::<Result<Vec<_>, _>>().map_err(in_study)?;
-        let problem = problem(&study, &machine, &fits).map_err(in_study)?;
+        let load = columns_of(&study, &machine)?;
+        let problem = problem(&study, &machine, &load, &fits).map_err(in_study)?;
         let estimate = estimate(&study, &problem).map_err(in_study)?;
         timings.estimation += started.elapsed().as_secs_f64();
-        Ok(TrainingFit { study, machine, fits, problem, estimate, friction_choice })
+        Ok(TrainingFit { study, machine, fits, problem, estimate, columns: load, friction_choice })
     }
 
     fn fit_once(&self, study: Study, machine: Machine, timings: &mut Timings) -> Result<TrainingFit, Error> {
+        let columns = LoadColumns::new(&study, self.study_path, &machine)?;
         let started = Instant::now();
         let fits = read_logs(&study, &machine, self.motion, self.files, self.logs, self.options)?;
         timings.logs += started.elapsed().as_secs_f64();
         let started = Instant::now();
         let in_study = |source| Error::Estimation { path: self.study_path.to_owned(), source };
-        let problem = problem(&study, &machine, &fits).map_err(in_study)?;
+        let problem = problem(&study, &machine, &columns, &fits).map_err(in_study)?;
         let estimate = estimate(&study, &problem).map_err(in_study)?;
         timings.estimation += started.elapsed().as_secs_f64();
-        Ok(TrainingFit { study, machine, fits, problem, estimate, friction_choice: Vec::new() })
+        Ok(TrainingFit { study, machine, fits, problem, estimate, columns, friction_choice: Vec::new() })
+    }
+
+    /// Where the study asks for gains: the estimate with them. The machine then has them, and the problem is in newton metres.
+    fn gains(&self, fitted: &mut TrainingFit) -> Result<Option<(Estimate, Vec<DriveGain>)>, Error> {
+        if fitted.study.drive.gains == GainChoice::Stated {
+            return Ok(None);
+        }
+        let Gains { of_joints: gains, estimate, problem } =
+            drive_gains(&fitted.study, self.study_path, &fitted.columns, &fitted.problem, self.logs)?;
+        fitted.machine.torque_gains = gains.iter().map(|gain| gain.gain).collect();
+        fitted.problem = problem;
+        Ok(Some((estimate, gains)))
     }
 }
 
@@ -434,7 +494,12 @@ fn read_log(
     let mut sink = FitSink {
         file: file.display().to_string(),
         factors,
-        evidence: machine.prior.as_ref().map(|prior| Evidence::new(columns, prior)),
+        // Torque in a unit that nobody knows says nothing about the description.
+        evidence: machine
+            .prior
+            .as_ref()
+            .filter(|_| study.drive.gains == GainChoice::Stated)
+            .map(|prior| Evidence::new(columns, prior)),
         buffer: Vec::new(),
     };
     let pass = Pass {
@@ -450,7 +515,7 @@ fn read_log(
     let passed = pass.run(&mut sink)?;
     let joints = joint_names(machine);
     let agreement = sink.evidence.as_ref().map(|evidence| evidence.agreement(&joints));
-    let summary = log_summary(study, index, passed, agreement, Vec::new(), &joints);
+    let summary = log_summary(study, index, passed, agreement, &[], &joints);
     Ok(LogFit { index, factors: sink.factors, summary })
 }
 
@@ -463,12 +528,14 @@ struct SecondLook<'a> {
 impl RowSink for SecondLook<'_> {
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), Error> {
         self.trace.filtered(rows);
+        self.lag.filtered(rows);
         Ok(())
     }
 
     fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), Error> {
         self.trace.raw(samples);
-        self.lag.raw(samples)
+        self.lag.raw(samples);
+        Ok(())
     }
 }
 
@@ -480,31 +547,37 @@ fn second_look(
     index: usize,
     file: &Path,
     theta: &[f64],
-) -> Result<(Vec<Option<f64>>, LogTrace), Error> {
+) -> Result<(Vec<Option<TorqueLag>>, LogTrace), Error> {
     let mut look = SecondLook { lag: LagCheck::new(machine, theta), trace: TraceSink::new(machine, theta) };
     let most_samples = Some(LAG_SAMPLES as u64);
     let pass = Pass { study, machine, motion, index, file, reader_thread: false, most_samples, progress: &Silent };
     let passed = pass.run(&mut look)?;
-    let lags = look.lag.lags(passed.motion_cutoff_hz);
+    let lags = look.lag.lags(study, motion);
     Ok((lags, look.trace.finished(study.log_name(index), "identify", passed.filtered_rate_hz)))
 }
 
 fn problem(
     study: &Study,
     machine: &Machine,
+    columns: &LoadColumns,
     fits: &[LogFit],
 ) -> Result<LinearProblem, dynident_estimation::EstimationError> {
-    let symbols = machine.layout.columns().iter().map(Column::symbol).collect();
-    let mut problem = LinearProblem::new(symbols, joint_names(machine));
+    let mut problem = LinearProblem::new(columns.symbols(machine), joint_names(machine));
     for fit in fits {
         // Two logs may share a name; their numbers keep them apart.
         let log = format!("{} ({})", study.log_name(fit.index), fit.index + 1);
         for (joint, factor) in fit.factors.iter().enumerate() {
-            problem.add(&log, joint, machine.layout.joint_columns(joint).to_vec(), factor.clone())?;
+            let own = machine.layout.joint_columns(joint);
+            let keep_known = study.drive.gains == GainChoice::Unknown;
+            columns.add(&mut problem, (fit.index, &log), joint, (own, factor), keep_known)?;
         }
     }
     match &machine.prior {
-        Some(prior) => problem.with_fallback(prior.clone()),
+        Some(prior) => {
+            let mut prior = prior.clone();
+            prior.resize(columns.count(), 0.0);
+            problem.with_fallback(prior)
+        }
         None => Ok(problem),
     }
 }

@@ -34,6 +34,7 @@ pub(crate) fn identification_report(found: &Identification) -> Result<String, Er
     parameters(&mut page, r);
     page.add(Heading::new("Friction and drives"));
     friction(&mut page, r);
+    crate::load::report::loads(&mut page, r);
     page.add(Heading::new("Bodies"));
     bodies(&mut page, r);
     page.add(Heading::new("Logs"));
@@ -219,10 +220,29 @@ fn friction(page: &mut Report, r: &ResultFile) {
         }
     }
     page.add(table);
+    lags(page, r);
     if !r.friction_choice.is_empty() {
         let rows = r.friction_choice.iter().map(|joint| vec![Cell::from(&joint.joint), Cell::from(&joint.chosen)]);
         page.add(Table::new("Friction that the logs chose", ["joint", "friction"]).rows(rows));
     }
+}
+
+fn lags(page: &mut Report, r: &ResultFile) {
+    let rows = r.joints.iter().filter_map(|joint| {
+        let lag = joint.torque_lag?;
+        let ms = |seconds: f64| Cell::from(short(1e3 * seconds, 3));
+        let tone = if lag.matters { Tone::Warning } else { Tone::Plain };
+        Some(vec![
+            Cell::from(&joint.name),
+            Cell::judged(short(1e3 * lag.lag_s, 3), tone),
+            ms(lag.std_s),
+            ms(lag.half_width_95_s),
+        ])
+    });
+    let table = Table::new("Lag of the torque behind the motion", ["joint", "lag, ms", "std, ms", "95 %, ± ms"])
+        .note("estimated together with the model, log by log; marked where it moves more torque than the model leaves unexplained")
+        .rows(rows);
+    page.add(table);
 }
 
 fn bodies(page: &mut Report, r: &ResultFile) {

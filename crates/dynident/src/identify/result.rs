@@ -6,7 +6,10 @@ use crate::identify::intervals::PossibleIntervalResult;
 use crate::identify::periodic::PeriodicFit;
 use crate::identify::sign::SignEvidence;
 use crate::identify::simulated::SimulatedFit;
+use crate::load::gains::DriveGain;
+use crate::load::payload_result::PayloadResult;
 use crate::measured::evidence::PriorAgreement;
+use crate::measured::lag::TorqueLag;
 use crate::measured::residuals::{JointResiduals, TorqueBand};
 use dynident_estimation::{CorrelatedPair, EssentialReport, ValidationReport};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
@@ -54,6 +57,12 @@ pub struct ResultFile {
     pub joints: Vec<JointResult>,
     /// How friction was chosen, for the joints where the study asks for it.
     pub friction_choice: Vec<JointFriction>,
+    /// Payloads that were estimated.
+    pub payloads: Vec<PayloadResult>,
+    /// Offsets log by log; empty unless the study asks for them. The base parameters hold their mean.
+    pub offsets: Vec<LogOffset>,
+    /// Drive gains, joint by joint; none unless the study says that they are unknown.
+    pub drive_gains: Option<Vec<DriveGain>>,
     /// Drives that turn with two joints.
     pub couplings: Vec<LawResult>,
     /// The fit on the logs that it was made from.
@@ -194,6 +203,21 @@ pub struct JointResult {
     pub residual_std_nm: f64,
     /// How strongly its residual is correlated in time: the lag-1 correlation that matters for the error bars.
     pub residual_correlation: Option<f64>,
+    /// Lag of its torque behind the motion by all training logs; none where they do not tell. The model itself is fitted to the torque as logged.
+    pub torque_lag: Option<TorqueLag>,
+}
+
+/// The offset of one joint in one log.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LogOffset {
+    /// The log.
+    pub log: String,
+    /// The joint.
+    pub joint: String,
+    /// What it differs from the mean over the training logs, Nm (N).
+    pub deviation_nm: f64,
+    /// The deviation's standard deviation.
+    pub std_nm: f64,
 }
 
 /// Figures of the fit on its own data.
@@ -308,8 +332,12 @@ pub struct LogSummary {
     pub filtered_rows: u64,
     /// The log against the description's own inertials.
     pub prior_agreement: Option<PriorAgreement>,
-    /// Lag of torque behind motion by joint, seconds, by the fitted model; none where the motion does not tell.
+    /// Lag of torque behind motion by joint, seconds, estimated together with the model from this log alone; none where the log does not tell.
     pub torque_lag_s: Vec<Option<f64>>,
+    /// Standard deviations of the lags.
+    pub torque_lag_std_s: Vec<Option<f64>>,
+    /// Half the widths of their 95 % intervals.
+    pub torque_lag_half_width_95_s: Vec<Option<f64>>,
     /// What follows from both.
     pub model_findings: Vec<Finding>,
 }

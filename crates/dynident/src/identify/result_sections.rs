@@ -1,11 +1,13 @@
 //! From an estimate to the sections of `result.json`.
 
 use crate::identify::result::{
-    BaseParameterResult, BodyResult, JointResult, LawResult, MethodSummary, PhysicalVerdict, RobotSummary,
+    BaseParameterResult, BodyResult, JointResult, LawResult, LogOffset, MethodSummary, PhysicalVerdict, RobotSummary,
     TrainingJoint, TrainingResult,
 };
 use crate::job::joint_names;
+use crate::load::columns::LoadColumns;
 use crate::machine::Machine;
+use crate::measured::lag::TorqueLag;
 use crate::study::Study;
 use dynident_estimation::{Estimate, EstimateStatus, LinearProblem};
 use dynident_model::laws::Law;
@@ -128,7 +130,44 @@ pub(crate) fn law_results(
     machine.laws.iter().enumerate().filter(|(_, law)| wanted(law)).map(of_law).collect()
 }
 
-pub(crate) fn joint_results(machine: &Machine, estimate: &Estimate, parameters: &[f64]) -> Vec<JointResult> {
+/// Deviations of single logs' offsets from their mean; the last log's is what the others leave.
+pub(crate) fn offset_results(
+    study: &Study,
+    machine: &Machine,
+    training: &[usize],
+    columns: &LoadColumns,
+    estimate: &Estimate,
+) -> Vec<LogOffset> {
+    let joints = joint_names(machine);
+    let mut offsets = Vec::new();
+    for (joint, name) in joints.iter().enumerate() {
+        let own: Vec<&(usize, usize, usize)> = columns.offsets.iter().filter(|(_, of, _)| *of == joint).collect();
+        if own.is_empty() {
+            continue;
+        }
+        let mut add = |log: usize, deviation_nm: f64, variance: f64| {
+            let std_nm = variance.max(0.0).sqrt();
+            offsets.push(LogOffset { log: study.log_name(log), joint: name.clone(), deviation_nm, std_nm });
+        };
+        for &&(log, _, column) in &own {
+            add(log, estimate.values[column], estimate.covariance[(column, column)]);
+        }
+        let sum: f64 = own.iter().map(|(_, _, column)| estimate.values[*column]).sum();
+        let pairs = own.iter().flat_map(|a| own.iter().map(move |b| (a.2, b.2)));
+        let variance = pairs.map(|pair| estimate.covariance[pair]).sum();
+        if let Some(&last) = training.last() {
+            add(last, -sum, variance);
+        }
+    }
+    offsets
+}
+
+pub(crate) fn joint_results(
+    machine: &Machine,
+    estimate: &Estimate,
+    parameters: &[f64],
+    lags: &[Option<TorqueLag>],
+) -> Vec<JointResult> {
     machine
         .model
         .joints()
@@ -141,6 +180,7 @@ pub(crate) fn joint_results(machine: &Machine, estimate: &Estimate, parameters: 
             }),
             residual_std_nm: estimate.joint_sigma[index],
             residual_correlation: estimate.effective_lag1.get(index).copied().filter(|rho| rho.is_finite()),
+            torque_lag: lags[index],
         })
         .collect()
 }

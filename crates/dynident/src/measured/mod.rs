@@ -2,6 +2,7 @@
 
 pub(crate) mod evidence;
 pub(crate) mod lag;
+pub(crate) mod lag_rows;
 pub(crate) mod motion_log;
 pub(crate) mod residuals;
 pub(crate) mod rows;

@@ -46,13 +46,10 @@ pub(crate) struct Uncertainty {
 }
 
 impl Uncertainty {
-    pub(crate) fn of(estimate: &Estimate) -> Self {
+    /// Of base parameters with the given covariance.
+    pub(crate) fn of(estimate: &Estimate, covariance: DMatrix<f64>) -> Self {
         let freedom = estimate.degrees_of_freedom as f64;
-        Self {
-            covariance: estimate.covariance.clone(),
-            joint_sigma: estimate.joint_sigma.clone(),
-            width: student_half_width(0.95, freedom),
-        }
+        Self { covariance, joint_sigma: estimate.joint_sigma.clone(), width: student_half_width(0.95, freedom) }
     }
 }
 

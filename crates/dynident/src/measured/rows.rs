@@ -79,6 +79,7 @@ impl Pass<'_> {
     pub(crate) fn run(&self, sink: &mut dyn RowSink) -> Result<Passed, Error> {
         let log = self.study.log_name(self.index);
         let failed = |source| Error::recording(&log, source);
+        self.machine.check_temperature(self.study, self.index)?;
         let mut stream = motion_stream(self.study, self.machine, self.motion, self.index, self.file)?;
         let motion_cutoff_hz = self.motion.differentiator.cutoff_hz();
         let settings = decimation(&self.study.parallel_filter, stream.rate_hz(), motion_band_hz(self.motion));
@@ -93,6 +94,7 @@ impl Pass<'_> {
             self.progress,
         )
         .map_err(|source| Error::Filter { log: log.clone(), source })?;
+        computer.torque_gains.clone_from(&self.machine.torque_gains);
         if self.reader_thread && self.most_samples.is_none() {
             read_beside(&mut stream, |block| computer.take(block, sink)).map_err(|error| error.named(&log))?;
         } else {
@@ -198,6 +200,8 @@ pub(crate) struct Computer<'a> {
     panels: Panels,
     history: LawHistory,
     decimators: Option<Vec<Decimator>>,
+    torque_gains: Vec<f64>,
+    temperature_c: Vec<f64>,
     segment: usize,
     motion: [Vec<f64>; 3],
     out: Vec<f64>,
@@ -232,6 +236,8 @@ impl<'a> Computer<'a> {
             panels: Panels::default(),
             history: LawHistory::new(load_parameters),
             decimators,
+            torque_gains: Vec::new(),
+            temperature_c: Vec::new(),
             segment: 0,
             motion: [Vec::new(), Vec::new(), Vec::new()],
             out: Vec::new(),
@@ -260,6 +266,14 @@ impl<'a> Computer<'a> {
             in_model_order(block, log_place, from, samples, &mut self.motion);
             let [q, dq, ddq] = &self.motion;
             let motion = JointMotion { samples, q, dq, ddq };
+            if !block.temperature_c.is_empty() {
+                self.temperature_c.clear();
+                for &place in log_place {
+                    let temperature = block.joint(&block.temperature_c, place);
+                    self.temperature_c.extend_from_slice(&temperature[from..from + samples]);
+                }
+                self.history.set_temperature(&self.temperature_c);
+            }
             regressor_panels_following(
                 model,
                 &mut self.workspace,
@@ -270,7 +284,13 @@ impl<'a> Computer<'a> {
             );
             for (joint, &place) in log_place.iter().enumerate() {
                 let tau = &block.joint(block.fitted_tau(), place)[from..from + samples];
-                self.panels.torque_mut(joint).copy_from_slice(tau);
+                let torque = self.panels.torque_mut(joint);
+                torque.copy_from_slice(tau);
+                if let Some(gain) = self.torque_gains.get(joint) {
+                    for torque in torque {
+                        *torque *= gain;
+                    }
+                }
             }
             sink.raw(&RawSamples { segment: block.segment, rate_hz: block.rate_hz, panels: &self.panels })?;
             let mut rows = samples;

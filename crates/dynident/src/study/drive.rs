@@ -18,6 +18,28 @@ pub enum CoulombChoice {
     Smooth,
 }
 
+/// Which logs share the joints' offsets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OffsetChoice {
+    /// All.
+    #[default]
+    Shared,
+    /// None: each training log has its own, and the base parameters hold their mean.
+    PerLog,
+}
+
+/// Who says what a unit of logged torque is worth in newton metres.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GainChoice {
+    /// Unit and scale of the log's format.
+    #[default]
+    Stated,
+    /// Training logs without and with a payload that is known: one gain for each joint is estimated with the parameters.
+    Unknown,
+}
+
 /// `[drive]`: the laws of every joint, and exceptions by joint.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
@@ -34,6 +56,10 @@ pub struct DriveSection {
     pub coulomb_dead_band: f64,
     /// A constant torque. On by default.
     pub offset: bool,
+    /// Whether training logs share their offsets (`"shared"`, the default).
+    pub offsets: OffsetChoice,
+    /// Who says what a unit of logged torque is worth. The format (`"stated"`) by default.
+    pub gains: GainChoice,
     /// Further laws of friction. None by default.
     pub laws: Vec<FrictionLaw>,
     /// Whether the keys above say which friction there is (`"stated"`, the default), or the training logs (`"auto"`).
@@ -51,6 +77,8 @@ impl Default for DriveSection {
             coulomb_width: 0.02,
             coulomb_dead_band: 0.0,
             offset: true,
+            offsets: OffsetChoice::Shared,
+            gains: GainChoice::Stated,
             laws: Vec::new(),
             friction: FrictionChoice::Stated,
             joints: BTreeMap::new(),

@@ -2,7 +2,7 @@
 
 use dynident_model::laws::{
     CoulombShape, Direction, DirectionalCoulomb, DirectionalViscous, Law, LoadFriction, MaxwellSlip, Power,
-    PowerExponent, Sigmoid, Stribeck,
+    PowerExponent, Sigmoid, Stribeck, TemperatureCoulomb, TemperatureViscous,
 };
 use serde::{Deserialize, Serialize};
 
@@ -53,11 +53,31 @@ pub enum FrictionLaw {
         #[serde(default)]
         width: Option<f64>,
     },
+    /// Viscous and Coulomb friction change with the joint's temperature, beside `viscous` and `coulomb`; logs need a `temperature`.
+    Temperature {
+        /// The temperature at which friction is what `viscous` and `coulomb` say, °C; 25 by default.
+        #[serde(default = "room_temperature")]
+        reference_c: f64,
+        /// Whether viscous friction changes. True by default.
+        #[serde(default = "yes")]
+        viscous: bool,
+        /// Whether Coulomb friction changes. True by default.
+        #[serde(default = "yes")]
+        coulomb: bool,
+    },
     /// Springs that slip, one per yield displacement.
     MaxwellSlip {
         /// rad or m.
         yield_displacements: Vec<f64>,
     },
+}
+
+fn room_temperature() -> f64 {
+    25.0
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// Speed below which a power of it is rounded, rad/s or m/s: below any speed that a differentiated encoder tells from rest.
@@ -90,6 +110,13 @@ impl FrictionLaw {
                 let shape = width.map_or(step, |width| CoulombShape::Smooth { width });
                 vec![Law::Load(LoadFriction { joint, shape })]
             }
+            &Self::Temperature { reference_c, viscous, coulomb } => {
+                let changes = [
+                    viscous.then_some(Law::TemperatureViscous(TemperatureViscous { joint, reference_c })),
+                    coulomb.then_some(Law::TemperatureCoulomb(TemperatureCoulomb { joint, reference_c, shape: step })),
+                ];
+                changes.into_iter().flatten().collect()
+            }
             Self::MaxwellSlip { yield_displacements } => {
                 let element = |&yield_displacement| Law::MaxwellSlip(MaxwellSlip { joint, yield_displacement });
                 yield_displacements.iter().map(element).collect()
@@ -115,6 +142,12 @@ impl FrictionLaw {
             Self::Sigmoid { steepness, offset_speed } => {
                 within("steepness", *steepness, 1.0e-3, 1.0e6)?;
                 within("offset_speed", *offset_speed, -1.0e3, 1.0e3)
+            }
+            Self::Temperature { reference_c, viscous, coulomb } => {
+                if !viscous && !coulomb {
+                    return Err(format!("{key}: neither viscous nor coulomb changes: leave the law out"));
+                }
+                within("reference_c", *reference_c, -273.15, 1.0e3)
             }
             Self::Load { width } => width.map_or(Ok(()), |width| within("width", width, 1.0e-6, 1.0e3)),
             Self::MaxwellSlip { yield_displacements } => {

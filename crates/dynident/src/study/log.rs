@@ -34,6 +34,9 @@ pub struct LogSection {
     /// The motion that was commanded, in place of the differentiator's own; for differentiators that need it.
     #[serde(default)]
     pub reference: Option<ReferenceSettings>,
+    /// The `[[payload]]` that it was recorded with, by name; none by default.
+    #[serde(default)]
+    pub payload: Option<String>,
     /// In place of the format's `rows`.
     #[serde(default, deserialize_with = "exactly")]
     pub rows: Option<[u64; 2]>,

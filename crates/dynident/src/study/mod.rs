@@ -9,17 +9,19 @@ mod log;
 mod noise_levels;
 mod numbers;
 mod parallel_filter;
+mod payload;
 mod periods;
 mod physical;
 mod robot;
 mod simulated;
 
-pub use drive::{CoulombChoice, CouplingSection, DriveSection, JointDrive};
+pub use drive::{CoulombChoice, CouplingSection, DriveSection, GainChoice, JointDrive, OffsetChoice};
 pub use estimator::{EstimatorMethod, EstimatorSection};
 pub use folders::Folders;
 pub use log::{LogSection, Role};
 pub use noise_levels::NoiseLevelSection;
 pub use parallel_filter::ParallelFilterSection;
+pub use payload::{ArmSection, PayloadSection, Refit};
 pub use periods::PeriodSection;
 pub use physical::PhysicalChoice;
 pub use robot::RobotSection;
@@ -80,6 +82,12 @@ pub struct Study {
     /// Drives that turn with two joints.
     #[serde(default)]
     pub coupling: Vec<CouplingSection>,
+    /// What logs were recorded with.
+    #[serde(default)]
+    pub payload: Vec<PayloadSection>,
+    /// An arm that is known already.
+    #[serde(default)]
+    pub arm: Option<ArmSection>,
     /// How all logs are written; a log may have its own `format`.
     #[serde(default)]
     pub format: Option<LogFormat>,
@@ -185,11 +193,18 @@ impl Study {
             log.validate().map_err(|error| format!("[[log]] number {}: {error}", index + 1))?;
         }
         self.drive.validate()?;
+        self.check_temperature()?;
         for (index, coupling) in self.coupling.iter().enumerate() {
             if self.coupling[..index].iter().any(|other| other.name == coupling.name) {
                 return Err(format!("coupling `{}` stands twice: give each drive a name of its own", coupling.name));
             }
             coupling.validate()?;
+        }
+        for (index, payload) in self.payload.iter().enumerate() {
+            if self.payload[..index].iter().any(|other| other.name == payload.name) {
+                return Err(format!("payload `{}` stands twice: give each a name of its own", payload.name));
+            }
+            payload.validate()?;
         }
         self.robot.validate()?;
         self.parallel_filter.validate()?;
@@ -198,6 +213,22 @@ impl Study {
         }
         self.motion.validate().map_err(|error| format!("[motion]: {error}"))?;
         self.estimator.validate()?;
+        Ok(())
+    }
+
+    /// That friction which depends on the temperature is asked for where it can be had.
+    fn check_temperature(&self) -> Result<(), String> {
+        let laws = self.drive.joints.values().filter_map(|own| own.laws.as_ref()).chain([&self.drive.laws]).flatten();
+        if !laws.into_iter().any(|law| matches!(law, friction::FrictionLaw::Temperature { .. })) {
+            return Ok(());
+        }
+        let own = self.drive.joints.values().filter_map(|own| own.friction);
+        if own.chain([self.drive.friction]).any(|choice| choice == friction::FrictionChoice::Auto) {
+            return Err("drive: friction = \"auto\" does not go with the law `temperature`: let the logs choose friction without it, then state what they chose beside it".to_owned());
+        }
+        if self.estimator.method == EstimatorMethod::Instrumental || self.estimator.instruments.is_some() {
+            return Err("drive: the law `temperature` does not go with instruments: use another estimator.method and leave out estimator.instruments".to_owned());
+        }
         Ok(())
     }
 

@@ -1,0 +1,66 @@
+//! Friction that changes with the temperature: `τ = F_vT (T − T₀) q̇` and `τ = F_cT (T − T₀) s(q̇)` with a step `s`.
+//!
+//! Beside viscous and Coulomb friction, which then are those at T₀: coefficients linear in the temperature, `F_v(T) = F_v + F_vT (T − T₀)`. Grease thins as it warms, so F_vT is
+//! usually negative; neither sign is impossible. A law knows motions only, so the temperature comes with them (see [`LawInput`](super::LawInput)); without one the joint counts as being at T₀ and the
+//! column is zero. Linear in a range of some 20 K; beyond, the viscous part falls exponentially. Source: Bittencourt and Axelsson, IEEE/ASME Trans. Mechatronics 19 (2014) 1484; Simoni et al., IFAC
+//! PapersOnLine 48 (2015) 183.
+
+use super::{CoulombShape, JointMotion};
+
+/// Change of viscous friction with temperature, Nm s/(rad K) (N s/(m K)).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TemperatureViscous {
+    /// The joint.
+    pub joint: usize,
+    /// T₀, °C.
+    pub reference_c: f64,
+}
+
+/// Change of Coulomb friction with temperature, Nm/K (N/K).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TemperatureCoulomb {
+    /// The joint.
+    pub joint: usize,
+    /// T₀, °C.
+    pub reference_c: f64,
+    /// The step near zero speed.
+    pub shape: CoulombShape,
+}
+
+impl TemperatureViscous {
+    /// `(T − T₀) q̇`: torque per unit of the parameter at the temperature `temperature_c` (°C) and speed `dq`.
+    pub fn value(self, temperature_c: f64, dq: f64) -> f64 {
+        (temperature_c - self.reference_c) * dq
+    }
+
+    /// Its derivative by the speed.
+    pub fn slope(self, temperature_c: f64) -> f64 {
+        temperature_c - self.reference_c
+    }
+}
+
+impl TemperatureCoulomb {
+    /// `(T − T₀) s(q̇)`.
+    pub fn value(self, temperature_c: f64, dq: f64) -> f64 {
+        (temperature_c - self.reference_c) * self.shape.step(dq)
+    }
+
+    /// Its derivative by the speed; zero for the sign.
+    pub fn slope(self, temperature_c: f64, dq: f64) -> f64 {
+        (temperature_c - self.reference_c) * self.shape.slope(dq)
+    }
+}
+
+/// A column from temperature and speed, sample by sample; zero without a temperature.
+pub(super) fn by_temperature(
+    joint: usize,
+    motion: &JointMotion<'_>,
+    temperature_c: Option<&[f64]>,
+    out: &mut [f64],
+    value: impl Fn(f64, f64) -> f64,
+) {
+    let Some(temperature) = temperature_c else { return out.fill(0.0) };
+    for ((to, &dq), &temperature) in out.iter_mut().zip(motion.dq_of(joint)).zip(temperature) {
+        *to = value(temperature, dq);
+    }
+}

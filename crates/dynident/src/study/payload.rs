@@ -1,0 +1,87 @@
+//! `[[payload]]` and `[arm]`: what the arm carries in which log, and an arm that is known already.
+
+use super::arrays::exactly;
+use dynident_model::{InertialParameters, Mat3, Vec3};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// `[[payload]]`: something that some logs were recorded with, at a link of the robot. A `[[log]]` carries it by its name. Without `mass_kg` it is estimated; with it, it is known.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct PayloadSection {
+    /// What logs call it.
+    pub name: String,
+    /// The link that it is fixed to: its mass, centre of mass and inertia are in that link's frame.
+    pub link: String,
+    /// Its mass, where it is known.
+    #[serde(default)]
+    pub mass_kg: Option<f64>,
+    /// Its centre of mass in the link's frame, where it is known.
+    #[serde(default, deserialize_with = "exactly")]
+    pub com_m: Option<[f64; 3]>,
+    /// Its inertia about its centre of mass, axes of the link's frame: xx, xy, xz, yy, yz, zz. Zero by default, which is a point mass.
+    #[serde(default, deserialize_with = "exactly")]
+    pub inertia_at_com_kgm2: Option<[f64; 6]>,
+}
+
+/// What of the arm is fitted again, beside the payload.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Refit {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// The joints' offsets.
+    Offset,
+    /// Offsets and friction: both change with the temperature from run to run.
+    Friction,
+}
+
+/// `[arm]`: the arm by an earlier identification. Only payloads are estimated then, and the arm's error bars go into theirs.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct ArmSection {
+    /// The earlier `result.json`, of the same robot with the same drives.
+    pub result: PathBuf,
+    /// What is fitted again; nothing by default.
+    #[serde(default)]
+    pub refit: Refit,
+}
+
+/// A body's pseudo-inertia may be this much negative, beside its largest entry: rounding of a thin body's inertia in print.
+const ROUNDING: f64 = 1.0e-6;
+
+impl PayloadSection {
+    /// Its ten parameters in the link's frame, where it is known.
+    pub(crate) fn known(&self) -> Option<InertialParameters> {
+        let [xx, xy, xz, yy, yz, zz] = self.inertia_at_com_kgm2.unwrap_or_default();
+        let inertia = Mat3([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]);
+        let com = Vec3(self.com_m.unwrap_or_default());
+        self.mass_kg.map(|mass| InertialParameters::from_centre_of_mass(mass, com, &inertia))
+    }
+
+    pub(crate) fn validate(&self) -> Result<(), String> {
+        let name = &self.name;
+        let numbers = self.com_m.iter().flatten().chain(self.inertia_at_com_kgm2.iter().flatten());
+        if numbers.chain(&self.mass_kg).any(|value| !value.is_finite() || value.abs() > 1.0e6) {
+            return Err(format!("payload `{name}`: give finite numbers in kg, m and kg m^2"));
+        }
+        match (self.mass_kg, self.com_m, self.inertia_at_com_kgm2) {
+            (None, None, None) => return Ok(()),
+            (Some(_), Some(_), _) => {}
+            _ => {
+                return Err(format!(
+                    "payload `{name}`: a known payload has mass_kg and com_m (and inertia_at_com_kgm2 unless it is a point), one to estimate has none of them"
+                ));
+            }
+        }
+        let Some(known) = self.known() else { return Ok(()) };
+        let pseudo_inertia = known.pseudo_inertia();
+        if known.mass_kg() <= 0.0 || pseudo_inertia.symmetric_eigenvalues().min() < -ROUNDING * pseudo_inertia.amax() {
+            return Err(format!(
+                "payload `{name}`: no body has this mass and inertia: the mass must be positive and no moment about the centre of mass larger than the sum of the other two"
+            ));
+        }
+        Ok(())
+    }
+}
