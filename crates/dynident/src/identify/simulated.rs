@@ -151,7 +151,11 @@ pub(crate) fn simulated(logs: &Logs<'_>, problem: &LinearProblem) -> Result<(Est
     let mut estimate = weighted_least_squares(&rows, &weighted).map_err(|source| logs.in_study(source))?;
     estimate.iterations = iterations;
     if found.status == EstimateStatus::IterationLimit {
+        // The step that these rows ask for made the simulation worse: the last values that were simulated stand.
         estimate.status = EstimateStatus::IterationLimit;
+        estimate.values.clone_from(&found.values);
+        let relative = |(std, value): (&f64, &f64)| (*std > 0.0 && *value != 0.0).then(|| 100.0 * std / value.abs());
+        estimate.relative_std_percent = estimate.std.iter().zip(&estimate.values).map(relative).collect();
     }
     let residual_std = std::mem::take(&mut estimate.joint_sigma);
     // What the model leaves of the measured torque, whatever was compared: that is what the torque's band is made of.
