@@ -26,7 +26,7 @@ const TRACKING: [(&str, Tracking); 6] = [
     ("vibration", Tracking { delay_s: 0.0, shape: 0.0, vibration: 1e-4 }),
 ];
 
-const WAYS: [(&str, &str); 15] = [
+const WAYS: [(&str, &str); 16] = [
     ("low-pass", ""),
     ("butterworth", ""),
     ("central-differences", "order = 2"),
@@ -35,6 +35,7 @@ const WAYS: [(&str, &str); 15] = [
     ("smoothed-differences", "window = 101"),
     ("five-point-cubic", ""),
     ("frequency-domain", ""),
+    ("frequency-domain", "ends = \"mirrored\""),
     ("frequency-domain", "ends = \"periodic\""),
     ("fourier-fit", "SERIES"),
     ("speed-series", "SERIES"),

@@ -163,7 +163,7 @@ pub enum DifferentiatorSettings {
         /// Highest frequency that is kept; chosen from the data by default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         cutoff_hz: Option<f64>,
-        /// What stands beyond the ends; the piece mirrored by default.
+        /// What stands beyond the ends; a smooth bridge by default.
         #[serde(default)]
         ends: Ends,
     },

@@ -1,18 +1,29 @@
 //! Differentiation in the frequency domain.
 
-use crate::differentiator::{Derivatives, Differentiator};
+use crate::bridge::{LEAST_SAMPLES, bridge};
+use crate::differentiator::{Derivatives, Differentiator, Place};
 use crate::error::FilterError;
-use core::f64::consts::TAU;
+use core::f64::consts::{PI, TAU};
+use core::ops::Range;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
 use serde::{Deserialize, Serialize};
+
+/// Length of the bridge that leads from the end of a piece back to its begin, in periods of the cut-off.
+const BRIDGE_PERIODS: f64 = 8.0;
+
+/// Where the tapered band ends, in cut-offs.
+const TAPER: f64 = 2.0;
 
 /// What stands beyond the ends of a piece: the transform takes it to repeat.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ends {
-    /// The piece, then the piece backwards: value and acceleration go on without a jump, and so does the speed of a motion that is at rest at both ends.
+    /// A smooth bridge back to the begin, over eight periods of the cut-off: value, speed and acceleration go on without a jump, whatever the motion does at its ends. The band ends gently, by half a cosine from the cut-off
+    /// to twice it, so that what is left rings near the ends only; one period of the cut-off at either end does not count.
     #[default]
+    Tapered,
+    /// The piece, then the piece backwards: value and acceleration go on without a jump, and so does the speed of a motion that is at rest at both ends.
     Mirrored,
     /// The piece again: for whole periods of a settled periodic motion. Anything else leaks into all frequencies.
     Periodic,
@@ -22,9 +33,9 @@ pub enum Ends {
 ///
 /// `q = F⁻¹{X}`, `dq = F⁻¹{jω X}`, `ddq = F⁻¹{-ω² X}`, |ω| <= 2π f_c.
 ///
-/// Exact for a periodic motion below the cut-off over whole periods. White noise of standard deviation σ leaves `σ √(2 f_c/rate)` in q, `2π f_c σ √(2 f_c/(3 rate))` in dq and
-/// `(2π f_c)² σ √(2 f_c/(5 rate))` in ddq. A motion that does not repeat, or is mirrored while it moves, rings near the ends: leave them out with `trim_s`.
-/// Source: Swevers, Ganseman, Tükel, de Schutter, van Brussel, IEEE Trans. Robot. Autom. 13 (1997) 730.
+/// Exact for a periodic motion below the cut-off over whole periods ([`Ends::Periodic`]). White noise of standard deviation σ leaves `σ √(2 f_c/rate)` in q, `2π f_c σ √(2 f_c/(3 rate))` in dq and
+/// `(2π f_c)² σ √(2 f_c/(5 rate))` in ddq; with tapered ends 1.17, 1.65 and 2.41 times that. A motion that is mirrored while it moves rings far into the piece: take tapered ends.
+/// Source: Swevers, Ganseman, Tükel, de Schutter, van Brussel, IEEE Trans. Robot. Autom. 13 (1997) 730; the tapered ends are this project's own.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrequencyDomain {
     cutoff_hz: f64,
@@ -44,6 +55,20 @@ impl FrequencyDomain {
         }
     }
 
+    /// Samples of one period of the cut-off: what a polynomial is fitted to at tapered ends, and what does not count there.
+    fn edge(&self, rate_hz: f64) -> usize {
+        ((rate_hz / self.cutoff_hz).ceil() as usize).max(LEAST_SAMPLES)
+    }
+
+    fn gain(&self, hz: f64) -> f64 {
+        let beyond = (hz / self.cutoff_hz - 1.0) / (TAPER - 1.0);
+        match self.ends {
+            _ if beyond <= 0.0 => 1.0,
+            Ends::Tapered if beyond < 1.0 => 0.5 * (1.0 + (PI * beyond).cos()),
+            _ => 0.0,
+        }
+    }
+
     /// Applies (jω)^order in the band, for each of `orders`.
     fn transformed(&self, rate_hz: f64, signal: &[f64], out: &mut [&mut [f64]]) -> Result<(), FilterError> {
         let n = signal.len();
@@ -56,8 +81,17 @@ impl FrequencyDomain {
         // Relative to the first sample: rounding then scales with the motion.
         let origin = signal[0];
         let mut input: Vec<f64> = signal.iter().map(|x| x - origin).collect();
-        if self.ends == Ends::Mirrored {
-            input.extend((1..n - 1).rev().map(|i| signal[i] - origin));
+        match self.ends {
+            Ends::Tapered => {
+                let window = self.edge(rate_hz);
+                if n < window {
+                    return Err(FilterError::TooShort { method: self.name(), found: n, needed: window });
+                }
+                let rest = bridge(&input, window, (BRIDGE_PERIODS * rate_hz / self.cutoff_hz).ceil() as usize);
+                input.extend(rest);
+            }
+            Ends::Mirrored => input.extend((1..n - 1).rev().map(|i| signal[i] - origin)),
+            Ends::Periodic => {}
         }
         let length = input.len();
         let mut planner = RealFftPlanner::<f64>::new();
@@ -70,11 +104,11 @@ impl FrequencyDomain {
             let mut bins: Vec<Complex<f64>> = spectrum.clone();
             for (k, bin) in bins.iter_mut().enumerate() {
                 let hz = k as f64 * rate_hz / length as f64;
+                let gain = scale * self.gain(hz);
                 let factor = match order {
-                    _ if hz > self.cutoff_hz => Complex::new(0.0, 0.0),
-                    0 => Complex::new(scale, 0.0),
-                    1 => Complex::new(0.0, scale * TAU * hz),
-                    _ => Complex::new(-scale * (TAU * hz).powi(2), 0.0),
+                    0 => Complex::new(gain, 0.0),
+                    1 => Complex::new(0.0, gain * TAU * hz),
+                    _ => Complex::new(-gain * (TAU * hz).powi(2), 0.0),
                 };
                 *bin *= factor;
             }
@@ -110,6 +144,21 @@ impl Differentiator for FrequencyDomain {
 
     fn differentiate(&self, rate_hz: f64, q: &[f64], out: Derivatives<'_>) -> Result<(), FilterError> {
         self.transformed(rate_hz, q, &mut [out.q, out.dq, out.ddq])
+    }
+
+    fn differentiate_at(
+        &self,
+        place: Place,
+        q: &[f64],
+        out: Derivatives<'_>,
+    ) -> Result<Vec<Range<usize>>, FilterError> {
+        self.differentiate(place.rate_hz, q, out)?;
+        if self.ends != Ends::Tapered {
+            return Ok(Vec::new());
+        }
+        let edge = self.edge(place.rate_hz);
+        let whole = 2 * edge >= q.len();
+        Ok(if whole { core::iter::once(0..q.len()).collect() } else { vec![0..edge, q.len() - edge..q.len()] })
     }
 
     fn smooth(&self, rate_hz: f64, signal: &[f64], out: &mut [f64]) -> Result<(), FilterError> {
@@ -155,6 +204,52 @@ mod tests {
         }
     }
 
+    /// A sum of sines that is cut wherever it happens to be: mirrored it rings far into the piece.
+    #[test]
+    fn a_motion_that_moves_at_its_ends_rings_only_near_them() {
+        let (rate, n, cutoff) = (500.0, 10_000_usize, 1.0);
+        let at = |i: usize| {
+            let mut sum = [0.0; 3];
+            for k in 1..=5 {
+                let w = TAU * 0.1 * f64::from(k);
+                let (sin, cos) = (w * i as f64 / rate + f64::from(k * k)).sin_cos();
+                let size = 0.6 / f64::from(k);
+                (sum[0], sum[1], sum[2]) = (sum[0] + size * sin, sum[1] + size * w * cos, sum[2] - size * w * w * sin);
+            }
+            sum
+        };
+        let q: Vec<f64> = (0..n).map(|i| at(i)[0]).collect();
+        let worst = |ends: Ends| {
+            let way = FrequencyDomain::new(cutoff, ends).unwrap();
+            let mut out = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
+            let [own_q, dq, ddq] = &mut out;
+            let place = Place { rate_hz: rate, joint: 0, first_time_s: 0.0 };
+            let marked = way.differentiate_at(place, &q, Derivatives { q: own_q, dq, ddq }).unwrap();
+            let counts = |i: &usize| (500..n - 500).contains(i);
+            let error = |k: usize| (0..n).filter(counts).map(|i| (out[k][i] - at(i)[k]).abs()).fold(0.0, f64::max);
+            (marked, [error(0), error(1), error(2)])
+        };
+        let (marked, tapered) = worst(Ends::Tapered);
+        // One period of the cut-off at either end.
+        assert_eq!(marked, [0..500, n - 500..n]);
+        // What is left of a jump in the third derivative (10 rad/s³) behind a gentle band edge, a period of the cut-off away: below a thousandth of the speed (1.9 rad/s) and the acceleration (3 rad/s²).
+        assert!(tapered[0] < 1e-3 && tapered[1] < 2e-3 && tapered[2] < 3e-3, "{tapered:?}");
+        let (marked, mirrored) = worst(Ends::Mirrored);
+        assert!(marked.is_empty() && mirrored[2] > 20.0 * tapered[2], "{mirrored:?} {tapered:?}");
+    }
+
+    #[test]
+    fn a_gentle_band_edge_lets_the_documented_noise_through() {
+        let (rate, cutoff, n) = (1000.0, 40.0, 1 << 15);
+        let out = differentiated(&FrequencyDomain::new(cutoff, Ends::Tapered).unwrap(), rate, &normal(3, n));
+        let (top, band) = (TAU * cutoff, 2.0 * cutoff / rate);
+        let expected = [1.17 * band.sqrt(), 1.65 * top * (band / 3.0).sqrt(), 2.41 * top * top * (band / 5.0).sqrt()];
+        for (out, expected) in out.iter().zip(expected) {
+            // As below, and the bridge is of another noise: 10 periods of the cut-off of 1311.
+            assert!((rms(out) / expected - 1.0).abs() < 0.13, "{} {expected}", rms(out));
+        }
+    }
+
     #[test]
     fn noise_comes_out_as_the_band_says() {
         let (rate, cutoff, n) = (1000.0, 40.0, 1 << 15);
@@ -171,6 +266,8 @@ mod tests {
     fn bad_cutoffs_and_short_signals_are_refused() {
         assert!(FrequencyDomain::new(0.0, Ends::Periodic).is_err());
         assert!(FrequencyDomain::new(f64::INFINITY, Ends::Periodic).is_err());
+        // A polynomial needs ten samples.
+        assert!(FrequencyDomain::new(3.0, Ends::Tapered).unwrap().smooth(10.0, &[0.0; 9], &mut [0.0; 9]).is_err());
         let way = FrequencyDomain::new(3.0, Ends::Mirrored).unwrap();
         assert!(way.smooth(10.0, &[0.0; 3], &mut [0.0; 3]).is_err());
         assert!(way.smooth(6.0, &[0.0; 30], &mut [0.0; 30]).is_err());

@@ -31,6 +31,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod bridge;
 mod butterworth;
 mod central_differences;
 mod channel_checks;
@@ -54,6 +55,7 @@ mod logistic_path;
 mod low_pass;
 mod mapping;
 mod marks;
+mod orthonormal;
 mod periods;
 mod position_map;
 mod reader;

@@ -2,6 +2,7 @@
 
 use crate::differentiator::{Derivatives, Differentiator};
 use crate::error::FilterError;
+use crate::orthonormal::orthonormal_polynomials;
 
 /// Least-squares polynomial of `degree` on `window` samples, its value and derivatives at the middle; in the first and
 /// last half window those of the first and last full window, as `scipy.signal.savgol_filter(q, window, degree, deriv=d,
@@ -38,36 +39,10 @@ impl SavitzkyGolay {
     }
 }
 
-/// Weights from polynomials that are orthonormal over the window (two Gram-Schmidt passes), the abscissa scaled to ±1.
+/// Weights from polynomials that are orthonormal over the window, the abscissa scaled to ±1.
 fn polynomial_weights(window: usize, degree: usize) -> Vec<[Vec<f64>; 3]> {
     let half = (window / 2) as f64;
-    let abscissa: Vec<f64> = (0..window).map(|i| (i as f64 - half) / half).collect();
-    // basis[k]: values of polynomial k over the window and of its first two derivatives, built by x · p_{k-1} made orthogonal.
-    let mut basis: Vec<[Vec<f64>; 3]> = Vec::with_capacity(degree + 1);
-    for k in 0..=degree {
-        let mut next = match basis.get(k.wrapping_sub(1)) {
-            None => [vec![1.0; window], vec![0.0; window], vec![0.0; window]],
-            Some([p, dp, ddp]) => {
-                let at = |i: usize| (abscissa[i], p[i], dp[i], ddp[i]);
-                [
-                    (0..window).map(at).map(|(x, p, _, _)| x * p).collect(),
-                    (0..window).map(at).map(|(x, p, dp, _)| p + x * dp).collect(),
-                    (0..window).map(at).map(|(x, _, dp, ddp)| 2.0 * dp + x * ddp).collect(),
-                ]
-            }
-        };
-        for _ in 0..2 {
-            for known in &basis {
-                let share: f64 = known[0].iter().zip(&next[0]).map(|(a, b)| a * b).sum();
-                for (next, known) in next.iter_mut().zip(known) {
-                    next.iter_mut().zip(known).for_each(|(next, known)| *next -= share * known);
-                }
-            }
-        }
-        let norm = next[0].iter().map(|p| p * p).sum::<f64>().sqrt();
-        next.iter_mut().flatten().for_each(|value| *value /= norm);
-        basis.push(next);
-    }
+    let basis = orthonormal_polynomials(window, degree);
     (0..window)
         .map(|place| {
             [0, 1, 2].map(|derivative| {

@@ -106,7 +106,7 @@ fn legs_one_after_another_are_the_librarys() {
         assert!(parameter.std.is_some() && (before.std.is_none() || parameter.std == before.std));
     }
     // The locked joint stays where it is.
-    assert!(file.runs.iter().all(|run| run.max_tracking_error_rad[if run.leg == Some(1) { 0 } else { 1 }] == 0.0));
+    assert!(file.runs.iter().all(|run| run.max_tracking_error_rad[usize::from(run.leg != Some(1))] == 0.0));
     assert!(out.path().join("leg_2/runs/run_1/log.csv").is_file());
     // A second call finds everything.
     let again = iterated(&study, &path, out.path()).unwrap();

@@ -324,14 +324,18 @@ fn by_run(
     for &place in places {
         let each: Vec<Option<&IterationParameter>> = file.runs.iter().map(|run| run.parameters.get(place)).collect();
         let told = |parameter: &&IterationParameter| parameter.std.is_some();
-        let value = |parameter: &Option<&IterationParameter>| {
+        let value = |parameter: Option<&IterationParameter>| {
             parameter.filter(told).map_or(f64::NAN, |parameter| parameter.error.unwrap_or(parameter.value))
         };
-        let bar = |parameter: &Option<&IterationParameter>| {
+        let bar = |parameter: Option<&IterationParameter>| {
             parameter.and_then(|parameter| parameter.std).map_or(f64::NAN, |std| HALF_WIDTH_95 * std)
         };
         let name = each.iter().flatten().next().map_or_else(String::new, |parameter| parameter.symbol.clone());
-        plot = plot.curve_with_bars(name, each.iter().map(value).collect(), each.iter().map(bar).collect());
+        plot = plot.curve_with_bars(
+            name,
+            each.iter().copied().map(value).collect(),
+            each.iter().copied().map(bar).collect(),
+        );
     }
     plot
 }
