@@ -6,7 +6,7 @@ use crate::error::EstimationError;
 use crate::estimate::{Estimate, Fitted, joint_freedom};
 use crate::problem::expect;
 use crate::rank::{RankSettings, solve, split};
-use crate::simultaneous_rows::WhiteRows;
+use crate::simultaneous_rows::{WhiteRows, cost};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -159,7 +159,7 @@ pub fn simultaneous_least_squares<M: SimultaneousModel>(
         let gradient = rows.gradient(&residuals, &sigma);
         let step = system.solve(&gradient);
         let length = (step.dot(&gradient).max(0.0) / step.len() as f64).sqrt();
-        let before = rows.cost(&residuals, &sigma);
+        let before = cost(&residuals, &sigma);
         let mut share = 1.0;
         let mut better = None;
         while better.is_none() && share > 1.0e-3 {
@@ -167,7 +167,7 @@ pub fn simultaneous_least_squares<M: SimultaneousModel>(
             let (c, p) = candidate.as_slice().split_at(motion);
             let found = rows.filtered(&model.residuals(c, p)?)?;
             // At the minimum costs differ by rounding.
-            if rows.cost(&found, &sigma) <= before * (1.0 + 1.0e-10) {
+            if cost(&found, &sigma) <= before * (1.0 + 1.0e-10) {
                 better = Some((candidate, found));
             }
             share *= 0.5;

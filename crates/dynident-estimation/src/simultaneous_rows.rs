@@ -54,6 +54,11 @@ impl System {
     }
 }
 
+/// `Σ ‖r_c‖²/σ_c²`.
+pub(crate) fn cost(residuals: &[DVector<f64>], sigma: &[f64]) -> f64 {
+    residuals.iter().zip(sigma).map(|(r, sigma)| r.norm_squared() / (sigma * sigma)).sum()
+}
+
 impl WhiteRows {
     pub(crate) fn new(
         channels: &[ChannelRows],
@@ -81,11 +86,6 @@ impl WhiteRows {
             Ok(found)
         };
         residuals.iter().zip(&self.colours).zip(&self.channels).map(one).collect()
-    }
-
-    /// `Σ ‖r_c‖²/σ_c²`.
-    pub(crate) fn cost(&self, residuals: &[DVector<f64>], sigma: &[f64]) -> f64 {
-        residuals.iter().zip(sigma).map(|(r, sigma)| r.norm_squared() / (sigma * sigma)).sum()
     }
 
     /// `Σ X_cᵀ r_c/σ_c²`.

@@ -213,8 +213,8 @@ impl PeriodicModel<'_> {
             out.column_mut(joint * own).copy_from(&by_q);
             for (h, &omega) in self.omega.iter().enumerate() {
                 let [sin, cos] = [1, 2].map(|part| self.row_basis.column(part + 2 * h));
-                let straight: DVector<f64> = &by_q - &by_ddq * (omega * omega);
-                let turned: DVector<f64> = &by_dq * omega;
+                let straight: DVector<f64> = by_q - by_ddq * (omega * omega);
+                let turned: DVector<f64> = by_dq * omega;
                 let first = joint * own + 1 + 2 * h;
                 out.column_mut(first).copy_from(&(straight.component_mul(&sin) + turned.component_mul(&cos)));
                 out.column_mut(first + 1).copy_from(&(straight.component_mul(&cos) - turned.component_mul(&sin)));
@@ -276,7 +276,7 @@ mod tests {
                         (0..above[place].len()).map(|k| (below[place][k] - above[place][k]) / (2.0 * step));
                     let differences = DVector::from_iterator(above[place].len(), differences);
                     let scale = differences.amax().max(1.0);
-                    let found = column.map_or_else(|| DVector::zeros(differences.len()), |column| column.into_owned());
+                    let found = column.map_or_else(|| DVector::zeros(differences.len()), nalgebra::Matrix::into_owned);
                     // Means of products against products of means: the series turns by ωΔt = 0.04 rad over three samples.
                     let tolerance = if mean_of == 1 { 1e-5 } else { 2e-2 };
                     let error = (&found - &differences).amax();

@@ -124,7 +124,9 @@ impl Scenario {
         for body in prior.chunks_exact_mut(10) {
             // Four standard deviations below, a body would weigh less than nothing.
             let factor = (1.0 + spread * random.normal()).max(0.25);
-            body.iter_mut().for_each(|value| *value *= factor);
+            for value in body {
+                *value *= factor;
+            }
         }
         prior.extend(vec![0.0; self.laws.len()]);
         prior
