@@ -12,53 +12,46 @@ pub(crate) mod physical;
 pub(crate) mod report;
 pub(crate) mod result;
 pub(crate) mod result_sections;
+mod second_look;
 pub(crate) mod sign;
 pub(crate) mod simulated;
 mod simulated_loop;
 pub(crate) mod standard_parameters;
+mod training;
 pub(crate) mod written_urdf;
 
 use crate::error::Error;
 use crate::identify::fit::{Fitted, Logs};
-use crate::identify::friction_candidates::{candidate_columns, joints_to_choose};
-use crate::identify::friction_choice::{JointFriction, choose_friction, with_friction};
+use crate::identify::friction_choice::with_friction;
 use crate::identify::instruments::InstrumentSource;
 use crate::identify::intervals::{Asked, possible_intervals};
 use crate::identify::physical::{physical_fit_result, possible_parameters, source_of};
-use crate::identify::result::{LogSummary, RESULT_SCHEMA, ResultFile, Timings};
+use crate::identify::result::{RESULT_SCHEMA, ResultFile, Timings};
 use crate::identify::result_sections::{
     base_parameters, bodies, joint_results, law_results, method_summary, offset_results, robot_summary,
     training_result, verdict,
 };
+use crate::identify::second_look::second_look;
 use crate::identify::sign::{sign_evidence, sign_findings};
 use crate::identify::standard_parameters::{inertials, nearest_to_prior};
+use crate::identify::training::Training;
 use crate::identify::written_urdf::written_urdf;
-use crate::job::{RunOptions, joint_names, log_files, log_summary, note_lags, of_role, study_name};
+use crate::job::{RunOptions, joint_names, log_files, note_lags, of_role, study_name};
 use crate::load::arm::KnownArm;
-use crate::load::columns::LoadColumns;
-use crate::load::gains::{DriveGain, Gains, drive_gains};
 use crate::load::payload_result::payload_results;
 use crate::machine::{Machine, prior_parameters};
-use crate::measured::evidence::Evidence;
-use crate::measured::lag::{self, LAG_SAMPLES, LagCheck, TorqueLag};
+use crate::measured::lag::{self, TorqueLag};
 use crate::measured::residuals::Uncertainty;
-use crate::measured::rows::{JointRows, Pass, RawSamples, RowSink, motion_in_force};
-use crate::measured::torque_trace::{LogTrace, TraceSink};
-use crate::progress::Silent;
+use crate::measured::rows::motion_in_force;
+use crate::measured::torque_trace::LogTrace;
 use crate::study::friction::FrictionChoice;
-use crate::study::{EstimatorMethod, Folders, GainChoice, Role, Study};
+use crate::study::{EstimatorMethod, Folders, Role, Study};
 use crate::validate::{Tested, read_model, validate_log};
-use dynident_dynamics::Column;
-use dynident_estimation::{
-    Estimate, LinearProblem, OrdinarySettings, SegmentedFactor, WeightedSettings, essential, ordinary_least_squares,
-    strongest_correlations, weighted_least_squares,
-};
+use dynident_estimation::{Estimate, essential, strongest_correlations};
 use dynident_experiment::iteration::impossible_priors;
 use dynident_model::InertialParameters;
 use dynident_model::laws::Law;
-use dynident_recording::MotionSettings;
-use rayon::prelude::*;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
 /// Correlations that a result tells.
@@ -307,277 +300,4 @@ fn identified(
         timings_s: timings,
     };
     Ok(Identification { result, estimate, inertials, urdf, traces })
-}
-
-/// What fitting needs beside study and machine.
-struct Training<'a> {
-    study_path: &'a Path,
-    folders: &'a Folders,
-    motion: &'a MotionSettings,
-    files: &'a [PathBuf],
-    /// The logs to fit to.
-    logs: &'a [usize],
-    options: &'a RunOptions<'a>,
-}
-
-/// A fit, and the study and machine with the friction that it was made with.
-struct TrainingFit {
-    study: Study,
-    machine: Machine,
-    fits: Vec<LogFit>,
-    problem: LinearProblem,
-    estimate: Estimate,
-    columns: LoadColumns,
-    friction_choice: Vec<JointFriction>,
-}
-
-impl Training<'_> {
-    /// Fits the stated model; where friction is to be chosen or depends on the load, once more with what that fit says.
-    fn fit(&self, study: &Study, machine: Machine, timings: &mut Timings) -> Result<TrainingFit, Error> {
-        let first = self.fit_once(study.clone(), machine, timings)?;
-        let choose = joints_to_choose(study, &first.machine);
-        if choose.is_empty() {
-            let machine = first.machine.clone().with_load_of(&first.machine, &first.estimate.values);
-            return if machine.load_parameters.is_some() {
-                self.fit_once(first.study, machine, timings)
-            } else {
-                Ok(first)
-            };
-        }
-        let in_study = |source| Error::Estimation { path: self.study_path.to_owned(), source };
-        let columns = candidate_columns(study, &first.machine, &choose);
-        let known = first.machine.layout.columns();
-        let further = columns.iter().flatten().map(|column| column.law.clone());
-        let further = further.filter(|law| !known.contains(&Column::Law(law.clone())));
-        let wide = first.machine.with_columns_of(further).with_load_of(&first.machine, &first.estimate.values);
-        let started = Instant::now();
-        let fits = read_logs(study, &wide, self.motion, self.files, self.logs, self.options)?;
-        timings.logs += started.elapsed().as_secs_f64();
-        let started = Instant::now();
-        let columns_of = |study: &Study, machine: &Machine| LoadColumns::new(study, self.study_path, machine);
-        let wide_problem = problem(study, &wide, &columns_of(study, &wide)?, &fits).map_err(in_study)?;
-        let friction_choice =
-            choose_friction(study, &first.machine, &wide, &wide_problem, &choose, &columns, &first.estimate)
-                .map_err(in_study)?;
-        let study = with_friction(study, &friction_choice);
-        let machine =
-            Machine::new(&study, self.study_path, self.folders)?.with_load_of(&first.machine, &first.estimate.values);
-        let fits =
-            fits.into_iter().map(|fit| fit.of(&wide, &machine)).collect::<Result<Vec<_>, _>>().map_err(in_study)?;
-        let load = columns_of(&study, &machine)?;
-        let problem = problem(&study, &machine, &load, &fits).map_err(in_study)?;
-        let estimate = estimate(&study, &problem).map_err(in_study)?;
-        timings.estimation += started.elapsed().as_secs_f64();
-        Ok(TrainingFit { study, machine, fits, problem, estimate, columns: load, friction_choice })
-    }
-
-    fn fit_once(&self, study: Study, machine: Machine, timings: &mut Timings) -> Result<TrainingFit, Error> {
-        let columns = LoadColumns::new(&study, self.study_path, &machine)?;
-        let started = Instant::now();
-        let fits = read_logs(&study, &machine, self.motion, self.files, self.logs, self.options)?;
-        timings.logs += started.elapsed().as_secs_f64();
-        let started = Instant::now();
-        let in_study = |source| Error::Estimation { path: self.study_path.to_owned(), source };
-        let problem = problem(&study, &machine, &columns, &fits).map_err(in_study)?;
-        let estimate = estimate(&study, &problem).map_err(in_study)?;
-        timings.estimation += started.elapsed().as_secs_f64();
-        Ok(TrainingFit { study, machine, fits, problem, estimate, columns, friction_choice: Vec::new() })
-    }
-
-    /// Where the study asks for gains: the estimate with them. The machine then has them, and the problem is in newton metres.
-    fn gains(&self, fitted: &mut TrainingFit) -> Result<Option<(Estimate, Vec<DriveGain>)>, Error> {
-        if fitted.study.drive.gains == GainChoice::Stated {
-            return Ok(None);
-        }
-        let Gains { of_joints: gains, estimate, problem } =
-            drive_gains(&fitted.study, self.study_path, &fitted.columns, &fitted.problem, self.logs)?;
-        fitted.machine.torque_gains = gains.iter().map(|gain| gain.gain).collect();
-        fitted.problem = problem;
-        Ok(Some((estimate, gains)))
-    }
-}
-
-/// The estimate that friction is chosen and loads are taken by: least squares, whatever estimator comes in the end.
-fn estimate(study: &Study, problem: &LinearProblem) -> Result<Estimate, dynident_estimation::EstimationError> {
-    let (rank, covariance) = (study.estimator.rank, study.estimator.covariance);
-    if study.estimator.method == EstimatorMethod::Ordinary {
-        ordinary_least_squares(problem, &OrdinarySettings { rank, covariance })
-    } else {
-        weighted_least_squares(problem, &WeightedSettings { rank, covariance, ..WeightedSettings::default() })
-    }
-}
-
-/// What is left of one log for fitting.
-struct LogFit {
-    index: usize,
-    factors: Vec<SegmentedFactor>,
-    summary: LogSummary,
-}
-
-impl LogFit {
-    /// The same rows as another machine sees them, whose columns are among those of `wide`.
-    fn of(mut self, wide: &Machine, machine: &Machine) -> Result<Self, dynident_estimation::EstimationError> {
-        for (joint, factor) in self.factors.iter_mut().enumerate() {
-            let seen = wide.layout.joint_columns(joint);
-            // A column that is not there gets a number out of range, which the selection refuses.
-            let place = |&column: &usize| {
-                let wanted = &machine.layout.columns()[column];
-                seen.iter().position(|&global| wide.layout.columns()[global] == *wanted).unwrap_or(usize::MAX)
-            };
-            let places: Vec<usize> = machine.layout.joint_columns(joint).iter().map(place).collect();
-            *factor = factor.selected(&places)?;
-        }
-        Ok(self)
-    }
-}
-
-struct FitSink<'a> {
-    file: String,
-    factors: Vec<SegmentedFactor>,
-    evidence: Option<Evidence<'a>>,
-    buffer: Vec<f64>,
-}
-
-impl RowSink for FitSink<'_> {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), Error> {
-        if let Some(evidence) = &mut self.evidence {
-            evidence.filtered(rows, &mut self.buffer);
-        }
-        self.factors[rows.joint]
-            .absorb(rows.panel, rows.rows)
-            .map_err(|source| Error::Estimation { path: PathBuf::from(&self.file), source })
-    }
-
-    fn raw(&mut self, _samples: &RawSamples<'_>) -> Result<(), Error> {
-        Ok(())
-    }
-}
-
-fn read_logs(
-    study: &Study,
-    machine: &Machine,
-    motion: &MotionSettings,
-    files: &[PathBuf],
-    training: &[usize],
-    options: &RunOptions<'_>,
-) -> Result<Vec<LogFit>, Error> {
-    options
-        .progress
-        .begin("logs to factors", crate::measured::rows::estimated_rows(training.iter().map(|&i| &*files[i])));
-    // Logs side by side, or one log with its reader on a second thread; results stand in the study's order either way.
-    let one = |index: &usize| read_log(study, machine, motion, *index, &files[*index], training.len() == 1, options);
-    let fits = if training.len() > 1 && options.threads > 1 {
-        training.par_iter().map(one).collect::<Result<Vec<_>, _>>()
-    } else {
-        training.iter().map(one).collect()
-    };
-    options.progress.end();
-    fits
-}
-
-fn read_log(
-    study: &Study,
-    machine: &Machine,
-    motion: &MotionSettings,
-    index: usize,
-    file: &Path,
-    alone: bool,
-    options: &RunOptions<'_>,
-) -> Result<LogFit, Error> {
-    let columns: Vec<&[usize]> = (0..machine.model.dof()).map(|joint| machine.layout.joint_columns(joint)).collect();
-    let in_log = |source| Error::Estimation { path: file.to_owned(), source };
-    let factors = columns
-        .iter()
-        .map(|columns| SegmentedFactor::new(columns.len(), study.estimator.segments))
-        .collect::<Result<Vec<_>, _>>()
-        .map_err(in_log)?;
-    let mut sink = FitSink {
-        file: file.display().to_string(),
-        factors,
-        // Torque in a unit that nobody knows says nothing about the description.
-        evidence: machine
-            .prior
-            .as_ref()
-            .filter(|_| study.drive.gains == GainChoice::Stated)
-            .map(|prior| Evidence::new(columns, prior)),
-        buffer: Vec::new(),
-    };
-    let pass = Pass {
-        study,
-        machine,
-        motion,
-        index,
-        file,
-        reader_thread: alone && options.threads > 1,
-        most_samples: None,
-        progress: options.progress,
-    };
-    let passed = pass.run(&mut sink)?;
-    let joints = joint_names(machine);
-    let agreement = sink.evidence.as_ref().map(|evidence| evidence.agreement(&joints));
-    let summary = log_summary(study, index, passed, agreement, &[], &joints);
-    Ok(LogFit { index, factors: sink.factors, summary })
-}
-
-/// What a second look gathers.
-struct SecondLook<'a> {
-    lag: LagCheck<'a>,
-    trace: TraceSink<'a>,
-}
-
-impl RowSink for SecondLook<'_> {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), Error> {
-        self.trace.filtered(rows);
-        self.lag.filtered(rows);
-        Ok(())
-    }
-
-    fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), Error> {
-        self.trace.raw(samples);
-        self.lag.raw(samples);
-        Ok(())
-    }
-}
-
-/// A second look at the first samples of a log, now that there is a model to predict them with: the torque's lags, and the torque over time.
-fn second_look(
-    study: &Study,
-    machine: &Machine,
-    motion: &MotionSettings,
-    index: usize,
-    file: &Path,
-    theta: &[f64],
-) -> Result<(Vec<Option<TorqueLag>>, LogTrace), Error> {
-    let mut look = SecondLook { lag: LagCheck::new(machine, theta), trace: TraceSink::new(machine, theta) };
-    let most_samples = Some(LAG_SAMPLES as u64);
-    let pass = Pass { study, machine, motion, index, file, reader_thread: false, most_samples, progress: &Silent };
-    let passed = pass.run(&mut look)?;
-    let lags = look.lag.lags(study, motion);
-    Ok((lags, look.trace.finished(study.log_name(index), "identify", passed.filtered_rate_hz)))
-}
-
-fn problem(
-    study: &Study,
-    machine: &Machine,
-    columns: &LoadColumns,
-    fits: &[LogFit],
-) -> Result<LinearProblem, dynident_estimation::EstimationError> {
-    let mut problem = LinearProblem::new(columns.symbols(machine), joint_names(machine));
-    for fit in fits {
-        // Two logs may share a name; their numbers keep them apart.
-        let log = format!("{} ({})", study.log_name(fit.index), fit.index + 1);
-        for (joint, factor) in fit.factors.iter().enumerate() {
-            let own = machine.layout.joint_columns(joint);
-            let keep_known = study.drive.gains == GainChoice::Unknown;
-            columns.add(&mut problem, (fit.index, &log), joint, (own, factor), keep_known)?;
-        }
-    }
-    match &machine.prior {
-        Some(prior) => {
-            let mut prior = prior.clone();
-            prior.resize(columns.count(), 0.0);
-            problem.with_fallback(prior)
-        }
-        None => Ok(problem),
-    }
 }
