@@ -228,6 +228,9 @@ fn friction(page: &mut Report, r: &ResultFile) {
 }
 
 fn lags(page: &mut Report, r: &ResultFile) {
+    if r.joints.iter().all(|joint| joint.torque_lag.is_none()) {
+        return;
+    }
     let rows = r.joints.iter().filter_map(|joint| {
         let lag = joint.torque_lag?;
         let ms = |seconds: f64| Cell::from(short(1e3 * seconds, 3));
