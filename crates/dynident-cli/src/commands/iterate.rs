@@ -3,7 +3,7 @@
 use super::search::Search;
 use super::{Context, json, told, told_in};
 use crate::{Verdict, summary, terminal};
-use dynident::{IterationWatch, RunOptions, Study, check_writable, iterate_study};
+use dynident::{IterationWatch, LegOrder, RunOptions, Study, check_writable, iterate_study};
 use std::path::PathBuf;
 
 /// Options of `iterate`.
@@ -34,10 +34,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let search = Search::new(context);
-    let most = study
-        .iteration
-        .as_ref()
-        .map_or_else(|| dynident::IterationSection::default().max_runs, |section| section.max_runs);
+    let section = study.iteration.clone().unwrap_or_default();
+    let iterations = if section.order == LegOrder::OneAfterAnother { section.leg.len().max(1) } else { 1 };
+    let most = section.max_runs * iterations;
     progress.begin("runs", Some(most as u64));
     let mut hear = |_: &_, _: &[_]| progress.advance(1);
     let mut watch = IterationWatch { design: &|at| search.hear(at), run: &mut hear };
