@@ -154,9 +154,10 @@ fn label(way: usize) -> String {
     let (method, settings) = WAYS[way];
     let short = match way {
         2 | 3 => settings.replace("order = ", "order "),
-        13 => "of Butterworth, cut-off from the data".to_owned(),
-        14 => "of Butterworth at 0.5 Hz, behind the lag".to_owned(),
-        8 => "periodic".to_owned(),
+        14 => "of Butterworth, cut-off from the data".to_owned(),
+        15 => "of Butterworth at 0.5 Hz, behind the lag".to_owned(),
+        8 => "mirrored".to_owned(),
+        9 => "periodic".to_owned(),
         _ => return method.to_owned(),
     };
     format!("{method}, {short}")
