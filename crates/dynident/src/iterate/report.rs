@@ -219,6 +219,10 @@ fn tracking(page: &mut Report, file: &IterationsFile, traces: &[RunTrace]) {
         let own: Vec<&RunTrace> = traces.iter().filter(|trace| trace.name.leg == leg).collect();
         let Some(longest) = own.iter().max_by_key(|trace| trace.times_s.len()) else { continue };
         for (joint, name) in file.joints.iter().enumerate() {
+            // A locked joint has no error to draw.
+            if own.iter().all(|trace| trace.error[joint].iter().all(|error| *error == 0.0)) {
+                continue;
+            }
             let of_leg = leg.map_or_else(String::new, |leg| format!(", leg {leg}"));
             let title = format!("{name}: tracking error{of_leg}");
             let mut plot =
