@@ -79,9 +79,10 @@ pub use simulated::{
     simulated_least_squares,
 };
 pub use simultaneous::{
-    ChannelNoise, ChannelRows, SimultaneousEstimate, SimultaneousModel, SimultaneousSettings, simultaneous_bound,
+    ChannelNoise, SimultaneousEstimate, SimultaneousModel, SimultaneousSettings, simultaneous_bound,
     simultaneous_least_squares,
 };
+pub use simultaneous_rows::ChannelRows;
 pub use total::{TotalEstimate, TotalSettings, total_least_squares};
 pub use validation::{JointValidation, Validation, ValidationReport};
 pub use weighted::{WeightedSettings, weighted_least_squares};

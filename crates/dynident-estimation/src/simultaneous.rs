@@ -6,22 +6,9 @@ use crate::error::EstimationError;
 use crate::estimate::{Estimate, Fitted, joint_freedom};
 use crate::problem::expect;
 use crate::rank::{RankSettings, solve, split};
-use crate::simultaneous_rows::{WhiteRows, cost};
+use crate::simultaneous_rows::{ChannelRows, WhiteRows, cost};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
-
-/// One channel's rows about given unknowns: a joint's positions, or a joint's torques, of one uninterrupted piece of one log, in the order of time.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ChannelRows {
-    /// `y − f(motion, parameters)`, one number for each row.
-    pub residual: Vec<f64>,
-    /// Number of the motion's unknown that the first column of `by_motion` belongs to; the others follow it.
-    pub first_motion: usize,
-    /// `∂f/∂motion`, shape (rows, any): the unknowns before and after do not act on this channel.
-    pub by_motion: DMatrix<f64>,
-    /// `∂f/∂parameters`, shape (rows, parameters), or (rows, 0) if they do not act on this channel.
-    pub by_parameters: DMatrix<f64>,
-}
 
 /// What [`simultaneous_least_squares`] asks: the measurements less what unknown motion and parameters predict.
 pub trait SimultaneousModel {

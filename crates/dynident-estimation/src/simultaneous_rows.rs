@@ -4,7 +4,6 @@ use crate::autoregression::{whitened, whitened_columns};
 use crate::error::EstimationError;
 use crate::problem::{LinearProblem, expect};
 use crate::segments::{SegmentSettings, SegmentedFactor};
-use crate::simultaneous::ChannelRows;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// A pivot of the information, scaled to a unit diagonal, that counts as zero: the square of a share of a column that is far below what any real motion leaves, and above rounding.
@@ -13,6 +12,19 @@ const SINGULAR: f64 = 1.0e-13;
 const SMALLEST_SIGMA: f64 = 1.0e-9;
 /// Columns that are multiplied at a time: the normal matrices are symmetric, and half of them need not be made.
 const STRIP: usize = 64;
+
+/// One channel's rows about given unknowns: a joint's positions, or a joint's torques, of one uninterrupted piece of one log, in the order of time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChannelRows {
+    /// `y − f(motion, parameters)`, one number for each row.
+    pub residual: Vec<f64>,
+    /// Number of the motion's unknown that the first column of `by_motion` belongs to; the others follow it.
+    pub first_motion: usize,
+    /// `∂f/∂motion`, shape (rows, any): the unknowns before and after do not act on this channel.
+    pub by_motion: DMatrix<f64>,
+    /// `∂f/∂parameters`, shape (rows, parameters), or (rows, 0) if they do not act on this channel.
+    pub by_parameters: DMatrix<f64>,
+}
 
 /// Rows after the whitening filter of their channel, and their normal matrices, which hold for any σ.
 pub(crate) struct WhiteRows {
