@@ -140,15 +140,33 @@ pub fn student_half_width(level: f64, freedom: f64) -> f64 {
     // Beyond a million degrees the normal distribution's differs by less than 1e-6.
     let freedom = freedom.clamp(1.0, 1.0e6);
     let outside = |t: f64| incomplete_beta(freedom / (freedom + t * t), 0.5 * freedom, 0.5);
+    // Twice Student's density: how fast the tails lose.
+    let constant =
+        ln_gamma(0.5 * freedom + 0.5) - ln_gamma(0.5 * freedom) - 0.5 * (freedom * core::f64::consts::PI).ln();
+    let loss = |t: f64| 2.0 * (constant - (0.5 * freedom + 0.5) * (t * t / freedom).ln_1p()).exp();
     let (mut low, mut high) = (0.0, 1.0);
     while outside(high) > 1.0 - level && high < 1.0e12 {
+        low = high;
         high *= 2.0;
     }
+    // The tails are convex: from below Newton's steps never go too far, but for rounding.
+    let mut t = low;
     for _ in 0..100 {
-        let middle = 0.5 * (low + high);
-        if outside(middle) > 1.0 - level { low = middle } else { high = middle }
+        let above = outside(t) - (1.0 - level);
+        if above > 0.0 {
+            low = t
+        } else {
+            high = t
+        }
+        let newton = t + above / loss(t);
+        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        let still = (next - t).abs() <= 1.0e-15 * next;
+        t = next;
+        if still || high - low <= 1.0e-15 * high {
+            break;
+        }
     }
-    0.5 * (low + high)
+    t
 }
 
 #[cfg(test)]

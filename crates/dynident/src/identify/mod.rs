@@ -34,7 +34,7 @@ use crate::identify::result_sections::{
 use crate::identify::second_look::second_look;
 use crate::identify::sign::{sign_evidence, sign_findings};
 use crate::identify::standard_parameters::{inertials, nearest_to_prior};
-use crate::identify::training::Training;
+use crate::identify::training::{LogFit, Training};
 use crate::identify::written_urdf::written_urdf;
 use crate::job::{RunOptions, joint_names, log_files, note_lags, of_role, study_name};
 use crate::load::arm::KnownArm;
@@ -51,6 +51,7 @@ use dynident_estimation::{Estimate, essential, strongest_correlations};
 use dynident_experiment::iteration::impossible_priors;
 use dynident_model::InertialParameters;
 use dynident_model::laws::Law;
+use rayon::prelude::*;
 use std::path::Path;
 use std::time::Instant;
 
@@ -200,10 +201,17 @@ fn identified(
     let joints = joint_names(machine);
     let (mut logs, mut traces) = (Vec::new(), Vec::new());
     let mut lags_by_joint = vec![Vec::new(); joints.len()];
-    for fit in fits {
-        let mut summary = fit.summary.clone();
+    let look = |fit: &LogFit| {
         let theta = columns.base_values(fit.index, &estimate.values);
-        let (lags, trace) = second_look(study, machine, &motion, fit.index, &files[fit.index], &theta)?;
+        second_look(study, machine, &motion, fit.index, &files[fit.index], &theta)
+    };
+    let looks: Vec<_> = if options.threads > 1 {
+        fits.par_iter().map(look).collect::<Result<_, _>>()?
+    } else {
+        fits.iter().map(look).collect::<Result<_, _>>()?
+    };
+    for (fit, (lags, trace)) in fits.iter().zip(looks) {
+        let mut summary = fit.summary.clone();
         note_lags(&mut summary, &lags);
         traces.push(trace);
         summary.model_findings.extend(lag::findings(&lags, &joints));
