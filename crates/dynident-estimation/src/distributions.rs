@@ -153,11 +153,7 @@ pub fn student_half_width(level: f64, freedom: f64) -> f64 {
     let mut t = low;
     for _ in 0..100 {
         let above = outside(t) - (1.0 - level);
-        if above > 0.0 {
-            low = t
-        } else {
-            high = t
-        }
+        (low, high) = if above > 0.0 { (t, high) } else { (low, t) };
         let newton = t + above / loss(t);
         let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
         let still = (next - t).abs() <= 1.0e-15 * next;
