@@ -307,7 +307,7 @@ fn sizes(problem: &PhysicalProblem) -> Vec<f64> {
     sizes
 }
 
-/// Mean of the base parameters' variances over those of white residuals.
+/// Mean of the base parameters' variances over those of white residuals; one where the data leave a base parameter without a white variance.
 fn mean_inflation(covariance: &DMatrix<f64>, information: &DMatrix<f64>) -> f64 {
     let Some(white) = information.clone().cholesky().map(|factor| factor.inverse()) else { return 1.0 };
     let ratios: Vec<f64> = (0..white.nrows())
