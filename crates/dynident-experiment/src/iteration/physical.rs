@@ -3,7 +3,7 @@
 use super::possible_settings::{EllipsoidSettings, PossibleSettings};
 use dynident_dynamics::BaseParameters;
 use dynident_estimation::LinearProblem;
-use dynident_estimation::physical::{
+use dynident_estimation::consistent::{
     BaseMap, Ellipsoid, PhysicalBody, PhysicalFit, PhysicalProblem, PhysicalScalar, physical_fit, rough_body,
 };
 use dynident_model::laws::Law;

@@ -1,6 +1,6 @@
 //! What is known of a machine's bodies and laws before the data: settings of the possible machine that fits best.
 
-use dynident_estimation::physical::{PhysicalError, PhysicalPrior, PhysicalRoute, PhysicalSettings};
+use dynident_estimation::consistent::{PhysicalError, PhysicalPrior, PhysicalRoute, PhysicalSettings};
 use dynident_model::Model;
 use dynident_model::laws::Law;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -39,7 +39,7 @@ pub struct BodyKnowledge {
 }
 
 /// How the possible machine that fits best is found, and what is known of it. See [`PhysicalSettings`] and
-/// [`PhysicalBody`](dynident_estimation::physical::PhysicalBody).
+/// [`PhysicalBody`](dynident_estimation::consistent::PhysicalBody).
 ///
 /// ```
 /// use dynident_experiment::iteration::PossibleSettings;
