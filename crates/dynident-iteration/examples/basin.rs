@@ -7,7 +7,6 @@
 #![allow(clippy::print_stdout, reason = "printing a table is what this program is for")]
 
 use dynident_dynamics::ParametricModel;
-use dynident_dynamics::ParametricModel;
 use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_excitation::families::{SplicedLogisticSettings, Step, StepWiseLogistic};
 use dynident_iteration::{

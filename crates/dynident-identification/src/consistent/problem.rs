@@ -4,7 +4,7 @@ use super::error::ConsistencyError;
 use super::settings::{ConsistencySettings, EllipsoidSettings};
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::LinearProblem;
-use dynident_estimation::physical::{
+use dynident_estimation::consistent::{
     BaseMap, Ellipsoid, PhysicalBody, PhysicalFit, PhysicalProblem, PhysicalScalar, physical_fit, rough_body,
 };
 use dynident_model::laws::Law;

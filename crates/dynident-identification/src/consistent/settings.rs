@@ -1,7 +1,11 @@
 //! What is known of a machine's bodies and laws before the data: settings of the possible machine that fits best.
 
+<<<<<<< HEAD:crates/dynident-identification/src/consistent/settings.rs
 use super::error::ConsistencyError;
 use dynident_estimation::physical::{PhysicalError, PhysicalPrior, PhysicalRoute, PhysicalSettings};
+=======
+use dynident_estimation::consistent::{PhysicalError, PhysicalPrior, PhysicalRoute, PhysicalSettings};
+>>>>>>> estimation:crates/dynident-experiment/src/iteration/possible_settings.rs
 use dynident_model::Model;
 use dynident_model::laws::Law;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -40,7 +44,7 @@ pub struct BodyKnowledge {
 }
 
 /// How the possible machine that fits best is found, and what is known of it. See [`PhysicalSettings`] and
-/// [`PhysicalBody`](dynident_estimation::physical::PhysicalBody).
+/// [`PhysicalBody`](dynident_estimation::consistent::PhysicalBody).
 ///
 /// ```
 /// use dynident_identification::consistent::ConsistencySettings;

@@ -4,7 +4,7 @@ use crate::machine::Machine;
 use crate::progress::Progress;
 use crate::study::EstimatorMethod;
 use dynident_dynamics::Column;
-use dynident_estimation::physical::{IntervalEnd, IntervalSettings, PhysicalSettings, PossibleIntervals};
+use dynident_estimation::consistent::{IntervalEnd, IntervalSettings, PhysicalSettings, PossibleIntervals};
 use dynident_estimation::{Estimate, LinearProblem};
 use dynident_identification::consistent::{ConsistencySettings, consistency_problem};
 use rayon::prelude::*;

@@ -3,7 +3,7 @@
 use crate::identify::result::{PhysicalBodyResult, PhysicalFitResult};
 use crate::machine::Machine;
 use crate::study::EstimatorMethod;
-use dynident_estimation::physical::{PhysicalFit, PhysicalStatus};
+use dynident_estimation::consistent::{PhysicalFit, PhysicalStatus};
 use dynident_estimation::{Estimate, LinearProblem};
 use dynident_identification::consistent::{
     ConsistencyError, ConsistencySettings, consistent_parameters, nearest_consistent_parameters,
