@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use dynident_dynamics::ParametricModel;
-use dynident_dynamics::ParametricModel;
 use dynident_excitation::families::{SplicedLogisticSettings, Step, StepWiseLogistic};
 use dynident_iteration::SimulatedRobot;
 use dynident_iteration::{

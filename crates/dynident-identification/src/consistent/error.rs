@@ -1,7 +1,7 @@
 //! Why no physically consistent parameters could be found.
 
 use dynident_estimation::EstimationError;
-use dynident_estimation::physical::PhysicalError;
+use dynident_estimation::consistent::PhysicalError;
 use thiserror::Error;
 
 /// Why there are no physically consistent parameters for an estimate.

@@ -1,11 +1,7 @@
 //! What is known of a machine's bodies and laws before the data: settings of the possible machine that fits best.
 
-<<<<<<< HEAD:crates/dynident-identification/src/consistent/settings.rs
 use super::error::ConsistencyError;
-use dynident_estimation::physical::{PhysicalError, PhysicalPrior, PhysicalRoute, PhysicalSettings};
-=======
 use dynident_estimation::consistent::{PhysicalError, PhysicalPrior, PhysicalRoute, PhysicalSettings};
->>>>>>> estimation:crates/dynident-experiment/src/iteration/possible_settings.rs
 use dynident_model::Model;
 use dynident_model::laws::Law;
 use serde::{Deserialize, Deserializer, Serialize};

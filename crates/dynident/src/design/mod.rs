@@ -6,6 +6,7 @@ mod forecast;
 mod joined;
 mod name_or_table;
 mod optimiser;
+mod pictures;
 mod prepared;
 mod prior;
 mod section;

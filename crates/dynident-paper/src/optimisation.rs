@@ -1,12 +1,9 @@
 //! Fig. 7 and Table 3: the paper's genetic algorithm on the paper's problem, and the optimum beside it.
 
-use super::arm::Arm;
-use super::piece::{PaperCell, PaperFigure, PaperTable};
-use crate::design::{StrokeFile, WindowedFile, design_study};
-use crate::error::Error;
-use crate::job::RunOptions;
-use crate::study::Study;
+use crate::arm::Arm;
+use crate::piece::{PaperCell, PaperFigure, PaperTable};
 use core::ops::ControlFlow;
+use dynident::{Error, RunOptions, StrokeFile, Study, WindowedFile, design_study};
 use dynident_excitation::optimisers::Generation;
 use dynident_excitation::paper_problem::{PaperProblem, Stroke};
 use dynident_report::LinePlot;
@@ -15,24 +12,25 @@ use dynident_report::LinePlot;
 const DELTA_RATE_HZ: f64 = 100.0;
 
 /// The paper's design problem, solved.
-pub(super) struct Optimised {
-    pub(super) figure_7: PaperFigure,
-    pub(super) table_3: PaperTable,
+pub(crate) struct Optimised {
+    pub(crate) figure_7: PaperFigure,
+    pub(crate) table_3: PaperTable,
     /// The optimum inside (18), joint 1 first.
-    pub(super) optimum: [Stroke; 2],
+    pub(crate) optimum: [Stroke; 2],
     /// H of the optimum and of the genetic algorithm.
-    pub(super) fitness: [f64; 2],
+    pub(crate) fitness: [f64; 2],
 }
 
 /// Designs by the study in `out/study`, as `dynident design` does.
-pub(super) fn optimised(arm: &Arm, seed: u64, options: &RunOptions<'_>) -> Result<Optimised, Error> {
+pub(crate) fn optimised(arm: &Arm, seed: u64, options: &RunOptions<'_>) -> Result<Optimised, Error> {
     let mut study = Study::load(&arm.design)?;
     study.design.get_or_insert_default().search.seed = seed;
     let outcome = design_study(&study, &arm.design, options, |_| ControlFlow::Continue(()))?;
     let windowed =
         outcome.file.windowed.as_ref().filter(|file| file.optimum_strokes.len() == 2 && file.strokes.len() == 2);
     let Some((file, optimum_fitness)) = windowed.and_then(|file| Some((file, file.optimum?))) else {
-        return Err(Error::study(&arm.design, "the design found nothing inside the limits (18)".to_owned()));
+        let message = "the design found nothing inside the limits (18)".to_owned();
+        return Err(Error::Study { path: arm.design.clone(), message });
     };
     let [optimum, genetic] =
         [&file.optimum_strokes, &file.strokes].map(|strokes| ["joint1", "joint2"].map(|joint| stroke(strokes, joint)));

@@ -1,15 +1,11 @@
 //! Fig. 15 and Table 6: the same iteration on a finite Fourier series inside the same limits.
 
-use super::arm::{Arm, TRUTH};
-use super::base_parameters::{COLUMNS, theta};
-use super::joint_runs::{failed, first_gains, model_based, prior};
-use super::piece::{PaperCell, PaperFigure, PaperTable};
-use crate::design::design_study;
-use crate::error::Error;
-use crate::job::RunOptions;
-use crate::output::write_whole;
-use crate::study::Study;
+use crate::arm::{Arm, TRUTH};
+use crate::base_parameters::{COLUMNS, theta};
+use crate::joint_runs::{failed, first_gains, model_based, prior};
+use crate::piece::{PaperCell, PaperFigure, PaperTable};
 use core::ops::ControlFlow;
+use dynident::{Error, RunOptions, Study, design_study, write_whole};
 use dynident_dynamics::ParametricModel;
 use dynident_excitation::Motion;
 use dynident_iteration::{Iteration, IterationError, IterationSettings, IterationTask, Leg, iterate};
@@ -59,14 +55,14 @@ const RUNS: usize = 3;
 const PAPER: [f64; 6] = [1.98, 2.0, 0.0, 1.007, 1.00, 0.009];
 
 /// What the Fourier series told.
-pub(super) struct FourierRuns {
-    pub(super) figure_15: PaperFigure,
-    pub(super) table_6: PaperTable,
-    pub(super) values: [f64; 6],
+pub(crate) struct FourierRuns {
+    pub(crate) figure_15: PaperFigure,
+    pub(crate) table_6: PaperTable,
+    pub(crate) values: [f64; 6],
 }
 
 /// Designs the series, runs and identifies three times with both joints moving, and keeps the last estimate.
-pub(super) fn fourier(arm: &Arm, out: &Path, seed: u64, options: &RunOptions<'_>) -> Result<FourierRuns, Error> {
+pub(crate) fn fourier(arm: &Arm, out: &Path, seed: u64, options: &RunOptions<'_>) -> Result<FourierRuns, Error> {
     let path = out.join("study/design_fourier.toml");
     write_whole(&path, STUDY.as_bytes())?;
     let mut study = Study::load(&path)?;

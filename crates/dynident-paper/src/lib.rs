@@ -1,4 +1,10 @@
-//! The paper, reproduced through the same crates and studies as a user's own robot: every table and figure of *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*.
+//! **What does the paper say, and is it so?** Every table and figure of *Iterative Identification of Robot Dynamic
+//! Parameters Based on Logistic Function*, computed through the same crates and studies as a user's own robot, with what
+//! the paper alone needs.
+//!
+//! [`reproduce`] is all of it, as the command `dynident reproduce` calls it.
+
+#![forbid(unsafe_code)]
 
 mod arm;
 mod base_parameters;
@@ -13,11 +19,9 @@ mod verification;
 
 pub use piece::{Deviation, PaperCell, PaperFigure, PaperTable};
 
-use crate::error::Error;
-use crate::job::RunOptions;
-use crate::output::{check_writable, write_whole};
 use arm::Arm;
 use deviations::DEVIATIONS;
+use dynident::{Error, RunOptions, check_writable, write_whole};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,9 +1,9 @@
 //! Where the reproduction departs from the paper's text, each with its reason.
 
-use super::piece::Deviation;
+use crate::piece::Deviation;
 
 /// All of them, in the order of the paper.
-pub(super) const DEVIATIONS: &[Deviation] = &[
+pub(crate) const DEVIATIONS: &[Deviation] = &[
     Deviation {
         place: "section 1",
         trouble: "the parameter vector of a link names I_zx twice and leaves I_zz out",

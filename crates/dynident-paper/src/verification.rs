@@ -1,8 +1,8 @@
 //! Figs. 16, 17: torques on another motion (Eq. 25), predicted by both models.
 
-use super::arm::{Arm, TRUTH};
-use super::base_parameters::COLUMNS;
-use super::piece::PaperFigure;
+use crate::arm::{Arm, TRUTH};
+use crate::base_parameters::COLUMNS;
+use crate::piece::PaperFigure;
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, Workspace, torque_regressor};
 use dynident_excitation::grid;
 use dynident_report::LinePlot;
@@ -12,7 +12,7 @@ const DURATION_S: f64 = 10.0;
 const SAMPLES: usize = 1001;
 
 /// Driving torques along q1 = sin t, q2 = sin(-t), and those predicted from the six parameters by either method.
-pub(super) fn figures_16_and_17(arm: &Arm, logistic: &[f64; 6], fourier: &[f64; 6]) -> Vec<PaperFigure> {
+pub(crate) fn figures_16_and_17(arm: &Arm, logistic: &[f64; 6], fourier: &[f64; 6]) -> Vec<PaperFigure> {
     let times = grid(DURATION_S, SAMPLES);
     let base = BaseParameters::new(&arm.model, &[], &BaseParameterSettings::default());
     let mut workspace = Workspace::new(&arm.model);

@@ -18,7 +18,7 @@ pub enum PaperCell {
 
 impl PaperCell {
     /// As a person reads it: four digits.
-    pub(super) fn shown(&self) -> String {
+    pub(crate) fn shown(&self) -> String {
         match self {
             Self::Number(value) if *value == 0.0 => "0".to_owned(),
             Self::Number(value) if value.abs() < 1e-3 => format!("{value:.1e}"),
@@ -59,12 +59,12 @@ pub struct PaperTable {
 }
 
 impl PaperTable {
-    pub(super) fn new(number: usize, title: &str, columns: &[&str], note: &str) -> Self {
+    pub(crate) fn new(number: usize, title: &str, columns: &[&str], note: &str) -> Self {
         let columns = columns.iter().map(|&column| column.to_owned()).collect();
         Self { number, title: title.to_owned(), columns, rows: Vec::new(), note: note.to_owned() }
     }
 
-    pub(super) fn row(&mut self, cells: impl IntoIterator<Item = PaperCell>) {
+    pub(crate) fn row(&mut self, cells: impl IntoIterator<Item = PaperCell>) {
         self.rows.push(cells.into_iter().collect());
     }
 }
@@ -89,13 +89,13 @@ pub struct PaperFigure {
 }
 
 impl PaperFigure {
-    pub(super) fn new(number: usize, plot: LinePlot, note: &str) -> Self {
+    pub(crate) fn new(number: usize, plot: LinePlot, note: &str) -> Self {
         let title = plot.title.clone();
         let file = format!("figure_{number:02}.svg");
         Self { number, file, title, values: BTreeMap::new(), note: note.to_owned(), plot }
     }
 
-    pub(super) fn value(mut self, name: &str, value: f64) -> Self {
+    pub(crate) fn value(mut self, name: &str, value: f64) -> Self {
         self.values.insert(name.to_owned(), value);
         self
     }

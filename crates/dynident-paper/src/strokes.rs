@@ -1,6 +1,6 @@
 //! Figs. 2 to 6: the logistic function, the splice, what ω and T do to it, and the windows.
 
-use super::piece::PaperFigure;
+use crate::piece::PaperFigure;
 use dynident_excitation::families::{SplicedLogistic, SplicedLogisticSettings};
 use dynident_excitation::{Family, Motion, grid};
 use dynident_report::LinePlot;
@@ -13,7 +13,7 @@ fn logistic(t: f64) -> f64 {
 }
 
 /// Fig. 2: the function and its derivatives, by f' = f(1 - f), f'' = f(1 - f)(1 - 2f).
-pub(super) fn figure_2() -> PaperFigure {
+pub(crate) fn figure_2() -> PaperFigure {
     let times: Vec<f64> = grid(20.0, POINTS).into_iter().map(|t| t - 10.0).collect();
     let of = |curve: fn(f64) -> f64| times.iter().map(|&t| curve(logistic(t))).collect::<Vec<f64>>();
     let (f, first, second) = (of(|f| f), of(|f| f * (1.0 - f)), of(|f| f * (1.0 - f) * (1.0 - 2.0 * f)));
@@ -35,7 +35,7 @@ fn spliced(omega: f64, period_s: f64, duration_s: f64) -> Option<(Vec<f64>, f64)
 }
 
 /// Fig. 3: ω = 1, T = 40.
-pub(super) fn figure_3() -> PaperFigure {
+pub(crate) fn figure_3() -> PaperFigure {
     let (q, rest) = spliced(1.0, 40.0, 40.0).unwrap_or_default();
     let plot = LinePlot::new("Spliced logistic function", "t, s", "q, rad", grid(40.0, POINTS)).line("A = 1, ω = 1", q);
     PaperFigure::new(3, plot, "speed and acceleration at both ends and at the splice are below 1e-4")
@@ -43,7 +43,7 @@ pub(super) fn figure_3() -> PaperFigure {
 }
 
 /// Fig. 4: different ω at T = 80.
-pub(super) fn figure_4() -> PaperFigure {
+pub(crate) fn figure_4() -> PaperFigure {
     let mut plot = LinePlot::new("Different ω at T = 80", "t, s", "q, rad", grid(80.0, POINTS));
     for omega in [0.6, 0.8, 1.0, 1.5] {
         let (q, _) = spliced(omega, 80.0, 80.0).unwrap_or_default();
@@ -53,7 +53,7 @@ pub(super) fn figure_4() -> PaperFigure {
 }
 
 /// Fig. 5: different T at ω = 0.6.
-pub(super) fn figure_5() -> PaperFigure {
+pub(crate) fn figure_5() -> PaperFigure {
     let times = grid(100.0, POINTS);
     let mut plot = LinePlot::new("Different T at ω = 0.6", "t, s", "q, rad", times.clone());
     for period in [70.0, 80.0, 90.0, 100.0] {
@@ -76,7 +76,7 @@ fn sampled(values: &[f64], share: f64) -> f64 {
 }
 
 /// Fig. 6: the part of a stroke around its mid-points that is used.
-pub(super) fn figure_6(amplitude: f64, omega: f64, window_s: f64) -> PaperFigure {
+pub(crate) fn figure_6(amplitude: f64, omega: f64, window_s: f64) -> PaperFigure {
     let period = 40.0 / omega;
     let times = grid(period, POINTS);
     let (q, _) = spliced(omega, period, period).unwrap_or_default();

@@ -1,12 +1,12 @@
 //! `report.html` of the reproduction.
 
-use super::PaperFile;
-use super::piece::{PaperCell, PaperFigure, PaperTable};
-use crate::error::Error;
+use crate::PaperFile;
+use crate::piece::{PaperCell, PaperFigure, PaperTable};
+use dynident::Error;
 use dynident_report::{Heading, KeyFigures, Report, Table, Text, Tone};
 
 /// The page: what was reached, then every table and figure in the order of the paper, then where we depart from it.
-pub(super) fn page(file: &PaperFile, tables: &[PaperTable], figures: &[PaperFigure]) -> Result<String, Error> {
+pub(crate) fn page(file: &PaperFile, tables: &[PaperTable], figures: &[PaperFigure]) -> Result<String, Error> {
     let mut page = Report::new("Iterative identification of robot dynamic parameters based on logistic function")
         .subtitle("every table and figure of the paper, computed anew by `dynident reproduce`, the paper's values beside ours");
     let mut key = KeyFigures::new();

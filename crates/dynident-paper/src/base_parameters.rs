@@ -1,7 +1,7 @@
 //! Table 2 and Eqs. 6, 7: the base parameters and the observation matrix of the planar arm, by the general algorithm.
 
-use super::arm::{A1, Arm, GRAVITY, TRUTH};
-use super::piece::{PaperCell, PaperTable};
+use crate::arm::{A1, Arm, GRAVITY, TRUTH};
+use crate::piece::{PaperCell, PaperTable};
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, Workspace, torque_regressor};
 use dynident_model::sample::Random;
 
@@ -9,13 +9,13 @@ use dynident_model::sample::Random;
 const PAPER: [&str; 6] = ["I1zz + m2 a1²", "m1 r1x + m2 a1", "m1 r1y", "I2zz", "m2 r2x", "m2 r2y"];
 
 /// Where θ₁ to θ₆ stand among the base columns, which keep the order of the inertial parameters: m r_x, m r_y, I_zz of each link.
-pub(super) const COLUMNS: [usize; 6] = [2, 0, 1, 5, 3, 4];
+pub(crate) const COLUMNS: [usize; 6] = [2, 0, 1, 5, 3, 4];
 
 /// Random states of the comparison with Eq. 7.
 const STATES: usize = 1000;
 
 /// Table 2, and the largest difference between the general regressor and Eq. 7.
-pub(super) fn table_2(arm: &Arm) -> (PaperTable, f64) {
+pub(crate) fn table_2(arm: &Arm) -> (PaperTable, f64) {
     let base = BaseParameters::new(&arm.model, &[], &BaseParameterSettings::default());
     let difference = difference_from_equation_7(arm, base.independent());
     let note = format!(
@@ -40,7 +40,7 @@ pub(super) fn table_2(arm: &Arm) -> (PaperTable, f64) {
 }
 
 /// `theta_1` and so on, as people write it.
-pub(super) fn theta(place: usize) -> String {
+pub(crate) fn theta(place: usize) -> String {
     const DIGITS: [&str; 6] = ["θ₁", "θ₂", "θ₃", "θ₄", "θ₅", "θ₆"];
     DIGITS[place].to_owned()
 }

@@ -1,9 +1,9 @@
 //! Tables 4, 5 and Figs. 9 to 14: three runs of joint 2 while joint 1 rests, then three of joint 1, by the iteration that serves every robot.
 
-use super::arm::{Arm, TRUTH};
-use super::base_parameters::{COLUMNS, theta};
-use super::piece::{PaperCell, PaperFigure, PaperTable};
-use crate::error::Error;
+use crate::arm::{Arm, TRUTH};
+use crate::base_parameters::{COLUMNS, theta};
+use crate::piece::{PaperCell, PaperFigure, PaperTable};
+use dynident::Error;
 use dynident_dynamics::ParametricModel;
 use dynident_excitation::families::{SplicedLogistic, SplicedLogisticSettings};
 use dynident_excitation::paper_problem::{PaperProblem, Stroke};
@@ -16,13 +16,13 @@ use dynident_simulation::{ControllerSettings, Integrator, LoopSettings, Plant, R
 use std::path::Path;
 
 /// What the runs told.
-pub(super) struct JointRuns {
-    pub(super) tables: Vec<PaperTable>,
-    pub(super) figures: Vec<PaperFigure>,
+pub(crate) struct JointRuns {
+    pub(crate) tables: Vec<PaperTable>,
+    pub(crate) figures: Vec<PaperFigure>,
     /// Our θ after the last run.
-    pub(super) ours: [f64; 6],
-    pub(super) error_after_three: f64,
-    pub(super) error_after_six: f64,
+    pub(crate) ours: [f64; 6],
+    pub(crate) error_after_three: f64,
+    pub(crate) error_after_six: f64,
 }
 
 /// How a joint's runs are made.
@@ -60,7 +60,7 @@ const FIGURE_12: [f64; 3] = [0.6, 0.15, 0.0];
 const SHOWN: usize = 3;
 
 /// Both schemes, both joints: the paper's own with its Table 3, and ours inside the limits (18).
-pub(super) fn joint_runs(arm: &Arm, optimum: &[Stroke; 2]) -> Result<JointRuns, Error> {
+pub(crate) fn joint_runs(arm: &Arm, optimum: &[Stroke; 2]) -> Result<JointRuns, Error> {
     let paper = Protocol {
         rate_hz: 100.0,
         steps_per_sample: 10,
@@ -94,8 +94,8 @@ pub(super) fn joint_runs(arm: &Arm, optimum: &[Stroke; 2]) -> Result<JointRuns, 
     })
 }
 
-pub(super) fn failed(path: &Path, why: &IterationError) -> Error {
-    Error::study(path, why.to_string())
+pub(crate) fn failed(path: &Path, why: &IterationError) -> Error {
+    Error::Study { path: path.to_owned(), message: why.to_string() }
 }
 
 fn error(joint: usize, values: &[f64; 3]) -> f64 {
@@ -149,13 +149,13 @@ fn one_joint(arm: &Arm, protocol: &Protocol, joint: usize, known: &[(usize, f64)
 }
 
 /// Eq. 23 with its gains.
-pub(super) fn model_based() -> ControllerSettings {
+pub(crate) fn model_based() -> ControllerSettings {
     let [kp, kd] = [0, 1].map(|gain| GAINS.map(|gains| gains[gain]).to_vec());
     ControllerSettings::FiniteTime(FiniteTimeSettings::with_gains(kp, kd))
 }
 
 /// The first run's controller, which needs no model.
-pub(super) fn first_gains() -> ControllerSettings {
+pub(crate) fn first_gains() -> ControllerSettings {
     let [kp, kd] = [0, 1].map(|gain| FIRST.map(|gains| gains[gain]).to_vec());
     ControllerSettings::JointPd(JointPdSettings { kp: kp.into(), kd: kd.into() })
 }
@@ -180,7 +180,7 @@ fn iteration_settings(protocol: &Protocol) -> IterationSettings {
 }
 
 /// What is believed before the first run. The paper begins with zeros; a possible machine needs a mass: half a kilogram half way along each link.
-pub(super) fn prior(literal: bool) -> Vec<f64> {
+pub(crate) fn prior(literal: bool) -> Vec<f64> {
     let link = if literal { [0.0; 10] } else { [0.5, 0.25, 0.0, 0.0, 0.02, 0.0, 0.0, 0.2, 0.0, 0.2] };
     [link, link].concat()
 }
