@@ -117,7 +117,7 @@ fn files(outcome: &DesignOutcome, options: &Options) -> Result<Vec<(&'static str
     };
     let path = |sampled: &Sampled<'_>| {
         let title = format!("{}: {}, {} s", file.name, file.family, file.duration_s);
-        path_svg(sampled, &title, &outcome.machine.model, &outcome.limits).map_err(|error| error.to_string())
+        path_svg(sampled, &title, &outcome.machine.model(), &outcome.limits).map_err(|error| error.to_string())
     };
     let mut files = vec![("preview.svg", at(PICTURE_RATE_HZ, &picture)?), ("path.svg", at(PICTURE_RATE_HZ, &path)?)];
     // Who brings a trajectory has it, maybe under this very name.

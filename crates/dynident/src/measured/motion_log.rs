@@ -36,7 +36,7 @@ fn reference(
     }
     // The differentiator says that it needs one.
     let Some(reference) = commanded(study, machine, motion, index)? else { return Ok(None) };
-    let mut order = vec![0; machine.model.dof()];
+    let mut order = vec![0; machine.model().dof()];
     for (joint, &place) in machine.log_place.iter().enumerate() {
         order[place] = joint;
     }
@@ -57,7 +57,7 @@ pub(crate) fn commanded(
     let Some(settings) = own.or_else(|| motion.differentiator.reference()) else { return Ok(None) };
     let failed = |source| Error::recording(&study.log_name(index), source);
     let filter = |source| failed(RecordingError::Filter(source));
-    let dof = machine.model.dof();
+    let dof = machine.model().dof();
     let reference = match (&settings.file, settings.closed_form().map_err(filter)?) {
         (_, Some(closed)) => closed,
         (Some(file), None) => {
