@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::machine::Machine;
 use crate::study::Study;
-use dynident_recording::{FilterError, MotionSettings, MotionStream, RecordingError, Reference};
+use dynident_recording::{FilterError, Log, MotionSettings, MotionStream, RecordingError, Reference};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -20,8 +20,8 @@ pub(crate) fn motion_stream(
 ) -> Result<MotionStream, Error> {
     let failed = |source| Error::recording(&study.log_name(index), source);
     let reference = reference(study, machine, motion, index)?;
-    MotionStream::open_following(&study.format_of(index), file, &machine.log_joints, motion, reference.as_ref())
-        .map_err(failed)
+    let log = Log::file(file, study.format_of(index), &machine.log_joints);
+    MotionStream::following(&log, motion, reference.as_ref()).map_err(failed)
 }
 
 /// The commanded motion of a log, its joints in the order of the log's columns; `None` for differentiators that need none.

@@ -6,11 +6,11 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 /// Longest line that is read; a humanoid's log row has a few thousand bytes.
-pub const MAX_LINE_BYTES: usize = 1 << 20;
+const MAX_LINE_BYTES: usize = 1 << 20;
 
 /// The lines that matter of one file.
 #[derive(Debug)]
-pub(crate) struct Lines {
+pub(super) struct Lines {
     path: PathBuf,
     reader: BufReader<File>,
     buffer: Vec<u8>,
@@ -21,7 +21,7 @@ pub(crate) struct Lines {
 }
 
 impl Lines {
-    pub(crate) fn open(path: &Path) -> Result<Self, RecordingError> {
+    pub(super) fn open(path: &Path) -> Result<Self, RecordingError> {
         let refused = |source| RecordingError::Io { file: path.to_owned(), source };
         let file = File::open(path).map_err(refused)?;
         // Opening a folder succeeds on some systems and fails only when read, with a less clear reason.
@@ -37,33 +37,29 @@ impl Lines {
         })
     }
 
-    pub(crate) fn path(&self) -> &Path {
-        &self.path
-    }
-
-    pub(crate) fn number(&self) -> u64 {
+    pub(super) fn number(&self) -> u64 {
         self.number
     }
 
-    pub(crate) fn complete(&self) -> bool {
+    pub(super) fn complete(&self) -> bool {
         self.complete
     }
 
     /// Whether nothing follows the line last read.
-    pub(crate) fn at_end(&mut self) -> Result<bool, RecordingError> {
+    pub(super) fn at_end(&mut self) -> Result<bool, RecordingError> {
         let rest = self.reader.fill_buf();
         Ok(rest.map_err(|source| RecordingError::Io { file: self.path.clone(), source })?.is_empty())
     }
 
     /// The line that [`advance`](Self::advance) moved to, without byte-order mark, newline and outer blanks.
-    pub(crate) fn line(&self) -> &[u8] {
+    pub(super) fn line(&self) -> &[u8] {
         let line = self.buffer.strip_suffix(b"\n").unwrap_or(&self.buffer);
         let line = if self.number == 1 { line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(line) } else { line };
         line.strip_suffix(b"\r").unwrap_or(line)
     }
 
     /// Moves to the next line that is neither blank nor a comment; false at the end of the file.
-    pub(crate) fn advance(&mut self) -> Result<bool, RecordingError> {
+    pub(super) fn advance(&mut self) -> Result<bool, RecordingError> {
         loop {
             self.buffer.clear();
             let limit = MAX_LINE_BYTES as u64 + 1;

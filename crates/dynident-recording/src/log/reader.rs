@@ -1,16 +1,18 @@
 //! Logs as a stream of blocks: paired files, ranges, mapping to joints. Memory does not grow with the log.
 
+use super::columns::Selected;
+use super::format::Missing;
+use super::mapping::Mapping;
+use super::source::LogSource;
+use super::{Log, file_source};
 use crate::error::RecordingError;
-use crate::format::{LogFormat, Missing};
-use crate::mapping::Mapping;
-use crate::table::{Row, Table, row_count};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Largest position or torque: its squares and its second differences per second squared are finite.
 const LARGEST: f64 = 1e60;
 
 /// Rows of a [`RawBlock`] at most.
-pub const BLOCK_ROWS: usize = 4096;
+const BLOCK_ROWS: usize = 4096;
 
 /// Some successive rows of a log in joint values (SI), as they were logged: no filter, no resampling.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -50,26 +52,20 @@ pub struct LinesDropped {
 #[derive(Debug)]
 struct Group {
     key: &'static str,
-    file: usize,
+    table: usize,
     slots: Vec<usize>,
     mapping: Mapping,
     columns: Vec<Vec<f64>>,
 }
 
-#[derive(Debug)]
-struct Source {
-    table: Table,
-    values: Vec<f64>,
-}
-
-/// A log that is being read.
+/// One pass over a log: raw columns become joint values in SI, ranges and missing values are dealt with.
 #[derive(Debug)]
 pub struct LogReader {
-    file: PathBuf,
+    label: String,
     joints: Vec<String>,
-    sources: Vec<Source>,
+    tables: Vec<Selected>,
     groups: Vec<Group>,
-    /// Slot of the time column in the main file and its factor to seconds.
+    /// Slot of the time column in the main table and its factor to seconds.
     time: Option<(usize, f64)>,
     period_s: f64,
     first_stamp_s: Option<f64>,
@@ -84,33 +80,46 @@ pub struct LogReader {
 }
 
 impl LogReader {
-    /// Opens the log whose main file is `file`; the `file` keys of channel groups are relative to its folder.
+    /// Begins a pass over `log`.
     ///
     /// # Errors
     /// If the description is wrong, a file is missing or empty, or a column does not exist.
-    pub fn open(format: &LogFormat, file: &Path, joints: &[String]) -> Result<Self, RecordingError> {
-        format.validate(joints)?;
-        let folder = file.parent().unwrap_or(Path::new(""));
-        let mut sources = vec![Table::open(file, format)?];
+    pub fn open(log: &Log) -> Result<Self, RecordingError> {
+        let format = &log.format;
+        format.validate(&log.joints)?;
+        let main = log.source();
+        let mut tables = vec![Selected::new(main.label(), main.open()?)];
         let time = match &format.time {
-            Some(time) => Some((sources[0].want("time.column", &time.column)?, time.unit.seconds() * time.scale)),
+            Some(time) => Some((tables[0].want("time.column", &time.column)?, time.unit.seconds() * time.scale)),
             None => None,
         };
+
+        // Channel groups in files of their own: each file is opened once.
+        let mut paths = vec![main.path().map(Path::to_owned)];
         let mut groups = Vec::new();
         for (key, group, quantity) in format.groups() {
-            let path = group.file.as_ref().map_or_else(|| file.to_owned(), |name| folder.join(name));
-            let source = if let Some(known) = sources.iter().position(|table| table.path() == path) {
-                known
-            } else {
-                sources.push(Table::open(&path, format)?);
-                sources.len() - 1
+            let path = match &group.file {
+                None => main.path().map(Path::to_owned),
+                Some(name) => {
+                    let beside = main.path().ok_or_else(|| RecordingError::NoFolder { log: main.label(), key })?;
+                    Some(beside.parent().unwrap_or(Path::new("")).join(name))
+                }
             };
+            let table = paths.iter().position(|known| *known == path).unwrap_or(paths.len());
+            if let (Some(path), true) = (&path, table == paths.len()) {
+                let source = file_source(path, format);
+                tables.push(Selected::new(source.label(), source.open()?));
+                paths.push(Some(path.clone()));
+            }
             let list = group.column_list(key)?;
-            let slots = list.iter().map(|column| sources[source].want(&format!("{key}.columns"), column));
+            let slots = list.iter().map(|column| tables[table].want(&format!("{key}.columns"), column));
             let slots = slots.collect::<Result<Vec<_>, _>>()?;
-            let mapping = Mapping::new(key, group, quantity, joints.len())?;
-            groups.push(Group { key, file: source, columns: vec![Vec::new(); slots.len()], slots, mapping });
+            let mapping = Mapping::new(key, group, quantity, log.joints.len())?;
+            groups.push(Group { key, table, columns: vec![Vec::new(); slots.len()], slots, mapping });
         }
+        tables.iter_mut().for_each(Selected::ready);
+
+        // The part of the log that is asked for, and what to call it in messages.
         let mut selection = Vec::new();
         let rows = match (format.rows, format.fraction) {
             (Some(rows), _) => {
@@ -119,7 +128,7 @@ impl LogReader {
             }
             (None, Some([from, to])) => {
                 selection.push(format!("fraction = [{from}, {to}]"));
-                let count = row_count(file, format)? as f64;
+                let count = row_count(main)? as f64;
                 [(from * count).round() as u64, (to * count).round() as u64]
             }
             (None, None) => [0, u64::MAX],
@@ -127,11 +136,10 @@ impl LogReader {
         if let Some(range) = format.time_range_s {
             selection.push(format!("time_range_s = {range:?}"));
         }
-        let sources = sources.into_iter().map(|table| Source { values: vec![0.0; table.slots()], table }).collect();
         Ok(Self {
-            file: file.to_owned(),
-            joints: joints.to_vec(),
-            sources,
+            label: main.label(),
+            joints: log.joints.clone(),
+            tables,
             groups,
             time,
             period_s: format.rate_hz.map_or(0.0, f64::recip),
@@ -157,17 +165,17 @@ impl LogReader {
         self.next_row
     }
 
-    /// The main file.
-    pub fn file(&self) -> &Path {
-        &self.file
+    /// What messages call the log.
+    pub fn label(&self) -> &str {
+        &self.label
     }
 
     /// Name or index of the time column, for messages.
     pub fn time_label(&self) -> String {
-        self.time.map_or_else(|| "none".to_owned(), |(slot, _)| self.sources[0].table.label_of_slot(slot))
+        self.time.map_or_else(|| "none".to_owned(), |(slot, _)| self.tables[0].label_of_slot(slot))
     }
 
-    /// Reads up to [`BLOCK_ROWS`] rows into `block`; false when the log has ended (and `block` is empty).
+    /// Reads up to 4096 rows into `block`; false when the log has ended (and `block` is empty).
     ///
     /// # Errors
     /// If a row cannot be read, files of one log differ in length, or the selection leaves no row at all.
@@ -197,7 +205,7 @@ impl LogReader {
             for (joint, values) in out.iter().enumerate() {
                 if let Some(at) = values.iter().position(|value| !(-LARGEST..=LARGEST).contains(value)) {
                     return Err(RecordingError::Overflow {
-                        file: self.file.clone(),
+                        log: self.label.clone(),
                         row: block.row[at],
                         group: finite,
                         joint: self.joints[joint].clone(),
@@ -208,10 +216,10 @@ impl LogReader {
         self.delivered += block.row.len() as u64;
         if block.row.is_empty() && self.delivered == 0 {
             return Err(if self.next_row == 0 && self.rows[1] > 0 {
-                RecordingError::NoRows { file: self.file.clone(), line: self.sources[0].table.line() }
+                RecordingError::NoRows { place: self.tables[0].table.place() }
             } else {
                 RecordingError::EmptySelection {
-                    file: self.file.clone(),
+                    log: self.label.clone(),
                     selection: if self.selection.is_empty() {
                         "missing = \"drop\"".to_owned()
                     } else {
@@ -232,8 +240,8 @@ impl LogReader {
         // The first row is always read: times count from it.
         if self.next_row > 0 && self.next_row < self.rows[0] {
             let mut ended = None;
-            for (index, source) in self.sources.iter_mut().enumerate() {
-                if !source.table.skip_row()? {
+            for (index, table) in self.tables.iter_mut().enumerate() {
+                if !table.skip_row()? {
                     ended = Some(index);
                 }
             }
@@ -242,11 +250,11 @@ impl LogReader {
             return ended.map_or(Ok(()), |index| self.check_ends(index));
         }
         let (mut ended, mut missing) = (None, None);
-        for (index, source) in self.sources.iter_mut().enumerate() {
-            match source.table.next_row(&mut source.values)? {
-                Row::Values => {}
-                Row::Missing => missing = Some(index),
-                Row::End => ended = Some(index),
+        for (index, table) in self.tables.iter_mut().enumerate() {
+            if !table.next_row()? {
+                ended = Some(index);
+            } else if table.missing() {
+                missing = Some(index);
             }
         }
         if let Some(index) = ended {
@@ -257,15 +265,14 @@ impl LogReader {
         self.next_row += 1;
         if let Some(index) = missing {
             if self.missing == Missing::Error {
-                let source = &self.sources[index];
-                return Err(source.table.missing_error(&source.values));
+                return Err(self.tables[index].missing_error());
             }
             self.dropped.missing += u64::from(row >= self.rows[0]);
             return Ok(());
         }
         let time_s = match self.time {
             Some((slot, seconds)) => {
-                let stamp = self.sources[0].values[slot];
+                let stamp = self.tables[0].values[slot];
                 // The difference of the stamps first: nanoseconds since 1970 do not survive the multiplication.
                 (stamp - *self.first_stamp_s.get_or_insert(stamp)) * seconds
             }
@@ -277,7 +284,7 @@ impl LogReader {
         block.row.push(row);
         block.time_s.push(time_s);
         for group in &mut self.groups {
-            let values = &self.sources[group.file].values;
+            let values = &self.tables[group.table].values;
             for (column, slot) in group.columns.iter_mut().zip(&group.slots) {
                 column.push(values[*slot]);
             }
@@ -287,19 +294,28 @@ impl LogReader {
 
     /// The files of one log must end together; one cut-off last row is forgiven.
     fn check_ends(&mut self, ended: usize) -> Result<(), RecordingError> {
-        for source in &mut self.sources {
-            if let Some(line) = source.table.truncated_line() {
-                self.dropped.truncated = Some(format!("{}:{line}", source.table.path().display()));
+        for table in &self.tables {
+            if let Some(place) = table.table.truncated() {
+                self.dropped.truncated = Some(place.to_string());
             }
         }
-        let (rows, file) = (self.sources[ended].table.rows(), self.sources[ended].table.path().to_owned());
+        let (rows, log) = (self.tables[ended].rows, self.tables[ended].label.clone());
         let forgiven = u64::from(self.dropped.truncated.is_some());
-        for source in &mut self.sources {
-            let longer = source.table.rows() > rows;
-            if longer && (source.table.rows() > rows + forgiven || source.table.skip_row()?) {
-                return Err(RecordingError::UnequalFiles { file, rows, other: source.table.path().to_owned() });
+        for table in &mut self.tables {
+            let longer = table.rows > rows;
+            if longer && (table.rows > rows + forgiven || table.skip_row()?) {
+                return Err(RecordingError::UnequalFiles { log, rows, other: table.label.clone() });
             }
         }
         Ok(())
     }
+}
+
+/// Data rows of a log: one cheap pass without reading numbers.
+fn row_count(source: &dyn LogSource) -> Result<u64, RecordingError> {
+    let (mut table, mut rows) = (source.open()?, 0);
+    while table.skip_row()? {
+        rows += 1;
+    }
+    Ok(rows)
 }

@@ -1,8 +1,8 @@
 //! From columns to joints: unit, sign, scale, matrix, offset.
 
+use super::format::ChannelGroup;
+use super::units::{Quantity, si_factor};
 use crate::error::FormatError;
-use crate::format::ChannelGroup;
-use crate::units::{Quantity, si_factor};
 
 /// `joint = matrix · column + offset`, with unit, sign and scale already in the matrix.
 #[derive(Clone, Debug)]

@@ -1,8 +1,8 @@
 //! The description of a log: which column is what. Plain data, read from the study file.
 
-use crate::column_pattern::expanded;
+use super::column_pattern::expanded;
+use super::units::{Quantity, si_factor, unit_names};
 use crate::error::FormatError;
-use crate::units::{Quantity, si_factor, unit_names};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -197,6 +197,13 @@ fn one() -> f64 {
     1.0
 }
 
+impl TimeColumn {
+    /// Stamps in seconds.
+    pub fn seconds(column: ColumnRef) -> Self {
+        Self { column, unit: TimeUnit::Seconds, scale: one() }
+    }
+}
+
 /// What to do with a row that has an empty, NaN or infinite field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -289,6 +296,33 @@ fn default_max_gap_steps() -> f64 {
 }
 
 impl LogFormat {
+    /// A log with a time column, all else by default: no further channel, every row, a header if there seems to be one.
+    pub fn with_time(time: TimeColumn, position: ChannelGroup, torque: ChannelGroup) -> Self {
+        Self {
+            header: Header::default(),
+            delimiter: None,
+            time: Some(time),
+            rate_hz: None,
+            position,
+            velocity: None,
+            acceleration: None,
+            torque,
+            temperature: None,
+            rows: None,
+            fraction: None,
+            time_range_s: None,
+            missing: Missing::default(),
+            clock: ClockRule::default(),
+            max_gap_steps: default_max_gap_steps(),
+        }
+    }
+
+    /// As [`with_time`](Self::with_time), for samples at an even rate and without stamps.
+    pub fn at_rate(rate_hz: f64, position: ChannelGroup, torque: ChannelGroup) -> Self {
+        let time = TimeColumn::seconds(ColumnRef::Index(0));
+        Self { time: None, rate_hz: Some(rate_hz), ..Self::with_time(time, position, torque) }
+    }
+
     /// Checks the description against itself and the study's joints.
     ///
     /// # Errors
@@ -388,6 +422,20 @@ impl LogFormat {
 }
 
 impl ChannelGroup {
+    /// Columns that are joint values in SI already, in the main file.
+    pub fn new(columns: Columns) -> Self {
+        Self {
+            file: None,
+            columns,
+            unit: None,
+            scale: None,
+            sign: None,
+            offset: None,
+            matrix: None,
+            inverse_matrix: None,
+        }
+    }
+
     /// The columns one by one, ranges expanded.
     ///
     /// # Errors
@@ -471,7 +519,7 @@ impl ChannelGroup {
         if let Some(matrix) = &self.inverse_matrix {
             check_matrix(&at("inverse_matrix"), matrix, joints.len(), columns)?;
         }
-        crate::mapping::Mapping::new(key, self, quantity, joints.len()).map(|_| ())
+        super::mapping::Mapping::new(key, self, quantity, joints.len()).map(|_| ())
     }
 }
 
