@@ -12,7 +12,7 @@ pub const NEGLIGIBLE_JITTER: f64 = 1e-3;
 pub const SHORTEST_STEP: f64 = 0.1;
 
 /// What the first rows tell about the clock.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Clock {
     /// Samples per second on the uniform grid.
     pub rate_hz: f64,

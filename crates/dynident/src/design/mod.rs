@@ -26,9 +26,9 @@ pub use windows::{GivenStroke, StrokeFile, StrokeLimitFile, WindowedCondition, W
 
 use crate::cpu_time::cpu_seconds;
 use crate::error::Error;
-use crate::job::RunOptions;
-use crate::machine::Machine;
+use crate::jobs::options::RunOptions;
 use crate::study::Study;
+use crate::study::StudyRobot;
 use core::ops::ControlFlow;
 use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_excitation::check::{CHECK_RATE_HZ, LimitReport, VIOLATION, check_limits};
@@ -53,7 +53,7 @@ pub struct DesignOutcome {
     /// What `design.json` holds.
     pub file: DesignFile,
     /// The machine.
-    pub machine: Machine,
+    pub machine: StudyRobot,
     /// The limits in force: the description's with the study's laid over them.
     pub limits: Limits,
     /// The search by generations, for optimisers that have them; empty for gradients.
