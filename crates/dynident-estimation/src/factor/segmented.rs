@@ -93,15 +93,6 @@ pub struct SegmentedFactor {
     workspace: FactorWorkspace,
 }
 
-/// What one segment says about a parameter vector.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SegmentScore {
-    /// Rows in the segment.
-    pub rows: usize,
-    /// `Wᵀ(τ − Wθ)` over the segment's rows.
-    pub score: DVector<f64>,
-}
-
 impl SegmentedFactor {
     /// No rows yet, for `columns` regressor columns and the torque.
     ///
@@ -284,7 +275,7 @@ impl SegmentedFactor {
     ///
     /// # Errors
     /// [`EstimationError::Mismatch`] when `theta` does not have one value per column.
-    pub fn scores(&self, theta: &[f64]) -> Result<Vec<SegmentScore>, EstimationError> {
+    pub fn scores(&self, theta: &[f64]) -> Result<Vec<DVector<f64>>, EstimationError> {
         if theta.len() != self.columns {
             let what = "parameters for a factor's columns".into();
             return Err(EstimationError::Mismatch { what, expected: self.columns, found: theta.len() });
@@ -303,7 +294,7 @@ impl SegmentedFactor {
                 score
             }
         };
-        Ok(self.segments.iter().map(|s| SegmentScore { rows: s.rows(self.columns), score: score(s) }).collect())
+        Ok(self.segments.iter().map(score).collect())
     }
 }
 

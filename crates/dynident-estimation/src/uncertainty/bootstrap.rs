@@ -14,10 +14,11 @@ const REPLICATES: usize = 300;
 const SEED: u64 = 1;
 
 /// The segments of one joint in one log, whitened: information and score of each.
-pub(crate) type Blocks = Vec<(DMatrix<f64>, DVector<f64>)>;
+pub(super) type Blocks = Vec<(DMatrix<f64>, DVector<f64>)>;
 
-/// The second moment of the replicates' changes about zero, about which they are drawn. `fixed` is the information that is not drawn (a prior's).
-pub(crate) fn spread(blocks: &[Blocks], fixed: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimationError> {
+/// The second moment of the replicates' changes about zero, about which they are drawn. `fixed` is the
+/// information that is not drawn (a prior's).
+pub(super) fn replicated(blocks: &[Blocks], fixed: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimationError> {
     let size = fixed.nrows();
     let mut random = Random::new(SEED);
     let mut sum = DMatrix::zeros(size, size);
@@ -58,13 +59,13 @@ mod tests {
             .map(|x| (DMatrix::from_element(1, 1, 1.0 / f64::from(n)), DVector::from_element(1, x / f64::from(n))))
             .collect();
         let expected = values.iter().map(|x| x * x).sum::<f64>() / f64::from(n * n);
-        let found = spread(&[blocks], &DMatrix::zeros(1, 1)).unwrap()[(0, 0)];
+        let found = replicated(&[blocks], &DMatrix::zeros(1, 1)).unwrap()[(0, 0)];
         assert!((found / expected - 1.0).abs() < 0.25, "{found} {expected}");
     }
 
     #[test]
     fn a_direction_that_no_draw_holds_is_an_error() {
         let blocks = vec![(DMatrix::zeros(1, 1), DVector::zeros(1)); 3];
-        assert!(spread(&[blocks], &DMatrix::zeros(1, 1)).is_err());
+        assert!(replicated(&[blocks], &DMatrix::zeros(1, 1)).is_err());
     }
 }

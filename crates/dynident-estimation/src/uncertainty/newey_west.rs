@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 /// Bartlett's kernel up to this lag.
 ///
 /// `L = ⌊1.1447 (s₁/s₀)^(2/3) T^(1/3)⌋`, `s₀ = γ_0 + 2 Σ γ_l`, `s₁ = 2 Σ l γ_l` over l = 1..⌊4 (T/100)^(2/9)⌋, at most T − 1.
-pub(crate) fn bandwidth(series: &[DVector<f64>]) -> usize {
+pub(super) fn bandwidth(series: &[DVector<f64>]) -> usize {
     let count = series.len();
     if count < 3 {
         return 0;
@@ -37,7 +37,7 @@ fn autocovariance(series: &[DVector<f64>], lag: usize) -> f64 {
 }
 
 /// S of one series with the given bandwidth; positive semi-definite.
-pub(crate) fn long_run(series: &[DVector<f64>], size: usize, bandwidth: usize) -> DMatrix<f64> {
+pub(super) fn long_run(series: &[DVector<f64>], size: usize, bandwidth: usize) -> DMatrix<f64> {
     let mut sum = DMatrix::zeros(size, size);
     for score in series {
         sum.ger(1.0, score, score, 1.0);
