@@ -1,8 +1,9 @@
 //! Block bootstrap: what the estimate would have been from other draws of the same time segments.
 //!
-//! Each replicate draws as many segments of a joint in a log as there are, with replacement, and solves again with the weights of the fit. In coordinates where the fit's information is the unit
-//! matrix a replicate's change is `(Σ_g n_g H_g)⁻¹ Σ_g n_g s_g`, with H_g the segment's information, s_g its score and n_g how often it was drawn. Künsch, Annals of Statistics 17 (1989) 1217;
-//! Davison and Hinkley, Bootstrap Methods and their Application (1997), 8.2.
+//! Each replicate draws as many segments of a joint in a log as there are, with replacement, and solves again with the
+//! weights of the fit. In coordinates where the fit's information is the unit matrix a replicate's change is `(Σ_g n_g
+//! H_g)⁻¹ Σ_g n_g s_g`, with H_g the segment's information, s_g its score and n_g how often it was drawn. Künsch,
+//! Annals of Statistics 17 (1989) 1217; Davison and Hinkley, Bootstrap Methods and their Application (1997), 8.2.
 
 use crate::error::EstimationError;
 use dynident_model::sample::Random;
@@ -49,7 +50,8 @@ pub(super) fn replicated(blocks: &[Blocks], fixed: &DMatrix<f64>) -> Result<DMat
 mod tests {
     use super::*;
 
-    /// The mean of independent numbers: the bootstrap's variance is Σ (x − mean)² / n². Two hundred draws of 300 know it to 8 % (one σ); 25 % is three.
+    /// The mean of independent numbers: the bootstrap's variance is Σ (x − mean)² / n². Two hundred draws of 300 know
+    /// it to 8 % (one σ); 25 % is three.
     #[test]
     fn the_mean_has_its_textbook_variance() {
         let n = 50;

@@ -1,18 +1,19 @@
 //! How far an estimate may be off: covariance under white noise, and under noise that is correlated in time.
 //!
-//! Residuals of robot torque are strongly coloured (lag-1 correlations of 0.3 to 0.98 at usual rates): unmodelled friction and
-//! elasticity last longer than a sample. The textbook `σ²(WᵀW)⁻¹` counts every sample as new information and is then too small, by a
-//! factor of about √((1+ρ)/(1−ρ)) in the standard deviation. The cluster-robust covariance
+//! Residuals of robot torque are strongly coloured (lag-1 correlations of 0.3 to 0.98 at usual rates): unmodelled
+//! friction and elasticity last longer than a sample. The textbook `σ²(WᵀW)⁻¹` counts every sample as new information
+//! and is then too small, by a factor of about √((1+ρ)/(1−ρ)) in the standard deviation. The cluster-robust covariance
 //!
 //! ```text
 //!     V = c A⁻¹ (Σ_g s_g s_gᵀ) A⁻¹,   A = Σ w_j² W_jᵀW_j,   s_g = w_j² W_gᵀ(τ_g − W_g θ),   c = G/(G−1) · (N−1)/(N−p)
 //! ```
 //!
-//! sums the scores over each time segment g **before** squaring: whatever the correlation (and the changes of variance) within a
-//! segment, its effect is in s_g. It is right as long as segments last much longer than the correlation, so that their sums are
-//! nearly independent, and there are clearly more segments than parameters that each joint's rows pay for. The first can be checked:
-//! [`Estimate::segment_correlation`](crate::Estimate::segment_correlation) is near zero then.
-//! Liang and Zeger, Biometrika 73 (1986) 13; Cameron and Miller, J. Human Resources 50 (2015) 317, who also give c.
+//! sums the scores over each time segment g **before** squaring: whatever the correlation (and the changes of variance)
+//! within a segment, its effect is in s_g. It is right as long as segments last much longer than the correlation, so
+//! that their sums are nearly independent, and there are clearly more segments than parameters that each joint's rows
+//! pay for. The first can be checked: [`Estimate::segment_correlation`](crate::Estimate::segment_correlation) is near
+//! zero then. Liang and Zeger, Biometrika 73 (1986) 13; Cameron and Miller, J. Human Resources 50 (2015) 317, who also
+//! give c.
 
 use super::bootstrap::{Blocks, replicated};
 use super::newey_west::{bandwidth, long_run};
@@ -26,20 +27,23 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CovarianceMethod {
-    /// Every time segment of every joint and log is a cluster, errors may be correlated within a segment, and each segment is judged by the fit
-    /// **without it** (delete-one jackknife, CR3). A fit bends towards what it was made from, the more the fewer segments there are for each parameter; this does not
-    /// take that for accuracy. Slightly cautious when segments are few.
+    /// Every time segment of every joint and log is a cluster, errors may be correlated within a segment, and each
+    /// segment is judged by the fit **without it** (delete-one jackknife, CR3). A fit bends towards what it was made
+    /// from, the more the fewer segments there are for each parameter; this does not take that for accuracy. Slightly
+    /// cautious when segments are few.
     #[default]
     Jackknife,
-    /// The same clusters with the residuals of the fit itself and the usual small-sample factor (CR1): too optimistic unless there are many more segments than
-    /// parameters.
+    /// The same clusters with the residuals of the fit itself and the usual small-sample factor (CR1): too optimistic
+    /// unless there are many more segments than parameters.
     Segments,
-    /// A time segment of a log is one cluster for all joints: errors may also be correlated across joints. Needs more segments,
-    /// for there are fewer clusters.
+    /// A time segment of a log is one cluster for all joints: errors may also be correlated across joints. Needs more
+    /// segments, for there are fewer clusters.
     SegmentsAcrossJoints,
-    /// Neighbouring segments may be correlated as well, with Bartlett's weights up to a lag chosen from the scores (Newey and West 1994). For segments shorter than the correlation lasts; needs many of them.
+    /// Neighbouring segments may be correlated as well, with Bartlett's weights up to a lag chosen from the scores
+    /// (Newey and West 1994). For segments shorter than the correlation lasts; needs many of them.
     NeweyWest,
-    /// Segments drawn with replacement, 300 times, from a fixed seed. As the segments' own method, with the fit's changes of information in it.
+    /// Segments drawn with replacement, 300 times, from a fixed seed. As the segments' own method, with the fit's
+    /// changes of information in it.
     Bootstrap,
     /// Errors independent from sample to sample. Too optimistic on real data; for simulations and comparisons.
     White,
@@ -181,8 +185,8 @@ fn newey_west(scores: &Scores<'_>, rows: usize) -> Result<Moment, EstimationErro
         .fold(DMatrix::zeros(scores.free, scores.free), |sum, (joint, bandwidth)| {
             sum + long_run(&joint.scores, scores.free, *bandwidth)
         });
-    // Bartlett's kernel of bandwidth L makes 3/(2 (L + 1)) independent squares of one score (Priestley, Spectral Analysis
-    // and Time Series, 6.2); never more than one.
+    // Bartlett's kernel of bandwidth L makes 3/(2 (L + 1)) independent squares of one score (Priestley, Spectral
+    // Analysis and Time Series, 6.2); never more than one.
     let longest = bandwidths.iter().copied().max().unwrap_or(0) as f64;
     Ok(Moment { matrix: sum * (n / (n - p)), clusters, independent: (1.5 / (longest + 1.0)).min(1.0) })
 }
@@ -219,7 +223,8 @@ fn second_moment(clusters: &[DVector<f64>], free: usize, factor: f64) -> Moment 
     Moment { matrix: rows.tr_mul(&rows) * factor, clusters: clusters.len(), independent: 1.0 }
 }
 
-/// The correlation matrix of a covariance matrix. A row and column of zero variance (a fixed column) become those of the unit matrix.
+/// The correlation matrix of a covariance matrix. A row and column of zero variance (a fixed column) become those of
+/// the unit matrix.
 ///
 /// ```
 /// use dynident_estimation::correlation;

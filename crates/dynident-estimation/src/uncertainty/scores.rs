@@ -1,7 +1,7 @@
 //! The scores of a fit in coordinates where its information is the unit matrix.
 //!
-//! With `A = RᵀR` the information of the free columns, `R⁻ᵀ` whitens: what every covariance method looks at is
-//! `R⁻ᵀ s_g` of each time segment g of each joint in each log, and its result `M` spreads to the columns as `R⁻¹ M R⁻ᵀ`.
+//! With `A = RᵀR` the information of the free columns, `R⁻ᵀ` whitens: what every covariance method looks at is `R⁻ᵀ
+//! s_g` of each time segment g of each joint in each log, and its result `M` spreads to the columns as `R⁻¹ M R⁻ᵀ`.
 
 use super::covariance::Fit;
 use crate::error::EstimationError;
@@ -64,7 +64,8 @@ impl<'a> Scores<'a> {
         self.joints.iter().map(|joint| joint.scores.len()).sum()
     }
 
-    /// For every joint the squared scores over those of white noise, and the correlation of neighbouring segments' scores.
+    /// For every joint the squared scores over those of white noise, and the correlation of neighbouring segments'
+    /// scores.
     pub(super) fn inflation_and_neighbours(&self, fit: &Fit<'_>) -> (Vec<f64>, Vec<f64>) {
         let count = fit.joint_sigma.len();
         let (mut found, mut expected, mut products) = (vec![0.0; count], vec![0.0; count], vec![0.0; count]);
@@ -93,8 +94,8 @@ impl<'a> Scores<'a> {
         })
     }
 
-    /// Degrees of freedom of every column's variance, `independent` times those of its clusters under white noise; infinite
-    /// for fixed columns.
+    /// Degrees of freedom of every column's variance, `independent` times those of its clusters under white noise;
+    /// infinite for fixed columns.
     pub(super) fn freedom(&self, independent: f64) -> Vec<f64> {
         // What share of each estimate's variance comes from each cluster.
         let shares: Vec<Vec<f64>> = self.joints.iter().flat_map(|joint| joint.shares(self.inverse)).collect();
@@ -112,8 +113,8 @@ impl JointScores<'_> {
 
     /// By how much leaving out one segment changes the estimate.
     pub(super) fn change_without(&self, segment: &TriangularFactor) -> DVector<f64> {
-        // Where a segment alone fixes a direction its own residual there is zero, and so is the quotient; this keeps it from
-        // being 0/0.
+        // Where a segment alone fixes a direction its own residual there is zero, and so is the quotient; this keeps it
+        // from being 0/0.
         const ALONE: f64 = 1.0e-6;
         let triangle = segment.regressor_triangle();
         let rest = (segment.rotated_torque() - &triangle * DVector::from_column_slice(&self.theta)) * self.weight;
@@ -135,8 +136,8 @@ impl JointScores<'_> {
 
 /// `(Σ_g h_g)² / Σ_g h_g²`: the degrees of freedom of a sum of independent squares with expectations h_g.
 ///
-/// Satterthwaite, Biometrics Bulletin 2 (1946) 110; for clusters Bell and McCaffrey, Survey Methodology 28 (2002) 169, here
-/// without the correlation that the fit puts between clusters, and less the one degree that the jackknife's factor
+/// Satterthwaite, Biometrics Bulletin 2 (1946) 110; for clusters Bell and McCaffrey, Survey Methodology 28 (2002) 169,
+/// here without the correlation that the fit puts between clusters, and less the one degree that the jackknife's factor
 /// (G − 1)/G stands for.
 fn satterthwaite(shares: &[Vec<f64>], k: usize) -> f64 {
     let (sum, square) = shares.iter().fold((0.0, 0.0), |(sum, square), h| (sum + h[k], square + h[k] * h[k]));

@@ -32,6 +32,11 @@ pub(crate) struct Case {
     pub(crate) settings: PhysicalSettings,
     #[allow(dead_code, reason = "not every test asks for it")]
     pub(crate) truth: Vec<f64>,
+    /// R of the data, column by column, and ρ: what the problem was made from, for other solvers.
+    #[allow(dead_code, reason = "not every test asks for it")]
+    pub(crate) rows: (DMatrix<f64>, DVector<f64>),
+    #[allow(dead_code, reason = "not every test asks for it")]
+    pub(crate) total_mass_kg: Option<[f64; 2]>,
 }
 
 /// Problem number `seed` with `bodies` bodies.
@@ -78,7 +83,8 @@ pub(crate) fn case(seed: u64, bodies: usize) -> Case {
             scale: 1.0,
         });
     }
-    // Base columns: some 60 % of the bodies' are independent, the others go into up to four of them; scalars stand alone.
+    // Base columns: some 60 % of the bodies' are independent, the others go into up to four of them; scalars stand
+    // alone.
     let mut independent: Vec<usize> =
         (0..columns).filter(|&c| c >= 10 * bodies || random.uniform(0.0, 1.0) < 0.6).collect();
     independent.dedup();
@@ -108,9 +114,10 @@ pub(crate) fn case(seed: u64, bodies: usize) -> Case {
     let panel: Vec<f64> = triangle.iter().chain(right.iter()).copied().collect();
     let factor = TriangularFactor::from_rows(rows, &panel, rows).unwrap();
     let mut problem = PhysicalProblem::new(base, described, named, &factor).unwrap();
-    if kind == 3 {
-        let total: f64 = (0..bodies).map(|body| truth[10 * body]).sum();
-        problem = problem.with_total_mass_kg([total * 0.98, total * 1.01]).unwrap();
+    let total: f64 = (0..bodies).map(|body| truth[10 * body]).sum();
+    let total_mass_kg = (kind == 3).then_some([total * 0.98, total * 1.01]);
+    if let Some(limits) = total_mass_kg {
+        problem = problem.with_total_mass_kg(limits).unwrap();
     }
     let prior = [PhysicalPrior::Entropic, PhysicalPrior::Pullback, PhysicalPrior::Euclidean][below(&mut random, 3)];
     let settings = PhysicalSettings {
@@ -118,5 +125,5 @@ pub(crate) fn case(seed: u64, bodies: usize) -> Case {
         prior_weight: [1.0e-2, 1.0, 1.0e-3][below(&mut random, 3)],
         ..PhysicalSettings::default()
     };
-    Case { problem, settings, truth }
+    Case { problem, settings, truth, rows: (triangle, right), total_mass_kg }
 }

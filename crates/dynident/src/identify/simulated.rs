@@ -223,7 +223,7 @@ fn settled(
     };
     let (mut iterations, mut simulations) = (0, 0);
     for round in 1..=ROUNDS {
-        let found = simulated_least_squares(&asked, simulated, &settings).map_err(|stop| stop.of(logs))?;
+        let found = simulated_least_squares(&asked, &settings, simulated).map_err(|stop| stop.of(logs))?;
         iterations += found.iterations;
         simulations += found.simulations;
         let next = deviations(simulated, &found.residual, measured, found.rank.rank);
