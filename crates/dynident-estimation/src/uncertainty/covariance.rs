@@ -17,9 +17,9 @@
 
 use super::bootstrap::{Blocks, replicated};
 use super::newey_west::{bandwidth, long_run};
-use super::scores::Scores;
+use super::scores::{Fit, Scores};
 use crate::error::EstimationError;
-use crate::factor::{LinearProblem, Solution, Split, StackedProblem};
+use crate::factor::{LinearProblem, StackedProblem};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -63,19 +63,6 @@ pub(crate) struct Covariances {
     pub(crate) inflation: Vec<f64>,
     /// For every joint the correlation of the scores of neighbouring segments.
     pub(crate) neighbours: Vec<f64>,
-}
-
-/// What [`covariances`] needs to know about the fit.
-pub(crate) struct Fit<'a> {
-    pub(crate) split: &'a Split,
-    pub(crate) solution: &'a Solution,
-    /// w_j: what the rows of joint j were multiplied by.
-    pub(crate) weights: &'a [f64],
-    /// Noise of joint j, same unit as its torque.
-    pub(crate) joint_sigma: &'a [f64],
-    /// Variance of the weighted rows under white noise.
-    pub(crate) weighted_variance: f64,
-    pub(crate) rows: usize,
 }
 
 /// The second moment of the scores by a method, in whitened coordinates, without the prior's.

@@ -1,7 +1,8 @@
 //! An estimate is never a bare vector: values with covariance, the noise found, and what was decided about the rank.
 
-use super::covariance::{CovarianceMethod, Fit, covariances};
+use super::covariance::{CovarianceMethod, covariances};
 use super::distributions::student_half_width;
+use super::scores::Fit;
 use crate::error::EstimationError;
 use crate::factor::{RankReport, RankSettings, Solution, Split, StackedProblem, TriangularFactor, report};
 use nalgebra::DMatrix;

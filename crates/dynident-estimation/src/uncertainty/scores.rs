@@ -3,10 +3,22 @@
 //! With `A = RᵀR` the information of the free columns, `R⁻ᵀ` whitens: what every covariance method looks at is `R⁻ᵀ
 //! s_g` of each time segment g of each joint in each log, and its result `M` spreads to the columns as `R⁻¹ M R⁻ᵀ`.
 
-use super::covariance::Fit;
 use crate::error::EstimationError;
-use crate::factor::{JointRows, StackedProblem, TriangularFactor};
+use crate::factor::{JointRows, Solution, Split, StackedProblem, TriangularFactor};
 use nalgebra::{DMatrix, DVector};
+
+/// What a covariance needs to know about the fit.
+pub(crate) struct Fit<'a> {
+    pub(crate) split: &'a Split,
+    pub(crate) solution: &'a Solution,
+    /// w_j: what the rows of joint j were multiplied by.
+    pub(crate) weights: &'a [f64],
+    /// Noise of joint j, same unit as its torque.
+    pub(crate) joint_sigma: &'a [f64],
+    /// Variance of the weighted rows under white noise.
+    pub(crate) weighted_variance: f64,
+    pub(crate) rows: usize,
+}
 
 /// The scores of all joints in all logs.
 pub(super) struct Scores<'a> {
