@@ -276,7 +276,7 @@ fn settled(
     };
     let (mut iterations, mut simulations) = (0, 0);
     for round in 1..=ROUNDS {
-        let found = simulated_least_squares(&fit, simulated, &settings)?;
+        let found = simulated_least_squares(&fit, &settings, simulated)?;
         iterations += found.iterations;
         simulations += found.simulations;
         let next = deviations(simulated, &found.residual, measured, found.rank.rank);

@@ -24,7 +24,9 @@ use dynident_iteration::{
     Iteration, IterationError, IterationStatus, IterationStore, IterationTask, RunRecord, iterate,
 };
 use dynident_iteration::{Robot, RobotRun};
+use fnv::FnvHasher;
 use report::{RunName, RunTrace, TimeSpent};
+use std::hash::Hasher;
 use std::path::Path;
 use std::time::Instant;
 use told::{Stage, Told, joined};
@@ -171,10 +173,9 @@ fn write_file(path: &Path, file: &IterationsFile) -> Result<(), Error> {
 /// Everything that runs depend on, in one number: study, robot, and the version of the program (FNV-1a, 64 bits).
 fn fingerprint(study: &Study, machine: &StudyRobot, options: &RunOptions<'_>) -> String {
     let text = format!("{study:?} {:?} {:?} {}", machine.model(), options.data, env!("CARGO_PKG_VERSION"));
-    let hash = text
-        .bytes()
-        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
-    format!("{hash:016x}")
+    let mut hasher = FnvHasher::default();
+    hasher.write(text.as_bytes());
+    format!("{:016x}", hasher.finish())
 }
 
 /// The trajectories of an earlier call, or new ones, which are kept before anything is run.
