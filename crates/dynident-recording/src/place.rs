@@ -4,6 +4,7 @@ use core::fmt;
 
 /// A place in a log, for messages: `log.csv:17`, or `my samples, row 16`.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum LogPlace {
     /// No place in particular.
     Whole {

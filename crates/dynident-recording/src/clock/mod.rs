@@ -7,10 +7,10 @@ mod resampler;
 pub(crate) mod segments;
 
 use crate::log::ClockRule;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-/// Jitter below which the question of the clock is idle: standard deviation of the steps over their mean. At 0.1 % of a step the position
-/// error of a wrong decision is a thousandth of the motion within one step.
+/// Jitter below which the question of the clock is idle: standard deviation of the steps over their mean. At 0.1 % of a
+/// step the position error of a wrong decision is a thousandth of the motion within one step.
 pub(crate) const NEGLIGIBLE_JITTER: f64 = 1e-3;
 
 /// Stamps closer together than this part of the mean step carry no information beside the noise: the second is left out
@@ -18,7 +18,7 @@ pub(crate) const NEGLIGIBLE_JITTER: f64 = 1e-3;
 pub(crate) const SHORTEST_STEP: f64 = 0.1;
 
 /// What the first rows tell about the clock.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Clock {
     /// Samples per second on the uniform grid.
     pub rate_hz: f64,
@@ -37,10 +37,10 @@ pub struct Clock {
 
 /// Decides on the clock from the stamps `time_s` and positions `q` (one slice for each joint) of the first rows.
 ///
-/// Rule: with a jitter below [`NEGLIGIBLE_JITTER`] spacing is even. Otherwise every sample is predicted from its four neighbours by the cubic
-/// through them, once at even spacing and once at the stamps; where sampling was regular and only the stamps
-/// jitter (a time taken after transmission), the first predicts better, and the other way round. Stamps are
-/// believed if they predict at least 10 % better.
+/// Rule: with a jitter below [`NEGLIGIBLE_JITTER`] spacing is even. Otherwise every sample is predicted from its four
+/// neighbours by the cubic through them, once at even spacing and once at the stamps; where sampling was regular and
+/// only the stamps jitter (a time taken after transmission), the first predicts better, and the other way round. Stamps
+/// are believed if they predict at least 10 % better.
 ///
 /// `Err` holds the reason why no rate follows.
 pub(crate) fn clock(

@@ -25,8 +25,8 @@ impl Cascade {
         butterworth_low_pass(self.order, self.cutoff_hz, rate_hz)
     }
 
-    /// Length of the odd extension: three times the filter's length, as `sosfiltfilt` has it. It covers the reach of the
-    /// differences, which is three samples.
+    /// Length of the odd extension: three times the filter's length, as `sosfiltfilt` has it. It covers the reach of
+    /// the differences, which is three samples.
     fn padding(&self) -> usize {
         3 * (self.order + 1)
     }
@@ -39,8 +39,9 @@ impl Cascade {
     }
 }
 
-/// Puts the first and second differences of a signal beside it: d1[n] = x[n] - x[n-1], d2[n] = d1[n+1] - d1[n], constant
-/// before the start. The steady state in which a forward run starts is that of a constant, whose differences are zero.
+/// Puts the first and second differences of a signal beside it: d1[n] = x[n] - x[n-1], d2[n] = d1[n+1] - d1[n],
+/// constant before the start. The steady state in which a forward run starts is that of a constant, whose differences
+/// are zero.
 fn add_differences(signal: &mut [Triple]) {
     let last = signal.len() - 1;
     for n in (1..=last).rev() {
@@ -67,18 +68,19 @@ fn run_backwards(sections: &[Section], signal: &mut [Triple]) {
 /// A Butterworth low-pass run forwards and backwards, then differentiated.
 ///
 /// Filtered position: `scipy.signal.sosfiltfilt(butter(order, cutoff_hz, fs=rate_hz, output="sos"), q)`, with its odd
-/// extension by the default length at both ends. The amplitude is `1 / (1 + (tan(πf/rate)/tan(πf_c/rate))^(2 order))`, so one half at
-/// the cut-off.
+/// extension by the default length at both ends. The amplitude is `1 / (1 + (tan(πf/rate)/tan(πf_c/rate))^(2 order))`,
+/// so one half at the cut-off.
 ///
-/// Derivatives: central differences of sixth order of the filtered signal y (its extension included, so that there is no
-/// one-sided formula at the ends), with δ²y = y₊ - 2y + y₋ and μδy = (y₊ - y₋)/2:
+/// Derivatives: central differences of sixth order of the filtered signal y (its extension included, so that there is
+/// no one-sided formula at the ends), with δ²y = y₊ - 2y + y₋ and μδy = (y₊ - y₋)/2:
 ///
 /// `dq = rate · (μδ - μδ³/6 + μδ⁵/30) y`,  `ddq = rate² · (δ² - δ⁴/12 + δ⁶/90) y`
 ///
-/// The differences are not taken from y itself: first and second differences of q go through the same recursion beside q.
-/// That is the same by linearity, but rounding is then relative to the acceleration and not to the position,
-/// which is what a 5 kHz log needs (two differences of y would cost eight digits there).
-/// Source: Abramowitz and Stegun, Handbook of Mathematical Functions, 25.3; Gustafsson, IEEE Trans. Signal Process. 44 (1996) 988.
+/// The differences are not taken from y itself: first and second differences of q go through the same recursion beside
+/// q. That is the same by linearity, but rounding is then relative to the acceleration and not to the position, which
+/// is what a 5 kHz log needs (two differences of y would cost eight digits there).
+/// Source: Abramowitz and Stegun, Handbook of Mathematical Functions, 25.3; Gustafsson, IEEE Trans. Signal Process. 44
+/// (1996) 988.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ButterworthZeroPhase {
     cascade: Cascade,
@@ -139,12 +141,15 @@ impl Differentiator for ButterworthZeroPhase {
 
 /// A Butterworth low-pass run forwards only, then differentiated by central differences of sixth order.
 ///
-/// Amplitude `1 / √(1 + (tan(πf/rate)/tan(πf_c/rate))^(2 order))`, so 0.707 at the cut-off. q, dq and ddq all come late by the filter's
-/// [delay](Self::delay_s); the torque does not, unless it passes [`smooth`](Differentiator::smooth) as well. A regressor that lags the torque by δ
-/// biases the fit by about ωδ at each frequency ω of the motion: this way stands here for comparison, and for logs whose torque was filtered the same way.
+/// Amplitude `1 / √(1 + (tan(πf/rate)/tan(πf_c/rate))^(2 order))`, so 0.707 at the cut-off. q, dq and ddq all come late
+/// by the filter's [delay](Self::delay_s); the torque does not, unless it passes [`smooth`](Differentiator::smooth) as
+/// well. A regressor that lags the torque by δ biases the fit by about ωδ at each frequency ω of the motion: this way
+/// stands here for comparison, and for logs whose torque was filtered the same way.
 ///
-/// The run starts in the steady state of a point-mirrored extension of three filter lengths, as in [`ButterworthZeroPhase`](crate::ButterworthZeroPhase).
-/// Source: Atkeson, An, Hollerbach, Int. J. Robotics Res. 5 (1986) 101 (filtered by a low-pass before differentiation); Oppenheim and Schafer, Discrete-Time Signal Processing, 7.1.2.
+/// The run starts in the steady state of a point-mirrored extension of three filter lengths, as in
+/// [`ButterworthZeroPhase`].
+/// Source: Atkeson, An, Hollerbach, Int. J. Robotics Res. 5 (1986) 101 (filtered by a low-pass before differentiation);
+/// Oppenheim and Schafer, Discrete-Time Signal Processing, 7.1.2.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LowPass {
     cascade: Cascade,
@@ -159,8 +164,8 @@ impl LowPass {
         Ok(Self { cascade: Cascade::new(order, cutoff_hz)? })
     }
 
-    /// Seconds by which a slow signal comes out late: the group delay at zero frequency. For an analogue Butterworth filter of order n that is
-    /// `Σ_k sin(π(2k+1)/2n) / (2π f_c)`, so 2.61/(2π f_c) for order 4.
+    /// Seconds by which a slow signal comes out late: the group delay at zero frequency. For an analogue Butterworth
+    /// filter of order n that is `Σ_k sin(π(2k+1)/2n) / (2π f_c)`, so 2.61/(2π f_c) for order 4.
     ///
     /// # Errors
     /// If the cut-off is not below half of `rate_hz`.
@@ -220,7 +225,8 @@ fn write_values(signal: &[Triple], out: &mut [f64]) {
     }
 }
 
-/// Value, first and second derivative at sample `n` from the signal with its backward first and central second differences: central differences of sixth order.
+/// Value, first and second derivative at sample `n` from the signal with its backward first and central second
+/// differences: central differences of sixth order.
 fn sixth_order(signal: &[Triple], n: usize, rate_hz: f64) -> [f64; 3] {
     let d2 = |k: isize| signal[n.wrapping_add_signed(k)][2];
     let first = 0.5 * (signal[n][1] + signal[n + 1][1]);
@@ -300,7 +306,8 @@ mod tests {
         let mut out = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
         let [y, dy, ddy] = &mut out;
         filter.differentiate(rate, &q, Derivatives { q: y, dq: dy, ddq: ddy }).unwrap();
-        // Truncation of the sixth-order formulas: (omega h)^6 / 140 = 1.3e-9 of the derivative; transients have died by half-way.
+        // Truncation of the sixth-order formulas: (omega h)^6 / 140 = 1.3e-9 of the derivative; transients have died by
+        // half-way.
         for i in 1000..1990 {
             let (sin, cos) = (omega * i as f64 / rate + phase).sin_cos();
             assert!((out[0][i] - gain * sin).abs() < 1e-10, "{i}");

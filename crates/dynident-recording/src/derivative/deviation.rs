@@ -6,12 +6,15 @@ use crate::error::FilterError;
 use crate::reference::Reference;
 use std::sync::Arc;
 
-/// `q = q_d + e`: any other way smooths and differentiates the deviation e alone, and the reference's own derivatives are added exactly:
+/// `q = q_d + e`: any other way smooths and differentiates the deviation e alone, and the reference's own derivatives
+/// are added exactly:
 ///
 /// `dq = dq_d + S{e}'`, `ddq = ddq_d + S{e}''`
 ///
-/// A linear smoother S takes `(1 - H) e` instead of `(1 - H) q`: its bias shrinks by the size of e against q, while its noise stays. Equal noise, less bias; or a lower cut-off, so less noise, at equal bias.
-/// With `max_lag_s` the reference is first shifted by the lag of the whole piece, so that a delay leaves nothing in e. Samples where a reference that does not rest at its ends has ended are marked.
+/// A linear smoother S takes `(1 - H) e` instead of `(1 - H) q`: its bias shrinks by the size of e against q, while its
+/// noise stays. Equal noise, less bias; or a lower cut-off, so less noise, at equal bias. With `max_lag_s` the
+/// reference is first shifted by the lag of the whole piece, so that a delay leaves nothing in e. Samples where a
+/// reference that does not rest at its ends has ended are marked.
 /// Source: this project's own.
 #[derive(Debug)]
 pub struct Deviation {
@@ -58,7 +61,8 @@ impl Differentiator for Deviation {
             None => 0.0,
         };
         let time_s = |i: usize| place.time_s(i) - lag_s;
-        // Where the reference is not known, the deviation of the nearest sample where it is: a jump would reach into good samples.
+        // Where the reference is not known, the deviation of the nearest sample where it is: a jump would reach into
+        // good samples.
         let known: Vec<bool> = (0..q.len()).map(|i| self.reference.covers(place.joint, time_s(i))).collect();
         let mut deviation = vec![0.0; q.len()];
         let mut last = (0..q.len()).find(|&i| known[i]).unwrap_or(0);

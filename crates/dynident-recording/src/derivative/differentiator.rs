@@ -117,8 +117,8 @@ pub trait Differentiator: core::fmt::Debug + Send + Sync {
     /// Returns the samples at which this way does not apply: velocity and acceleration there mean nothing.
     ///
     /// # Errors
-    /// [`FilterError`] if `q` is shorter than [`minimum_samples`](Self::minimum_samples) or the filter does not exist at
-    /// this rate.
+    /// [`FilterError`] if `q` is shorter than [`minimum_samples`](Self::minimum_samples) or the filter does not exist
+    /// at this rate.
     ///
     /// # Panics
     /// If a slice of `out` is shorter than `q`.
@@ -135,7 +135,8 @@ pub trait Differentiator: core::fmt::Debug + Send + Sync {
         Ok(())
     }
 
-    /// As [`differentiate_at`](Self::differentiate_at), the samples taken for those of the first joint from time zero on.
+    /// As [`differentiate_at`](Self::differentiate_at), the samples taken for those of the first joint from time zero
+    /// on.
     ///
     /// # Errors
     /// As [`differentiate_at`](Self::differentiate_at).

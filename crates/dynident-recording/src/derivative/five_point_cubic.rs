@@ -6,12 +6,14 @@ use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use super::savitzky_golay::SavitzkyGolay;
 use crate::error::FilterError;
 
-/// Torque ([`smooth`](Differentiator::smooth)): the least-squares cubic on five points, `(-3, 12, 17, 12, -3)/35`, `passes` times, at the ends the first and last cubic's own values. Position: one
-/// zero-phase Butterworth filter of order 4 for q, dq and ddq, the latter by central differences of second order.
+/// Torque ([`smooth`](Differentiator::smooth)): the least-squares cubic on five points, `(-3, 12, 17, 12, -3)/35`,
+/// `passes` times, at the ends the first and last cubic's own values. Position: one zero-phase Butterworth filter of
+/// order 4 for q, dq and ddq, the latter by central differences of second order.
 ///
-/// One pass has the gain `(17 + 24 cos ω - 6 cos 2ω)/35` at ω radians a sample: 1 - 3ω⁴/35 for slow signals, so each pass costs them nearly nothing; white noise keeps √(17/35) = 0.70
-/// of its size in the first pass.
-/// Source: Zhang et al., as cited in the paper behind this project, for the combination (it does not say whether its low-pass is zero-phase); Savitzky and Golay, Anal. Chem. 36 (1964) 1627, table I, for the weights.
+/// One pass has the gain `(17 + 24 cos ω - 6 cos 2ω)/35` at ω radians a sample: 1 - 3ω⁴/35 for slow signals, so each
+/// pass costs them nearly nothing; white noise keeps √(17/35) = 0.70 of its size in the first pass.
+/// Source: Zhang et al., as cited in the paper behind this project, for the combination (it does not say whether its
+/// low-pass is zero-phase); Savitzky and Golay, Anal. Chem. 36 (1964) 1627, table I, for the weights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FivePointCubic {
     cubic: SavitzkyGolay,

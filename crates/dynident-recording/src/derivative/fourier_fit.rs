@@ -4,13 +4,14 @@ use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use super::harmonic_fit::{HarmonicFit, check_series};
 use crate::error::FilterError;
 
-/// Least squares of an offset, a straight line (unless left out) and harmonics 1 to K of `base_hz` to the whole piece; position, velocity and acceleration are the series' own, so exact
-/// for a motion inside the series:
+/// Least squares of an offset, a straight line (unless left out) and harmonics 1 to K of `base_hz` to the whole piece;
+/// position, velocity and acceleration are the series' own, so exact for a motion inside the series:
 ///
 /// `q(t) = c + d t + Σ_k a_k sin(2π k f t) + b_k cos(2π k f t)`
 ///
-/// Noise of standard deviation σ in N samples over whole periods leaves `σ √((2K + 1)/N)` in q, and `σ √(2 Σ (2πkf)²/N)`, `σ √(2 Σ (2πkf)⁴/N)` in dq and ddq. The bias is whatever the
-/// motion holds beside the series: tracking errors at other frequencies, transients before the motion repeats.
+/// Noise of standard deviation σ in N samples over whole periods leaves `σ √((2K + 1)/N)` in q, and `σ √(2 Σ
+/// (2πkf)²/N)`, `σ √(2 Σ (2πkf)⁴/N)` in dq and ddq. The bias is whatever the motion holds beside the series: tracking
+/// errors at other frequencies, transients before the motion repeats.
 /// Source: Swevers, Ganseman, Tükel, de Schutter, van Brussel, IEEE Trans. Robot. Autom. 13 (1997) 730.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FourierFit {
@@ -109,7 +110,8 @@ mod tests {
         let power = |order: i32| (1..=harmonics).map(|k| (TAU * base * k as f64).powi(2 * order)).sum::<f64>();
         let expected = [(2.0 * power(0) + 1.0) / n as f64, 2.0 * power(1) / n as f64, 2.0 * power(2) / n as f64];
         for (sum, expected) in sums.iter().zip(expected) {
-            // 40 runs of 7 (6, 6, unequally weighted) chi-square values: relative deviation √(2/240) = 0.09, up to 0.13 where one harmonic leads; 4 of them.
+            // 40 runs of 7 (6, 6, unequally weighted) chi-square values: relative deviation √(2/240) = 0.09, up to 0.13
+            // where one harmonic leads; 4 of them.
             assert!((sum / runs as f64 / expected - 1.0).abs() < 0.5, "{sums:?} {expected:?}");
         }
     }

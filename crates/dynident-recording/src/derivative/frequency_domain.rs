@@ -17,12 +17,15 @@ const TAPER: f64 = 2.0;
 /// What stands beyond the ends of a piece: the transform takes it to repeat.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Ends {
-    /// A smooth bridge back to the begin, over eight periods of the cut-off: value, speed and acceleration go on without a jump, whatever the motion does at its ends. The band ends gently, by half a cosine from the cut-off
-    /// to twice it, so that what is left rings near the ends only; one period of the cut-off at either end does not count.
+    /// A smooth bridge back to the begin, over eight periods of the cut-off: value, speed and acceleration go on
+    /// without a jump, whatever the motion does at its ends. The band ends gently, by half a cosine from the cut-off to
+    /// twice it, so that what is left rings near the ends only; one period of the cut-off at either end does not count.
     #[default]
     Tapered,
-    /// The piece, then the piece backwards: value and acceleration go on without a jump, and so does the speed of a motion that is at rest at both ends.
+    /// The piece, then the piece backwards: value and acceleration go on without a jump, and so does the speed of a
+    /// motion that is at rest at both ends.
     Mirrored,
     /// The piece again: for whole periods of a settled periodic motion. Anything else leaks into all frequencies.
     Periodic,
@@ -32,9 +35,12 @@ pub enum Ends {
 ///
 /// `q = F⁻¹{X}`, `dq = F⁻¹{jω X}`, `ddq = F⁻¹{-ω² X}`, |ω| <= 2π f_c.
 ///
-/// Exact for a periodic motion below the cut-off over whole periods ([`Ends::Periodic`]). White noise of standard deviation σ leaves `σ √(2 f_c/rate)` in q, `2π f_c σ √(2 f_c/(3 rate))` in dq and
-/// `(2π f_c)² σ √(2 f_c/(5 rate))` in ddq; with tapered ends 1.17, 1.65 and 2.41 times that. A motion that is mirrored while it moves rings far into the piece: take tapered ends.
-/// Source: Swevers, Ganseman, Tükel, de Schutter, van Brussel, IEEE Trans. Robot. Autom. 13 (1997) 730; the tapered ends are this project's own.
+/// Exact for a periodic motion below the cut-off over whole periods ([`Ends::Periodic`]). White noise of standard
+/// deviation σ leaves `σ √(2 f_c/rate)` in q, `2π f_c σ √(2 f_c/(3 rate))` in dq and `(2π f_c)² σ √(2 f_c/(5 rate))` in
+/// ddq; with tapered ends 1.17, 1.65 and 2.41 times that. A motion that is mirrored while it moves rings far into the
+/// piece: take tapered ends.
+/// Source: Swevers, Ganseman, Tükel, de Schutter, van Brussel, IEEE Trans. Robot. Autom. 13 (1997) 730; the tapered
+/// ends are this project's own.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrequencyDomain {
     cutoff_hz: f64,
@@ -54,7 +60,8 @@ impl FrequencyDomain {
         }
     }
 
-    /// Samples of one period of the cut-off: what a polynomial is fitted to at tapered ends, and what does not count there.
+    /// Samples of one period of the cut-off: what a polynomial is fitted to at tapered ends, and what does not count
+    /// there.
     fn edge(&self, rate_hz: f64) -> usize {
         ((rate_hz / self.cutoff_hz).ceil() as usize).max(LEAST_SAMPLES)
     }
@@ -216,7 +223,8 @@ mod tests {
         let (marked, tapered) = worst(Ends::Tapered);
         // One period of the cut-off at either end.
         assert_eq!(marked, [0..500, n - 500..n]);
-        // What is left of a jump in the third derivative (10 rad/s³) behind a gentle band edge, a period of the cut-off away: below a thousandth of the speed (1.9 rad/s) and the acceleration (3 rad/s²).
+        // What is left of a jump in the third derivative (10 rad/s³) behind a gentle band edge, a period of the cut-off
+        // away: below a thousandth of the speed (1.9 rad/s) and the acceleration (3 rad/s²).
         assert!(tapered[0] < 1e-3 && tapered[1] < 2e-3 && tapered[2] < 3e-3, "{tapered:?}");
         let (marked, mirrored) = worst(Ends::Mirrored);
         assert!(marked.is_empty() && mirrored[2] > 20.0 * tapered[2], "{mirrored:?} {tapered:?}");
@@ -241,7 +249,8 @@ mod tests {
         let (top, band) = (TAU * cutoff, 2.0 * cutoff / rate);
         let expected = [band.sqrt(), top * (band / 3.0).sqrt(), top * top * (band / 5.0).sqrt()];
         for (out, expected) in out.iter().zip(expected) {
-            // 2620 real coefficients, those near the top counting most: relative deviation below √(5/(2·2620)) = 3 %; 4 of them.
+            // 2620 real coefficients, those near the top counting most: relative deviation below √(5/(2·2620)) = 3 %; 4
+            // of them.
             assert!((rms(out) / expected - 1.0).abs() < 0.12, "{} {expected}", rms(out));
         }
     }

@@ -6,7 +6,8 @@ use crate::error::FilterError;
 use crate::reference::Reference;
 use std::sync::Arc;
 
-/// Eqs. 15 and 16 to the letter: the branch changes at half a period whatever the joint's lag, and positions outside the stroke are mapped as well, to speeds of the wrong sign.
+/// Eqs. 15 and 16 to the letter: the branch changes at half a period whatever the joint's lag, and positions outside
+/// the stroke are mapped as well, to speeds of the wrong sign.
 ///
 /// Needs the strokes in closed form ([`Reference::logistic`]). Source: the paper's Eqs. 15 and 16.
 #[derive(Clone, Debug)]

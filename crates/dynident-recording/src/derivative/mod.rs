@@ -3,8 +3,8 @@
 //! [`Differentiator`] is the interface, also for ways that this crate does not know; [`DifferentiatorSettings`] is the
 //! registry of those that it does. They come in three kinds:
 //!
-//! * filters and local fits, which work through a long log in pieces: [`ButterworthZeroPhase`] (the default), [`LowPass`],
-//!   [`CentralDifferences`], [`SmoothedDifferences`], [`SavitzkyGolay`], [`FivePointCubic`];
+//! * filters and local fits, which work through a long log in pieces: [`ButterworthZeroPhase`] (the default),
+//!   [`LowPass`], [`CentralDifferences`], [`SmoothedDifferences`], [`SavitzkyGolay`], [`FivePointCubic`];
 //! * fits to a whole piece: [`FourierFit`], [`SpeedSeries`], [`FrequencyDomain`];
 //! * ways that use the commanded motion: [`PositionMap`], [`TimeWarp`], [`Deviation`], [`LiteralMap`].
 //!

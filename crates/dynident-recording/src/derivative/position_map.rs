@@ -9,15 +9,20 @@ use std::sync::Arc;
 /// Halvings that bring a bracket of any stroke below the last bit of its time.
 const HALVINGS: usize = 60;
 
-/// On a stroke that goes one way, position alone tells speed and acceleration, `dq = g(q)`, `ddq = g'(q) g(q)`. For the paper's logistic strokes in closed form, its Eqs. 15 and 16
-/// ([`LogisticPath::rates`](crate::LogisticPath::rates)); for any other reference by solving `q_d(s) = q` for s within the stroke.
+/// On a stroke that goes one way, position alone tells speed and acceleration, `dq = g(q)`, `ddq = g'(q) g(q)`. For the
+/// paper's logistic strokes in closed form, its Eqs. 15 and 16 ([`LogisticPath::rates`](crate::LogisticPath::rates));
+/// for any other reference by solving `q_d(s) = q` for s within the stroke.
 ///
-/// * The branch (there or back, which stroke) is chosen by phase at the time `t - δ`, with the lag δ of the joint behind its reference estimated (one for each stroke, by least squares): a joint that
-///   lags is still on the earlier branch.
-/// * Outside the stroke, where the formulas have the wrong sign, and on strokes that turn or are not followed within the longest lag, the map does not apply: such samples are returned as marked.
-/// * Where the reference rests there is no stroke: speed and acceleration are the reference's own, at most 1e-3 of their peaks.
+/// * The branch (there or back, which stroke) is chosen by phase at the time `t - δ`, with the lag δ of the joint
+///   behind its reference estimated (one for each stroke, by least squares): a joint that lags is still on the earlier
+///   branch.
+/// * Outside the stroke, where the formulas have the wrong sign, and on strokes that turn or are not followed within
+///   the longest lag, the map does not apply: such samples are returned as marked.
+/// * Where the reference rests there is no stroke: speed and acceleration are the reference's own, at most 1e-3 of
+///   their peaks.
 ///
-/// Noise σ of q comes out as at most ωσ in dq and ω²σ in ddq. A pure lag costs nothing; any other tracking error e = q_d - q biases dq by `ė - g'(q) e`, |g'| <= ω. q itself is passed through.
+/// Noise σ of q comes out as at most ωσ in dq and ω²σ in ddq. A pure lag costs nothing; any other tracking error e =
+/// q_d - q biases dq by `ė - g'(q) e`, |g'| <= ω. q itself is passed through.
 /// Source: the paper's Eqs. 15 and 16; branch by lag and refusal are this project's.
 #[derive(Clone, Debug)]
 pub struct PositionMap {
@@ -133,7 +138,8 @@ mod tests {
     fn a_lagging_joint_is_mapped_exactly_also_past_the_splices() {
         let lag = 0.31;
         let q: Vec<f64> = (0..6100).map(|i| PATH.at(place().time_s(i) - lag)[0]).collect();
-        // The sampled reference is the closed form to 1e-12 in q; near the stroke's ends its inverse is as good as the speed there allows.
+        // The sampled reference is the closed form to 1e-12 in q; near the stroke's ends its inverse is as good as the
+        // speed there allows.
         for (reference, tolerance) in [(Reference::logistic(&[PATH]).unwrap(), 1e-6), (sampled(), 1e-5)] {
             let ([_, dq, ddq], marked) = mapped(reference, &q);
             assert!(marked.is_empty(), "{marked:?}");

@@ -23,13 +23,15 @@ pub(super) struct StrokeLag {
     pub(super) at_limit: bool,
 }
 
-/// For every stroke of the joint's reference the lag δ that minimises `Σ (q(t) - q_d(t - δ))²` over the stroke's samples, |δ| <= `max_lag_s`: a coarse search, then Gauss-Newton with `∂/∂δ q_d(t - δ) =
-/// -dq_d(t - δ)`. White noise σ of q leaves a standard deviation of `σ/√(Σ dq_d²)`.
+/// For every stroke of the joint's reference the lag δ that minimises `Σ (q(t) - q_d(t - δ))²` over the stroke's
+/// samples, |δ| <= `max_lag_s`: a coarse search, then Gauss-Newton with `∂/∂δ q_d(t - δ) = -dq_d(t - δ)`. White noise σ
+/// of q leaves a standard deviation of `σ/√(Σ dq_d²)`.
 ///
 /// The lag of the whole piece, which says where each stroke's samples lie, stands before those of the strokes.
 ///
 /// # Errors
-/// [`FilterError::Setting`] if `max_lag_s` is not positive, finite and at most 60; [`FilterError::Reference`] if the reference has no such joint.
+/// [`FilterError::Setting`] if `max_lag_s` is not positive, finite and at most 60; [`FilterError::Reference`] if the
+/// reference has no such joint.
 pub(super) fn lags(
     reference: &Reference,
     place: Place,
@@ -157,7 +159,8 @@ mod tests {
         let strokes = lags(&reference, place(), &q, 0.5).unwrap().1;
         assert_eq!(strokes.len(), 2);
         for (found, lag_s) in strokes.iter().zip([0.123, -0.05]) {
-            // The rest between strokes is shifted by the wrong lag for some samples, where the reference moves by less than 1e-4 of the stroke.
+            // The rest between strokes is shifted by the wrong lag for some samples, where the reference moves by less
+            // than 1e-4 of the stroke.
             assert!((found.lag_s - lag_s).abs() < 1e-5 && !found.at_limit, "{found:?}");
         }
         let late: Vec<f64> = (0..3600).map(|i| PATH.at(place().time_s(i) - 0.9)[0]).collect();

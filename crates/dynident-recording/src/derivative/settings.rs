@@ -28,6 +28,7 @@ use std::sync::Arc;
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "method", rename_all = "kebab-case", deny_unknown_fields)]
+#[non_exhaustive]
 pub enum DifferentiatorSettings {
     /// [`ButterworthZeroPhase`]; without `cutoff_hz` the cut-off is chosen from the data ([`cutoff`](crate::cutoff())).
     Butterworth {
@@ -242,7 +243,8 @@ impl DifferentiatorSettings {
         }
     }
 
-    /// The cut-off that the settings name (a deviation's smoother names its own); `None` where there is none, or it is left to the data.
+    /// The cut-off that the settings name (a deviation's smoother names its own); `None` where there is none, or it is
+    /// left to the data.
     pub fn cutoff_hz(&self) -> Option<f64> {
         self.clone().cutoff_place().copied().flatten()
     }
@@ -261,7 +263,8 @@ impl DifferentiatorSettings {
         self
     }
 
-    /// The differentiator; `chosen_cutoff_hz` stands in where the settings name none. A commanded motion has to be given in closed form: see [`build_following`](Self::build_following).
+    /// The differentiator; `chosen_cutoff_hz` stands in where the settings name none. A commanded motion has to be
+    /// given in closed form: see [`build_following`](Self::build_following).
     ///
     /// # Errors
     /// A [`FilterError`] that names the setting.

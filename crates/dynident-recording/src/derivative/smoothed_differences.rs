@@ -4,12 +4,14 @@ use super::central_differences::CentralDifferences;
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use crate::error::FilterError;
 
-/// Central differences of the positions as logged, the acceleration then smoothed by a moving average of `window` samples; the torque is smoothed the same way where `smooth_torque`
-/// asks for it. Position and velocity stay as they are.
+/// Central differences of the positions as logged, the acceleration then smoothed by a moving average of `window`
+/// samples; the torque is smoothed the same way where `smooth_torque` asks for it. Position and velocity stay as they
+/// are.
 ///
-/// White noise σ of the position leaves `σ rate/√2` in dq (order 2). In ddq the average of second differences telescopes to the difference of two slopes, so `2 σ rate²/W` for
-/// 2 <= W, where the differences alone have `√6 σ rate²`. The average takes `(W² - 1)/(24 rate²)` of the acceleration's own second derivative. Near the ends the window
-/// shrinks, staying centred.
+/// White noise σ of the position leaves `σ rate/√2` in dq (order 2). In ddq the average of second differences
+/// telescopes to the difference of two slopes, so `2 σ rate²/W` for 2 <= W, where the differences alone have `√6 σ
+/// rate²`. The average takes `(W² - 1)/(24 rate²)` of the acceleration's own second derivative. Near the ends the
+/// window shrinks, staying centred.
 /// Source: Xu et al., as cited in the paper behind this project.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SmoothedDifferences {

@@ -5,11 +5,13 @@ use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use super::harmonic_fit::{HarmonicFit, check_series};
 use crate::error::FilterError;
 
-/// q and dq by a zero-phase Butterworth filter of order 4; a Fourier series (offset and harmonics 1 to K of `base_hz`) fitted to that dq over the whole piece; dq and ddq are the series' own value and
-/// derivative. q stays the filtered position.
+/// q and dq by a zero-phase Butterworth filter of order 4; a Fourier series (offset and harmonics 1 to K of `base_hz`)
+/// fitted to that dq over the whole piece; dq and ddq are the series' own value and derivative. q stays the filtered
+/// position.
 ///
-/// Exact for a periodic motion in the series and well below the cut-off. The fit keeps `√((2K + 1)/N)` of white noise in N samples; the noise of a filtered difference is not white and smaller at the
-/// series' low frequencies, so ddq has about the noise of [`FourierFit`](crate::FourierFit).
+/// Exact for a periodic motion in the series and well below the cut-off. The fit keeps `√((2K + 1)/N)` of white noise
+/// in N samples; the noise of a filtered difference is not white and smaller at the series' low frequencies, so ddq has
+/// about the noise of [`FourierFit`](super::FourierFit).
 /// Source: Feng et al., as cited in the paper behind this project.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpeedSeries {
@@ -78,7 +80,8 @@ mod tests {
             let x = w * i as f64 / rate;
             let dq = w * (gain(base) * x.cos() - 0.9 * gain(3.0 * base) * (3.0 * x).sin());
             let ddq = -w * w * (gain(base) * x.sin() + 2.7 * gain(3.0 * base) * (3.0 * x).cos());
-            // The filter's transients at the two ends (some tenths of a second of twenty) reach the fit with at most a thousandth of the speed.
+            // The filter's transients at the two ends (some tenths of a second of twenty) reach the fit with at most a
+            // thousandth of the speed.
             assert!((out[1][i] - dq).abs() < 2e-3 * w && (out[2][i] - ddq).abs() < 6e-3 * w * w, "{i}");
         }
     }

@@ -6,10 +6,13 @@ use crate::error::FilterError;
 use crate::reference::Reference;
 use std::sync::Arc;
 
-/// `dq(t) = dq_d(t - δ_s)`, `ddq(t) = ddq_d(t - δ_s)`, with one lag δ_s for each stroke s of the joint (by least squares); q is passed through.
+/// `dq(t) = dq_d(t - δ_s)`, `ddq(t) = ddq_d(t - δ_s)`, with one lag δ_s for each stroke s of the joint (by least
+/// squares); q is passed through.
 ///
-/// Exact under any lag that is constant over a stroke. White noise σ of q leaves `|ddq_d| σ/√(Σ dq_d²)` in dq and `|jerk_d| σ/√(Σ dq_d²)` in ddq: a thousand samples shrink the map's noise by
-/// thirty. Whatever else the joint does, an overshoot, a vibration, a wrong amplitude, is not seen at all: that is bias. Samples of strokes that are not followed within the longest lag are marked.
+/// Exact under any lag that is constant over a stroke. White noise σ of q leaves `|ddq_d| σ/√(Σ dq_d²)` in dq and
+/// `|jerk_d| σ/√(Σ dq_d²)` in ddq: a thousand samples shrink the map's noise by thirty. Whatever else the joint does,
+/// an overshoot, a vibration, a wrong amplitude, is not seen at all: that is bias. Samples of strokes that are not
+/// followed within the longest lag are marked.
 /// Source: this project's own.
 #[derive(Clone, Debug)]
 pub struct TimeWarp {

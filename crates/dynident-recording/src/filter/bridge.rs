@@ -21,7 +21,8 @@ fn state(signal: &[f64], basis: &[[Vec<f64>; 3]], place: usize) -> [f64; 3] {
     state
 }
 
-/// `steps - 1` samples that lead from behind the signal's end back to its begin in `steps` steps: the quintic polynomial through value, speed and acceleration of both, which are those of polynomials of degree 4 fitted to
+/// `steps - 1` samples that lead from behind the signal's end back to its begin in `steps` steps: the quintic
+/// polynomial through value, speed and acceleration of both, which are those of polynomials of degree 4 fitted to
 /// `window` samples at either end. The signal and these, repeated, have no jump up to the second derivative.
 pub(crate) fn bridge(signal: &[f64], window: usize, steps: usize) -> Vec<f64> {
     let basis = orthonormal_polynomials(window, DEGREE);
@@ -59,7 +60,8 @@ mod tests {
         let round = |i: usize| whole[i % whole.len()];
         for i in 0..whole.len() {
             let third = round(i + 3) - 3.0 * round(i + 2) + 3.0 * round(i + 1) - round(i);
-            // Third derivatives of a few units over 1/200 and 1/100: 60 c / steps³, c below 30. A jump of the second derivative by 1 would be 2.5e-5, of the first 5e-3.
+            // Third derivatives of a few units over 1/200 and 1/100: 60 c / steps³, c below 30. A jump of the second
+            // derivative by 1 would be 2.5e-5, of the first 5e-3.
             assert!(third.abs() < 6e-5, "{i}: {third}");
             let second = round(i + 2) - 2.0 * round(i + 1) + round(i);
             assert!(second.abs() < 5e-3, "{i}: {second}");

@@ -1,15 +1,16 @@
 //! A cut-off chosen from the data: where the motion's acceleration has faded into the noise of the position.
 
 use realfft::RealFftPlanner;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Samples that are looked at, at most.
 pub(crate) const CUTOFF_SAMPLES: usize = 1 << 16;
 
 /// Part of the acceleration's power (noise subtracted) that the pass band has to hold.
 const POWER_SHARE: f64 = 0.9999;
-/// Two-way Butterworth filters of order 4 pass 99.6 % of the amplitude at half their cut-off and 86 % at 0.8 of it. What the filter takes from
-/// positions alone, and not from torque, biases the fit; this margin keeps it to 0.4 % at the motion's highest frequency.
+/// Two-way Butterworth filters of order 4 pass 99.6 % of the amplitude at half their cut-off and 86 % at 0.8 of it.
+/// What the filter takes from positions alone, and not from torque, biases the fit; this margin keeps it to 0.4 % at
+/// the motion's highest frequency.
 const MARGIN: f64 = 2.0;
 /// A spectrum this far above the noise floor counts as motion.
 const ABOVE_NOISE: f64 = 10.0;
@@ -17,7 +18,7 @@ const ABOVE_NOISE: f64 = 10.0;
 const HIGHEST: f64 = 0.4;
 
 /// A cut-off and why.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CutoffChoice {
     /// The cut-off for all joints.
     pub cutoff_hz: f64,
@@ -28,17 +29,19 @@ pub struct CutoffChoice {
 }
 
 /// Chooses one cut-off for all joints from uniformly sampled positions `q` (one slice for each joint; at most the first
-/// [`CUTOFF_SAMPLES`] are used).
+/// 65 536 samples are used).
 ///
-/// Per joint, from the Welch spectrum of the second difference of q (Hann window, half overlap, about eight seconds a piece):
-/// * Noise in the position makes the spectrum of the acceleration rise with frequency. Behind the peak of the velocity's
-///   spectrum, the first frequency at which the acceleration's (smoothed over a quarter octave) comes within twice its minimum is the
-///   valley where motion has faded into noise.
-/// * Data that were filtered before have their valley far above the motion: there the frequency counts below which 99.99 % of the
-///   acceleration's power up to the valley lies.
+/// Per joint, from the Welch spectrum of the second difference of q (Hann window, half overlap, about eight seconds a
+/// piece):
+/// * Noise in the position makes the spectrum of the acceleration rise with frequency. Behind the peak of the
+///   velocity's spectrum, the first frequency at which the acceleration's (smoothed over a quarter octave) comes within
+///   twice its minimum is the valley where motion has faded into noise.
+/// * Data that were filtered before have their valley far above the motion: there the frequency counts below which
+///   99.99 % of the acceleration's power up to the valley lies.
 ///
-/// The joint asks for twice the lower of the two; the log's cut-off is the highest of its joints', at most 0.4 of the rate.
-/// A joint whose spectrum nowhere stands above ten times its median over the upper half of the band does not count.
+/// The joint asks for twice the lower of the two; the log's cut-off is the highest of its joints', at most 0.4 of the
+/// rate. A joint whose spectrum nowhere stands above ten times its median over the upper half of the band does not
+/// count.
 pub fn cutoff<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> CutoffChoice {
     let joints: Vec<Option<Content>> = q.iter().map(|q| content(q.as_ref(), rate_hz)).collect();
     let highest = HIGHEST * rate_hz;
@@ -104,7 +107,8 @@ fn content(q: &[f64], rate_hz: f64) -> Option<Content> {
     Some(Content { power_hz: hertz(last.unwrap_or(end)), valley_hz: hertz(valley), noise: floor.sqrt() })
 }
 
-/// Index (bin minus one) at which the acceleration's spectrum has come down to twice its minimum behind the main motion.
+/// Index (bin minus one) at which the acceleration's spectrum has come down to twice its minimum behind the main
+/// motion.
 fn valley(acceleration: &[f64]) -> usize {
     let bins = acceleration.len();
     let sums: Vec<f64> = core::iter::once(0.0)

@@ -14,12 +14,13 @@ pub struct DecimationSettings {
     /// Middle of the transition band (gain one half); by default 0.4 of the rate after decimation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cutoff_hz: Option<f64>,
-    /// Width of the transition band; by default 0.4 of the rate after decimation, so that the stop band starts at 0.6 of it.
+    /// Width of the transition band; by default 0.4 of the rate after decimation, so that the stop band starts at 0.6
+    /// of it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub transition_hz: Option<f64>,
-    /// Attenuation in the stop band, 21 to 120 dB; the gain in the pass band (up to 0.2 of the
-    /// reduced rate) lies within `4 · 10^(-A/20)` of one, 0.4 % at the default of 60: each of the band's two edges ripples by one
-    /// such unit, and making the gain at zero frequency one can double that.
+    /// Attenuation in the stop band, 21 to 120 dB; the gain in the pass band (up to 0.2 of the reduced rate) lies
+    /// within `4 · 10^(-A/20)` of one, 0.4 % at the default of 60: each of the band's two edges ripples by one such
+    /// unit, and making the gain at zero frequency one can double that.
     pub stop_band_db: f64,
 }
 
@@ -33,12 +34,13 @@ impl Default for DecimationSettings {
 const MAX_TAPS: usize = 20_001;
 
 impl DecimationSettings {
-    /// The filter's coefficients at `rate_hz`: windowed sinc with Kaiser's window, odd length, symmetric, unit gain at zero
-    /// frequency.
+    /// The filter's coefficients at `rate_hz`: windowed sinc with Kaiser's window, odd length, symmetric, unit gain at
+    /// zero frequency.
     ///
-    /// `h[k] = 2 f_c/rate · sinc(2 f_c/rate · (k - M)) · I₀(β √(1 - ((k - M)/M)²)) / I₀(β)`, length `(A - 7.95) / (2.285 Δω) + 1`
-    /// with A two decibels above `stop_band_db`.
-    /// Source: Kaiser, Proc. IEEE Int. Symp. Circuits and Systems (1974) 20; Gautier's parallel filter: Pressé and Gautier, ICRA 1993.
+    /// `h[k] = 2 f_c/rate · sinc(2 f_c/rate · (k - M)) · I₀(β √(1 - ((k - M)/M)²)) / I₀(β)`, length `(A - 7.95) /
+    /// (2.285 Δω) + 1` with A two decibels above `stop_band_db`.
+    /// Source: Kaiser, Proc. IEEE Int. Symp. Circuits and Systems (1974) 20; Gautier's parallel filter: Pressé and
+    /// Gautier, ICRA 1993.
     ///
     /// # Errors
     /// A [`FilterError`] that names the setting.
@@ -111,9 +113,9 @@ fn bessel_i0(x: f64) -> f64 {
 
 /// Filters and decimates panels of columns, all alike, as they come.
 ///
-/// Only rows whose whole filter support lies inside the signal are produced ("valid" convolution): output row `k` belongs
-/// to input row `k · factor + half_length` and has no delay; nothing is invented at the ends. The result does not depend on how the
-/// input is cut into panels.
+/// Only rows whose whole filter support lies inside the signal are produced ("valid" convolution): output row `k`
+/// belongs to input row `k · factor + half_length` and has no delay; nothing is invented at the ends. The result does
+/// not depend on how the input is cut into panels.
 ///
 /// ```
 /// use dynident_recording::{DecimationSettings, Decimator};
@@ -184,8 +186,8 @@ impl Decimator {
         index * self.factor as u64 + self.half_length() as u64
     }
 
-    /// Takes the next `rows` rows of the column-major `panel` (`panel[column * rows + row]`) and replaces the contents of
-    /// `out` by the output rows that are now complete, column-major with the returned row count as stride.
+    /// Takes the next `rows` rows of the column-major `panel` (`panel[column * rows + row]`) and replaces the contents
+    /// of `out` by the output rows that are now complete, column-major with the returned row count as stride.
     ///
     /// # Panics
     /// If `panel` has not `rows` times the number of columns entries.
@@ -225,8 +227,8 @@ impl Decimator {
         produced
     }
 
-    /// Ends the signal: forgets its last rows, so that the next [`push`](Self::push) starts a new one. Returns the output rows
-    /// produced since the start.
+    /// Ends the signal: forgets its last rows, so that the next [`push`](Self::push) starts a new one. Returns the
+    /// output rows produced since the start.
     pub fn finish(&mut self) -> u64 {
         self.carried = 0;
         self.skip = 0;

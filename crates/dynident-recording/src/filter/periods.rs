@@ -7,7 +7,8 @@ use crate::error::FormatError;
 pub struct AveragedPeriods {
     /// Channel by channel the mean over the periods, `period_samples` numbers each.
     pub mean: Vec<Vec<f64>>,
-    /// Covariance of a single sample's noise between channels at one instant, row by row; that of the mean is a P-th of it.
+    /// Covariance of a single sample's noise between channels at one instant, row by row; that of the mean is a P-th of
+    /// it.
     pub sample_covariance: Vec<Vec<f64>>,
     /// Periods P that were averaged.
     pub periods: usize,
@@ -25,11 +26,13 @@ impl AveragedPeriods {
 ///     x̄_k = Σ_p x_pk / P,   Σ = Σ_k Σ_p (x_pk − x̄_k)(x_pk − x̄_k)ᵀ / (N (P − 1))
 /// ```
 ///
-/// for N samples in a period and all whole periods P; what is left over at the end is not used. Noise with a period's memory or drift from period to period counts as noise. Olsen, Swevers
-/// and Verdonck, Int. J. Robotics Research 21 (2002) 895.
+/// for N samples in a period and all whole periods P; what is left over at the end is not used. Noise with a period's
+/// memory or drift from period to period counts as noise. Olsen, Swevers and Verdonck, Int. J. Robotics Research 21
+/// (2002) 895.
 ///
 /// # Errors
-/// [`FormatError`] with key `period_samples` when it is zero or channels are shorter than two periods, `channels` when they differ in length or hold a number that is not finite.
+/// [`FormatError`] with key `period_samples` when it is zero or channels are shorter than two periods, `channels` when
+/// they differ in length or hold a number that is not finite.
 ///
 /// ```
 /// // Two periods of three samples, 0.2 apart everywhere.

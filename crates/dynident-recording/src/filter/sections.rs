@@ -15,9 +15,9 @@ pub(crate) struct Section {
 /// Lowest cut-off as part of the sampling rate: there the gain at zero frequency still holds to seven digits.
 const LOWEST: f64 = 1e-5;
 
-/// The digital Butterworth low-pass of `order`: analogue prototype poles `exp(iπ(2k + n + 1) / 2n)`, cut-off pre-warped,
-/// bilinear transform; each section has unit gain at zero frequency. The cascade is that of `scipy.signal.butter(order,
-/// cutoff_hz, fs=rate_hz, output="sos")`, up to how the gain is spread over the sections.
+/// The digital Butterworth low-pass of `order`: analogue prototype poles `exp(iπ(2k + n + 1) / 2n)`, cut-off
+/// pre-warped, bilinear transform; each section has unit gain at zero frequency. The cascade is that of
+/// `scipy.signal.butter(order, cutoff_hz, fs=rate_hz, output="sos")`, up to how the gain is spread over the sections.
 /// Source: Oppenheim and Schafer, Discrete-Time Signal Processing, section 7.1.2.
 ///
 /// # Errors
@@ -73,8 +73,8 @@ pub(crate) fn pole_radius(sections: &[Section]) -> f64 {
 /// Three signals side by side: positions, first and second differences go through the same recursion.
 pub(crate) type Triple = [f64; 3];
 
-/// Runs the cascade over `signal` in place (in reverse order if asked), transposed direct form II. Each section starts in
-/// its steady state for the constant input `start`, as with `scipy.signal.sosfilt_zi`.
+/// Runs the cascade over `signal` in place (in reverse order if asked), transposed direct form II. Each section starts
+/// in its steady state for the constant input `start`, as with `scipy.signal.sosfilt_zi`.
 pub(crate) fn run(sections: &[Section], signal: &mut [Triple], start: Triple, reversed: bool) {
     for section in sections {
         let ([b0, b1, b2], [a1, a2]) = (section.b, section.a);

@@ -8,8 +8,8 @@ use std::path::Path;
 /// Where raw rows come from: a file of some format, or samples in memory.
 ///
 /// A format is one type with this trait and one with [`LogTable`]. They deal in columns of numbers as they were
-/// recorded; what the columns mean (unit, sign, gear, range, missing values) is a
-/// [`LogFormat`](crate::LogFormat) and the business of [`LogReader`](crate::LogReader), which stands behind all of them.
+/// recorded; what the columns mean (unit, sign, gear, range, missing values) is a [`LogFormat`](crate::LogFormat) and
+/// the business of [`LogReader`](crate::LogReader), which stands behind all of them.
 ///
 /// ```
 /// use dynident_recording::{Log, LogFormat, LogPlace, LogSource, LogTable, MotionBlock, MotionSettings, MotionStream};
@@ -103,7 +103,8 @@ pub trait LogTable: fmt::Debug + Send {
         None
     }
 
-    /// The columns, each once, that [`next_row`](Self::next_row) is to give, in this order. Called before the first row.
+    /// The columns, each once, that [`next_row`](Self::next_row) is to give, in this order. Called before the first
+    /// row.
     fn select(&mut self, fields: &[usize]);
 
     /// Reads one row: one number for each selected column, NaN or infinite where it is missing; false at the end.

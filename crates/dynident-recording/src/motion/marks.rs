@@ -3,7 +3,8 @@
 use super::block::MotionBlock;
 use core::ops::Range;
 
-/// The runs of rows of a block that no mark touches. Marks (in any order, overlapping or not) count in a window whose sample `first` is the block's first row.
+/// The runs of rows of a block that no mark touches. Marks (in any order, overlapping or not) count in a window whose
+/// sample `first` is the block's first row.
 pub(crate) fn kept_runs(marked: &[Range<usize>], first: usize, rows: usize) -> Vec<Range<usize>> {
     let mut ranges: Vec<Range<usize>> = marked
         .iter()

@@ -7,7 +7,7 @@ use crate::clock::{Clock, clock};
 use crate::derivative::{Derivatives, Differentiator, Place};
 use crate::error::{FilterError, RecordingError};
 use crate::filter::cutoff::{CUTOFF_SAMPLES, CutoffChoice, cutoff};
-use crate::log::{Log, LogFormat, LogReader, RawBlock};
+use crate::log::{Log, LogFormat, LogReader, Quantity, RawBlock};
 use crate::reference::Reference;
 use crate::report::ImportReport;
 use crate::report::channels::{ChannelCheck, quantisation_step};
@@ -23,8 +23,8 @@ const CHUNK_ROWS: usize = 8192;
 /// A log on its way to a motion; memory does not grow with the log's length, unless the differentiator needs
 /// the whole log.
 ///
-/// Opening reads a bounded first part of the log to decide on clock, rate and cut-off; then the log is read once more from
-/// the start, as [`next_block`](Self::next_block) is called.
+/// Opening reads a bounded first part of the log to decide on clock, rate and cut-off; then the log is read once more
+/// from the start, as [`next_block`](Self::next_block) is called.
 #[derive(Debug)]
 pub struct MotionStream {
     reader: LogReader,
@@ -96,7 +96,8 @@ impl MotionStream {
 
     /// As [`new`](Self::new), with the commanded motion for a way that needs it, its joints in the order of the log's.
     ///
-    /// Where the way does not apply to a joint, the samples of all joints are left out, the piece is cut there, and the report says how many.
+    /// Where the way does not apply to a joint, the samples of all joints are left out, the piece is cut there, and the
+    /// report says how many.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -147,13 +148,13 @@ impl MotionStream {
         let cutoff = cutoff(&longest_segment(segmenter, &prefix), clock.rate_hz);
         let differentiator = build(&cutoff)?;
         let mut checks = Vec::new();
-        for (key, _, quantity) in format.groups() {
+        for (quantity, _) in format.groups() {
             for (index, joint) in joints.iter().enumerate() {
                 let mut check = ChannelCheck::new(quantity, joint);
-                check.quantisation_step = match key {
-                    "position" => quantisation_step(&prefix.q[index]),
-                    "torque" => quantisation_step(&prefix.tau[index]),
-                    _ => None,
+                check.quantisation_step = match quantity {
+                    Quantity::Position => quantisation_step(&prefix.q[index]),
+                    Quantity::Torque => quantisation_step(&prefix.tau[index]),
+                    Quantity::Velocity | Quantity::Acceleration | Quantity::Temperature => None,
                 };
                 checks.push(check);
             }
@@ -393,7 +394,8 @@ impl MotionStream {
         Ok(false)
     }
 
-    /// Leaves the marked samples out; what remains waits as blocks of pieces of their own. `first` is the place of the block's first row in the window that the marks count in.
+    /// Leaves the marked samples out; what remains waits as blocks of pieces of their own. `first` is the place of the
+    /// block's first row in the window that the marks count in.
     fn keep_unmarked(&mut self, block: &MotionBlock, marked: &[core::ops::Range<usize>], first: usize) {
         let runs = kept_runs(marked, first, block.rows);
         let kept: usize = runs.iter().map(ExactSizeIterator::len).sum();

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 /// One joint's spliced logistic function, there and back:
 ///
-/// `q(t) = h + A/(1 + e^-(ω rem(t, T) - ωT/4))` in the first half of each period, `h + A/(1 + e^(ω rem(t, T) - 3ωT/4))` in the second;
+/// `q(t) = h + A/(1 + e^-(ω rem(t, T) - ωT/4))` in the first half of each period, `h + A/(1 + e^(ω rem(t, T) - 3ωT/4))`
+/// in the second;
 ///
 /// after the last period it stands where it began. A joint with A = 0 stands still.
 /// Source: the paper's Eqs. 12 to 14.
@@ -43,7 +44,8 @@ impl LogisticPath {
     /// Checks the numbers.
     ///
     /// # Errors
-    /// [`FilterError::Reference`]: numbers that are not finite, ω or T not positive, ωT below 20 (the strokes would not come to rest: 1 % of the peak speed would be left) or beyond 1e4, repetitions not 1 to 1000.
+    /// [`FilterError::Reference`]: numbers that are not finite, ω or T not positive, ωT below 20 (the strokes would not
+    /// come to rest: 1 % of the peak speed would be left) or beyond 1e4, repetitions not 1 to 1000.
     pub fn validate(&self) -> Result<(), FilterError> {
         let wrong = |problem: String| Err(FilterError::Reference { problem });
         let Self { amplitude, omega, offset, period_s, repetitions } = *self;
@@ -90,14 +92,16 @@ impl LogisticPath {
         ]
     }
 
-    /// Speed and acceleration by position alone, Eqs. 15 and 16: `dq = ±(ω/A)(q - h)(A - q + h)`, plus on the way `there`,
-    /// `ddq = (ω²/A²)(q - h)(A - q + h)(A - 2q + 2h)`. `None` outside the stroke, where the formulas give the wrong sign.
+    /// Speed and acceleration by position alone, Eqs. 15 and 16: `dq = ±(ω/A)(q - h)(A - q + h)`, plus on the way
+    /// `there`, `ddq = (ω²/A²)(q - h)(A - q + h)(A - 2q + 2h)`. `None` outside the stroke, where the formulas give the
+    /// wrong sign.
     pub fn rates(&self, q: f64, there: bool) -> Option<[f64; 2]> {
         let gone = (q - self.offset) / self.amplitude;
         (gone > 0.0 && gone < 1.0).then(|| self.rates_as_written(q, there))
     }
 
-    /// Eqs. 15 and 16 at any position, outside the stroke as well, where the sign is wrong. A joint that stands still (A = 0) has neither speed nor acceleration.
+    /// Eqs. 15 and 16 at any position, outside the stroke as well, where the sign is wrong. A joint that stands still
+    /// (A = 0) has neither speed nor acceleration.
     pub(crate) fn rates_as_written(&self, q: f64, there: bool) -> [f64; 2] {
         let Self { amplitude, omega, offset, .. } = *self;
         if amplitude == 0.0 {
@@ -119,7 +123,8 @@ impl LogisticPath {
         [0.25 * size, size * self.omega / (6.0 * 3.0_f64.sqrt())]
     }
 
-    /// Two strokes a period, none if A = 0. They move where the speed is above 1e-3 of its peak: up to ln(4000)/ω from the middle.
+    /// Two strokes a period, none if A = 0. They move where the speed is above 1e-3 of its peak: up to ln(4000)/ω from
+    /// the middle.
     pub(crate) fn strokes(&self) -> Vec<Stroke> {
         if self.amplitude == 0.0 {
             return Vec::new();

@@ -1,7 +1,7 @@
 //! The motion that a robot was commanded to make: the seam through which ways that need it get it.
 //!
-//! [`Reference`] is that motion at any time: samples, or the closed form of [`LogisticPath`]s. It knows its [`Stroke`]s,
-//! the pieces between rests. [`ReferenceSettings`] is how a study file names it.
+//! [`Reference`] is that motion at any time: samples, or the closed form of [`LogisticPath`]s. It knows its
+//! [`Stroke`]s, the pieces between rests. [`ReferenceSettings`] is how a study file names it.
 
 mod logistic_path;
 mod settings;
@@ -25,7 +25,8 @@ const RESTING: [f64; 2] = [1e-3, 1e-2];
 
 /// Position, speed and acceleration of every joint as commanded, at any time.
 ///
-/// Nothing here knows how the motion was designed: it is either samples (what `design` writes as `trajectory.csv`), or the closed form of the paper's logistic strokes.
+/// Nothing here knows how the motion was designed: it is either samples (what `design` writes as `trajectory.csv`), or
+/// the closed form of the paper's logistic strokes.
 #[derive(Clone, Debug)]
 pub struct Reference {
     joints: Vec<JointReference>,
@@ -55,13 +56,15 @@ struct Sampled {
 }
 
 impl Reference {
-    /// From samples: `joints[j]` holds q, dq and ddq of joint j at `times_s` (rad, rad/s, rad/s²; m for sliding joints), which increase.
+    /// From samples: `joints[j]` holds q, dq and ddq of joint j at `times_s` (rad, rad/s, rad/s²; m for sliding
+    /// joints), which increase.
     ///
-    /// Between samples it is the quintic through both ends' q, dq and ddq: for a smooth motion exact to `h⁶/46080` of its sixth derivative. Before the first and after the last sample the
-    /// joint stands still.
+    /// Between samples it is the quintic through both ends' q, dq and ddq: for a smooth motion exact to `h⁶/46080` of
+    /// its sixth derivative. Before the first and after the last sample the joint stands still.
     ///
     /// # Errors
-    /// [`FilterError::Reference`] for fewer than two samples, lists of unequal length, times that do not increase, or numbers that are not finite.
+    /// [`FilterError::Reference`] for fewer than two samples, lists of unequal length, times that do not increase, or
+    /// numbers that are not finite.
     pub fn sampled(times_s: &[f64], joints: &[[Vec<f64>; 3]]) -> Result<Self, FilterError> {
         let wrong = |problem: String| FilterError::Reference { problem };
         if times_s.len() < 2 || times_s.len() > MOST_SAMPLES || joints.is_empty() {
@@ -114,7 +117,8 @@ impl Reference {
         Ok(Self { joints, start_s: 0.0 })
     }
 
-    /// Reads a table as `design` writes it: columns `t_s`, `q1..`, `dq1..`, `ddq1..`, numbers from 1 to `joints`, SI units. Time counts from its first row.
+    /// Reads a table as `design` writes it: columns `t_s`, `q1..`, `dq1..`, `ddq1..`, numbers from 1 to `joints`, SI
+    /// units. Time counts from its first row.
     ///
     /// # Errors
     /// As [`LogReader`], and as [`sampled`](Self::sampled).
@@ -160,7 +164,8 @@ impl Reference {
         self
     }
 
-    /// The same with strokes between successive `boundaries_s` (seconds after its own start) in place of those between rests: for motions that turn without resting. Joints that never move keep none.
+    /// The same with strokes between successive `boundaries_s` (seconds after its own start) in place of those between
+    /// rests: for motions that turn without resting. Joints that never move keep none.
     ///
     /// # Errors
     /// [`FilterError::Reference`] for fewer than two boundaries, or boundaries that are not finite or do not increase.
@@ -179,7 +184,8 @@ impl Reference {
         Ok(self)
     }
 
-    /// The same for joints in another order: joint `j` of the new reference is joint `order[j]` of this one; `None` if there is no such joint.
+    /// The same for joints in another order: joint `j` of the new reference is joint `order[j]` of this one; `None` if
+    /// there is no such joint.
     pub fn reordered(&self, order: &[usize]) -> Option<Self> {
         let joints = order.iter().map(|&joint| self.joints.get(joint).cloned()).collect::<Option<Vec<_>>>()?;
         Some(Self { joints, start_s: self.start_s })
@@ -190,7 +196,8 @@ impl Reference {
         self.joints.len()
     }
 
-    /// After how many seconds it begins anew if it is run again and again: the length of its table, or the period that all closed forms share; none where their periods differ.
+    /// After how many seconds it begins anew if it is run again and again: the length of its table, or the period that
+    /// all closed forms share; none where their periods differ.
     pub fn period_s(&self) -> Option<f64> {
         let period = |joint: &JointReference| match &joint.path {
             JointPath::Sampled(sampled) => sampled.times_s[sampled.times_s.len() - 1] - sampled.times_s[0],
@@ -225,7 +232,8 @@ impl Reference {
         rests(&self.at(joint, time_s), self.joints[joint].peak)
     }
 
-    /// The joint's strokes: from rest to rest, in seconds after the log's first row; one for the whole motion if it never rests, none if it never moves.
+    /// The joint's strokes: from rest to rest, in seconds after the log's first row; one for the whole motion if it
+    /// never rests, none if it never moves.
     ///
     /// # Panics
     /// If there is no such joint.
@@ -252,7 +260,8 @@ impl Reference {
         }
     }
 
-    /// Whether the motion is known at this time (seconds after the log's first row): inside its samples, or at an end at which it stands still.
+    /// Whether the motion is known at this time (seconds after the log's first row): inside its samples, or at an end
+    /// at which it stands still.
     ///
     /// # Panics
     /// If there is no such joint.
@@ -330,7 +339,8 @@ mod tests {
         for i in 0..500 {
             let t = f64::from(i) * 0.01;
             let [q, dq, ddq] = reference.at(0, t + 1.0);
-            // h⁶ w⁶ / 46080 = 2e-11 in q; orders h⁵ and h⁴ below it in dq and ddq, with constants below 1/1000 and 1/100.
+            // h⁶ w⁶ / 46080 = 2e-11 in q; orders h⁵ and h⁴ below it in dq and ddq, with constants below 1/1000 and
+            // 1/100.
             assert!((q - (w * t).sin()).abs() < 5e-11, "{t}");
             assert!((dq - w * (w * t).cos()).abs() < 2e-8, "{t}");
             assert!((ddq + w * w * (w * t).sin()).abs() < 5e-6, "{t}");

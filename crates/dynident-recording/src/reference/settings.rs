@@ -6,7 +6,8 @@ use crate::error::FilterError;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Where the commanded motion comes from: the table that `design` wrote, or the closed form of the paper's strokes. A text alone is the table's file.
+/// Where the commanded motion comes from: the table that `design` wrote, or the closed form of the paper's strokes. A
+/// text alone is the table's file.
 ///
 /// ```
 /// use dynident_recording::DifferentiatorSettings;
@@ -30,7 +31,8 @@ pub struct ReferenceSettings {
     /// In place of a table: one spliced logistic function for each joint, in the same order.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<LogisticPath>,
-    /// Where strokes begin and end, seconds after the motion's start, for all joints; by default they are what lies between rests.
+    /// Where strokes begin and end, seconds after the motion's start, for all joints; by default they are what lies
+    /// between rests.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub strokes_s: Vec<f64>,
     /// When it begins, in seconds after the log's first row; 0 by default.
@@ -71,7 +73,8 @@ impl ReferenceSettings {
     /// Checks what can be checked without the table.
     ///
     /// # Errors
-    /// [`FilterError::Reference`] if file and joints are both given or a path has no meaning; [`FilterError::Setting`] if the start is not finite.
+    /// [`FilterError::Reference`] if file and joints are both given or a path has no meaning; [`FilterError::Setting`]
+    /// if the start is not finite.
     pub fn validate(&self) -> Result<(), FilterError> {
         if !(self.start_s.is_finite() && self.start_s.abs() <= 1e6) {
             return Err(FilterError::Setting { name: "start_s", value: self.start_s, mend: "give seconds" });

@@ -1,16 +1,16 @@
 //! What a channel looks like: its range, whether it is alive, quantised, saturated. Accumulated block by block.
 
 use crate::log::Quantity;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Samples in a row at an extreme value from which a torque counts as saturated.
 const SATURATED_RUN: u64 = 20;
 
 /// What was seen of one channel of one joint.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChannelReport {
-    /// `position`, `velocity`, `acceleration`, `torque` or `temperature`.
-    pub channel: &'static str,
+    /// What it measures.
+    pub channel: Quantity,
     /// The joint.
     pub joint: String,
     /// Smallest value (SI).
@@ -33,7 +33,7 @@ impl ChannelReport {
 
     /// Whether the channel sits at a limit for long.
     pub fn saturated(&self) -> bool {
-        self.channel == "torque" && !self.constant() && self.longest_run_at_extreme >= SATURATED_RUN
+        self.channel == Quantity::Torque && !self.constant() && self.longest_run_at_extreme >= SATURATED_RUN
     }
 }
 
@@ -99,13 +99,7 @@ impl ChannelCheck {
 
     pub(crate) fn report(&self) -> ChannelReport {
         ChannelReport {
-            channel: match self.quantity {
-                Quantity::Position => "position",
-                Quantity::Velocity => "velocity",
-                Quantity::Acceleration => "acceleration",
-                Quantity::Torque => "torque",
-                Quantity::Temperature => "temperature",
-            },
+            channel: self.quantity,
             joint: self.joint.clone(),
             min: -self.low.value,
             max: self.high.value,

@@ -1,13 +1,13 @@
 //! A logged derivative against the derivative of the position.
 
 use super::lag::{Lag, best_lag};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Samples kept for the lag.
 const KEPT: usize = 1 << 13;
 
 /// How a logged velocity (or acceleration) relates to the derivative of the position, both filtered alike.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DerivativeComparison {
     /// The joint.
     pub joint: String,

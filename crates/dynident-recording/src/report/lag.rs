@@ -1,9 +1,9 @@
 //! By how much one signal comes after another.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The shift at which two signals match best.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Lag {
     /// Seconds by which the second signal comes after the first; negative if before.
     pub seconds: f64,
@@ -13,13 +13,15 @@ pub struct Lag {
     pub correlation: f64,
     /// Correlation without a shift.
     pub correlation_unshifted: f64,
-    /// Whether the largest correlation was found at the end of the search: the true lag may be longer, or there is none.
+    /// Whether the largest correlation was found at the end of the search: the true lag may be longer, or there is
+    /// none.
     pub at_limit: bool,
 }
 
-/// The lag of `b` behind `a`, searched up to `max_lag_samples` either way: the shift `k` of largest `|corr(a[i], b[i + k])|`
-/// (Pearson's correlation, the same samples of `a` for every shift), refined by a parabola. `None` for signals that are constant,
-/// not finite, or not at least three times as long as the largest lag. Filter both signals alike before.
+/// The lag of `b` behind `a`, searched up to `max_lag_samples` either way: the shift `k` of largest `|corr(a[i], b[i +
+/// k])|` (Pearson's correlation, the same samples of `a` for every shift), refined by a parabola. `None` for signals
+/// that are constant, not finite, or not at least three times as long as the largest lag. Filter both signals alike
+/// before.
 pub fn best_lag(a: &[f64], b: &[f64], max_lag_samples: usize, rate_hz: f64) -> Option<Lag> {
     let n = a.len().min(b.len());
     if n < 3 * max_lag_samples.max(1) || !(rate_hz.is_finite() && rate_hz > 0.0) {

@@ -15,11 +15,11 @@ pub use lag::{Lag, best_lag};
 
 use crate::clock::Clock;
 use crate::filter::CutoffChoice;
-use crate::log::LinesDropped;
-use serde::Serialize;
+use crate::log::{LinesDropped, Quantity};
+use serde::{Deserialize, Serialize};
 
 /// How much a finding matters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
     /// Good to know.
@@ -31,7 +31,7 @@ pub enum Level {
 }
 
 /// One thing that was found.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     /// How much it matters.
     pub level: Level,
@@ -42,7 +42,7 @@ pub struct Finding {
 }
 
 /// A step between successive samples that is longer than three median steps.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gap {
     /// 0-based data row before the gap.
     pub row: u64,
@@ -53,7 +53,7 @@ pub struct Gap {
 }
 
 /// Time steps between successive rows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Steps {
     /// Shortest, in seconds.
     pub min_s: f64,
@@ -66,7 +66,7 @@ pub struct Steps {
 }
 
 /// Everything the importer found in a log.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImportReport {
     /// The main file.
     pub file: String,
@@ -159,8 +159,8 @@ impl ImportReport {
             add(Level::Info, "rows", format!("the cut-off last line was left out ({place})"));
         }
         for channel in &self.channels {
-            let name = format!("{} {}", channel.channel, channel.joint);
-            let measured = matches!(channel.channel, "position" | "torque");
+            let name = format!("{} {}", channel.channel.key(), channel.joint);
+            let measured = matches!(channel.channel, Quantity::Position | Quantity::Torque);
             if channel.constant() {
                 let level = if measured { Level::Problem } else { Level::Warning };
                 add(level, &name, format!("dead: constantly {}", channel.min));
