@@ -16,7 +16,6 @@ mod information;
 pub mod limits;
 mod motion;
 pub mod optimisers;
-pub mod paper_problem;
 pub mod step_wise;
 
 pub use derivative_free::{DerivativeFree, design_without_gradients};

@@ -3,9 +3,10 @@
 use crate::arm::{Arm, TRUTH};
 use crate::base_parameters::{COLUMNS, theta};
 use crate::piece::{PaperCell, PaperFigure, PaperTable};
+use crate::problem::table_3;
 use dynident::Error;
 use dynident_excitation::families::{SplicedLogistic, SplicedLogisticSettings};
-use dynident_excitation::paper_problem::{PaperProblem, Stroke};
+use dynident_excitation::step_wise::Stroke;
 use dynident_experiment::controllers::{FiniteTimeSettings, JointPdSettings};
 use dynident_experiment::iteration::{
     IteratedMachine, Iteration, IterationError, IterationSettings, IterationTask, Leg, Scheme, iterate,
@@ -61,13 +62,7 @@ const SHOWN: usize = 3;
 
 /// Both schemes, both joints: the paper's own with its Table 3, and ours inside the limits (18).
 pub(crate) fn joint_runs(arm: &Arm, optimum: &[Stroke; 2]) -> Result<JointRuns, Error> {
-    let paper = Protocol {
-        rate_hz: 100.0,
-        steps_per_sample: 10,
-        runs: SHOWN,
-        strokes: PaperProblem::table_3(100.0),
-        literal: true,
-    };
+    let paper = Protocol { rate_hz: 100.0, steps_per_sample: 10, runs: SHOWN, strokes: table_3(100.0), literal: true };
     let ours = Protocol { rate_hz: 1000.0, steps_per_sample: 1, runs: 6, strokes: *optimum, literal: false };
     let [as_paper, own] = [&paper, &ours].map(|protocol| -> Result<[Runs; 2], Error> {
         let two = one_joint(arm, protocol, 1, &[]).map_err(|why| failed(&arm.description, &why))?;

@@ -14,6 +14,7 @@ mod joint_runs;
 mod optimisation;
 mod page;
 mod piece;
+mod problem;
 mod strokes;
 mod verification;
 

@@ -1,7 +1,6 @@
 //! The paper's excitation trajectory: logistic functions spliced there and back.
 
 use super::error::{FamilyError, MOST, require, require_frame};
-use super::logistic_map::LogisticMap;
 use super::random_start::{grid, scale_and_shift};
 use crate::family::Family;
 use crate::motion::{Motion, MotionCotangent};
@@ -104,15 +103,6 @@ impl SplicedLogistic {
     /// If the joint or the parameters do not exist.
     pub fn period_s(&self, parameters: &[f64], joint: usize) -> f64 {
         self.period(joint, parameters[joint * self.each() + 1])
-    }
-
-    /// The map from position to speed and acceleration of a joint, Eqs. 15 and 16; the branch is [`Branch::at`](super::Branch::at) with [`period_s`](Self::period_s).
-    ///
-    /// # Panics
-    /// If the joint or the parameters do not exist.
-    pub fn map(&self, parameters: &[f64], joint: usize) -> LogisticMap {
-        let own = &parameters[joint * self.each()..(joint + 1) * self.each()];
-        LogisticMap { amplitude: own[0], omega: own[1], offset: self.offset(joint, own) }
     }
 
     /// Free numbers a joint.
@@ -274,7 +264,7 @@ impl Family for SplicedLogistic {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::families::{Branch, check};
+    use crate::families::check;
     use proptest::prelude::*;
 
     fn family(joints: usize, duration_s: f64, settings: &SplicedLogisticSettings) -> SplicedLogistic {
@@ -356,29 +346,6 @@ mod tests {
                 times.extend((0..8).map(|_| period * (0.5 * half as f64 + 0.25 + random.uniform(-0.2, 0.2))));
             }
             check::gradient_on(&family, &parameters, &times, seed);
-        }
-
-        /// The map gives the family's own speed and acceleration back. Its error is the rounding of q, at most ω and ω² times 1e-16 |q|, so 1e-12 of the peaks is ample.
-        #[test]
-        fn map_is_exact_on_the_stroke(seed in any::<u64>()) {
-            let family = family(2, 60.0, &SplicedLogisticSettings::default());
-            let parameters = check::start(&family, seed);
-            let times: Vec<f64> = (0..600).map(|s| 0.1 * f64::from(s)).collect();
-            let mut motion = Motion::default();
-            family.motion(&parameters, &times, &mut motion);
-            for joint in 0..2 {
-                let (map, period) = (family.map(&parameters, joint), family.period_s(&parameters, joint));
-                let [speed, acceleration] =
-                    [map.amplitude * map.omega, map.amplitude * map.omega * map.omega].map(|x| x.abs().max(1.0));
-                for (at, &time) in motion.of(joint).zip(&times).filter(|(_, time)| **time < period) {
-                    let rates = map.rates(motion.q[at], Branch::at(time, period)).unwrap();
-                    prop_assert!((rates.dq - motion.dq[at]).abs() < 1e-12 * speed);
-                    prop_assert!((rates.ddq - motion.ddq[at]).abs() < 1e-12 * acceleration);
-                }
-                for outside in [-1e-6, 1.0 + 1e-6, f64::NAN] {
-                    prop_assert_eq!(map.rates(map.offset + outside * map.amplitude, Branch::There), None);
-                }
-            }
         }
     }
 }

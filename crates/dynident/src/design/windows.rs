@@ -9,8 +9,9 @@ use dynident_excitation::limits::Limits;
 use dynident_excitation::optimisers::{
     BinaryGeneticSettings, CmaEsSettings, Generation, Progress, binary_genetic, cma_es,
 };
-use dynident_excitation::paper_problem::{PaperProblem, PaperQuantity, Stroke};
-use dynident_excitation::step_wise::{StepWiseJoint, StepWiseProblem, gravity_across};
+use dynident_excitation::step_wise::{
+    StepWiseJoint, StepWiseProblem, Stroke, StrokeConstants, StrokeQuantity, gravity_across,
+};
 use dynident_excitation::{DesignProgress, Family};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -52,15 +53,14 @@ pub struct WindowedCondition {
 
 impl Default for WindowedCondition {
     fn default() -> Self {
-        let paper = PaperProblem::default();
         Self {
             problem: WindowedProblem::StepWise,
             joints: None,
-            penalty: paper.penalty,
-            rest_limit: paper.rest_limit,
-            amplitude_range: paper.amplitude_range,
-            steepness_range: paper.steepness_range,
-            window_range: paper.window_range,
+            penalty: 1000.0,
+            rest_limit: 1e-4,
+            amplitude_range: [0.1, core::f64::consts::PI],
+            steepness_range: [0.1, 3.0],
+            window_range: [0.1, 10.0],
         }
     }
 }
@@ -125,7 +125,7 @@ pub struct StrokeFile {
 #[derive(Clone, Debug, Serialize)]
 pub struct StrokeLimitFile {
     /// What is bounded.
-    pub quantity: PaperQuantity,
+    pub quantity: StrokeQuantity,
     /// Its peak; positions count from the offset. rad and s.
     pub value: f64,
     /// What it must stay below.
@@ -148,12 +148,11 @@ impl WindowedFile {
         for stroke in &self.strokes {
             for limit in stroke.limits.iter().filter(|limit| !limit.kept) {
                 let what = match limit.quantity {
-                    PaperQuantity::Position => "reach (rad)",
-                    PaperQuantity::Speed => "peak speed (rad/s)",
-                    PaperQuantity::Acceleration => "peak acceleration (rad/s\u{b2})",
-                    PaperQuantity::RestSpeed => "speed at rest (rad/s)",
-                    PaperQuantity::RestAcceleration => "acceleration at rest (rad/s\u{b2})",
-                    PaperQuantity::Ground => "dip below the ground",
+                    StrokeQuantity::Position => "reach (rad)",
+                    StrokeQuantity::Speed => "peak speed (rad/s)",
+                    StrokeQuantity::Acceleration => "peak acceleration (rad/s\u{b2})",
+                    StrokeQuantity::RestSpeed => "speed at rest (rad/s)",
+                    StrokeQuantity::RestAcceleration => "acceleration at rest (rad/s\u{b2})",
                 };
                 sentences.push(format!(
                     "The stroke of `{}`, {what}: {} where less than {} is allowed, {:.0} % too much.",
@@ -322,7 +321,7 @@ fn problem(
             }
             None => FREE_RAD,
         };
-        let constants = PaperProblem {
+        let constants = StrokeConstants {
             gravity,
             rate_hz: section.search.rate_hz,
             period_times_steepness: settings.period_times_omega,
@@ -384,7 +383,7 @@ fn told(
             quantity: limit.quantity,
             value: limit.value,
             limit: limit.limit,
-            excess_percent: 100.0 * limit.excess().unwrap_or(0.0),
+            excess_percent: 100.0 * limit.excess(),
             kept: limit.kept(),
         });
         StrokeFile {
