@@ -3,7 +3,8 @@
 mod common;
 
 use common::Random;
-use dynident_estimation::{EstimationError, FactorWorkspace, SegmentSettings, SegmentedFactor, TriangularFactor};
+use dynident_estimation::factor::FactorWorkspace;
+use dynident_estimation::{EstimationError, SegmentSettings, SegmentedFactor, TriangularFactor};
 use dynident_lanes::Level;
 use nalgebra::DMatrix;
 use proptest::prelude::*;

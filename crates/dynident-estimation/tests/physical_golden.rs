@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
 use dynident_estimation::TriangularFactor;
-use dynident_estimation::physical::{
+use dynident_estimation::consistent::{
     BaseMap, Ellipsoid, PhysicalBody, PhysicalPrior, PhysicalProblem, PhysicalRoute, PhysicalScalar, PhysicalSettings,
     physical_fit,
 };

@@ -5,7 +5,7 @@
 
 mod physical_problems;
 
-use dynident_estimation::physical::{PhysicalFit, PhysicalRoute, PhysicalSettings, physical_fit};
+use dynident_estimation::consistent::{PhysicalFit, PhysicalRoute, PhysicalSettings, physical_fit};
 use dynident_model::InertialParameters;
 use physical_problems::{Case, case};
 

@@ -6,13 +6,13 @@ use crate::joint_runs::{failed, first_gains, model_based, prior};
 use crate::piece::{PaperCell, PaperFigure, PaperTable};
 use core::ops::ControlFlow;
 use dynident::{Error, RunOptions, Study, design_study, write_whole};
+use dynident_dynamics::ParametricModel;
 use dynident_excitation::Motion;
-use dynident_experiment::iteration::{
-    IteratedMachine, Iteration, IterationError, IterationSettings, IterationTask, Leg, iterate,
-};
-use dynident_experiment::{Integrator, LoopSettings, Plant, Reference, Robot, SimulatedRobot};
+use dynident_iteration::{Iteration, IterationError, IterationSettings, IterationTask, Leg, iterate};
+use dynident_iteration::{Robot, SimulatedRobot};
 use dynident_recording::DifferentiatorSettings;
 use dynident_report::LinePlot;
+use dynident_simulation::{Integrator, LoopSettings, Plant, Reference};
 use std::path::Path;
 
 /// The design of the comparison: two periods, of which the second is used.
@@ -93,7 +93,7 @@ pub(crate) fn fourier(arm: &Arm, out: &Path, seed: u64, options: &RunOptions<'_>
 fn identified(arm: &Arm, motion: &Motion) -> Result<[f64; 6], IterationError> {
     let reference = Reference::new(RATE_HZ, motion.clone())?;
     let second = vec![vec![[PERIOD_S, 2.0 * PERIOD_S]]; 2];
-    let machine = IteratedMachine::new(&arm.model, &[], Some(prior(false)))?;
+    let machine = ParametricModel::new(arm.model.clone(), Vec::new())?.with_nominal(prior(false))?;
     let task = IterationTask {
         machine,
         legs: vec![Leg::windowed(reference, second)?],

@@ -5,15 +5,15 @@ use crate::base_parameters::{COLUMNS, theta};
 use crate::piece::{PaperCell, PaperFigure, PaperTable};
 use crate::problem::table_3;
 use dynident::Error;
+use dynident_dynamics::ParametricModel;
 use dynident_excitation::families::{SplicedLogistic, SplicedLogisticSettings};
 use dynident_excitation::step_wise::Stroke;
-use dynident_experiment::controllers::{FiniteTimeSettings, JointPdSettings};
-use dynident_experiment::iteration::{
-    IteratedMachine, Iteration, IterationError, IterationSettings, IterationTask, Leg, Scheme, iterate,
-};
-use dynident_experiment::{ControllerSettings, Integrator, LoopSettings, Plant, Reference, Robot, Run, SimulatedRobot};
+use dynident_iteration::{Iteration, IterationError, IterationSettings, IterationTask, Leg, Scheme, iterate};
+use dynident_iteration::{Robot, SimulatedRobot};
 use dynident_recording::{DifferentiatorSettings, LogisticPath, ReferenceSettings};
 use dynident_report::LinePlot;
+use dynident_simulation::controllers::{FiniteTimeSettings, JointPdSettings};
+use dynident_simulation::{ControllerSettings, Integrator, LoopSettings, Plant, Reference, Run};
 use std::path::Path;
 
 /// What the runs told.
@@ -120,7 +120,7 @@ fn one_joint(arm: &Arm, protocol: &Protocol, joint: usize, known: &[(usize, f64)
     let mut paths = [LogisticPath { amplitude: 0.0, ..path }; 2];
     paths[joint] = path;
     let leg = Leg::windowed(reference, windows)?.with_commanded(dynident_recording::Reference::logistic(&paths)?);
-    let machine = IteratedMachine::new(&arm.model, &[], Some(prior(protocol.literal)))?;
+    let machine = ParametricModel::new(arm.model.clone(), Vec::new())?.with_nominal(prior(protocol.literal))?;
     let task = IterationTask { machine, legs: vec![leg], known: known.to_vec(), torque_limits: None };
     let iteration = Iteration::new(task, iteration_settings(protocol))?;
     let resting = arm.model.joints()[1 - joint].name.clone();

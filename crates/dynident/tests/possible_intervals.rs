@@ -4,7 +4,7 @@
 mod common;
 
 use common::repository;
-use dynident::estimation::physical::IntervalEnd;
+use dynident::estimation::consistent::IntervalEnd;
 use dynident::{RunOptions, Silent, Study, identify};
 use std::collections::BTreeMap;
 

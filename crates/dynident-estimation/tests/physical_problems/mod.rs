@@ -1,6 +1,6 @@
 //! Random physical problems: noisy, near-singular, with their optimum on the boundary, with and without limits.
 use dynident_estimation::TriangularFactor;
-use dynident_estimation::physical::{
+use dynident_estimation::consistent::{
     BaseMap, Ellipsoid, PhysicalBody, PhysicalPrior, PhysicalProblem, PhysicalScalar, PhysicalSettings, rough_body,
 };
 use nalgebra::{DMatrix, DVector};

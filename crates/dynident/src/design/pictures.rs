@@ -55,7 +55,7 @@ impl DesignOutcome {
     pub fn path_svg(&self) -> Result<String, Error> {
         let (_, motion) = self.sampled(RATE_HZ);
         let title = format!("{}: {}, {} s", self.file.name, self.file.family, self.file.duration_s);
-        let model = &self.machine.model;
+        let model = self.machine.model();
         let mut workspace = Workspace::new(model);
         let tools = tools(model);
         // Places of the joints and of the tools at one sample, m.
