@@ -2,7 +2,7 @@
 
 use crate::criteria::Criterion;
 use crate::design::assess::assess;
-use crate::design::{DesignProgress, DesignSettings, DesignTask, Designed, grid, ranges};
+use crate::design::{Design, DesignProgress, DesignSettings, DesignTask, grid, ranges};
 use crate::information::Information;
 use crate::limits::LimitWorkspace;
 use crate::motion::Motion;
@@ -51,7 +51,7 @@ pub fn design_without_gradients(
     settings: &DesignSettings,
     optimiser: &DerivativeFree,
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
-) -> Result<(Designed, Vec<Generation>), OptimiserError> {
+) -> Result<(Design, Vec<Generation>), OptimiserError> {
     let begun = Instant::now();
     let late = || settings.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > limit);
     let criterion = task.criteria[task.criteria.len() - 1];
@@ -111,7 +111,7 @@ pub fn design_without_gradients(
         }
     }
     let kept = kept.ok_or(OptimiserError::Start)?;
-    let designed = Designed {
+    let designed = Design {
         figure: kept.figure,
         information: kept.information,
         violation: kept.violation,

@@ -97,7 +97,7 @@ pub struct DesignTask<'a> {
 
 /// The best trajectory found.
 #[derive(Clone, Debug)]
-pub struct Designed {
+pub struct Design {
     /// Parameters of the family.
     pub parameters: Vec<f64>,
     /// Information of the trajectory, every logged sample counted.
@@ -133,7 +133,7 @@ pub fn design(
     task: &DesignTask<'_>,
     settings: &DesignSettings,
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
-) -> Result<Designed, OptimiserError> {
+) -> Result<Design, OptimiserError> {
     let begun = Instant::now();
     let late = || settings.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > limit);
     let evaluations = AtomicU64::new(0);
@@ -231,7 +231,7 @@ pub fn design(
         (kept, used) = restored(task, settings, kept, [&fine, &logged], &stop)?;
         evaluations.fetch_add(used as u64, Ordering::Relaxed);
     }
-    Ok(Designed {
+    Ok(Design {
         figure: kept.figure,
         information: kept.information,
         violation: kept.violation,

@@ -19,7 +19,7 @@ pub mod optimisers;
 pub mod step_wise;
 
 pub use derivative_free::{DerivativeFree, design_without_gradients};
-pub use design::{DesignProgress, DesignSettings, DesignTask, Designed, design, grid};
+pub use design::{Design, DesignProgress, DesignSettings, DesignTask, design, grid};
 pub use family::Family;
 pub use forecast::{Direction, Forecast, forecast};
 pub use information::Information;

@@ -7,7 +7,7 @@ use dynident_excitation::check::check_limits;
 use dynident_excitation::criteria::{Criterion, DOptimal};
 use dynident_excitation::families::{Fourier, FourierSettings};
 use dynident_excitation::limits::{LimitSet, Limits};
-use dynident_excitation::{DesignSettings, DesignTask, Designed, Family, Motion, design, forecast, grid};
+use dynident_excitation::{Design, DesignSettings, DesignTask, Family, Motion, design, forecast, grid};
 use dynident_model::sample::Random;
 use dynident_model::{Model, load_robot};
 
@@ -32,7 +32,7 @@ fn small() -> DesignSettings {
     }
 }
 
-fn designed(threads: usize) -> (Model, Limits, Fourier, PanelLayout, Designed) {
+fn designed(threads: usize) -> (Model, Limits, Fourier, PanelLayout, Design) {
     let (model, limits) = ur10();
     let set = LimitSet::new(&limits, &model).expect("limits fit the robot");
     let family = Fourier::new(model.dof(), 10.0, &FourierSettings::default()).expect("settings are valid");

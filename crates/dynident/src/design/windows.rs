@@ -1,6 +1,7 @@
 //! The paper's criterion over windows as a study asks for it, solved by any optimiser, with the optimum beside it.
 
 use super::optimiser::OptimiserChoice;
+use super::search::SearchResult;
 use super::section::{DesignSection, FamilyChoice};
 use crate::machine::Machine;
 use core::ops::ControlFlow;
@@ -172,16 +173,6 @@ fn digits(value: f64) -> String {
     if value < 1e-2 { format!("{value:.3e}") } else { format!("{value:.4}") }
 }
 
-/// A solved windowed design.
-pub(crate) struct Windowed {
-    pub(crate) file: WindowedFile,
-    pub(crate) family: StepWiseLogistic,
-    pub(crate) parameters: Vec<f64>,
-    pub(crate) history: Vec<Generation>,
-    pub(crate) evaluations: usize,
-    pub(crate) seconds: f64,
-}
-
 /// Solves the step-wise problem of a study.
 pub(crate) fn step_wise(
     section: &DesignSection,
@@ -189,7 +180,7 @@ pub(crate) fn step_wise(
     machine: &Machine,
     limits: &Limits,
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
-) -> Result<Windowed, String> {
+) -> Result<SearchResult, String> {
     let begun = Instant::now();
     let FamilyChoice::SplicedLogistic(settings) = &section.family else {
         return Err(format!(
@@ -286,7 +277,16 @@ pub(crate) fn step_wise(
         optimum_strokes: if inside { optimum_strokes } else { Vec::new() },
     };
     debug_assert_eq!(family.joints(), dof);
-    Ok(Windowed { file, family, parameters, history, evaluations, seconds: begun.elapsed().as_secs_f64() })
+    Ok(SearchResult {
+        family: Box::new(family),
+        parameters,
+        start_posture: Vec::new(),
+        figure: Some(condition_sum),
+        windowed: Some(file),
+        history,
+        evaluations,
+        seconds: begun.elapsed().as_secs_f64(),
+    })
 }
 
 /// The constants of every joint.
