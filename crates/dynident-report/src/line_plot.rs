@@ -150,7 +150,9 @@ impl LinePlot {
         let kept = kept_samples(&self.x, &views, (right - left).max(1.0) as usize);
         let path = |curve: &Vec<f64>| {
             let mut pen = Pen::default();
-            kept.iter().for_each(|&i| pen.to([at_x(self.x[i]), at_y(curve[i])]));
+            for &i in &kept {
+                pen.to([at_x(self.x[i]), at_y(curve[i])]);
+            }
             pen.path()
         };
         let lines = self.lines.iter().zip(&curves).enumerate().map(|(k, (line, curve))| {

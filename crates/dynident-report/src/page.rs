@@ -165,7 +165,7 @@ pub(crate) fn rendered(name: &str, view: &impl Serialize) -> Result<String, Repo
         environment.add_template(name, source)?;
     }
     let mut text = environment.get_template(name)?.render(view)?;
-    if name.ends_with(".svg") {
+    if text.starts_with("<svg") {
         // XML has no place for control characters.
         text.retain(|letter| letter == '\n' || !letter.is_control());
     }

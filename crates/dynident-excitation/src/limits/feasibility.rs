@@ -67,7 +67,7 @@ impl Limits {
 ///
 /// Double-S profile (Biagiotti and Melchiorri, *Trajectory Planning for Automatic Machines and Robots* (2008), section 3.4, rest at both ends); without a jerk limit the
 /// trapezoid. Zero when nothing limits.
-pub fn shortest_duration_s(displacement: f64, speed: Option<f64>, acceleration: Option<f64>, jerk: Option<f64>) -> f64 {
+fn shortest_duration_s(displacement: f64, speed: Option<f64>, acceleration: Option<f64>, jerk: Option<f64>) -> f64 {
     let d = displacement;
     if d <= 0.0 {
         return 0.0;

@@ -31,17 +31,17 @@ pub enum LimitKind {
 
 impl LimitKind {
     /// True for limits that change when the same path is run slower.
-    pub fn depends_on_time(self) -> bool {
+    pub(crate) fn depends_on_time(self) -> bool {
         matches!(self, Self::Speed | Self::Acceleration | Self::Jerk | Self::Torque | Self::Power)
     }
 
     /// True for limits on where points of the arm are, which no single joint decides.
-    pub fn is_place(self) -> bool {
+    pub(crate) fn is_place(self) -> bool {
         matches!(self, Self::Box | Self::Floor | Self::Column | Self::SelfCollision)
     }
 
     /// True where the limit is a least distance and not a largest magnitude.
-    pub fn is_clearance(self) -> bool {
+    pub(crate) fn is_clearance(self) -> bool {
         matches!(self, Self::Floor | Self::Column | Self::SelfCollision)
     }
 }

@@ -25,13 +25,10 @@ mod torque;
 mod validate;
 mod wrench;
 
-pub use capsules::{BodyCapsule, CapsulePairs, LinkCapsule, SelfCollision};
+pub use capsules::{LinkCapsule, SelfCollision};
 pub use description::{BoxLimit, ColumnLimit, FloorLimit, JointLimit, Limits, LinkPoint};
 pub use diagnose::{BrokenLimit, Diagnosis, LimitChange, Relaxation, diagnose};
 pub use error::LimitError;
-pub use feasibility::shortest_duration_s;
 pub use kind::{Constraint, LimitKind};
 pub use peaks::{Peak, PeakSettings, peaks};
-pub use segments::{SegmentDistance, segment_distance};
 pub use set::{LimitSet, LimitWorkspace};
-pub use torque::torque_pull_back;

@@ -4,7 +4,7 @@ use dynident_model::Vec3;
 
 /// Where two segments come nearest: as fractions along each, the distance, and the direction from the second to the first.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SegmentDistance {
+pub(crate) struct SegmentDistance {
     /// Fraction along the first segment, 0 to 1.
     pub along_first: f64,
     /// Fraction along the second segment, 0 to 1.
@@ -21,7 +21,7 @@ pub struct SegmentDistance {
 /// of which is the distance of an end point from the other segment (compare Ericson, *Real-Time Collision Detection* (2005), section 5.1.9). All five are
 /// looked at, so that no case depends on a parallelism threshold; of equal candidates the middle is taken, for parallel segments the middle of their overlap.
 /// By the envelope theorem the distance changes with the motion of the two nearest points along [`direction`](SegmentDistance::direction) only.
-pub fn segment_distance(first: [Vec3; 2], second: [Vec3; 2]) -> SegmentDistance {
+pub(crate) fn segment_distance(first: [Vec3; 2], second: [Vec3; 2]) -> SegmentDistance {
     let (u, v, w) = (first[1] - first[0], second[1] - second[0], first[0] - second[0]);
     let (uu, uv, vv, uw, vw) = (u.dot(u), u.dot(v), v.dot(v), u.dot(w), v.dot(w));
     // Nearest fraction on one segment to a fraction on the other; a segment without length has only its start.

@@ -99,12 +99,12 @@ impl LimitSet {
     }
 
     /// The rows that bound a single joint's motion.
-    pub fn bands(&self) -> &[JointBand] {
+    pub(crate) fn bands(&self) -> &[JointBand] {
         &self.bands
     }
 
     /// Whether the places of points are limited: boxes, floor, column, self-collision.
-    pub fn has_places(&self) -> bool {
+    pub(crate) fn has_places(&self) -> bool {
         self.placements
     }
 

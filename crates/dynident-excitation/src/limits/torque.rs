@@ -63,7 +63,7 @@ impl Term for TorqueLimits {
 ///
 /// # Panics
 /// If sizes differ.
-pub fn torque_pull_back(
+pub(crate) fn torque_pull_back(
     model: &Model,
     workspace: &mut Workspace,
     motion: &Motion,

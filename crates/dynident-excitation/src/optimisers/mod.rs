@@ -1,7 +1,9 @@
-//! Optimisers, one file each: without derivatives ([`binary_genetic()`], [`cma_es()`]) and with exact gradients ([`augmented_lagrangian()`],
-//! [`multi_start()`]).
+//! **What looks for the best?** Optimisers, one file each: without derivatives ([`binary_genetic()`], [`cma_es()`]), and
+//! with exact gradients from many starts (augmented Lagrangian, projected L-BFGS), which [`design()`](crate::design())
+//! runs.
 //!
-//! All are deterministic by their seed or start, on any number of threads, and anytime: a callback hears the best point so far and can stop them.
+//! All are deterministic by their seed or start, on any number of threads, and anytime: a callback hears the best point so
+//! far and can stop them.
 
 mod augmented_lagrangian;
 mod binary_genetic;
@@ -9,14 +11,16 @@ mod cma_es;
 mod multi_start;
 mod projected_lbfgs;
 
-pub use augmented_lagrangian::{
-    AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianState, AugmentedLagrangianStatus,
-    ConstrainedProblem, Known, augmented_lagrangian, augmented_lagrangian_from,
+#[cfg(test)]
+pub(crate) use augmented_lagrangian::AugmentedLagrangianStatus;
+pub(crate) use augmented_lagrangian::{
+    AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianState, ConstrainedProblem, Known,
+    augmented_lagrangian,
 };
 pub use binary_genetic::{BinaryGeneticResult, BinaryGeneticSettings, Generation, binary_genetic};
 pub use cma_es::{CmaEsResult, CmaEsRun, CmaEsSettings, CmaEsStatus, cma_es};
-pub use multi_start::{MultiStartResult, multi_start};
-pub use projected_lbfgs::Step;
+pub(crate) use multi_start::multi_start;
+pub(crate) use projected_lbfgs::Step;
 
 use core::ops::ControlFlow;
 use rayon::prelude::*;

@@ -41,7 +41,7 @@ pub(crate) struct Effort {
 
 /// A step of a search, and how it changed the gradient.
 #[derive(Clone, Copy, Debug)]
-pub struct Step<'a> {
+pub(crate) struct Step<'a> {
     /// Difference of the points.
     pub by: &'a [f64],
     /// Difference of the gradients.
