@@ -1,4 +1,5 @@
-//! The same design by optimisers without derivatives, for comparison: the paper's genetic algorithm and CMA-ES, with penalties for what is broken.
+//! The same design by optimisers without derivatives, for comparison: the paper's genetic algorithm and CMA-ES, with
+//! penalties for what is broken.
 
 use crate::criteria::Criterion;
 use crate::design::assess::assess;
@@ -36,11 +37,13 @@ const SEARCHES: usize = 3;
 const SIZED_BY: usize = 100;
 const WIDER: f64 = 1.3;
 
-/// Searches for [`design`](crate::design())'s task without gradients: the last criterion's [`fitness`](Criterion::fitness) plus 1000 times the sum of the largest violation of each limit.
+/// Searches for [`design`](crate::design())'s task without gradients: the last criterion's
+/// [`fitness`](Criterion::fitness) plus 1000 times the sum of the largest violation of each limit.
 ///
-/// Parameters are looked for in a box: the family's bounds, where they are finite, else what 100 random starts of the family span, 1.3 times as wide. The search grid is that of the settings; seed and
-/// time limit are theirs, too (a seed in the optimiser's own settings is not used). Up to three searches, with wider margins while something is broken between samples; the best motion by the
-/// check between samples is kept.
+/// Parameters are looked for in a box: the family's bounds, where they are finite, else what 100 random starts of the
+/// family span, 1.3 times as wide. The search grid is that of the settings; seed and time limit are theirs, too (a seed
+/// in the optimiser's own settings is not used). Up to three searches, with wider margins while something is broken
+/// between samples; the best motion by the check between samples is kept.
 ///
 /// Also gives one [`Generation`] of the first search after another (for CMA-ES the best so far, three times).
 ///
@@ -231,7 +234,8 @@ mod tests {
             assert!(designed.violation <= 0.0, "{optimiser:?}: {}", designed.violation);
             assert!(history.len() >= generations);
             assert!(history.windows(2).all(|w| w[1].best_so_far <= w[0].best_so_far));
-            // The median random start is inside position and speed limits; a search must beat it by more than a factor e in the determinant.
+            // The median random start is inside position and speed limits; a search must beat it by more than a factor
+            // e in the determinant.
             let (positions, speeds) = ranges(&set);
             let logged = grid(6.0, 601);
             let mut figures: Vec<f64> = (0..21)

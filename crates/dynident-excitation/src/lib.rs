@@ -1,4 +1,5 @@
-//! **How should it move?** Trajectory families, criteria, limits, optimisers and the forecast of every parameter's error bar.
+//! **How should it move?** Trajectory families, criteria, limits, optimisers and the forecast of every parameter's
+//! error bar.
 
 #![forbid(unsafe_code)]
 

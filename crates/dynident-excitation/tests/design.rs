@@ -1,4 +1,5 @@
-//! Whole designs: feasible everywhere by code that shares nothing with the search, the same for any number of threads, and a forecast that comes true.
+//! Whole designs: feasible everywhere by code that shares nothing with the search, the same for any number of threads,
+//! and a forecast that comes true.
 
 use core::ops::ControlFlow;
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, BatchWorkspace, PanelLayout, Panels, regressor_panels};
@@ -84,7 +85,8 @@ fn the_forecast_comes_true() {
         forecast(&design.information, 3).std.into_iter().map(|std| std.expect("every parameter is excited")).collect();
     let mut random = Random::new(77);
     let truth: Vec<f64> = (0..columns).map(|_| random.uniform(-1.0, 1.0)).collect();
-    // The 200 runs; the standard deviation of a standard deviation from 200 runs is 5 %, so single parameters scatter by more than the 10 % that hold for their mean square.
+    // The 200 runs; the standard deviation of a standard deviation from 200 runs is 5 %, so single parameters
+    // scatter by more than the 10 % that hold for their mean square.
     let runs = 200;
     let mut squares = vec![0.0; columns];
     for _ in 0..runs {

@@ -146,7 +146,8 @@ fn check_agrees_with_the_values_and_peaks_bound_both() {
         for (key, peak) in worst(&set, &peak_values, 1) {
             let (dense, scale) = (sampled[&key], 1.0 + sampled[&key].abs());
             assert!(peak >= dense - 1e-9 * scale, "{key:?}: refined {peak}, sampled {dense}");
-            // At 10 kHz a peak of harmonics below 12 rad/s is at most (1e-4 · 12)² / 8 = 2e-7 above the samples; a distance has corners.
+            // At 10 kHz a peak of harmonics below 12 rad/s is at most (1e-4 · 12)² / 8 = 2e-7 above the samples; a
+            // distance has corners.
             assert!(peak <= dense + 1e-3 * scale, "{key:?}: refined {peak}, sampled {dense}");
         }
         for (peak, constraint) in found.iter().zip(set.constraints()) {

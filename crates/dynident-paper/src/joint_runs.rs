@@ -1,4 +1,5 @@
-//! Tables 4, 5 and Figs. 9 to 14: three runs of joint 2 while joint 1 rests, then three of joint 1, by the iteration that serves every robot.
+//! Tables 4, 5 and Figs. 9 to 14: three runs of joint 2 while joint 1 rests, then three of joint 1, by the iteration
+//! that serves every robot.
 
 use crate::arm::{Arm, TRUTH};
 use crate::base_parameters::{COLUMNS, theta};
@@ -45,7 +46,8 @@ struct Runs {
 /// Gains of Eq. 23: `K_p`, `K_d` of joint 1 and 2.
 const GAINS: [[f64; 2]; 2] = [[2.0, 20.0], [4.0, 4.0]];
 
-/// Gains of the first run, of a joint PD: with these the errors of Fig. 12 come about (the paper's own first run gives no torque at all).
+/// Gains of the first run, of a joint PD: with these the errors of Fig. 12 come about (the paper's own first run gives
+/// no torque at all).
 const FIRST: [[f64; 2]; 2] = [[100.0, 60.0], [16.0, 8.0]];
 
 /// The paper's Tables 4 and 5: identified values after each run.
@@ -174,7 +176,8 @@ fn iteration_settings(protocol: &Protocol) -> IterationSettings {
     settings
 }
 
-/// What is believed before the first run. The paper begins with zeros; a possible machine needs a mass: half a kilogram half way along each link.
+/// What is believed before the first run. The paper begins with zeros; a possible machine needs a mass: half a kilogram
+/// half way along each link.
 pub(crate) fn prior(literal: bool) -> Vec<f64> {
     let link = if literal { [0.0; 10] } else { [0.5, 0.25, 0.0, 0.0, 0.02, 0.0, 0.0, 0.2, 0.0, 0.2] };
     [link, link].concat()

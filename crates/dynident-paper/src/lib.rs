@@ -1,6 +1,6 @@
 //! **What does the paper say, and is it so?** Every table and figure of *Iterative Identification of Robot Dynamic
-//! Parameters Based on Logistic Function*, computed through the same crates and studies as a user's own robot, with what
-//! the paper alone needs.
+//! Parameters Based on Logistic Function*, computed through the same crates and studies as a user's own robot, with
+//! what the paper alone needs.
 //!
 //! [`reproduce`] is all of it, as the command `dynident reproduce` calls it.
 

@@ -54,7 +54,8 @@ mod tests {
         assert!((table[0].window_s - 3.67).abs() < 1e-12);
         let limits = table.map(|stroke| constants().limits(&stroke));
         let find = |joint: usize, quantity| limits[joint].iter().find(|l| l.quantity == quantity).unwrap();
-        // Digits of the reading notes: 0.881 against π/6 and 0.516 against π/15; joint 2 keeps both with 0.521 and 0.200.
+        // Digits of the reading notes: 0.881 against π/6 and 0.516 against π/15; joint 2 keeps both with 0.521 and
+        // 0.200.
         let speed = find(0, StrokeQuantity::Speed);
         assert!((speed.value - 0.881).abs() < 5e-4 && (speed.excess() - 0.68).abs() < 5e-3, "{speed:?}");
         let acceleration = find(0, StrokeQuantity::Acceleration);

@@ -25,7 +25,8 @@ pub struct Line {
 
 /// Curves over a common axis: zoomed by dragging, values under the pointer, curves switched in the legend.
 ///
-/// Of more than 4800 samples the page holds the least and the largest of each of 1200 pixel columns ([`kept_samples`](crate::kept_samples)): nothing that shows is lost, but zooming in adds no detail.
+/// Of more than 4800 samples the page holds the least and the largest of each of 1200 pixel columns
+/// ([`kept_samples`](crate::kept_samples)): nothing that shows is lost, but zooming in adds no detail.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinePlot {
     /// Headline.

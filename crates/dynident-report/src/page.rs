@@ -96,7 +96,8 @@ impl Report {
         self
     }
 
-    /// The page: one HTML file with all scripts, styles and data inside. It asks nothing of any network, and its security policy forbids that.
+    /// The page: one HTML file with all scripts, styles and data inside. It asks nothing of any network, and its
+    /// security policy forbids that.
     ///
     /// # Errors
     /// A section whose lists do not belong together, or whose axis runs backwards; the message names it.

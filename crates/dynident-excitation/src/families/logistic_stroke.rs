@@ -6,9 +6,10 @@ use dynident_lanes::Scalar;
 ///
 /// s(t) = 1/(1 + e^-φ), φ = κ u/(1 - u²), u = (t - c)/w,
 ///
-/// times an amplitude, from 0 at t = c - w to 1 at t = c + w. φ runs to ±∞ at the window's ends, so that s reaches 0 and 1 there with **all** derivatives zero: the exact soft start
-/// and stop that Eq. 11 of the paper asks for. Around the middle φ = ω (t - c) with ω = κ/w: the paper's stroke of that steepness (peak speed Aω/4), which it becomes everywhere as
-/// κ grows. κ = 2√3 has the flattest speed at the middle; κ near 4 resembles a minimum-jerk move.
+/// times an amplitude, from 0 at t = c - w to 1 at t = c + w. φ runs to ±∞ at the window's ends, so that s reaches 0
+/// and 1 there with **all** derivatives zero: the exact soft start and stop that Eq. 11 of the paper asks for. Around
+/// the middle φ = ω (t - c) with ω = κ/w: the paper's stroke of that steepness (peak speed Aω/4), which it becomes
+/// everywhere as κ grows. κ = 2√3 has the flattest speed at the middle; κ near 4 resembles a minimum-jerk move.
 ///
 /// φ(u) can be inverted in closed form, so position still tells speed and acceleration: [`LogisticStroke::rates`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,7 +24,8 @@ pub struct LogisticStroke {
     pub sharpness: f64,
 }
 
-/// Beyond this |u| every κ >= 2√3 has φ > 3500, where e^-φ is zero in double precision: s and all its derivatives are exact there.
+/// Beyond this |u| every κ >= 2√3 has φ > 3500, where e^-φ is zero in double precision: s and all its derivatives are
+/// exact there.
 pub(super) const LAST: f64 = 1.0 - 1.0 / 2048.0;
 
 impl LogisticStroke {
@@ -88,7 +90,8 @@ pub(super) fn warp<T: Scalar>(u: T) -> [T; 5] {
     psi
 }
 
-/// The unit stroke by Taylor arithmetic from its [`warp`], given the logistic function's value at κψ and its derivative there.
+/// The unit stroke by Taylor arithmetic from its [`warp`], given the logistic function's value at κψ and its derivative
+/// there.
 #[inline(always)]
 pub(super) fn unit_stroke<T: Scalar>(psi: &[T; 5], sharpness: T, value: T, bell: T) -> StrokeDerivatives<T> {
     let two = T::splat(2.0);
@@ -174,7 +177,8 @@ mod tests {
         }
     }
 
-    /// A sharp stroke is the paper's: around the middle φ = ωt (1 + u² + ..), and ωt = 8 lies at u = 8/κ, so the relative change of φ is (8/κ)².
+    /// A sharp stroke is the paper's: around the middle φ = ωt (1 + u² + ..), and ωt = 8 lies at u = 8/κ, so the
+    /// relative change of φ is (8/κ)².
     #[test]
     fn large_sharpness_is_the_papers_stroke() {
         let stroke = LogisticStroke { amplitude: 2.0, centre_s: 0.0, half_duration_s: 1e5, sharpness: 1e5 };
@@ -189,8 +193,8 @@ mod tests {
     }
 
     proptest! {
-        /// Dual numbers through the same arithmetic: each order's derivative is the next order, and the one by κ is ∂/∂κ. 1e-11 of the sizes that Taylor
-        /// coefficients reach near the window's ends.
+        /// Dual numbers through the same arithmetic: each order's derivative is the next order, and the one by κ is
+        /// ∂/∂κ. 1e-11 of the sizes that Taylor coefficients reach near the window's ends.
         #[test]
         fn orders_derive_each_other(u in -0.97_f64..0.97, sharpness in 3.4642_f64..30.0) {
             let plain = plain_stroke(u, sharpness);

@@ -53,7 +53,8 @@ impl LogisticStrokesSettings {
     /// Checks the settings for a duration.
     ///
     /// # Errors
-    /// Too few strokes (1, or 2 if the motion returns) or more than 1000, κ outside its range, or a largest ω too small for one stroke to fit into the duration.
+    /// Too few strokes (1, or 2 if the motion returns) or more than 1000, κ outside its range, or a largest ω too small
+    /// for one stroke to fit into the duration.
     pub fn validate(&self, duration_s: f64) -> Result<(), FamilyError> {
         let least = if self.returns { 2 } else { 1 };
         require(
@@ -80,14 +81,17 @@ impl LogisticStrokesSettings {
     }
 }
 
-/// q(t) = h + Σ_k A_k s_k(t) with [`LogisticStroke`]s: the generalisation of the paper's Eq. 14 to strokes of unequal amplitude, steepness and time, all joints moving at once.
+/// q(t) = h + Σ_k A_k s_k(t) with [`LogisticStroke`]s: the generalisation of the paper's Eq. 14 to strokes of unequal
+/// amplitude, steepness and time, all joints moving at once.
 ///
 /// Free numbers a joint, in this order:
-/// * overlapping: h, A_1..A_K (without A_K, which closes the sum, if the motion returns), ω_1..ω_K in 1/s, places τ_1..τ_K from 0 (stroke begins with the motion) to 1
-///   (ends with it). 3 K numbers if it returns.
-/// * spliced: h, A_1..A_K (ditto), κ_1..κ_K, logarithms of the lengths of slots 1..K-1 against the last slot's. 3 K - 1 numbers if it returns.
+/// * overlapping: h, A_1..A_K (without A_K, which closes the sum, if the motion returns), ω_1..ω_K in 1/s, places
+///   τ_1..τ_K from 0 (stroke begins with the motion) to 1 (ends with it). 3 K numbers if it returns.
+/// * spliced: h, A_1..A_K (ditto), κ_1..κ_K, logarithms of the lengths of slots 1..K-1 against the last slot's. 3 K - 1
+///   numbers if it returns.
 ///
-/// Every value within [`bounds`](Family::bounds) keeps all strokes within the duration, so both ends are exactly at rest, with all derivatives zero.
+/// Every value within [`bounds`](Family::bounds) keeps all strokes within the duration, so both ends are exactly at
+/// rest, with all derivatives zero.
 #[derive(Clone, Debug)]
 pub struct LogisticStrokes {
     settings: LogisticStrokesSettings,
@@ -301,7 +305,8 @@ impl Kernel for Backward<'_> {
                         let unit = lanes_stroke(u, stroke.sharpness);
                         let inverse = T::splat(1.0 / stroke.half_duration_s);
                         let mut scale = T::ONE;
-                        // Moving the middle by dc is -du·w; stretching by dw scales u: order n gains -(u S_{n+1} + n S_n)/w.
+                        // Moving the middle by dc is -du·w; stretching by dw scales u: order n gains -(u S_{n+1} + n
+                        // S_n)/w.
                         let mut local = [T::ZERO; 4];
                         for order in 0..4 {
                             let pull = pulls[order] * scale;
@@ -343,7 +348,8 @@ impl Family for LogisticStrokes {
         self.joints * self.each()
     }
 
-    /// Overlapping: ω from the one stroke that fills the duration to the largest, places from 0 to 1. Spliced: κ from 2√3 to 40, slots up to e³ times as long as the last or as short.
+    /// Overlapping: ω from the one stroke that fills the duration to the largest, places from 0 to 1. Spliced: κ from
+    /// 2√3 to 40, slots up to e³ times as long as the last or as short.
     fn bounds(&self) -> Vec<[f64; 2]> {
         let count = self.settings.strokes;
         let (third, fourth) = match self.settings.order {

@@ -13,7 +13,8 @@ const NAME: &str = "spliced_logistic";
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SplicedLogisticSettings {
-    /// ω T. Default 40 (the paper gives no T; |q̇(0)| < 1e-4 rad/s asks for about this). Where T is given, its least allowed value.
+    /// ω T. Default 40 (the paper gives no T; |q̇(0)| < 1e-4 rad/s asks for about this). Where T is given, its least
+    /// allowed value.
     pub period_times_omega: f64,
     /// The period T of each joint in seconds. Default none: T = `period_times_omega` / ω, changing with ω.
     pub periods_s: Option<Vec<f64>>,
@@ -33,7 +34,8 @@ impl SplicedLogisticSettings {
     /// Checks the settings for so many joints and seconds.
     ///
     /// # Errors
-    /// ω T not positive or above 1e4, no repetitions, lists that do not name each joint once, numbers that are not finite, or periods that do not fit into the duration.
+    /// ω T not positive or above 1e4, no repetitions, lists that do not name each joint once, numbers that are not
+    /// finite, or periods that do not fit into the duration.
     pub fn validate(&self, joints: usize, duration_s: f64) -> Result<(), FamilyError> {
         let product = self.period_times_omega;
         require(product > 0.0 && product <= 1e4, NAME, "period_times_omega", product, "give more than 0, at most 1e4")?;
@@ -63,12 +65,15 @@ impl SplicedLogisticSettings {
 
 /// The spliced logistic function, Eqs. 12 to 14 of the paper:
 ///
-/// q(t) = h + A/(1 + e^-(ω rem(t, T) - ωT/4)) in the first half of each period, h + A/(1 + e^(ω rem(t, T) - 3ωT/4)) in the second.
+/// q(t) = h + A/(1 + e^-(ω rem(t, T) - ωT/4)) in the first half of each period, h + A/(1 + e^(ω rem(t, T) - 3ωT/4)) in
+/// the second.
 ///
-/// Free numbers a joint: A in rad (m), ω in 1/s, and h in rad (m) unless given. Peak speed Aω/4, peak acceleration Aω²/(6√3).
+/// Free numbers a joint: A in rad (m), ω in 1/s, and h in rad (m) unless given. Peak speed Aω/4, peak acceleration
+/// Aω²/(6√3).
 ///
-/// At the splices the joint is at rest only nearly: it is A/(1 + e^(ωT/4)) away from its asymptote (4.5e-5 A for ωT = 40) with a speed of about that times ω, which changes sign there.
-/// [`LogisticStrokes`](super::LogisticStrokes) are exactly at rest.
+/// At the splices the joint is at rest only nearly: it is A/(1 + e^(ωT/4)) away from its asymptote (4.5e-5 A for
+/// ωT = 40) with a speed of about that times ω, which changes sign there. [`LogisticStrokes`](super::LogisticStrokes)
+/// are exactly at rest.
 ///
 /// Position tells speed and acceleration: [`SplicedLogistic::map`].
 #[derive(Clone, Debug)]
@@ -271,8 +276,8 @@ mod tests {
         SplicedLogistic::new(joints, duration_s, settings).unwrap()
     }
 
-    /// Figs. 4 and 5: for T = 80 all ω pass A/2 at T/4 and 3T/4 with slope ±Aω/4 and reach A at T/2; for ω = 0.6 the same stroke moves with T. Peak acceleration Aω²/(6√3) where
-    /// e^x = 2 + √3. Rounding only.
+    /// Figs. 4 and 5: for T = 80 all ω pass A/2 at T/4 and 3T/4 with slope ±Aω/4 and reach A at T/2; for ω = 0.6 the
+    /// same stroke moves with T. Peak acceleration Aω²/(6√3) where e^x = 2 + √3. Rounding only.
     #[test]
     fn features_of_figures_4_and_5() {
         for (omega, period) in [(0.5, 80.0), (1.0, 80.0), (2.0, 80.0), (0.6, 70.0), (0.6, 80.0), (0.6, 100.0)] {
@@ -328,7 +333,8 @@ mod tests {
             check::derivatives(&family(2, 60.0, &settings), seed);
         }
 
-        /// On the strokes: at a splice, which moves with ω where T does, the speed jumps by e^-10 and has no derivative.
+        /// On the strokes: at a splice, which moves with ω where T does, the speed jumps by e^-10 and has no
+        /// derivative.
         #[test]
         fn gradient_is_exact(seed in any::<u64>(), repetitions in 1_usize..4, fixed in any::<bool>(), given in any::<bool>()) {
             let settings = SplicedLogisticSettings {

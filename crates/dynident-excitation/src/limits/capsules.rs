@@ -63,8 +63,8 @@ pub(crate) struct CapsulePairs {
     pub capsules: Vec<BodyCapsule>,
     /// Pairs that are kept apart, by capsule number.
     pub pairs: Vec<[usize; 2]>,
-    /// Pairs of links whose **fitted** capsules overlap in every posture tried, so that keeping them apart would forbid all motion. They are not checked: give capsules of
-    /// their own to links that can really touch.
+    /// Pairs of links whose **fitted** capsules overlap in every posture tried, so that keeping them apart would forbid
+    /// all motion. They are not checked: give capsules of their own to links that can really touch.
     pub left_out: Vec<[String; 2]>,
 }
 
@@ -75,7 +75,8 @@ impl SelfCollision {
     /// Checks numbers and names.
     ///
     /// # Errors
-    /// If a link is unknown, a number is not finite, a radius or the clearance negative, or a pair has no size at all to keep apart.
+    /// If a link is unknown, a number is not finite, a radius or the clearance negative, or a pair has no size at all
+    /// to keep apart.
     pub fn validate(&self, model: &Model) -> Result<(), LimitError> {
         not_negative("clearance of the self-collision limit", self.clearance_m)?;
         if self.capsules.is_empty() {
@@ -95,8 +96,9 @@ impl SelfCollision {
         Ok(())
     }
 
-    /// The capsules on their bodies and the pairs to keep apart: all but those on one body, on neighbours (parent and child) and those ignored. Of **fitted** capsules also
-    /// those are left out that overlap in each of 256 seeded postures within the position limits of the description.
+    /// The capsules on their bodies and the pairs to keep apart: all but those on one body, on neighbours (parent and
+    /// child) and those ignored. Of **fitted** capsules also those are left out that overlap in each of 256 seeded
+    /// postures within the position limits of the description.
     ///
     /// # Errors
     /// As [`validate`](SelfCollision::validate).

@@ -58,8 +58,8 @@ impl Term for TorqueLimits {
     }
 }
 
-/// Adds to `cotangent` what a cost with derivatives `by_torque` (joint-major) by the rigid-body torques pulls: `(∂τ/∂q)ᵀ w`, `(∂τ/∂q̇)ᵀ w`, `Mᵀ w` at every
-/// sample where a weight is not zero.
+/// Adds to `cotangent` what a cost with derivatives `by_torque` (joint-major) by the rigid-body torques pulls:
+/// `(∂τ/∂q)ᵀ w`, `(∂τ/∂q̇)ᵀ w`, `Mᵀ w` at every sample where a weight is not zero.
 ///
 /// # Panics
 /// If sizes differ.

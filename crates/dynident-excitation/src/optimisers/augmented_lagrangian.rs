@@ -3,11 +3,12 @@
 use super::projected_lbfgs::{Effort, End, Smooth, projected_lbfgs};
 use super::{OptimiserError, Progress, Step, Watch, check_bounds, check_length, setting};
 
-/// minimise f(x) subject to c_i(x) = 0 for the first [`equalities`](ConstrainedProblem::equalities) constraints, c_i(x) <= 0 for the others, and
-/// lower <= x <= upper.
+/// minimise f(x) subject to c_i(x) = 0 for the first [`equalities`](ConstrainedProblem::equalities) constraints,
+/// c_i(x) <= 0 for the others, and lower <= x <= upper.
 ///
-/// Evaluation is split in two so that one adjoint sweep gives the gradient of f and of any number of constraints together, reusing what the values needed.
-/// Constraints work best when scaled to order one (limit reached = 0, limit exceeded by its own size = 1).
+/// Evaluation is split in two so that one adjoint sweep gives the gradient of f and of any number of constraints
+/// together, reusing what the values needed. Constraints work best when scaled to order one (limit reached = 0, limit
+/// exceeded by its own size = 1).
 pub(crate) trait ConstrainedProblem {
     /// Number of variables.
     fn variables(&self) -> usize;
@@ -19,12 +20,15 @@ pub(crate) trait ConstrainedProblem {
     fn equalities(&self) -> usize {
         0
     }
-    /// Writes c(x) and returns f(x), at an `x` inside the bounds. Not finite where they are not defined; the search then takes a shorter step.
+    /// Writes c(x) and returns f(x), at an `x` inside the bounds. Not finite where they are not defined; the search
+    /// then takes a shorter step.
     fn values(&mut self, x: &[f64], constraints: &mut [f64]) -> f64;
-    /// Writes the gradient of `f + Σ weights_i c_i` at the `x` of the last [`values`](ConstrainedProblem::values). Most weights are zero.
+    /// Writes the gradient of `f + Σ weights_i c_i` at the `x` of the last [`values`](ConstrainedProblem::values). Most
+    /// weights are zero.
     fn gradient(&mut self, weights: &[f64], gradient: &mut [f64]);
-    /// Optional: takes up a positive definite model of the augmented Lagrangian's curvature at the `x` of the last [`gradient`](ConstrainedProblem::gradient), from which the quasi-Newton
-    /// matrix starts at every step. Returns whether there is a model.
+    /// Optional: takes up a positive definite model of the augmented Lagrangian's curvature at the `x` of the last
+    /// [`gradient`](ConstrainedProblem::gradient), from which the quasi-Newton matrix starts at every step. Returns
+    /// whether there is a model.
     fn prepare_metric(&mut self, _known: &Known<'_>) -> bool {
         false
     }
@@ -142,7 +146,8 @@ pub(crate) enum AugmentedLagrangianStatus {
 pub(crate) struct AugmentedLagrangianResult {
     /// How it ended.
     pub status: AugmentedLagrangianStatus,
-    /// The feasible point of the lowest objective among all that were evaluated; if none was feasible, the one with the smallest violation.
+    /// The feasible point of the lowest objective among all that were evaluated; if none was feasible, the one with the
+    /// smallest violation.
     pub best: Vec<f64>,
     /// Objective there.
     pub value: f64,
@@ -150,9 +155,11 @@ pub(crate) struct AugmentedLagrangianResult {
     pub violation: f64,
     /// Whether that is within the tolerance.
     pub feasible: bool,
-    /// The last iterate with its multipliers and penalty. While constraints are still violated it tells more than [`best`](Self::best), which may be an early point that kept them by standing still.
+    /// The last iterate with its multipliers and penalty. While constraints are still violated it tells more than
+    /// [`best`](Self::best), which may be an early point that kept them by standing still.
     pub end: AugmentedLagrangianState,
-    /// `f + Σ λ_i c_i` there over the violated constraints: to first order the objective that is left once they are kept.
+    /// `f + Σ λ_i c_i` there over the violated constraints: to first order the objective that is left once they are
+    /// kept.
     pub lagrangian: f64,
     /// Largest violation there.
     pub end_violation: f64,
@@ -162,8 +169,8 @@ pub(crate) struct AugmentedLagrangianResult {
     pub evaluations: usize,
 }
 
-/// Minimises a [`ConstrainedProblem`] from `state`, a point that is first moved into the bounds, or the end of an earlier
-/// search.
+/// Minimises a [`ConstrainedProblem`] from `state`, a point that is first moved into the bounds, or the end of an
+/// earlier search.
 ///
 /// Powell, Hestenes and Rockafellar's function L = f + Σ_eq (λ c + ρ c²/2) + Σ_ineq [max(0, λ + ρ c)² - λ²] / 2ρ is
 /// minimised inside the bounds by L-BFGS with projected steps; then λ ← λ + ρ c (not below 0 for inequalities), and ρ
@@ -219,7 +226,8 @@ pub(crate) fn augmented_lagrangian(
         if search.halted() {
             break;
         }
-        // Values and constraints at the point where the descent ended; the last evaluation may have been a rejected trial.
+        // Values and constraints at the point where the descent ended; the last evaluation may have been a rejected
+        // trial.
         search.value(&x);
         search.outer += 1;
         let measure = search.update_multipliers();

@@ -123,7 +123,8 @@ fn hock_and_schittkowski_43() {
     }
 }
 
-/// As many constraints as a sampled trajectory has: the smallest disc's centre problem, a bowl cut by 7000 half-planes that leave a disc of radius 1.
+/// As many constraints as a sampled trajectory has: the smallest disc's centre problem, a bowl cut by 7000 half-planes
+/// that leave a disc of radius 1.
 struct ManyHalfPlanes(Vec<f64>);
 
 impl ConstrainedProblem for ManyHalfPlanes {
@@ -161,7 +162,8 @@ fn thousands_of_constraints() {
     let settings = AugmentedLagrangianSettings::default();
     let result = augmented_lagrangian(&mut ManyHalfPlanes(Vec::new()), &at(&[0.0; 50]), &settings, &mut never).unwrap();
     assert!(result.feasible, "{:?} {}", result.status, result.violation);
-    // The polygon lies between the discs of radius 1 and 1/cos(π/7000) = 1 + 1e-7: distance from (3, 4) is 4 within that, the value 16 within 1e-6.
+    // The polygon lies between the discs of radius 1 and 1/cos(π/7000) = 1 + 1e-7: distance from (3, 4) is 4 within
+    // that, the value 16 within 1e-6.
     assert!((result.value - 16.0).abs() < 2e-6, "{} {:?}", result.value, result.status);
     assert!((result.best[0] - 0.6).abs() < 1e-3 && (result.best[1] - 0.8).abs() < 1e-3);
 }

@@ -31,9 +31,9 @@ impl MultiStartResult {
 
 /// Runs [`augmented_lagrangian()`] from every start, in parallel, each on its own problem from `problem`.
 ///
-/// `watch` hears the best over all starts whenever it improves, and is asked after every evaluation whether to go on; `iteration` and `evaluations`
-/// are those of the start that speaks.
-/// Unless it stops the search, the result does not depend on the number of threads: among equals the first start is best.
+/// `watch` hears the best over all starts whenever it improves, and is asked after every evaluation whether to go on;
+/// `iteration` and `evaluations` are those of the start that speaks. Unless it stops the search, the result does not
+/// depend on the number of threads: among equals the first start is best.
 ///
 /// # Errors
 /// No start; settings or bounds out of range.
@@ -75,7 +75,8 @@ pub(crate) fn multi_start<P: ConstrainedProblem>(
     Ok(MultiStartResult { best_start, runs })
 }
 
-/// Whether a point of this value and violation is better than another: feasible before infeasible, then by value or violation.
+/// Whether a point of this value and violation is better than another: feasible before infeasible, then by value or
+/// violation.
 fn before(one: (f64, f64), other: (f64, f64), tolerance: f64) -> bool {
     match (one.1 <= tolerance, other.1 <= tolerance) {
         (true, true) => one.0 < other.0,

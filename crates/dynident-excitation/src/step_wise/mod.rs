@@ -1,10 +1,10 @@
 //! **One joint after another**: each makes a logistic stroke while the others rest.
 //!
 //! *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*, equations 9, 10 and 17 to 19, for
-//! any arm. A revolute joint that moves alone excites three parameters of all that it carries: the inertia about its axis
-//! and the two first moments across it, whose row is `[q̈, g cos q, -g sin q]` with the part g of gravity across the axis.
-//! Where gravity leans to zero position only turns the last two columns, which changes no condition number. So
-//! H = Σ cond over the joints, and the search falls apart into joints.
+//! any arm. A revolute joint that moves alone excites three parameters of all that it carries: the inertia about its
+//! axis and the two first moments across it, whose row is `[q̈, g cos q, -g sin q]` with the part g of gravity across
+//! the axis. Where gravity leans to zero position only turns the last two columns, which changes no condition number.
+//! So H = Σ cond over the joints, and the search falls apart into joints.
 
 mod singular_values;
 mod smooth;
@@ -115,7 +115,8 @@ impl StepWiseProblem {
         self.joints[place].constants.limits(stroke)
     }
 
-    /// H of equation 19: the sum of the condition numbers, with the penalty where a limit is broken (once, as in the paper).
+    /// H of equation 19: the sum of the condition numbers, with the penalty where a limit is broken (once, as in the
+    /// paper).
     ///
     /// # Panics
     /// If `x` has fewer than three entries a joint.
@@ -126,10 +127,10 @@ impl StepWiseProblem {
         self.condition_numbers(&strokes).iter().sum::<f64>() + if kept { 0.0 } else { penalty }
     }
 
-    /// H with a penalty that grows with the violation: Σ cond + penalty · Σ max(0, value/limit - 1). Inside the limits it
-    /// is H, and its lowest point is the same, because the penalty outweighs what a violation gains. The step of equation
-    /// 19 hides from a search on which side of a limit to go, and lets evolution strategies die at the wall: their
-    /// covariance collapses before they have slid along it.
+    /// H with a penalty that grows with the violation: Σ cond + penalty · Σ max(0, value/limit - 1). Inside the limits
+    /// it is H, and its lowest point is the same, because the penalty outweighs what a violation gains. The step of
+    /// equation 19 hides from a search on which side of a limit to go, and lets evolution strategies die at the wall:
+    /// their covariance collapses before they have slid along it.
     ///
     /// # Panics
     /// If `x` has fewer than three entries a joint.

@@ -6,19 +6,19 @@ use crate::optimisers::ConstrainedProblem;
 /// Points of a window: the error of the condition number is below 1e-4 of itself.
 const POINTS: usize = 256;
 
-/// Minimise s over A, ω, δ, s, where s bounds the logarithm of the joint's condition number from above, under the limits
-/// of equations 17 and 18 as constraints value/limit - 1 <= 0. Joints that move one after another do not know of each
-/// other, so this is the whole of a joint's constants.
+/// Minimise s over A, ω, δ, s, where s bounds the logarithm of the joint's condition number from above, under the
+/// limits of equations 17 and 18 as constraints value/limit - 1 <= 0. Joints that move one after another do not know of
+/// each other, so this is the whole of a joint's constants.
 ///
-/// [`StrokeConstants::condition_number`] jumps where δ takes in one sample more. Here every window holds the same number
-/// of samples, spread evenly from -δ to δ (the middles of equal parts), which has the same condition number up to the
-/// width of a sample; δ <= T/4 is a constraint. Limits are tightened by one part in a million, so that a solution within
-/// the optimiser's tolerance keeps them strictly.
+/// [`StrokeConstants::condition_number`] jumps where δ takes in one sample more. Here every window holds the same
+/// number of samples, spread evenly from -δ to δ (the middles of equal parts), which has the same condition number up
+/// to the width of a sample; δ <= T/4 is a constraint. Limits are tightened by one part in a million, so that a
+/// solution within the optimiser's tolerance keeps them strictly.
 ///
-/// The condition number itself has a kink, and the optimum lies on it: turned by A/2, the rows are
-/// [q̈, -g sin p | g cos p] with p = q - A/2, odd and even in time from the mid-point, so W splits into two blocks, and at
-/// the optimum the largest singular values of both are equal. Each block's singular values are smooth; so is the problem
-/// with one constraint ln σ_large - ln σ_small - s <= 0 for every pair that may be extreme.
+/// The condition number itself has a kink, and the optimum lies on it: turned by A/2, the rows are [q̈, -g sin p | g
+/// cos p] with p = q - A/2, odd and even in time from the mid-point, so W splits into two blocks, and at the optimum
+/// the largest singular values of both are equal. Each block's singular values are smooth; so is the problem with one
+/// constraint ln σ_large - ln σ_small - s <= 0 for every pair that may be extreme.
 #[derive(Clone, Debug)]
 pub(super) struct SmoothStroke {
     constants: StrokeConstants,

@@ -1,6 +1,8 @@
-//! One joint's logistic stroke: how well the windows about its mid-points excite the joint's parameters, and its limits.
+//! One joint's logistic stroke: how well the windows about its mid-points excite the joint's parameters, and its
+//! limits.
 //!
-//! *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*, equations 7 to 10 and 14 to 19, Fig. 6.
+//! *Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*, equations 7 to 10 and 14 to 19,
+//! Fig. 6.
 
 use super::singular_values::Singular3;
 use crate::optimisers::OptimiserError;

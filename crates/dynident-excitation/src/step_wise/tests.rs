@@ -53,7 +53,8 @@ fn the_known_optimum_is_inside_the_limits_with_the_known_condition_number() {
     assert!((problem.fitness(&broken) - sum - 1000.0).abs() < 1e-9);
 }
 
-/// Condition number through the library's own regressor of the planar arm, its base columns and nalgebra's singular values.
+/// Condition number through the library's own regressor of the planar arm, its base columns and nalgebra's singular
+/// values.
 fn condition_by_the_regressor(constants: &StrokeConstants, stroke: &Stroke, joint: usize) -> f64 {
     let mut random = Random::new(1);
     let model = planar_2r(1.0, random.body(), random.body());
@@ -136,7 +137,8 @@ fn gradients_are_those_of_the_values() {
             value + c.iter().zip(&weights).map(|(c, w)| c * w).sum::<f64>()
         };
         for i in 0..x.len() {
-            // Five-point difference: truncation h⁴ and rounding cond·1e-16/h both below 1e-7 of the largest slopes here.
+            // Five-point difference: truncation h⁴ and rounding cond·1e-16/h both below 1e-7 of the largest slopes
+            // here.
             let h = 1e-3 * x[i];
             let mut at = |steps: f64| {
                 let mut moved = x.clone();

@@ -1,4 +1,5 @@
-//! The look at a motion that is there already: a trajectory that the user brings, or a log after the run. Nothing is searched.
+//! The look at a motion that is there already: a trajectory that the user brings, or a log after the run. Nothing is
+//! searched.
 
 use super::limit_check::LimitCheck;
 use super::outcome::{MotionOrigin, MotionReview};
@@ -30,9 +31,9 @@ const MAX_SAMPLES: usize = 2_000_000;
 /// A speed at an end below this share of its peak is rest.
 const REST: f64 = 1e-3;
 
-/// Judges the trajectory in the table `trajectory` (`t_s`, `q1..` or the joints' names, and `dq1..`, `ddq1..` or neither)
-/// as a design would be: every limit at 10 kHz on the quintic spline through the table's samples, the criteria's figures
-/// and the forecast at `search.rate_hz`.
+/// Judges the trajectory in the table `trajectory` (`t_s`, `q1..` or the joints' names, and `dq1..`, `ddq1..` or
+/// neither) as a design would be: every limit at 10 kHz on the quintic spline through the table's samples, the
+/// criteria's figures and the forecast at `search.rate_hz`.
 ///
 /// # Errors
 /// If the study makes no sense, or the table is missing, holds other joints or something that is no motion.
@@ -62,9 +63,9 @@ pub fn check_trajectory(
     Ok(DesignOutcome::new(setup, origin, MotionReview { duration_s, rate_hz, information, check }))
 }
 
-/// Judges a log of the study, by its name or its file: what the run that is over tells about each parameter. Positions go
-/// the same way to speeds and accelerations as they would to a fit; limits are looked at on the log's own samples, every
-/// one of which counts for the forecast.
+/// Judges a log of the study, by its name or its file: what the run that is over tells about each parameter. Positions
+/// go the same way to speeds and accelerations as they would to a fit; limits are looked at on the log's own samples,
+/// every one of which counts for the forecast.
 ///
 /// # Errors
 /// If the study makes no sense, no log or more than one is called `name`, or the log cannot be read.

@@ -12,8 +12,9 @@ const TERMS: usize = 6;
 /// A prior value below this share of the largest is zero.
 const NEGLIGIBLE: f64 = 1e-9;
 
-/// The forecast from the motion's information, with the parameters' names and with their sizes by the description; `with_prior` is the information that includes what was known before. Worst
-/// directions are those of all that is known.
+/// The forecast from the motion's information, with the parameters' names and with their sizes by the description;
+/// `with_prior` is the information that includes what was known before. Worst directions are those of all that is
+/// known.
 pub(super) fn named_forecast(
     machine: &Machine,
     information: &DMatrix<f64>,

@@ -47,7 +47,8 @@ impl LimitCheck {
         self.diagnosis.is_empty() && self.reports.iter().all(|report| !report.violated)
     }
 
-    /// Takes in the check of a later piece, which begins `after_s` into the whole: of each limit the worse report stays.
+    /// Takes in the check of a later piece, which begins `after_s` into the whole: of each limit the worse report
+    /// stays.
     pub(super) fn append(&mut self, later: Self, after_s: f64) {
         let first = self.reports.is_empty();
         for (place, mut report) in later.reports.into_iter().enumerate() {

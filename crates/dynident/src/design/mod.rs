@@ -1,4 +1,5 @@
-//! A study to the motion that should be recorded: the best of a family inside every limit, checked again, with a forecast.
+//! A study to the motion that should be recorded: the best of a family inside every limit, checked again, with a
+//! forecast.
 
 mod check;
 mod file;
@@ -41,11 +42,11 @@ use setup::DesignSetup;
 use std::path::Path;
 use windows::step_wise;
 
-/// Designs the motion that a study's `[design]` asks for (its defaults where the section is absent). `watch` hears how far
-/// the search is and may end it: the best so far is the result.
+/// Designs the motion that a study's `[design]` asks for (its defaults where the section is absent). `watch` hears how
+/// far the search is and may end it: the best so far is the result.
 ///
-/// The laws are those of `[drive]`, with a smooth step for Coulomb friction. Limits are checked again at 10 kHz; a motion
-/// that breaks one is a result, with `feasible` false and a diagnosis.
+/// The laws are those of `[drive]`, with a smooth step for Coulomb friction. Limits are checked again at 10 kHz; a
+/// motion that breaks one is a result, with `feasible` false and a diagnosis.
 ///
 /// # Errors
 /// If the study, the description, the family's settings, the start, the prior, the task or the limits make no sense, or

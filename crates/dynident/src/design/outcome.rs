@@ -171,8 +171,8 @@ impl DesignOutcome {
         &*self.family
     }
 
-    /// The times `0, 1/rate, ..` up to the end, which stands last even if the rate does not divide the duration, and the
-    /// motion there; of a log with gaps that of its longest piece.
+    /// The times `0, 1/rate, ..` up to the end, which stands last even if the rate does not divide the duration, and
+    /// the motion there; of a log with gaps that of its longest piece.
     pub fn sampled(&self, rate_hz: f64) -> (Vec<f64>, Motion) {
         let duration_s = self.family.duration_s();
         let steps = (duration_s * rate_hz - 1e-9).ceil().max(1.0) as usize;

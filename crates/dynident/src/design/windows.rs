@@ -27,7 +27,8 @@ const FREE_RAD: f64 = 1e6;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum WindowedProblem {
-    /// One joint after another makes its stroke, from the tip to the base, while all others rest at their offsets: the paper's Q for the tip joint, then M for the base joint.
+    /// One joint after another makes its stroke, from the tip to the base, while all others rest at their offsets: the
+    /// paper's Q for the tip joint, then M for the base joint.
     #[default]
     StepWise,
 }
