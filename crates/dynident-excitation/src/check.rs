@@ -3,7 +3,7 @@
 //!
 //! Plain loops over the description: names are looked up here, torques come from single-sample inverse dynamics,
 //! distances of capsules from a search that knows no closed form. Only the choice of fitted capsules and their pairs,
-//! which is part of what the limit *is*, comes from [`SelfCollision::resolve`](crate::limits::SelfCollision::resolve).
+//! which is part of what the limit *is*, comes from [`SelfCollision`](crate::limits::SelfCollision).
 
 use crate::limits::{JointLimit, LimitError, LimitKind, Limits, LinkPoint};
 use crate::motion::Motion;
