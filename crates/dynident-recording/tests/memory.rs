@@ -101,7 +101,7 @@ fn errors_name_the_label_and_the_place() {
     let mut holed = log(vec![ramp(), holed], vec![ramp(); 2]).unwrap();
     let message = motion(&holed, &settings).unwrap_err().to_string();
     assert!(message.starts_with("bench run, row 17, column 1: `NaN`"), "{message}");
-    holed.format.missing = dynident_recording::Missing::Drop;
+    holed.format.missing = dynident_recording::log::Missing::Drop;
     assert_eq!(motion(&holed, &settings).unwrap().1.dropped.missing, 1);
     let message = motion(&log(vec![vec![]; 2], vec![vec![]; 2]).unwrap(), &settings).unwrap_err().to_string();
     assert!(message.starts_with("bench run: no data rows; "), "{message}");

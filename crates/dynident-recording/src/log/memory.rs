@@ -2,8 +2,9 @@
 
 use super::Log;
 use super::format::{ChannelGroup, ColumnRef, Columns, LogFormat, TimeColumn};
-use super::source::{LogPlace, LogSource, LogTable};
+use super::source::{LogSource, LogTable};
 use crate::error::RecordingError;
+use crate::place::LogPlace;
 use std::sync::Arc;
 
 /// Samples of all joints in SI and in joint order; `q[j]` holds joint j.

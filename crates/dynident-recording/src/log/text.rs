@@ -3,8 +3,9 @@
 use super::columns::column_label;
 use super::format::{Header, LogFormat};
 use super::lines::Lines;
-use super::source::{LogPlace, LogSource, LogTable};
+use super::source::{LogSource, LogTable};
 use crate::error::RecordingError;
+use crate::place::LogPlace;
 use std::path::{Path, PathBuf};
 
 /// A text file with one row of numbers a line.
