@@ -3,6 +3,7 @@
 
 use crate::arm::{Arm, TRUTH};
 use crate::base_parameters::{COLUMNS, theta};
+use crate::literal_map::LiteralMap;
 use crate::piece::{PaperCell, PaperFigure, PaperTable};
 use crate::problem::table_3;
 use dynident::Error;
@@ -11,11 +12,12 @@ use dynident_excitation::families::{SplicedLogistic, SplicedLogisticSettings};
 use dynident_excitation::step_wise::Stroke;
 use dynident_iteration::{Iteration, IterationError, IterationSettings, IterationTask, Leg, Scheme, iterate};
 use dynident_iteration::{Robot, SimulatedRobot};
-use dynident_recording::{DifferentiatorSettings, LogisticPath, ReferenceSettings};
+use dynident_recording::LogisticPath;
 use dynident_report::LinePlot;
 use dynident_simulation::controllers::{FiniteTimeSettings, JointPdSettings};
 use dynident_simulation::{ControllerSettings, Integrator, LoopSettings, Plant, Reference, Run};
 use std::path::Path;
+use std::sync::Arc;
 
 /// What the runs told.
 pub(crate) struct JointRuns {
@@ -121,7 +123,10 @@ fn one_joint(arm: &Arm, protocol: &Protocol, joint: usize, known: &[(usize, f64)
     };
     let mut paths = [LogisticPath { amplitude: 0.0, ..path }; 2];
     paths[joint] = path;
-    let leg = Leg::windowed(reference, windows)?.with_commanded(dynident_recording::Reference::logistic(&paths)?);
+    let mut leg = Leg::windowed(reference, windows)?.with_commanded(dynident_recording::Reference::logistic(&paths)?);
+    if protocol.literal {
+        leg = leg.with_differentiator(Arc::new(LiteralMap { paths: paths.to_vec() }));
+    }
     let machine = ParametricModel::new(arm.model.clone(), Vec::new())?.with_nominal(prior(protocol.literal))?;
     let task = IterationTask { machine, legs: vec![leg], known: known.to_vec(), torque_limits: None };
     let iteration = Iteration::new(task, iteration_settings(protocol))?;
@@ -161,8 +166,6 @@ fn iteration_settings(protocol: &Protocol) -> IterationSettings {
     let mut settings = IterationSettings::default();
     if protocol.literal {
         settings = IterationSettings::literal(0.5);
-        settings.identification.differentiator =
-            DifferentiatorSettings::LiteralMap { reference: ReferenceSettings::default() };
     }
     // Only one joint's rows count.
     settings.identification.scheme = Scheme::StepByStep;

@@ -11,6 +11,7 @@ mod base_parameters;
 mod deviations;
 mod fourier;
 mod joint_runs;
+mod literal_map;
 mod optimisation;
 mod page;
 mod piece;
