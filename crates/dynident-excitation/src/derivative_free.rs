@@ -73,13 +73,13 @@ pub fn design_without_gradients(
         let mut curve = Vec::new();
         let mut hear = |progress: &Progress<'_>| {
             curve.push(Generation { best: progress.value, best_so_far: progress.value, mean: progress.value });
-            let told = DesignProgress {
+            let so_far = DesignProgress {
                 round: "generations",
                 value: progress.value,
                 violation: 0.0,
                 evaluations: (evaluations + progress.evaluations) as u64,
             };
-            stopped = watch(&told).is_break() || late();
+            stopped = watch(&so_far).is_break() || late();
             if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let seed = settings.seed.wrapping_add(search as u64);

@@ -19,7 +19,7 @@ use dynident_simulation::{ControllerSettings, Integrator, LoopSettings, Plant, R
 use std::path::Path;
 use std::sync::Arc;
 
-/// What the runs told.
+/// What the runs give.
 pub(crate) struct JointRuns {
     pub(crate) tables: Vec<PaperTable>,
     pub(crate) figures: Vec<PaperFigure>,

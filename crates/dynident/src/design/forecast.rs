@@ -5,7 +5,7 @@ use crate::machine::Machine;
 use dynident_excitation::forecast;
 use nalgebra::DMatrix;
 
-/// Worst directions that are told, and the terms of each.
+/// Worst directions shown, and the terms of each.
 const DIRECTIONS: usize = 3;
 const TERMS: usize = 6;
 

@@ -183,14 +183,14 @@ fn of_result(path: &Path, machine: &Machine) -> Result<DMatrix<f64>, Error> {
     Ok(information)
 }
 
-/// Names that are told of a list at most.
+/// Names shown of a list at most.
 const TOLD: usize = 6;
 
 /// For every stored parameter its column in the machine.
 fn places(stored: &[BaseParameterResult], machine: &Machine) -> Result<Vec<usize>, String> {
     let symbols: Vec<String> = machine.layout().columns().iter().map(Column::symbol).collect();
     let expressions = machine.base().expressions();
-    let told = |names: &[&str]| {
+    let listed = |names: &[&str]| {
         let more = if names.len() > TOLD { format!(" and {} more", names.len() - TOLD) } else { String::new() };
         format!("{}{more}", names[..names.len().min(TOLD)].join(", "))
     };
@@ -203,10 +203,10 @@ fn places(stored: &[BaseParameterResult], machine: &Machine) -> Result<Vec<usize
         .collect();
     let mend = "use a result of the same robot with the same [drive] and [robot]";
     if !strange.is_empty() {
-        return Err(format!("its base parameters {} are none of the study's machine: {mend}", told(&strange)));
+        return Err(format!("its base parameters {} are none of the study's machine: {mend}", listed(&strange)));
     }
     if !absent.is_empty() {
-        return Err(format!("it does not hold the machine's base parameters {} once each: {mend}", told(&absent)));
+        return Err(format!("it does not hold the machine's base parameters {} once each: {mend}", listed(&absent)));
     }
     stored
         .iter()

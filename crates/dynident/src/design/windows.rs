@@ -208,13 +208,13 @@ pub(crate) fn step_wise(
     let seed = section.search.seed;
     let late = || section.search.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > limit);
     let stop = |round: &'static str, progress: &Progress<'_>| {
-        let told = DesignProgress {
+        let progress = DesignProgress {
             round,
             value: progress.value,
             violation: progress.violation,
             evaluations: progress.evaluations as u64,
         };
-        if watch(&told).is_break() || late() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if watch(&progress).is_break() || late() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     // The optimum stands beside every design: it takes a tenth of a second.
     let optimum = problem.gradient_solution(seed, STARTS, |_| ControlFlow::Continue(()));
@@ -251,9 +251,9 @@ pub(crate) fn step_wise(
     };
 
     let strokes = problem.strokes(&x);
-    let told = |x: &[f64]| told(&problem, &problem.strokes(x), settings, &offsets, machine);
+    let files_of = |x: &[f64]| stroke_files(&problem, &problem.strokes(x), settings, &offsets, machine);
     let condition_sum = problem.condition_numbers(&strokes).iter().sum();
-    let optimum_strokes = told(&optimum);
+    let optimum_strokes = files_of(&optimum);
     let inside = optimum_strokes.iter().flat_map(|stroke| &stroke.limits).all(|limit| limit.kept);
     let best = inside.then(|| problem.fitness(&optimum));
     let steps: Vec<Step> = problem
@@ -274,7 +274,7 @@ pub(crate) fn step_wise(
         condition_sum,
         optimum: best,
         above_optimum_percent: best.map(|best| 100.0 * (condition_sum / best - 1.0)),
-        strokes: told(&x),
+        strokes: files_of(&x),
         optimum_strokes: if inside { optimum_strokes } else { Vec::new() },
     };
     debug_assert_eq!(family.joints(), dof);
@@ -369,7 +369,7 @@ fn given(strokes: &[GivenStroke], names: &[String]) -> Result<Vec<f64>, String> 
 }
 
 /// Strokes as the file tells them.
-fn told(
+fn stroke_files(
     problem: &StepWiseProblem,
     strokes: &[Stroke],
     settings: &SplicedLogisticSettings,
