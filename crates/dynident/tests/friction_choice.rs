@@ -6,7 +6,7 @@ mod common;
 use common::{Job, Random};
 use dynident::dynamics::{Workspace, inverse_dynamics};
 use dynident::model::load_robot;
-use dynident::{FrictionLaw, Identification, validate};
+use dynident::{FrictionLaw, IdentificationOutcome, validate};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -60,7 +60,7 @@ fn arm(folder: &Path) -> std::path::PathBuf {
     path
 }
 
-fn all_finite(found: &Identification) -> bool {
+fn all_finite(found: &IdentificationOutcome) -> bool {
     found.result.base_parameters.iter().all(|p| p.value.is_finite() && p.std.is_finite())
         && found.result.validation.iter().all(|log| log.model.rmse_nm.is_finite())
 }

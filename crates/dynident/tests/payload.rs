@@ -4,8 +4,9 @@
 mod common;
 
 use common::{Job, Motion, Random, Truth, assert_recovered, format, header, plain, repository, write_log};
+use dynident::identification::payload::Measured;
 use dynident::model::{InertialParameters, Mat3, Vec3};
-use dynident::{Measured, validate};
+use dynident::validate;
 use std::fmt::Write;
 use std::path::Path;
 

@@ -18,7 +18,7 @@ pub(crate) const NEGLIGIBLE_JITTER: f64 = 1e-3;
 pub(crate) const SHORTEST_STEP: f64 = 0.1;
 
 /// What the first rows tell about the clock.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Clock {
     /// Samples per second on the uniform grid.
     pub rate_hz: f64,

@@ -17,7 +17,7 @@ const ABOVE_NOISE: f64 = 10.0;
 const HIGHEST: f64 = 0.4;
 
 /// A cut-off and why.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct CutoffChoice {
     /// The cut-off for all joints.
     pub cutoff_hz: f64,

@@ -66,7 +66,7 @@ pub struct Steps {
 }
 
 /// Everything the importer found in a log.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ImportReport {
     /// The main file.
     pub file: String,

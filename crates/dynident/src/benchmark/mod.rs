@@ -25,9 +25,8 @@ use bound_with_motion::BoundWithMotion;
 use shared::Shared;
 
 use crate::cpu_time::thread_seconds;
-use crate::error::Error;
-use crate::progress::Progress;
 use dynident_estimation::EstimationError;
+use dynident_identification::{IdentificationError, Progress};
 use dynident_model::UrdfError;
 use dynident_model::sample::Random;
 use dynident_recording::FilterError;
@@ -101,7 +100,7 @@ pub enum BenchmarkError {
     },
     /// An error of the pipeline.
     #[error(transparent)]
-    Pipeline(Box<Error>),
+    Pipeline(Box<IdentificationError>),
 }
 
 /// What is compared.

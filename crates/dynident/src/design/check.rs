@@ -6,17 +6,16 @@ use super::outcome::{MotionOrigin, MotionReview};
 use super::setup::{DesignSetup, MotionInformation};
 use super::{DesignOutcome, table};
 use crate::error::Error;
-use crate::job::{RunOptions, joint_names};
-use crate::machine::Machine;
-use crate::measured::motion_log::motion_stream;
-use crate::measured::rows::motion_in_force;
+use crate::jobs::options::RunOptions;
+use crate::study::StudyRobot;
 use crate::study::{Folders, Study};
 use dynident_excitation::check::CHECK_RATE_HZ;
 use dynident_excitation::families::Given;
 use dynident_excitation::{Family, Motion, grid};
+use dynident_identification::{Execution, IdentificationSettings, Logs};
 use dynident_recording::MotionBlock;
 use nalgebra::DMatrix;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// What is checked of a table, and of a log.
 const SPLINE: &str = "the quintic spline through the samples of the table";
@@ -44,7 +43,7 @@ pub fn check_trajectory(
     options: &RunOptions<'_>,
 ) -> Result<DesignOutcome, Error> {
     let mut setup = DesignSetup::for_check(study, study_path, options)?;
-    let joints = joint_names(&setup.machine);
+    let joints = setup.machine.parametric.joint_names();
     let table = table::trajectory(trajectory, &joints, &study.motion)?;
     let given = table.given;
     let duration_s = given.duration_s();
@@ -80,7 +79,7 @@ pub fn check_log(
     let mut setup = DesignSetup::for_check(study, study_path, options)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let file = folders.find(&study.log[index].file, study.source.as_deref())?;
-    let (mut pieces, rate_hz) = pieces(study, &setup.machine, index, &file)?;
+    let (mut pieces, rate_hz) = pieces(study, study_path, (&setup.machine, &folders), index, &file)?;
     let gaps = pieces.len().saturating_sub(1);
     if gaps > 0 {
         setup.notes.push(format!(
@@ -124,13 +123,26 @@ fn log_called(study: &Study, name: &str) -> Result<usize, String> {
 }
 
 /// The uninterrupted pieces of a log as motions in the model's order of joints, and the log's rate.
-fn pieces(study: &Study, machine: &Machine, index: usize, file: &Path) -> Result<(Vec<Given>, f64), Error> {
+fn pieces(
+    study: &Study,
+    study_path: &Path,
+    (machine, folders): (&StudyRobot, &Folders),
+    index: usize,
+    file: &Path,
+) -> Result<(Vec<Given>, f64), Error> {
     let log = study.log_name(index);
     let failed = |source| Error::recording(&log, source);
-    let mut files = vec![PathBuf::new(); study.log.len()];
-    file.clone_into(&mut files[index]);
-    let motion = motion_in_force(study, machine, &files, &[index], None)?;
-    let mut stream = motion_stream(study, machine, &motion, index, file)?;
+    let in_study = |error| Error::identification(study_path, error);
+    let recording = study.recording(machine, folders, index, file)?;
+    let mut settings = IdentificationSettings::default();
+    settings.motion = study.motion.clone();
+    let execution = Execution::default();
+    let (model, alone) = (machine.model(), core::slice::from_ref(&recording));
+    let motion = Logs::new(model, alone, &settings, &[0], None, execution).map_err(in_study)?.motion;
+    let places = recording.places(model).map_err(in_study)?;
+    let Some(mut stream) = recording.open(model, &motion).map_err(in_study)? else {
+        return Err(Error::study(study_path, format!("log `{log}` has no samples")));
+    };
     let rate_hz = stream.rate_hz();
     // By piece: for q, dq, ddq and each joint of the model its samples.
     let mut found: Vec<Vec<Vec<f64>>> = Vec::new();
@@ -148,7 +160,7 @@ fn pieces(study: &Study, machine: &Machine, index: usize, file: &Path) -> Result
         }
         if let Some(piece) = found.last_mut() {
             for (order, source) in [&block.q, &block.dq, &block.ddq].into_iter().enumerate() {
-                for (joint, &place) in machine.log_place.iter().enumerate() {
+                for (joint, &place) in places.iter().enumerate() {
                     piece[order * dof + joint].extend_from_slice(block.joint(source, place));
                 }
             }

@@ -1,7 +1,7 @@
 //! The forecast under the parameters' names.
 
 use super::file::{DirectionForecast, ParameterForecast};
-use crate::machine::Machine;
+use crate::study::StudyRobot;
 use dynident_excitation::forecast;
 use nalgebra::DMatrix;
 
@@ -16,7 +16,7 @@ const NEGLIGIBLE: f64 = 1e-9;
 /// `with_prior` is the information that includes what was known before. Worst directions are those of all that is
 /// known.
 pub(super) fn named_forecast(
-    machine: &Machine,
+    machine: &StudyRobot,
     information: &DMatrix<f64>,
     with_prior: Option<&DMatrix<f64>>,
 ) -> (Vec<ParameterForecast>, Vec<DirectionForecast>) {

@@ -30,7 +30,7 @@ pub(crate) use table::trajectory as trajectory_table;
 pub use windows::{GivenStroke, StrokeFile, StrokeLimitFile, WindowedCondition, WindowedFile, WindowedProblem};
 
 use crate::error::Error;
-use crate::job::RunOptions;
+use crate::jobs::options::RunOptions;
 use crate::study::Study;
 use core::ops::ControlFlow;
 use dynident_excitation::check::CHECK_RATE_HZ;

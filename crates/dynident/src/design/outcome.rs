@@ -8,8 +8,7 @@ use super::section::FamilyChoice;
 use super::setup::{DesignSetup, MotionInformation};
 use super::windows::WindowedFile;
 use crate::cpu_time::cpu_seconds;
-use crate::job::joint_names;
-use crate::machine::Machine;
+use crate::study::StudyRobot;
 use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_excitation::criteria::{ConditionNumber, Criterion, DOptimal};
 use dynident_excitation::families::Given;
@@ -112,7 +111,7 @@ pub struct DesignOutcome {
     /// What `design.json` holds.
     pub file: DesignFile,
     /// The machine.
-    pub machine: Machine,
+    pub machine: StudyRobot,
     /// The limits in force: the description's with the study's laid over them.
     pub limits: Limits,
     /// The search by generations, for optimisers that have them; empty for gradients.
@@ -131,7 +130,7 @@ impl DesignOutcome {
         let file = DesignFile {
             schema: DESIGN_SCHEMA,
             name: setup.name,
-            joints: joint_names(&setup.machine),
+            joints: setup.machine.parametric.joint_names(),
             family: origin.family,
             family_settings: origin.family_settings,
             given: origin.given,

@@ -1,9 +1,9 @@
 //! `[design.prior]`: what is known before the motion, so that the next one looks for what is not.
 
 use crate::error::Error;
-use crate::identify::result::{BaseParameterResult, RESULT_SCHEMA};
-use crate::machine::Machine;
+use crate::result::identification::{BaseParameterResult, RESULT_SCHEMA};
 use crate::study::Folders;
+use crate::study::StudyRobot;
 use dynident_dynamics::Column;
 use dynident_model::laws::Law;
 use nalgebra::DMatrix;
@@ -50,7 +50,7 @@ impl PriorSection {
     /// nothing is said.
     pub(crate) fn information(
         &self,
-        machine: &Machine,
+        machine: &StudyRobot,
         study_path: &Path,
         folders: &Folders,
         notes: &mut Vec<String>,
@@ -84,7 +84,7 @@ impl PriorSection {
 
 /// `K diag(σ²) Kᵀ` of the base parameters: the independent ones with their own variance, and what is regrouped into
 /// them.
-fn cad_covariance(machine: &Machine, share: f64) -> DMatrix<f64> {
+fn cad_covariance(machine: &StudyRobot, share: f64) -> DMatrix<f64> {
     let std = standard_deviations(machine, share);
     let base = machine.base();
     let mut spread = base.regrouping().clone();
@@ -99,7 +99,7 @@ fn cad_covariance(machine: &Machine, share: f64) -> DMatrix<f64> {
 }
 
 /// Standard deviation of every standard parameter: bodies, then laws.
-fn standard_deviations(machine: &Machine, share: f64) -> Vec<f64> {
+fn standard_deviations(machine: &StudyRobot, share: f64) -> Vec<f64> {
     const KINDS: [core::ops::Range<usize>; 3] = [0..1, 1..4, 4..10];
     let values = machine.nominal().to_vec();
     let largest = |values: &[f64]| values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
@@ -143,7 +143,7 @@ struct StoredUncertainty {
 }
 
 /// Inverse covariance of an earlier result in the machine's columns; zero for those that it did not excite.
-fn of_result(path: &Path, machine: &Machine) -> Result<DMatrix<f64>, Error> {
+fn of_result(path: &Path, machine: &StudyRobot) -> Result<DMatrix<f64>, Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
     let stored: StoredUncertainty = serde_json::from_slice(&bytes).map_err(|error| {
@@ -187,7 +187,7 @@ fn of_result(path: &Path, machine: &Machine) -> Result<DMatrix<f64>, Error> {
 const TOLD: usize = 6;
 
 /// For every stored parameter its column in the machine.
-fn places(stored: &[BaseParameterResult], machine: &Machine) -> Result<Vec<usize>, String> {
+fn places(stored: &[BaseParameterResult], machine: &StudyRobot) -> Result<Vec<usize>, String> {
     let symbols: Vec<String> = machine.layout().columns().iter().map(Column::symbol).collect();
     let expressions = machine.base().expressions();
     let listed = |names: &[&str]| {

@@ -4,8 +4,8 @@ use super::outcome::Stopwatch;
 use super::section::{CriterionChoice, DesignSection, TorqueNoise};
 use super::table;
 use crate::error::Error;
-use crate::job::{RunOptions, joint_names, study_name};
-use crate::machine::Machine;
+use crate::jobs::options::{RunOptions, study_name};
+use crate::study::StudyRobot;
 use crate::study::{CoulombChoice, Folders, Study};
 use dynident_excitation::criteria::{Criterion, DOptimal, Prediction};
 use dynident_excitation::limits::{LimitSet, Limits};
@@ -28,7 +28,7 @@ pub(super) struct MotionInformation {
 pub(super) struct DesignSetup {
     pub(super) name: String,
     pub(super) section: DesignSection,
-    pub(super) machine: Machine,
+    pub(super) machine: StudyRobot,
     pub(super) limits: Limits,
     pub(super) set: LimitSet,
     pub(super) criteria: Vec<Box<dyn Criterion>>,
@@ -60,7 +60,7 @@ impl DesignSetup {
         let wrong = |part: &str, why: &dyn core::fmt::Display| Error::study(study_path, format!("[{part}]: {why}"));
         section.validate().map_err(|why| wrong("design", &why))?;
         let folders = Folders::new(study, study_path, options.data.as_deref());
-        let machine = Machine::new(study, study_path, &folders)?;
+        let machine = StudyRobot::new(study, study_path, &folders)?;
         let limits = Limits::from_model(machine.model()).overlaid(&section.limits);
         let set = LimitSet::new(&limits, machine.model()).map_err(|why| wrong("design.limits", &why))?;
         let torque_std_nm = torque_std(&section, &machine, &mut notes).map_err(|why| wrong("design", &why))?;
@@ -68,7 +68,7 @@ impl DesignSetup {
         let criteria = match &section.criterion {
             CriterionChoice::Prediction { trajectory } => {
                 let path = folders.find(trajectory, None)?;
-                let task = table::trajectory(&path, &joint_names(&machine), &study.motion)?;
+                let task = table::trajectory(&path, &machine.parametric.joint_names(), &study.motion)?;
                 notes.extend(task.note.map(|note| format!("task: {note}")));
                 let samples = task.given.samples();
                 let motion_at = |times: &[f64], out: &mut Motion| task.given.motion(&[], times, out);
@@ -125,7 +125,7 @@ impl DesignSetup {
 
 /// Information of a motion at `times`, a block at a time.
 fn information(
-    machine: &Machine,
+    machine: &StudyRobot,
     torque_std_nm: &[f64],
     times: &[f64],
     motion_at: &dyn Fn(&[f64], &mut Motion),
@@ -160,7 +160,7 @@ fn smooth(study: &Study, notes: &mut Vec<String>) -> Study {
 }
 
 /// That something bounds how fast each joint moves: without it the best motion is infinitely fast.
-fn bounded(machine: &Machine, limits: &Limits) -> Result<(), String> {
+fn bounded(machine: &StudyRobot, limits: &Limits) -> Result<(), String> {
     for joint in machine.model().joints() {
         let free = limits.of(&joint.name).is_none_or(|limit| {
             let rates = [limit.speed, limit.acceleration, limit.jerk, limit.torque, limit.power_w];
@@ -178,7 +178,7 @@ fn bounded(machine: &Machine, limits: &Limits) -> Result<(), String> {
 }
 
 /// Torque noise of every joint.
-fn torque_std(section: &DesignSection, machine: &Machine, notes: &mut Vec<String>) -> Result<Vec<f64>, String> {
+fn torque_std(section: &DesignSection, machine: &StudyRobot, notes: &mut Vec<String>) -> Result<Vec<f64>, String> {
     let joints = machine.model().joints();
     match &section.torque_std_nm {
         Some(TorqueNoise::Same(std)) => Ok(vec![*std; joints.len()]),

@@ -3,7 +3,7 @@
 use super::optimiser::OptimiserChoice;
 use super::search::SearchResult;
 use super::section::{DesignSection, FamilyChoice};
-use crate::machine::Machine;
+use crate::study::StudyRobot;
 use core::ops::ControlFlow;
 use dynident_excitation::families::{SplicedLogisticSettings, Step, StepWiseLogistic};
 use dynident_excitation::limits::Limits;
@@ -178,7 +178,7 @@ fn digits(value: f64) -> String {
 pub(crate) fn step_wise(
     section: &DesignSection,
     windowed: &WindowedCondition,
-    machine: &Machine,
+    machine: &StudyRobot,
     limits: &Limits,
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
 ) -> Result<SearchResult, String> {
@@ -294,7 +294,7 @@ pub(crate) fn step_wise(
 fn problem(
     section: &DesignSection,
     windowed: &WindowedCondition,
-    machine: &Machine,
+    machine: &StudyRobot,
     limits: &Limits,
     settings: &SplicedLogisticSettings,
     offsets: &[f64],
@@ -374,7 +374,7 @@ fn stroke_files(
     strokes: &[Stroke],
     settings: &SplicedLogisticSettings,
     offsets: &[f64],
-    machine: &Machine,
+    machine: &StudyRobot,
 ) -> Vec<StrokeFile> {
     let conditions = problem.condition_numbers(strokes);
     let one = |place: usize| {
