@@ -7,8 +7,8 @@ use common::{Job, Motion, Random, Truth, format, header, repository, write_log};
 use dynident::estimation::HausmanVerdict;
 use dynident::identification::IdentificationError;
 use dynident::identification::estimators::InstrumentSource;
-use dynident::recording::MotionBlock;
 use dynident::identify_with_instruments;
+use dynident::recording::MotionBlock;
 
 /// The motion that the log was made from, as a perfect simulation would give it.
 struct TrueMotion {

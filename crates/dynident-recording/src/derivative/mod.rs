@@ -6,7 +6,7 @@
 //! * filters and local fits, which work through a long log in pieces: [`ButterworthZeroPhase`] (the default),
 //!   [`LowPass`], [`CentralDifferences`], [`SmoothedDifferences`], [`SavitzkyGolay`], [`FivePointCubic`];
 //! * fits to a whole piece: [`FourierFit`], [`SpeedSeries`], [`FrequencyDomain`];
-//! * ways that use the commanded motion: [`PositionMap`], [`TimeWarp`], [`Deviation`], [`LiteralMap`].
+//! * ways that use the commanded motion: [`PositionMap`], [`TimeWarp`], [`Deviation`].
 //!
 //! A further way is a file here and its variant of [`DifferentiatorSettings`]; the compiler asks for the rest.
 
@@ -18,7 +18,6 @@ mod five_point_cubic;
 mod fourier_fit;
 mod frequency_domain;
 mod harmonic_fit;
-mod literal_map;
 mod position_map;
 mod reference_lag;
 mod savitzky_golay;
@@ -36,7 +35,6 @@ pub use differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 pub use five_point_cubic::FivePointCubic;
 pub use fourier_fit::FourierFit;
 pub use frequency_domain::{Ends, FrequencyDomain};
-pub use literal_map::LiteralMap;
 pub use position_map::PositionMap;
 pub use savitzky_golay::SavitzkyGolay;
 pub use settings::DifferentiatorSettings;

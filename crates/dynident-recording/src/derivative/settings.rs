@@ -7,7 +7,6 @@ use super::differentiator::Differentiator;
 use super::five_point_cubic::FivePointCubic;
 use super::fourier_fit::FourierFit;
 use super::frequency_domain::{Ends, FrequencyDomain};
-use super::literal_map::LiteralMap;
 use super::position_map::PositionMap;
 use super::reference_lag::check_max_lag;
 use super::savitzky_golay::SavitzkyGolay;
@@ -118,12 +117,6 @@ pub enum DifferentiatorSettings {
         #[serde(default = "half")]
         max_lag_s: f64,
     },
-    /// [`LiteralMap`]: the paper's map to the letter, right or wrong: to show what it does.
-    LiteralMap {
-        /// The commanded strokes in closed form.
-        #[serde(default)]
-        reference: ReferenceSettings,
-    },
     /// [`TimeWarp`]: the reference at a shifted time, one lag a stroke.
     TimeWarp {
         /// The commanded motion; a log may have its own.
@@ -184,7 +177,6 @@ impl DifferentiatorSettings {
                 reference.validate()?;
                 check_max_lag(*max_lag_s)
             }
-            Self::LiteralMap { reference } => reference.validate(),
             Self::Deviation { reference, smoother, max_lag_s } => {
                 reference.validate()?;
                 max_lag_s.map_or(Ok(()), check_max_lag)?;
@@ -210,7 +202,6 @@ impl DifferentiatorSettings {
     pub fn reference(&self) -> Option<&ReferenceSettings> {
         match self {
             Self::PositionMap { reference, .. }
-            | Self::LiteralMap { reference }
             | Self::TimeWarp { reference, .. }
             | Self::Deviation { reference, .. } => Some(reference),
             Self::Butterworth { .. }
@@ -238,7 +229,6 @@ impl DifferentiatorSettings {
             | Self::FourierFit { .. }
             | Self::SmoothedDifferences { .. }
             | Self::PositionMap { .. }
-            | Self::LiteralMap { .. }
             | Self::TimeWarp { .. } => None,
         }
     }
@@ -308,7 +298,6 @@ impl DifferentiatorSettings {
             Self::PositionMap { reference, max_lag_s } => {
                 Box::new(PositionMap::new(motion(reference, "position-map")?, *max_lag_s)?)
             }
-            Self::LiteralMap { reference } => Box::new(LiteralMap::new(motion(reference, "literal-map")?)),
             Self::TimeWarp { reference, max_lag_s } => {
                 Box::new(TimeWarp::new(motion(reference, "time-warp")?, *max_lag_s)?)
             }

@@ -96,20 +96,15 @@ impl LogisticPath {
     /// `there`, `ddq = (ω²/A²)(q - h)(A - q + h)(A - 2q + 2h)`. `None` outside the stroke, where the formulas give the
     /// wrong sign.
     pub fn rates(&self, q: f64, there: bool) -> Option<[f64; 2]> {
-        let gone = (q - self.offset) / self.amplitude;
-        (gone > 0.0 && gone < 1.0).then(|| self.rates_as_written(q, there))
-    }
-
-    /// Eqs. 15 and 16 at any position, outside the stroke as well, where the sign is wrong. A joint that stands still
-    /// (A = 0) has neither speed nor acceleration.
-    pub(crate) fn rates_as_written(&self, q: f64, there: bool) -> [f64; 2] {
         let Self { amplitude, omega, offset, .. } = *self;
-        if amplitude == 0.0 {
-            return [0.0; 2];
-        }
         let (gone, left) = (q - offset, amplitude - (q - offset));
+        let share = gone / amplitude;
+        if !(share > 0.0 && share < 1.0) {
+            return None;
+        }
         let dq = omega / amplitude * gone * left;
-        [if there { dq } else { -dq }, omega * omega / (amplitude * amplitude) * gone * left * (left - gone)]
+        let ddq = omega * omega / (amplitude * amplitude) * gone * left * (left - gone);
+        Some([if there { dq } else { -dq }, ddq])
     }
 
     /// Whether the joint goes there (or back) at a time: the branch of Eq. 15.

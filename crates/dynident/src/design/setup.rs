@@ -1,19 +1,14 @@
-//! What a search and the check of a given motion share: machine, limits, noise, prior and criterion of a study, and the figures that are told in the end.
+//! What a search and the check of a given motion start with: robot, limits, noise, prior and criterion of a study.
 
-use super::file::{DESIGN_SCHEMA, DesignFile};
-use super::forecast::named_forecast;
-use super::section::{CriterionChoice, DesignSection, FamilyChoice, TorqueNoise};
-use super::windows::WindowedFile;
-use super::{DesignOutcome, table};
-use crate::cpu_time::cpu_seconds;
+use super::outcome::Stopwatch;
+use super::section::{CriterionChoice, DesignSection, TorqueNoise};
+use super::table;
 use crate::error::Error;
 use crate::jobs::options::{RunOptions, study_name};
 use crate::study::StudyRobot;
 use crate::study::{CoulombChoice, Folders, Study};
-use dynident_excitation::check::LimitReport;
-use dynident_excitation::criteria::{ConditionNumber, Criterion, DOptimal, Prediction};
+use dynident_excitation::criteria::{Criterion, DOptimal, Prediction};
 use dynident_excitation::limits::{LimitSet, Limits};
-use dynident_excitation::optimisers::Generation;
 use dynident_excitation::{Family, Information, Motion};
 use nalgebra::DMatrix;
 use std::path::Path;
@@ -21,8 +16,16 @@ use std::path::Path;
 /// Samples whose regressor is held at once.
 const SAMPLES_AT_ONCE: usize = 4096;
 
-/// A study's `[design]`, ready.
-pub(super) struct Prepared {
+/// What a motion tells of the base parameters.
+pub(super) struct MotionInformation {
+    /// `Σ WᵀW`: every torque noise 1 Nm (N).
+    pub(super) plain: DMatrix<f64>,
+    /// `Σ Wᵀ Σ⁻¹ W` with the torque noise of the study.
+    pub(super) weighted: DMatrix<f64>,
+}
+
+/// A study's `[design]`, read and checked.
+pub(super) struct DesignSetup {
     pub(super) name: String,
     pub(super) section: DesignSection,
     pub(super) machine: StudyRobot,
@@ -30,44 +33,20 @@ pub(super) struct Prepared {
     pub(super) set: LimitSet,
     pub(super) criteria: Vec<Box<dyn Criterion>>,
     pub(super) prior: Option<DMatrix<f64>>,
-    torque_std_nm: Vec<f64>,
+    pub(super) torque_std_nm: Vec<f64>,
     ones: Vec<f64>,
     pub(super) notes: Vec<String>,
+    pub(super) stopwatch: Stopwatch,
 }
 
-/// What is known of a motion in the end.
-pub(super) struct Judged {
-    pub(super) family: &'static str,
-    pub(super) family_settings: Option<FamilyChoice>,
-    pub(super) given: Option<String>,
-    pub(super) parameters: Vec<f64>,
-    pub(super) start_posture: Vec<Option<f64>>,
-    pub(super) optimiser: &'static str,
-    pub(super) criterion: &'static str,
-    pub(super) figure: Option<f64>,
-    pub(super) windowed: Option<WindowedFile>,
-    pub(super) history: Vec<Generation>,
-    pub(super) plain: DMatrix<f64>,
-    pub(super) weighted: DMatrix<f64>,
-    pub(super) duration_s: f64,
-    pub(super) rate_hz: f64,
-    pub(super) reports: Vec<LimitReport>,
-    pub(super) check_rate_hz: f64,
-    pub(super) check_of: &'static str,
-    pub(super) diagnosis: Vec<String>,
-    pub(super) evaluations: usize,
-    pub(super) seconds: f64,
-    pub(super) cpu_at_start: Option<f64>,
-}
-
-impl Prepared {
+impl DesignSetup {
     /// For a search: laws are smooth, and something bounds how fast each joint moves.
     pub(super) fn for_search(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Self, Error> {
         let mut notes = Vec::new();
-        let prepared = Self::new(&smooth(study, &mut notes), study_path, options, notes)?;
-        bounded(&prepared.machine, &prepared.limits)
+        let setup = Self::new(&smooth(study, &mut notes), study_path, options, notes)?;
+        bounded(&setup.machine, &setup.limits)
             .map_err(|why| Error::study(study_path, format!("[design.limits]: {why}")))?;
-        Ok(prepared)
+        Ok(setup)
     }
 
     /// For a motion that is there already: laws as the study has them.
@@ -76,6 +55,7 @@ impl Prepared {
     }
 
     fn new(study: &Study, study_path: &Path, options: &RunOptions<'_>, mut notes: Vec<String>) -> Result<Self, Error> {
+        let stopwatch = Stopwatch::start();
         let section = study.design.clone().unwrap_or_default();
         let wrong = |part: &str, why: &dyn core::fmt::Display| Error::study(study_path, format!("[{part}]: {why}"));
         section.validate().map_err(|why| wrong("design", &why))?;
@@ -94,7 +74,8 @@ impl Prepared {
                 let motion_at = |times: &[f64], out: &mut Motion| task.given.motion(&[], times, out);
                 let sum = information(&machine, &torque_std_nm, task.given.times_s(), &motion_at);
                 let criterion: Box<dyn Criterion> = Box::new(Prediction::new(sum / samples.samples as f64));
-                // From a motion that tells all parameters well to one that tells the task's: a better start than any random one.
+                // From a motion that tells all parameters well to one that tells the task's: a better start than any
+                // random one.
                 vec![Box::new(DOptimal), criterion]
             }
             named => named.criteria().unwrap_or_default(),
@@ -110,6 +91,7 @@ impl Prepared {
             prior,
             torque_std_nm,
             notes,
+            stopwatch,
         })
     }
 
@@ -118,9 +100,11 @@ impl Prepared {
         if self.section.criterion.of_regressor() { &self.ones } else { &self.torque_std_nm }
     }
 
-    /// `Σ WᵀW` and `Σ Wᵀ Σ⁻¹ W` of a motion at `times`.
-    pub(super) fn informations(&self, times: &[f64], motion_at: &dyn Fn(&[f64], &mut Motion)) -> [DMatrix<f64>; 2] {
-        [&self.ones, &self.torque_std_nm].map(|std| information(&self.machine, std, times, motion_at))
+    /// What a motion tells at `times`.
+    pub(super) fn information(&self, times: &[f64], motion_at: &dyn Fn(&[f64], &mut Motion)) -> MotionInformation {
+        let [plain, weighted] =
+            [&self.ones, &self.torque_std_nm].map(|std| information(&self.machine, std, times, motion_at));
+        MotionInformation { plain, weighted }
     }
 
     /// The criterion's name.
@@ -129,56 +113,13 @@ impl Prepared {
     }
 
     /// The criterion's figure of a motion that was not searched for.
-    pub(super) fn figure(&self, plain: &DMatrix<f64>, weighted: &DMatrix<f64>) -> Option<f64> {
-        let counted = if self.section.criterion.of_regressor() { plain.clone() } else { self.with_prior(weighted) };
-        self.criteria.last().and_then(|criterion| criterion.figure(&counted))
-    }
-
-    fn with_prior(&self, information: &DMatrix<f64>) -> DMatrix<f64> {
-        self.prior.as_ref().map_or_else(|| information.clone(), |prior| prior + information)
-    }
-
-    /// All of it as it is told.
-    pub(super) fn outcome(self, judged: Judged, family: Box<dyn Family>) -> DesignOutcome {
-        let log_det = |information: &DMatrix<f64>| DOptimal.figure(information).map(|figure| -figure);
-        let condition = |scaled| ConditionNumber { scaled, ..ConditionNumber::default() }.figure(&judged.plain);
-        let all = self.prior.as_ref().map(|prior| prior + &judged.weighted);
-        let (forecast, worst_directions) = named_forecast(&self.machine, &judged.weighted, all.as_ref());
-        let file = DesignFile {
-            schema: DESIGN_SCHEMA,
-            name: self.name,
-            joints: self.machine.parametric.joint_names(),
-            family: judged.family,
-            family_settings: judged.family_settings,
-            given: judged.given,
-            parameters: judged.parameters,
-            start_posture: judged.start_posture,
-            optimiser: judged.optimiser,
-            criterion: judged.criterion,
-            criterion_figure: judged.figure,
-            condition_number: condition(false),
-            condition_number_scaled: condition(true),
-            log_det: log_det(&judged.plain),
-            log_det_weighted: log_det(&judged.weighted),
-            base_columns: self.machine.base().count(),
-            duration_s: judged.duration_s,
-            rate_hz: judged.rate_hz,
-            torque_std_nm: self.torque_std_nm,
-            feasible: judged.diagnosis.is_empty() && judged.reports.iter().all(|report| !report.violated),
-            check_rate_hz: judged.check_rate_hz,
-            check_of: judged.check_of,
-            limits: judged.reports,
-            forecast,
-            worst_directions,
-            windowed: judged.windowed,
-            evaluations: judged.evaluations,
-            cpu_s: judged.cpu_at_start.zip(cpu_seconds()).map(|(start, end)| end - start),
-            seconds: judged.seconds,
-            seed: self.section.search.seed,
-            diagnosis: judged.diagnosis,
-            notes: self.notes,
-        };
-        DesignOutcome { file, machine: self.machine, limits: self.limits, history: judged.history, family }
+    pub(super) fn figure(&self, MotionInformation { plain, weighted }: &MotionInformation) -> Option<f64> {
+        let criterion = self.criteria.last()?;
+        match &self.prior {
+            _ if self.section.criterion.of_regressor() => criterion.figure(plain),
+            Some(prior) => criterion.figure(&(prior + weighted)),
+            None => criterion.figure(weighted),
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Logistic strokes against Fourier series: the same arm, limits, time, controller and noise, and the error of the parameters over many noisy runs.
 //!
 //! ```text
-//! cargo run --release -p dynident --example logistic_against_fourier [SEEDS]
+//! cargo run --release -p dynident-paper --example logistic_against_fourier [SEEDS]
 //! ```
 
 #![allow(clippy::print_stdout, reason = "printing a table is what this program is for")]

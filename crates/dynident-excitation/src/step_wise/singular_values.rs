@@ -5,9 +5,9 @@
 pub(super) struct Singular3([f64; 3]);
 
 impl Singular3 {
-    /// Of the matrix with these rows: triangular factor by Givens rotations, row by row, then one-sided Jacobi rotations of its columns (Golub and
-    /// Van Loan, *Matrix Computations*,
-    /// 2013, sections 5.2 and 8.6). No product of the matrix with itself is formed, so condition numbers are good up to about 1e15.
+    /// Of the matrix with these rows: triangular factor by Givens rotations, row by row, then one-sided Jacobi
+    /// rotations of its columns (Golub and Van Loan, *Matrix Computations*, 2013, sections 5.2 and 8.6). No product of
+    /// the matrix with itself is formed, so condition numbers are good up to about 1e15.
     pub(super) fn of_rows(rows: impl IntoIterator<Item = [f64; 3]>) -> Self {
         let mut r = [[0.0; 3]; 3];
         for mut row in rows {
