@@ -13,31 +13,50 @@
 //! The rows span what is identifiable. The idea of following such spaces outward is that of Wensing, Niemeyer and Slotine, *A geometric characterization of observability in
 //! inertial parameter identification* (2024); drive inertias, couplings and offsets join as constants in single entries.
 
+use crate::independent_columns::Columns;
 use crate::inverse_dynamics::inertial_wrench;
 use dynident_model::laws::{
     Coulomb, Coupling, CouplingEffect, Direction, DirectionalCoulomb, DirectionalViscous, Law, LoadFriction,
     MaxwellSlip, Power, Sigmoid, Stribeck, TemperatureCoulomb, TemperatureViscous,
 };
 use dynident_model::{InertialParameters, Joint, Model, Transform, Vec3};
-use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, SVector};
+use nalgebra::{DVector, Matrix6, SMatrix, SVector};
 
 type Matrix10 = SMatrix<f64, 10, 10>;
 type Vector10 = SVector<f64, 10>;
 
-/// A matrix of independent rows over all columns (bodies, then laws) whose row space is what torques depend on.
-pub(super) fn identifiable_directions(model: &Model, laws: &[Law], tolerance: f64) -> DMatrix<f64> {
-    let (dof, columns) = (model.dof(), 10 * model.dof() + laws.len());
-    let mut rows: Vec<DVector<f64>> = Vec::new();
+/// Rows over all columns (bodies, then laws) whose span is what torques depend on: those that each body gives, base to tip, then those of friction. A body's rows
+/// have entries for it, for the bodies further out and for the laws; they are kept where they arise and carried outward column by column.
+pub(super) struct IdentifiableDirections<'a> {
+    model: &'a Model,
+    laws: usize,
+    /// Of each body: its functionals of its ten composite parameters, with the constants of the laws beside them.
+    functionals: Vec<Vec<DVector<f64>>>,
+    /// Of each body: row of its first functional; the last is where the rows of friction begin.
+    first_row: Vec<usize>,
+    /// Of each body: the constant part of a composite's way to the parent, transposed.
+    carry: Vec<Matrix10>,
+    /// Over the laws alone.
+    friction: Vec<DVector<f64>>,
+}
+
+/// The directions that `model` and `laws` allow to be told, where a share below `tolerance` counts as none.
+pub(super) fn identifiable_directions<'a>(
+    model: &'a Model,
+    laws: &[Law],
+    tolerance: f64,
+) -> IdentifiableDirections<'a> {
+    let dof = model.dof();
     let mut twists: Vec<Vec<Arriving>> = Vec::with_capacity(dof);
-    let mut functionals: Vec<Vec<Vector10>> = Vec::with_capacity(dof);
-    let mut moves: Vec<Harmonics> = Vec::with_capacity(dof);
+    let mut composites: Vec<Vec<Vector10>> = Vec::with_capacity(dof);
+    let (mut functionals, mut first_row, mut carry) = (Vec::new(), vec![0], Vec::new());
     for (j, joint) in model.joints().iter().enumerate() {
         let motion = Harmonics::of(joint);
         let arriving = arriving_twists(model, j, joint, &motion, joint.parent.map(|p| &twists[p][..]), tolerance);
         // Conditions on this body's composite by its own joint, with the constants of the laws beside them.
         let own = arriving.iter().map(|w| (power(model, j, w), law_constants(laws, j, w, dof)));
         // Conditions that come from further in: all but the constant harmonic bind this composite alone.
-        let inherited: &[Vector10] = joint.parent.map_or(&[], |p| &functionals[p]);
+        let inherited: &[Vector10] = joint.parent.map_or(&[], |p| &composites[p]);
         let through = inherited
             .iter()
             .flat_map(|f| motion.inertia[1..].iter().map(move |t| (t.transpose() * f, DVector::zeros(laws.len()))));
@@ -49,35 +68,55 @@ pub(super) fn identifiable_directions(model: &Model, laws: &[Law], tolerance: f6
         let carried = inherited.iter().map(|f| motion.inertia[0].transpose() * f);
         let here = bound.iter().map(|v| Vector10::from_iterator(v.iter().copied().take(10)));
         let all: Vec<DVector<f64>> = here.chain(carried).map(|f| DVector::from_column_slice(f.as_slice())).collect();
-        functionals.push(basis(&all, tolerance).iter().map(|v| Vector10::from_column_slice(v.as_slice())).collect());
+        composites.push(basis(&all, tolerance).iter().map(|v| Vector10::from_column_slice(v.as_slice())).collect());
         twists.push(arriving);
-        moves.push(motion);
-        rows.extend(bound.iter().map(|v| scalar_condition(model, &moves, j, v, columns)));
+        first_row.push(first_row[j] + bound.len());
+        functionals.push(bound);
+        carry.push(motion.inertia[0].transpose());
     }
-    // Outward bodies were not known yet when a row was made: carry each row's constant part on.
-    for (j, joint) in model.joints().iter().enumerate() {
-        let Some(parent) = joint.parent else { continue };
-        let constant = moves[j].inertia[0].transpose();
-        for row in &mut rows {
-            let outward = constant * Vector10::from_column_slice(&row.as_slice()[10 * parent..10 * parent + 10]);
-            // Rows made at this body or outward of it have nothing at the parent, so nothing is counted twice.
-            for k in 0..10 {
-                row[10 * j + k] += outward[k];
-            }
-        }
-    }
-    rows.extend(friction_conditions(laws, dof, columns));
-    if rows.is_empty() { DMatrix::zeros(0, columns) } else { DMatrix::from_columns(&rows).transpose() }
+    let friction = friction_conditions(laws);
+    IdentifiableDirections { model, laws: laws.len(), functionals, first_row, carry, friction }
 }
 
-/// The row of one functional of body `j`'s composite before its outward part is added.
-fn scalar_condition(model: &Model, moves: &[Harmonics], j: usize, v: &DVector<f64>, columns: usize) -> DVector<f64> {
-    debug_assert!(moves.len() > j);
-    let mut row = DVector::zeros(columns);
-    row.rows_mut(10 * j, 10).copy_from(&v.rows(0, 10));
-    let laws = v.len() - 10;
-    row.rows_mut(10 * model.dof(), laws).copy_from(&v.rows(10, laws));
-    row
+impl Columns for IdentifiableDirections<'_> {
+    fn rows(&self) -> usize {
+        self.first_row[self.functionals.len()] + self.friction.len()
+    }
+
+    fn for_each(&self, take: &mut dyn FnMut(&[f64])) {
+        let joints = self.model.joints();
+        let mut children = vec![0_usize; joints.len()];
+        for parent in joints.iter().filter_map(|joint| joint.parent) {
+            children[parent] += 1;
+        }
+        // Row, and its ten entries for the body: of all bodies that have children to come.
+        let mut blocks: Vec<Vec<(usize, Vector10)>> = vec![Vec::new(); joints.len()];
+        for (j, joint) in joints.iter().enumerate() {
+            let mut block = Vec::new();
+            if let Some(parent) = joint.parent {
+                block.extend(blocks[parent].iter().map(|(row, f)| (*row, self.carry[j] * f)));
+                children[parent] -= 1;
+                if children[parent] == 0 {
+                    blocks[parent] = Vec::new();
+                }
+            }
+            let own = self.functionals[j].iter().map(|v| Vector10::from_iterator(v.iter().copied().take(10)));
+            block.extend((self.first_row[j]..).zip(own));
+            let mut column = vec![0.0; self.first_row[j + 1]];
+            for k in 0..10 {
+                for (row, f) in &block {
+                    // A reflection depends on the sign of a zero: none is negative.
+                    column[*row] = f[k] + 0.0;
+                }
+                take(&column);
+            }
+            blocks[j] = block;
+        }
+        for law in 0..self.laws {
+            let constants = self.functionals.iter().flatten().map(|v| v[10 + law]);
+            take(&constants.chain(self.friction.iter().map(|row| row[law])).collect::<Vec<f64>>());
+        }
+    }
 }
 
 /// A twist that can arrive at a joint, and as which joint's axis (or as gravity, last) its constant part counts.
@@ -215,15 +254,15 @@ fn law_constants(laws: &[Law], j: usize, w: &Arriving, dof: usize) -> DVector<f6
 
 /// Friction depends on speeds alone, so it mixes with nothing above. Each distinct function of speed in each joint's row is one condition; laws that say the same
 /// twice share it.
-fn friction_conditions(laws: &[Law], dof: usize, columns: usize) -> Vec<DVector<f64>> {
+fn friction_conditions(laws: &[Law]) -> Vec<DVector<f64>> {
     let mut functions: Vec<(String, DVector<f64>)> = Vec::new();
     for (x, law) in laws.iter().enumerate() {
         for (function, factor) in friction_functions(law) {
             let place = functions.iter().position(|(name, _)| *name == function).unwrap_or_else(|| {
-                functions.push((function, DVector::zeros(columns)));
+                functions.push((function, DVector::zeros(laws.len())));
                 functions.len() - 1
             });
-            functions[place].1[10 * dof + x] += factor;
+            functions[place].1[x] += factor;
         }
     }
     functions.into_iter().map(|(_, row)| row).collect()
@@ -273,8 +312,9 @@ fn basis(vectors: &[DVector<f64>], tolerance: f64) -> Vec<DVector<f64>> {
     let mut found: Vec<DVector<f64>> = Vec::new();
     loop {
         // The first of the longest, so that the choice is the same everywhere.
-        let norm = rest.iter().map(DVector::norm).fold(0.0, f64::max);
-        let Some(next) = rest.iter().find(|vector| vector.norm() == norm) else { return found };
+        let norms: Vec<f64> = rest.iter().map(DVector::norm).collect();
+        let norm = norms.iter().copied().fold(0.0, f64::max);
+        let Some(next) = norms.iter().position(|other| *other == norm).map(|place| &rest[place]) else { return found };
         if norm <= tolerance * longest {
             return found;
         }
