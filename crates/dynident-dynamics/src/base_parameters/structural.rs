@@ -15,12 +15,10 @@
 
 use crate::independent_columns::Columns;
 use crate::inverse_dynamics::inertial_wrench;
-use dynident_model::laws::{
-    Coulomb, Coupling, CouplingEffect, Direction, DirectionalCoulomb, DirectionalViscous, Law, LoadFriction,
-    MaxwellSlip, Power, Sigmoid, Stribeck, TemperatureCoulomb, TemperatureViscous,
-};
+use dynident_model::laws::{Law, MotionFunction};
 use dynident_model::{InertialParameters, Joint, Model, Transform, Vec3};
 use nalgebra::{DVector, Matrix6, SMatrix, SVector};
+use std::collections::HashMap;
 
 type Matrix10 = SMatrix<f64, 10, 10>;
 type Vector10 = SVector<f64, 10>;
@@ -247,61 +245,30 @@ fn power(model: &Model, j: usize, w: &Arriving) -> Vector10 {
 /// What the laws add to the entry of joint `j` that `w` stands for.
 fn law_constants(laws: &[Law], j: usize, w: &Arriving, dof: usize) -> DVector<f64> {
     DVector::from_fn(laws.len(), |x, _| {
-        let inertia: f64 = (0..dof).map(|k| w.source[k] * laws[x].mass_matrix_entry(j, k)).sum();
-        inertia + w.source[dof] * laws[x].constant_torque(j)
+        let law = &laws[x];
+        if !law.acts_on(j) {
+            return 0.0;
+        }
+        let inertia: f64 = law.joints().into_iter().map(|k| w.source[k] * law.mass_matrix_entry(j, k)).sum();
+        inertia + w.source[dof] * law.constant_torque(j)
     })
 }
 
-/// Friction depends on speeds alone, so it mixes with nothing above. Each distinct function of speed in each joint's row is one condition; laws that say the same
+/// Friction depends on speeds alone, so it mixes with nothing above. Each distinct function of the motion in each joint's row is one condition; laws that say the same
 /// twice share it.
 fn friction_conditions(laws: &[Law]) -> Vec<DVector<f64>> {
-    let mut functions: Vec<(String, DVector<f64>)> = Vec::new();
+    let mut places: HashMap<(usize, String), usize> = HashMap::new();
+    let mut conditions: Vec<DVector<f64>> = Vec::new();
     for (x, law) in laws.iter().enumerate() {
-        for (function, factor) in friction_functions(law) {
-            let place = functions.iter().position(|(name, _)| *name == function).unwrap_or_else(|| {
-                functions.push((function, DVector::zeros(laws.len())));
-                functions.len() - 1
-            });
-            functions[place].1[x] += factor;
+        for MotionFunction { row, function, factor } in law.functions() {
+            let place = *places.entry((row, function)).or_insert(conditions.len());
+            if place == conditions.len() {
+                conditions.push(DVector::zeros(laws.len()));
+            }
+            conditions[place][x] += factor;
         }
     }
-    functions.into_iter().map(|(_, row)| row).collect()
-}
-
-/// The functions of speed that a law adds: (row and function, factor).
-fn friction_functions(law: &Law) -> Vec<(String, f64)> {
-    let key = |row: usize, function: &dyn core::fmt::Debug| format!("row {row}: {function:?}");
-    match law {
-        // What holds in both directions is the sum of both halves.
-        Law::Viscous(law) => vec![(key(law.joint, &law.joint), 1.0), (key(law.joint, &(law.joint, '-')), 1.0)],
-        Law::DirectionalViscous(DirectionalViscous { joint, direction: Direction::Forward }) => {
-            vec![(key(*joint, joint), 1.0)]
-        }
-        Law::DirectionalViscous(law) => vec![(key(law.joint, &(law.joint, '-')), 1.0)],
-        Law::Coulomb(Coulomb { joint, shape }) => {
-            vec![(key(*joint, &(joint, shape)), 1.0), (key(*joint, &(joint, shape, '-')), 1.0)]
-        }
-        Law::DirectionalCoulomb(DirectionalCoulomb { joint, direction: Direction::Forward, shape }) => {
-            vec![(key(*joint, &(joint, shape)), 1.0)]
-        }
-        Law::DirectionalCoulomb(law) => vec![(key(law.joint, &(law.joint, law.shape, '-')), 1.0)],
-        Law::Stribeck(Stribeck { joint, .. })
-        | Law::Sigmoid(Sigmoid { joint, .. })
-        | Law::Power(Power { joint, .. })
-        | Law::Load(LoadFriction { joint, .. })
-        | Law::TemperatureViscous(TemperatureViscous { joint, .. })
-        | Law::TemperatureCoulomb(TemperatureCoulomb { joint, .. })
-        | Law::MaxwellSlip(MaxwellSlip { joint, .. }) => vec![(key(*joint, law), 1.0)],
-        Law::Coupling(Coupling { effect: CouplingEffect::Viscous, first, second, ratios, .. }) => {
-            let cross = ratios[0] * ratios[1];
-            vec![(key(*first, second), cross), (key(*second, first), cross)]
-        }
-        Law::Coupling(Coupling { effect: CouplingEffect::Coulomb(shape), first, second, ratios, .. }) => {
-            let function = (first, second, ratios, shape);
-            vec![(key(*first, &function), ratios[0]), (key(*second, &function), ratios[1])]
-        }
-        Law::Offset(_) | Law::DriveInertia(_) | Law::Coupling(_) => Vec::new(),
-    }
+    conditions
 }
 
 /// An orthonormal basis of the span, without directions below `tolerance` times the longest vector: Gram and Schmidt with pivoting, each vector

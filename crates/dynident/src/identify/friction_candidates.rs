@@ -50,7 +50,39 @@ impl Term {
         match self {
             Self::Coulomb => 1,
             Self::Sigmoid | Self::Stribeck => 2,
-            _ => 0,
+            Self::Viscous
+            | Self::AsymmetricViscous
+            | Self::CubeRoot
+            | Self::Quadratic
+            | Self::Load
+            | Self::MaxwellSlip => 0,
+        }
+    }
+
+    /// The term of a key of `drive.laws`; none where data do not choose it.
+    fn of(key: &FrictionLaw) -> Option<Self> {
+        match key {
+            FrictionLaw::AsymmetricViscous {} => Some(Self::AsymmetricViscous),
+            FrictionLaw::Stribeck { .. } => Some(Self::Stribeck),
+            FrictionLaw::Sigmoid { .. } => Some(Self::Sigmoid),
+            FrictionLaw::CubeRoot {} => Some(Self::CubeRoot),
+            FrictionLaw::Quadratic {} => Some(Self::Quadratic),
+            FrictionLaw::Load { .. } => Some(Self::Load),
+            FrictionLaw::MaxwellSlip { .. } => Some(Self::MaxwellSlip),
+            FrictionLaw::AsymmetricCoulomb {} | FrictionLaw::Temperature { .. } => None,
+        }
+    }
+
+    /// True when it is tried in addition to the two models that a search begins with.
+    pub(crate) fn is_addition(self) -> bool {
+        match self {
+            Self::Viscous | Self::Coulomb | Self::Sigmoid => false,
+            Self::AsymmetricViscous
+            | Self::Stribeck
+            | Self::CubeRoot
+            | Self::Quadratic
+            | Self::Load
+            | Self::MaxwellSlip => true,
         }
     }
 
@@ -65,8 +97,6 @@ impl Term {
 pub(crate) struct CandidateColumn {
     pub(crate) term: Term,
     pub(crate) law: Law,
-    /// Its key under `drive.laws`, where it has one.
-    pub(crate) key: Option<FrictionLaw>,
 }
 
 /// The joints whose friction is to be chosen.
@@ -97,32 +127,32 @@ fn columns_of(study: &Study, name: &str, joint: usize) -> Vec<CandidateColumn> {
         Some(CoulombShape::Smooth { width }) => width,
         _ => study.drive.coulomb_width,
     };
-    let mut columns = vec![CandidateColumn { term: Term::Viscous, law: Law::Viscous(Viscous { joint }), key: None }];
+    let mut columns = vec![CandidateColumn { term: Term::Viscous, law: Law::Viscous(Viscous { joint }) }];
     columns.extend(shapes.into_iter().map(|shape| {
         let law = Law::Coulomb(Coulomb { joint, shape });
-        CandidateColumn { term: Term::Coulomb, law, key: None }
+        CandidateColumn { term: Term::Coulomb, law }
     }));
-    let mut add = |term, key: FrictionLaw| {
-        let laws = key.laws(joint, sign);
-        columns.extend(laws.into_iter().map(|law| CandidateColumn { term, law, key: Some(key.clone()) }));
+    let mut add = |key: FrictionLaw| {
+        let Some(term) = Term::of(&key) else { return };
+        columns.extend(key.laws(joint, sign).into_iter().map(|law| CandidateColumn { term, law }));
     };
-    add(Term::AsymmetricViscous, FrictionLaw::AsymmetricViscous {});
+    add(FrictionLaw::AsymmetricViscous {});
     for width in SIGMOID_WIDTHS {
         for offset_speed in [-0.5 * width, 0.5 * width] {
-            add(Term::Sigmoid, FrictionLaw::Sigmoid { steepness: 2.0 / width, offset_speed });
+            add(FrictionLaw::Sigmoid { steepness: 2.0 / width, offset_speed });
         }
     }
     for speed in STRIBECK_SPEEDS {
         for exponent in STRIBECK_EXPONENTS {
             let width = Some(STRIBECK_WIDTH * speed);
-            add(Term::Stribeck, FrictionLaw::Stribeck { speed, exponent, width });
+            add(FrictionLaw::Stribeck { speed, exponent, width });
         }
     }
-    add(Term::CubeRoot, FrictionLaw::CubeRoot {});
-    add(Term::Quadratic, FrictionLaw::Quadratic {});
-    add(Term::Load, FrictionLaw::Load { width: Some(load_width) });
+    add(FrictionLaw::CubeRoot {});
+    add(FrictionLaw::Quadratic {});
+    add(FrictionLaw::Load { width: Some(load_width) });
     for value in YIELDS {
-        add(Term::MaxwellSlip, FrictionLaw::MaxwellSlip { yield_displacements: vec![value] });
+        add(FrictionLaw::MaxwellSlip { yield_displacements: vec![value] });
     }
     columns
 }
@@ -137,7 +167,7 @@ pub(crate) fn stated(columns: &[&CandidateColumn]) -> JointDrive {
     };
     let mut laws: Vec<FrictionLaw> = Vec::new();
     for column in columns {
-        match (&column.law, &column.key) {
+        match (&column.law, FrictionLaw::stating(&column.law)) {
             (Law::Viscous(_), _) => drive.viscous = Some(true),
             (Law::Coulomb(Coulomb { shape: CoulombShape::Sign { dead_band }, .. }), _) => {
                 (drive.coulomb, drive.coulomb_dead_band) = (Some(CoulombChoice::Sign), Some(*dead_band));
@@ -152,11 +182,11 @@ pub(crate) fn stated(columns: &[&CandidateColumn]) -> JointDrive {
                 });
                 match known {
                     Some(known) => known.extend(more),
-                    None => laws.push(FrictionLaw::MaxwellSlip { yield_displacements: more.clone() }),
+                    None => laws.push(FrictionLaw::MaxwellSlip { yield_displacements: more }),
                 }
             }
-            (_, Some(key)) if !laws.contains(key) => laws.push(key.clone()),
-            _ => {}
+            (_, Some(key)) if !laws.contains(&key) => laws.push(key),
+            (_, Some(_) | None) => {}
         }
     }
     drive.laws = Some(laws);

@@ -50,7 +50,6 @@ use crate::validate::{Tested, read_model, validate_log};
 use dynident_estimation::{Estimate, essential, strongest_correlations};
 use dynident_identification::consistent::inconsistent_nominal_bodies;
 use dynident_model::InertialParameters;
-use dynident_model::laws::Law;
 use rayon::prelude::*;
 use std::path::Path;
 use std::time::Instant;
@@ -297,7 +296,7 @@ fn identified(
         payloads: payload_results(study, &training, columns, &estimate),
         offsets: offset_results(study, machine, &training, columns, &estimate),
         drive_gains: gains.map(|(_, gains)| gains),
-        couplings: law_results(machine, &estimate, &parameters, |law| matches!(law, Law::Coupling(_))),
+        couplings: law_results(machine, &estimate, &parameters, |law| law.own_joint().is_none()),
         training: training_result(study, machine, problem, &training, &estimate).map_err(in_study)?,
         torque_band: validation.iter().flat_map(|log| &log.residuals).filter_map(|joint| joint.band.clone()).collect(),
         validation,

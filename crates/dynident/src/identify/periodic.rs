@@ -12,7 +12,7 @@ use dynident_estimation::{
     CovarianceMethod, Estimate, InstantRows, InstantVisitor, LinearProblem, MaximumLikelihoodEstimate,
     MaximumLikelihoodSettings, maximum_likelihood, student_half_width,
 };
-use dynident_model::laws::{JointMotion, Law};
+use dynident_model::laws::JointMotion;
 use dynident_recording::{AveragedPeriods, MotionBlock, MotionSettings, averaged_periods};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -60,7 +60,7 @@ pub(crate) fn periodic(logs: &Logs<'_>, problem: &LinearProblem) -> Result<(Esti
     let Logs { study, machine, .. } = *logs;
     let section = &study.estimator;
     let wrong = |message: String| Error::Method { path: logs.path.to_owned(), method: section.method.name(), message };
-    if let Some(law) = machine.laws().iter().find(|law| matches!(law, Law::MaxwellSlip(_) | Law::Load(_))) {
+    if let Some(law) = machine.laws().iter().find(|law| law.has_memory() || law.needs_load()) {
         return Err(wrong(format!(
             "{} depends on more than the motion of one instant: leave that law out, or take another method",
             law.symbol()

@@ -2,7 +2,6 @@
 
 use dynident_dynamics::{BaseParameters, Column};
 use dynident_identification::consistent::typical_length_m;
-use dynident_model::laws::Law;
 use dynident_model::{InertialParameters, Model};
 use nalgebra::{DMatrix, DVector};
 
@@ -19,7 +18,8 @@ pub(crate) fn nearest_to_prior(model: &Model, base: &BaseParameters, theta: &[f6
         let scale: f64 = match &columns[column] {
             Column::Body { parameter: 0, .. } => 1.0,
             Column::Body { parameter: 1..=3, .. } => length,
-            Column::Body { .. } | Column::Law(Law::DriveInertia(_)) => length * length,
+            Column::Body { .. } => length * length,
+            Column::Law(law) if law.is_drive_inertia() => length * length,
             Column::Law(_) => 1.0,
         };
         scale * scale

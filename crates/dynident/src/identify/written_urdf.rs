@@ -1,7 +1,7 @@
 //! The user's own URDF with the identified values.
 
 use crate::machine::Machine;
-use dynident_model::laws::Law;
+use dynident_model::laws::JointProperty;
 use dynident_model::{DescriptionFormat, InertialParameters, JointChange, LinkChange, link_changes, rewrite_urdf};
 
 /// The user's URDF with the new values; joints that were locked keep theirs. Otherwise the reason why there is none.
@@ -18,10 +18,10 @@ pub(crate) fn written_urdf(
     let mut joints: Vec<JointChange> = Vec::new();
     let laws = machine.laws().iter().zip(&parameters[10 * machine.model().dof()..]);
     for (law, &value) in laws {
-        let (joint, damping, friction) = match law {
-            Law::Viscous(law) => (law.joint, Some(value), None),
-            Law::Coulomb(law) => (law.joint, None, Some(value)),
-            _ => continue,
+        let (Some(joint), Some(property)) = (law.own_joint(), law.property()) else { continue };
+        let (damping, friction) = match property {
+            JointProperty::Damping => (Some(value), None),
+            JointProperty::Friction => (None, Some(value)),
         };
         let name = &machine.model().joints()[joint].name;
         let place = joints.iter().position(|change| change.joint == *name).unwrap_or_else(|| {

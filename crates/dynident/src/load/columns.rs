@@ -325,7 +325,7 @@ fn check(study: &Study, machine: &Machine) -> Result<(), String> {
              they chose (friction_choice of its result.json), or hold the arm by [arm]"
             .to_owned());
     }
-    if loaded && machine.laws().iter().any(|law| matches!(law, Law::Load(_))) {
+    if loaded && machine.laws().iter().any(Law::needs_load) {
         return Err("load-dependent friction does not go with payloads, for its load is the bare arm's: leave out the law `load`".to_owned());
     }
     Ok(())
