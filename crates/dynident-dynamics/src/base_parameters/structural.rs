@@ -44,15 +44,15 @@ pub(super) fn identifiable_directions<'a>(
     laws: &[Law],
     tolerance: f64,
 ) -> IdentifiableDirections<'a> {
-    let dof = model.dof();
+    let (dof, slots) = (model.dof(), source_slots(model, laws));
     let mut twists: Vec<Vec<Arriving>> = Vec::with_capacity(dof);
     let mut composites: Vec<Vec<Vector10>> = Vec::with_capacity(dof);
     let (mut functionals, mut first_row, mut carry) = (Vec::new(), vec![0], Vec::new());
     for (j, joint) in model.joints().iter().enumerate() {
         let motion = Harmonics::of(joint);
-        let arriving = arriving_twists(model, j, joint, &motion, joint.parent.map(|p| &twists[p][..]), tolerance);
+        let arriving = arriving_twists(model, j, &motion, joint.parent.map(|p| &twists[p][..]), slots, tolerance);
         // Conditions on this body's composite by its own joint, with the constants of the laws beside them.
-        let own = arriving.iter().map(|w| (power(model, j, w), law_constants(laws, j, w, dof)));
+        let own = arriving.iter().map(|w| (power(model, j, w), law_constants(laws, j, w, slots)));
         // Conditions that come from further in: all but the constant harmonic bind this composite alone.
         let inherited: &[Vector10] = joint.parent.map_or(&[], |p| &composites[p]);
         let through = inherited
@@ -115,6 +115,18 @@ impl Columns for IdentifiableDirections<'_> {
             take(&constants.chain(self.friction.iter().map(|row| row[law])).collect::<Vec<f64>>());
         }
     }
+}
+
+/// Joints back to which a twist's source is known at least: in longer machines only couplings ask further.
+const SOURCES: usize = 48;
+
+/// Slots for the sources of twists: joint `k` has slot `k` modulo their number, so that a source is known as long as a coupling may ask for it.
+fn source_slots(model: &Model, laws: &[Law]) -> usize {
+    let reach = laws.iter().map(|law| {
+        let joints = law.joints();
+        joints.iter().max().zip(joints.iter().min()).map_or(0, |(most, least)| most - least)
+    });
+    SOURCES.max(reach.max().unwrap_or(0) + 1).min(model.dof())
 }
 
 /// A twist that can arrive at a joint, and as which joint's axis (or as gravity, last) its constant part counts.
@@ -185,15 +197,15 @@ fn inertia_to_parent(parent_from_child: &Transform) -> Matrix10 {
 fn arriving_twists(
     model: &Model,
     j: usize,
-    joint: &Joint,
     motion: &Harmonics,
     parent: Option<&[Arriving]>,
+    slots: usize,
     tolerance: f64,
 ) -> Vec<Arriving> {
-    let dof = model.dof();
+    let joint = &model.joints()[j];
     let mut stacked = Vec::new();
     let mut push = |twist: &nalgebra::Vector6<f64>, source: DVector<f64>| {
-        stacked.push(DVector::from_iterator(7 + dof, twist.iter().copied().chain(source.iter().copied())));
+        stacked.push(DVector::from_iterator(7 + slots, twist.iter().copied().chain(source.iter().copied())));
     };
     let axis = joint.axis;
     let own = if joint.turns() {
@@ -201,14 +213,14 @@ fn arriving_twists(
     } else {
         [0.0, 0.0, 0.0, axis[0], axis[1], axis[2]]
     };
-    let mark = |place: usize| DVector::from_fn(dof + 1, |i, _| f64::from(i == place));
-    push(&own.into(), mark(j));
+    let mark = |place: usize| DVector::from_fn(slots + 1, |i, _| f64::from(i == place));
+    push(&own.into(), mark(j % slots));
     let gravity = model.gravity();
     // In units of about one, as the axes are.
     let size = gravity.norm().max(f64::MIN_POSITIVE);
     let at_base = [Arriving {
         twist: [0.0, 0.0, 0.0, -gravity[0] / size, -gravity[1] / size, -gravity[2] / size].into(),
-        source: mark(dof) / size,
+        source: mark(slots) / size,
     }];
     let from: &[Arriving] = match parent {
         Some(parent) => parent,
@@ -216,16 +228,19 @@ fn arriving_twists(
         None => &[],
     };
     for w in from {
-        push(&(motion.twist[0] * w.twist), w.source.clone());
+        let mut source = w.source.clone();
+        // The slot is the joint's own from here on.
+        source[j % slots] = 0.0;
+        push(&(motion.twist[0] * w.twist), source);
         for matrix in &motion.twist[1..] {
-            push(&(matrix * w.twist), DVector::zeros(dof + 1));
+            push(&(matrix * w.twist), DVector::zeros(slots + 1));
         }
     }
     basis(&stacked, tolerance)
         .iter()
         .map(|v| Arriving {
             twist: nalgebra::Vector6::from_column_slice(&v.as_slice()[..6]),
-            source: v.rows(6, dof + 1).into_owned(),
+            source: v.rows(6, slots + 1).into_owned(),
         })
         .collect()
 }
@@ -243,14 +258,15 @@ fn power(model: &Model, j: usize, w: &Arriving) -> Vector10 {
 }
 
 /// What the laws add to the entry of joint `j` that `w` stands for.
-fn law_constants(laws: &[Law], j: usize, w: &Arriving, dof: usize) -> DVector<f64> {
+fn law_constants(laws: &[Law], j: usize, w: &Arriving, slots: usize) -> DVector<f64> {
     DVector::from_fn(laws.len(), |x, _| {
         let law = &laws[x];
         if !law.acts_on(j) {
             return 0.0;
         }
-        let inertia: f64 = law.joints().into_iter().map(|k| w.source[k] * law.mass_matrix_entry(j, k)).sum();
-        inertia + w.source[dof] * law.constant_torque(j)
+        let inward = law.joints().into_iter().filter(|k| *k <= j);
+        let inertia: f64 = inward.map(|k| w.source[k % slots] * law.mass_matrix_entry(j, k)).sum();
+        inertia + w.source[slots] * law.constant_torque(j)
     })
 }
 
@@ -274,17 +290,16 @@ fn friction_conditions(laws: &[Law]) -> Vec<DVector<f64>> {
 /// An orthonormal basis of the span, without directions below `tolerance` times the longest vector: Gram and Schmidt with pivoting, each vector
 /// cleaned twice. (An SVD would do; the one at hand returned 5e-5 for an exact zero on a matrix of rank three.)
 fn basis(vectors: &[DVector<f64>], tolerance: f64) -> Vec<DVector<f64>> {
+    let longest = vectors.iter().map(DVector::norm).fold(0.0, f64::max);
     let mut rest = vectors.to_vec();
-    let longest = rest.iter().map(DVector::norm).fold(0.0, f64::max);
     let mut found: Vec<DVector<f64>> = Vec::new();
     loop {
+        // What is left of a vector only shrinks.
+        rest.retain(|vector| vector.norm() > tolerance * longest);
         // The first of the longest, so that the choice is the same everywhere.
         let norms: Vec<f64> = rest.iter().map(DVector::norm).collect();
         let norm = norms.iter().copied().fold(0.0, f64::max);
         let Some(next) = norms.iter().position(|other| *other == norm).map(|place| &rest[place]) else { return found };
-        if norm <= tolerance * longest {
-            return found;
-        }
         let direction = next / norm;
         for vector in &mut rest {
             for _ in 0..2 {
