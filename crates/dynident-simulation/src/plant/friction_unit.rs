@@ -58,6 +58,13 @@ impl FrictionUnit {
         self.update(0.0, 0.0);
     }
 
+    /// Adds a law that follows a speed.
+    #[cfg(test)]
+    pub(super) fn add_law(&mut self, law: &Law, value: f64) {
+        let TermAction::Friction(friction) = law.action() else { panic!("{law:?} follows no speed") };
+        self.add(law, &friction, value);
+    }
+
     /// Whether it can hold a joint at rest.
     pub(super) fn holds(&self) -> bool {
         self.steps
@@ -166,22 +173,16 @@ mod tests {
     use super::*;
     use dynident_model::laws::{Coulomb, CoulombShape, Power, PowerExponent, Sigmoid, Stribeck};
 
-    fn add(unit: &mut FrictionUnit, law: &Law, value: f64) {
-        let TermAction::Friction(friction) = law.action() else { panic!("{law:?} follows no speed") };
-        unit.add(law, &friction, value);
-    }
-
     /// The scalar problem is solved: w + c f(w) = r, for steep and flat maps alike. Rounding of r, with room.
     #[test]
     fn resolved_speeds_fulfil_their_equation() {
         let mut unit = FrictionUnit::new(vec![(0, 1.0)]);
         let shape = CoulombShape::Smooth { width: 1e-3 };
-        add(&mut unit, &Law::Coulomb(Coulomb { joint: 3, shape: CoulombShape::Sign { dead_band: 0.1 } }), 0.5);
-        add(&mut unit, &Law::Coulomb(Coulomb { joint: 3, shape }), 10.0);
-        add(&mut unit, &Law::Sigmoid(Sigmoid { joint: 3, steepness: 20.0, offset_speed: 0.1 }), 0.7);
-        add(&mut unit, &Law::Power(Power { joint: 3, exponent: PowerExponent::CubeRoot, rounding: 1e-6 }), 0.3);
-        add(
-            &mut unit,
+        unit.add_law(&Law::Coulomb(Coulomb { joint: 3, shape: CoulombShape::Sign { dead_band: 0.1 } }), 0.5);
+        unit.add_law(&Law::Coulomb(Coulomb { joint: 3, shape }), 10.0);
+        unit.add_law(&Law::Sigmoid(Sigmoid { joint: 3, steepness: 20.0, offset_speed: 0.1 }), 0.7);
+        unit.add_law(&Law::Power(Power { joint: 3, exponent: PowerExponent::CubeRoot, rounding: 1e-6 }), 0.3);
+        unit.add_law(
             &Law::Stribeck(Stribeck {
                 joint: 3,
                 speed: 0.1,
