@@ -1,9 +1,10 @@
 //! Inverse dynamics: the recursive Newton-Euler algorithm.
 
+use crate::states::BodyState;
 use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Workspace, put_lanes, take, take_lanes};
 use dynident_lanes::{Kernel, Lane, Scalar, dispatch, dispatch_single};
 use dynident_model::laws::JointMotion;
-use dynident_model::{InertialParameters, Mat3, Model, Transform, Vec3};
+use dynident_model::{InertialParameters, JointMap, Mat3, Model, Transform, Vec3};
 
 /// Joint torques `τ = M(q) q̈ + C(q, q̇) q̇ + g(q)` of the rigid bodies with the model's inertial parameters, without friction and
 /// drives. One entry per joint: Nm for turning joints, N for sliding ones.
@@ -144,36 +145,47 @@ pub(crate) fn newton_euler_placed<T: Scalar>(model: &Model, scratch: &mut CoreSc
 pub(crate) fn outward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     let gravity = -model.gravity();
     for (index, map) in model.maps().iter().enumerate() {
-        let (dq, ddq) = (scratch.dq[index], scratch.ddq[index]);
         let (inner, outer) = scratch.bodies.split_at_mut(index);
-        let body = &mut outer[0];
-        let Transform { rotation, translation } = &body.parent_from_body;
-        let translation = *translation;
-        let axis = map.axis.splat::<T>();
-        let (omega, alpha, acceleration) = if let Some(parent) = map.parent {
-            let parent = &inner[parent];
-            let swing = parent
-                .omega
-                .cross_add(parent.omega.cross(translation), parent.alpha.cross_add(translation, parent.acceleration));
-            (
-                rotation.transpose_mul_vec(parent.omega),
-                rotation.transpose_mul_vec(parent.alpha),
-                rotation.transpose_mul_vec(swing),
-            )
-        } else {
-            (Vec3::ZERO, Vec3::ZERO, rotation.transpose_mul_vec(gravity.splat()))
-        };
-        let own = axis.scale(dq);
-        if map.turns {
-            body.omega = omega + own;
-            body.alpha = axis.scale_add(ddq, omega.cross_add(own, alpha));
-            body.acceleration = acceleration;
-        } else {
-            body.omega = omega;
-            body.alpha = alpha;
-            let coriolis = omega.cross(own);
-            body.acceleration = axis.scale_add(ddq, acceleration + coriolis + coriolis);
-        }
+        let parent = map.parent.map(|parent| &inner[parent]);
+        moved(map, parent, gravity, scratch.dq[index], scratch.ddq[index], &mut outer[0]);
+    }
+}
+
+/// One step outward: the motion of a body from its parent's, at the transform that stands in `body`. `gravity` is the base's acceleration against gravity.
+#[inline(always)]
+pub(crate) fn moved<T: Scalar>(
+    map: &JointMap,
+    parent: Option<&BodyState<T>>,
+    gravity: Vec3,
+    dq: T,
+    ddq: T,
+    body: &mut BodyState<T>,
+) {
+    let Transform { rotation, translation } = &body.parent_from_body;
+    let translation = *translation;
+    let axis = map.axis.splat::<T>();
+    let (omega, alpha, acceleration) = if let Some(parent) = parent {
+        let swing = parent
+            .omega
+            .cross_add(parent.omega.cross(translation), parent.alpha.cross_add(translation, parent.acceleration));
+        (
+            rotation.transpose_mul_vec(parent.omega),
+            rotation.transpose_mul_vec(parent.alpha),
+            rotation.transpose_mul_vec(swing),
+        )
+    } else {
+        (Vec3::ZERO, Vec3::ZERO, rotation.transpose_mul_vec(gravity.splat()))
+    };
+    let own = axis.scale(dq);
+    if map.turns {
+        body.omega = omega + own;
+        body.alpha = axis.scale_add(ddq, omega.cross_add(own, alpha));
+        body.acceleration = acceleration;
+    } else {
+        body.omega = omega;
+        body.alpha = alpha;
+        let coriolis = omega.cross(own);
+        body.acceleration = axis.scale_add(ddq, acceleration + coriolis + coriolis);
     }
 }
 

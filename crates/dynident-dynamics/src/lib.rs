@@ -25,7 +25,9 @@ mod regressor_panels;
 mod states;
 mod workspace;
 
-pub use base_parameters::{BaseParameterSettings, BaseParameters, NumericalRank, numerical_rank};
+pub use base_parameters::{
+    BaseParameterSettings, BaseParameters, NumericalRank, numerical_rank, numerical_rank_by_body,
+};
 pub use derivatives::{InverseDynamicsDerivatives, inverse_dynamics_derivatives};
 pub use energy::{kinetic_energy, potential_energy};
 pub use forward_dynamics::forward_dynamics;

@@ -3,7 +3,7 @@
 use crate::base_parameters::{BaseParameterSettings, BaseParameters};
 use crate::regressor_panels::{Column, PanelLayout};
 use dynident_model::Model;
-use dynident_model::laws::{Coulomb, Law};
+use dynident_model::laws::Law;
 use thiserror::Error;
 
 /// Why a parametric model could not be put together.
@@ -161,10 +161,6 @@ impl ParametricModel {
 /// All parameters by the description: inertials, and what it says of damping and friction.
 fn described(model: &Model, laws: &[Law]) -> Vec<f64> {
     let mut parameters = model.parameter_vector();
-    parameters.extend(laws.iter().map(|law| match law {
-        Law::Viscous(law) => model.joints()[law.joint].damping.unwrap_or(0.0),
-        Law::Coulomb(Coulomb { joint, .. }) => model.joints()[*joint].friction.unwrap_or(0.0),
-        _ => 0.0,
-    }));
+    parameters.extend(laws.iter().map(|law| law.described(model).unwrap_or(0.0)));
     parameters
 }

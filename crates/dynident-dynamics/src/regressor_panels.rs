@@ -226,11 +226,11 @@ pub fn regressor_panels_following(
         for &(place, global) in &panel.laws {
             let Column::Law(law) = &layout.columns[global] else { continue };
             let columns = panels.joint_mut(joint);
-            if let (Law::Load(_), false, Some(parameters)) = (law, load_is_known, &history.load_parameters) {
+            if let (true, false, Some(parameters)) = (law.needs_load(), load_is_known, &history.load_parameters) {
                 load_of(&layout.columns, panel, parameters, columns, samples, &mut history.load);
                 load_is_known = true;
             }
-            if matches!(law, Law::MaxwellSlip(_)) && history.memories.len() < layout.columns.len() {
+            if law.has_memory() && history.memories.len() < layout.columns.len() {
                 history.memories.resize_with(layout.columns.len(), LawMemory::default);
             }
             let mut none = LawMemory::default();

@@ -1,7 +1,8 @@
 //! Base parameters against the paper, against numerical ranks, and against full-parameter torques.
 
 use dynident_dynamics::{
-    BaseParameterSettings, BaseParameters, Workspace, inverse_dynamics, numerical_rank, torque_regressor,
+    BaseParameterSettings, BaseParameters, Workspace, inverse_dynamics, numerical_rank, numerical_rank_by_body,
+    torque_regressor,
 };
 use dynident_model::Model;
 use dynident_model::laws::{CoulombShape, Coupling, CouplingEffect, DriveChoice, Law, laws_per_joint};
@@ -42,25 +43,62 @@ fn structure_and_random_states_choose_the_same_columns() {
     }
 }
 
+/// A serial arm of the joints and bodies of a random tree.
+fn random_chain(seed: u64, dof: usize) -> Model {
+    let tree = random_tree(seed, dof);
+    let mut joints = tree.joints().to_vec();
+    for (index, joint) in joints.iter_mut().enumerate() {
+        joint.parent = index.checked_sub(1);
+    }
+    Model::new("chain", tree.base().clone(), joints, tree.bodies().to_vec()).unwrap()
+}
+
+#[test]
+fn motions_of_one_joint_choose_the_same_columns() {
+    for seed in 0..40 {
+        let model = random_tree(seed, 1 + seed as usize % 7);
+        let weightless = model.clone().with_gravity(dynident_model::Vec3([0.0; 3])).unwrap();
+        for model in [model, weightless] {
+            let by_body = numerical_rank_by_body(&model, 5, 1e-8);
+            assert_eq!(by_body.independent, numerical_rank(&model, &[], 77, 1e-8).independent, "seed {seed}");
+        }
+    }
+}
+
+#[test]
+fn long_chains_keep_their_base_parameters() {
+    // Where regressors of all joints at once can still be split.
+    let model = random_chain(3, 40);
+    let base = BaseParameters::new(&model, &[], &BaseParameterSettings::default());
+    assert_eq!(base.independent(), numerical_rank(&model, &[], 77, 1e-8).independent);
+    // Where they cannot, body by body.
+    let model = random_chain(4, 250);
+    let base = BaseParameters::new(&model, &[], &BaseParameterSettings::default());
+    assert_eq!(base.independent(), numerical_rank_by_body(&model, 5, 1e-8).independent);
+    assert_full_torques(&model, 4);
+}
+
 #[test]
 fn base_parameters_give_the_full_torques() {
-    let mut random = Random::new(3);
     for seed in 0..30 {
-        let dof = 1 + seed as usize % 8;
-        let model = random_tree(seed, dof);
-        let base = BaseParameters::new(&model, &[], &BaseParameterSettings::default());
-        let theta = base.values(&model.parameter_vector());
-        let mut ws = Workspace::new(&model);
-        let mut vector = || (0..dof).map(|_| random.uniform(-2.0, 2.0)).collect::<Vec<f64>>();
-        let (q, dq, ddq) = (vector(), vector(), vector());
-        let tau = inverse_dynamics(&model, &mut ws, &q, &dq, &ddq).to_vec();
-        let regressor = torque_regressor(&model, &mut ws, &q, &dq, &ddq);
-        for (joint, row) in regressor.chunks_exact(10 * dof).enumerate() {
-            let by_base: f64 = base.independent().iter().zip(&theta).map(|(&c, t)| row[c] * t).sum();
-            // The regrouping solves triangles of condition up to some thousand.
-            let scale = tau.iter().fold(1.0_f64, |m, t| m.max(t.abs()));
-            assert!((by_base - tau[joint]).abs() <= 1e-9 * scale, "seed {seed}: {by_base} against {}", tau[joint]);
-        }
+        assert_full_torques(&random_tree(seed, 1 + seed as usize % 8), seed);
+    }
+}
+
+fn assert_full_torques(model: &Model, seed: u64) {
+    let (mut random, dof) = (Random::new(seed), model.dof());
+    let base = BaseParameters::new(model, &[], &BaseParameterSettings::default());
+    let theta = base.values(&model.parameter_vector());
+    let mut ws = Workspace::new(model);
+    let mut vector = || (0..dof).map(|_| random.uniform(-2.0, 2.0)).collect::<Vec<f64>>();
+    let (q, dq, ddq) = (vector(), vector(), vector());
+    let tau = inverse_dynamics(model, &mut ws, &q, &dq, &ddq).to_vec();
+    let regressor = torque_regressor(model, &mut ws, &q, &dq, &ddq);
+    for (joint, row) in regressor.chunks_exact(10 * dof).enumerate() {
+        let by_base: f64 = base.independent().iter().zip(&theta).map(|(&c, t)| row[c] * t).sum();
+        // The regrouping solves triangles of condition up to some thousand.
+        let scale = tau.iter().fold(1.0_f64, |m, t| m.max(t.abs()));
+        assert!((by_base - tau[joint]).abs() <= 1e-9 * scale, "seed {seed}: {by_base} against {}", tau[joint]);
     }
 }
 

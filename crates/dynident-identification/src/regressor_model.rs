@@ -67,7 +67,7 @@ impl RegressorModel {
     /// The same with the bodies of an estimate of `other`, where load-dependent friction needs them.
     #[must_use]
     pub fn with_load_of(mut self, other: &Self, values: &[f64]) -> Self {
-        if self.layout().columns().iter().any(|column| matches!(column, Column::Law(Law::Load(_)))) {
+        if self.layout().columns().iter().any(|column| matches!(column, Column::Law(law) if law.needs_load())) {
             let known = other.layout().columns();
             let value = |column: &Column| known.iter().position(|c| c == column).map_or(0.0, |place| values[place]);
             self.load_parameters = Some(self.layout().columns().iter().map(value).collect());

@@ -2,8 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use dynident_model::laws::{
-    Coulomb, CoulombShape, Direction, DirectionalCoulomb, DirectionalViscous, JointMotion, Law, LawInput, LawMemory,
-    LoadFriction, MaxwellSlip, Power, PowerExponent, Sigmoid, Stribeck, Viscous,
+    Coulomb, CoulombShape, Coupling, CouplingEffect, Direction, DirectionalCoulomb, DirectionalViscous, DriveInertia,
+    JointMotion, Law, LawInput, LawMemory, LoadFriction, MaxwellSlip, Offset, Power, PowerExponent, Sigmoid,
+    SpeedCurve, Stribeck, TemperatureCoulomb, TemperatureViscous, TermAction, Viscous,
 };
 
 const STEP: CoulombShape = CoulombShape::Smooth { width: 0.05 };
@@ -33,6 +34,72 @@ fn laws_of_speed() -> Vec<Law> {
         laws.push(Law::Stribeck(Stribeck { joint, speed: 0.1, exponent, shape: STEP }));
     }
     laws
+}
+
+/// One law of every kind and shape, of joint 0 or of joints 0 and 1.
+fn laws_of_all_kinds() -> Vec<Law> {
+    let (joint, reference_c) = (0, 20.0);
+    let mut laws = laws_of_speed();
+    for shape in [STEP, CoulombShape::Sign { dead_band: 0.0 }] {
+        laws.extend([
+            Law::Coulomb(Coulomb { joint, shape }),
+            Law::DirectionalCoulomb(DirectionalCoulomb { joint, direction: Direction::Backward, shape }),
+            Law::Stribeck(Stribeck { joint, speed: 0.1, exponent: 1.5, shape }),
+            Law::Load(LoadFriction { joint, shape }),
+            Law::TemperatureCoulomb(TemperatureCoulomb { joint, reference_c, shape }),
+        ]);
+    }
+    laws.extend([
+        Law::TemperatureViscous(TemperatureViscous { joint, reference_c }),
+        Law::MaxwellSlip(MaxwellSlip { joint, yield_displacement: 0.1 }),
+        Law::Offset(Offset { joint }),
+        Law::DriveInertia(DriveInertia { joint }),
+    ]);
+    let coupling =
+        |effect| Law::Coupling(Coupling { name: "m".into(), first: 0, second: 1, ratios: [1.5, -0.5], effect });
+    laws.extend([CouplingEffect::Inertia, CouplingEffect::Viscous, CouplingEffect::Coulomb(STEP)].map(coupling));
+    laws
+}
+
+/// What a simulation makes of a law is what its regressor column says.
+#[test]
+fn columns_are_what_the_action_says() {
+    let (q, dq, ddq) = ([0.3, -0.2], [0.07, 0.4], [2.0, -3.0]);
+    let motion = JointMotion { samples: 1, q: &q, dq: &dq, ddq: &ddq };
+    let load = 7.0;
+    for law in laws_of_all_kinds() {
+        let joints = law.joints();
+        for &row in &joints {
+            let mut out = [f64::NAN];
+            let mut memory = LawMemory::default();
+            let mut input = LawInput { load: Some(&[load]), temperature_c: None, memory: &mut memory };
+            law.column_following(row, &motion, &mut input, &mut out);
+            let across = |x: &[f64; 2]| x[*joints.iter().rfind(|&&other| other != row).unwrap_or(&row)];
+            let expected = match law.action() {
+                TermAction::Inertia { factor } => factor * across(&ddq),
+                TermAction::Damping { factor } => factor * across(&dq),
+                TermAction::Constant => 1.0,
+                // A spring that starts here, and a joint at its reference temperature.
+                TermAction::Hysteresis | TermAction::Temperature => 0.0,
+                TermAction::Friction(friction) => {
+                    let speed: f64 = joints.iter().zip(friction.ratios).map(|(&joint, ratio)| ratio * dq[joint]).sum();
+                    let curve = match friction.curve {
+                        SpeedCurve::Step { forward, backward } => {
+                            f64::from(forward && speed > 0.0) - f64::from(backward && speed < 0.0)
+                        }
+                        SpeedCurve::Smooth(function) => function.value(speed),
+                    };
+                    let faded = friction.fading.map_or(1.0, |[v, delta]| (-(speed / v).abs().powf(delta)).exp());
+                    let share = joints.iter().zip(friction.ratios).find(|(joint, _)| **joint == row).unwrap().1;
+                    share * curve * faded * if friction.by_load { load } else { 1.0 }
+                }
+            };
+            assert!((out[0] - expected).abs() < 1e-14, "{law:?} in row {row}: {} {expected}", out[0]);
+            let across_entry = law.mass_matrix_entry(row, *joints.iter().rfind(|&&other| other != row).unwrap_or(&row));
+            assert_eq!(across_entry != 0.0, matches!(law.action(), TermAction::Inertia { .. }), "{law:?}");
+            assert_eq!(law.functions().is_empty(), !law.is_friction(), "{law:?}");
+        }
+    }
 }
 
 #[test]

@@ -9,24 +9,19 @@ pub(super) const NEGLIGIBLE: f64 = 1e-9;
 
 /// One sum per independent column.
 pub(super) fn expressions(columns: &[Column], split: &IndependentColumns) -> Vec<String> {
-    let sums = split.independent.iter().enumerate().map(|(b, &column)| {
-        let mut sum = columns[column].symbol();
-        for (d, &dependent) in split.dependent.iter().enumerate() {
-            let factor = split.regrouping[(b, d)];
-            if factor.abs() < NEGLIGIBLE {
-                continue;
-            }
-            let sign = if factor < 0.0 { '-' } else { '+' };
-            let symbol = columns[dependent].symbol();
+    let mut sums: Vec<String> = split.independent.iter().map(|&column| columns[column].symbol()).collect();
+    for (&dependent, factors) in split.dependent.iter().zip(split.regrouping.column_iter()) {
+        let symbol = columns[dependent].symbol();
+        for (sum, factor) in sums.iter_mut().zip(factors.iter()).filter(|(_, factor)| factor.abs() >= NEGLIGIBLE) {
+            let sign = if *factor < 0.0 { '-' } else { '+' };
             // Writing to a string cannot fail.
             let _ = match coefficient(factor.abs()) {
                 None => write!(sum, " {sign} {symbol}"),
                 Some(number) => write!(sum, " {sign} {number} {symbol}"),
             };
         }
-        sum
-    });
-    sums.collect()
+    }
+    sums
 }
 
 /// Six significant digits without trailing zeros; nothing for one.

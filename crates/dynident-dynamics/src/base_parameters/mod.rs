@@ -2,15 +2,17 @@
 //!
 //! One choice for one machine: the columns of the regressor from base to tip in the order of [`all_columns`](crate::all_columns); a column
 //! that depends on earlier ones is regrouped into them (Gautier and Khalil 1990; Gautier 1991). The dependencies come from the machine's
-//! structure ([`structural`]); the rank of regressors at random states ([`numerical_rank`]) is the cross-check.
+//! structure ([`structural`]); the rank of regressors at random states ([`numerical_rank`], [`numerical_rank_by_body`]) is the cross-check.
 
 mod expression;
 mod numerical;
+mod one_joint_motions;
 mod structural;
 
 pub use numerical::{NumericalRank, numerical_rank};
+pub use one_joint_motions::numerical_rank_by_body;
 
-use crate::independent_columns::{IndependentColumns, independent_columns};
+use crate::independent_columns::{IndependentColumns, split_columns};
 use crate::regressor_panels::{Column, all_columns};
 use dynident_model::Model;
 use dynident_model::laws::Law;
@@ -41,8 +43,8 @@ impl BaseParameters {
     /// Base parameters from the machine's structure: no data, no random numbers.
     pub fn new(model: &Model, laws: &[Law], settings: &BaseParameterSettings) -> Self {
         let columns = all_columns(model, laws);
-        let conditions = structural::identifiable_directions(model, laws, settings.tolerance);
-        let split = independent_columns(&conditions, settings.tolerance);
+        let directions = structural::identifiable_directions(model, laws, settings.tolerance);
+        let split = split_columns(&directions, settings.tolerance);
         Self { columns, split }
     }
 
@@ -83,9 +85,9 @@ impl BaseParameters {
     pub fn values(&self, parameters: &[f64]) -> Vec<f64> {
         assert_eq!(parameters.len(), self.columns.len(), "one value per column");
         let mut values: Vec<f64> = self.split.independent.iter().map(|&index| parameters[index]).collect();
-        for (d, &column) in self.split.dependent.iter().enumerate() {
-            for (b, value) in values.iter_mut().enumerate() {
-                *value += self.split.regrouping[(b, d)] * parameters[column];
+        for (&column, factors) in self.split.dependent.iter().zip(self.split.regrouping.column_iter()) {
+            for (value, factor) in values.iter_mut().zip(factors.iter()) {
+                *value += factor * parameters[column];
             }
         }
         values

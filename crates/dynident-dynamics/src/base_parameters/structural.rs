@@ -13,31 +13,48 @@
 //! The rows span what is identifiable. The idea of following such spaces outward is that of Wensing, Niemeyer and Slotine, *A geometric characterization of observability in
 //! inertial parameter identification* (2024); drive inertias, couplings and offsets join as constants in single entries.
 
+use crate::independent_columns::Columns;
 use crate::inverse_dynamics::inertial_wrench;
-use dynident_model::laws::{
-    Coulomb, Coupling, CouplingEffect, Direction, DirectionalCoulomb, DirectionalViscous, Law, LoadFriction,
-    MaxwellSlip, Power, Sigmoid, Stribeck, TemperatureCoulomb, TemperatureViscous,
-};
+use dynident_model::laws::{Law, MotionFunction};
 use dynident_model::{InertialParameters, Joint, Model, Transform, Vec3};
-use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, SVector};
+use nalgebra::{DVector, Matrix6, SMatrix, SVector};
+use std::collections::HashMap;
 
 type Matrix10 = SMatrix<f64, 10, 10>;
 type Vector10 = SVector<f64, 10>;
 
-/// A matrix of independent rows over all columns (bodies, then laws) whose row space is what torques depend on.
-pub(super) fn identifiable_directions(model: &Model, laws: &[Law], tolerance: f64) -> DMatrix<f64> {
-    let (dof, columns) = (model.dof(), 10 * model.dof() + laws.len());
-    let mut rows: Vec<DVector<f64>> = Vec::new();
+/// Rows over all columns (bodies, then laws) whose span is what torques depend on: those that each body gives, base to tip, then those of friction. A body's rows
+/// have entries for it, for the bodies further out and for the laws; they are kept where they arise and carried outward column by column.
+pub(super) struct IdentifiableDirections<'a> {
+    model: &'a Model,
+    laws: usize,
+    /// Of each body: its functionals of its ten composite parameters, with the constants of the laws beside them.
+    functionals: Vec<Vec<DVector<f64>>>,
+    /// Of each body: row of its first functional; the last is where the rows of friction begin.
+    first_row: Vec<usize>,
+    /// Of each body: the constant part of a composite's way to the parent, transposed.
+    carry: Vec<Matrix10>,
+    /// Over the laws alone.
+    friction: Vec<DVector<f64>>,
+}
+
+/// The directions that `model` and `laws` allow to be told, where a share below `tolerance` counts as none.
+pub(super) fn identifiable_directions<'a>(
+    model: &'a Model,
+    laws: &[Law],
+    tolerance: f64,
+) -> IdentifiableDirections<'a> {
+    let (dof, slots) = (model.dof(), source_slots(model, laws));
     let mut twists: Vec<Vec<Arriving>> = Vec::with_capacity(dof);
-    let mut functionals: Vec<Vec<Vector10>> = Vec::with_capacity(dof);
-    let mut moves: Vec<Harmonics> = Vec::with_capacity(dof);
+    let mut composites: Vec<Vec<Vector10>> = Vec::with_capacity(dof);
+    let (mut functionals, mut first_row, mut carry) = (Vec::new(), vec![0], Vec::new());
     for (j, joint) in model.joints().iter().enumerate() {
         let motion = Harmonics::of(joint);
-        let arriving = arriving_twists(model, j, joint, &motion, joint.parent.map(|p| &twists[p][..]), tolerance);
+        let arriving = arriving_twists(model, j, &motion, joint.parent.map(|p| &twists[p][..]), slots, tolerance);
         // Conditions on this body's composite by its own joint, with the constants of the laws beside them.
-        let own = arriving.iter().map(|w| (power(model, j, w), law_constants(laws, j, w, dof)));
+        let own = arriving.iter().map(|w| (power(model, j, w), law_constants(laws, j, w, slots)));
         // Conditions that come from further in: all but the constant harmonic bind this composite alone.
-        let inherited: &[Vector10] = joint.parent.map_or(&[], |p| &functionals[p]);
+        let inherited: &[Vector10] = joint.parent.map_or(&[], |p| &composites[p]);
         let through = inherited
             .iter()
             .flat_map(|f| motion.inertia[1..].iter().map(move |t| (t.transpose() * f, DVector::zeros(laws.len()))));
@@ -49,35 +66,67 @@ pub(super) fn identifiable_directions(model: &Model, laws: &[Law], tolerance: f6
         let carried = inherited.iter().map(|f| motion.inertia[0].transpose() * f);
         let here = bound.iter().map(|v| Vector10::from_iterator(v.iter().copied().take(10)));
         let all: Vec<DVector<f64>> = here.chain(carried).map(|f| DVector::from_column_slice(f.as_slice())).collect();
-        functionals.push(basis(&all, tolerance).iter().map(|v| Vector10::from_column_slice(v.as_slice())).collect());
+        composites.push(basis(&all, tolerance).iter().map(|v| Vector10::from_column_slice(v.as_slice())).collect());
         twists.push(arriving);
-        moves.push(motion);
-        rows.extend(bound.iter().map(|v| scalar_condition(model, &moves, j, v, columns)));
+        first_row.push(first_row[j] + bound.len());
+        functionals.push(bound);
+        carry.push(motion.inertia[0].transpose());
     }
-    // Outward bodies were not known yet when a row was made: carry each row's constant part on.
-    for (j, joint) in model.joints().iter().enumerate() {
-        let Some(parent) = joint.parent else { continue };
-        let constant = moves[j].inertia[0].transpose();
-        for row in &mut rows {
-            let outward = constant * Vector10::from_column_slice(&row.as_slice()[10 * parent..10 * parent + 10]);
-            // Rows made at this body or outward of it have nothing at the parent, so nothing is counted twice.
-            for k in 0..10 {
-                row[10 * j + k] += outward[k];
-            }
-        }
-    }
-    rows.extend(friction_conditions(laws, dof, columns));
-    if rows.is_empty() { DMatrix::zeros(0, columns) } else { DMatrix::from_columns(&rows).transpose() }
+    let friction = friction_conditions(laws);
+    IdentifiableDirections { model, laws: laws.len(), functionals, first_row, carry, friction }
 }
 
-/// The row of one functional of body `j`'s composite before its outward part is added.
-fn scalar_condition(model: &Model, moves: &[Harmonics], j: usize, v: &DVector<f64>, columns: usize) -> DVector<f64> {
-    debug_assert!(moves.len() > j);
-    let mut row = DVector::zeros(columns);
-    row.rows_mut(10 * j, 10).copy_from(&v.rows(0, 10));
-    let laws = v.len() - 10;
-    row.rows_mut(10 * model.dof(), laws).copy_from(&v.rows(10, laws));
-    row
+impl Columns for IdentifiableDirections<'_> {
+    fn rows(&self) -> usize {
+        self.first_row[self.functionals.len()] + self.friction.len()
+    }
+
+    fn for_each(&self, take: &mut dyn FnMut(&[f64])) {
+        let joints = self.model.joints();
+        let mut children = vec![0_usize; joints.len()];
+        for parent in joints.iter().filter_map(|joint| joint.parent) {
+            children[parent] += 1;
+        }
+        // Row, and its ten entries for the body: of all bodies that have children to come.
+        let mut blocks: Vec<Vec<(usize, Vector10)>> = vec![Vec::new(); joints.len()];
+        for (j, joint) in joints.iter().enumerate() {
+            let mut block = Vec::new();
+            if let Some(parent) = joint.parent {
+                block.extend(blocks[parent].iter().map(|(row, f)| (*row, self.carry[j] * f)));
+                children[parent] -= 1;
+                if children[parent] == 0 {
+                    blocks[parent] = Vec::new();
+                }
+            }
+            let own = self.functionals[j].iter().map(|v| Vector10::from_iterator(v.iter().copied().take(10)));
+            block.extend((self.first_row[j]..).zip(own));
+            let mut column = vec![0.0; self.first_row[j + 1]];
+            for k in 0..10 {
+                for (row, f) in &block {
+                    // A reflection depends on the sign of a zero: none is negative.
+                    column[*row] = f[k] + 0.0;
+                }
+                take(&column);
+            }
+            blocks[j] = block;
+        }
+        for law in 0..self.laws {
+            let constants = self.functionals.iter().flatten().map(|v| v[10 + law]);
+            take(&constants.chain(self.friction.iter().map(|row| row[law])).collect::<Vec<f64>>());
+        }
+    }
+}
+
+/// Joints back to which a twist's source is known at least: in longer machines only couplings ask further.
+const SOURCES: usize = 48;
+
+/// Slots for the sources of twists: joint `k` has slot `k` modulo their number, so that a source is known as long as a coupling may ask for it.
+fn source_slots(model: &Model, laws: &[Law]) -> usize {
+    let reach = laws.iter().map(|law| {
+        let joints = law.joints();
+        joints.iter().max().zip(joints.iter().min()).map_or(0, |(most, least)| most - least)
+    });
+    SOURCES.max(reach.max().unwrap_or(0) + 1).min(model.dof())
 }
 
 /// A twist that can arrive at a joint, and as which joint's axis (or as gravity, last) its constant part counts.
@@ -148,15 +197,15 @@ fn inertia_to_parent(parent_from_child: &Transform) -> Matrix10 {
 fn arriving_twists(
     model: &Model,
     j: usize,
-    joint: &Joint,
     motion: &Harmonics,
     parent: Option<&[Arriving]>,
+    slots: usize,
     tolerance: f64,
 ) -> Vec<Arriving> {
-    let dof = model.dof();
+    let joint = &model.joints()[j];
     let mut stacked = Vec::new();
     let mut push = |twist: &nalgebra::Vector6<f64>, source: DVector<f64>| {
-        stacked.push(DVector::from_iterator(7 + dof, twist.iter().copied().chain(source.iter().copied())));
+        stacked.push(DVector::from_iterator(7 + slots, twist.iter().copied().chain(source.iter().copied())));
     };
     let axis = joint.axis;
     let own = if joint.turns() {
@@ -164,14 +213,14 @@ fn arriving_twists(
     } else {
         [0.0, 0.0, 0.0, axis[0], axis[1], axis[2]]
     };
-    let mark = |place: usize| DVector::from_fn(dof + 1, |i, _| f64::from(i == place));
-    push(&own.into(), mark(j));
+    let mark = |place: usize| DVector::from_fn(slots + 1, |i, _| f64::from(i == place));
+    push(&own.into(), mark(j % slots));
     let gravity = model.gravity();
     // In units of about one, as the axes are.
     let size = gravity.norm().max(f64::MIN_POSITIVE);
     let at_base = [Arriving {
         twist: [0.0, 0.0, 0.0, -gravity[0] / size, -gravity[1] / size, -gravity[2] / size].into(),
-        source: mark(dof) / size,
+        source: mark(slots) / size,
     }];
     let from: &[Arriving] = match parent {
         Some(parent) => parent,
@@ -179,16 +228,19 @@ fn arriving_twists(
         None => &[],
     };
     for w in from {
-        push(&(motion.twist[0] * w.twist), w.source.clone());
+        let mut source = w.source.clone();
+        // The slot is the joint's own from here on.
+        source[j % slots] = 0.0;
+        push(&(motion.twist[0] * w.twist), source);
         for matrix in &motion.twist[1..] {
-            push(&(matrix * w.twist), DVector::zeros(dof + 1));
+            push(&(matrix * w.twist), DVector::zeros(slots + 1));
         }
     }
     basis(&stacked, tolerance)
         .iter()
         .map(|v| Arriving {
             twist: nalgebra::Vector6::from_column_slice(&v.as_slice()[..6]),
-            source: v.rows(6, dof + 1).into_owned(),
+            source: v.rows(6, slots + 1).into_owned(),
         })
         .collect()
 }
@@ -206,78 +258,48 @@ fn power(model: &Model, j: usize, w: &Arriving) -> Vector10 {
 }
 
 /// What the laws add to the entry of joint `j` that `w` stands for.
-fn law_constants(laws: &[Law], j: usize, w: &Arriving, dof: usize) -> DVector<f64> {
+fn law_constants(laws: &[Law], j: usize, w: &Arriving, slots: usize) -> DVector<f64> {
     DVector::from_fn(laws.len(), |x, _| {
-        let inertia: f64 = (0..dof).map(|k| w.source[k] * laws[x].mass_matrix_entry(j, k)).sum();
-        inertia + w.source[dof] * laws[x].constant_torque(j)
+        let law = &laws[x];
+        if !law.acts_on(j) {
+            return 0.0;
+        }
+        let inward = law.joints().into_iter().filter(|k| *k <= j);
+        let inertia: f64 = inward.map(|k| w.source[k % slots] * law.mass_matrix_entry(j, k)).sum();
+        inertia + w.source[slots] * law.constant_torque(j)
     })
 }
 
-/// Friction depends on speeds alone, so it mixes with nothing above. Each distinct function of speed in each joint's row is one condition; laws that say the same
+/// Friction depends on speeds alone, so it mixes with nothing above. Each distinct function of the motion in each joint's row is one condition; laws that say the same
 /// twice share it.
-fn friction_conditions(laws: &[Law], dof: usize, columns: usize) -> Vec<DVector<f64>> {
-    let mut functions: Vec<(String, DVector<f64>)> = Vec::new();
+fn friction_conditions(laws: &[Law]) -> Vec<DVector<f64>> {
+    let mut places: HashMap<(usize, String), usize> = HashMap::new();
+    let mut conditions: Vec<DVector<f64>> = Vec::new();
     for (x, law) in laws.iter().enumerate() {
-        for (function, factor) in friction_functions(law) {
-            let place = functions.iter().position(|(name, _)| *name == function).unwrap_or_else(|| {
-                functions.push((function, DVector::zeros(columns)));
-                functions.len() - 1
-            });
-            functions[place].1[10 * dof + x] += factor;
+        for MotionFunction { row, function, factor } in law.functions() {
+            let place = *places.entry((row, function)).or_insert(conditions.len());
+            if place == conditions.len() {
+                conditions.push(DVector::zeros(laws.len()));
+            }
+            conditions[place][x] += factor;
         }
     }
-    functions.into_iter().map(|(_, row)| row).collect()
-}
-
-/// The functions of speed that a law adds: (row and function, factor).
-fn friction_functions(law: &Law) -> Vec<(String, f64)> {
-    let key = |row: usize, function: &dyn core::fmt::Debug| format!("row {row}: {function:?}");
-    match law {
-        // What holds in both directions is the sum of both halves.
-        Law::Viscous(law) => vec![(key(law.joint, &law.joint), 1.0), (key(law.joint, &(law.joint, '-')), 1.0)],
-        Law::DirectionalViscous(DirectionalViscous { joint, direction: Direction::Forward }) => {
-            vec![(key(*joint, joint), 1.0)]
-        }
-        Law::DirectionalViscous(law) => vec![(key(law.joint, &(law.joint, '-')), 1.0)],
-        Law::Coulomb(Coulomb { joint, shape }) => {
-            vec![(key(*joint, &(joint, shape)), 1.0), (key(*joint, &(joint, shape, '-')), 1.0)]
-        }
-        Law::DirectionalCoulomb(DirectionalCoulomb { joint, direction: Direction::Forward, shape }) => {
-            vec![(key(*joint, &(joint, shape)), 1.0)]
-        }
-        Law::DirectionalCoulomb(law) => vec![(key(law.joint, &(law.joint, law.shape, '-')), 1.0)],
-        Law::Stribeck(Stribeck { joint, .. })
-        | Law::Sigmoid(Sigmoid { joint, .. })
-        | Law::Power(Power { joint, .. })
-        | Law::Load(LoadFriction { joint, .. })
-        | Law::TemperatureViscous(TemperatureViscous { joint, .. })
-        | Law::TemperatureCoulomb(TemperatureCoulomb { joint, .. })
-        | Law::MaxwellSlip(MaxwellSlip { joint, .. }) => vec![(key(*joint, law), 1.0)],
-        Law::Coupling(Coupling { effect: CouplingEffect::Viscous, first, second, ratios, .. }) => {
-            let cross = ratios[0] * ratios[1];
-            vec![(key(*first, second), cross), (key(*second, first), cross)]
-        }
-        Law::Coupling(Coupling { effect: CouplingEffect::Coulomb(shape), first, second, ratios, .. }) => {
-            let function = (first, second, ratios, shape);
-            vec![(key(*first, &function), ratios[0]), (key(*second, &function), ratios[1])]
-        }
-        Law::Offset(_) | Law::DriveInertia(_) | Law::Coupling(_) => Vec::new(),
-    }
+    conditions
 }
 
 /// An orthonormal basis of the span, without directions below `tolerance` times the longest vector: Gram and Schmidt with pivoting, each vector
 /// cleaned twice. (An SVD would do; the one at hand returned 5e-5 for an exact zero on a matrix of rank three.)
 fn basis(vectors: &[DVector<f64>], tolerance: f64) -> Vec<DVector<f64>> {
+    let longest = vectors.iter().map(DVector::norm).fold(0.0, f64::max);
     let mut rest = vectors.to_vec();
-    let longest = rest.iter().map(DVector::norm).fold(0.0, f64::max);
     let mut found: Vec<DVector<f64>> = Vec::new();
     loop {
+        // What is left of a vector only shrinks.
+        rest.retain(|vector| vector.norm() > tolerance * longest);
         // The first of the longest, so that the choice is the same everywhere.
-        let norm = rest.iter().map(DVector::norm).fold(0.0, f64::max);
-        let Some(next) = rest.iter().find(|vector| vector.norm() == norm) else { return found };
-        if norm <= tolerance * longest {
-            return found;
-        }
+        let norms: Vec<f64> = rest.iter().map(DVector::norm).collect();
+        let norm = norms.iter().copied().fold(0.0, f64::max);
+        let Some(next) = norms.iter().position(|other| *other == norm).map(|place| &rest[place]) else { return found };
         let direction = next / norm;
         for vector in &mut rest {
             for _ in 0..2 {

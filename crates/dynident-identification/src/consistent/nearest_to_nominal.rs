@@ -2,7 +2,6 @@
 
 use super::problem::typical_length_m;
 use dynident_dynamics::{Column, ParametricModel};
-use dynident_model::laws::Law;
 use dynident_model::{InertialParameters, Model};
 use nalgebra::{DMatrix, DVector};
 
@@ -20,7 +19,8 @@ pub fn nearest_to_nominal(robot: &ParametricModel, theta: &[f64]) -> Vec<f64> {
         let scale: f64 = match &columns[column] {
             Column::Body { parameter: 0, .. } => 1.0,
             Column::Body { parameter: 1..=3, .. } => length,
-            Column::Body { .. } | Column::Law(Law::DriveInertia(_)) => length * length,
+            Column::Body { .. } => length * length,
+            Column::Law(law) if law.is_drive_inertia() => length * length,
             Column::Law(_) => 1.0,
         };
         scale * scale

@@ -7,7 +7,6 @@ use dynident_estimation::LinearProblem;
 use dynident_estimation::consistent::{
     BaseMap, Ellipsoid, PhysicalBody, PhysicalFit, PhysicalProblem, PhysicalScalar, physical_fit, rough_body,
 };
-use dynident_model::laws::Law;
 use dynident_model::{InertialParameters, Model};
 
 /// A joint's noise counts as at least this share of its torque's root mean square: no model is better, and with noise-free (simulated) torque the prior would
@@ -128,7 +127,7 @@ pub fn consistency_problem(
     let scalars = laws.iter().zip(&prior[10 * model.dof()..]).map(|(law, &value)| {
         let bounded = law.is_nonnegative();
         let own = settings.laws.get(&law.symbol());
-        let scale = if matches!(law, Law::DriveInertia(_)) { mean_mass * length * length } else { 1.0 };
+        let scale = if law.is_drive_inertia() { mean_mass * length * length } else { 1.0 };
         let lower = own.map(|limits| limits[0]);
         PhysicalScalar {
             name: law.symbol(),

@@ -11,7 +11,7 @@ use dynident_estimation::{
     CovarianceMethod, Estimate, InstantRows, InstantVisitor, LinearProblem, MaximumLikelihoodEstimate,
     MaximumLikelihoodSettings, maximum_likelihood, student_half_width,
 };
-use dynident_model::laws::{JointMotion, Law};
+use dynident_model::laws::JointMotion;
 use dynident_recording::{AveragedPeriods, MotionBlock, MotionSettings, averaged_periods};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -90,7 +90,7 @@ pub(super) fn periodic(
     let TrainingRows { logs, model, problem, .. } = *rows;
     let method = "maximum-likelihood";
     let wrong = |message: String| IdentificationError::Estimator { method, message };
-    if let Some(law) = model.laws().iter().find(|law| matches!(law, Law::MaxwellSlip(_) | Law::Load(_))) {
+    if let Some(law) = model.laws().iter().find(|law| law.has_memory() || law.needs_load()) {
         return Err(wrong(format!(
             "{} depends on more than the motion of one instant: leave that law out, or take another method",
             law.symbol()

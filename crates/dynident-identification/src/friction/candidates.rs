@@ -50,7 +50,46 @@ impl Term {
         match self {
             Self::Coulomb => 1,
             Self::Sigmoid | Self::Stribeck => 2,
-            _ => 0,
+            Self::Viscous
+            | Self::AsymmetricViscous
+            | Self::CubeRoot
+            | Self::Quadratic
+            | Self::Load
+            | Self::MaxwellSlip => 0,
+        }
+    }
+
+    /// The candidate that a torque term belongs to; none where data do not choose it.
+    fn of(law: &Law) -> Option<Self> {
+        match law {
+            Law::Viscous(_) => Some(Self::Viscous),
+            Law::Coulomb(_) => Some(Self::Coulomb),
+            Law::DirectionalViscous(_) => Some(Self::AsymmetricViscous),
+            Law::Stribeck(_) => Some(Self::Stribeck),
+            Law::Sigmoid(_) => Some(Self::Sigmoid),
+            Law::Power(Power { exponent: PowerExponent::CubeRoot, .. }) => Some(Self::CubeRoot),
+            Law::Power(Power { exponent: PowerExponent::Quadratic, .. }) => Some(Self::Quadratic),
+            Law::Load(_) => Some(Self::Load),
+            Law::MaxwellSlip(_) => Some(Self::MaxwellSlip),
+            Law::DirectionalCoulomb(_)
+            | Law::TemperatureViscous(_)
+            | Law::TemperatureCoulomb(_)
+            | Law::Offset(_)
+            | Law::DriveInertia(_)
+            | Law::Coupling(_) => None,
+        }
+    }
+
+    /// True when it is tried in addition to the two models that a search begins with.
+    pub(crate) fn is_addition(self) -> bool {
+        match self {
+            Self::Viscous | Self::Coulomb | Self::Sigmoid => false,
+            Self::AsymmetricViscous
+            | Self::Stribeck
+            | Self::CubeRoot
+            | Self::Quadratic
+            | Self::Load
+            | Self::MaxwellSlip => true,
         }
     }
 
@@ -102,34 +141,34 @@ pub(crate) fn candidate_columns(search: &FrictionSearch, joint: usize) -> Vec<Ca
         _ => search.width,
     };
     let mut columns = Vec::new();
-    let mut add = |term, laws: Vec<Law>| {
-        let column = |law: &Law| CandidateColumn { term, law: law.clone(), stated: laws.clone() };
-        columns.extend(laws.iter().map(column));
+    let mut add = |laws: Vec<Law>| {
+        let column = |law: &Law| Some(CandidateColumn { term: Term::of(law)?, law: law.clone(), stated: laws.clone() });
+        columns.extend(laws.iter().filter_map(column));
     };
-    add(Term::Viscous, vec![Law::Viscous(Viscous { joint })]);
+    add(vec![Law::Viscous(Viscous { joint })]);
     for shape in shapes {
-        add(Term::Coulomb, vec![Law::Coulomb(Coulomb { joint, shape })]);
+        add(vec![Law::Coulomb(Coulomb { joint, shape })]);
     }
     let both = [Direction::Forward, Direction::Backward];
     let directions = both.map(|direction| Law::DirectionalViscous(DirectionalViscous { joint, direction }));
-    add(Term::AsymmetricViscous, directions.to_vec());
+    add(directions.to_vec());
     for width in SIGMOID_WIDTHS {
         for offset_speed in [-0.5 * width, 0.5 * width] {
-            add(Term::Sigmoid, vec![Law::Sigmoid(Sigmoid { joint, steepness: 2.0 / width, offset_speed })]);
+            add(vec![Law::Sigmoid(Sigmoid { joint, steepness: 2.0 / width, offset_speed })]);
         }
     }
     for speed in STRIBECK_SPEEDS {
         for exponent in STRIBECK_EXPONENTS {
             let shape = CoulombShape::Smooth { width: STRIBECK_WIDTH * speed };
-            add(Term::Stribeck, vec![Law::Stribeck(Stribeck { joint, speed, exponent, shape })]);
+            add(vec![Law::Stribeck(Stribeck { joint, speed, exponent, shape })]);
         }
     }
-    for (term, exponent) in [(Term::CubeRoot, PowerExponent::CubeRoot), (Term::Quadratic, PowerExponent::Quadratic)] {
-        add(term, vec![Law::Power(Power { joint, exponent, rounding: Power::ROUNDING })]);
+    for exponent in [PowerExponent::CubeRoot, PowerExponent::Quadratic] {
+        add(vec![Law::Power(Power { joint, exponent, rounding: Power::ROUNDING })]);
     }
-    add(Term::Load, vec![Law::Load(LoadFriction { joint, shape: CoulombShape::Smooth { width: load_width } })]);
+    add(vec![Law::Load(LoadFriction { joint, shape: CoulombShape::Smooth { width: load_width } })]);
     for yield_displacement in YIELDS {
-        add(Term::MaxwellSlip, vec![Law::MaxwellSlip(MaxwellSlip { joint, yield_displacement })]);
+        add(vec![Law::MaxwellSlip(MaxwellSlip { joint, yield_displacement })]);
     }
     columns
 }

@@ -237,11 +237,11 @@ fn search(joint: String, count: usize, folds: &JointFolds, columns: &[CandidateC
         tuned(folds, columns, vec![Term::Viscous, Term::Sigmoid], None),
     ];
     let mut at = usize::from(met[1].errors.rms() < met[0].errors.rms());
-    let additions =
-        [Term::AsymmetricViscous, Term::Stribeck, Term::CubeRoot, Term::Quadratic, Term::Load, Term::MaxwellSlip];
+    let mut additions: Vec<Term> = columns.iter().map(|column| column.term).filter(|term| term.is_addition()).collect();
+    additions.dedup();
     for _ in 0..MOST_ADDED {
         let start = met.len();
-        for added in additions {
+        for &added in &additions {
             if met[at].terms.contains(&added) {
                 continue;
             }

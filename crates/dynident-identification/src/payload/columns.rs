@@ -336,7 +336,7 @@ fn check(
     if !settings.friction.is_empty() {
         return Err(PayloadError::FrictionChoice);
     }
-    if loaded && model.laws().iter().any(|law| matches!(law, Law::Load(_))) {
+    if loaded && model.laws().iter().any(Law::needs_load) {
         return Err(PayloadError::LoadFriction);
     }
     Ok(())

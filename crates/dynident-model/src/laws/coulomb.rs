@@ -1,6 +1,10 @@
 //! Coulomb friction: `τ = F_c s(q̇)` with a sign or a smooth step `s`.
 
-use super::JointMotion;
+use super::kind::{
+    JointProperty, MotionFunction, SpeedCurve, SpeedFriction, SpeedFunction, TermAction, TermConstant, TermJoints,
+    TermKind, halves,
+};
+use super::{JointMotion, LawInput};
 
 /// The step near zero speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +43,24 @@ impl CoulombShape {
             }
         }
     }
+
+    /// As friction of a robot. The dead band of a sign is a device for noisy speeds of a log: a robot has none.
+    pub(super) fn curve(&self) -> SpeedCurve<'_> {
+        match self {
+            Self::Sign { .. } => SpeedCurve::Step { forward: true, backward: true },
+            Self::Smooth { .. } => SpeedCurve::Smooth(self),
+        }
+    }
+}
+
+impl SpeedFunction for CoulombShape {
+    fn value(&self, dq: f64) -> f64 {
+        self.step(dq)
+    }
+
+    fn slope(&self, dq: f64) -> f64 {
+        CoulombShape::slope(*self, dq)
+    }
 }
 
 /// Coulomb friction of one joint, Nm (N).
@@ -50,10 +72,48 @@ pub struct Coulomb {
     pub shape: CoulombShape,
 }
 
-impl Coulomb {
-    pub(super) fn column(self, motion: &JointMotion<'_>, out: &mut [f64]) {
-        for (to, &dq) in out.iter_mut().zip(motion.dq_of(self.joint)) {
-            *to = self.shape.step(dq);
-        }
+impl TermKind for Coulomb {
+    fn name(&self) -> &'static str {
+        "coulomb"
+    }
+
+    fn symbol(&self) -> String {
+        format!("fc{}", self.joint + 1)
+    }
+
+    fn unit(&self) -> &'static str {
+        "Nm"
+    }
+
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn is_nonnegative(&self) -> bool {
+        true
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        TermAction::Friction(SpeedFriction::of(self.shape.curve()))
+    }
+
+    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
+        vec![("shape", TermConstant::Step(self.shape))]
+    }
+
+    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
+        self.shape.fill(self.joint, motion, out);
+    }
+
+    fn pull_back(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
+        self.shape.add_slopes(self.joint, motion, weights, by_dq);
+    }
+
+    fn functions(&self) -> Vec<MotionFunction> {
+        halves(self.joint, &format!("{:?}", self.shape)).into()
+    }
+
+    fn property(&self) -> Option<JointProperty> {
+        Some(JointProperty::Friction)
     }
 }

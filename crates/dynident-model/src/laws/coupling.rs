@@ -6,7 +6,8 @@
 //! * viscous friction: `τ_1 += k_1 k_2 F q̇_2`, `τ_2 += k_1 k_2 F q̇_1`,
 //! * Coulomb friction: `τ_1 += k_1 F s(w)`, `τ_2 += k_2 F s(w)`.
 
-use super::{CoulombShape, JointMotion};
+use super::kind::{MotionFunction, SpeedFriction, TermAction, TermConstant, TermJoints, TermKind};
+use super::{CoulombShape, JointMotion, LawInput};
 
 /// What the shared drive adds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,8 +35,12 @@ pub struct Coupling {
     pub effect: CouplingEffect,
 }
 
-impl Coupling {
-    pub(super) fn symbol(&self) -> String {
+impl TermKind for Coupling {
+    fn name(&self) -> &'static str {
+        "coupling"
+    }
+
+    fn symbol(&self) -> String {
         let prefix = match self.effect {
             CouplingEffect::Inertia => "Ia",
             CouplingEffect::Viscous => "fv",
@@ -44,7 +49,44 @@ impl Coupling {
         format!("{prefix}_{}", self.name)
     }
 
-    pub(super) fn column(&self, row: usize, motion: &JointMotion<'_>, out: &mut [f64]) {
+    fn unit(&self) -> &'static str {
+        match self.effect {
+            CouplingEffect::Inertia => "kg m^2",
+            CouplingEffect::Viscous => "Nm s/rad",
+            CouplingEffect::Coulomb(_) => "Nm",
+        }
+    }
+
+    fn joints(&self) -> TermJoints {
+        TermJoints::Two(self.first, self.second)
+    }
+
+    fn is_nonnegative(&self) -> bool {
+        // Cross terms are judged with their drive.
+        false
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        let factor = self.ratios[0] * self.ratios[1];
+        match &self.effect {
+            CouplingEffect::Inertia => TermAction::Inertia { factor },
+            CouplingEffect::Viscous => TermAction::Damping { factor },
+            CouplingEffect::Coulomb(shape) => {
+                TermAction::Friction(SpeedFriction { ratios: self.ratios, ..SpeedFriction::of(shape.curve()) })
+            }
+        }
+    }
+
+    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
+        let (effect, shape) = match self.effect {
+            CouplingEffect::Inertia => ("inertia", TermConstant::Nothing),
+            CouplingEffect::Viscous => ("viscous", TermConstant::Nothing),
+            CouplingEffect::Coulomb(shape) => ("coulomb", TermConstant::Step(shape)),
+        };
+        vec![("effect", TermConstant::Word(effect)), ("ratios", TermConstant::Numbers(self.ratios)), ("shape", shape)]
+    }
+
+    fn column(&self, row: usize, motion: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
         let (other, own_ratio) =
             if row == self.first { (self.second, self.ratios[0]) } else { (self.first, self.ratios[1]) };
         let cross = self.ratios[0] * self.ratios[1];
@@ -68,14 +110,7 @@ impl Coupling {
         }
     }
 
-    pub(super) fn pull_back(
-        &self,
-        row: usize,
-        motion: &JointMotion<'_>,
-        weights: &[f64],
-        by_dq: &mut [f64],
-        by_ddq: &mut [f64],
-    ) {
+    fn pull_back(&self, row: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], by_ddq: &mut [f64]) {
         let (other, own_ratio) =
             if row == self.first { (self.second, self.ratios[0]) } else { (self.first, self.ratios[1]) };
         let cross = self.ratios[0] * self.ratios[1];
@@ -95,8 +130,22 @@ impl Coupling {
         }
     }
 
-    pub(super) fn mass_matrix_entry(&self, row: usize, column: usize) -> f64 {
-        let crosses = (row, column) == (self.first, self.second) || (row, column) == (self.second, self.first);
-        if self.effect == CouplingEffect::Inertia && crosses { self.ratios[0] * self.ratios[1] } else { 0.0 }
+    fn functions(&self) -> Vec<MotionFunction> {
+        let both = |of_first: String, of_second: String, factors: [f64; 2]| {
+            let rows = [(self.first, of_first, factors[0]), (self.second, of_second, factors[1])];
+            rows.map(|(row, function, factor)| MotionFunction { row, function, factor }).into()
+        };
+        match self.effect {
+            CouplingEffect::Inertia => Vec::new(),
+            CouplingEffect::Viscous => {
+                let of_other = |other: usize| format!("viscous of joint {other}");
+                let cross = self.ratios[0] * self.ratios[1];
+                both(of_other(self.second), of_other(self.first), [cross; 2])
+            }
+            CouplingEffect::Coulomb(shape) => {
+                let function = format!("{:?}", (self.first, self.second, self.ratios, shape));
+                both(function.clone(), function, self.ratios)
+            }
+        }
     }
 }

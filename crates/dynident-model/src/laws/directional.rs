@@ -3,7 +3,10 @@
 //! Viscous: `τ = F_v⁺ max(q̇, 0) + F_v⁻ min(q̇, 0)`. Coulomb: `τ = F_c⁺ max(s(q̇), 0) + F_c⁻ min(s(q̇), 0)` with a step `s`. All four parameters are
 //! positive where friction takes power. With a step that is a sign, the two Coulomb columns and an offset say the same: keep two of the three.
 
-use super::{CoulombShape, JointMotion};
+use super::kind::{
+    MotionFunction, SpeedCurve, SpeedFriction, SpeedFunction, TermAction, TermConstant, TermJoints, TermKind, halves,
+};
+use super::{CoulombShape, JointMotion, LawInput};
 
 /// Sense of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,6 +35,21 @@ impl Direction {
         }
     }
 
+    fn constant(self) -> TermConstant {
+        TermConstant::Word(match self {
+            Self::Forward => "+",
+            Self::Backward => "-",
+        })
+    }
+
+    /// Its half of a function.
+    fn half(self, [forward, backward]: [MotionFunction; 2]) -> Vec<MotionFunction> {
+        match self {
+            Self::Forward => vec![forward],
+            Self::Backward => vec![backward],
+        }
+    }
+
     #[inline]
     fn holds(self, dq: f64) -> bool {
         match self {
@@ -50,13 +68,55 @@ pub struct DirectionalViscous {
     pub direction: Direction,
 }
 
-impl DirectionalViscous {
-    pub(super) fn value(self, dq: f64) -> f64 {
+impl SpeedFunction for DirectionalViscous {
+    fn value(&self, dq: f64) -> f64 {
         self.direction.part(dq)
     }
 
-    pub(super) fn slope(self, dq: f64) -> f64 {
+    fn slope(&self, dq: f64) -> f64 {
         f64::from(self.direction.holds(dq))
+    }
+}
+
+impl TermKind for DirectionalViscous {
+    fn name(&self) -> &'static str {
+        "directional-viscous"
+    }
+
+    fn symbol(&self) -> String {
+        format!("fv{}{}", self.joint + 1, self.direction.sign())
+    }
+
+    fn unit(&self) -> &'static str {
+        "Nm s/rad"
+    }
+
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn is_nonnegative(&self) -> bool {
+        true
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        TermAction::Friction(SpeedFriction::of(SpeedCurve::Smooth(self)))
+    }
+
+    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
+        vec![("direction", self.direction.constant())]
+    }
+
+    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
+        self.fill(self.joint, motion, out);
+    }
+
+    fn pull_back(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
+        self.add_slopes(self.joint, motion, weights, by_dq);
+    }
+
+    fn functions(&self) -> Vec<MotionFunction> {
+        self.direction.half(halves(self.joint, "viscous"))
     }
 }
 
@@ -71,19 +131,59 @@ pub struct DirectionalCoulomb {
     pub shape: CoulombShape,
 }
 
-impl DirectionalCoulomb {
-    pub(super) fn value(self, dq: f64) -> f64 {
+impl SpeedFunction for DirectionalCoulomb {
+    fn value(&self, dq: f64) -> f64 {
         self.direction.part(self.shape.step(dq))
     }
 
-    pub(super) fn slope(self, dq: f64) -> f64 {
+    fn slope(&self, dq: f64) -> f64 {
         if self.direction.holds(dq) { self.shape.slope(dq) } else { 0.0 }
     }
 }
 
-/// The columns of a motion are those of its speed.
-pub(super) fn by_speed(joint: usize, motion: &JointMotion<'_>, out: &mut [f64], value: impl Fn(f64) -> f64) {
-    for (to, &dq) in out.iter_mut().zip(motion.dq_of(joint)) {
-        *to = value(dq);
+impl TermKind for DirectionalCoulomb {
+    fn name(&self) -> &'static str {
+        "directional-coulomb"
+    }
+
+    fn symbol(&self) -> String {
+        format!("fc{}{}", self.joint + 1, self.direction.sign())
+    }
+
+    fn unit(&self) -> &'static str {
+        "Nm"
+    }
+
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn is_nonnegative(&self) -> bool {
+        true
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        let forward = self.direction == Direction::Forward;
+        let curve = match self.shape {
+            CoulombShape::Sign { .. } => SpeedCurve::Step { forward, backward: !forward },
+            CoulombShape::Smooth { .. } => SpeedCurve::Smooth(self),
+        };
+        TermAction::Friction(SpeedFriction::of(curve))
+    }
+
+    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
+        vec![("direction", self.direction.constant()), ("shape", TermConstant::Step(self.shape))]
+    }
+
+    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
+        self.fill(self.joint, motion, out);
+    }
+
+    fn pull_back(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
+        self.add_slopes(self.joint, motion, weights, by_dq);
+    }
+
+    fn functions(&self) -> Vec<MotionFunction> {
+        self.direction.half(halves(self.joint, &format!("{:?}", self.shape)))
     }
 }

@@ -1,6 +1,7 @@
 //! Inertia of rotor and gear, reflected to the joint: `τ = I_a q̈`.
 
-use super::JointMotion;
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind};
+use super::{JointMotion, LawInput};
 
 /// Reflected drive inertia of one joint, kg m² (kg).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,8 +10,41 @@ pub struct DriveInertia {
     pub joint: usize,
 }
 
-impl DriveInertia {
-    pub(super) fn column(self, motion: &JointMotion<'_>, out: &mut [f64]) {
+impl TermKind for DriveInertia {
+    fn name(&self) -> &'static str {
+        "drive-inertia"
+    }
+
+    fn symbol(&self) -> String {
+        format!("Ia{}", self.joint + 1)
+    }
+
+    fn unit(&self) -> &'static str {
+        "kg m^2"
+    }
+
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn is_nonnegative(&self) -> bool {
+        true
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        TermAction::Inertia { factor: 1.0 }
+    }
+
+    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
+        Vec::new()
+    }
+
+    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
         out.copy_from_slice(motion.ddq_of(self.joint));
+    }
+
+    fn pull_back(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], _: &mut [f64], by_ddq: &mut [f64]) {
+        let range = self.joint * motion.samples..(self.joint + 1) * motion.samples;
+        by_ddq[range].iter_mut().zip(weights).for_each(|(to, w)| *to += w);
     }
 }

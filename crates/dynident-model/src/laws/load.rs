@@ -3,7 +3,8 @@
 //! `τ_load` is what the gear carries: the torque of the rigid bodies, by an earlier estimate. A law knows motions only, so the load comes with them (see
 //! [`LawInput`](super::LawInput)); without one the column is zero. Source: Hamon, Gautier and Garrec, IROS 2010, 6187.
 
-use super::{CoulombShape, JointMotion};
+use super::kind::{SpeedFriction, TermAction, TermConstant, TermJoints, TermKind};
+use super::{CoulombShape, JointMotion, LawInput};
 
 /// Share of the load that one joint loses to friction; no unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,11 +15,44 @@ pub struct LoadFriction {
     pub shape: CoulombShape,
 }
 
-impl LoadFriction {
-    pub(super) fn column(self, motion: &JointMotion<'_>, load: Option<&[f64]>, out: &mut [f64]) {
-        let Some(load) = load else { return out.fill(0.0) };
+impl TermKind for LoadFriction {
+    fn name(&self) -> &'static str {
+        "load"
+    }
+
+    fn symbol(&self) -> String {
+        format!("fl{}", self.joint + 1)
+    }
+
+    fn unit(&self) -> &'static str {
+        "1"
+    }
+
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn is_nonnegative(&self) -> bool {
+        true
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        TermAction::Friction(SpeedFriction { by_load: true, ..SpeedFriction::of(self.shape.curve()) })
+    }
+
+    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
+        vec![("shape", TermConstant::Step(self.shape))]
+    }
+
+    fn column(&self, _: usize, motion: &JointMotion<'_>, input: &mut LawInput<'_>, out: &mut [f64]) {
+        let Some(load) = input.load else { return out.fill(0.0) };
+        assert_eq!(load.len(), motion.samples, "one load per sample");
         for ((to, &dq), load) in out.iter_mut().zip(motion.dq_of(self.joint)).zip(load) {
             *to = load.abs() * self.shape.step(dq);
         }
+    }
+
+    fn pull_back(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: &mut [f64], _: &mut [f64]) {
+        // Without a load the column is zero.
     }
 }

@@ -1,10 +1,11 @@
 //! Laws beyond rigid bodies: friction, drive inertia, offsets, couplings. Each law is one parameter and one regressor column per
-//! joint that feels it; each kind is one file here and one line in [`Law`].
+//! joint that feels it; each kind is one file here, which says all that there is to say of it, a variant of [`Law`] and a line in its `kind`.
 
 mod coulomb;
 mod coupling;
 mod directional;
 mod drive_inertia;
+mod kind;
 mod load;
 mod offset;
 mod order;
@@ -19,6 +20,9 @@ pub use coulomb::{Coulomb, CoulombShape};
 pub use coupling::{Coupling, CouplingEffect};
 pub use directional::{Direction, DirectionalCoulomb, DirectionalViscous};
 pub use drive_inertia::DriveInertia;
+pub use kind::{
+    JointProperty, MotionFunction, SpeedCurve, SpeedFriction, SpeedFunction, TermAction, TermConstant, TermJoints,
+};
 pub use load::LoadFriction;
 pub use offset::Offset;
 pub use order::sort_terms;
@@ -30,8 +34,7 @@ pub use temperature::{TemperatureCoulomb, TemperatureViscous};
 pub use viscous::Viscous;
 
 use crate::tree::Model;
-use directional::by_speed;
-use temperature::by_temperature;
+use kind::TermKind;
 
 /// Joint motion of a block of samples, joint-major: joint `j`, sample `s` stands at `j * samples + s`.
 #[derive(Clone, Copy, Debug)]
@@ -108,99 +111,168 @@ pub enum Law {
 }
 
 impl Law {
+    /// The one place that knows all kinds.
+    fn kind(&self) -> &dyn TermKind {
+        match self {
+            Self::Viscous(term) => term,
+            Self::Coulomb(term) => term,
+            Self::DirectionalViscous(term) => term,
+            Self::DirectionalCoulomb(term) => term,
+            Self::Stribeck(term) => term,
+            Self::Sigmoid(term) => term,
+            Self::Power(term) => term,
+            Self::Load(term) => term,
+            Self::MaxwellSlip(term) => term,
+            Self::TemperatureViscous(term) => term,
+            Self::TemperatureCoulomb(term) => term,
+            Self::Offset(term) => term,
+            Self::DriveInertia(term) => term,
+            Self::Coupling(term) => term,
+        }
+    }
+
+    /// Name of the kind: `viscous`, `coulomb`, `maxwell-slip`, ..
+    pub fn kind_name(&self) -> &'static str {
+        self.kind().name()
+    }
+
     /// Readable name of the parameter: its symbol, and the joint's number from 1 (`fv3`), as in the field's papers.
     pub fn symbol(&self) -> String {
-        match self {
-            Self::Viscous(law) => format!("fv{}", law.joint + 1),
-            Self::Coulomb(law) => format!("fc{}", law.joint + 1),
-            Self::DirectionalViscous(law) => format!("fv{}{}", law.joint + 1, law.direction.sign()),
-            Self::DirectionalCoulomb(law) => format!("fc{}{}", law.joint + 1, law.direction.sign()),
-            Self::Stribeck(law) => format!("fs{}", law.joint + 1),
-            Self::Sigmoid(law) => format!("sig{}", law.joint + 1),
-            Self::Power(Power { joint, exponent: PowerExponent::CubeRoot, .. }) => format!("fr{}", joint + 1),
-            Self::Power(Power { joint, exponent: PowerExponent::Quadratic, .. }) => format!("fq{}", joint + 1),
-            Self::Load(law) => format!("fl{}", law.joint + 1),
-            Self::MaxwellSlip(law) => format!("slip{}_{}", law.joint + 1, law.yield_displacement),
-            Self::TemperatureViscous(law) => format!("fvT{}", law.joint + 1),
-            Self::TemperatureCoulomb(law) => format!("fcT{}", law.joint + 1),
-            Self::Offset(law) => format!("off{}", law.joint + 1),
-            Self::DriveInertia(law) => format!("Ia{}", law.joint + 1),
-            Self::Coupling(law) => law.symbol(),
-        }
+        self.kind().symbol()
     }
 
     /// Unit of the parameter at a turning joint.
     pub fn unit(&self) -> &'static str {
-        match self {
-            Self::Viscous(_)
-            | Self::DirectionalViscous(_)
-            | Self::Coupling(Coupling { effect: CouplingEffect::Viscous, .. }) => "Nm s/rad",
-            Self::Power(Power { exponent: PowerExponent::CubeRoot, .. }) => "Nm (s/rad)^(1/3)",
-            Self::Power(Power { exponent: PowerExponent::Quadratic, .. }) => "Nm (s/rad)^2",
-            Self::Load(_) => "1",
-            Self::TemperatureViscous(_) => "Nm s/(rad K)",
-            Self::TemperatureCoulomb(_) => "Nm/K",
-            Self::Coulomb(_)
-            | Self::DirectionalCoulomb(_)
-            | Self::Stribeck(_)
-            | Self::Sigmoid(_)
-            | Self::MaxwellSlip(_)
-            | Self::Offset(_)
-            | Self::Coupling(Coupling { effect: CouplingEffect::Coulomb(_), .. }) => "Nm",
-            Self::DriveInertia(_) | Self::Coupling(Coupling { effect: CouplingEffect::Inertia, .. }) => "kg m^2",
-        }
+        self.kind().unit()
     }
 
-    /// The one joint that the law belongs to; none for a drive that turns with two.
-    fn own_joint(&self) -> Option<usize> {
-        Some(match self {
-            Self::Viscous(law) => law.joint,
-            Self::Coulomb(law) => law.joint,
-            Self::DirectionalViscous(law) => law.joint,
-            Self::DirectionalCoulomb(law) => law.joint,
-            Self::Stribeck(law) => law.joint,
-            Self::Sigmoid(law) => law.joint,
-            Self::Power(law) => law.joint,
-            Self::Load(law) => law.joint,
-            Self::MaxwellSlip(law) => law.joint,
-            Self::TemperatureViscous(law) => law.joint,
-            Self::TemperatureCoulomb(law) => law.joint,
-            Self::Offset(law) => law.joint,
-            Self::DriveInertia(law) => law.joint,
-            Self::Coupling(_) => return None,
-        })
+    /// Its constants by name, beside joints and parameter.
+    pub fn constants(&self) -> Vec<(&'static str, TermConstant)> {
+        self.kind().constants()
     }
 
     /// The joints that feel this law.
     pub fn joints(&self) -> Vec<usize> {
-        match self {
-            Self::Coupling(law) => vec![law.first, law.second],
-            _ => self.own_joint().into_iter().collect(),
+        match self.kind().joints() {
+            TermJoints::One(joint) => vec![joint],
+            TermJoints::Two(first, second) => vec![first, second],
+        }
+    }
+
+    /// The one joint that the law belongs to; none for a drive that turns with two.
+    pub fn own_joint(&self) -> Option<usize> {
+        match self.kind().joints() {
+            TermJoints::One(joint) => Some(joint),
+            TermJoints::Two(..) => None,
         }
     }
 
     /// True when joint `joint` feels this law. Allocates nothing, unlike [`joints`](Law::joints).
     pub fn acts_on(&self, joint: usize) -> bool {
-        match self {
-            Self::Coupling(law) => law.first == joint || law.second == joint,
-            _ => self.own_joint() == Some(joint),
+        match self.kind().joints() {
+            TermJoints::One(own) => own == joint,
+            TermJoints::Two(first, second) => first == joint || second == joint,
+        }
+    }
+
+    /// Where it enters the equation of motion.
+    pub fn action(&self) -> TermAction<'_> {
+        self.kind().action()
+    }
+
+    /// The functions of the motion that friction adds to torques; none for inertia and offset.
+    pub fn functions(&self) -> Vec<MotionFunction> {
+        self.kind().functions()
+    }
+
+    /// The property of its joint by which a robot's description states the parameter.
+    pub fn property(&self) -> Option<JointProperty> {
+        self.kind().property()
+    }
+
+    /// The parameter by the description of `model`, where that says anything of it.
+    ///
+    /// # Panics
+    /// If the model does not have its joints.
+    pub fn described(&self, model: &Model) -> Option<f64> {
+        let joint = &model.joints()[self.own_joint()?];
+        match self.property()? {
+            JointProperty::Damping => joint.damping,
+            JointProperty::Friction => joint.friction,
         }
     }
 
     /// True when a negative parameter is not possible: friction takes power from the motion at every speed, inertia is positive. An offset may have either sign, and so may a change with temperature; a coupling's
     /// cross terms are judged with their drive.
     pub fn is_nonnegative(&self) -> bool {
-        !matches!(self, Self::Offset(_) | Self::Coupling(_) | Self::TemperatureViscous(_) | Self::TemperatureCoulomb(_))
+        self.kind().is_nonnegative()
     }
 
     /// True when the column needs the joint's temperature.
     pub fn needs_temperature(&self) -> bool {
-        matches!(self, Self::TemperatureViscous(_) | Self::TemperatureCoulomb(_))
+        match self.action() {
+            TermAction::Temperature => true,
+            TermAction::Inertia { .. }
+            | TermAction::Damping { .. }
+            | TermAction::Constant
+            | TermAction::Friction(_)
+            | TermAction::Hysteresis => false,
+        }
+    }
+
+    /// True when the column needs the joint's load.
+    pub fn needs_load(&self) -> bool {
+        match self.action() {
+            TermAction::Friction(friction) => friction.by_load,
+            TermAction::Inertia { .. }
+            | TermAction::Damping { .. }
+            | TermAction::Constant
+            | TermAction::Hysteresis
+            | TermAction::Temperature => false,
+        }
+    }
+
+    /// True when the column depends on earlier samples.
+    pub fn has_memory(&self) -> bool {
+        match self.action() {
+            TermAction::Hysteresis => true,
+            TermAction::Inertia { .. }
+            | TermAction::Damping { .. }
+            | TermAction::Constant
+            | TermAction::Friction(_)
+            | TermAction::Temperature => false,
+        }
+    }
+
+    /// True for friction, of one joint or of a shared drive: all but inertia and offset.
+    pub fn is_friction(&self) -> bool {
+        match self.action() {
+            TermAction::Inertia { .. } | TermAction::Constant => false,
+            TermAction::Damping { .. } | TermAction::Friction(_) | TermAction::Hysteresis | TermAction::Temperature => {
+                true
+            }
+        }
     }
 
     /// True for friction of one joint: all but offset, drive inertia and couplings.
     pub fn is_joint_friction(&self) -> bool {
-        !matches!(self, Self::Offset(_) | Self::DriveInertia(_) | Self::Coupling(_))
+        self.is_friction() && self.own_joint().is_some()
+    }
+
+    /// True for the inertia of one joint's drive.
+    pub fn is_drive_inertia(&self) -> bool {
+        self.mass_matrix_factor().is_some() && self.own_joint().is_some()
+    }
+
+    fn mass_matrix_factor(&self) -> Option<f64> {
+        match self.action() {
+            TermAction::Inertia { factor } => Some(factor),
+            TermAction::Damping { .. }
+            | TermAction::Constant
+            | TermAction::Friction(_)
+            | TermAction::Hysteresis
+            | TermAction::Temperature => None,
+        }
     }
 
     /// The regressor column of this parameter in the row of joint `row`: `out[s] = ∂τ_row/∂parameter` at sample `s`. The block counts as a recording of its own, without known
@@ -221,29 +293,7 @@ impl Law {
         assert_eq!(out.len(), motion.samples);
         assert!(self.acts_on(row), "joint {row} does not feel {}", self.symbol());
         assert!(input.temperature_c.is_none_or(|t| t.len() == motion.samples), "one temperature per sample");
-        match self {
-            Self::Viscous(law) => law.column(motion, out),
-            Self::Coulomb(law) => law.column(motion, out),
-            Self::DirectionalViscous(law) => by_speed(row, motion, out, |dq| law.value(dq)),
-            Self::DirectionalCoulomb(law) => by_speed(row, motion, out, |dq| law.value(dq)),
-            Self::Stribeck(law) => by_speed(row, motion, out, |dq| law.value(dq)),
-            Self::Sigmoid(law) => by_speed(row, motion, out, |dq| law.value(dq)),
-            Self::Power(law) => by_speed(row, motion, out, |dq| law.value(dq)),
-            Self::Load(law) => {
-                assert!(input.load.is_none_or(|load| load.len() == motion.samples), "one load per sample");
-                law.column(motion, input.load, out);
-            }
-            Self::MaxwellSlip(law) => law.column(motion.q_of(row), input.memory, out),
-            Self::TemperatureViscous(law) => {
-                by_temperature(row, motion, input.temperature_c, out, |t, dq| law.value(t, dq));
-            }
-            Self::TemperatureCoulomb(law) => {
-                by_temperature(row, motion, input.temperature_c, out, |t, dq| law.value(t, dq));
-            }
-            Self::Offset(law) => law.column(out),
-            Self::DriveInertia(law) => law.column(motion, out),
-            Self::Coupling(law) => law.column(row, motion, out),
-        }
+        self.kind().column(row, motion, input, out);
     }
 
     /// Adds to `by_dq` and `by_ddq` (joint-major) the derivatives of `Σ weights[s] · column[s]` by the speeds and accelerations, where `column` is that of
@@ -260,47 +310,27 @@ impl Law {
         by_ddq: &mut [f64],
     ) {
         assert_eq!(weights.len(), motion.samples);
-        let range = |joint: usize| joint * motion.samples..(joint + 1) * motion.samples;
-        let slopes = |slope: &dyn Fn(f64) -> f64, by_dq: &mut [f64]| {
-            for ((to, w), &dq) in by_dq[range(row)].iter_mut().zip(weights).zip(motion.dq_of(row)) {
-                *to += w * slope(dq);
-            }
-        };
-        match self {
-            Self::Viscous(_) => slopes(&|_| 1.0, by_dq),
-            Self::Coulomb(law) => slopes(&|dq| law.shape.slope(dq), by_dq),
-            Self::DirectionalViscous(law) => slopes(&|dq| law.slope(dq), by_dq),
-            Self::DirectionalCoulomb(law) => slopes(&|dq| law.slope(dq), by_dq),
-            Self::Stribeck(law) => slopes(&|dq| law.slope(dq), by_dq),
-            Self::Sigmoid(law) => slopes(&|dq| law.slope(dq), by_dq),
-            Self::Power(law) => slopes(&|dq| law.slope(dq), by_dq),
-            // Without a load or a temperature the column is zero.
-            Self::Load(_)
-            | Self::TemperatureViscous(_)
-            | Self::TemperatureCoulomb(_)
-            | Self::MaxwellSlip(_)
-            | Self::Offset(_) => {}
-            Self::DriveInertia(law) => {
-                by_ddq[range(law.joint)].iter_mut().zip(weights).for_each(|(to, w)| *to += w);
-            }
-            Self::Coupling(law) => law.pull_back(row, motion, weights, by_dq, by_ddq),
-        }
+        self.kind().pull_back(row, motion, weights, by_dq, by_ddq);
     }
 
     /// What this parameter adds to entry (`row`, `column`) of the mass matrix: a constant, zero for friction.
     pub fn mass_matrix_entry(&self, row: usize, column: usize) -> f64 {
-        match self {
-            Self::DriveInertia(law) => f64::from(row == law.joint && column == law.joint),
-            Self::Coupling(law) => law.mass_matrix_entry(row, column),
-            _ => 0.0,
-        }
+        let entry = match self.kind().joints() {
+            TermJoints::One(joint) => (row, column) == (joint, joint),
+            TermJoints::Two(first, second) => (row, column) == (first, second) || (row, column) == (second, first),
+        };
+        self.mass_matrix_factor().filter(|_| entry).unwrap_or(0.0)
     }
 
     /// What this parameter adds to the torque of joint `row` at rest: a constant, one for the offset of that joint.
     pub fn constant_torque(&self, row: usize) -> f64 {
-        match self {
-            Self::Offset(law) => f64::from(row == law.joint),
-            _ => 0.0,
+        match self.action() {
+            TermAction::Constant => f64::from(self.acts_on(row)),
+            TermAction::Inertia { .. }
+            | TermAction::Damping { .. }
+            | TermAction::Friction(_)
+            | TermAction::Hysteresis
+            | TermAction::Temperature => 0.0,
         }
     }
 }

@@ -1,5 +1,8 @@
 //! A constant torque: sensor bias, unmodelled spring, asymmetric friction. `τ = τ_0`.
 
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind};
+use super::{JointMotion, LawInput};
+
 /// Constant torque of one joint, Nm (N).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Offset {
@@ -7,9 +10,40 @@ pub struct Offset {
     pub joint: usize,
 }
 
-impl Offset {
-    #[allow(clippy::unused_self, reason = "all laws are asked in the same way")]
-    pub(super) fn column(self, out: &mut [f64]) {
+impl TermKind for Offset {
+    fn name(&self) -> &'static str {
+        "offset"
+    }
+
+    fn symbol(&self) -> String {
+        format!("off{}", self.joint + 1)
+    }
+
+    fn unit(&self) -> &'static str {
+        "Nm"
+    }
+
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn is_nonnegative(&self) -> bool {
+        false
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        TermAction::Constant
+    }
+
+    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
+        Vec::new()
+    }
+
+    fn column(&self, _: usize, _: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
         out.fill(1.0);
+    }
+
+    fn pull_back(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: &mut [f64], _: &mut [f64]) {
+        // It does not change.
     }
 }

@@ -2,6 +2,9 @@
 //!
 //! `p = 1/3`: the sub-linear losses of harmonic drives. `p = 2`: churning lubricant. The rounding keeps the slope finite at rest, where that of a cube root is not.
 
+use super::kind::{SpeedCurve, SpeedFriction, SpeedFunction, TermAction, TermConstant, TermJoints, TermKind};
+use super::{JointMotion, LawInput};
+
 /// Friction of one joint by a power of its speed, Nm (s/rad)^p.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Power {
@@ -36,14 +39,61 @@ impl PowerExponent {
     }
 }
 
-impl Power {
-    pub(super) fn value(self, dq: f64) -> f64 {
+impl SpeedFunction for Power {
+    fn value(&self, dq: f64) -> f64 {
         dq * dq.hypot(self.rounding).powf(self.exponent.value() - 1.0)
     }
 
-    pub(super) fn slope(self, dq: f64) -> f64 {
+    fn slope(&self, dq: f64) -> f64 {
         let (p, size) = (self.exponent.value(), dq.hypot(self.rounding));
         let share = dq / size;
         size.powf(p - 1.0) * (1.0 + (p - 1.0) * share * share)
+    }
+}
+
+impl TermKind for Power {
+    fn name(&self) -> &'static str {
+        "power"
+    }
+
+    fn symbol(&self) -> String {
+        match self.exponent {
+            PowerExponent::CubeRoot => format!("fr{}", self.joint + 1),
+            PowerExponent::Quadratic => format!("fq{}", self.joint + 1),
+        }
+    }
+
+    fn unit(&self) -> &'static str {
+        match self.exponent {
+            PowerExponent::CubeRoot => "Nm (s/rad)^(1/3)",
+            PowerExponent::Quadratic => "Nm (s/rad)^2",
+        }
+    }
+
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn is_nonnegative(&self) -> bool {
+        true
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        TermAction::Friction(SpeedFriction::of(SpeedCurve::Smooth(self)))
+    }
+
+    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
+        vec![
+            ("exponent", TermConstant::Number(self.exponent.value())),
+            ("rounding", TermConstant::Number(self.rounding)),
+        ]
+    }
+
+    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
+        self.fill(self.joint, motion, out);
+    }
+
+    fn pull_back(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
+        self.add_slopes(self.joint, motion, weights, by_dq);
     }
 }

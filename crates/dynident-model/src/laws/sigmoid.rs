@@ -3,6 +3,9 @@
 //! It is a Coulomb step of height `φ₁` whose middle lies at `-φ₃`; linear in `φ₁` at given `φ₂` and `φ₃`. With `φ₃ = 0` it is half a smooth Coulomb step of width `2/φ₂`. Source: Gaz,
 //! Cognetti, Oliva, Robuffo Giordano and De Luca, IEEE RA-L 4 (2019) 4147.
 
+use super::kind::{SpeedCurve, SpeedFriction, SpeedFunction, TermAction, TermConstant, TermJoints, TermKind};
+use super::{JointMotion, LawInput};
+
 /// The step of one joint, Nm (N).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sigmoid {
@@ -19,13 +22,54 @@ fn logistic(x: f64) -> f64 {
     0.5 * (1.0 + (0.5 * x).tanh())
 }
 
-impl Sigmoid {
-    pub(super) fn value(self, dq: f64) -> f64 {
+impl SpeedFunction for Sigmoid {
+    fn value(&self, dq: f64) -> f64 {
         logistic(self.steepness * (dq + self.offset_speed)) - logistic(self.steepness * self.offset_speed)
     }
 
-    pub(super) fn slope(self, dq: f64) -> f64 {
+    fn slope(&self, dq: f64) -> f64 {
         let share = logistic(self.steepness * (dq + self.offset_speed));
         self.steepness * share * (1.0 - share)
+    }
+}
+
+impl TermKind for Sigmoid {
+    fn name(&self) -> &'static str {
+        "sigmoid"
+    }
+
+    fn symbol(&self) -> String {
+        format!("sig{}", self.joint + 1)
+    }
+
+    fn unit(&self) -> &'static str {
+        "Nm"
+    }
+
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn is_nonnegative(&self) -> bool {
+        true
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        TermAction::Friction(SpeedFriction::of(SpeedCurve::Smooth(self)))
+    }
+
+    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
+        vec![
+            ("steepness", TermConstant::Number(self.steepness)),
+            ("offset_speed", TermConstant::Number(self.offset_speed)),
+        ]
+    }
+
+    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
+        self.fill(self.joint, motion, out);
+    }
+
+    fn pull_back(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
+        self.add_slopes(self.joint, motion, weights, by_dq);
     }
 }

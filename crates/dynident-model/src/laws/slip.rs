@@ -5,6 +5,9 @@
 //! ([`LawMemory`]); an uninterrupted recording starts undeflected, and the start is forgotten once the joint has moved by 2Δ in one direction. Source: Al-Bender, Lampaert and
 //! Swevers, IEEE Trans. Automatic Control 50 (2005) 1883 (without its sliding dynamics); Lampaert, Swevers and Al-Bender (2002).
 
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind};
+use super::{JointMotion, LawInput};
+
 /// Yield torque of one element of one joint, Nm (N).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MaxwellSlip {
@@ -28,14 +31,46 @@ impl LawMemory {
     }
 }
 
-impl MaxwellSlip {
-    pub(super) fn column(self, q: &[f64], memory: &mut LawMemory, out: &mut [f64]) {
-        let limit = self.yield_displacement;
-        for (to, &q) in out.iter_mut().zip(q) {
+impl TermKind for MaxwellSlip {
+    fn name(&self) -> &'static str {
+        "maxwell-slip"
+    }
+
+    fn symbol(&self) -> String {
+        format!("slip{}_{}", self.joint + 1, self.yield_displacement)
+    }
+
+    fn unit(&self) -> &'static str {
+        "Nm"
+    }
+
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn is_nonnegative(&self) -> bool {
+        true
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        TermAction::Hysteresis
+    }
+
+    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
+        vec![("yield_displacement", TermConstant::Number(self.yield_displacement))]
+    }
+
+    fn column(&self, _: usize, motion: &JointMotion<'_>, input: &mut LawInput<'_>, out: &mut [f64]) {
+        let (limit, memory) = (self.yield_displacement, &mut *input.memory);
+        for (to, &q) in out.iter_mut().zip(motion.q_of(self.joint)) {
             let [before, deflection] = memory.last.unwrap_or([q, 0.0]);
             let deflection = (deflection + q - before).clamp(-limit, limit);
             memory.last = Some([q, deflection]);
             *to = deflection / limit;
         }
+    }
+
+    fn pull_back(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: &mut [f64], _: &mut [f64]) {
+        // The deflection follows positions.
     }
 }

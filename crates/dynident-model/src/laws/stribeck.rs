@@ -3,7 +3,8 @@
 //! Beside Coulomb friction `F_c`, `F_s` is what static friction has more. Linear in `F_s` at given `v_s` and `δ`. Source: Armstrong-Hélouvry, Dupont and Canudas de Wit,
 //! Automatica 30 (1994) 1083.
 
-use super::CoulombShape;
+use super::kind::{SpeedFriction, SpeedFunction, TermAction, TermConstant, TermJoints, TermKind};
+use super::{CoulombShape, JointMotion, LawInput};
 
 /// Extra friction of one joint near rest, Nm (N).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,12 +19,12 @@ pub struct Stribeck {
     pub shape: CoulombShape,
 }
 
-impl Stribeck {
-    pub(super) fn value(self, dq: f64) -> f64 {
+impl SpeedFunction for Stribeck {
+    fn value(&self, dq: f64) -> f64 {
         (-(dq / self.speed).abs().powf(self.exponent)).exp() * self.shape.step(dq)
     }
 
-    pub(super) fn slope(self, dq: f64) -> f64 {
+    fn slope(&self, dq: f64) -> f64 {
         let x = (dq / self.speed).abs();
         let share = (-x.powf(self.exponent)).exp();
         // At zero speed the step is zero and goes to zero faster than x^(δ-1) grows.
@@ -34,5 +35,50 @@ impl Stribeck {
         };
         // Far out the share is zero, however large its factor.
         if share > 0.0 { share * (self.shape.slope(dq) - falling) } else { 0.0 }
+    }
+}
+
+impl TermKind for Stribeck {
+    fn name(&self) -> &'static str {
+        "stribeck"
+    }
+
+    fn symbol(&self) -> String {
+        format!("fs{}", self.joint + 1)
+    }
+
+    fn unit(&self) -> &'static str {
+        "Nm"
+    }
+
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn is_nonnegative(&self) -> bool {
+        true
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        TermAction::Friction(SpeedFriction {
+            fading: Some([self.speed, self.exponent]),
+            ..SpeedFriction::of(self.shape.curve())
+        })
+    }
+
+    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
+        vec![
+            ("speed", TermConstant::Number(self.speed)),
+            ("exponent", TermConstant::Number(self.exponent)),
+            ("shape", TermConstant::Step(self.shape)),
+        ]
+    }
+
+    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
+        self.fill(self.joint, motion, out);
+    }
+
+    fn pull_back(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
+        self.add_slopes(self.joint, motion, weights, by_dq);
     }
 }

@@ -5,7 +5,8 @@
 //! column is zero. Linear in a range of some 20 K; beyond, the viscous part falls exponentially. Source: Bittencourt and Axelsson, IEEE/ASME Trans. Mechatronics 19 (2014) 1484; Simoni et al., IFAC
 //! PapersOnLine 48 (2015) 183.
 
-use super::{CoulombShape, JointMotion};
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind};
+use super::{CoulombShape, JointMotion, LawInput};
 
 /// Change of viscous friction with temperature, Nm s/(rad K) (N s/(m K)).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,8 +52,84 @@ impl TemperatureCoulomb {
     }
 }
 
+impl TermKind for TemperatureViscous {
+    fn name(&self) -> &'static str {
+        "temperature-viscous"
+    }
+
+    fn symbol(&self) -> String {
+        format!("fvT{}", self.joint + 1)
+    }
+
+    fn unit(&self) -> &'static str {
+        "Nm s/(rad K)"
+    }
+
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn is_nonnegative(&self) -> bool {
+        false
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        TermAction::Temperature
+    }
+
+    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
+        vec![("reference_c", TermConstant::Number(self.reference_c))]
+    }
+
+    fn column(&self, _: usize, motion: &JointMotion<'_>, input: &mut LawInput<'_>, out: &mut [f64]) {
+        by_temperature(self.joint, motion, input.temperature_c, out, |t, dq| self.value(t, dq));
+    }
+
+    fn pull_back(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: &mut [f64], _: &mut [f64]) {
+        // Without a temperature the column is zero.
+    }
+}
+
+impl TermKind for TemperatureCoulomb {
+    fn name(&self) -> &'static str {
+        "temperature-coulomb"
+    }
+
+    fn symbol(&self) -> String {
+        format!("fcT{}", self.joint + 1)
+    }
+
+    fn unit(&self) -> &'static str {
+        "Nm/K"
+    }
+
+    fn joints(&self) -> TermJoints {
+        TermJoints::One(self.joint)
+    }
+
+    fn is_nonnegative(&self) -> bool {
+        false
+    }
+
+    fn action(&self) -> TermAction<'_> {
+        TermAction::Temperature
+    }
+
+    fn constants(&self) -> Vec<(&'static str, TermConstant)> {
+        vec![("reference_c", TermConstant::Number(self.reference_c)), ("shape", TermConstant::Step(self.shape))]
+    }
+
+    fn column(&self, _: usize, motion: &JointMotion<'_>, input: &mut LawInput<'_>, out: &mut [f64]) {
+        by_temperature(self.joint, motion, input.temperature_c, out, |t, dq| self.value(t, dq));
+    }
+
+    fn pull_back(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: &mut [f64], _: &mut [f64]) {
+        // Without a temperature the column is zero.
+    }
+}
+
 /// A column from temperature and speed, sample by sample; zero without a temperature.
-pub(super) fn by_temperature(
+fn by_temperature(
     joint: usize,
     motion: &JointMotion<'_>,
     temperature_c: Option<&[f64]>,

@@ -166,7 +166,7 @@ impl ControllerModel {
         };
         let motion = JointMotion { samples: 1, q, dq, ddq: acceleration };
         for ((law, value), memory) in laws.iter().zip(memories) {
-            if friction == FrictionCompensation::None && is_friction(law) {
+            if friction == FrictionCompensation::None && law.is_friction() {
                 continue;
             }
             for joint in 0..tau.len() {
@@ -196,13 +196,4 @@ impl ControllerModel {
             }
         }
     }
-}
-
-/// All but inertia and offset.
-pub(super) fn is_friction(law: &Law) -> bool {
-    use dynident_model::laws::{Coupling, CouplingEffect};
-    !matches!(
-        law,
-        Law::DriveInertia(_) | Law::Offset(_) | Law::Coupling(Coupling { effect: CouplingEffect::Inertia, .. })
-    )
 }

@@ -1,10 +1,10 @@
 //! Slotine and Li's passivity-based controller, adaptive if asked.
 
-use super::{Controller, ControllerModel, FrictionCompensation, Measured, Target, model::is_friction};
+use super::{Controller, ControllerModel, FrictionCompensation, Measured, Target};
 use crate::error::{SimulationError, require};
 use crate::per_joint::PerJoint;
 use dynident_dynamics::{Workspace, torque_regressor};
-use dynident_model::laws::{JointMotion, Law, LawInput, LawMemory};
+use dynident_model::laws::{JointMotion, LawInput, LawMemory};
 use dynident_model::{Model, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -123,7 +123,7 @@ impl SlotineLi {
         let motion = JointMotion { samples: 1, q, dq, ddq: reference_acceleration };
         for (place, ((law, _), memory)) in start.laws().iter().zip(memories).enumerate() {
             // A load would make the column depend on the other parameters.
-            if self.friction == FrictionCompensation::None && is_friction(law) || matches!(law, Law::Load(_)) {
+            if self.friction == FrictionCompensation::None && law.is_friction() || law.needs_load() {
                 continue;
             }
             for joint in 0..joints {

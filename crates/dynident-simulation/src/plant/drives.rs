@@ -3,7 +3,7 @@
 use super::friction_unit::FrictionUnit;
 use crate::error::{SimulationError, require, require_length};
 use dynident_model::Model;
-use dynident_model::laws::{Coulomb, CouplingEffect, JointMotion, Law, LawInput, LawMemory};
+use dynident_model::laws::{JointMotion, Law, LawInput, LawMemory, TermAction};
 
 /// Laws with their parameters: constants of the mass matrix and of the torque, linear damping, springs that slip, and friction that follows a speed.
 #[derive(Clone, Debug)]
@@ -52,50 +52,32 @@ impl Drives {
             if joints.iter().any(|&joint| joint >= dof) {
                 return Err(SimulationError::LawJoint { law: law.symbol(), joints: dof });
             }
-            match law {
-                Law::DriveInertia(law) => drives.inertia.push((law.joint, law.joint, value)),
-                Law::Offset(law) => drives.constant[law.joint] += value,
-                Law::Viscous(law) => drives.viscous.push((law.joint, law.joint, value)),
-                Law::MaxwellSlip(slip) => {
-                    drives.slips.push(Slip {
-                        joint: slip.joint,
-                        law: law.clone(),
-                        value,
-                        memory: LawMemory::default(),
-                    });
-                }
-                Law::Coupling(coupling) => {
-                    let [first, second] = [coupling.first, coupling.second];
-                    let cross = coupling.ratios[0] * coupling.ratios[1] * value;
-                    match coupling.effect {
-                        CouplingEffect::Inertia => {
-                            drives.inertia.extend([(first, second, cross), (second, first, cross)]);
-                        }
-                        CouplingEffect::Viscous => {
-                            drives.viscous.extend([(first, second, cross), (second, first, cross)]);
-                        }
-                        CouplingEffect::Coulomb(shape) => {
-                            if value < 0.0 {
-                                return Err(SimulationError::Negative { law: law.symbol(), value });
-                            }
-                            let ratios = coupling.ratios;
-                            let mut unit = FrictionUnit::new(vec![(first, ratios[0]), (second, ratios[1])]);
-                            unit.add(&Law::Coulomb(Coulomb { joint: 0, shape }), value);
-                            drives.units.push(unit);
-                        }
-                    }
+            let entries = |factor: f64| match joints[..] {
+                [first, second] => vec![(first, second, factor * value), (second, first, factor * value)],
+                _ => joints.iter().map(|&joint| (joint, joint, factor * value)).collect(),
+            };
+            match law.action() {
+                TermAction::Inertia { factor } => drives.inertia.extend(entries(factor)),
+                TermAction::Damping { factor } => drives.viscous.extend(entries(factor)),
+                TermAction::Constant => joints.iter().for_each(|&joint| drives.constant[joint] += value),
+                TermAction::Hysteresis => {
+                    let slip = |&joint: &usize| Slip { joint, law: law.clone(), value, memory: LawMemory::default() };
+                    drives.slips.extend(joints.iter().map(slip));
                 }
                 // Simulated drives are at their reference temperature.
-                Law::TemperatureViscous(_) | Law::TemperatureCoulomb(_) => {}
-                Law::Coulomb(_)
-                | Law::DirectionalViscous(_)
-                | Law::DirectionalCoulomb(_)
-                | Law::Stribeck(_)
-                | Law::Sigmoid(_)
-                | Law::Power(_)
-                | Law::Load(_) => {
-                    own[joints[0]].add(law, value);
-                    used[joints[0]] = true;
+                TermAction::Temperature => {}
+                TermAction::Friction(friction) => {
+                    if value < 0.0 {
+                        return Err(SimulationError::Negative { law: law.symbol(), value });
+                    }
+                    if let [joint] = joints[..] {
+                        own[joint].add(law, &friction, value);
+                        used[joint] = true;
+                    } else {
+                        let mut unit = FrictionUnit::new(joints.into_iter().zip(friction.ratios).collect());
+                        unit.add(law, &friction, value);
+                        drives.units.push(unit);
+                    }
                 }
             }
         }

@@ -167,7 +167,7 @@ mod tests {
                     } else {
                         CoulombShape::Smooth { width: 0.01 }
                     };
-                    unit.add(&Law::Coulomb(Coulomb { joint, shape }), random.uniform(0.1, 3.0));
+                    unit.add_law(&Law::Coulomb(Coulomb { joint, shape }), random.uniform(0.1, 3.0));
                     unit
                 })
                 .collect();

@@ -1,24 +1,17 @@
 //! Friction of one speed: of a joint, or of a drive that turns with two joints.
 
-use dynident_model::laws::{Coulomb, CoulombShape, DirectionalCoulomb, JointMotion, Law};
+use dynident_model::laws::{Law, SpeedCurve, SpeedFriction, TermAction};
 
-/// How a term of friction follows the speed.
-#[derive(Clone, Debug)]
-enum Shape {
-    /// A sign: at rest, anything up to the level. In which directions it is felt.
-    Step { forward: bool, backward: bool },
-    /// A law of joint 0 without a jump.
-    Smooth(Law),
-}
-
-/// A parameter times a shape; a Stribeck or load-dependent term changes its size with the state.
+/// A friction law with its parameter; a Stribeck or load-dependent one changes its size with the state.
 #[derive(Clone, Debug)]
 struct Term {
+    law: Law,
     value: f64,
     by_load: bool,
     /// Speed and exponent of the Stribeck effect.
-    fading: Option<(f64, f64)>,
-    shape: Shape,
+    fading: Option<[f64; 2]>,
+    /// For a sign, which at rest holds anything up to the level: in which directions it is felt.
+    step: Option<[bool; 2]>,
     /// Value with load and fading at the current state.
     size: f64,
 }
@@ -50,36 +43,26 @@ impl FrictionUnit {
         Self { joints, ..Self::default() }
     }
 
-    /// Adds a friction law with its parameter. The dead band of a sign is a device for noisy speeds of a log: a simulated robot has none.
-    pub(super) fn add(&mut self, law: &Law, value: f64) {
-        let (mut by_load, mut fading) = (false, None);
-        let both = |shape: CoulombShape| match shape {
-            CoulombShape::Sign { .. } => Shape::Step { forward: true, backward: true },
-            CoulombShape::Smooth { .. } => Shape::Smooth(Law::Coulomb(Coulomb { joint: 0, shape })),
+    /// Adds `law`, whose friction is `friction`, with its parameter.
+    pub(super) fn add(&mut self, law: &Law, friction: &SpeedFriction<'_>, value: f64) {
+        let step = match friction.curve {
+            SpeedCurve::Step { forward, backward } => Some([forward, backward]),
+            SpeedCurve::Smooth(_) => None,
         };
-        let shape = match law {
-            Law::Coulomb(law) => both(law.shape),
-            Law::DirectionalCoulomb(DirectionalCoulomb { shape: CoulombShape::Sign { .. }, direction, .. }) => {
-                let forward = direction.sign() == '+';
-                Shape::Step { forward, backward: !forward }
-            }
-            Law::Stribeck(law) => {
-                fading = Some((law.speed, law.exponent));
-                both(law.shape)
-            }
-            Law::Load(law) => {
-                by_load = true;
-                both(law.shape)
-            }
-            other => Shape::Smooth(at_first_joint(other)),
-        };
-        match shape {
-            Shape::Step { .. } => self.steps = true,
-            Shape::Smooth(_) => self.smooth = true,
-        }
+        self.steps |= step.is_some();
+        self.smooth |= step.is_none();
+        let SpeedFriction { by_load, fading, .. } = *friction;
         self.by_load |= by_load;
-        self.terms.push(Term { value, by_load, fading, shape, size: if by_load { 0.0 } else { value } });
+        let size = if by_load { 0.0 } else { value };
+        self.terms.push(Term { law: law.clone(), value, by_load, fading, step, size });
         self.update(0.0, 0.0);
+    }
+
+    /// Adds a law that follows a speed.
+    #[cfg(test)]
+    pub(super) fn add_law(&mut self, law: &Law, value: f64) {
+        let TermAction::Friction(friction) = law.action() else { panic!("{law:?} follows no speed") };
+        self.add(law, &friction, value);
     }
 
     /// Whether it can hold a joint at rest.
@@ -96,11 +79,11 @@ impl FrictionUnit {
             if term.by_load {
                 size *= load.abs();
             }
-            if let Some((fade, exponent)) = term.fading {
+            if let Some([fade, exponent]) = term.fading {
                 size *= (-(speed / fade).abs().powf(exponent)).exp();
             }
             term.size = size;
-            if let Shape::Step { forward, backward } = term.shape {
+            if let Some([forward, backward]) = term.step {
                 level[0] += if forward { size } else { 0.0 };
                 level[1] += if backward { size } else { 0.0 };
             }
@@ -119,10 +102,10 @@ impl FrictionUnit {
         let mut sum = [0.0; 2];
         if self.smooth {
             for term in &self.terms {
-                if let Shape::Smooth(law) = &term.shape {
-                    let [value, slope] = value_and_slope(law, speed);
-                    sum[0] += term.size * value;
-                    sum[1] += term.size * slope;
+                if let TermAction::Friction(SpeedFriction { curve: SpeedCurve::Smooth(curve), .. }) = term.law.action()
+                {
+                    sum[0] += term.size * curve.value(speed);
+                    sum[1] += term.size * curve.slope(speed);
                 }
             }
         }
@@ -185,51 +168,21 @@ impl FrictionUnit {
     }
 }
 
-fn value_and_slope(law: &Law, speed: f64) -> [f64; 2] {
-    let motion = JointMotion { samples: 1, q: &[0.0], dq: &[speed], ddq: &[0.0] };
-    let (mut value, mut slope) = ([0.0], [0.0]);
-    law.column(0, &motion, &mut value);
-    law.pull_back(0, &motion, &[1.0], &mut slope, &mut [0.0]);
-    [value[0], slope[0]]
-}
-
-/// The same law of joint 0.
-fn at_first_joint(law: &Law) -> Law {
-    let mut law = law.clone();
-    match &mut law {
-        Law::Viscous(law) => law.joint = 0,
-        Law::Coulomb(law) => law.joint = 0,
-        Law::DirectionalViscous(law) => law.joint = 0,
-        Law::DirectionalCoulomb(law) => law.joint = 0,
-        Law::Stribeck(law) => law.joint = 0,
-        Law::Sigmoid(law) => law.joint = 0,
-        Law::Power(law) => law.joint = 0,
-        Law::Load(law) => law.joint = 0,
-        Law::MaxwellSlip(law) => law.joint = 0,
-        Law::TemperatureViscous(law) => law.joint = 0,
-        Law::TemperatureCoulomb(law) => law.joint = 0,
-        Law::Offset(law) => law.joint = 0,
-        Law::DriveInertia(law) => law.joint = 0,
-        Law::Coupling(_) => {}
-    }
-    law
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynident_model::laws::{Power, PowerExponent, Sigmoid, Stribeck};
+    use dynident_model::laws::{Coulomb, CoulombShape, Power, PowerExponent, Sigmoid, Stribeck};
 
     /// The scalar problem is solved: w + c f(w) = r, for steep and flat maps alike. Rounding of r, with room.
     #[test]
     fn resolved_speeds_fulfil_their_equation() {
         let mut unit = FrictionUnit::new(vec![(0, 1.0)]);
         let shape = CoulombShape::Smooth { width: 1e-3 };
-        unit.add(&Law::Coulomb(Coulomb { joint: 3, shape: CoulombShape::Sign { dead_band: 0.1 } }), 0.5);
-        unit.add(&Law::Coulomb(Coulomb { joint: 3, shape }), 10.0);
-        unit.add(&Law::Sigmoid(Sigmoid { joint: 3, steepness: 20.0, offset_speed: 0.1 }), 0.7);
-        unit.add(&Law::Power(Power { joint: 3, exponent: PowerExponent::CubeRoot, rounding: 1e-6 }), 0.3);
-        unit.add(
+        unit.add_law(&Law::Coulomb(Coulomb { joint: 3, shape: CoulombShape::Sign { dead_band: 0.1 } }), 0.5);
+        unit.add_law(&Law::Coulomb(Coulomb { joint: 3, shape }), 10.0);
+        unit.add_law(&Law::Sigmoid(Sigmoid { joint: 3, steepness: 20.0, offset_speed: 0.1 }), 0.7);
+        unit.add_law(&Law::Power(Power { joint: 3, exponent: PowerExponent::CubeRoot, rounding: 1e-6 }), 0.3);
+        unit.add_law(
             &Law::Stribeck(Stribeck {
                 joint: 3,
                 speed: 0.1,

@@ -10,7 +10,7 @@ use dynident_dynamics::{BatchWorkspace, PanelLayout, Panels, ParametricModel, re
 use dynident_excitation::families::{Fourier, FourierSettings};
 use dynident_excitation::{Family, Motion};
 use dynident_model::Model;
-use dynident_model::laws::{CoulombShape, DriveChoice, JointMotion, Law, laws_per_joint};
+use dynident_model::laws::{CoulombShape, DriveChoice, JointMotion, Law, TermAction, laws_per_joint};
 use dynident_model::sample::Random;
 use nalgebra::DMatrix;
 
@@ -177,11 +177,11 @@ fn drive_value(law: &Law, motion: &Motion, bodies: &[f64], joint: usize) -> f64 
     let rms = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();
     // A joint that the bodies hardly load (a last link about its own axis) has friction all the same.
     let torque = rms(bodies).max(0.5);
-    match law {
-        Law::Viscous(_) => 0.15 * torque / rms(&motion.dq[motion.of(joint)]),
-        Law::DriveInertia(_) => 0.20 * torque / rms(&motion.ddq[motion.of(joint)]),
-        Law::Coulomb(_) => 0.15 * torque,
-        _ => 0.03 * torque,
+    match law.action() {
+        TermAction::Damping { .. } => 0.15 * torque / rms(&motion.dq[motion.of(joint)]),
+        TermAction::Inertia { .. } => 0.20 * torque / rms(&motion.ddq[motion.of(joint)]),
+        TermAction::Friction(_) | TermAction::Hysteresis => 0.15 * torque,
+        TermAction::Constant | TermAction::Temperature => 0.03 * torque,
     }
 }
 

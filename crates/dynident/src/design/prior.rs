@@ -5,7 +5,6 @@ use crate::result::identification::{BaseParameterResult, RESULT_SCHEMA};
 use crate::study::Folders;
 use crate::study::StudyRobot;
 use dynident_dynamics::Column;
-use dynident_model::laws::Law;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -114,8 +113,8 @@ fn standard_deviations(machine: &StudyRobot, share: f64) -> Vec<f64> {
             std.extend(body[kind].iter().map(|value| share * value.abs().max(FLOOR * scale)));
         }
     }
-    std.extend(machine.laws().iter().zip(laws).map(|(law, value)| match law {
-        Law::Viscous(_) | Law::Coulomb(_) if *value != 0.0 => share * value.abs(),
+    std.extend(machine.laws().iter().zip(laws).map(|(law, value)| match law.property() {
+        Some(_) if *value != 0.0 => share * value.abs(),
         _ => UNKNOWN,
     }));
     std

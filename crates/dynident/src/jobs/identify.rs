@@ -19,7 +19,6 @@ use dynident_identification::{
     identify_with_instruments as identify_task_with_instruments,
 };
 use dynident_model::InertialParameters;
-use dynident_model::laws::Law;
 use std::path::Path;
 use std::time::Instant;
 
@@ -236,7 +235,7 @@ fn result_file(
         payloads: found.payloads.clone(),
         offsets: offset_results(found, &task.recordings),
         drive_gains: found.training.gains.as_ref().map(|(_, gains)| gains.clone()),
-        couplings: law_results(model, estimate, parameters, |law| matches!(law, Law::Coupling(_))),
+        couplings: law_results(model, estimate, parameters, |law| law.own_joint().is_none()),
         training: parts.training,
         torque_band: bands.collect(),
         validation: held_out.map(|log| log.validation.clone()).collect(),

@@ -1,7 +1,7 @@
 //! What a robot description says, and what is wrong with it.
 
 use crate::error::Error;
-use dynident_dynamics::{BaseParameterSettings, BaseParameters, numerical_rank};
+use dynident_dynamics::{BaseParameterSettings, BaseParameters, numerical_rank_by_body};
 use dynident_model::{InertialParameters, audit, load_robot};
 use serde::Serialize;
 use std::path::Path;
@@ -78,7 +78,7 @@ pub struct BaseSummary {
     pub expressions: Vec<String>,
     /// Parameters that no motion can tell.
     pub unidentifiable: Vec<String>,
-    /// Rank of regressors at random states: the cross-check.
+    /// Rank of the bodies' regressor at random states, by [`numerical_rank_by_body`]: the cross-check.
     pub numerical_rank: usize,
     /// Smallest share of a column that counted as independent, largest that counted as dependent.
     pub gap: [f64; 2],
@@ -155,7 +155,7 @@ pub fn inspect(path: &Path) -> Result<Inspection, Error> {
             count: base.count(),
             expressions: base.expressions(),
             unidentifiable: base.unidentifiable().iter().map(|&column| base.all_columns()[column].symbol()).collect(),
-            numerical_rank: numerical_rank(model, &[], 1, settings.tolerance).independent.len(),
+            numerical_rank: numerical_rank_by_body(model, 1, settings.tolerance).independent.len(),
             gap: [weakest, strongest],
         },
         audit: entries,

@@ -167,9 +167,7 @@ pub(crate) fn joint_results(
         .enumerate()
         .map(|(index, joint)| JointResult {
             name: joint.name.clone(),
-            laws: law_results(model, estimate, parameters, |law| {
-                !matches!(law, Law::Coupling(_)) && law.joints() == [index]
-            }),
+            laws: law_results(model, estimate, parameters, |law| law.own_joint() == Some(index)),
             residual_std_nm: estimate.joint_sigma[index],
             residual_correlation: estimate.effective_lag1.get(index).copied().filter(|rho| rho.is_finite()),
             torque_lag: lags[index],

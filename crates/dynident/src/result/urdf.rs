@@ -2,7 +2,7 @@
 
 use crate::study::StudyRobot;
 use dynident_dynamics::ParametricModel;
-use dynident_model::laws::Law;
+use dynident_model::laws::JointProperty;
 use dynident_model::{DescriptionFormat, InertialParameters, JointChange, LinkChange, link_changes, rewrite_urdf};
 
 /// The user's URDF with the new values; joints that were locked keep theirs. Otherwise the reason why there is none.
@@ -20,10 +20,10 @@ pub(crate) fn written_urdf(
     let mut joints: Vec<JointChange> = Vec::new();
     let laws = model.laws().iter().zip(&parameters[10 * model.model().dof()..]);
     for (law, &value) in laws {
-        let (joint, damping, friction) = match law {
-            Law::Viscous(law) => (law.joint, Some(value), None),
-            Law::Coulomb(law) => (law.joint, None, Some(value)),
-            _ => continue,
+        let (Some(joint), Some(property)) = (law.own_joint(), law.property()) else { continue };
+        let (damping, friction) = match property {
+            JointProperty::Damping => (Some(value), None),
+            JointProperty::Friction => (None, Some(value)),
         };
         let name = &model.model().joints()[joint].name;
         let place = joints.iter().position(|change| change.joint == *name).unwrap_or_else(|| {

@@ -2,7 +2,7 @@
 
 use crate::study::StudyRobot;
 use dynident_iteration::SimulatedRobot;
-use dynident_model::laws::Law;
+use dynident_model::laws::{JointProperty, Law, TermAction};
 use dynident_model::sample::Random;
 use dynident_model::{InertialParameters, Model};
 use dynident_simulation::{
@@ -156,13 +156,22 @@ impl SimulationSection {
             .laws()
             .iter()
             .zip(&symbols)
-            .map(|(law, symbol)| match (self.laws.get(symbol), law) {
-                (Some(value), _) => Ok(*value),
-                (None, Law::Viscous(law)) => Ok(self.viscous.of(law.joint)),
-                (None, Law::Coulomb(law)) => Ok(self.coulomb.of(law.joint)),
-                (None, Law::DriveInertia(law)) => Ok(self.drive_inertia.of(law.joint)),
-                (None, Law::Offset(law)) => Ok(self.offset.of(law.joint)),
-                (None, _) => Err(format!("laws: say what {symbol} is ({symbol} = ...)")),
+            .map(|(law, symbol)| {
+                let by_kind = law.own_joint().and_then(|joint| match (law.property(), law.action()) {
+                    (Some(JointProperty::Damping), _) => Some(self.viscous.of(joint)),
+                    (Some(JointProperty::Friction), _) => Some(self.coulomb.of(joint)),
+                    (None, TermAction::Inertia { .. }) => Some(self.drive_inertia.of(joint)),
+                    (None, TermAction::Constant) => Some(self.offset.of(joint)),
+                    (
+                        None,
+                        TermAction::Damping { .. }
+                        | TermAction::Friction(_)
+                        | TermAction::Hysteresis
+                        | TermAction::Temperature,
+                    ) => None,
+                });
+                let value = self.laws.get(symbol).copied().or(by_kind);
+                value.ok_or_else(|| format!("laws: say what {symbol} is ({symbol} = ...)"))
             })
             .collect::<Result<Vec<f64>, _>>()?;
         let mut parameters = model.parameter_vector();

@@ -124,6 +124,35 @@ impl FrictionLaw {
         }
     }
 
+    /// The key that states `law`; none for what has keys of its own beside `laws`. One of several laws of a key gives the key with that law alone.
+    pub(crate) fn stating(law: &Law) -> Option<Self> {
+        let width = |shape: CoulombShape| match shape {
+            CoulombShape::Sign { .. } => None,
+            CoulombShape::Smooth { width } => Some(width),
+        };
+        match *law {
+            Law::Viscous(_) | Law::Coulomb(_) | Law::Offset(_) | Law::DriveInertia(_) | Law::Coupling(_) => None,
+            Law::DirectionalViscous(_) => Some(Self::AsymmetricViscous {}),
+            Law::DirectionalCoulomb(_) => Some(Self::AsymmetricCoulomb {}),
+            Law::Stribeck(Stribeck { speed, exponent, shape, .. }) => {
+                Some(Self::Stribeck { speed, exponent, width: width(shape) })
+            }
+            Law::Sigmoid(Sigmoid { steepness, offset_speed, .. }) => Some(Self::Sigmoid { steepness, offset_speed }),
+            Law::Power(Power { exponent: PowerExponent::CubeRoot, .. }) => Some(Self::CubeRoot {}),
+            Law::Power(Power { exponent: PowerExponent::Quadratic, .. }) => Some(Self::Quadratic {}),
+            Law::Load(LoadFriction { shape, .. }) => Some(Self::Load { width: width(shape) }),
+            Law::MaxwellSlip(MaxwellSlip { yield_displacement, .. }) => {
+                Some(Self::MaxwellSlip { yield_displacements: vec![yield_displacement] })
+            }
+            Law::TemperatureViscous(TemperatureViscous { reference_c, .. }) => {
+                Some(Self::Temperature { reference_c, viscous: true, coulomb: false })
+            }
+            Law::TemperatureCoulomb(TemperatureCoulomb { reference_c, .. }) => {
+                Some(Self::Temperature { reference_c, viscous: false, coulomb: true })
+            }
+        }
+    }
+
     /// Checks its constants; `key` is where it stands.
     pub(crate) fn validate(&self, key: &str) -> Result<(), String> {
         let within = |name: &str, value: f64, from: f64, to: f64| {
@@ -162,7 +191,7 @@ impl FrictionLaw {
                 }
                 Ok(())
             }
-            _ => Ok(()),
+            Self::AsymmetricViscous {} | Self::AsymmetricCoulomb {} | Self::CubeRoot {} | Self::Quadratic {} => Ok(()),
         }
     }
 }

@@ -1,0 +1,105 @@
+//! The rank of the bodies' regressor from motions that differ in one joint: the cross-check for machines of any length.
+//!
+//! Two states that differ in joint `j` alone (its position, velocity and acceleration) give the joints further in torques whose **difference** depends on body `j` and the bodies
+//! further out alone; so do the torques of joint `j` themselves. The rows of all joints, base to tip, make an upper block triangle, whose rank
+//! is at least the sum of the ranks of its diagonal blocks. One block has ten columns, so the cost grows with the square of a chain's length (its
+//! fourth power for [`numerical_rank`](super::numerical_rank)).
+
+use super::NumericalRank;
+use crate::independent_columns::independent_columns;
+use crate::inverse_dynamics::{inertial_wrench, moved};
+use crate::states::BodyState;
+use crate::workspace::joint_transform;
+use dynident_model::sample::Random;
+use dynident_model::{InertialParameters, JointMap, Model, Transform, Vec3};
+use nalgebra::DMatrix;
+
+/// Pairs of states for one joint: enough at the base, where a pair gives two rows, and more than the two that fix ten columns anywhere.
+fn pairs(joints_on_path: usize) -> usize {
+    5 + 20 / joints_on_path
+}
+
+/// A lower bound of the rank of the bodies' columns, body by body: which of the ten columns of each the torques can tell from those of the bodies before it, at states as those of
+/// [`numerical_rank`](super::numerical_rank) that differ in one joint. Where the structure says that a column is independent, it must be among these. Deterministic in `seed`.
+pub fn numerical_rank_by_body(model: &Model, seed: u64, tolerance: f64) -> NumericalRank {
+    let maps = model.maps();
+    let mut random = Random::new(seed);
+    let states: Vec<Vec<BodyState<f64>>> = (0..pairs(1))
+        .map(|_| {
+            let mut bodies: Vec<BodyState<f64>> = Vec::with_capacity(maps.len());
+            for map in maps {
+                let body = random_motion(model, map, map.parent.map(|parent| &bodies[parent]), &mut random);
+                bodies.push(body);
+            }
+            bodies
+        })
+        .collect();
+    let mut all = NumericalRank { independent: Vec::new(), weakest_independent: 1.0, strongest_dependent: 0.0 };
+    for (j, map) in maps.iter().enumerate() {
+        let mut rows: Vec<[f64; 10]> = Vec::new();
+        for bodies in &states[..pairs(model.path(j).len())] {
+            let first = &bodies[j];
+            let second = random_motion(model, map, map.parent.map(|parent| &bodies[parent]), &mut random);
+            let [one, other] = [first, &second].map(unit_wrenches);
+            rows.extend([one.map(|wrench| wrench.on(map)), other.map(|wrench| wrench.on(map))]);
+            let mut inward = map.parent;
+            let mut difference: [Wrench; 10] = core::array::from_fn(|k| {
+                let (a, b) = (one[k].to_parent(&first.parent_from_body), other[k].to_parent(&second.parent_from_body));
+                Wrench { force: a.force - b.force, moment: a.moment - b.moment }
+            });
+            while let Some(joint) = inward {
+                rows.push(difference.map(|wrench| wrench.on(&maps[joint])));
+                difference = difference.map(|wrench| wrench.to_parent(&bodies[joint].parent_from_body));
+                inward = maps[joint].parent;
+            }
+        }
+        let split = independent_columns(&DMatrix::from_fn(rows.len(), 10, |row, k| rows[row][k]), tolerance);
+        all.independent.extend(split.independent.iter().map(|k| 10 * j + k));
+        all.weakest_independent = all.weakest_independent.min(split.weakest_independent);
+        all.strongest_dependent = all.strongest_dependent.max(split.strongest_dependent);
+    }
+    all
+}
+
+/// A body's motion on its parent's, with position, velocity and acceleration of the joint at random.
+fn random_motion(
+    model: &Model,
+    map: &JointMap,
+    parent: Option<&BodyState<f64>>,
+    random: &mut Random,
+) -> BodyState<f64> {
+    let q = random.uniform(-1.0, 1.0) * if map.turns { core::f64::consts::PI } else { 1.0 };
+    let (dq, ddq) = (random.uniform(-2.0, 2.0), random.uniform(-5.0, 5.0));
+    let mut body = BodyState { parent_from_body: joint_transform(map, q, q.sin(), q.cos()), ..BodyState::REST };
+    moved(map, parent, -model.gravity(), dq, ddq, &mut body);
+    body
+}
+
+/// Force and moment about the frame's origin.
+#[derive(Clone, Copy)]
+struct Wrench {
+    force: Vec3,
+    moment: Vec3,
+}
+
+impl Wrench {
+    /// The torque or force that it asks of the joint of its frame.
+    fn on(&self, map: &JointMap) -> f64 {
+        map.axis.dot(if map.turns { self.moment } else { self.force })
+    }
+
+    fn to_parent(self, parent_from_body: &Transform) -> Self {
+        let Transform { rotation, translation } = parent_from_body;
+        let force = rotation.mul_vec(self.force);
+        Self { force, moment: rotation.mul_vec(self.moment) + translation.cross(force) }
+    }
+}
+
+/// What one unit of each inertial parameter asks for.
+fn unit_wrenches(body: &BodyState<f64>) -> [Wrench; 10] {
+    core::array::from_fn(|k| {
+        let unit = InertialParameters(core::array::from_fn(|i| f64::from(i == k)));
+        let (force, moment) = inertial_wrench(&unit, body.omega, body.alpha, body.acceleration);
+        Wrench { force, moment }
+    })
+}

@@ -1,0 +1,179 @@
+//! What every kind of torque term says of itself. A kind is one type in one file that implements [`TermKind`]; [`Law`](super::Law) hands every question on to it, so
+//! that nobody else has to know which kinds there are.
+
+use super::{CoulombShape, JointMotion, LawInput};
+use core::fmt::Debug;
+
+/// The joints that feel a term.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TermJoints {
+    /// One joint.
+    One(usize),
+    /// Both joints that a shared drive turns with.
+    Two(usize, usize),
+}
+
+/// Where a term enters the equation of motion: what its torque follows.
+#[derive(Clone, Copy, Debug)]
+pub enum TermAction<'a> {
+    /// `factor q̈`: a constant entry of the mass matrix, that of its joint or both off the diagonal of its two joints.
+    Inertia {
+        /// Entry per unit of the parameter.
+        factor: f64,
+    },
+    /// `factor q̇`, with the entries as for inertia.
+    Damping {
+        /// Entry per unit of the parameter.
+        factor: f64,
+    },
+    /// The same torque always.
+    Constant,
+    /// Friction that follows one speed.
+    Friction(SpeedFriction<'a>),
+    /// Friction that follows positions and remembers them.
+    Hysteresis,
+    /// Friction's change with the temperature: nothing at its reference.
+    Temperature,
+}
+
+/// Friction that follows one speed `w = Σ ratio q̇`; the torque of each joint is `ratio f(w)`.
+#[derive(Clone, Copy, Debug)]
+pub struct SpeedFriction<'a> {
+    /// Of its joints; the second counts where there are two.
+    pub ratios: [f64; 2],
+    /// The speed's function, before load and fading.
+    pub curve: SpeedCurve<'a>,
+    /// Times the absolute value of the load.
+    pub by_load: bool,
+    /// Times `e^{-|w/v|^δ}`, with `v` and `δ`.
+    pub fading: Option<[f64; 2]>,
+}
+
+impl<'a> SpeedFriction<'a> {
+    /// Friction of one joint by `curve` alone.
+    pub(super) fn of(curve: SpeedCurve<'a>) -> Self {
+        Self { ratios: [1.0, 0.0], curve, by_load: false, fading: None }
+    }
+}
+
+/// How friction follows a speed.
+#[derive(Clone, Copy, Debug)]
+pub enum SpeedCurve<'a> {
+    /// A sign: at rest, anything up to one. In which directions it is felt.
+    Step {
+        /// At positive speed.
+        forward: bool,
+        /// At negative speed.
+        backward: bool,
+    },
+    /// Without a jump.
+    Smooth(&'a dyn SpeedFunction),
+}
+
+/// A function of a speed and its slope, per unit of the parameter.
+pub trait SpeedFunction: Debug {
+    /// Its value at speed `dq`.
+    fn value(&self, dq: f64) -> f64;
+
+    /// Its derivative by the speed; a sign counts as constant.
+    fn slope(&self, dq: f64) -> f64;
+
+    /// Its values in the motion of joint `joint`.
+    fn fill(&self, joint: usize, motion: &JointMotion<'_>, out: &mut [f64]) {
+        for (to, &dq) in out.iter_mut().zip(motion.dq_of(joint)) {
+            *to = self.value(dq);
+        }
+    }
+
+    /// Adds `weights · slope` in the motion of joint `joint` to its part of `by_dq`.
+    fn add_slopes(&self, joint: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64]) {
+        let range = joint * motion.samples..(joint + 1) * motion.samples;
+        for ((to, w), &dq) in by_dq[range].iter_mut().zip(weights).zip(motion.dq_of(joint)) {
+            *to += w * self.slope(dq);
+        }
+    }
+}
+
+/// A function of the motion that a friction term adds to a joint's torque. Terms that add the same function to the same joints cannot be told apart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MotionFunction {
+    /// The joint.
+    pub row: usize,
+    /// The function: the same text for the same function.
+    pub function: String,
+    /// How much of it per unit of the parameter.
+    pub factor: f64,
+}
+
+/// What a robot's description (URDF) can say of a term.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointProperty {
+    /// `damping`.
+    Damping,
+    /// `friction`.
+    Friction,
+}
+
+/// A constant of a term, such as a speed or an exponent, for programs that are not this one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TermConstant {
+    /// A number.
+    Number(f64),
+    /// One number per joint.
+    Numbers([f64; 2]),
+    /// One of a few words.
+    Word(&'static str),
+    /// A step near zero speed.
+    Step(CoulombShape),
+    /// Not there for this term.
+    Nothing,
+}
+
+/// What a kind of torque term says of itself.
+pub(super) trait TermKind: Debug {
+    /// Name of the kind.
+    fn name(&self) -> &'static str;
+
+    /// Symbol of the parameter with the joint's number from 1.
+    fn symbol(&self) -> String;
+
+    /// Unit of the parameter at a turning joint.
+    fn unit(&self) -> &'static str;
+
+    /// The joints that feel it.
+    fn joints(&self) -> TermJoints;
+
+    /// Whether a negative parameter is impossible.
+    fn is_nonnegative(&self) -> bool;
+
+    /// Where it enters the equation of motion.
+    fn action(&self) -> TermAction<'_>;
+
+    /// Its constants by name, beside joints and parameter.
+    fn constants(&self) -> Vec<(&'static str, TermConstant)>;
+
+    /// The regressor column in the row of joint `row`.
+    fn column(&self, row: usize, motion: &JointMotion<'_>, input: &mut LawInput<'_>, out: &mut [f64]);
+
+    /// Adds what `Σ weights · column` in the row of joint `row` changes with speeds and accelerations.
+    fn pull_back(&self, row: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], by_ddq: &mut [f64]);
+
+    /// The functions of the motion that friction adds. What shares no function with another kind is one of its own.
+    fn functions(&self) -> Vec<MotionFunction> {
+        let row = match (self.action(), self.joints()) {
+            (TermAction::Inertia { .. } | TermAction::Constant, _) => return Vec::new(),
+            (_, TermJoints::One(joint) | TermJoints::Two(joint, _)) => joint,
+        };
+        vec![MotionFunction { row, function: format!("{self:?}"), factor: 1.0 }]
+    }
+
+    /// The property of the joint that a robot's description states it by, if any.
+    fn property(&self) -> Option<JointProperty> {
+        None
+    }
+}
+
+/// Both halves of a function that [`MotionFunction`]s by direction share: for positive and for negative speed.
+pub(super) fn halves(row: usize, function: &str) -> [MotionFunction; 2] {
+    ['+', '-'].map(|sign| MotionFunction { row, function: format!("{function} {sign}"), factor: 1.0 })
+}
