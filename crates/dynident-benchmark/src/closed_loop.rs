@@ -3,14 +3,14 @@
 use crate::clock::Report;
 use dynident_dynamics::{Workspace, mass_matrix};
 use dynident_excitation::Motion;
-use dynident_experiment::controllers::{FiniteTimeSettings, JointPdSettings};
-use dynident_experiment::{
-    ControllerModel, ControllerSettings, ExperimentError, Integrator, LoopSettings, Plant, Reference, Start,
-    closed_loop,
-};
 use dynident_model::Model;
 use dynident_model::laws::{Coulomb, CoulombShape, Law};
 use dynident_model::sample::Random;
+use dynident_simulation::controllers::{FiniteTimeSettings, JointPdSettings};
+use dynident_simulation::{
+    ControllerModel, ControllerSettings, Integrator, LoopSettings, Plant, Reference, SimulationError, Start,
+    closed_loop,
+};
 use std::hint::black_box;
 
 /// Samples of a timed run: as in `bench_mujoco.c`.
@@ -20,7 +20,7 @@ const RK4: Integrator = Integrator::Rk4 { steps_per_sample: 1 };
 
 /// Times one step of 1 ms under joint PD towards zero (gains 100 and 20 times the mass matrix' diagonal at zero) by both fixed-step integrators, the same with dry friction, and 10 s of the paper's controller at 1 kHz along sines.
 /// Always at this processor's best level.
-pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), ExperimentError> {
+pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), SimulationError> {
     let dof = model.dof();
     let zeros = vec![0.0; dof];
     let mut workspace = Workspace::new(model);

@@ -6,7 +6,8 @@ use dynident_dynamics::{
     BaseParameterSettings, BaseParameters, BatchWorkspace, Column, PanelLayout, Panels, all_columns,
     inverse_dynamics_batch, regressor_panels,
 };
-use dynident_estimation::{EstimationError, FactorWorkspace, TriangularFactor};
+use dynident_estimation::factor::FactorWorkspace;
+use dynident_estimation::{EstimationError, TriangularFactor};
 use dynident_model::Model;
 use std::hint::black_box;
 

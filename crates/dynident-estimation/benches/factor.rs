@@ -3,7 +3,8 @@
 
 #![allow(clippy::print_stdout, reason = "a benchmark prints")]
 
-use dynident_estimation::{BLOCK_ROWS, FactorWorkspace, SegmentSettings, SegmentedFactor, TriangularFactor};
+use dynident_estimation::factor::{BLOCK_ROWS, FactorWorkspace};
+use dynident_estimation::{SegmentSettings, SegmentedFactor, TriangularFactor};
 use dynident_lanes::Level;
 use std::time::Instant;
 

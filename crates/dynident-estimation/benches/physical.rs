@@ -8,7 +8,7 @@
 #[path = "../tests/it/physical_problems/mod.rs"]
 mod physical_problems;
 
-use dynident_estimation::physical::{PhysicalRoute, PhysicalSettings, physical_fit};
+use dynident_estimation::consistent::{PhysicalRoute, PhysicalSettings, physical_fit};
 use physical_problems::case;
 use std::time::Instant;
 

@@ -124,3 +124,8 @@ pub enum EstimationError {
     #[error("no rows of any joint: absorb a log before estimating")]
     Empty,
 }
+
+/// That two things which describe the same columns, joints or rows agree in number.
+pub(crate) fn expect(what: &str, expected: usize, found: usize) -> Result<(), EstimationError> {
+    if expected == found { Ok(()) } else { Err(EstimationError::Mismatch { what: what.into(), expected, found }) }
+}

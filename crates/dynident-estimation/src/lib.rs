@@ -13,76 +13,36 @@
 
 #![forbid(unsafe_code)]
 
-mod autoregression;
-mod bootstrap;
-mod covariance;
-mod cross_validation;
-mod diagnostics;
-mod distributions;
+pub mod consistent;
+pub mod diagnostics;
 mod error;
-mod essential;
-mod estimate;
-mod factor;
-mod generalized;
-mod hausman;
-mod instrumental;
-mod instrumented;
-mod joint_gains;
-mod known_columns;
-mod maximum_likelihood;
-mod newey_west;
-mod noise_levels;
-mod nonnegative;
-mod ordinary;
-pub mod physical;
-mod problem;
-mod projection;
-mod rank;
-mod reflect;
-mod robust;
-mod segments;
-mod simulated;
-mod simultaneous;
-mod simultaneous_rows;
-mod total;
-mod validation;
-mod weighted;
+pub mod factor;
+pub mod linear;
+pub mod nonlinear;
+pub mod uncertainty;
 
-pub use covariance::{CovarianceMethod, correlation};
-pub use cross_validation::{CrossValidation, FoldErrors, JointFolds};
-pub use diagnostics::{Normality, NormalityReport, RegimeFigures, Regimes, RegimesReport, Whiteness, WhitenessReport};
-pub use distributions::{chi_squared_tail, f_tail, student_half_width};
+pub use diagnostics::{
+    CorrelatedPair, CrossValidation, EssentialEnd, EssentialReport, EssentialSettings, FoldErrors, JointFolds,
+    Normality, NormalityReport, Regimes, RegimesReport, Validation, ValidationReport, Whiteness, WhitenessReport,
+    essential, strongest_correlations,
+};
 pub use error::EstimationError;
-pub use essential::{
-    CorrelatedPair, DroppedParameter, EssentialEnd, EssentialReport, EssentialSettings, essential,
-    strongest_correlations,
+pub use factor::{
+    InstrumentedProblem, JointRows, LinearProblem, Prior, RankSettings, SegmentSettings, SegmentedFactor,
+    TriangularFactor,
 };
-pub use estimate::{Estimate, EstimateStatus};
-pub use factor::{BLOCK_ROWS, FactorWorkspace, TriangularFactor};
-pub use generalized::{CrossProblem, GeneralizedEstimate, generalized_least_squares};
-pub use hausman::{HausmanColumn, HausmanSettings, HausmanTest, HausmanVerdict, hausman_test};
-pub use instrumental::{InstrumentReport, InstrumentalEstimate, InstrumentalSettings, instrumental_variables};
-pub use instrumented::InstrumentedProblem;
-pub use joint_gains::{GainEstimate, GainProblem, JointGain, joint_gains};
-pub use known_columns::{KnownColumns, weighted_least_squares_with_known};
-pub use maximum_likelihood::{
-    InstantRows, InstantVisitor, MaximumLikelihoodEstimate, MaximumLikelihoodSettings, maximum_likelihood,
+pub use linear::{
+    CrossProblem, GainProblem, GeneralizedEstimate, HausmanSettings, HausmanTest, HausmanVerdict, InstrumentReport,
+    InstrumentalEstimate, InstrumentalSettings, JointGain, KnownColumns, NoiseLevelSettings, NoiseWeightedEstimate,
+    OrdinarySettings, RobustEstimate, RobustSettings, RowBlock, RowVisitor, RowWeight, TotalEstimate, TotalSettings,
+    WeightedSettings, generalized_least_squares, hausman_test, instrumental_variables, joint_gains,
+    noise_weighted_least_squares, ordinary_least_squares, robust_least_squares, total_least_squares,
+    weighted_least_squares, weighted_least_squares_with_known,
 };
-pub use noise_levels::{NoiseLevelSettings, NoiseWeightedEstimate, noise_weighted_least_squares};
-pub use ordinary::{OrdinarySettings, ordinary_least_squares};
-pub use problem::{JointRows, LinearProblem, Prior};
-pub use rank::{FixedColumn, RankReport, RankSettings};
-pub use robust::{RobustEstimate, RobustSettings, RowBlock, RowVisitor, RowWeight, robust_least_squares};
-pub use segments::{SegmentScore, SegmentSettings, SegmentedFactor};
-pub use simulated::{
+pub use nonlinear::{
+    ChannelNoise, ChannelRows, InstantRows, InstantVisitor, MaximumLikelihoodEstimate, MaximumLikelihoodSettings,
     SimulatedCriterion, SimulatedEstimate, SimulatedMotion, SimulatedProblem, SimulatedRows, SimulatedSettings,
-    simulated_least_squares,
+    SimultaneousEstimate, SimultaneousModel, SimultaneousSettings, maximum_likelihood, simulated_least_squares,
+    simultaneous_bound, simultaneous_least_squares,
 };
-pub use simultaneous::{
-    ChannelNoise, SimultaneousEstimate, SimultaneousModel, SimultaneousSettings, simultaneous_bound,
-    simultaneous_least_squares,
-};
-pub use simultaneous_rows::ChannelRows;
-pub use total::{TotalEstimate, TotalSettings, total_least_squares};
-pub use validation::{JointValidation, Validation, ValidationReport};
-pub use weighted::{WeightedSettings, weighted_least_squares};
+pub use uncertainty::{CovarianceMethod, Estimate, EstimateStatus, correlation, student_half_width};

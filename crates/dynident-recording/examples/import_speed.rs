@@ -3,7 +3,7 @@
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a benchmark for people")]
 
 use dynident_recording::{
-    DecimationSettings, Decimator, LogFormat, LogReader, MotionBlock, MotionSettings, MotionStream, RawBlock,
+    DecimationSettings, Decimator, Log, LogFormat, LogReader, MotionBlock, MotionSettings, MotionStream, RawBlock,
 };
 use std::io::Write;
 use std::time::Instant;
@@ -32,7 +32,7 @@ fn main() {
         "time = { column = \"t\" }\nposition = { columns = \"q{1..7}\" }\ntorque = { columns = \"tau{1..7}\" }";
     let format: LogFormat = toml::from_str(format).unwrap();
     let start = Instant::now();
-    let mut reader = LogReader::open(&format, &file, &joints).unwrap();
+    let mut reader = LogReader::open(&Log::file(&file, format.clone(), &joints)).unwrap();
     let mut raw = RawBlock::default();
     while reader.next_block(&mut raw).unwrap() {}
     println!("reading and mapping alone: {:.2} s", start.elapsed().as_secs_f64());

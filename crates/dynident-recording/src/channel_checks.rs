@@ -1,6 +1,6 @@
 //! What a channel looks like: its range, whether it is alive, quantised, saturated. Accumulated block by block.
 
-use crate::units::Quantity;
+use crate::log::Quantity;
 use serde::Serialize;
 
 /// Samples in a row at an extreme value from which a torque counts as saturated.

@@ -1,6 +1,6 @@
 //! The clock of a log: its rate, whether the stamps or the even spacing are to be believed, where it has gaps.
 
-use crate::format::ClockRule;
+use crate::log::ClockRule;
 use serde::Serialize;
 
 /// Jitter below which the question of the clock is idle: standard deviation of the steps over their mean. At 0.1 % of a step the position

@@ -1,5 +1,6 @@
 //! What can go wrong between a log file and a motion: each message names the file, the place and the mend.
 
+use crate::log::LogPlace;
 use std::path::PathBuf;
 
 /// A [`LogFormat`](crate::LogFormat) that contradicts itself or the list of joints.
@@ -36,12 +37,10 @@ pub enum RecordingError {
         source: std::io::Error,
     },
     /// No row of numbers in the file.
-    #[error("{}: no data rows after line {line}; the log needs at least one row of numbers", file.display())]
+    #[error("{}; the log needs at least one row of numbers", no_rows(place))]
     NoRows {
-        /// The file.
-        file: PathBuf,
-        /// Last line that was read, 1-based.
-        line: u64,
+        /// Where reading stopped.
+        place: LogPlace,
     },
     /// The file is not text.
     #[error("{}:{line}: a NUL byte: this is not a text table; export the log as CSV", file.display())]
@@ -59,7 +58,7 @@ pub enum RecordingError {
         /// 1-based line.
         line: u64,
     },
-    /// A line beyond [`MAX_LINE_BYTES`](crate::MAX_LINE_BYTES).
+    /// A line beyond the limit.
     #[error("{}:{line}: the line is longer than {limit} bytes; is this a CSV file with one sample per line?", file.display())]
     LineTooLong {
         /// The file.
@@ -70,12 +69,10 @@ pub enum RecordingError {
         limit: usize,
     },
     /// Two columns of one name, one of which is asked for.
-    #[error("{}:{line}: column name `{name}` stands at columns {first} and {second}; address it by its 0-based index", file.display())]
+    #[error("{place}: column name `{name}` stands at columns {first} and {second}; address it by its 0-based index")]
     DuplicateColumn {
-        /// The file.
-        file: PathBuf,
-        /// Line of the header, 1-based.
-        line: u64,
+        /// Where the columns are named.
+        place: LogPlace,
         /// The name.
         name: String,
         /// 0-based index of its first place.
@@ -84,12 +81,10 @@ pub enum RecordingError {
         second: usize,
     },
     /// A column that the file does not have.
-    #[error("{}:{line}: no column `{wanted}` (key `{key}`); {hint}", file.display())]
+    #[error("{place}: no column `{wanted}` (key `{key}`); {hint}")]
     UnknownColumn {
-        /// The file.
-        file: PathBuf,
-        /// Line of the header (or of the first row), 1-based.
-        line: u64,
+        /// Where the columns are named, or the first row.
+        place: LogPlace,
         /// The key of the format that asks for it.
         key: String,
         /// What was asked for.
@@ -98,12 +93,10 @@ pub enum RecordingError {
         hint: String,
     },
     /// A row with too few or too many fields.
-    #[error("{}:{line}: {found} fields where {expected} are expected; mend or delete the line{hint}", file.display())]
+    #[error("{place}: {found} fields where {expected} are expected; mend or delete the line{hint}")]
     RaggedRow {
-        /// The file.
-        file: PathBuf,
-        /// 1-based line.
-        line: u64,
+        /// Where.
+        place: LogPlace,
         /// Number of fields in the header or the first row.
         expected: usize,
         /// Number of fields in this row.
@@ -112,12 +105,10 @@ pub enum RecordingError {
         hint: &'static str,
     },
     /// A field that is no number.
-    #[error("{}:{line}, column {column}: `{text}` is not a number; {mend}", file.display())]
+    #[error("{place}, column {column}: `{text}` is not a number; {mend}")]
     NotANumber {
-        /// The file.
-        file: PathBuf,
-        /// 1-based line.
-        line: u64,
+        /// Where.
+        place: LogPlace,
         /// Name or 0-based index of the column.
         column: String,
         /// The field, shortened and escaped.
@@ -126,22 +117,23 @@ pub enum RecordingError {
         mend: &'static str,
     },
     /// A field that is empty, NaN or infinite under `missing = "error"`.
-    #[error("{}:{line}, column {column}: `{text}` is not a finite number; set missing = \"drop\" to leave such rows out", file.display())]
+    #[error("{place}, column {column}: `{text}` is not a finite number; set missing = \"drop\" to leave such rows out")]
     Missing {
-        /// The file.
-        file: PathBuf,
-        /// 1-based line.
-        line: u64,
+        /// Where.
+        place: LogPlace,
         /// Name or 0-based index of the column.
         column: String,
         /// The field.
         text: String,
     },
     /// A channel that is absurdly large once its unit, scale, matrix or offset is applied.
-    #[error("{}, row {row}: {group} of joint `{joint}` is beyond 1e60 or not finite after scaling; check the factors of `{group}` and the raw value", file.display())]
+    #[error(
+        "{log}, row {row}: {group} of joint `{joint}` is beyond 1e60 or not finite after scaling; \
+         check the factors of `{group}` and the raw value"
+    )]
     Overflow {
-        /// The log's main file.
-        file: PathBuf,
+        /// Label of the log.
+        log: String,
         /// 0-based data row.
         row: u64,
         /// Key of the channel group.
@@ -150,30 +142,49 @@ pub enum RecordingError {
         joint: String,
     },
     /// Files of one log that have different numbers of rows.
-    #[error("{} ends after {rows} rows but {} goes on; files of one log must hold the same samples", file.display(), other.display())]
+    #[error("{log} ends after {rows} rows but {other} goes on; files of one log must hold the same samples")]
     UnequalFiles {
         /// The shorter file.
-        file: PathBuf,
+        log: String,
         /// Its data rows.
         rows: u64,
         /// A longer file.
-        other: PathBuf,
+        other: String,
+    },
+    /// A channel group in another file, of a log that is no file.
+    #[error("{log}: `{key}.file` names another file, but the log is none; leave the key out")]
+    NoFolder {
+        /// Label of the log.
+        log: String,
+        /// Key of the channel group.
+        key: &'static str,
+    },
+    /// Samples in memory that do not go together.
+    #[error("{log}: {problem}; give as many values of every joint as there are samples")]
+    Samples {
+        /// Label of the log.
+        log: String,
+        /// What does not go with what.
+        problem: String,
     },
     /// The row or time range leaves nothing.
-    #[error("{}: the selection ({selection}) leaves no row after {rows} rows were read; widen it", file.display())]
+    #[error("{log}: the selection ({selection}) leaves no row after {rows} rows were read; widen it")]
     EmptySelection {
-        /// The file.
-        file: PathBuf,
+        /// Label of the log.
+        log: String,
         /// The keys in force.
         selection: String,
         /// Data rows that were read.
         rows: u64,
     },
     /// Time stamps from which no rate follows.
-    #[error("{}: no sampling rate follows from column {column} ({reason}); check time.column and time.unit, or give rate_hz", file.display())]
+    #[error(
+        "{log}: no sampling rate follows from column {column} ({reason}); \
+         check time.column and time.unit, or give rate_hz"
+    )]
     NoRate {
-        /// The file.
-        file: PathBuf,
+        /// Label of the log.
+        log: String,
         /// The time column.
         column: String,
         /// Why.
@@ -191,20 +202,26 @@ pub enum RecordingError {
         problem: String,
     },
     /// No sample at which a way that needs the commanded motion applies.
-    #[error("{}: at none of {samples} samples does {method} apply: the joints do not follow this reference; check its file, start_s and max_lag_s", file.display())]
+    #[error(
+        "{log}: at none of {samples} samples does {method} apply: the joints do not follow this reference; \
+         check its file, start_s and max_lag_s"
+    )]
     NotFollowed {
-        /// The log's main file.
-        file: PathBuf,
+        /// Label of the log.
+        log: String,
         /// The differentiator.
         method: &'static str,
         /// Samples looked at.
         samples: u64,
     },
     /// No segment of the log is long enough for the filter.
-    #[error("{}: the longest uninterrupted piece has {found} samples, the {method} filter needs {needed}; widen the range or choose a shorter filter", file.display())]
+    #[error(
+        "{log}: the longest uninterrupted piece has {found} samples, the {method} filter needs {needed}; \
+         widen the range or choose a shorter filter"
+    )]
     TooShort {
-        /// The file.
-        file: PathBuf,
+        /// Label of the log.
+        log: String,
         /// Samples in the longest segment.
         found: usize,
         /// Samples needed.
@@ -212,6 +229,13 @@ pub enum RecordingError {
         /// The differentiator.
         method: &'static str,
     },
+}
+
+fn no_rows(place: &LogPlace) -> String {
+    match place {
+        LogPlace::Line { log, line } => format!("{log}: no data rows after line {line}"),
+        LogPlace::Whole { log } | LogPlace::Row { log, .. } => format!("{log}: no data rows"),
+    }
 }
 
 /// A filter that cannot be built, or a signal that it cannot be applied to.

@@ -36,7 +36,6 @@ mod butterworth;
 mod central_differences;
 mod channel_checks;
 pub mod clock;
-mod column_pattern;
 mod comparison;
 pub mod cutoff;
 mod decimation;
@@ -44,21 +43,18 @@ mod deviation;
 mod differentiator;
 mod error;
 mod five_point_cubic;
-mod format;
 mod fourier_fit;
 mod frequency_domain;
 mod harmonic_fit;
 mod lag;
-mod lines;
 mod literal_map;
+mod log;
 mod logistic_path;
 mod low_pass;
-mod mapping;
 mod marks;
 mod orthonormal;
 mod periods;
 mod position_map;
-mod reader;
 mod reference;
 mod reference_lag;
 mod reference_settings;
@@ -71,12 +67,10 @@ mod smoothed_differences;
 mod speed_series;
 mod stream;
 mod stroke;
-mod table;
 #[cfg(test)]
 mod test_signals;
 mod time_checks;
 mod time_warp;
-mod units;
 
 pub use butterworth::ButterworthZeroPhase;
 pub use central_differences::CentralDifferences;
@@ -89,19 +83,19 @@ pub use deviation::Deviation;
 pub use differentiator::{Derivatives, Differentiator, DifferentiatorSettings, Place};
 pub use error::{FilterError, FormatError, RecordingError};
 pub use five_point_cubic::FivePointCubic;
-pub use format::{
-    ChannelGroup, ClockRule, ColumnRef, Columns, Header, LogFormat, Missing, OneOrMany, TimeColumn, TimeUnit,
-};
 pub use fourier_fit::FourierFit;
 pub use frequency_domain::{Ends, FrequencyDomain};
 pub use lag::{Lag, best_lag};
-pub use lines::MAX_LINE_BYTES;
 pub use literal_map::LiteralMap;
+pub use log::{
+    ChannelGroup, ClockRule, ColumnRef, Columns, Header, JointSamples, LinesDropped, Log, LogFormat, LogPlace,
+    LogReader, LogSource, LogTable, MemoryLog, Missing, OneOrMany, Quantity, RawBlock, SampleClock, TextLog,
+    TimeColumn, TimeUnit, si_factor, unit_names,
+};
 pub use logistic_path::LogisticPath;
 pub use low_pass::LowPass;
 pub use periods::{AveragedPeriods, averaged_periods};
 pub use position_map::PositionMap;
-pub use reader::{BLOCK_ROWS, LinesDropped, LogReader, RawBlock};
 pub use reference::Reference;
 pub use reference_lag::{StrokeLag, stroke_lags};
 pub use reference_settings::ReferenceSettings;
@@ -113,4 +107,3 @@ pub use speed_series::SpeedSeries;
 pub use stream::{MotionBlock, MotionSettings, MotionStream};
 pub use stroke::Stroke;
 pub use time_warp::TimeWarp;
-pub use units::{Quantity, si_factor, unit_names};

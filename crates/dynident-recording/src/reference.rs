@@ -1,9 +1,10 @@
 //! The motion that a robot was told to make: the seam through which ways that need it get it.
 
 use crate::error::{FilterError, RecordingError};
-use crate::format::{ChannelGroup, ColumnRef, Columns, LogFormat, TimeColumn};
+use crate::log::{
+    ChannelGroup, ClockRule, ColumnRef, Columns, Header, Log, LogFormat, LogReader, RawBlock, TimeColumn,
+};
 use crate::logistic_path::LogisticPath;
-use crate::reader::{LogReader, RawBlock};
 use crate::stroke::{Stroke, between, share_rests, strokes_of};
 use std::path::Path;
 
@@ -108,40 +109,21 @@ impl Reference {
     /// # Errors
     /// As [`LogReader`], and as [`sampled`](Self::sampled).
     pub fn read(file: &Path, joints: usize) -> Result<Self, RecordingError> {
-        let columns = |name: &str| ChannelGroup {
-            file: None,
-            columns: Columns::List((1..=joints).map(|j| ColumnRef::Name(format!("{name}{j}"))).collect()),
-            unit: None,
-            scale: None,
-            sign: None,
-            offset: None,
-            matrix: None,
-            inverse_matrix: None,
+        let columns = |name: &str| {
+            ChannelGroup::new(Columns::List((1..=joints).map(|j| ColumnRef::Name(format!("{name}{j}"))).collect()))
         };
+        let time = TimeColumn::seconds(ColumnRef::Name("t_s".to_owned()));
         let format = LogFormat {
-            header: crate::format::Header::Present,
-            delimiter: None,
-            time: Some(TimeColumn {
-                column: ColumnRef::Name("t_s".to_owned()),
-                unit: crate::format::TimeUnit::Seconds,
-                scale: 1.0,
-            }),
-            rate_hz: None,
-            position: columns("q"),
+            header: Header::Present,
             velocity: Some(columns("dq")),
             acceleration: Some(columns("ddq")),
-            // A log has a torque; a reference has none, and its positions stand in.
-            torque: columns("q"),
-            temperature: None,
-            rows: None,
-            fraction: None,
-            time_range_s: None,
-            missing: crate::format::Missing::Error,
-            clock: crate::format::ClockRule::Stamps,
+            clock: ClockRule::Stamps,
             max_gap_steps: 1000.0,
+            // A log has a torque; a reference has none, and its positions stand in.
+            ..LogFormat::with_time(time, columns("q"), columns("q"))
         };
         let names: Vec<String> = (1..=joints).map(|j| format!("joint {j}")).collect();
-        let mut reader = LogReader::open(&format, file, &names)?;
+        let mut reader = LogReader::open(&Log::file(file, format, &names))?;
         let (mut times, mut block) = (Vec::new(), RawBlock::default());
         let mut table = vec![[Vec::new(), Vec::new(), Vec::new()]; joints];
         while reader.next_block(&mut block)? {

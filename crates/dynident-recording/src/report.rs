@@ -4,7 +4,7 @@ use crate::channel_checks::ChannelReport;
 use crate::clock::Clock;
 use crate::comparison::DerivativeComparison;
 use crate::cutoff::CutoffChoice;
-use crate::reader::LinesDropped;
+use crate::log::LinesDropped;
 use serde::Serialize;
 
 /// How much a finding matters.

@@ -6,9 +6,8 @@ use crate::comparison::Comparison;
 use crate::cutoff::{CUTOFF_SAMPLES, CutoffChoice, cutoff};
 use crate::differentiator::{Derivatives, Differentiator, DifferentiatorSettings, Place};
 use crate::error::{FilterError, RecordingError};
-use crate::format::LogFormat;
+use crate::log::{Log, LogFormat, LogReader, RawBlock};
 use crate::marks::{kept_runs, part};
-use crate::reader::{LogReader, RawBlock};
 use crate::reference::Reference;
 use crate::report::ImportReport;
 use crate::segments::Segmenter;
@@ -139,34 +138,41 @@ struct Prefix {
 }
 
 impl MotionStream {
-    /// Opens the log whose main file is `file` and decides on clock and cut-off.
+    /// Begins a pass over the log whose main file is `file`: [`new`](Self::new) of [`Log::file`].
     ///
     /// # Errors
-    /// If settings or description are wrong, the file cannot be read, or no rate follows from it.
+    /// As [`new`](Self::new).
     pub fn open(
         format: &LogFormat,
         file: &Path,
         joints: &[String],
         settings: &MotionSettings,
     ) -> Result<Self, RecordingError> {
-        Self::open_following(format, file, joints, settings, None)
+        Self::new(&Log::file(file, format.clone(), joints), settings)
     }
 
-    /// As [`open`](Self::open), with the commanded motion for a way that needs it, its joints in the order of `joints`.
+    /// Begins a pass over `log` and decides on clock and cut-off.
+    ///
+    /// # Errors
+    /// If settings or description are wrong, the log cannot be read, or no rate follows from it.
+    pub fn new(log: &Log, settings: &MotionSettings) -> Result<Self, RecordingError> {
+        Self::following(log, settings, None)
+    }
+
+    /// As [`new`](Self::new), with the commanded motion for a way that needs it, its joints in the order of the log's.
     ///
     /// Where the way does not apply to a joint, the samples of all joints are left out, the piece is cut there, and the report says how many.
     ///
     /// # Errors
-    /// As [`open`](Self::open).
-    pub fn open_following(
-        format: &LogFormat,
-        file: &Path,
-        joints: &[String],
+    /// As [`new`](Self::new).
+    pub fn following(
+        log: &Log,
         settings: &MotionSettings,
         reference: Option<&Arc<Reference>>,
     ) -> Result<Self, RecordingError> {
         settings.validate()?;
-        let (prefix, time_label) = prefix(format, file, joints)?;
+        let Log { format, joints, .. } = log;
+        let (prefix, time_label) = prefix(log)?;
         let clock = match format.rate_hz {
             Some(rate_hz) => Clock {
                 rate_hz,
@@ -177,7 +183,7 @@ impl MotionStream {
                 evidence: "even spacing: the rate is given, there are no stamps".to_owned(),
             },
             None => clock(format.clock, &prefix.time_s, &prefix.row, &prefix.q, format.max_gap_steps)
-                .map_err(|reason| RecordingError::NoRate { file: file.to_owned(), column: time_label, reason })?,
+                .map_err(|reason| RecordingError::NoRate { log: log.source().label(), column: time_label, reason })?,
         };
         let segmenter = Segmenter::new(&clock, format.max_gap_steps, 2 * joints.len());
         let cutoff = cutoff(&longest_segment(segmenter, &prefix), clock.rate_hz);
@@ -202,10 +208,10 @@ impl MotionStream {
         let temperature = if format.temperature.is_some() { joints.len() } else { 0 };
         let channels = 2 * joints.len() + velocity.len() + acceleration.len() + temperature;
         Ok(Self {
-            reader: LogReader::open(format, file, joints)?,
+            reader: LogReader::open(log)?,
             raw: RawBlock::default(),
             raw_at: 0,
-            joints: joints.to_vec(),
+            joints: joints.clone(),
             trim: (settings.trim_s * clock.rate_hz).round() as usize,
             context: differentiator.context_samples(clock.rate_hz),
             segmenter: Segmenter::new(&clock, format.max_gap_steps, channels),
@@ -282,7 +288,7 @@ impl MotionStream {
         *block = MotionBlock { rate_hz: self.clock.rate_hz, joints: self.joints.len(), ..MotionBlock::default() };
         if self.segments == 0 {
             return Err(RecordingError::TooShort {
-                file: self.reader.file().to_owned(),
+                log: self.reader.label().to_owned(),
                 found: self.longest_short,
                 needed: self.needed(),
                 method: self.differentiator.name(),
@@ -290,7 +296,7 @@ impl MotionStream {
         }
         if self.given == 0 && self.unmapped > 0 {
             return Err(RecordingError::NotFollowed {
-                file: self.reader.file().to_owned(),
+                log: self.reader.label().to_owned(),
                 method: self.differentiator.name(),
                 samples: self.unmapped,
             });
@@ -449,7 +455,7 @@ impl MotionStream {
     /// What was found so far; complete once [`next_block`](Self::next_block) has returned false.
     pub fn report(&self) -> ImportReport {
         let mut report = ImportReport {
-            file: self.reader.file().display().to_string(),
+            file: self.reader.label().to_owned(),
             rows: self.rows,
             rate_hz: self.clock.rate_hz,
             clock: self.clock.clone(),
@@ -475,9 +481,9 @@ impl MotionStream {
 }
 
 /// Reads the first [`CUTOFF_SAMPLES`] rows.
-fn prefix(format: &LogFormat, file: &Path, joints: &[String]) -> Result<(Prefix, String), RecordingError> {
-    let mut reader = LogReader::open(format, file, joints)?;
-    let columns = || vec![Vec::new(); joints.len()];
+fn prefix(log: &Log) -> Result<(Prefix, String), RecordingError> {
+    let mut reader = LogReader::open(log)?;
+    let columns = || vec![Vec::new(); log.joints.len()];
     let mut prefix = Prefix { row: Vec::new(), time_s: Vec::new(), q: columns(), tau: columns() };
     let mut raw = RawBlock::default();
     while prefix.row.len() < CUTOFF_SAMPLES && reader.next_block(&mut raw)? {

@@ -1,6 +1,7 @@
 //! Bars with error bars.
 
 use crate::error::ReportError;
+use crate::pen::tenth;
 use crate::ticks::{short, ticks};
 use serde::Serialize;
 
@@ -92,7 +93,7 @@ impl BarPlot {
         let [low, high] = ends.fold([0.0_f64, 0.0_f64], |[a, b], x| [a.min(x), b.max(x)]);
         let high = if high > low { high } else { low + 1.0 };
         let (left, right) = (LABELS + 8.0, WIDTH - FIGURES);
-        let at = |x: f64| ((left + (x - low) / (high - low) * (right - left)) * 10.0).round() / 10.0;
+        let at = |x: f64| tenth(left + (x - low) / (high - low) * (right - left));
         let bars = self.bars.iter().enumerate().map(|(k, bar)| {
             let shown = finite(bar.value).then_some(bar.value);
             let half = bar.half_width.filter(|half| finite(*half) && shown.is_some());

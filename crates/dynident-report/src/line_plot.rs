@@ -2,9 +2,9 @@
 
 use crate::decimation::kept_samples;
 use crate::error::ReportError;
+use crate::pen::{Pen, tenth};
 use crate::plot_data::{CurveData, PlotData, check_axis, check_length, rounded};
 use crate::ticks::{short, ticks};
-use core::fmt::Write;
 use serde::Serialize;
 
 /// Pixel columns that a curve is drawn for.
@@ -149,17 +149,9 @@ impl LinePlot {
         let views: Vec<&[f64]> = curves.iter().map(|curve| &curve[..]).collect();
         let kept = kept_samples(&self.x, &views, (right - left).max(1.0) as usize);
         let path = |curve: &Vec<f64>| {
-            let mut text = String::new();
-            let mut pen_down = false;
-            for &i in &kept {
-                if curve[i].is_finite() {
-                    let command = if pen_down { 'L' } else { 'M' };
-                    // Writing to a string cannot fail.
-                    let _ = write!(text, "{command}{:.1} {:.1}", at_x(self.x[i]), at_y(curve[i]));
-                }
-                pen_down = curve[i].is_finite();
-            }
-            text
+            let mut pen = Pen::default();
+            kept.iter().for_each(|&i| pen.to([at_x(self.x[i]), at_y(curve[i])]));
+            pen.path()
         };
         let lines = self.lines.iter().zip(&curves).enumerate().map(|(k, (line, curve))| {
             let points = kept.iter().filter(|&&i| line.points && curve[i].is_finite());
@@ -168,7 +160,7 @@ impl LinePlot {
                 colour: COLOURS[k % COLOURS.len()],
                 dashed: line.dashed,
                 path: if line.points { String::new() } else { path(curve) },
-                points: points.map(|&i| [round1(at_x(self.x[i])), round1(at_y(curve[i]))]).collect(),
+                points: points.map(|&i| [tenth(at_x(self.x[i])), tenth(at_y(curve[i]))]).collect(),
                 legend_x: left + 130.0 * k as f64,
             }
         });
@@ -180,8 +172,8 @@ impl LinePlot {
             frame: [left, top, right, bottom],
             x_label: &self.x_label,
             y_label: &self.y_label,
-            x_ticks: ticks(from, to, 6).into_iter().map(|x| (round1(at_x(x)), short(x, 4))).collect(),
-            y_ticks: ticks(low, high, 5).into_iter().map(|y| (round1(at_y(y)), short(exact(y), 3))).collect(),
+            x_ticks: ticks(from, to, 6).into_iter().map(|x| (tenth(at_x(x)), short(x, 4))).collect(),
+            y_ticks: ticks(low, high, 5).into_iter().map(|y| (tenth(at_y(y)), short(exact(y), 3))).collect(),
             lines: lines.collect(),
         };
         crate::page::rendered("line_plot.svg", &view)
@@ -191,10 +183,6 @@ impl LinePlot {
 /// The page's colours: told apart by people who see colours differently (Okabe and Ito), and dark enough on white.
 pub(crate) const COLOURS: [&str; 8] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00", "#56b4e9", "#7a3fb0", "#5f6368"];
-
-fn round1(x: f64) -> f64 {
-    (10.0 * x).round() / 10.0
-}
 
 /// A little air above and below; a flat or empty range gets one of its own.
 fn padded([low, high]: [f64; 2]) -> [f64; 2] {

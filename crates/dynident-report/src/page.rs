@@ -55,7 +55,7 @@ pub struct Report {
     pub sections: Vec<Section>,
 }
 
-const TEMPLATES: [(&str, &str); 12] = [
+const TEMPLATES: [(&str, &str); 15] = [
     ("page.html", include_str!("templates/page.html")),
     ("heading.html", include_str!("templates/heading.html")),
     ("text.html", include_str!("templates/text.html")),
@@ -66,6 +66,9 @@ const TEMPLATES: [(&str, &str); 12] = [
     ("bar_plot.svg", include_str!("templates/bar_plot.svg")),
     ("heat_map.svg", include_str!("templates/heat_map.svg")),
     ("line_plot.svg", include_str!("templates/line_plot.svg")),
+    ("motion_picture.svg", include_str!("templates/motion_picture.svg")),
+    ("path_picture.svg", include_str!("templates/path_picture.svg")),
+    ("fitness_picture.svg", include_str!("templates/fitness_picture.svg")),
     ("report.css", include_str!("templates/report.css")),
     ("report.js", include_str!("templates/report.js")),
 ];
@@ -161,5 +164,10 @@ pub(crate) fn rendered(name: &str, view: &impl Serialize) -> Result<String, Repo
     for (name, source) in TEMPLATES.iter().filter(|(name, _)| !name.starts_with("report.")) {
         environment.add_template(name, source)?;
     }
-    Ok(environment.get_template(name)?.render(view)?)
+    let mut text = environment.get_template(name)?.render(view)?;
+    if name.ends_with(".svg") {
+        // XML has no place for control characters.
+        text.retain(|letter| letter == '\n' || !letter.is_control());
+    }
+    Ok(text)
 }

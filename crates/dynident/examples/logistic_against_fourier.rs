@@ -8,12 +8,13 @@
 
 use core::ops::ControlFlow;
 use dynident::{RunOptions, Silent, Study, design_study};
-use dynident_experiment::controllers::FiniteTimeSettings;
-use dynident_experiment::iteration::{IteratedMachine, IterationTask, RunIdentificationSettings, identify_run};
-use dynident_experiment::{
+use dynident_dynamics::ParametricModel;
+use dynident_iteration::{IterationTask, RunIdentificationSettings, identify_run};
+use dynident_recording::{DecimationSettings, DifferentiatorSettings, ReferenceSettings};
+use dynident_simulation::controllers::FiniteTimeSettings;
+use dynident_simulation::{
     ControllerModel, ControllerSettings, Integrator, LoopSettings, Plant, Reference, SensorSettings, closed_loop,
 };
-use dynident_recording::{DecimationSettings, DifferentiatorSettings, ReferenceSettings};
 use std::error::Error;
 use std::path::Path;
 
@@ -81,9 +82,9 @@ fn compared(path: &Path, family: &str, duration_s: Option<f64>, seeds: u64) -> R
     let outcome = design_study(&study, path, &options, |_| ControlFlow::Continue(()))?;
     let (true, Some(log_det)) = (outcome.file.feasible, outcome.file.log_det) else { return Ok(None) };
     let reference = Reference::new(RATE_HZ, outcome.sampled(RATE_HZ).1)?;
-    let model = &outcome.machine.model;
-    let machine = IteratedMachine::new(model, &[], None)?;
-    let truth = machine.base().values(machine.prior());
+    let model = outcome.machine.model();
+    let machine = ParametricModel::new(model.clone(), Vec::new())?;
+    let truth = machine.base().values(machine.nominal());
     let task = IterationTask::new(machine, reference.clone())?;
     let identification = RunIdentificationSettings {
         differentiator: DifferentiatorSettings::Deviation {

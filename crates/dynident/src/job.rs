@@ -36,7 +36,7 @@ pub(crate) fn of_role(study: &Study, role: Role) -> Vec<usize> {
 }
 
 pub(crate) fn joint_names(machine: &Machine) -> Vec<String> {
-    machine.model.joints().iter().map(|joint| joint.name.clone()).collect()
+    machine.model().joints().iter().map(|joint| joint.name.clone()).collect()
 }
 
 pub(crate) fn log_summary(

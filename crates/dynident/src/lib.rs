@@ -2,7 +2,7 @@
 //!
 //! [`identify()`] fits a [`Study`]'s machine to its logs and tests it on the held-out ones; [`validate()`] tests a finished model; [`inspect()`] audits a robot
 //! description; [`evaluate()`] computes dynamics for a table of states; [`design_study()`] finds the motion to record, [`check_trajectory()`] and [`check_log()`] judge one that is there. The rooms below are re-exported: [`model`],
-//! [`dynamics`], [`recording`], [`estimation`], [`excitation`].
+//! [`dynamics`], [`recording`], [`estimation`], [`excitation`], [`simulation`], [`identification`], [`iteration`].
 
 #![forbid(unsafe_code)]
 
@@ -22,7 +22,6 @@ mod machine;
 mod measured;
 mod output;
 mod progress;
-mod reproduce;
 mod simulate;
 mod study;
 mod validate;
@@ -30,9 +29,11 @@ mod validate;
 pub use dynident_dynamics as dynamics;
 pub use dynident_estimation as estimation;
 pub use dynident_excitation as excitation;
-pub use dynident_experiment as experiment;
+pub use dynident_identification as identification;
+pub use dynident_iteration as iteration;
 pub use dynident_model as model;
 pub use dynident_recording as recording;
+pub use dynident_simulation as simulation;
 
 pub use design::{
     CriterionChoice, DESIGN_SCHEMA, DesignFile, DesignOutcome, DesignSection, DirectionForecast, FamilyChoice,
@@ -70,7 +71,6 @@ pub use measured::residuals::{JointResiduals, TorqueBand};
 pub use measured::torque_trace::{JointTrace, LogTrace};
 pub use output::{check_writable, write_whole};
 pub use progress::{Progress, Silent};
-pub use reproduce::{Deviation, PAPER_SCHEMA, PaperCell, PaperFigure, PaperFile, PaperTable, Reached, reproduce};
 pub use simulate::section::{SimulatedTruth, SimulationSection};
 pub use simulate::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, Simulation, SimulationFile, simulate_study};
 pub use study::friction::{FrictionChoice, FrictionLaw};

@@ -2,8 +2,8 @@
 
 use crate::error::Error;
 use crate::study::{CoulombChoice, Folders, JointDrive, Study};
-use dynident_dynamics::{BaseParameterSettings, BaseParameters, Column, PanelLayout};
-use dynident_model::laws::{Coulomb, CoulombShape, Coupling, CouplingEffect, DriveChoice, Law, laws_per_joint};
+use dynident_dynamics::{BaseParameters, Column, PanelLayout, ParametricModel};
+use dynident_model::laws::{CoulombShape, Coupling, CouplingEffect, DriveChoice, Law, laws_per_joint};
 use dynident_model::{Model, Robot, Vec3, load_robot};
 use std::path::Path;
 
@@ -12,20 +12,12 @@ use std::path::Path;
 pub struct Machine {
     /// The description as read.
     pub robot: Robot,
-    /// The model with joints locked, gravity and base in force.
-    pub model: Model,
+    /// The model with joints locked, gravity and base in force, its torque terms, base parameters and nominal values.
+    pub parametric: ParametricModel,
     /// Joint names in the order of the log's columns.
     pub log_joints: Vec<String>,
     /// For each joint of the model its place among `log_joints`.
     pub log_place: Vec<usize>,
-    /// Friction, drive and coupling laws.
-    pub laws: Vec<Law>,
-    /// Base parameters of bodies and laws.
-    pub base: BaseParameters,
-    /// Panels of base columns.
-    pub layout: PanelLayout,
-    /// Base parameters by the description's own inertials, damping and friction; `None` while a moving body's inertial is unknown.
-    pub prior: Option<Vec<f64>>,
     /// For load-dependent friction: the bodies by an earlier estimate, one value per column of the layout. Without it such friction has a column of zeros.
     pub load_parameters: Option<Vec<f64>>,
     /// What logged torque is multiplied by, joint by joint, where gains were found and not stated; empty otherwise.
@@ -107,33 +99,57 @@ impl Machine {
             });
             laws.extend(couplings);
         }
-        let base = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
-        let layout = PanelLayout::new(&model, base.base_columns());
-        let prior = model.bodies_without_prior().is_empty().then(|| base.values(&prior_parameters(&model, &laws)));
+        let parametric =
+            ParametricModel::new(model, laws).map_err(|error| Error::study(study_path, error.to_string()))?;
         Ok(Self {
             robot,
-            model,
+            parametric,
             log_joints,
             log_place,
-            laws,
-            base,
-            layout,
-            prior,
             load_parameters: None,
             torque_gains: Vec::new(),
             folders: folders.clone(),
         })
     }
 
+    /// Links, joints and gravity.
+    pub fn model(&self) -> &Model {
+        self.parametric.model()
+    }
+
+    /// Torque terms beside the rigid bodies.
+    pub fn laws(&self) -> &[Law] {
+        self.parametric.laws()
+    }
+
+    /// Base parameters of bodies and terms.
+    pub fn base(&self) -> &BaseParameters {
+        self.parametric.base()
+    }
+
+    /// Regressor blocks of the base columns.
+    pub fn layout(&self) -> &PanelLayout {
+        self.parametric.layout()
+    }
+
+    /// Nominal values of all parameters.
+    pub fn nominal(&self) -> &[f64] {
+        self.parametric.nominal()
+    }
+
+    /// Base parameters by the description's own inertials, damping and friction; `None` while a moving body's inertial is unknown.
+    pub fn nominal_base(&self) -> Option<&[f64]> {
+        self.parametric.nominal_base()
+    }
+
     /// The machine with further laws behind its base columns, dependent or not: for choosing among them from one set of factors. `base` and `laws` stay as they are.
     pub(crate) fn with_columns_of(&self, further: impl IntoIterator<Item = Law>) -> Self {
-        let mut columns = self.base.base_columns();
-        columns.extend(further.into_iter().map(Column::Law));
         let mut wide = self.clone();
-        for parameters in wide.prior.iter_mut().chain(&mut wide.load_parameters) {
-            parameters.resize(columns.len(), 0.0);
+        wide.parametric = self.parametric.with_further_columns(further);
+        let columns = wide.layout().columns().len();
+        if let Some(parameters) = &mut wide.load_parameters {
+            parameters.resize(columns, 0.0);
         }
-        wide.layout = PanelLayout::new(&self.model, columns);
         wide
     }
 
@@ -142,14 +158,14 @@ impl Machine {
     /// # Errors
     /// [`Error::NoTemperature`].
     pub(crate) fn check_temperature(&self, study: &Study, log: usize) -> Result<(), Error> {
-        let columns = self.layout.columns().iter();
+        let columns = self.layout().columns().iter();
         let needing = columns.filter_map(|column| match column {
             Column::Law(law) if law.needs_temperature() => law.joints().first().copied(),
             _ => None,
         });
         match needing.min() {
             Some(joint) if study.format_of(log).temperature.is_none() => {
-                Err(Error::NoTemperature { log: study.log_name(log), joint: self.model.joints()[joint].name.clone() })
+                Err(Error::NoTemperature { log: study.log_name(log), joint: self.model().joints()[joint].name.clone() })
             }
             _ => Ok(()),
         }
@@ -157,24 +173,13 @@ impl Machine {
 
     /// The machine with the bodies of an estimate of `other`, where load-dependent friction needs them.
     pub(crate) fn with_load_of(mut self, other: &Self, values: &[f64]) -> Self {
-        if self.layout.columns().iter().any(|column| matches!(column, Column::Law(Law::Load(_)))) {
-            let known = other.layout.columns();
+        if self.layout().columns().iter().any(|column| matches!(column, Column::Law(Law::Load(_)))) {
+            let known = other.layout().columns();
             let value = |column: &Column| known.iter().position(|c| c == column).map_or(0.0, |place| values[place]);
-            self.load_parameters = Some(self.layout.columns().iter().map(value).collect());
+            self.load_parameters = Some(self.layout().columns().iter().map(value).collect());
         }
         self
     }
-}
-
-/// All parameters by the description: inertials, and what it says of damping and friction.
-pub(crate) fn prior_parameters(model: &Model, laws: &[Law]) -> Vec<f64> {
-    let mut parameters = model.parameter_vector();
-    parameters.extend(laws.iter().map(|law| match law {
-        Law::Viscous(law) => model.joints()[law.joint].damping.unwrap_or(0.0),
-        Law::Coulomb(Coulomb { joint, .. }) => model.joints()[*joint].friction.unwrap_or(0.0),
-        _ => 0.0,
-    }));
-    parameters
 }
 
 pub(crate) fn drive_choice(study: &Study, joint: &str) -> DriveChoice {

@@ -145,7 +145,7 @@ fn stored_model(path: &Path, stored: StoredModel, mut machine: Machine) -> Resul
     machine.load_parameters = stored.method.load_parameters;
     machine.torque_gains = stored.drive_gains.iter().flatten().map(|stored| stored.gain).collect();
     let usable = machine.torque_gains.iter().all(|gain| gain.is_finite());
-    if !(machine.torque_gains.is_empty() || machine.torque_gains.len() == machine.model.dof() && usable) {
+    if !(machine.torque_gains.is_empty() || machine.torque_gains.len() == machine.model().dof() && usable) {
         return Err(wrong("drive_gains are not one finite number for each joint: identify again".to_owned()));
     }
     Ok((values, possible, stored.method.motion, machine))
@@ -154,7 +154,7 @@ fn stored_model(path: &Path, stored: StoredModel, mut machine: Machine) -> Resul
 /// The base parameters of a stored result, which must be those of this machine.
 pub(crate) fn same_machine(path: &Path, stored: &StoredModel, machine: &Machine) -> Result<Vec<f64>, Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
-    let expressions = machine.base.expressions();
+    let expressions = machine.base().expressions();
     if stored.base_parameters.len() != expressions.len() {
         return Err(wrong(format!(
             "{} base parameters, but the study's machine has {}: use the study that the result was made with",
@@ -194,7 +194,7 @@ impl StoredLoads {
         let mut added = known_payloads(study, study_path, machine)?;
         for payload in &stored.payloads {
             let values = &payload.base_parameters_added;
-            if values.len() != machine.layout.columns().len() || values.iter().any(|value| !value.is_finite()) {
+            if values.len() != machine.layout().columns().len() || values.iter().any(|value| !value.is_finite()) {
                 let message = format!("payload `{}`: not one finite number per base parameter", payload.name);
                 return Err(Error::Result { path: path.to_owned(), message });
             }
@@ -242,7 +242,7 @@ impl TestSink<'_> {
 
 impl RowSink for TestSink<'_> {
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), Error> {
-        let columns = self.machine.layout.joint_columns(rows.joint);
+        let columns = self.machine.layout().joint_columns(rows.joint);
         let measured = &rows.panel[columns.len() * rows.rows..];
         predicted(rows.panel, rows.rows, columns, self.theta, &mut self.buffer);
         self.model.add_joint(rows.joint, measured, &self.buffer).map_err(|source| self.failed(source))?;
@@ -264,8 +264,8 @@ impl RowSink for TestSink<'_> {
 
     fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), Error> {
         let rows = samples.panels.samples();
-        for joint in 0..self.machine.model.dof() {
-            let columns = self.machine.layout.joint_columns(joint);
+        for joint in 0..self.machine.model().dof() {
+            let columns = self.machine.layout().joint_columns(joint);
             let panel = samples.panels.joint(joint);
             predicted(panel, rows, columns, self.theta, &mut self.buffer);
             let added = self.raw.add_joint(joint, &panel[columns.len() * rows..], &self.buffer);
@@ -303,17 +303,17 @@ pub(crate) fn validate_log(
 ) -> Result<(LogSummary, LogValidation, Option<LogTrace>), Error> {
     let Tested { theta, physical, uncertainty, traced } = *tested;
     let joints = joint_names(machine);
-    let columns = (0..machine.model.dof()).map(|joint| machine.layout.joint_columns(joint)).collect();
+    let columns = (0..machine.model().dof()).map(|joint| machine.layout().joint_columns(joint)).collect();
     let mut sink = TestSink {
         machine,
         file: file.to_owned(),
         theta,
-        watches: (0..joints.len()).map(|joint| JointWatch::new(&machine.layout, joint, uncertainty)).collect(),
+        watches: (0..joints.len()).map(|joint| JointWatch::new(machine.layout(), joint, uncertainty)).collect(),
         model: Validation::new(joints.clone()),
         physical: physical.map(|physical| (physical, Validation::new(joints.clone()))),
         raw: Validation::new(joints.clone()),
-        prior: machine.prior.as_deref().map(|prior| (prior, Validation::new(joints.clone()))),
-        evidence: machine.prior.as_deref().map(|prior| Evidence::new(columns, prior)),
+        prior: machine.nominal_base().map(|prior| (prior, Validation::new(joints.clone()))),
+        evidence: machine.nominal_base().map(|prior| Evidence::new(columns, prior)),
         lag: LagCheck::new(machine, theta),
         trace: traced.then(|| TraceSink::new(machine, theta)),
         buffer: Vec::new(),

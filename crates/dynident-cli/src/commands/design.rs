@@ -6,16 +6,12 @@ use crate::{Verdict, summary, terminal};
 use clap::ValueEnum;
 use dynident::excitation::DesignProgress;
 use dynident::excitation::export::{
-    Preview, Sampled, UrScriptSettings, fitness_csv, fitness_svg, path_svg, preview_svg, ros2_joint_trajectory,
-    trajectory_csv, urscript, waypoints_csv,
+    Sampled, UrScriptSettings, fitness_csv, ros2_joint_trajectory, trajectory_csv, urscript, waypoints_csv,
 };
 use dynident::{
     DesignOutcome, RunOptions, Study, check_log, check_trajectory, check_writable, design_study, write_whole,
 };
 use std::path::PathBuf;
-
-/// Rate of the picture, Hz.
-const PICTURE_RATE_HZ: f64 = 100.0;
 
 /// Options of `design`.
 #[derive(clap::Args)]
@@ -109,26 +105,17 @@ fn files(outcome: &DesignOutcome, options: &Options) -> Result<Vec<(&'static str
     let plain = |write: fn(&Sampled<'_>) -> Result<String, dynident::excitation::export::ExportError>| {
         at(rate_hz, &|sampled| write(sampled).map_err(|error| error.to_string()))
     };
-    let picture = |sampled: &Sampled<'_>| {
-        let torque = outcome.torque_nm(sampled.motion);
-        let title = format!("{}: {}, {}", file.name, file.family, file.criterion);
-        let preview = Preview { title: &title, limits: &outcome.limits, torque_nm: torque.as_deref() };
-        preview_svg(sampled, &preview).map_err(|error| error.to_string())
-    };
-    let path = |sampled: &Sampled<'_>| {
-        let title = format!("{}: {}, {} s", file.name, file.family, file.duration_s);
-        path_svg(sampled, &title, &outcome.machine.model, &outcome.limits).map_err(|error| error.to_string())
-    };
-    let mut files = vec![("preview.svg", at(PICTURE_RATE_HZ, &picture)?), ("path.svg", at(PICTURE_RATE_HZ, &path)?)];
+    let mut files = vec![
+        ("preview.svg", outcome.preview_svg().map_err(told)?.into_bytes()),
+        ("path.svg", outcome.path_svg().map_err(told)?.into_bytes()),
+    ];
     // Who brings a trajectory has it, maybe under this very name.
     if file.given.is_none() {
         files.insert(0, ("trajectory.csv", plain(trajectory_csv)?));
     }
-    if !outcome.history.is_empty() {
-        let title = format!("{}: {}", file.name, file.optimiser);
-        let optimum = file.windowed.as_ref().and_then(|windowed| windowed.optimum);
+    if let Some(picture) = outcome.fitness_svg().map_err(told)? {
         files.push(("fitness.csv", fitness_csv(&outcome.history).into_bytes()));
-        files.push(("fitness.svg", fitness_svg(&title, &outcome.history, optimum).into_bytes()));
+        files.push(("fitness.svg", picture.into_bytes()));
     }
     // A motion that breaks limits is for the eye, not for the robot.
     for format in options.to.iter().filter(|_| file.feasible) {

@@ -2,7 +2,8 @@
 
 use super::{Context, json, pretty_json, told};
 use crate::{Verdict, summary, terminal};
-use dynident::{RunOptions, reproduce, write_whole};
+use dynident::{RunOptions, write_whole};
+use dynident_paper::reproduce;
 use std::path::PathBuf;
 
 /// Options of `reproduce`.

@@ -1,7 +1,7 @@
 //! The summary of `reproduce`.
 
 use super::text::{table, wrapped};
-use dynident::PaperFile;
+use dynident_paper::PaperFile;
 use std::path::Path;
 
 /// What was to be reached, and where to look.

@@ -1,9 +1,24 @@
-//! What residuals look like: white? normal? larger at reversals? Accumulators, fed sample after sample; memory does not grow.
+//! **Is the model good, and is all of it needed?** Errors on data that were not used, and a look at the residuals.
+//!
+//! [`Validation`] sums up the errors of predicted torque; [`CrossValidation`] leaves out one part of the logs after the
+//! other to compare sets of columns. [`essential`] drops parameters that the data do not support, one by one.
+//! [`Whiteness`], [`Normality`] and [`Regimes`] are fed sample after sample and say whether residuals are white, normal,
+//! or larger at reversals; their memory does not grow.
 
+mod cross_validation;
+mod essential;
+mod nonnegative;
 mod normality;
 mod regimes;
+mod validation;
 mod whiteness;
 
+pub use cross_validation::{CrossValidation, FoldErrors, JointFolds};
+pub use essential::{
+    CorrelatedPair, DroppedParameter, EssentialEnd, EssentialReport, EssentialSettings, essential,
+    strongest_correlations,
+};
 pub use normality::{Normality, NormalityReport};
 pub use regimes::{RegimeFigures, Regimes, RegimesReport};
+pub use validation::{JointValidation, Validation, ValidationReport};
 pub use whiteness::{Whiteness, WhitenessReport};

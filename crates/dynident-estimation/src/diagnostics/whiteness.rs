@@ -1,6 +1,6 @@
 //! Are residuals correlated in time? Ljung and Box's test.
 
-use crate::distributions::chi_squared_tail;
+use crate::uncertainty::chi_squared_tail;
 use serde::{Deserialize, Serialize};
 
 /// Lags looked at.

@@ -1,7 +1,8 @@
 //! Triangular and segmented factors: RᵀR = [W | τ]ᵀ[W | τ], whatever the blocking and order.
 
 use crate::common::Random;
-use dynident_estimation::{EstimationError, FactorWorkspace, SegmentSettings, SegmentedFactor, TriangularFactor};
+use dynident_estimation::factor::FactorWorkspace;
+use dynident_estimation::{EstimationError, SegmentSettings, SegmentedFactor, TriangularFactor};
 use dynident_lanes::Level;
 use nalgebra::DMatrix;
 use proptest::prelude::*;

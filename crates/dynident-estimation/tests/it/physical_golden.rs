@@ -1,7 +1,7 @@
 //! The physically consistent fit against cvxpy with Clarabel (golden/cvxpy_physical.py).
 
 use dynident_estimation::TriangularFactor;
-use dynident_estimation::physical::{
+use dynident_estimation::consistent::{
     BaseMap, Ellipsoid, PhysicalBody, PhysicalPrior, PhysicalProblem, PhysicalRoute, PhysicalScalar, PhysicalSettings,
     physical_fit,
 };

@@ -3,7 +3,7 @@
 #![allow(clippy::print_stdout, reason = "the figures are the point of the long run")]
 
 use crate::physical_problems::{Case, case};
-use dynident_estimation::physical::{PhysicalFit, PhysicalRoute, PhysicalSettings, physical_fit};
+use dynident_estimation::consistent::{PhysicalFit, PhysicalRoute, PhysicalSettings, physical_fit};
 use dynident_model::InertialParameters;
 
 /// What issue and book promise.
@@ -105,7 +105,7 @@ fn both_routes_find_the_same_optimum_of_150_problems() {
 }
 
 /// What is asked for: a quarter of an hour in the release profile, which is more than `.ci/run` has.
-/// `cargo test --release -p dynident-estimation --test it physical_routes -- --ignored --nocapture`
+/// `cargo test --release -p dynident-estimation --test physical_routes -- --ignored --nocapture`
 #[test]
 #[ignore = "takes a quarter of an hour in the release profile"]
 fn both_routes_find_the_same_optimum_of_1000_problems_of_up_to_30_bodies() {

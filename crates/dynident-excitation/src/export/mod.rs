@@ -1,17 +1,12 @@
-//! **How does the robot get it?** A sampled motion as the formats that robots and people take, one format a file.
+//! **How does the robot get it?** A sampled motion as the tables and programs that robots take, one format a file.
 
-mod fitness_svg;
-mod path_svg;
-mod preview_svg;
+mod fitness_csv;
 mod ros2;
-mod svg;
 mod trajectory_csv;
 mod urscript;
 mod waypoints;
 
-pub use fitness_svg::{fitness_csv, fitness_svg};
-pub use path_svg::path_svg;
-pub use preview_svg::{Preview, preview_svg};
+pub use fitness_csv::fitness_csv;
 pub use ros2::ros2_joint_trajectory;
 pub use trajectory_csv::trajectory_csv;
 pub use urscript::{UrScriptSettings, urscript};

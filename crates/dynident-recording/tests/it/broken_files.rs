@@ -116,7 +116,7 @@ fn missing_files_folders_and_endless_lines_are_named() {
     assert!(message.contains("cannot be read"), "{message}");
     let mut file = tempfile::NamedTempFile::new().unwrap();
     file.write_all(b"t,q1,q2,tau1,tau2\n0,0,0,0,0\n").unwrap();
-    file.write_all(&vec![b'1'; dynident_recording::MAX_LINE_BYTES + 10]).unwrap();
+    file.write_all(&vec![b'1'; (1 << 20) + 10]).unwrap();
     let message = import(file.path(), FORMAT).unwrap_err().to_string();
     assert!(message.contains(":3: the line is longer than"), "{message}");
 }

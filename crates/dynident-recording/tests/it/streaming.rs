@@ -1,7 +1,7 @@
 //! Streams: the same motion as from the whole log at once, whatever the file looks like; random files never panic.
 use dynident_recording::{
-    Derivatives, DifferentiatorSettings, LogFormat, LogReader, LogisticPath, MotionBlock, MotionSettings, MotionStream,
-    RawBlock, ReferenceSettings,
+    Derivatives, DifferentiatorSettings, Log, LogFormat, LogReader, LogisticPath, MotionBlock, MotionSettings,
+    MotionStream, RawBlock, ReferenceSettings,
 };
 use proptest::prelude::*;
 use std::fmt::Write as _;
@@ -244,7 +244,7 @@ proptest! {
         let file = file(text.as_bytes());
         let format = format("rate_hz = 10.0\nposition = { columns = [2, 0] }\ntorque = { columns = [1, 1] }");
         let joints = ["x".to_owned(), "y".to_owned()];
-        let mut reader = LogReader::open(&format, file.path(), &joints).unwrap();
+        let mut reader = LogReader::open(&Log::file(file.path(), format, &joints)).unwrap();
         let mut block = RawBlock::default();
         prop_assert!(reader.next_block(&mut block).unwrap());
         prop_assert_eq!(block.rows(), rows.len());

@@ -13,7 +13,7 @@ use dynident_estimation::{
     weighted_least_squares,
 };
 use dynident_excitation::Motion;
-use dynident_experiment::iteration::{PhysicalSource, PossibleSettings, possible_parameters};
+use dynident_identification::consistent::{ConsistencySettings, consistent_parameters};
 use dynident_model::sample::Random;
 use dynident_recording::MotionBlock;
 
@@ -112,10 +112,9 @@ pub(super) fn physical(trial: &Trial<'_>) -> Result<Answer, EstimationError> {
     let white = WeightedSettings { covariance: CovarianceMethod::White, ..WeightedSettings::default() };
     let sigma = weighted_least_squares(problem, &white)?.joint_sigma;
     let scenario = trial.scenario;
-    let source =
-        PhysicalSource { model: &scenario.model, laws: &scenario.laws, base: &scenario.base, prior: trial.prior };
-    let settings = PossibleSettings::default();
-    let fit = possible_parameters(&source, problem, &sigma, &settings).map_err(|_| EstimationError::Empty)?;
+    let robot = scenario.parametric.clone().with_nominal(trial.prior.to_vec()).map_err(|_| EstimationError::Empty)?;
+    let settings = ConsistencySettings::default();
+    let fit = consistent_parameters(&robot, problem, &sigma, &settings).map_err(|_| EstimationError::Empty)?;
     Ok(Answer { values: fit.base_values, half_width_95: None, converged: true })
 }
 

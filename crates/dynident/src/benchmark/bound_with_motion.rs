@@ -19,7 +19,7 @@ impl<'a> BoundWithMotion<'a> {
         let mut model = PeriodicModel::new(scenario, record, (DURATION_S, HARMONICS), 1);
         let motion = model.fitted_motion().ok_or(EstimationError::Empty)?;
         let rows = model.linearised(&motion, &scenario.truth)?;
-        Ok(Self { names, motion: motion.len(), joints: scenario.model.dof(), rows })
+        Ok(Self { names, motion: motion.len(), joints: scenario.parametric.model().dof(), rows })
     }
 
     /// The bound on every base parameter's standard deviation: the motion is a Fourier series of the excitation's frequencies with unknown coefficients.

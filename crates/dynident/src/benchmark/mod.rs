@@ -202,7 +202,8 @@ pub fn benchmark(settings: &BenchmarkSettings, progress: &dyn Progress) -> Resul
     progress.begin("runs", Some((robots.len() * levels.len() * settings.runs) as u64));
     for robot in &robots {
         let scenario = Scenario::new(robot, settings.seed)?;
-        let symbols: Vec<String> = scenario.layout.columns().iter().map(dynident_dynamics::Column::symbol).collect();
+        let symbols: Vec<String> =
+            scenario.parametric.layout().columns().iter().map(dynident_dynamics::Column::symbol).collect();
         let bounds = BoundWithMotion::new(&scenario, &symbols)
             .map_err(|_| BenchmarkError::NoBound { robot: robot.name.to_owned() })?;
         for level in &levels {

@@ -40,7 +40,7 @@ impl<'a> PeriodicModel<'a> {
         (period_s, harmonics): (f64, usize),
         mean_of: usize,
     ) -> Self {
-        let joints = scenario.model.dof();
+        let joints = scenario.parametric.model().dof();
         let samples = q.len() / joints;
         let omega: Vec<f64> = (1..=harmonics).map(|h| TAU * h as f64 / period_s).collect();
         let mut basis = DMatrix::from_element(samples, 1 + 2 * harmonics, 1.0);
@@ -51,15 +51,15 @@ impl<'a> PeriodicModel<'a> {
             }
         }
         Self {
-            model: &scenario.model,
-            layout: &scenario.layout,
+            model: scenario.parametric.model(),
+            layout: scenario.parametric.layout(),
             mean_of,
             omega,
             row_basis: means(&basis, mean_of),
             row_q: means(&DMatrix::from_column_slice(samples, joints, q), mean_of),
             basis,
             tau,
-            workspace: BatchWorkspace::new(&scenario.model),
+            workspace: BatchWorkspace::new(scenario.parametric.model()),
         }
     }
 
@@ -241,7 +241,7 @@ mod tests {
     #[test]
     fn derivatives_are_those_of_the_residuals() {
         let mut scenario = Scenario::new(&ROBOTS[0], 1).unwrap();
-        let joints = scenario.model.dof();
+        let joints = scenario.parametric.model().dof();
         // The first second is enough.
         let cut = |x: &[f64]| -> Vec<f64> {
             x.chunks_exact(scenario.motion.samples).flat_map(|joint| joint[..1000].iter().copied()).collect()

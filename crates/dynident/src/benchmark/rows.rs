@@ -47,7 +47,7 @@ impl<'a> Rows<'a> {
         motion: &MotionBlock,
         cutoff_hz: Option<f64>,
     ) -> Result<Self, BenchmarkError> {
-        let (model, layout) = (&scenario.model, &scenario.layout);
+        let (model, layout) = (scenario.parametric.model(), scenario.parametric.layout());
         let filter =
             cutoff_hz.and_then(|cutoff| decimation(&ParallelFilterSection::default(), motion.rate_hz, Some(cutoff)));
         let places: Vec<usize> = (0..model.dof()).collect();
@@ -60,19 +60,19 @@ impl<'a> Rows<'a> {
     }
 
     fn names(&self) -> (Vec<String>, Vec<String>) {
-        let columns = self.scenario.layout.columns().iter().map(Column::symbol).collect();
-        (columns, self.scenario.model.joints().iter().map(|joint| joint.name.clone()).collect())
+        let columns = self.scenario.parametric.layout().columns().iter().map(Column::symbol).collect();
+        (columns, self.scenario.parametric.model().joints().iter().map(|joint| joint.name.clone()).collect())
     }
 
     fn columns(&self, joint: usize) -> &[usize] {
-        self.scenario.layout.joint_columns(joint)
+        self.scenario.parametric.layout().joint_columns(joint)
     }
 
     /// The joints' rows as triangular factors.
     pub(super) fn problem(&self) -> Result<LinearProblem, EstimationError> {
         let (columns, joints) = self.names();
         let mut problem = LinearProblem::new(columns, joints);
-        for joint in 0..self.scenario.model.dof() {
+        for joint in 0..self.scenario.parametric.model().dof() {
             let own = self.columns(joint);
             let mut factor = SegmentedFactor::new(own.len(), EstimatorSection::default().segments)?;
             for block in self.blocks.iter().filter(|block| block.joint == joint) {
@@ -110,7 +110,7 @@ impl<'a> Rows<'a> {
     pub(super) fn instrumented(&self, instruments: &Self) -> Result<InstrumentedProblem, EstimationError> {
         let (columns, joints) = self.names();
         let mut problem = InstrumentedProblem::new(columns, joints);
-        for joint in 0..self.scenario.model.dof() {
+        for joint in 0..self.scenario.parametric.model().dof() {
             let own = self.columns(joint);
             let mut factor = SegmentedFactor::new(2 * own.len(), EstimatorSection::default().segments)?;
             let pairs = self.blocks.iter().zip(&instruments.blocks);
@@ -125,7 +125,7 @@ impl<'a> Rows<'a> {
 
     /// Root mean square of the difference of each column to that of other rows of the same filter.
     pub(super) fn column_differences(&self, other: &Self) -> Vec<f64> {
-        let count = self.scenario.layout.columns().len();
+        let count = self.scenario.parametric.layout().columns().len();
         let (mut squares, mut rows) = (vec![0.0; count], vec![0_usize; count]);
         for (a, b) in self.blocks.iter().zip(&other.blocks) {
             let columns = a.panel.chunks_exact(a.rows).zip(b.panel.chunks_exact(a.rows));

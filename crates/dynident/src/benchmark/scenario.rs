@@ -6,7 +6,7 @@
 use super::BenchmarkError;
 use super::noise::NoiseLevel;
 use super::robots::BenchmarkRobot;
-use dynident_dynamics::{BaseParameterSettings, BaseParameters, BatchWorkspace, PanelLayout, Panels, regressor_panels};
+use dynident_dynamics::{BatchWorkspace, PanelLayout, Panels, ParametricModel, regressor_panels};
 use dynident_excitation::families::{Fourier, FourierSettings};
 use dynident_excitation::{Family, Motion};
 use dynident_model::Model;
@@ -36,14 +36,8 @@ const SPEED_RAD_S: f64 = 2.0;
 pub struct Scenario {
     /// The robot's name.
     pub robot: &'static str,
-    /// The machine.
-    pub model: Model,
-    /// Friction and drives, the same in the data and in the fit.
-    pub laws: Vec<Law>,
-    /// Base parameters of bodies and laws.
-    pub base: BaseParameters,
-    /// Panels of base columns.
-    pub layout: PanelLayout,
+    /// The robot.
+    pub parametric: ParametricModel,
     /// What the controller was told to do.
     pub reference: Motion,
     pub(super) truth: Vec<f64>,
@@ -74,21 +68,24 @@ impl Scenario {
             offset: true,
         };
         let laws = laws_per_joint(&model, |_| drive);
-        let base = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
-        let layout = PanelLayout::new(&model, base.base_columns());
-        let reference = excitation(robot, &model, &layout, seed)?;
+        let parametric = ParametricModel::new(model, laws).map_err(|source| BenchmarkError::Excitation {
+            robot: robot.name.to_owned(),
+            reason: source.to_string(),
+        })?;
+        let (model, laws, layout) = (parametric.model(), parametric.laws(), parametric.layout());
+        let (base, reference) = (parametric.base(), excitation(robot, model, layout, seed)?);
         let motion = followed(&reference);
         let mut parameters = model.parameter_vector();
         parameters.extend(vec![0.0; laws.len()]);
-        let bodies_only = torque(&model, &layout, &motion, &base.values(&parameters));
+        let bodies_only = torque(model, layout, &motion, &base.values(&parameters));
         let first = parameters.len() - laws.len();
         for (law, value) in laws.iter().zip(&mut parameters[first..]) {
             let joint = law.joints()[0];
             *value = drive_value(law, &motion, &bodies_only[motion.of(joint)], joint);
         }
         let truth = base.values(&parameters);
-        let torque = torque(&model, &layout, &motion, &truth);
-        Ok(Self { robot: robot.name, model, laws, base, layout, reference, truth, motion, torque })
+        let torque = torque(model, layout, &motion, &truth);
+        Ok(Self { robot: robot.name, parametric, reference, truth, motion, torque })
     }
 
     /// One run's record.
@@ -120,7 +117,7 @@ impl Scenario {
 
     /// What a drawing office knows: bodies with a wrong density, no drives.
     pub(super) fn prior(&self, random: &mut Random, spread: f64) -> Vec<f64> {
-        let mut prior = self.model.parameter_vector();
+        let mut prior = self.parametric.model().parameter_vector();
         for body in prior.chunks_exact_mut(10) {
             // Four standard deviations below, a body would weigh less than nothing.
             let factor = (1.0 + spread * random.normal()).max(0.25);
@@ -128,7 +125,7 @@ impl Scenario {
                 *value *= factor;
             }
         }
-        prior.extend(vec![0.0; self.laws.len()]);
+        prior.extend(vec![0.0; self.parametric.laws().len()]);
         prior
     }
 
@@ -137,13 +134,19 @@ impl Scenario {
     pub(super) fn bound(&self, noise: &NoiseLevel) -> Option<Vec<f64>> {
         let (count, samples) = (self.truth.len(), self.motion.samples);
         let mut panels = Panels::default();
-        let mut workspace = BatchWorkspace::new(&self.model);
-        regressor_panels(&self.model, &mut workspace, &self.layout, &self.motion.view(), &mut panels);
+        let mut workspace = BatchWorkspace::new(self.parametric.model());
+        regressor_panels(
+            self.parametric.model(),
+            &mut workspace,
+            self.parametric.layout(),
+            &self.motion.view(),
+            &mut panels,
+        );
         let rho = noise.torque_correlation;
         let fresh = noise.torque_std_nm * (1.0 - rho * rho).sqrt();
         let mut information = DMatrix::<f64>::zeros(count, count);
-        for joint in 0..self.model.dof() {
-            let columns = self.layout.joint_columns(joint);
+        for joint in 0..self.parametric.model().dof() {
+            let columns = self.parametric.layout().joint_columns(joint);
             let whitened: Vec<Vec<f64>> = panels.joint(joint)[..columns.len() * samples]
                 .chunks_exact(samples)
                 .map(|y| {

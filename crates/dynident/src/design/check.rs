@@ -95,7 +95,7 @@ pub fn check_log(
             "the log has {gaps} gap(s): its pieces are judged one by one and count together; pictures show the longest"
         ));
     }
-    let count = prepared.machine.layout.columns().len();
+    let count = prepared.machine.layout().columns().len();
     let [mut plain, mut weighted] = [(); 2].map(|()| DMatrix::zeros(count, count));
     let (mut reports, mut diagnosis, mut duration_s): (Vec<LimitReport>, Vec<String>, f64) =
         (Vec::new(), Vec::new(), 0.0);
@@ -166,7 +166,7 @@ fn checked(
     rate_hz: f64,
     motion_at: &dyn Fn(&[f64], &mut Motion),
 ) -> Result<Vec<LimitReport>, Error> {
-    check_limits(&prepared.limits, &prepared.machine.model, duration_s, rate_hz, motion_at)
+    check_limits(&prepared.limits, &prepared.machine.model(), duration_s, rate_hz, motion_at)
         .map_err(|why| Error::study(study_path, format!("[design.limits]: {why}")))
 }
 
@@ -199,7 +199,7 @@ fn pieces(study: &Study, machine: &Machine, index: usize, file: &Path) -> Result
     // By piece: for q, dq, ddq and each joint of the model its samples.
     let mut found: Vec<Vec<Vec<f64>>> = Vec::new();
     let (mut segment, mut samples, mut block) = (None, 0, MotionBlock::default());
-    let dof = machine.model.dof();
+    let dof = machine.model().dof();
     while stream.next_block(&mut block).map_err(failed)? {
         if segment != Some(block.segment) {
             segment = Some(block.segment);

@@ -19,14 +19,15 @@ pub(super) fn named_forecast(
     information: &DMatrix<f64>,
     with_prior: Option<&DMatrix<f64>>,
 ) -> (Vec<ParameterForecast>, Vec<DirectionForecast>) {
-    let columns = machine.layout.columns();
+    let columns = machine.layout().columns();
     let alone = forecast(information, DIRECTIONS);
     let all = with_prior.map(|information| forecast(information, DIRECTIONS));
     // A prior that is zero but for the rounding of the description's angles has no relative error.
-    let largest = machine.prior.iter().flatten().fold(0.0_f64, |largest, prior| largest.max(prior.abs()));
-    let expressions = machine.base.expressions();
+    let largest =
+        machine.nominal_base().iter().copied().flatten().fold(0.0_f64, |largest, prior| largest.max(prior.abs()));
+    let expressions = machine.base().expressions();
     let parameters = expressions.into_iter().enumerate().map(|(index, expression)| {
-        let (std, prior) = (alone.std[index], machine.prior.as_ref().map(|prior| prior[index]));
+        let (std, prior) = (alone.std[index], machine.nominal_base().map(|prior| prior[index]));
         let size = prior.map(f64::abs).filter(|size| *size > NEGLIGIBLE * largest);
         let relative = std.zip(size).map(|(std, size)| 100.0 * std / size);
         let (symbol, unit) = (columns[index].symbol(), columns[index].unit());

@@ -6,6 +6,7 @@ mod forecast;
 mod joined;
 mod name_or_table;
 mod optimiser;
+mod pictures;
 mod prepared;
 mod prior;
 mod section;
@@ -78,7 +79,7 @@ impl DesignOutcome {
 
     /// Torque along a motion by the prior inertial parameters, joint-major as the motion, Nm (N); `None` while a body's inertial is unknown.
     pub fn torque_nm(&self, motion: &Motion) -> Option<Vec<f64>> {
-        let model = &self.machine.model;
+        let model = self.machine.model();
         if !model.bodies_without_prior().is_empty() {
             return None;
         }
@@ -125,7 +126,7 @@ pub fn design_study(
     let Prepared { section, machine, limits, set, .. } = &prepared;
     let duration_s = found.family.duration_s();
     let motion_at = |times: &[f64], out: &mut Motion| found.family.motion(&found.parameters, times, out);
-    let reports = check_limits(limits, &machine.model, duration_s, CHECK_RATE_HZ, motion_at)
+    let reports = check_limits(limits, machine.model(), duration_s, CHECK_RATE_HZ, motion_at)
         .map_err(|why| wrong("design.limits", &why))?;
     let inside = reports.iter().all(|report| !report.violated);
     let mut diagnosis = if inside { Vec::new() } else { sentences(set, duration_s, &reports, &motion_at) };
@@ -196,7 +197,7 @@ fn searched(
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
 ) -> Result<Found, Error> {
     let Prepared { section, machine, limits, set, .. } = prepared;
-    let model = &machine.model;
+    let model = machine.model();
     limits.check_duration(model, section.duration_s, LEAST_DISPLACEMENT).map_err(|why| wrong("design.limits", &why))?;
     let mut family =
         section.family.family(model.dof(), section.duration_s).map_err(|why| wrong("design.family", &why))?;
@@ -210,7 +211,7 @@ fn searched(
         family: &*family,
         criteria: &criteria,
         limits: set,
-        layout: &machine.layout,
+        layout: machine.layout(),
         torque_std_nm: prepared.counted_std_nm(),
         prior: prepared.prior.as_ref(),
     };

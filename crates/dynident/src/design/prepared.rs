@@ -81,8 +81,8 @@ impl Prepared {
         section.validate().map_err(|why| wrong("design", &why))?;
         let folders = Folders::new(study, study_path, options.data.as_deref());
         let machine = Machine::new(study, study_path, &folders)?;
-        let limits = Limits::from_model(&machine.model).overlaid(&section.limits);
-        let set = LimitSet::new(&limits, &machine.model).map_err(|why| wrong("design.limits", &why))?;
+        let limits = Limits::from_model(machine.model()).overlaid(&section.limits);
+        let set = LimitSet::new(&limits, machine.model()).map_err(|why| wrong("design.limits", &why))?;
         let torque_std_nm = torque_std(&section, &machine, &mut notes).map_err(|why| wrong("design", &why))?;
         let prior = section.prior.information(&machine, study_path, &folders, &mut notes)?;
         let criteria = match &section.criterion {
@@ -101,7 +101,7 @@ impl Prepared {
         };
         Ok(Self {
             name: study_name(study, study_path),
-            ones: vec![1.0; machine.model.dof()],
+            ones: vec![1.0; machine.model().dof()],
             section,
             machine,
             limits,
@@ -160,7 +160,7 @@ impl Prepared {
             condition_number_scaled: condition(true),
             log_det: log_det(&judged.plain),
             log_det_weighted: log_det(&judged.weighted),
-            base_columns: self.machine.base.count(),
+            base_columns: self.machine.base().count(),
             duration_s: judged.duration_s,
             rate_hz: judged.rate_hz,
             torque_std_nm: self.torque_std_nm,
@@ -189,8 +189,8 @@ fn information(
     times: &[f64],
     motion_at: &dyn Fn(&[f64], &mut Motion),
 ) -> DMatrix<f64> {
-    let count = machine.layout.columns().len();
-    let mut gatherer = Information::new(&machine.model, &machine.layout, torque_std_nm, None);
+    let count = machine.layout().columns().len();
+    let mut gatherer = Information::new(machine.model(), machine.layout(), torque_std_nm, None);
     let (mut sum, mut motion) = (DMatrix::zeros(count, count), Motion::default());
     for times in times.chunks(SAMPLES_AT_ONCE) {
         motion_at(times, &mut motion);
@@ -220,7 +220,7 @@ fn smooth(study: &Study, notes: &mut Vec<String>) -> Study {
 
 /// That something bounds how fast each joint moves: without it the best motion is infinitely fast.
 fn bounded(machine: &Machine, limits: &Limits) -> Result<(), String> {
-    for joint in machine.model.joints() {
+    for joint in machine.model().joints() {
         let free = limits.of(&joint.name).is_none_or(|limit| {
             let rates = [limit.speed, limit.acceleration, limit.jerk, limit.torque, limit.power_w];
             rates.iter().all(Option::is_none)
@@ -238,7 +238,7 @@ fn bounded(machine: &Machine, limits: &Limits) -> Result<(), String> {
 
 /// Torque noise of every joint.
 fn torque_std(section: &DesignSection, machine: &Machine, notes: &mut Vec<String>) -> Result<Vec<f64>, String> {
-    let joints = machine.model.joints();
+    let joints = machine.model().joints();
     match &section.torque_std_nm {
         Some(TorqueNoise::Same(std)) => Ok(vec![*std; joints.len()]),
         Some(TorqueNoise::Each(stds)) if stds.len() == joints.len() => Ok(stds.clone()),

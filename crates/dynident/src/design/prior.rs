@@ -61,7 +61,7 @@ impl PriorSection {
             notes.push(format!("prior: the covariance of {}", result.display()));
         }
         if let Some(percent) = self.cad_std_percent {
-            let unknown = machine.model.bodies_without_prior();
+            let unknown = machine.model().bodies_without_prior();
             if !unknown.is_empty() {
                 let message = format!(
                     "[design.prior]: cad_std_percent, but the inertial parameters of {} are unknown: give them in the description, or leave cad_std_percent out",
@@ -81,7 +81,7 @@ impl PriorSection {
 /// `K diag(σ²) Kᵀ` of the base parameters: the independent ones with their own variance, and what is regrouped into them.
 fn cad_covariance(machine: &Machine, share: f64) -> DMatrix<f64> {
     let std = standard_deviations(machine, share);
-    let base = &machine.base;
+    let base = machine.base();
     let mut spread = base.regrouping().clone();
     for (mut column, index) in spread.column_iter_mut().zip(base.dependent()) {
         column *= std[*index];
@@ -96,9 +96,9 @@ fn cad_covariance(machine: &Machine, share: f64) -> DMatrix<f64> {
 /// Standard deviation of every standard parameter: bodies, then laws.
 fn standard_deviations(machine: &Machine, share: f64) -> Vec<f64> {
     const KINDS: [core::ops::Range<usize>; 3] = [0..1, 1..4, 4..10];
-    let values = crate::machine::prior_parameters(&machine.model, &machine.laws);
+    let values = machine.nominal().to_vec();
     let largest = |values: &[f64]| values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
-    let (bodies, laws) = values.split_at(10 * machine.model.dof());
+    let (bodies, laws) = values.split_at(10 * machine.model().dof());
     let mut std = Vec::with_capacity(values.len());
     for body in bodies.chunks_exact(10) {
         for kind in KINDS {
@@ -109,7 +109,7 @@ fn standard_deviations(machine: &Machine, share: f64) -> Vec<f64> {
             std.extend(body[kind].iter().map(|value| share * value.abs().max(FLOOR * scale)));
         }
     }
-    std.extend(machine.laws.iter().zip(laws).map(|(law, value)| match law {
+    std.extend(machine.laws().iter().zip(laws).map(|(law, value)| match law {
         Law::Viscous(_) | Law::Coulomb(_) if *value != 0.0 => share * value.abs(),
         _ => UNKNOWN,
     }));
@@ -182,8 +182,8 @@ const TOLD: usize = 6;
 
 /// For every stored parameter its column in the machine.
 fn places(stored: &[BaseParameterResult], machine: &Machine) -> Result<Vec<usize>, String> {
-    let symbols: Vec<String> = machine.layout.columns().iter().map(Column::symbol).collect();
-    let expressions = machine.base.expressions();
+    let symbols: Vec<String> = machine.layout().columns().iter().map(Column::symbol).collect();
+    let expressions = machine.base().expressions();
     let told = |names: &[&str]| {
         let more = if names.len() > TOLD { format!(" and {} more", names.len() - TOLD) } else { String::new() };
         format!("{}{more}", names[..names.len().min(TOLD)].join(", "))

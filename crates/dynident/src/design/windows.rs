@@ -204,12 +204,12 @@ pub(crate) fn step_wise(
                 .to_owned(),
         );
     }
-    let dof = machine.model.dof();
+    let dof = machine.model().dof();
     settings.validate(dof, section.duration_s).map_err(|error| error.to_string())?;
     let offsets = settings.offsets.clone().unwrap_or_else(|| vec![0.0; dof]);
     let names: Vec<String> = match &windowed.joints {
         Some(joints) => joints.clone(),
-        None => machine.model.joints().iter().rev().map(|joint| joint.name.clone()).collect(),
+        None => machine.model().joints().iter().rev().map(|joint| joint.name.clone()).collect(),
     };
     let problem = problem(section, windowed, machine, limits, settings, &offsets, &names)?;
     problem.validate().map_err(|error| error.to_string())?;
@@ -300,7 +300,7 @@ fn problem(
     offsets: &[f64],
     names: &[String],
 ) -> Result<StepWiseProblem, String> {
-    let model = &machine.model;
+    let model = machine.model();
     let mut joints = Vec::with_capacity(names.len());
     for (place, name) in names.iter().enumerate() {
         let joint =
@@ -388,7 +388,7 @@ fn told(
             kept: limit.kept(),
         });
         StrokeFile {
-            joint: machine.model.joints()[joint].name.clone(),
+            joint: machine.model().joints()[joint].name.clone(),
             amplitude_rad: stroke.amplitude_rad,
             steepness_per_s: stroke.steepness_per_s,
             offset_rad: offsets[joint],

@@ -192,7 +192,7 @@ fn with_instruments(
     for (place, &index) in logs.training.iter().enumerate() {
         let factors = instrumented_factors(&logs.pass(index), source, section.segments)?;
         for (joint, factor) in factors.into_iter().enumerate() {
-            let columns = logs.machine.layout.joint_columns(joint);
+            let columns = logs.machine.layout().joint_columns(joint);
             instrumented.add(&problem.logs()[place], joint, columns, factor).map_err(in_study)?;
         }
     }

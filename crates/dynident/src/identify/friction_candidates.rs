@@ -75,13 +75,13 @@ pub(crate) fn joints_to_choose(study: &Study, machine: &Machine) -> Vec<usize> {
         let own = study.drive.joints.get(name).and_then(|own| own.friction);
         own.unwrap_or(study.drive.friction) == FrictionChoice::Auto
     };
-    let joints = machine.model.joints();
+    let joints = machine.model().joints();
     (0..joints.len()).filter(|&joint| of_joint(&joints[joint].name)).collect()
 }
 
 /// For each joint to choose, the columns to choose from; a term's columns stand together, in the order of its grid.
 pub(crate) fn candidate_columns(study: &Study, machine: &Machine, choose: &[usize]) -> Vec<Vec<CandidateColumn>> {
-    let of_joint = |&joint: &usize| columns_of(study, &machine.model.joints()[joint].name, joint);
+    let of_joint = |&joint: &usize| columns_of(study, &machine.model().joints()[joint].name, joint);
     choose.iter().map(of_joint).collect()
 }
 

@@ -77,7 +77,7 @@ pub(crate) fn choose_friction(
     columns: &[Vec<CandidateColumn>],
     plain: &Estimate,
 ) -> Result<Vec<JointFriction>, EstimationError> {
-    let name = |joint: usize| machine.model.joints()[joint].name.clone();
+    let name = |joint: usize| machine.model().joints()[joint].name.clone();
     let refused = |joint: usize, reason: &str| JointFriction {
         joint: name(joint),
         chosen: format!("as the study states: {reason}"),
@@ -108,7 +108,7 @@ pub(crate) fn choose_friction(
     let rows = wide_problem.joint_rows();
     let norms = wide_problem.column_norms();
     let place =
-        |law: &Law| wide.layout.columns().iter().position(|column| matches!(column, Column::Law(l) if l == law));
+        |law: &Law| wide.layout().columns().iter().position(|column| matches!(column, Column::Law(l) if l == law));
     let of_joint = |joint: usize, columns: &[CandidateColumn], before: &[Option<Vec<usize>>]| {
         let variable: Vec<usize> = columns.iter().filter_map(|column| place(&column.law)).collect();
         let speed = norms[variable[0]] / (rows[joint].max(1) as f64).sqrt();
@@ -117,14 +117,14 @@ pub(crate) fn choose_friction(
         }
         // The stated model, as far as the data excite it, without this joint's friction, and with that of others as chosen before.
         let chosen_before = |other: usize| choose.iter().position(|&c| c == other).and_then(|c| before[c].as_ref());
-        let kept = |index: &usize| match &machine.layout.columns()[*index] {
+        let kept = |index: &usize| match &machine.layout().columns()[*index] {
             Column::Law(law) if law.is_joint_friction() => {
                 law.joints().iter().all(|&other| other != joint && chosen_before(other).is_none())
             }
             _ => true,
         };
         let fixed = |index: &usize| plain.rank.fixed.iter().any(|fixed| fixed.column == *index);
-        let stated = (0..machine.layout.columns().len()).filter(|index| kept(index) && !fixed(index));
+        let stated = (0..machine.layout().columns().len()).filter(|index| kept(index) && !fixed(index));
         let others = choose.iter().filter(|&&other| other != joint).filter_map(|&other| chosen_before(other));
         let common: Vec<usize> = stated.chain(others.flatten().copied()).collect();
         match validation.joint(joint, &common, &variable, &weights) {

@@ -112,7 +112,7 @@ impl RowSink for SideBySide<'_> {
 pub(crate) fn generalized(logs: &Logs<'_>, problem: &LinearProblem) -> Result<GeneralizedEstimate, Error> {
     let section = &logs.study.estimator;
     let joints = problem.joints().len();
-    let lists = (0..joints).map(|joint| logs.machine.layout.joint_columns(joint).to_vec()).collect();
+    let lists = (0..joints).map(|joint| logs.machine.layout().joint_columns(joint).to_vec()).collect();
     let mut cross = CrossProblem::new(problem.columns().to_vec(), problem.joints().to_vec(), lists)
         .and_then(|cross| cross.with_fallback(problem.fallback().to_vec()))
         .map_err(|source| logs.in_study(source))?;

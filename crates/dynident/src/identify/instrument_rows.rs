@@ -2,7 +2,6 @@
 
 use crate::error::Error;
 use crate::identify::instruments::InstrumentSource;
-use crate::machine::Machine;
 use crate::measured::motion_log::motion_stream;
 use crate::measured::rows::{PANEL_SAMPLES, Pass, decimation, in_model_order, motion_band_hz};
 use dynident_dynamics::{BatchWorkspace, Panels, regressor_panels};
@@ -19,7 +18,7 @@ pub(crate) fn instrumented_factors(
     let log = pass.study.log_name(pass.index);
     let failed = |source| Error::recording(&log, source);
     let in_log = |source: EstimationError| Error::Estimation { path: pass.file.to_owned(), source };
-    let Machine { model, layout, log_place, .. } = pass.machine;
+    let (model, layout, log_place) = (pass.machine.model(), pass.machine.layout(), &pass.machine.log_place);
     let mut stream = motion_stream(pass.study, pass.machine, pass.motion, pass.index, pass.file)?;
     let settings = decimation(&pass.study.parallel_filter, stream.rate_hz(), motion_band_hz(pass.motion));
     let widths: Vec<usize> = (0..model.dof()).map(|joint| 2 * layout.joint_columns(joint).len()).collect();

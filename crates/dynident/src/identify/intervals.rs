@@ -1,13 +1,12 @@
 //! How far each parameter of a body or law could go: intervals that respect what is possible.
 
-use crate::identify::physical::source_of;
 use crate::machine::Machine;
 use crate::progress::Progress;
 use crate::study::EstimatorMethod;
 use dynident_dynamics::Column;
-use dynident_estimation::physical::{IntervalEnd, IntervalSettings, PhysicalSettings, PossibleIntervals};
+use dynident_estimation::consistent::{IntervalEnd, IntervalSettings, PhysicalSettings, PossibleIntervals};
 use dynident_estimation::{Estimate, LinearProblem};
-use dynident_experiment::iteration::{PossibleSettings, possible_problem};
+use dynident_identification::consistent::{ConsistencySettings, consistency_problem};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -35,9 +34,8 @@ pub(crate) struct Asked<'a> {
     pub(crate) machine: &'a Machine,
     pub(crate) problem: &'a LinearProblem,
     pub(crate) estimate: &'a Estimate,
-    pub(crate) prior: &'a [f64],
     pub(crate) method: EstimatorMethod,
-    pub(crate) settings: &'a PossibleSettings,
+    pub(crate) settings: &'a ConsistencySettings,
 }
 
 /// The intervals of all parameters that the model has; otherwise the reason why there are none.
@@ -45,10 +43,10 @@ pub(crate) fn possible_intervals(
     asked: &Asked<'_>,
     progress: &dyn Progress,
 ) -> Result<Vec<PossibleIntervalResult>, String> {
-    let Asked { machine, problem, estimate, prior, method, settings } = *asked;
-    let source = source_of(machine, prior);
+    let Asked { machine, problem, estimate, method, settings } = *asked;
     let said = |error: &dyn core::fmt::Display| error.to_string();
-    let mut problem = possible_problem(&source, problem, &estimate.joint_sigma, settings)?;
+    let mut problem = consistency_problem(&machine.parametric, problem, &estimate.joint_sigma, settings)
+        .map_err(|error| said(&error))?;
     if !method.is_plain() {
         problem = problem.around(&estimate.values).map_err(|error| said(&error))?;
     }
@@ -61,9 +59,9 @@ pub(crate) fn possible_intervals(
     let intervals =
         PossibleIntervals::new(&problem, Some(&estimate.covariance), freedom, IntervalSettings { physical, ..own })
             .map_err(|error| said(&error))?;
-    let columns = machine.base.all_columns();
+    let columns = machine.base().all_columns();
     progress.begin("intervals of bodies", Some(columns.len() as u64));
-    let joints = machine.model.joints();
+    let joints = machine.model().joints();
     let found = columns
         .par_iter()
         .enumerate()
@@ -71,7 +69,7 @@ pub(crate) fn possible_intervals(
             let interval = intervals.of(index).map_err(|error| said(&error))?;
             progress.advance(1);
             let of = match column {
-                Column::Body { body, .. } => Some(machine.model.bodies()[*body].name().to_owned()),
+                Column::Body { body, .. } => Some(machine.model().bodies()[*body].name().to_owned()),
                 Column::Law(law) => match law.joints()[..] {
                     [joint] => Some(joints[joint].name.clone()),
                     _ => None,

@@ -25,7 +25,7 @@ use crate::identify::fit::{Fitted, Logs};
 use crate::identify::friction_choice::with_friction;
 use crate::identify::instruments::InstrumentSource;
 use crate::identify::intervals::{Asked, possible_intervals};
-use crate::identify::physical::{physical_fit_result, possible_parameters, source_of};
+use crate::identify::physical::{physical_fit_result, possible_parameters};
 use crate::identify::result::{RESULT_SCHEMA, ResultFile, Timings};
 use crate::identify::result_sections::{
     base_parameters, bodies, joint_results, law_results, method_summary, offset_results, robot_summary,
@@ -39,7 +39,7 @@ use crate::identify::written_urdf::written_urdf;
 use crate::job::{RunOptions, joint_names, log_files, note_lags, of_role, study_name};
 use crate::load::arm::KnownArm;
 use crate::load::payload_result::payload_results;
-use crate::machine::{Machine, prior_parameters};
+use crate::machine::Machine;
 use crate::measured::lag::{self, TorqueLag};
 use crate::measured::residuals::Uncertainty;
 use crate::measured::rows::motion_in_force;
@@ -48,7 +48,7 @@ use crate::study::friction::FrictionChoice;
 use crate::study::{EstimatorMethod, Folders, Role, Study};
 use crate::validate::{Tested, read_model, validate_log};
 use dynident_estimation::{Estimate, essential, strongest_correlations};
-use dynident_experiment::iteration::impossible_priors;
+use dynident_identification::consistent::inconsistent_nominal_bodies;
 use dynident_model::InertialParameters;
 use dynident_model::laws::Law;
 use rayon::prelude::*;
@@ -131,7 +131,7 @@ fn identified(
             // Laws that the logs are to choose are not there yet.
             named.laws.clear();
         }
-        let checked = named.check_names(&machine.model, &machine.laws);
+        let checked = named.check_names(machine.model(), machine.laws());
         checked.map_err(|error| Error::study(study_path, format!("[estimator.physical]: {error}")))?;
     }
     let mut timings = Timings { machine: start.elapsed().as_secs_f64(), ..Timings::default() };
@@ -163,7 +163,7 @@ fn identified(
         }
         None => (estimate, None),
     };
-    let prior = prior_parameters(&machine.model, &machine.laws);
+    let prior = machine.nominal().to_vec();
     let theta = &estimate.values[..columns.base()];
     // Without the columns of payloads and offsets of single logs.
     let alone = (arm.is_none() && !columns.is_plain()).then(|| columns.arm_problem(problem, &estimate.values));
@@ -175,9 +175,9 @@ fn identified(
         }
         Some(settings) => {
             let asked = (study.estimator.method, settings);
-            match possible_parameters(machine, arm_problem, &arm_estimate, &prior, asked) {
+            match possible_parameters(machine, arm_problem, &arm_estimate, asked) {
                 Ok(fit) => (Some(fit), None),
-                Err(reason) => (None, Some(reason)),
+                Err(reason) => (None, Some(reason.to_string())),
             }
         }
         None => (None, None),
@@ -188,8 +188,7 @@ fn identified(
         // Where there is no possible machine, `physical.failure` says why.
         Some(settings) if study.estimator.intervals && possible.is_some() => {
             let method = study.estimator.method;
-            let asked =
-                Asked { machine, problem: arm_problem, estimate: &arm_estimate, prior: &prior, method, settings };
+            let asked = Asked { machine, problem: arm_problem, estimate: &arm_estimate, method, settings };
             let found = possible_intervals(&asked, options.progress);
             Some(found.map_err(|reason| Error::study(study_path, format!("estimator.intervals: {reason}")))?)
         }
@@ -240,8 +239,8 @@ fn identified(
 
     let parameters = possible
         .as_ref()
-        .map_or_else(|| nearest_to_prior(&machine.model, &machine.base, theta, &prior), |fit| fit.parameters.clone());
-    let inertials = inertials(&machine.model, &parameters);
+        .map_or_else(|| nearest_to_prior(machine.model(), machine.base(), theta, &prior), |fit| fit.parameters.clone());
+    let inertials = inertials(machine.model(), &parameters);
     let mut verdict = verdict(machine, &inertials, &parameters);
     if let Some(fit) = &possible {
         verdict.fit = Some(physical_fit_result(fit, &arm_estimate));
@@ -254,7 +253,7 @@ fn identified(
     verdict.failure = failure;
     verdict.sign = sign;
     if let Some(settings) = &possible_settings {
-        let impossible = impossible_priors(&source_of(machine, &prior), settings);
+        let impossible = inconsistent_nominal_bodies(&machine.parametric, settings);
         verdict.impossible_priors = impossible
             .into_iter()
             .map(|(body, least)| format!("{body}: least eigenvalue of the pseudo-inertia {least:.2e}"))

@@ -60,7 +60,7 @@ pub(crate) fn periodic(logs: &Logs<'_>, problem: &LinearProblem) -> Result<(Esti
     let Logs { study, machine, .. } = *logs;
     let section = &study.estimator;
     let wrong = |message: String| Error::Method { path: logs.path.to_owned(), method: section.method.name(), message };
-    if let Some(law) = machine.laws.iter().find(|law| matches!(law, Law::MaxwellSlip(_) | Law::Load(_))) {
+    if let Some(law) = machine.laws().iter().find(|law| matches!(law, Law::MaxwellSlip(_) | Law::Load(_))) {
         return Err(wrong(format!(
             "{} depends on more than the motion of one instant: leave that law out, or take another method",
             law.symbol()
@@ -83,7 +83,7 @@ pub(crate) fn periodic(logs: &Logs<'_>, problem: &LinearProblem) -> Result<(Esti
     }
     logs.options.progress.end();
     let Some(first) = means.first() else { return Err(wrong("there is no log to fit to".to_owned())) };
-    let (dof, most) = (machine.model.dof(), first.averaged.periods);
+    let (dof, most) = (machine.model().dof(), first.averaged.periods);
     let sample_covariance = pooled(&means);
     // Covariance of the mean of as many periods as the first log has; the other logs' rows are scaled to it.
     let mean_covariance = &sample_covariance / most as f64;
@@ -152,7 +152,7 @@ fn mean_period(
     let alike = MotionSettings { smooth_torque: true, ..motion.clone() };
     let failed = |source| Error::recording(&study.log_name(index), source);
     let mut stream = motion_stream(study, machine, &alike, index, &logs.files[index])?;
-    let (rate_hz, dof) = (stream.rate_hz(), machine.model.dof());
+    let (rate_hz, dof) = (stream.rate_hz(), machine.model().dof());
     let stride =
         decimation(&study.parallel_filter, rate_hz, motion_band_hz(motion)).map_or(1, |settings| settings.factor);
     let mut channels = vec![Vec::new(); 4 * dof];
@@ -189,7 +189,7 @@ fn mean_period(
         )));
     }
     let averaged = averaged_periods(&views, samples).map_err(|error| wrong(error.to_string()))?;
-    let joints = machine.model.joints();
+    let joints = machine.model().joints();
     for joint in 0..dof {
         let mean = &averaged.mean[joint];
         let middle = mean.iter().sum::<f64>() / mean.len() as f64;
@@ -237,12 +237,12 @@ struct Instants<'a> {
 
 impl<'a> Instants<'a> {
     fn new(machine: &'a Machine) -> Self {
-        Self { machine, workspace: BatchWorkspace::new(&machine.model), panels: Panels::default() }
+        Self { machine, workspace: BatchWorkspace::new(machine.model()), panels: Panels::default() }
     }
 
     /// Hands the instants of a mean period to `visit`. Rows of a mean over more periods count more; `weight` is the root of how much.
     fn of(&mut self, mean: &MeanPeriod, weight: f64, visit: &mut InstantVisitor<'_>) -> Result<(), Stop> {
-        let Machine { model, layout, .. } = self.machine;
+        let (model, layout) = (self.machine.model(), self.machine.layout());
         let (dof, columns) = (model.dof(), layout.columns().len());
         let variables = 3 * dof;
         let samples = 1 + 2 * variables;

@@ -3,14 +3,11 @@
 use crate::identify::result::{PhysicalBodyResult, PhysicalFitResult};
 use crate::machine::Machine;
 use crate::study::EstimatorMethod;
-use dynident_estimation::physical::{PhysicalFit, PhysicalStatus};
+use dynident_estimation::consistent::{PhysicalFit, PhysicalStatus};
 use dynident_estimation::{Estimate, LinearProblem};
-use dynident_experiment::iteration::{PhysicalSource, PossibleSettings, nearest_possible_parameters};
-
-/// What the possible machine is made of.
-pub(crate) fn source_of<'a>(machine: &'a Machine, prior: &'a [f64]) -> PhysicalSource<'a> {
-    PhysicalSource { model: &machine.model, laws: &machine.laws, base: &machine.base, prior }
-}
+use dynident_identification::consistent::{
+    ConsistencyError, ConsistencySettings, consistent_parameters, nearest_consistent_parameters,
+};
 
 /// The possible set of parameters that fits the logs best, from the factors that the estimate was made from; or, where another estimator than least squares was asked for, the one nearest to its
 /// estimate in the metric of these factors. Otherwise the reason why there is none.
@@ -18,14 +15,13 @@ pub(crate) fn possible_parameters(
     machine: &Machine,
     problem: &LinearProblem,
     estimate: &Estimate,
-    prior: &[f64],
-    (method, settings): (EstimatorMethod, &PossibleSettings),
-) -> Result<PhysicalFit, String> {
-    let (source, sigma) = (source_of(machine, prior), &estimate.joint_sigma);
+    (method, settings): (EstimatorMethod, &ConsistencySettings),
+) -> Result<PhysicalFit, ConsistencyError> {
+    let (robot, sigma) = (&machine.parametric, &estimate.joint_sigma);
     if method.is_plain() {
-        dynident_experiment::iteration::possible_parameters(&source, problem, sigma, settings)
+        consistent_parameters(robot, problem, sigma, settings)
     } else {
-        nearest_possible_parameters(&source, problem, sigma, settings, &estimate.values)
+        nearest_consistent_parameters(robot, problem, sigma, settings, &estimate.values)
     }
 }
 

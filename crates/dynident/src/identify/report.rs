@@ -5,7 +5,7 @@ use crate::identify::Identification;
 use crate::identify::intervals::PossibleIntervalResult;
 use crate::identify::result::{BaseParameterResult, LogSummary, LogValidation, ResultFile};
 use crate::measured::torque_trace::LogTrace;
-use dynident_estimation::physical::IntervalEnd;
+use dynident_estimation::consistent::IntervalEnd;
 use dynident_recording::Level;
 use dynident_report::{BarPlot, Cell, Heading, HeatMap, KeyFigures, LinePlot, Report, Table, Text, Tone, short};
 

@@ -16,11 +16,11 @@ use dynident_recording::MotionSettings;
 
 pub(crate) fn robot_summary(machine: &Machine) -> RobotSummary {
     RobotSummary {
-        name: machine.model.name().to_owned(),
+        name: machine.model().name().to_owned(),
         file: machine.robot.path.display().to_string(),
-        dof: machine.model.dof(),
+        dof: machine.model().dof(),
         joints: joint_names(machine),
-        gravity_m_s2: machine.model.gravity().0,
+        gravity_m_s2: machine.model().gravity().0,
         parameter_order: INERTIAL_NAMES,
     }
 }
@@ -31,7 +31,7 @@ pub(crate) fn method_summary(
     motion: &MotionSettings,
     estimate: &Estimate,
 ) -> MethodSummary {
-    let (weakest, strongest) = machine.base.gap();
+    let (weakest, strongest) = machine.base().gap();
     MethodSummary {
         estimator: study.estimator.method.name().to_owned(),
         status: match estimate.status {
@@ -63,8 +63,8 @@ pub(crate) fn base_parameters(
     estimate: &Estimate,
     physical: Option<&[f64]>,
 ) -> Vec<BaseParameterResult> {
-    let expressions = machine.base.expressions();
-    let columns = machine.layout.columns();
+    let expressions = machine.base().expressions();
+    let columns = machine.layout().columns();
     (0..columns.len())
         .map(|index| BaseParameterResult {
             symbol: columns[index].symbol(),
@@ -75,7 +75,7 @@ pub(crate) fn base_parameters(
             half_width_95: estimate.half_width_95[index],
             std_white: estimate.covariance_white[(index, index)].max(0.0).sqrt(),
             relative_std_percent: estimate.relative_std_percent[index],
-            prior: machine.prior.as_ref().map(|prior| prior[index]),
+            prior: machine.nominal_base().map(|prior| prior[index]),
             physical: physical.map(|values| values[index]),
             excited: !estimate.rank.fixed.iter().any(|fixed| fixed.column == index),
         })
@@ -84,7 +84,7 @@ pub(crate) fn base_parameters(
 
 pub(crate) fn bodies(machine: &Machine, inertials: &[InertialParameters]) -> Vec<BodyResult> {
     machine
-        .model
+        .model()
         .bodies()
         .iter()
         .zip(inertials)
@@ -107,16 +107,16 @@ pub(crate) fn law_results(
     parameters: &[f64],
     wanted: impl Fn(&Law) -> bool,
 ) -> Vec<LawResult> {
-    let first_law = 10 * machine.model.dof();
-    let expressions = machine.base.expressions();
+    let first_law = 10 * machine.model().dof();
+    let expressions = machine.base().expressions();
     let of_law = |(x, law): (usize, &Law)| {
         let column = first_law + x;
-        let place = machine.base.independent().iter().position(|&index| index == column);
+        let place = machine.base().independent().iter().position(|&index| index == column);
         // A law that other parameters were regrouped into has no value of its own either.
         let alone = place.filter(|&place| expressions[place] == law.symbol());
         let home = place.or_else(|| {
-            let d = machine.base.dependent().iter().position(|&index| index == column)?;
-            let column = machine.base.regrouping().column(d);
+            let d = machine.base().dependent().iter().position(|&index| index == column)?;
+            let column = machine.base().regrouping().column(d);
             (0..column.len()).find(|&b| column[b].abs() > 1e-9)
         });
         LawResult {
@@ -127,7 +127,7 @@ pub(crate) fn law_results(
             base_parameter: home.map(|place| expressions[place].clone()),
         }
     };
-    machine.laws.iter().enumerate().filter(|(_, law)| wanted(law)).map(of_law).collect()
+    machine.laws().iter().enumerate().filter(|(_, law)| wanted(law)).map(of_law).collect()
 }
 
 /// Deviations of single logs' offsets from their mean; the last log's is what the others leave.
@@ -169,7 +169,7 @@ pub(crate) fn joint_results(
     lags: &[Option<TorqueLag>],
 ) -> Vec<JointResult> {
     machine
-        .model
+        .model()
         .joints()
         .iter()
         .enumerate()
@@ -222,7 +222,7 @@ pub(crate) fn training_result(
 
 pub(crate) fn verdict(machine: &Machine, inertials: &[InertialParameters], parameters: &[f64]) -> PhysicalVerdict {
     let mut violations = Vec::new();
-    for (body, inertial) in machine.model.bodies().iter().zip(inertials) {
+    for (body, inertial) in machine.model().bodies().iter().zip(inertials) {
         let least = inertial.pseudo_inertia().symmetric_eigenvalues().min();
         if inertial.mass_kg() <= 0.0 {
             violations.push(format!("{}: mass {:.4} kg", body.name(), inertial.mass_kg()));
@@ -231,7 +231,7 @@ pub(crate) fn verdict(machine: &Machine, inertials: &[InertialParameters], param
                 .push(format!("{}: pseudo-inertia not positive definite (least eigenvalue {least:.2e})", body.name()));
         }
     }
-    for (law, value) in machine.laws.iter().zip(&parameters[10 * machine.model.dof()..]) {
+    for (law, value) in machine.laws().iter().zip(&parameters[10 * machine.model().dof()..]) {
         if *value < 0.0 && law.is_nonnegative() {
             violations.push(format!("{} = {value:.4} {}", law.symbol(), law.unit()));
         }

@@ -2,10 +2,9 @@
 //!
 //! Least squares fits either sign equally well: all parameters change sign. A possible machine has positive masses and inertias and friction that takes energy out, so it fits one of the two only.
 
-use crate::identify::physical::source_of;
 use crate::machine::Machine;
 use dynident_estimation::{Estimate, LinearProblem};
-use dynident_experiment::iteration::{PossibleSettings, nearest_possible_parameters};
+use dynident_identification::consistent::{ConsistencySettings, nearest_consistent_parameters};
 use dynident_recording::{Finding, Level};
 use serde::Serialize;
 
@@ -30,9 +29,9 @@ impl SignEvidence {
 
 /// Fits a possible machine to the torque and to its negative. The description's own inertials are not looked at: rough bodies of 1 kg are the prior, and no friction. None where a fit fails.
 pub(crate) fn sign_evidence(machine: &Machine, problem: &LinearProblem, estimate: &Estimate) -> Option<SignEvidence> {
-    let nothing = vec![0.0; 10 * machine.model.dof() + machine.laws.len()];
-    let source = source_of(machine, &nothing);
-    let settings = PossibleSettings::default();
+    let nothing = vec![0.0; 10 * machine.model().dof() + machine.laws().len()];
+    let robot = machine.parametric.clone().with_nominal(nothing).ok()?;
+    let settings = ConsistencySettings::default();
     let sigma = &estimate.joint_sigma;
     let mut sums = (0.0, 0.0);
     for equation in problem.equations() {
@@ -47,7 +46,7 @@ pub(crate) fn sign_evidence(machine: &Machine, problem: &LinearProblem, estimate
     let (left, torque) = sums;
     let percent = |sign: f64| {
         let theta: Vec<f64> = estimate.values.iter().map(|value| sign * value).collect();
-        let fit = nearest_possible_parameters(&source, problem, sigma, &settings, &theta).ok()?;
+        let fit = nearest_consistent_parameters(&robot, problem, sigma, &settings, &theta).ok()?;
         let percent = 100.0 * ((left + fit.moved_sigma * fit.moved_sigma) / torque).sqrt();
         percent.is_finite().then_some(percent)
     };

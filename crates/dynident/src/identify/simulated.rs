@@ -2,18 +2,16 @@
 
 use crate::error::Error;
 use crate::identify::fit::Logs;
-use crate::identify::physical::source_of;
 use crate::identify::simulated_loop::{Compared, LoopLog, SimulatedLoop};
 use crate::job::joint_names;
-use crate::machine::prior_parameters;
 use crate::study::{EstimatorMethod, SimulationStart};
 use dynident_dynamics::Column;
 use dynident_estimation::{
     Estimate, EstimateStatus, EstimationError, LinearProblem, SegmentedFactor, SimulatedEstimate, SimulatedMotion,
     SimulatedProblem, WeightedSettings, simulated_least_squares, weighted_least_squares,
 };
-use dynident_experiment::iteration::possible_parameters;
-use dynident_experiment::{ControllerModel, RunLimits, SensorSettings};
+use dynident_identification::consistent::consistent_parameters;
+use dynident_simulation::{ControllerModel, RunLimits, SensorSettings};
 use nalgebra::DVector;
 use serde::Serialize;
 
@@ -58,11 +56,11 @@ pub(crate) fn simulated(logs: &Logs<'_>, problem: &LinearProblem) -> Result<(Est
                 .to_owned(),
         ));
     };
-    let dof = machine.model.dof();
+    let dof = machine.model().dof();
     controller.validate(dof).map_err(|error| wrong(format!("[controller]: {error}")))?;
     let simulation = study.simulation.clone().unwrap_or_default();
     simulation.validate(dof).map_err(|error| wrong(format!("[simulation]: {error}")))?;
-    let mut settings = simulation.loop_settings(Some(&machine.model));
+    let mut settings = simulation.loop_settings(Some(machine.model()));
     settings.limits = RunLimits { torque: settings.limits.torque, ..RunLimits::default() };
     let SensorSettings { speed, feedback_delay_samples, .. } = settings.sensors;
     settings.sensors = SensorSettings { speed, feedback_delay_samples, ..SensorSettings::default() };
@@ -73,7 +71,7 @@ pub(crate) fn simulated(logs: &Logs<'_>, problem: &LinearProblem) -> Result<(Est
     };
     settings.accelerations = compared != Compared::Torque;
     let controller_model = if controller.needs_model() {
-        let unknown = machine.model.bodies_without_prior();
+        let unknown = machine.model().bodies_without_prior();
         if !unknown.is_empty() {
             return Err(wrong(format!(
                 "the controller \"{}\" needs the model that it had, and the description has no inertial of {}",
@@ -81,8 +79,8 @@ pub(crate) fn simulated(logs: &Logs<'_>, problem: &LinearProblem) -> Result<(Est
                 unknown.join(", ")
             )));
         }
-        let prior = prior_parameters(&machine.model, &machine.laws);
-        let model = ControllerModel::from_parameters(&machine.model, &machine.laws, &prior);
+        let prior = machine.nominal().to_vec();
+        let model = ControllerModel::from_parameters(machine.model(), machine.laws(), &prior);
         Some(model.map_err(|error| wrong(format!("[controller]: {error}")))?)
     } else {
         None
@@ -217,7 +215,7 @@ fn settled(
     let largest = values.iter().fold(0.0_f64, |most, value| most.max(value.abs())).max(1e-9);
     let scale = values.iter().zip(std).map(|(value, std)| value.abs().max(*std).max(1e-3 * largest)).collect();
     let mut asked = SimulatedProblem {
-        names: logs.machine.layout.columns().iter().map(Column::symbol).collect(),
+        names: logs.machine.layout().columns().iter().map(Column::symbol).collect(),
         start: values,
         scale,
         noise_std: by_row(simulated, &sigma),
@@ -252,18 +250,17 @@ fn start_values(
     let mut starts = Vec::new();
     let mut why = Vec::new();
     if choice != SimulationStart::Description {
-        let prior = prior_parameters(&machine.model, &machine.laws);
         let settings = logs.study.estimator.physical.settings().unwrap_or_default();
-        match possible_parameters(&source_of(machine, &prior), problem, &plain.joint_sigma, &settings) {
+        match consistent_parameters(&machine.parametric, problem, &plain.joint_sigma, &settings) {
             Ok(fit) => starts.push((fit.base_values, "estimate")),
             Err(reason) => why.push(format!("there is no possible machine to start from: {reason}")),
         }
     }
     if choice != SimulationStart::Estimate {
-        if let Some(prior) = &machine.prior {
-            starts.push((prior.clone(), "description"));
+        if let Some(prior) = machine.nominal_base() {
+            starts.push((prior.to_vec(), "description"));
         } else {
-            let unknown = machine.model.bodies_without_prior().join(", ");
+            let unknown = machine.model().bodies_without_prior().join(", ");
             why.push(format!("the description, which could be started from, has no inertial of {unknown}"));
         }
     }
@@ -287,7 +284,7 @@ fn deviations(
     measured: &DVector<f64>,
     free: usize,
 ) -> Vec<f64> {
-    let joints = simulated.machine.model.dof();
+    let joints = simulated.machine.model().dof();
     let (mut squares, mut signal, mut count) = (vec![0.0; joints], vec![0.0; joints], vec![0_usize; joints]);
     let mut at = 0;
     for log in &simulated.logs {

@@ -9,9 +9,9 @@ use crate::measured::rows::{Computer, JointRows, RawSamples, RowSink, decimation
 use crate::progress::Silent;
 use dynident_estimation::{SimulatedMotion, SimulatedRows};
 use dynident_excitation::Motion;
-use dynident_experiment::{ControllerModel, ControllerSettings, LoopSettings, Plant, Reference, Run, closed_loop};
 use dynident_model::laws::Law;
 use dynident_recording::{DecimationSettings, Decimator, FilterError, MotionBlock};
+use dynident_simulation::{ControllerModel, ControllerSettings, LoopSettings, Plant, Reference, Run, closed_loop};
 use nalgebra::{DMatrix, DVector};
 
 /// What is compared with the record.
@@ -81,7 +81,7 @@ impl LoopLog {
         let mut stream = motion_stream(study, machine, motion, index, &logs.files[index])?;
         let filter = decimation(&study.parallel_filter, stream.rate_hz(), motion_band_hz(motion));
         let in_filter = |source| Error::Filter { log: name.clone(), source };
-        let dof = machine.model.dof();
+        let dof = machine.model().dof();
         let mut outputs = Outputs::new(dof, filter.as_ref(), stream.rate_hz()).map_err(in_filter)?;
         let (mut block, mut pieces, mut samples) = (MotionBlock::default(), Vec::new(), 0);
         while stream.next_block(&mut block).map_err(|source| Error::recording(&name, source))? {
@@ -139,7 +139,7 @@ impl SimulatedLoop<'_> {
 
     /// The robot with base parameters θ: its torques, and so its mass matrix, are those of every full set that has these base parameters.
     fn plant(&self, theta: &[f64]) -> Result<Plant, String> {
-        let model = ControllerModel::from_columns(&self.machine.model, self.machine.layout.columns(), theta)
+        let model = ControllerModel::from_columns(self.machine.model(), self.machine.layout().columns(), theta)
             .map_err(|error| error.to_string())?;
         let (laws, values): (Vec<Law>, Vec<f64>) = model.laws().iter().cloned().unzip();
         Plant::new(model.model(), &laws, &values).map_err(|error| error.to_string())
@@ -147,14 +147,15 @@ impl SimulatedLoop<'_> {
 
     /// One log's rows of a run.
     fn rows_of(&self, log: &LoopLog, run: &Run, out: &mut Gathered) -> Result<(), Error> {
-        let dof = self.machine.model.dof();
+        let dof = self.machine.model().dof();
         let motion = (self.compared != Compared::Torque)
             .then(|| sampled(run, log.begins_s))
             .transpose()
             .map_err(|source| Error::Filter { log: log.name.clone(), source })?;
         let in_filter = |source| Error::Filter { log: log.name.clone(), source };
         let mut outputs = Outputs::new(dof, log.filter.as_ref(), log.rate_hz).map_err(in_filter)?;
-        let Machine { model, layout, log_place, load_parameters, .. } = self.machine;
+        let Machine { log_place, load_parameters, .. } = self.machine;
+        let (model, layout) = (self.machine.model(), self.machine.layout());
         let mut computer = (self.compared == Compared::TorqueRows)
             .then(|| {
                 Computer::new(
@@ -242,7 +243,7 @@ impl SimulatedMotion for SimulatedLoop<'_> {
             filled: 0,
         };
         for log in &self.logs {
-            let in_loop = |error: dynident_experiment::ExperimentError| {
+            let in_loop = |error: dynident_simulation::SimulationError| {
                 Stop::Log((self.wrong)(format!("log `{}`: the closed loop cannot be simulated: {error}", log.name)))
             };
             let mut controller = self.controller.build(plant.dof(), self.controller_model.as_ref()).map_err(in_loop)?;

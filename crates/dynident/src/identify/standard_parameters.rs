@@ -1,7 +1,7 @@
 //! From base parameters back to a full set: one of the many that give the same torque, as near to the prior as can be.
 
 use dynident_dynamics::{BaseParameters, Column};
-use dynident_experiment::iteration::typical_length_m;
+use dynident_identification::consistent::typical_length_m;
 use dynident_model::laws::Law;
 use dynident_model::{InertialParameters, Model};
 use nalgebra::{DMatrix, DVector};

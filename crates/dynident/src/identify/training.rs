@@ -58,7 +58,7 @@ impl Training<'_> {
         }
         let in_study = |source| Error::Estimation { path: self.study_path.to_owned(), source };
         let columns = candidate_columns(study, &first.machine, &choose);
-        let known = first.machine.layout.columns();
+        let known = first.machine.layout().columns();
         let further = columns.iter().flatten().map(|column| column.law.clone());
         let further = further.filter(|law| !known.contains(&Column::Law(law.clone())));
         let wide = first.machine.with_columns_of(further).with_load_of(&first.machine, &first.estimate.values);
@@ -130,13 +130,13 @@ impl LogFit {
     /// The same rows as another machine sees them, whose columns are among those of `wide`.
     fn of(mut self, wide: &Machine, machine: &Machine) -> Result<Self, dynident_estimation::EstimationError> {
         for (joint, factor) in self.factors.iter_mut().enumerate() {
-            let seen = wide.layout.joint_columns(joint);
+            let seen = wide.layout().joint_columns(joint);
             // A column that is not there gets a number out of range, which the selection refuses.
             let place = |&column: &usize| {
-                let wanted = &machine.layout.columns()[column];
-                seen.iter().position(|&global| wide.layout.columns()[global] == *wanted).unwrap_or(usize::MAX)
+                let wanted = &machine.layout().columns()[column];
+                seen.iter().position(|&global| wide.layout().columns()[global] == *wanted).unwrap_or(usize::MAX)
             };
-            let places: Vec<usize> = machine.layout.joint_columns(joint).iter().map(place).collect();
+            let places: Vec<usize> = machine.layout().joint_columns(joint).iter().map(place).collect();
             *factor = factor.selected(&places)?;
         }
         Ok(self)
@@ -196,7 +196,8 @@ fn read_log(
     alone: bool,
     options: &RunOptions<'_>,
 ) -> Result<LogFit, Error> {
-    let columns: Vec<&[usize]> = (0..machine.model.dof()).map(|joint| machine.layout.joint_columns(joint)).collect();
+    let columns: Vec<&[usize]> =
+        (0..machine.model().dof()).map(|joint| machine.layout().joint_columns(joint)).collect();
     let in_log = |source| Error::Estimation { path: file.to_owned(), source };
     let factors = columns
         .iter()
@@ -208,8 +209,7 @@ fn read_log(
         factors,
         // Torque in a unit that nobody knows says nothing about the description.
         evidence: machine
-            .prior
-            .as_ref()
+            .nominal_base()
             .filter(|_| study.drive.gains == GainChoice::Stated)
             .map(|prior| Evidence::new(columns, prior)),
         buffer: Vec::new(),
@@ -242,14 +242,14 @@ fn problem(
         // Two logs may share a name; their numbers keep them apart.
         let log = format!("{} ({})", study.log_name(fit.index), fit.index + 1);
         for (joint, factor) in fit.factors.iter().enumerate() {
-            let own = machine.layout.joint_columns(joint);
+            let own = machine.layout().joint_columns(joint);
             let keep_known = study.drive.gains == GainChoice::Unknown;
             columns.add(&mut problem, (fit.index, &log), joint, (own, factor), keep_known)?;
         }
     }
-    match &machine.prior {
+    match machine.nominal_base() {
         Some(prior) => {
-            let mut prior = prior.clone();
+            let mut prior = prior.to_vec();
             prior.resize(columns.count(), 0.0);
             problem.with_fallback(prior)
         }

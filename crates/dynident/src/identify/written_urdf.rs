@@ -13,17 +13,17 @@ pub(crate) fn written_urdf(
     if machine.robot.format != DescriptionFormat::Urdf {
         return Err("the robot's description is no URDF".to_owned());
     }
-    let mut links = link_changes(&machine.model, inertials).map_err(|error| error.to_string())?;
+    let mut links = link_changes(machine.model(), inertials).map_err(|error| error.to_string())?;
     note_locked(machine, &mut links);
     let mut joints: Vec<JointChange> = Vec::new();
-    let laws = machine.laws.iter().zip(&parameters[10 * machine.model.dof()..]);
+    let laws = machine.laws().iter().zip(&parameters[10 * machine.model().dof()..]);
     for (law, &value) in laws {
         let (joint, damping, friction) = match law {
             Law::Viscous(law) => (law.joint, Some(value), None),
             Law::Coulomb(law) => (law.joint, None, Some(value)),
             _ => continue,
         };
-        let name = &machine.model.joints()[joint].name;
+        let name = &machine.model().joints()[joint].name;
         let place = joints.iter().position(|change| change.joint == *name).unwrap_or_else(|| {
             joints.push(JointChange { joint: name.clone(), damping: None, friction: None });
             joints.len() - 1
@@ -36,7 +36,7 @@ pub(crate) fn written_urdf(
 
 /// Says in a body's comment which of its links are not fixed but stood behind locked joints: its values hold while those stay where they were.
 fn note_locked(machine: &Machine, changes: &mut [LinkChange]) {
-    for body in machine.model.bodies() {
+    for body in machine.model().bodies() {
         let own = machine.robot.model.bodies().iter().find(|original| original.name() == body.name());
         let behind: Vec<&str> = body
             .links

@@ -3,8 +3,8 @@
 use crate::machine::Machine;
 use dynident_excitation::Information;
 use dynident_excitation::Motion;
-use dynident_experiment::SensorSettings;
-use dynident_experiment::iteration::Leg;
+use dynident_iteration::Leg;
+use dynident_simulation::SensorSettings;
 use nalgebra::DMatrix;
 
 /// Samples whose regressor is held at once.
@@ -13,12 +13,12 @@ const SAMPLES_AT_ONCE: usize = 4096;
 /// The Cramér-Rao bound of every base parameter: `√ diag (Σ Wᵀ Σ_τ⁻¹ W)⁻¹` over the recorded samples along the trajectories that count, for white torque noise and exact positions; none without torque noise,
 /// with correlated noise, or where a parameter is not excited.
 pub(super) fn cramer_rao(machine: &Machine, legs: &[Leg], sensors: &SensorSettings) -> Option<Vec<f64>> {
-    let dof = machine.model.dof();
+    let dof = machine.model().dof();
     let std: Vec<f64> = (0..dof).map(|joint| sensors.torque_std.of(joint)).collect();
     if sensors.torque_correlation != 0.0 || std.iter().any(|std| *std <= 0.0) {
         return None;
     }
-    let columns = machine.layout.columns().len();
+    let columns = machine.layout().columns().len();
     let mut sum = DMatrix::zeros(columns, columns);
     for leg in legs {
         let (whole, rate_hz) = (leg.reference().motion(), leg.reference().rate_hz());
@@ -50,9 +50,9 @@ pub(super) fn cramer_rao(machine: &Machine, legs: &[Leg], sensors: &SensorSettin
 
 /// `Σ Wᵀ Σ_τ⁻¹ W` over some samples of a motion.
 fn information(machine: &Machine, whole: &Motion, std: &[f64], samples: &[usize]) -> DMatrix<f64> {
-    let dof = machine.model.dof();
-    let mut gatherer = Information::new(&machine.model, &machine.layout, std, None);
-    let count = machine.layout.columns().len();
+    let dof = machine.model().dof();
+    let mut gatherer = Information::new(machine.model(), machine.layout(), std, None);
+    let count = machine.layout().columns().len();
     let mut sum = DMatrix::zeros(count, count);
     for some in samples.chunks(SAMPLES_AT_ONCE) {
         let mut part = Motion::default();

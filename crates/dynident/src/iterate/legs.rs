@@ -10,9 +10,9 @@ use crate::simulate::section::SimulationSection;
 use crate::study::Study;
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
-use dynident_experiment::Robot;
-use dynident_experiment::iteration::Leg;
-use dynident_experiment::robot::{FolderRobot, ProcessRobot};
+use dynident_iteration::Leg;
+use dynident_iteration::Robot;
+use dynident_iteration::robot::{FolderRobot, ProcessRobot};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -178,7 +178,7 @@ impl IterationSection {
         members: &[usize],
     ) -> Result<Vec<Box<dyn Robot>>, String> {
         let joints = joint_names(machine);
-        let said = |error: dynident_experiment::ExperimentError| error.to_string();
+        let said = |error: dynident_simulation::SimulationError| error.to_string();
         Ok(match &self.robot {
             RobotChoice::Process(settings) => {
                 vec![Box::new(ProcessRobot::new(settings.clone(), joints).map_err(said)?)]

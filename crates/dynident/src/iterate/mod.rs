@@ -15,15 +15,15 @@ pub(crate) use trajectory::Trajectory;
 
 use crate::error::Error;
 use crate::job::{RunOptions, joint_names};
-use crate::machine::{Machine, prior_parameters};
+use crate::machine::Machine;
 use crate::output::write_whole;
 use crate::study::{Folders, Study};
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
-use dynident_experiment::iteration::{
-    IteratedMachine, Iteration, IterationError, IterationStatus, IterationStore, IterationTask, RunRecord, iterate,
+use dynident_iteration::{
+    Iteration, IterationError, IterationStatus, IterationStore, IterationTask, RunRecord, iterate,
 };
-use dynident_experiment::{Robot, RobotRun};
+use dynident_iteration::{Robot, RobotRun};
 use report::{RunName, RunTrace, TimeSpent};
 use std::path::Path;
 use std::time::Instant;
@@ -80,14 +80,15 @@ pub fn iterate_study(
     let rate_hz = simulation.rate_hz;
     let make = || legs::trajectories(study, study_path, &machine, rate_hz, options, watch.design);
     let trajectories = kept(&out.join("trajectory.json"), &fingerprint, resume, make)?;
-    let prior = match section.prior {
-        PriorChoice::Description => prior_parameters(&machine.model, &machine.laws),
-        PriorChoice::None => vec![0.0; 10 * machine.model.dof() + machine.laws.len()],
+    let iterated = match section.prior {
+        PriorChoice::Description => machine.parametric.clone(),
+        PriorChoice::None => {
+            let zeros = vec![0.0; machine.nominal().len()];
+            machine.parametric.clone().with_nominal(zeros).map_err(|why| wrong("iteration", &why))?
+        }
     };
-    let iterated = IteratedMachine::new(&machine.model, &machine.laws, Some(prior));
-    let iterated = iterated.map_err(|why| wrong("iteration", &why))?;
     let legs = section.legs(&trajectories, &machine).map_err(|why| wrong("iteration", &why))?;
-    let efforts = machine.model.joints().iter().map(|joint| joint.limits.effort.unwrap_or(f64::INFINITY)).collect();
+    let efforts = machine.model().joints().iter().map(|joint| joint.limits.effort.unwrap_or(f64::INFINITY)).collect();
     let torque_limits: Option<Vec<f64>> = simulation.effort_limits.then_some(efforts);
     let simulated = truth.is_some();
     let told = Told {
@@ -100,7 +101,7 @@ pub fn iterate_study(
     };
     let target = out.join("iterations.json");
     let before_runs_s = begin.elapsed().as_secs_f64();
-    let mut known_std: Vec<Option<f64>> = vec![None; machine.layout.columns().len()];
+    let mut known_std: Vec<Option<f64>> = vec![None; machine.layout().columns().len()];
     let mut known: Vec<(usize, f64)> = Vec::new();
     let (mut files, mut traces, mut made) = (Vec::new(), Vec::new(), 0);
     for (number, members) in stages.iter().enumerate() {
@@ -169,7 +170,7 @@ fn write_file(path: &Path, file: &IterationsFile) -> Result<(), Error> {
 
 /// Everything that runs depend on, in one number: study, robot, and the version of the program (FNV-1a, 64 bits).
 fn fingerprint(study: &Study, machine: &Machine, options: &RunOptions<'_>) -> String {
-    let text = format!("{study:?} {:?} {:?} {}", machine.model, options.data, env!("CARGO_PKG_VERSION"));
+    let text = format!("{study:?} {:?} {:?} {}", machine.model(), options.data, env!("CARGO_PKG_VERSION"));
     let hash = text
         .bytes()
         .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));

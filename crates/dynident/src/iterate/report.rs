@@ -2,12 +2,12 @@
 
 use super::file::{IterationParameter, IterationRun, IterationsFile};
 use crate::error::Error;
-use dynident_experiment::Reference;
-use dynident_experiment::iteration::IterationStore;
-use dynident_experiment::robot::read_log_table;
+use dynident_iteration::IterationStore;
+use dynident_iteration::robot::read_log_table;
 use dynident_report::{
     BarPlot, Cell, ConvergencePlot, Heading, KeyFigures, LinePlot, Report, Table, Text, Tone, short,
 };
+use dynident_simulation::Reference;
 
 /// Half width of a 95 % error bar, in standard deviations.
 const HALF_WIDTH_95: f64 = 1.96;

@@ -2,12 +2,12 @@
 
 use super::legs::{LegOrder, LegSection};
 use crate::study::{EstimatorMethod, Study};
-use dynident_experiment::ControllerSettings;
-use dynident_experiment::iteration::{
+use dynident_iteration::robot::{FolderSettings, ProcessSettings};
+use dynident_iteration::{
     IterationSettings, RunEstimator, RunIdentificationSettings, Scheme, SettledSettings, StartWith,
 };
-use dynident_experiment::robot::{FolderSettings, ProcessSettings};
 use dynident_recording::{DecimationSettings, DifferentiatorSettings};
+use dynident_simulation::ControllerSettings;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 

@@ -4,7 +4,7 @@ use super::file::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, Iteration
 use crate::job::{joint_names, study_name};
 use crate::machine::Machine;
 use crate::study::Study;
-use dynident_experiment::iteration::{IterationStatus, RunEstimate, RunRecord};
+use dynident_iteration::{IterationStatus, RunEstimate, RunRecord};
 use std::path::Path;
 
 /// The newest run before `record` whose machine its controller had.
@@ -44,8 +44,8 @@ impl Told<'_> {
     pub(super) fn file(&self, stage: &Stage<'_>) -> IterationsFile {
         let Stage { leg, records, status, known_std } = *stage;
         let bound = self.bound.as_deref();
-        let columns = self.machine.layout.columns();
-        let expressions = self.machine.base.expressions();
+        let columns = self.machine.layout().columns();
+        let expressions = self.machine.base().expressions();
         let parameters = |record: &RunRecord| {
             let Some(estimate) = &record.estimate else { return Vec::new() };
             let one = |k: usize| IterationParameter {

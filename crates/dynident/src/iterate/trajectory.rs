@@ -7,7 +7,7 @@ use crate::machine::Machine;
 use crate::study::{Folders, Study};
 use core::ops::ControlFlow;
 use dynident_excitation::{DesignProgress, Motion};
-use dynident_experiment::Reference;
+use dynident_simulation::Reference;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -69,10 +69,10 @@ impl Trajectory {
         let outcome = design_study(study, study_path, options, watch)?;
         let mut strokes = Vec::new();
         let windows = outcome.file.windowed.as_ref().map(|windowed| {
-            let mut windows = vec![Vec::new(); machine.model.dof()];
+            let mut windows = vec![Vec::new(); machine.model().dof()];
             let mut start_s = 0.0;
             for stroke in &windowed.strokes {
-                let Some(joint) = machine.model.joint_index(&stroke.joint) else { continue };
+                let Some(joint) = machine.model().joint_index(&stroke.joint) else { continue };
                 for middle in [0.25, 0.75] {
                     let centre = start_s + middle * stroke.period_s;
                     windows[joint].push([centre - stroke.window_s, centre + stroke.window_s]);
@@ -102,7 +102,7 @@ impl Trajectory {
     }
 
     /// As a reference for controllers.
-    pub(crate) fn reference(&self) -> Result<Reference, dynident_experiment::ExperimentError> {
+    pub(crate) fn reference(&self) -> Result<Reference, dynident_simulation::SimulationError> {
         let motion = Motion {
             samples: self.samples,
             joints: self.joints,

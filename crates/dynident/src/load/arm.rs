@@ -52,7 +52,7 @@ impl KnownArm {
         estimator: &EstimatorSection,
     ) -> Result<Estimate, EstimationError> {
         let held: Vec<usize> = (0..columns.base())
-            .filter(|&column| match &machine.layout.columns()[column] {
+            .filter(|&column| match &machine.layout().columns()[column] {
                 Column::Law(Law::Offset(_)) => section.refit == Refit::Nothing,
                 Column::Law(law) if law.is_joint_friction() => section.refit != Refit::Friction,
                 _ => true,

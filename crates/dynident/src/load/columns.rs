@@ -50,12 +50,12 @@ pub(crate) struct LoadColumns {
 }
 
 impl LoadColumns {
-    /// The columns of a study, in terms of the columns of `machine.layout`.
+    /// The columns of a study, in terms of the columns of `machine.layout()`.
     ///
     /// # Errors
     /// If a payload or its link is not there, or the study asks for something that does not go together with payloads.
     pub(crate) fn new(study: &Study, path: &Path, machine: &Machine) -> Result<Self, Error> {
-        let base = machine.layout.columns().len();
+        let base = machine.layout().columns().len();
         check(study, machine).map_err(|message| Error::study(path, message))?;
         let mut symbols = Vec::new();
         let (mut payloads, mut known) = (Vec::new(), vec![None; study.payload.len()]);
@@ -99,10 +99,10 @@ impl LoadColumns {
         let mut offsets = Vec::new();
         if per_log(study) {
             let joints = joint_names(machine);
-            let with_offset = |joint: &usize| machine.laws.contains(&Law::Offset(Offset { joint: *joint }));
+            let with_offset = |joint: &usize| machine.laws().contains(&Law::Offset(Offset { joint: *joint }));
             // The last log's are the others' with the opposite sign: the base parameters hold the mean.
             for &log in training.split_last().map_or(&[][..], |(_, rest)| rest) {
-                for joint in (0..machine.model.dof()).filter(with_offset) {
+                for joint in (0..machine.model().dof()).filter(with_offset) {
                     offsets.push((log, joint, base + symbols.len()));
                     symbols.push(format!("offset of {} in {}", joints[joint], study.log_name(log)));
                 }
@@ -152,7 +152,7 @@ impl LoadColumns {
         if let Some(payload) = self.payloads.iter().find(|payload| Some(payload.payload) == number) {
             map.view_mut((0, payload.first), (self.base, payload.kept.len())).copy_from(&payload.change);
         }
-        let all = machine.base.all_columns();
+        let all = machine.base().all_columns();
         for (joint, column, sign) in own {
             let offset = Column::Law(Law::Offset(Offset { joint }));
             if let Some(place) = all.iter().position(|column| *column == offset) {
@@ -180,7 +180,7 @@ impl LoadColumns {
 
     /// Symbols of all columns.
     pub(crate) fn symbols(&self, machine: &Machine) -> Vec<String> {
-        machine.layout.columns().iter().map(Column::symbol).chain(self.symbols.iter().cloned()).collect()
+        machine.layout().columns().iter().map(Column::symbol).chain(self.symbols.iter().cloned()).collect()
     }
 
     /// `θ_ℓ = T_ℓ x + c_ℓ`: the base parameters that explain a log.
@@ -325,7 +325,7 @@ fn check(study: &Study, machine: &Machine) -> Result<(), String> {
              they chose (friction_choice of its result.json), or hold the arm by [arm]"
             .to_owned());
     }
-    if loaded && machine.laws.iter().any(|law| matches!(law, Law::Load(_))) {
+    if loaded && machine.laws().iter().any(|law| matches!(law, Law::Load(_))) {
         return Err("load-dependent friction does not go with payloads, for its load is the bare arm's: leave out the law `load`".to_owned());
     }
     Ok(())
@@ -333,7 +333,7 @@ fn check(study: &Study, machine: &Machine) -> Result<(), String> {
 
 /// Column `place` of B, with zeros for columns of the layout that are no base parameters.
 fn base_column(machine: &Machine, place: usize, rows: usize) -> DVector<f64> {
-    let base = &machine.base;
+    let base = machine.base();
     let mut column = DVector::zeros(rows);
     if let Some(b) = base.independent().iter().position(|&index| index == place) {
         column[b] = 1.0;
@@ -345,14 +345,14 @@ fn base_column(machine: &Machine, place: usize, rows: usize) -> DVector<f64> {
 
 /// M: what ten parameters in the frame of `link` add to the base parameters.
 fn change_of_base(machine: &Machine, link: &str) -> Result<DMatrix<f64>, String> {
-    let bodies = machine.model.bodies().iter().enumerate();
+    let bodies = machine.model().bodies().iter().enumerate();
     let found = bodies.flat_map(|(body, b)| b.links.iter().map(move |link| (body, link))).find(|(_, l)| l.name == link);
     let Some((body, link)) = found else {
         let names: Vec<&str> =
-            machine.model.bodies().iter().flat_map(|body| body.links.iter().map(|link| &link.name[..])).collect();
+            machine.model().bodies().iter().flat_map(|body| body.links.iter().map(|link| &link.name[..])).collect();
         return Err(format!("payload at link `{link}`: no moving link has that name; they are {}", names.join(", ")));
     };
-    let rows = machine.layout.columns().len();
+    let rows = machine.layout().columns().len();
     let mut matrix = DMatrix::zeros(rows, 10);
     for k in 0..10 {
         let unit = InertialParameters(core::array::from_fn(|i| f64::from(u8::from(i == k))));

@@ -1,7 +1,7 @@
 //! From what the logs tell of a payload to a body with mass, centre of mass and inertia, and to a possible one.
 
 use crate::load::columns::PayloadColumns;
-use dynident_estimation::physical::{
+use dynident_estimation::consistent::{
     BaseMap, PhysicalBody, PhysicalFit, PhysicalProblem, PhysicalSettings, physical_fit, rough_body,
 };
 use dynident_estimation::{Estimate, TriangularFactor};

@@ -64,7 +64,7 @@ impl<'a> LagCheck<'a> {
     /// Rows as they leave the parallel filter; the samples that they belong to came before.
     pub(crate) fn filtered(&mut self, rows: &JointRows<'_>) {
         let Some(piece) = self.pieces.last_mut().filter(|_| !self.full) else { return };
-        let regressor = &rows.panel[..self.machine.layout.joint_columns(rows.joint).len() * rows.rows];
+        let regressor = &rows.panel[..self.machine.layout().joint_columns(rows.joint).len() * rows.rows];
         self.numbers += regressor.len();
         piece.rows[rows.joint].push((rows.rows, regressor.to_vec()));
     }
@@ -75,7 +75,7 @@ impl<'a> LagCheck<'a> {
             return;
         }
         self.rate_hz = samples.rate_hz;
-        let joints = self.machine.model.dof();
+        let joints = self.machine.model().dof();
         if self.pieces.last().is_none_or(|piece| piece.segment != samples.segment) {
             self.pieces.push(Piece::new(samples.segment, joints));
         }
@@ -83,7 +83,7 @@ impl<'a> LagCheck<'a> {
         self.samples += rows;
         let Some(piece) = self.pieces.last_mut() else { return };
         for joint in 0..joints {
-            let columns = self.machine.layout.joint_columns(joint);
+            let columns = self.machine.layout().joint_columns(joint);
             let panel = samples.panels.joint(joint);
             predicted(panel, rows, columns, self.theta, &mut self.buffer);
             piece.model[joint].extend_from_slice(&self.buffer);
@@ -94,7 +94,7 @@ impl<'a> LagCheck<'a> {
 
     /// Lag of torque behind motion by joint; `None` where the log does not tell it.
     pub(crate) fn lags(&self, study: &Study, motion: &MotionSettings) -> Vec<Option<TorqueLag>> {
-        let joints = self.machine.model.dof();
+        let joints = self.machine.model().dof();
         let filter = decimation(&study.parallel_filter, self.rate_hz, motion_band_hz(motion));
         let longest = LONGEST_LAG_S * self.rate_hz;
         let start = (0..joints).map(|joint| self.coarse(joint, motion.differentiator.cutoff_hz()).unwrap_or(0.0));
@@ -135,7 +135,7 @@ impl<'a> LagCheck<'a> {
             covariance: CovarianceMethod::White,
             ..WeightedSettings::default()
         };
-        let base = self.machine.layout.columns().len();
+        let base = self.machine.layout().columns().len();
         for _ in 0..MOST_STEPS {
             let merged = |rows: &LagRows| rows.factor.as_one_segment();
             let step = weighted_least_squares(&self.problem(&rows, &shift, merged)?, &quick)?;
@@ -159,7 +159,7 @@ impl<'a> LagCheck<'a> {
 
     /// The lag of one joint from the last step, if it settled.
     fn told(&self, last: &Estimate, rows: &LagRows, joint: usize, shift: f64, longest: f64) -> Option<TorqueLag> {
-        let column = self.machine.layout.columns().len() + joint;
+        let column = self.machine.layout().columns().len() + joint;
         let (rest, std) = (last.values[column], last.std[column]);
         let lag = shift + rest;
         let excited = last.rank.fixed.iter().all(|fixed| fixed.column != column);
@@ -184,7 +184,7 @@ impl<'a> LagCheck<'a> {
         joint: usize,
         shift: f64,
     ) -> Result<LagRows, EstimationError> {
-        let columns = self.machine.layout.joint_columns(joint).len();
+        let columns = self.machine.layout().joint_columns(joint).len();
         LagRows::new(&self.pieces, joint, columns, (self.rate_hz, filter), shift, study.estimator.segments)
     }
 
@@ -195,7 +195,7 @@ impl<'a> LagCheck<'a> {
         shift: &[f64],
         factor: impl Fn(&LagRows) -> SegmentedFactor,
     ) -> Result<LinearProblem, EstimationError> {
-        let layout = &self.machine.layout;
+        let layout = self.machine.layout();
         let base = layout.columns().len();
         let names = (0..base + rows.len()).map(|column| format!("column {column}")).collect();
         let joints = (0..rows.len()).map(|joint| format!("joint {joint}")).collect();

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::machine::Machine;
 use crate::study::Study;
-use dynident_recording::{FilterError, MotionSettings, MotionStream, RecordingError, Reference};
+use dynident_recording::{FilterError, Log, MotionSettings, MotionStream, RecordingError, Reference};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -20,8 +20,8 @@ pub(crate) fn motion_stream(
 ) -> Result<MotionStream, Error> {
     let failed = |source| Error::recording(&study.log_name(index), source);
     let reference = reference(study, machine, motion, index)?;
-    MotionStream::open_following(&study.format_of(index), file, &machine.log_joints, motion, reference.as_ref())
-        .map_err(failed)
+    let log = Log::file(file, study.format_of(index), &machine.log_joints);
+    MotionStream::following(&log, motion, reference.as_ref()).map_err(failed)
 }
 
 /// The commanded motion of a log, its joints in the order of the log's columns; `None` for differentiators that need none.
@@ -36,7 +36,7 @@ fn reference(
     }
     // The differentiator says that it needs one.
     let Some(reference) = commanded(study, machine, motion, index)? else { return Ok(None) };
-    let mut order = vec![0; machine.model.dof()];
+    let mut order = vec![0; machine.model().dof()];
     for (joint, &place) in machine.log_place.iter().enumerate() {
         order[place] = joint;
     }
@@ -57,7 +57,7 @@ pub(crate) fn commanded(
     let Some(settings) = own.or_else(|| motion.differentiator.reference()) else { return Ok(None) };
     let failed = |source| Error::recording(&study.log_name(index), source);
     let filter = |source| failed(RecordingError::Filter(source));
-    let dof = machine.model.dof();
+    let dof = machine.model().dof();
     let reference = match (&settings.file, settings.closed_form().map_err(filter)?) {
         (_, Some(closed)) => closed,
         (Some(file), None) => {

@@ -83,7 +83,7 @@ impl Pass<'_> {
         let mut stream = motion_stream(self.study, self.machine, self.motion, self.index, self.file)?;
         let motion_cutoff_hz = self.motion.differentiator.cutoff_hz();
         let settings = decimation(&self.study.parallel_filter, stream.rate_hz(), motion_band_hz(self.motion));
-        let Machine { model, layout, log_place, .. } = self.machine;
+        let (model, layout, log_place) = (self.machine.model(), self.machine.layout(), &self.machine.log_place);
         let mut computer = Computer::new(
             model,
             layout,

@@ -43,7 +43,7 @@ pub(crate) struct TraceSink<'a> {
 
 impl<'a> TraceSink<'a> {
     pub(crate) fn new(machine: &'a Machine, theta: &'a [f64]) -> Self {
-        let joints = vec![JointTrace::default(); machine.model.dof()];
+        let joints = vec![JointTrace::default(); machine.model().dof()];
         Self { machine, theta, trace: LogTrace { joints, ..LogTrace::default() }, segment: None, buffer: Vec::new() }
     }
 
@@ -61,7 +61,7 @@ impl<'a> TraceSink<'a> {
     }
 
     pub(crate) fn filtered(&mut self, rows: &JointRows<'_>) {
-        let columns = self.machine.layout.joint_columns(rows.joint);
+        let columns = self.machine.layout().joint_columns(rows.joint);
         let JointTrace { measured_nm, predicted_nm } = &mut self.trace.joints[rows.joint];
         let kept = rows.rows.min(MOST_ROWS.saturating_sub(measured_nm.len()));
         self.trace.cut |= kept < rows.rows;

@@ -5,12 +5,13 @@ pub(crate) mod section;
 use crate::error::Error;
 use crate::iterate::Trajectory;
 use crate::job::{RunOptions, joint_names, study_name};
-use crate::machine::{Machine, prior_parameters};
+use crate::machine::Machine;
 use crate::study::{Folders, Study};
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
-use dynident_experiment::controllers::JointPdSettings;
-use dynident_experiment::{ControllerModel, ControllerSettings, Robot, RobotStatus, RunRequest};
+use dynident_iteration::{Robot, RobotStatus, RunRequest};
+use dynident_simulation::controllers::JointPdSettings;
+use dynident_simulation::{ControllerModel, ControllerSettings};
 use serde::Serialize;
 use std::path::Path;
 
@@ -96,11 +97,11 @@ pub fn simulate_study(
         .controller
         .clone()
         .unwrap_or_else(|| ControllerSettings::JointPd(JointPdSettings { kp: 100.0.into(), kd: 20.0.into() }));
-    controller.validate(machine.model.dof()).map_err(|why| wrong("controller", &why))?;
+    controller.validate(machine.model().dof()).map_err(|why| wrong("controller", &why))?;
     let trajectory = Trajectory::of_study(study, study_path, &machine, simulation.rate_hz, options, watch)?;
     let reference = trajectory.reference().map_err(|why| wrong("iteration", &why))?;
-    let prior = prior_parameters(&machine.model, &machine.laws);
-    let model = ControllerModel::from_parameters(&machine.model, &machine.laws, &prior)
+    let prior = machine.nominal().to_vec();
+    let model = ControllerModel::from_parameters(machine.model(), machine.laws(), &prior)
         .map_err(|why| wrong("controller", &why))?;
     let request = RunRequest { run: 1, reference: &reference, controller: &controller, model: Some(&model) };
     let run = truth.robot.run(&request).map_err(|why| wrong("simulation", &why))?;
@@ -108,7 +109,7 @@ pub fn simulate_study(
         let named = expressions.into_iter().zip(units).zip(values);
         named.map(|((expression, unit), &value)| ParameterTruth { expression, value, unit }).collect()
     };
-    let bodies = machine.model.bodies().iter().zip(truth.parameters.chunks_exact(10));
+    let bodies = machine.model().bodies().iter().zip(truth.parameters.chunks_exact(10));
     let (max_error, saturated) = run
         .truth
         .as_ref()
@@ -128,14 +129,14 @@ pub fn simulate_study(
             .map(|(body, own)| BodyTruth { name: body.name().to_owned(), parameters: own.to_vec() })
             .collect(),
         laws: own(
-            &truth.parameters[10 * machine.model.dof()..],
-            machine.laws.iter().map(dynident_model::laws::Law::symbol).collect(),
-            machine.laws.iter().map(dynident_model::laws::Law::unit).collect(),
+            &truth.parameters[10 * machine.model().dof()..],
+            machine.laws().iter().map(dynident_model::laws::Law::symbol).collect(),
+            machine.laws().iter().map(dynident_model::laws::Law::unit).collect(),
         ),
         base_parameters: own(
             &truth.base_values,
-            machine.base.expressions(),
-            machine.layout.columns().iter().map(dynident_dynamics::Column::unit).collect(),
+            machine.base().expressions(),
+            machine.layout().columns().iter().map(dynident_dynamics::Column::unit).collect(),
         ),
     };
     Ok(Simulation { file, log: run.record.csv() })

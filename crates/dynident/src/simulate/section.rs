@@ -1,13 +1,13 @@
 //! `[simulation]`: the robot that is simulated, where it differs from its description, its sensors and limits.
 
 use crate::machine::Machine;
-use dynident_experiment::{
-    ExperimentError, Integrator, LoopSettings, PerJoint, Plant, RunLimits, SensorSettings, SimulatedRobot, Start,
-    with_length_errors,
-};
+use dynident_iteration::SimulatedRobot;
 use dynident_model::laws::Law;
 use dynident_model::sample::Random;
 use dynident_model::{InertialParameters, Model};
+use dynident_simulation::{
+    Integrator, LoopSettings, PerJoint, Plant, RunLimits, SensorSettings, SimulationError, Start, with_length_errors,
+};
 use nalgebra::Matrix4;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -100,7 +100,7 @@ impl SimulationSection {
     /// # Errors
     /// In words, with the key and the mend.
     pub fn validate(&self, joints: usize) -> Result<(), String> {
-        let said = |error: ExperimentError| error.to_string();
+        let said = |error: SimulationError| error.to_string();
         if !(1.0..=1e6).contains(&self.rate_hz) {
             return Err(format!("rate_hz = {}: give 1 to 1e6 samples a second", self.rate_hz));
         }
@@ -138,22 +138,22 @@ impl SimulationSection {
     /// # Errors
     /// In words: numbers that do not fit, bodies without inertials, laws without a parameter, a robot that cannot be simulated.
     pub fn truth(&self, machine: &Machine) -> Result<SimulatedTruth, String> {
-        let described = &machine.model;
+        let described = machine.model();
         self.validate(described.dof())?;
         let unknown = described.bodies_without_prior();
         if !unknown.is_empty() {
             return Err(format!("the description has no inertial of {}: a simulation needs them", unknown.join(", ")));
         }
-        let said = |error: ExperimentError| error.to_string();
+        let said = |error: SimulationError| error.to_string();
         let bodies = self.bodies(described);
         let model = described.with_inertials(&bodies).map_err(|error| error.to_string())?;
         let model = with_length_errors(&model, self.length_std_m, self.angle_std_rad, self.seed).map_err(said)?;
-        let symbols: Vec<String> = machine.laws.iter().map(Law::symbol).collect();
+        let symbols: Vec<String> = machine.laws().iter().map(Law::symbol).collect();
         if let Some(other) = self.laws.keys().find(|symbol| !symbols.contains(symbol)) {
             return Err(format!("laws.{other}: [drive] has no such law; it has {}", symbols.join(", ")));
         }
         let law_parameters = machine
-            .laws
+            .laws()
             .iter()
             .zip(&symbols)
             .map(|(law, symbol)| match (self.laws.get(symbol), law) {
@@ -167,9 +167,9 @@ impl SimulationSection {
             .collect::<Result<Vec<f64>, _>>()?;
         let mut parameters = model.parameter_vector();
         parameters.extend_from_slice(&law_parameters);
-        let plant = Plant::new(&model, &machine.laws, &law_parameters).map_err(said)?;
+        let plant = Plant::new(&model, machine.laws(), &law_parameters).map_err(said)?;
         let robot = SimulatedRobot::new(plant, self.loop_settings(Some(described))).map_err(said)?;
-        let base_values = machine.base.values(&parameters);
+        let base_values = machine.base().values(&parameters);
         Ok(SimulatedTruth { robot, model, parameters, base_values })
     }
 

@@ -31,9 +31,9 @@ use crate::design::DesignSection;
 use crate::error::Error;
 use crate::iterate::IterationSection;
 use crate::simulate::section::SimulationSection;
-use dynident_experiment::ControllerSettings;
 use dynident_model::line_and_column;
 use dynident_recording::{LogFormat, MotionSettings};
+use dynident_simulation::ControllerSettings;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 

@@ -1,10 +1,10 @@
 //! `[estimator.physical]`: whether the machine written is a possible one, and what is known of its bodies.
 
-use dynident_experiment::iteration::PossibleSettings;
+use dynident_identification::consistent::ConsistencySettings;
 use serde::de::value::MapAccessDeserializer;
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// `true`, `false`, or a table of [`PossibleSettings`], which stands for `true`.
+/// `true`, `false`, or a table of [`ConsistencySettings`], which stands for `true`.
 ///
 /// ```
 /// use dynident::{EstimatorSection, PhysicalChoice};
@@ -20,7 +20,7 @@ pub enum PhysicalChoice {
     /// With the defaults, or not at all.
     Switch(bool),
     /// With what is known of the machine.
-    Known(Box<PossibleSettings>),
+    Known(Box<ConsistencySettings>),
 }
 
 impl Default for PhysicalChoice {
@@ -31,9 +31,9 @@ impl Default for PhysicalChoice {
 
 impl PhysicalChoice {
     /// The settings of the fit; none when it is switched off.
-    pub fn settings(&self) -> Option<PossibleSettings> {
+    pub fn settings(&self) -> Option<ConsistencySettings> {
         match self {
-            Self::Switch(true) => Some(PossibleSettings::default()),
+            Self::Switch(true) => Some(ConsistencySettings::default()),
             Self::Switch(false) => None,
             Self::Known(settings) => Some((**settings).clone()),
         }
@@ -57,7 +57,7 @@ impl<'de> Deserialize<'de> for PhysicalChoice {
                 Ok(PhysicalChoice::Switch(switch))
             }
             fn visit_map<A: serde::de::MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
-                let settings = PossibleSettings::deserialize(MapAccessDeserializer::new(map))?;
+                let settings = ConsistencySettings::deserialize(MapAccessDeserializer::new(map))?;
                 Ok(PhysicalChoice::Known(Box::new(settings)))
             }
         }

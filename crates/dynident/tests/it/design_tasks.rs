@@ -80,7 +80,7 @@ fn a_result_is_a_prior_for_the_next_run() {
     let log = "[motion]\ndifferentiator = { method = \"central-differences\", order = 8 }\n[format]\ntime = { column = \"t\" }\nposition = { columns = \"q{1..3}\" }\ntorque = { columns = \"tau{1..3}\" }\n[[log]]\nfile = \"run.csv\"\n";
     let first = job(folder.path(), "", log);
     let machine = first.machine();
-    let model = machine.model.clone();
+    let model = machine.model().clone();
     let drive = vec![[0.0, 2.0, 1.5, 0.3]; 3];
     let truth = Truth { model, drive };
     assert!(urdf.exists());
@@ -169,7 +169,7 @@ fn the_description_is_a_prior() {
     );
     let machine: Machine = job.machine();
     let [_, known] = stds(&designed(&job));
-    let bodies = machine.model.parameter_vector();
+    let bodies = machine.model().parameter_vector();
     let std: Vec<f64> = (0..bodies.len())
         .map(|index| {
             let (body, kind) = (
@@ -185,9 +185,9 @@ fn the_description_is_a_prior() {
         })
         .collect();
     for (place, found) in known.iter().enumerate() {
-        let mut variance = std[machine.base.independent()[place]].powi(2);
-        for (column, index) in machine.base.dependent().iter().enumerate() {
-            variance += (machine.base.regrouping()[(place, column)] * std[*index]).powi(2);
+        let mut variance = std[machine.base().independent()[place]].powi(2);
+        for (column, index) in machine.base().dependent().iter().enumerate() {
+            variance += (machine.base().regrouping()[(place, column)] * std[*index]).powi(2);
         }
         // Sums of squares, an inverse of moderate condition and back.
         assert!((found - variance.sqrt()).abs() < 1e-4 * found, "{place}: {found} {}", variance.sqrt());

@@ -2,11 +2,11 @@
 use crate::common::repository;
 use core::ops::ControlFlow;
 use dynident::{Error, IterationWatch, IterationsFile, RunOptions, Silent, Study, design_study, iterate_study};
+use dynident_dynamics::ParametricModel;
 use dynident_excitation::Motion;
-use dynident_experiment::iteration::{
-    IteratedMachine, Iteration, IterationSettings, IterationTask, Leg, RunRecord, Scheme, iterate,
-};
-use dynident_experiment::{Integrator, LoopSettings, Plant, Reference, Robot, SimulatedRobot};
+use dynident_iteration::{Iteration, IterationSettings, IterationTask, Leg, RunRecord, Scheme, iterate};
+use dynident_iteration::{Robot, SimulatedRobot};
+use dynident_simulation::{Integrator, LoopSettings, Plant, Reference};
 use std::path::Path;
 
 const RATE_HZ: f64 = 1000.0;
@@ -23,7 +23,7 @@ fn iterated(study: &Study, path: &Path, out: &Path) -> Result<IterationsFile, Er
 /// The strokes of the design, one leg each, put together by hand.
 fn by_library(study: &Study, path: &Path) -> Vec<Vec<RunRecord>> {
     let outcome = design_study(study, path, &options(), |_| ControlFlow::Continue(())).unwrap();
-    let model = outcome.machine.model.clone();
+    let model = outcome.machine.model().clone();
     let whole = Reference::of_family(outcome.family(), &outcome.file.parameters, RATE_HZ, None).unwrap();
     let section = study.iteration.clone().unwrap();
     let mut known: Vec<(usize, f64)> = Vec::new();
@@ -49,7 +49,7 @@ fn by_library(study: &Study, path: &Path) -> Vec<Vec<RunRecord>> {
             })
             .to_vec();
         start_s += stroke.period_s;
-        let machine = IteratedMachine::new(&model, &[], Some(vec![0.0; 20])).unwrap();
+        let machine = ParametricModel::new(model.clone(), Vec::new()).unwrap().with_nominal(vec![0.0; 20]).unwrap();
         let legs = vec![Leg::windowed(reference, windows).unwrap()];
         let task = IterationTask { machine, legs, known: known.clone(), torque_limits: None };
         let mut settings = IterationSettings {

@@ -62,8 +62,8 @@ fn try_whole(text: &str) {
             }
             let folders = Folders::new(&study, &path, None);
             if let Ok(machine) = Machine::new(&study, &path, &folders) {
-                assert!(machine.base.count() <= 10 * machine.model.dof() + machine.laws.len());
-                assert!(machine.prior.is_none_or(|prior| prior.iter().all(|value| value.is_finite())));
+                assert!(machine.base().count() <= 10 * machine.model().dof() + machine.laws().len());
+                assert!(machine.nominal_base().is_none_or(|prior| prior.iter().all(|value| value.is_finite())));
             }
         }
         Err(error) => assert!(error.to_string().contains("study.toml"), "{error}"),
@@ -74,7 +74,7 @@ fn try_whole(text: &str) {
 fn the_study_itself_is_good() {
     let study = Study::parse(STUDY, Path::new("study.toml")).unwrap();
     let machine = Machine::new(&study, Path::new("study.toml"), &Folders::new(&study, &repository("study.toml"), None));
-    assert_eq!(machine.unwrap().model.dof(), 5);
+    assert_eq!(machine.unwrap().model().dof(), 5);
 }
 
 proptest! {

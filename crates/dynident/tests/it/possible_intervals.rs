@@ -1,6 +1,6 @@
 //! Intervals over all possible machines hold the truth of a simulated arm, and never what is impossible.
 use crate::common::repository;
-use dynident::estimation::physical::IntervalEnd;
+use dynident::estimation::consistent::IntervalEnd;
 use dynident::{RunOptions, Silent, Study, identify};
 use std::collections::BTreeMap;
 

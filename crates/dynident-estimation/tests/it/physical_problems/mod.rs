@@ -1,6 +1,6 @@
 //! Random physical problems: noisy, near-singular, with their optimum on the boundary, with and without limits.
 use dynident_estimation::TriangularFactor;
-use dynident_estimation::physical::{
+use dynident_estimation::consistent::{
     BaseMap, Ellipsoid, PhysicalBody, PhysicalPrior, PhysicalProblem, PhysicalScalar, PhysicalSettings, rough_body,
 };
 use nalgebra::{DMatrix, DVector};
@@ -50,7 +50,6 @@ pub(crate) fn points(random: &mut Random, count: usize) -> [f64; 10] {
 pub(crate) struct Case {
     pub(crate) problem: PhysicalProblem,
     pub(crate) settings: PhysicalSettings,
-    pub(crate) truth: Vec<f64>,
 }
 
 /// Problem number `seed` with `bodies` bodies.
@@ -133,5 +132,5 @@ pub(crate) fn case(seed: u64, bodies: usize) -> Case {
     let prior = [PhysicalPrior::Entropic, PhysicalPrior::Pullback, PhysicalPrior::Euclidean][random.below(3)];
     let settings =
         PhysicalSettings { prior, prior_weight: [1.0e-2, 1.0, 1.0e-3][random.below(3)], ..PhysicalSettings::default() };
-    Case { problem, settings, truth }
+    Case { problem, settings }
 }

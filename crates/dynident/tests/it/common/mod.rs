@@ -83,14 +83,14 @@ impl Truth {
     pub(crate) fn base_values(&self, machine: &Machine) -> Vec<f64> {
         use dynident::model::laws::Law;
         let mut all = self.model.parameter_vector();
-        all.extend(machine.laws.iter().map(|law| match law {
+        all.extend(machine.laws().iter().map(|law| match law {
             Law::DriveInertia(law) => self.drive[law.joint][0],
             Law::Viscous(law) => self.drive[law.joint][1],
             Law::Coulomb(law) => self.drive[law.joint][2],
             Law::Offset(law) => self.drive[law.joint][3],
             _ => 0.0,
         }));
-        machine.base.values(&all)
+        machine.base().values(&all)
     }
 }
 

@@ -1,0 +1,170 @@
+//! The one noun of identification: a robot as a function of its parameters.
+
+use crate::base_parameters::{BaseParameterSettings, BaseParameters};
+use crate::regressor_panels::{Column, PanelLayout};
+use dynident_model::Model;
+use dynident_model::laws::{Coulomb, Law};
+use thiserror::Error;
+
+/// Why a parametric model could not be put together.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ParametricModelError {
+    /// A torque term of a joint that is not there.
+    #[error("torque term {term} acts on a joint that the model of {joints} joints does not have")]
+    NoSuchJoint {
+        /// The term's symbol.
+        term: String,
+        /// Joints of the model.
+        joints: usize,
+    },
+    /// Nominal values of another number than there are parameters.
+    #[error("parameters of the prior: {found} entries where {expected} are needed")]
+    NominalLength {
+        /// Ten for each body and one for each term.
+        expected: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// A nominal value that is no number.
+    #[error("prior = {value}: give finite numbers")]
+    NominalNotFinite {
+        /// The value.
+        value: f64,
+    },
+}
+
+/// A model with torque terms beside its rigid bodies (friction, drives, offsets), its base parameters, the layout of its regressor, and the nominal values of all parameters.
+///
+/// The torque is linear in the parameters, `τ = Y(q, q̇, q̈) π = W(q, q̇, q̈) θ`, with `π` ten inertial parameters for each body (base to tip) and one value
+/// for each term, and `θ = B π` the base parameters ([`BaseParameters`]). Made once for a robot and used by everything that needs rows, values or symbols.
+///
+/// ```
+/// use dynident_dynamics::ParametricModel;
+/// use dynident_model::laws::{DriveChoice, laws_per_joint};
+/// # let text = r#"<robot name="pendulum"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="2"/>
+/// #   <inertia ixx="0.2" iyy="0.2" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+/// #   <joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>"#;
+/// let model = dynident_model::read_urdf(text)?;
+/// let friction = laws_per_joint(&model, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
+/// let pendulum = ParametricModel::new(model, friction)?;
+/// assert_eq!(pendulum.base().expressions(), ["mx1", "mz1", "Iyy1", "fv1"]);
+/// // The first moment of the rod, 2 kg half a metre below its hinge.
+/// assert_eq!(pendulum.nominal_base().unwrap()[1], -1.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct ParametricModel {
+    model: Model,
+    laws: Vec<Law>,
+    base: BaseParameters,
+    layout: PanelLayout,
+    nominal: Vec<f64>,
+    nominal_base: Option<Vec<f64>>,
+}
+
+impl ParametricModel {
+    /// The parametric model of a robot. Nominal values are those of its description: inertial parameters, viscous and Coulomb friction where it has them, zero for all other terms.
+    ///
+    /// # Errors
+    /// A term of a joint that the model does not have.
+    pub fn new(model: Model, laws: Vec<Law>) -> Result<Self, ParametricModelError> {
+        if let Some(law) = laws.iter().find(|law| law.joints().iter().any(|&joint| joint >= model.dof())) {
+            return Err(ParametricModelError::NoSuchJoint { term: law.symbol(), joints: model.dof() });
+        }
+        let base = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
+        let layout = PanelLayout::new(&model, base.base_columns());
+        let nominal = described(&model, &laws);
+        let nominal_base = model.bodies_without_prior().is_empty().then(|| base.values(&nominal));
+        Ok(Self { model, laws, base, layout, nominal, nominal_base })
+    }
+
+    /// The same with other nominal values: ten for each body, then one for each term.
+    ///
+    /// # Errors
+    /// Another number of values than there are parameters, or values that are not finite.
+    pub fn with_nominal(mut self, nominal: Vec<f64>) -> Result<Self, ParametricModelError> {
+        let expected = 10 * self.model.dof() + self.laws.len();
+        if nominal.len() != expected {
+            return Err(ParametricModelError::NominalLength { expected, found: nominal.len() });
+        }
+        if let Some(&value) = nominal.iter().find(|value| !value.is_finite()) {
+            return Err(ParametricModelError::NominalNotFinite { value });
+        }
+        self.nominal_base = Some(self.base.values(&nominal));
+        self.nominal = nominal;
+        Ok(self)
+    }
+
+    /// The same robot with other torque terms and the description's nominal values.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_laws(&self, laws: Vec<Law>) -> Result<Self, ParametricModelError> {
+        Self::new(self.model.clone(), laws)
+    }
+
+    /// The same with further terms behind the base columns of the layout, whether they depend on these or not: one set of rows for choosing among them. Base parameters and terms stay as they are.
+    #[must_use]
+    pub fn with_further_columns(&self, further: impl IntoIterator<Item = Law>) -> Self {
+        let mut columns = self.base.base_columns();
+        columns.extend(further.into_iter().map(Column::Law));
+        let mut wide = self.clone();
+        if let Some(values) = &mut wide.nominal_base {
+            values.resize(columns.len(), 0.0);
+        }
+        wide.layout = PanelLayout::new(&self.model, columns);
+        wide
+    }
+
+    /// Links, joints and gravity.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Torque terms beside the rigid bodies, in the order of their parameters.
+    pub fn laws(&self) -> &[Law] {
+        &self.laws
+    }
+
+    /// Base parameters of bodies and terms.
+    pub fn base(&self) -> &BaseParameters {
+        &self.base
+    }
+
+    /// Regressor blocks of the joints, of the base columns.
+    pub fn layout(&self) -> &PanelLayout {
+        &self.layout
+    }
+
+    /// Nominal values of all parameters: ten for each body (zeros where the description has none), then one for each term.
+    pub fn nominal(&self) -> &[f64] {
+        &self.nominal
+    }
+
+    /// Nominal values of the layout's columns; `None` while a moving body's inertial parameters are unknown.
+    pub fn nominal_base(&self) -> Option<&[f64]> {
+        self.nominal_base.as_deref()
+    }
+
+    /// Number of joints.
+    pub fn dof(&self) -> usize {
+        self.model.dof()
+    }
+
+    /// Names of the joints, base to tip.
+    pub fn joint_names(&self) -> Vec<String> {
+        self.model.joints().iter().map(|joint| joint.name.clone()).collect()
+    }
+}
+
+/// All parameters by the description: inertials, and what it says of damping and friction.
+fn described(model: &Model, laws: &[Law]) -> Vec<f64> {
+    let mut parameters = model.parameter_vector();
+    parameters.extend(laws.iter().map(|law| match law {
+        Law::Viscous(law) => model.joints()[law.joint].damping.unwrap_or(0.0),
+        Law::Coulomb(Coulomb { joint, .. }) => model.joints()[*joint].friction.unwrap_or(0.0),
+        _ => 0.0,
+    }));
+    parameters
+}

@@ -1,0 +1,276 @@
+//! What a physical fit is asked: bodies, scalars, the map to base parameters, and the data.
+
+use super::cone::least_eigenvalue;
+use super::coordinates::{Whitening, pseudo_inertia};
+use super::error::PhysicalError;
+use crate::factor::TriangularFactor;
+use nalgebra::{DMatrix, DVector};
+
+/// An interval of a mass or a coordinate, lower limit first.
+pub type Limits = [f64; 2];
+
+/// Ten consecutive standard parameters `[m, m rx, m ry, m rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz]` of one body, about its frame's origin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhysicalBody {
+    /// Its name in messages.
+    pub name: String,
+    /// The prior body P0, which is also the unit that the margin is measured in: from CAD, or a rough one from [`rough_body`].
+    pub reference: [f64; 10],
+    /// Its values, when they are not to be fitted (all zero for a body without mass).
+    pub known: Option<[f64; 10]>,
+    /// Limits of the mass, kg.
+    pub mass_kg: Option<Limits>,
+    /// Corners of a box (axes of the body frame, metres) that holds the centre of mass.
+    pub com_box_m: Option<[[f64; 3]; 2]>,
+    /// An ellipsoid that holds all of the mass, and so the centre of mass too: `tr(P Q) ≥ 0` (Wensing, Kim and Slotine 2018, eq. 24).
+    pub inside: Option<Ellipsoid>,
+}
+
+/// An ellipsoid with its axes along those of the body frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ellipsoid {
+    /// Centre in the body frame, metres.
+    pub centre_m: [f64; 3],
+    /// Half-lengths along the three axes, metres.
+    pub semi_axes_m: [f64; 3],
+}
+
+/// One standard parameter that is no body's: friction, drive inertia, offset.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhysicalScalar {
+    /// Its name in messages.
+    pub name: String,
+    /// Lower limit; zero for what can only lose energy or store it.
+    pub lower: Option<f64>,
+    /// Upper limit.
+    pub upper: Option<f64>,
+    /// The value that it has when the data say nothing.
+    pub prior: f64,
+    /// How far from it is ordinary: the unit of its prior `½ γ ((π − prior)/scale)²`. Greater than zero.
+    pub scale: f64,
+}
+
+/// `θ = B π`: which sums of standard parameters the data's columns are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BaseMap {
+    matrix: DMatrix<f64>,
+}
+
+impl BaseMap {
+    /// From B itself, shape (base parameters, standard parameters).
+    ///
+    /// # Errors
+    /// [`PhysicalError::NotFinite`].
+    pub fn new(matrix: DMatrix<f64>) -> Result<Self, PhysicalError> {
+        finite("an entry of the base map", matrix.as_slice())?;
+        Ok(Self { matrix })
+    }
+
+    /// From `θ = π[independent] + K π[dependent]`, as base parameters of a structure are given; K has shape (independent, dependent).
+    ///
+    /// # Errors
+    /// [`PhysicalError::Mismatch`] unless K fits and every column stands in one of the lists, once; [`PhysicalError::NotFinite`].
+    pub fn from_regrouping(
+        independent: &[usize],
+        dependent: &[usize],
+        regrouping: &DMatrix<f64>,
+    ) -> Result<Self, PhysicalError> {
+        let columns = independent.len() + dependent.len();
+        expect("rows of the regrouping", independent.len(), regrouping.nrows())?;
+        expect("columns of the regrouping", dependent.len(), regrouping.ncols())?;
+        let mut seen = vec![false; columns];
+        for &column in independent.iter().chain(dependent) {
+            if column >= columns || std::mem::replace(&mut seen[column], true) {
+                return Err(PhysicalError::Mismatch {
+                    what: "columns named once each by the base map".into(),
+                    expected: columns,
+                    found: column,
+                });
+            }
+        }
+        let mut matrix = DMatrix::zeros(independent.len(), columns);
+        for (row, &column) in independent.iter().enumerate() {
+            matrix[(row, column)] = 1.0;
+        }
+        for (d, &column) in dependent.iter().enumerate() {
+            matrix.set_column(column, &regrouping.column(d));
+        }
+        Self::new(matrix)
+    }
+
+    /// B.
+    pub fn matrix(&self) -> &DMatrix<f64> {
+        &self.matrix
+    }
+}
+
+/// Bodies first (ten columns each), then scalars: the standard parameters π in order.
+///
+/// The data are rows `R₁ θ ≈ ρ₁` over the base parameters `θ = B π`, each row in units of its own noise, so that `½‖R₁ B π − ρ₁‖²` is half the squared distance
+/// from the least-squares solution in standard deviations.
+#[derive(Clone, Debug)]
+pub struct PhysicalProblem {
+    pub(super) base: BaseMap,
+    pub(super) bodies: Vec<PhysicalBody>,
+    pub(super) whitenings: Vec<Whitening>,
+    pub(super) scalars: Vec<PhysicalScalar>,
+    pub(super) triangle: DMatrix<f64>,
+    pub(super) rotated: DVector<f64>,
+    pub(super) total_mass_kg: Option<Limits>,
+}
+
+/// Least relative width of an interval: narrower, it has no inside in double precision.
+const LEAST_WIDTH: f64 = 1.0e-6;
+
+impl PhysicalProblem {
+    /// A problem from a weighted factor over the base parameters ([`LinearProblem::combined`](crate::LinearProblem::combined) with weights 1/σ_j).
+    ///
+    /// # Errors
+    /// [`PhysicalError::Mismatch`] if the shapes differ, and everything that is wrong with a single body or scalar:
+    /// [`PhysicalError::InfeasiblePrior`], [`PhysicalError::InfeasibleKnown`], [`PhysicalError::EmptyInterval`], [`PhysicalError::NotFinite`].
+    pub fn new(
+        base: BaseMap,
+        bodies: Vec<PhysicalBody>,
+        scalars: Vec<PhysicalScalar>,
+        factor: &TriangularFactor,
+    ) -> Result<Self, PhysicalError> {
+        expect("columns of the base map", 10 * bodies.len() + scalars.len(), base.matrix.ncols())?;
+        expect("columns of the factor", base.matrix.nrows(), factor.columns())?;
+        let whitenings = bodies.iter().map(checked_body).collect::<Result<Vec<_>, _>>()?;
+        scalars.iter().try_for_each(checked_scalar)?;
+        let (triangle, rotated) = (factor.regressor_triangle(), factor.rotated_torque());
+        finite("an entry of the factor", triangle.as_slice())?;
+        finite("an entry of the factor", rotated.as_slice())?;
+        Ok(Self { base, bodies, whitenings, scalars, triangle, rotated, total_mass_kg: None })
+    }
+
+    /// Limits of the sum of all bodies' masses, known ones included.
+    ///
+    /// # Errors
+    /// [`PhysicalError::EmptyInterval`], and [`PhysicalError::TotalMass`] when the bodies' own limits exclude it.
+    pub fn with_total_mass_kg(mut self, limits: Limits) -> Result<Self, PhysicalError> {
+        interval("total mass", limits)?;
+        let own = |body: &PhysicalBody, side: usize, free: f64| {
+            body.known.map_or_else(|| body.mass_kg.map_or(free, |limits| limits[side]), |known| known[0])
+        };
+        let least: f64 = self.bodies.iter().map(|body| own(body, 0, 0.0)).sum();
+        let greatest: f64 = self.bodies.iter().map(|body| own(body, 1, f64::INFINITY)).sum();
+        let [lower, upper] = limits;
+        if lower >= greatest || upper <= least {
+            return Err(PhysicalError::TotalMass { lower, upper, least, greatest });
+        }
+        self.total_mass_kg = Some(limits);
+        Ok(self)
+    }
+
+    /// The same problem with the data's optimum at the base parameters `theta`: what is nearest to them in the data's own metric?
+    ///
+    /// # Errors
+    /// [`PhysicalError::Mismatch`], [`PhysicalError::NotFinite`].
+    pub fn around(&self, theta: &[f64]) -> Result<Self, PhysicalError> {
+        expect("base parameters", self.base.matrix.nrows(), theta.len())?;
+        finite("a base parameter", theta)?;
+        Ok(Self { rotated: &self.triangle * DVector::from_column_slice(theta), ..self.clone() })
+    }
+
+    /// The bodies.
+    pub fn bodies(&self) -> &[PhysicalBody] {
+        &self.bodies
+    }
+
+    /// The scalars.
+    pub fn scalars(&self) -> &[PhysicalScalar] {
+        &self.scalars
+    }
+
+    /// B.
+    pub fn base(&self) -> &BaseMap {
+        &self.base
+    }
+}
+
+/// A body of a given mass spread evenly about the frame's origin with radius of gyration `length_m` along each axis: a reference where nothing better is known.
+///
+/// ```
+/// let body = dynident_estimation::consistent::rough_body(2.0, 0.1);
+/// assert_eq!(body[0], 2.0);
+/// assert!((body[4] - 0.04).abs() < 1e-15); // Ixx = 2 m ℓ²
+/// ```
+pub fn rough_body(mass_kg: f64, length_m: f64) -> [f64; 10] {
+    let moment = 2.0 * mass_kg * length_m * length_m;
+    [mass_kg, 0.0, 0.0, 0.0, moment, 0.0, 0.0, moment, 0.0, moment]
+}
+
+fn checked_body(body: &PhysicalBody) -> Result<Whitening, PhysicalError> {
+    let name = &body.name;
+    finite(&format!("body {name}: a prior value"), &body.reference)?;
+    let whitening = Whitening::new(&body.reference).ok_or_else(|| PhysicalError::InfeasiblePrior {
+        body: name.clone(),
+        least_eigenvalue: least_eigenvalue(&pseudo_inertia(&body.reference)),
+    })?;
+    if let Some(known) = &body.known {
+        finite(&format!("body {name}: a known value"), known)?;
+        let least = least_eigenvalue(&pseudo_inertia(known));
+        // Rounding of a thin body's inertia leaves about this of its largest entry.
+        if least < -1.0e-12 * known.iter().fold(0.0, |a: f64, b| a.max(b.abs())) {
+            return Err(PhysicalError::InfeasibleKnown { body: name.clone(), least_eigenvalue: least });
+        }
+    }
+    if let Some(limits) = body.mass_kg {
+        interval(&format!("body {name}: mass"), limits)?;
+        if limits[1] <= 0.0 {
+            return Err(PhysicalError::EmptyInterval {
+                what: format!("body {name}: mass"),
+                lower: 0.0,
+                upper: limits[1],
+            });
+        }
+    }
+    if let Some([low, high]) = body.com_box_m {
+        for axis in 0..3 {
+            interval(&format!("body {name}: centre of mass along {}", ["x", "y", "z"][axis]), [low[axis], high[axis]])?;
+        }
+    }
+    if let Some(ellipsoid) = body.inside {
+        finite(&format!("body {name}: the ellipsoid's centre"), &ellipsoid.centre_m)?;
+        for half in ellipsoid.semi_axes_m {
+            interval(&format!("body {name}: half-length of the ellipsoid"), [0.0, half])?;
+        }
+    }
+    Ok(whitening)
+}
+
+fn checked_scalar(scalar: &PhysicalScalar) -> Result<(), PhysicalError> {
+    let name = &scalar.name;
+    let limits = [scalar.lower, scalar.upper];
+    for value in limits.into_iter().flatten().chain([scalar.prior, scalar.scale]) {
+        finite(name, &[value])?;
+    }
+    if scalar.scale <= 0.0 {
+        return Err(PhysicalError::EmptyInterval { what: format!("{name}: scale"), lower: 0.0, upper: scalar.scale });
+    }
+    match limits {
+        [Some(lower), Some(upper)] => interval(name, [lower, upper]),
+        _ => Ok(()),
+    }
+}
+
+fn interval(what: &str, [lower, upper]: Limits) -> Result<(), PhysicalError> {
+    finite(what, &[lower, upper])?;
+    if upper - lower > LEAST_WIDTH * lower.abs().max(upper.abs()) {
+        Ok(())
+    } else {
+        Err(PhysicalError::EmptyInterval { what: what.into(), lower, upper })
+    }
+}
+
+pub(super) fn expect(what: &str, expected: usize, found: usize) -> Result<(), PhysicalError> {
+    if expected == found { Ok(()) } else { Err(PhysicalError::Mismatch { what: what.into(), expected, found }) }
+}
+
+pub(super) fn finite(what: &str, values: &[f64]) -> Result<(), PhysicalError> {
+    match values.iter().find(|value| !value.is_finite()) {
+        Some(&value) => Err(PhysicalError::NotFinite { what: what.into(), value }),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,371 @@
+//! Newton systems as least squares: stacked square-root rows under orthogonal reflections, never normal equations.
+//!
+//! A direction of a barrier method solves `GᵀG u = Gᵀh − g`, where G stacks the rows of the data, of the priors, and of every constraint in its own scaling. Formed as a matrix, GᵀG
+//! loses what stands a factor 1e-16 below its largest entry, and near the cone's boundary the unit rows of a constraint stand beside data rows of 1e10. G itself loses
+//! the square root of that only. Each body's ten variables are seen in a frame (`Δx = J u`) in which the barrier's rows are the unit matrix; they need no reflection, and the
+//! block triangle that they make with the other rows of the same body is where the reflections of the data rows begin.
+//!
+//! Solved by the triangle and refined against the rows themselves (corrected seminormal equations: Björck, Linear Algebra Appl. 88 (1987) 31).
+
+use super::coordinates::Matrix10;
+use crate::factor::{CHUNK_ROWS, Chunk, TriangleOnPanel, row_start};
+use dynident_lanes::{Level, dispatch};
+use nalgebra::{DMatrix, DVector};
+
+/// Rows `[.. C ..]` that see consecutive variables only, in their frame.
+#[derive(Clone, Debug)]
+pub(super) struct LocalRows {
+    pub(super) first: usize,
+    pub(super) matrix: DMatrix<f64>,
+}
+
+/// What a Newton system is made of.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Rows {
+    /// Frames: `Δx[first..first + 10] = J u[first..first + 10]`; variables of no frame are their own.
+    pub(super) frames: Vec<(usize, Matrix10)>,
+    /// Rows of single bodies and scalars, in the frame.
+    pub(super) local: Vec<LocalRows>,
+    /// Rows that couple, in the frame.
+    pub(super) wide: Vec<DMatrix<f64>>,
+}
+
+/// Where rows that came one by one went.
+#[derive(Clone, Debug)]
+pub(super) struct Singles {
+    /// Those that see one body or one variable only.
+    local: Vec<usize>,
+    /// The others, which are one matrix.
+    wide: Vec<usize>,
+}
+
+impl Singles {
+    /// Appends their right-hand sides, one number for each row.
+    pub(super) fn append(&self, h: &[f64], local: &mut Vec<DVector<f64>>, wide: &mut Vec<DVector<f64>>) {
+        local.extend(self.local.iter().map(|&row| DVector::from_element(1, h[row])));
+        wide.push(DVector::from_iterator(self.wide.len(), self.wide.iter().map(|&row| h[row])));
+    }
+}
+
+/// The triangle of a stack of rows.
+#[derive(Clone, Debug)]
+pub(super) struct StackedSystem {
+    rows: Rows,
+    size: usize,
+    /// Packed by rows.
+    triangle: Vec<f64>,
+}
+
+/// A right-hand side: one vector for each set of rows, and a part that is no row's.
+#[derive(Clone, Debug)]
+pub(super) struct RightSide {
+    pub(super) local: Vec<DVector<f64>>,
+    pub(super) wide: Vec<DVector<f64>>,
+    /// −g, in the frame.
+    pub(super) direct: DVector<f64>,
+}
+
+impl Rows {
+    /// `Δx = J u`.
+    pub(super) fn unframed(&self, u: &DVector<f64>) -> DVector<f64> {
+        let mut x = u.clone();
+        for (first, frame) in &self.frames {
+            let part = frame * u.fixed_rows::<10>(*first);
+            x.fixed_rows_mut::<10>(*first).copy_from(&part);
+        }
+        x
+    }
+
+    /// `Jᵀ g`.
+    pub(super) fn framed_gradient(&self, gradient: &DVector<f64>) -> DVector<f64> {
+        let mut framed = gradient.clone();
+        for (first, frame) in &self.frames {
+            let part = frame.tr_mul(&gradient.fixed_rows::<10>(*first));
+            framed.fixed_rows_mut::<10>(*first).copy_from(&part);
+        }
+        framed
+    }
+
+    /// `A J`.
+    pub(super) fn framed(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut framed = matrix.clone();
+        for (first, frame) in &self.frames {
+            let part = matrix.fixed_columns::<10>(*first) * frame;
+            framed.fixed_columns_mut::<10>(*first).copy_from(&part);
+        }
+        framed
+    }
+
+    /// Adds single rows, in the frame. They come after all others.
+    pub(super) fn add_singles(&mut self, rows: &[DVector<f64>]) -> Singles {
+        let mut singles = Singles { local: Vec::new(), wide: Vec::new() };
+        for (index, row) in rows.iter().enumerate() {
+            let mut seen = row.iter().enumerate().filter(|(_, value)| **value != 0.0).map(|(column, _)| column);
+            let least = seen.next().unwrap_or(0);
+            let greatest = seen.next_back().unwrap_or(least);
+            let (first, width) = self.group_of(least);
+            if greatest < first + width {
+                let matrix = DMatrix::from_iterator(1, width, row.rows(first, width).iter().copied());
+                self.local.push(LocalRows { first, matrix });
+                singles.local.push(index);
+            } else {
+                singles.wide.push(index);
+            }
+        }
+        let columns = rows.first().map_or(0, DVector::len);
+        self.wide.push(DMatrix::from_fn(singles.wide.len(), columns, |i, j| rows[singles.wide[i]][j]));
+        singles
+    }
+
+    /// First variable and number of those in one frame with this one.
+    fn group_of(&self, variable: usize) -> (usize, usize) {
+        let holds = |first: usize| first <= variable && variable < first + 10;
+        self.frames.iter().find(|(first, _)| holds(*first)).map_or((variable, 1), |(first, _)| (*first, 10))
+    }
+
+    /// `C J` for columns that begin at `first` and end with that body or variable.
+    pub(super) fn framed_part(&self, first: usize, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        let frame = self.frames.iter().find(|(at, _)| *at == first && matrix.ncols() == 10);
+        frame.map_or_else(|| matrix.clone(), |(_, frame)| matrix * DMatrix::from_column_slice(10, 10, frame.as_slice()))
+    }
+
+    /// `Gᵀ h` of a right-hand side, with its direct part.
+    pub(super) fn transposed(&self, right: &RightSide) -> DVector<f64> {
+        let mut sum = right.direct.clone();
+        for (rows, h) in self.local.iter().zip(&right.local) {
+            let mut place = sum.rows_mut(rows.first, rows.matrix.ncols());
+            place.gemv_tr(1.0, &rows.matrix, h, 1.0);
+        }
+        for (rows, h) in self.wide.iter().zip(&right.wide).filter(|(rows, _)| rows.nrows() > 0) {
+            sum.gemv_tr(1.0, rows, h, 1.0);
+        }
+        sum
+    }
+
+    /// `h − G u`.
+    fn rest(&self, right: &RightSide, u: &DVector<f64>) -> RightSide {
+        let mut rest = right.clone();
+        for (rows, h) in self.local.iter().zip(&mut rest.local) {
+            h.gemv(-1.0, &rows.matrix, &u.rows(rows.first, rows.matrix.ncols()), 1.0);
+        }
+        for (rows, h) in self.wide.iter().zip(&mut rest.wide).filter(|(rows, _)| rows.nrows() > 0) {
+            h.gemv(-1.0, rows, u, 1.0);
+        }
+        rest
+    }
+}
+
+/// A pivot smaller than this share of its column counts as lost.
+const LEAST_PIVOT: f64 = 1.0e-15;
+
+impl StackedSystem {
+    /// Reduces the rows over `size` variables. Where rounding leaves a variable without any row of its own, the least row that helps is added. None when that is not enough, or
+    /// an entry is not finite.
+    pub(super) fn new(size: usize, rows: Rows) -> Option<Self> {
+        let mut squares = vec![0.0; size];
+        for part in &rows.local {
+            for (column, square) in part.matrix.column_iter().zip(&mut squares[part.first..]) {
+                *square += column.norm_squared();
+            }
+        }
+        for part in rows.wide.iter().filter(|part| part.nrows() > 0) {
+            for (column, square) in part.column_iter().zip(&mut squares) {
+                *square += column.norm_squared();
+            }
+        }
+        if !squares.iter().all(|square| *square > 0.0 && square.is_finite()) {
+            return None;
+        }
+        let mut added = 0.0;
+        loop {
+            let triangle = reduced(size, &rows, &squares, added);
+            let usable = (0..size).all(|k| triangle[row_start(size, k)] > LEAST_PIVOT * squares[k].sqrt());
+            if usable {
+                return Some(Self { rows, size, triangle });
+            }
+            added = if added == 0.0 { 1.0e-13 } else { 100.0 * added };
+            if added > 1.0e-6 {
+                return None;
+            }
+        }
+    }
+
+    /// The rows that it was made from.
+    pub(super) fn rows(&self) -> &Rows {
+        &self.rows
+    }
+
+    /// u with `GᵀG u = Gᵀh + direct`, refined as long as that helps.
+    pub(super) fn solve(&self, right: &RightSide) -> DVector<f64> {
+        let mut u = self.solve_once(self.rows.transposed(right));
+        let mut size = f64::INFINITY;
+        for _ in 0..4 {
+            let rest = self.rows.transposed(&self.rows.rest(right, &u));
+            let half = self.solve_lower(rest);
+            // The error in the system's own metric.
+            let norm = half.norm();
+            if norm.is_nan() || norm >= 0.3 * size {
+                break;
+            }
+            size = norm;
+            u += self.solve_upper(half);
+        }
+        u
+    }
+
+    fn solve_once(&self, right: DVector<f64>) -> DVector<f64> {
+        self.solve_upper(self.solve_lower(right))
+    }
+
+    /// y with `Rᵀ y = b`.
+    fn solve_lower(&self, mut b: DVector<f64>) -> DVector<f64> {
+        let values = b.as_mut_slice();
+        for k in 0..self.size {
+            let row = self.row(k);
+            let y = values[k] / row[0];
+            values[k] = y;
+            for (value, r) in values[k + 1..].iter_mut().zip(&row[1..]) {
+                *value -= r * y;
+            }
+        }
+        b
+    }
+
+    /// u with `R u = y`.
+    fn solve_upper(&self, mut y: DVector<f64>) -> DVector<f64> {
+        let values = y.as_mut_slice();
+        for k in (0..self.size).rev() {
+            let row = self.row(k);
+            let sum: f64 = row[1..].iter().zip(&values[k + 1..]).map(|(r, u)| r * u).sum();
+            values[k] = (values[k] - sum) / row[0];
+        }
+        y
+    }
+
+    fn row(&self, k: usize) -> &[f64] {
+        &self.triangle[row_start(self.size, k)..row_start(self.size, k + 1)]
+    }
+}
+
+/// The packed triangle of all rows and of `added √squares` on the diagonal.
+fn reduced(size: usize, rows: &Rows, squares: &[f64], added: f64) -> Vec<f64> {
+    let mut triangle = vec![0.0; row_start(size, size)];
+    let mut at = 0;
+    while at < size {
+        let (_, width) = rows.group_of(at);
+        let mine = || rows.local.iter().filter(|part| part.first == at && part.matrix.ncols() <= width);
+        let height = mine().map(|part| part.matrix.nrows()).sum::<usize>() + width;
+        let mut stack = DMatrix::zeros(height, width);
+        let mut row = 0;
+        for part in mine() {
+            stack.view_mut((row, 0), part.matrix.shape()).copy_from(&part.matrix);
+            row += part.matrix.nrows();
+        }
+        for k in 0..width {
+            stack[(row + k, k)] = added * squares[at + k].sqrt();
+        }
+        let small = stack.qr().r();
+        for i in 0..width {
+            // Either sign of a row is the same square.
+            let sign = if small[(i, i)] < 0.0 { -1.0 } else { 1.0 };
+            for j in i..width {
+                triangle[row_start(size, at + i) + j - i] = sign * small[(i, j)];
+            }
+        }
+        at += width;
+    }
+    let fits = |part: &LocalRows| part.matrix.ncols() <= rows.group_of(part.first).1;
+    let others: Vec<&LocalRows> = rows.local.iter().filter(|part| !fits(part)).collect();
+    let height =
+        rows.wide.iter().map(DMatrix::nrows).sum::<usize>() + others.iter().map(|p| p.matrix.nrows()).sum::<usize>();
+    let chunks = height.div_ceil(CHUNK_ROWS);
+    if chunks == 0 {
+        return triangle;
+    }
+    let mut panel = vec![Chunk::ZERO; size * chunks];
+    let mut start = 0;
+    let mut place = |first: usize, part: &DMatrix<f64>| {
+        for (k, column) in part.column_iter().enumerate() {
+            let chunks = &mut panel[(first + k) * chunks..(first + k + 1) * chunks];
+            for (row, &value) in column.iter().enumerate() {
+                let at = start + row;
+                chunks[at / CHUNK_ROWS].0[at % CHUNK_ROWS] = value;
+            }
+        }
+        start += part.nrows();
+    };
+    for part in &rows.wide {
+        place(0, part);
+    }
+    for part in others {
+        place(part.first, &part.matrix);
+    }
+    dispatch(Level::detect(), TriangleOnPanel { triangle: &mut triangle, size, panel: &mut panel, chunks });
+    triangle
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn matrix(rows: usize, columns: usize, seed: f64) -> DMatrix<f64> {
+        // Of full rank: the phase is no sum of a row's and a column's.
+        DMatrix::from_fn(rows, columns, |i, j| ((i * i * 5 + j * 3 + i * j * j * 2) as f64 * 0.37 + seed).sin())
+    }
+
+    #[test]
+    fn solves_rows_that_normal_equations_would_lose() {
+        // Data rows 1e9 times the unit rows, and of half the rank: the weak directions are the unit rows' alone, and 1e-16 · 1e18 is more than they have.
+        let (size, scale) = (14, 1.0e9);
+        let frame = Matrix10::identity();
+        let wide = matrix(6, size, 0.4) * scale;
+        let local = LocalRows { first: 0, matrix: DMatrix::identity(10, 10) };
+        let singles = (10..size).map(|first| LocalRows { first, matrix: DMatrix::identity(1, 1) });
+        let rows = Rows {
+            frames: vec![(0, frame)],
+            local: std::iter::once(local).chain(singles).collect(),
+            wide: vec![wide.clone()],
+        };
+        let system = StackedSystem::new(size, rows).unwrap();
+        // With h = (A v, v) the answer is v.
+        let v = DVector::from_fn(size, |i, _| (i as f64).cos());
+        let right = RightSide {
+            local: std::iter::once(v.rows(0, 10).into_owned())
+                .chain((10..size).map(|k| v.rows(k, 1).into_owned()))
+                .collect(),
+            wide: vec![&wide * &v],
+            direct: DVector::zeros(size),
+        };
+        // Condition 1e10 times rounding.
+        assert!((system.solve(&right) - v).amax() < 1e-5);
+    }
+
+    #[test]
+    fn frames_and_the_direct_part_are_the_normal_equations() {
+        let size = 12;
+        let frame = Matrix10::from_fn(|i, j| f64::from(i == j) + 0.1 * ((i * 3 + j) as f64).sin());
+        let mut rows = Rows { frames: vec![(1, frame)], ..Rows::default() };
+        let data = matrix(20, size, 0.1);
+        rows.wide.push(rows.framed(&data));
+        rows.local.push(LocalRows { first: 1, matrix: matrix(4, 10, 0.7) });
+        let system = StackedSystem::new(size, rows).unwrap();
+        let gradient = DVector::from_fn(size, |i, _| (i as f64 * 0.9).sin());
+        let framed = system.rows().framed_gradient(&gradient);
+        let right =
+            RightSide { local: vec![DVector::zeros(4)], wide: vec![DVector::zeros(20)], direct: framed.clone() };
+        let u = system.solve(&right);
+        let mut g = DMatrix::zeros(24, size);
+        g.rows_mut(0, 20).copy_from(&system.rows().wide[0]);
+        g.view_mut((20, 1), (4, 10)).copy_from(&matrix(4, 10, 0.7));
+        assert!((g.tr_mul(&(&g * &u)) - framed).amax() < 1e-10);
+        let x = system.rows().unframed(&u);
+        assert!((data * x - &system.rows().wide[0] * &u).amax() < 1e-10);
+    }
+
+    #[test]
+    fn a_variable_without_rows_or_a_broken_one_is_none() {
+        let rows = |value: f64| Rows { wide: vec![DMatrix::from_row_slice(1, 2, &[1.0, value])], ..Rows::default() };
+        assert!(StackedSystem::new(2, rows(0.0)).is_none());
+        assert!(StackedSystem::new(2, rows(f64::NAN)).is_none());
+    }
+}

@@ -1,0 +1,248 @@
+//! Cross-validation between models that share most of their columns, from factors alone: which of many columns should one joint have?
+//!
+//! The log's time segments are cut into K blocks. With block k left out, all other rows of all joints are reduced to one triangle whose last columns are the candidates':
+//!
+//! ```text
+//!     [ R_cc  R_cv  r_c ]   c: columns that every candidate model has, v: candidate columns
+//!     [  0    R_vv  r_v ]
+//! ```
+//!
+//! A candidate model takes some of v: its coefficients follow from `R_vv` and `r_v` alone (a problem of a few unknowns), the others by substitution, and the error on block k from that
+//! block's own triangle. So the rows are reduced once per block, whatever the number of candidates (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413).
+
+use super::nonnegative::nonnegative_least_squares;
+use crate::error::EstimationError;
+use crate::factor::{FactorWorkspace, LinearProblem, TriangularFactor};
+use nalgebra::{DMatrix, DVector};
+
+/// A column of which earlier ones leave a smaller share than this has no value of its own.
+const DEPENDENT: f64 = 1.0e-8;
+
+/// The rows of a problem, cut into blocks of time.
+#[derive(Debug)]
+pub struct CrossValidation<'a> {
+    problem: &'a LinearProblem,
+    /// For each equation, what each block holds, and what all others hold.
+    parts: Vec<[Vec<TriangularFactor>; 2]>,
+    folds: usize,
+}
+
+/// One joint's candidates with one block left out at a time.
+#[derive(Debug)]
+pub struct JointFolds {
+    common: Vec<usize>,
+    variable: Vec<usize>,
+    /// Per block and, last, with no block left out: the triangle; and the joint's rows of the block (of all blocks), in the order common, variable.
+    folds: Vec<(TriangularFactor, TriangularFactor)>,
+}
+
+/// What a candidate model leaves of the joint's torque.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FoldErrors {
+    /// Sum of squared residuals on each block by the fit to the others, (Nm)².
+    pub squares: Vec<f64>,
+    /// Rows of the joint in each block.
+    pub rows: Vec<usize>,
+    /// Coefficients of the candidate's columns by the fit to all blocks.
+    pub coefficients: Vec<f64>,
+}
+
+impl FoldErrors {
+    /// Root mean square over all blocks, Nm.
+    pub fn rms(&self) -> f64 {
+        (self.squares.iter().sum::<f64>() / self.rows.iter().sum::<usize>().max(1) as f64).sqrt()
+    }
+
+    /// Mean square error minus that of `other`, and the standard error of this difference as it varies from block to block: `s/√K`, with blocks weighted by their rows.
+    pub fn excess_over(&self, other: &Self) -> [f64; 2] {
+        let count = self.rows.len() as f64;
+        let mean_rows = self.rows.iter().sum::<usize>() as f64 / count;
+        let differences: Vec<f64> = self.squares.iter().zip(&other.squares).map(|(a, b)| (a - b) / mean_rows).collect();
+        let mean = differences.iter().sum::<f64>() / count;
+        let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        [mean, (variance / count).sqrt()]
+    }
+}
+
+impl<'a> CrossValidation<'a> {
+    /// Cuts the problem's rows into `folds` blocks of consecutive segments, about equally many rows each, over all logs in their order.
+    ///
+    /// # Errors
+    /// [`EstimationError::Setting`] for fewer than two blocks; [`EstimationError::TooFewSegments`] when there are fewer segments than blocks; [`EstimationError::Empty`].
+    pub fn new(problem: &'a LinearProblem, folds: usize) -> Result<Self, EstimationError> {
+        if folds < 2 {
+            let mend = "give at least 2 blocks";
+            return Err(EstimationError::Setting { setting: "folds", value: folds as f64, mend });
+        }
+        if problem.equations().is_empty() {
+            return Err(EstimationError::Empty);
+        }
+        let joint_rows = problem.joint_rows();
+        let mut before = vec![0; problem.joints().len()];
+        let mut parts = Vec::with_capacity(problem.equations().len());
+        let mut most_segments = vec![0; problem.joints().len()];
+        for equation in problem.equations() {
+            let columns = equation.factor.columns();
+            let mut own = vec![TriangularFactor::new(columns); folds];
+            let mut workspace = FactorWorkspace::default();
+            most_segments[equation.joint] += equation.factor.segment_rows().len();
+            for segment in equation.factor.segment_factors() {
+                let middle = before[equation.joint] + segment.rows() / 2;
+                let fold = (middle * folds / joint_rows[equation.joint].max(1)).min(folds - 1);
+                own[fold].absorb_factor(&mut workspace, &segment);
+                before[equation.joint] += segment.rows();
+            }
+            let others = all_but_one(&own, columns);
+            parts.push([own, others]);
+        }
+        let fewest = most_segments.into_iter().filter(|&count| count > 0).min().unwrap_or(0);
+        if fewest < folds {
+            return Err(EstimationError::TooFewSegments { clusters: fewest });
+        }
+        Ok(Self { problem, parts, folds })
+    }
+
+    /// Prepares the choice of joint `joint` among the columns `variable`, which no other joint sees. All joints see those of the columns `common` that are theirs; rows of joint j
+    /// count with `weights[j]`.
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] for numbers out of range or another number of weights; [`EstimationError::Setting`] for an impossible weight;
+    /// [`EstimationError::TooFewRows`] when a block leaves fewer rows of the joint, or all blocks but one of all joints, than could tell the columns apart.
+    pub fn joint(
+        &self,
+        joint: usize,
+        common: &[usize],
+        variable: &[usize],
+        weights: &[f64],
+    ) -> Result<JointFolds, EstimationError> {
+        let joints = self.problem.joints();
+        let mismatch = |what: &str, expected, found| EstimationError::Mismatch { what: what.into(), expected, found };
+        if weights.len() != joints.len() {
+            return Err(mismatch("weights of joints", joints.len(), weights.len()));
+        }
+        if joint >= joints.len() {
+            return Err(mismatch("a joint number below the number of joints", joints.len(), joint));
+        }
+        let size = self.problem.columns().len();
+        crate::factor::check_columns(common, size)?;
+        crate::factor::check_columns(variable, size)?;
+        let order: Vec<usize> = common.iter().chain(variable).copied().collect();
+        let mut folds = Vec::with_capacity(self.folds + 1);
+        for fold in 0..=self.folds {
+            let mut triangle = TriangularFactor::new(order.len());
+            let mut rows = TriangularFactor::new(order.len());
+            let mut workspace = FactorWorkspace::default();
+            for (equation, [own, others]) in self.problem.equations().iter().zip(&self.parts) {
+                let mut place = vec![None; size];
+                for (local, &column) in equation.columns.iter().enumerate() {
+                    place[column] = Some(local);
+                }
+                let mut absorb = |to: &mut TriangularFactor, from: &TriangularFactor, weight: f64| {
+                    to.absorb_entries(&mut workspace, from.columns() + 1, |row, column| {
+                        let local = order.get(column).map_or(Some(from.columns()), |&global| place[global]);
+                        weight * local.map_or(0.0, |local| from.entry(row, local))
+                    });
+                    to.count(from.rows());
+                };
+                let weight = weights[equation.joint];
+                if !(weight.is_finite() && weight >= 0.0) {
+                    let mend = "give a finite weight that is not negative";
+                    return Err(EstimationError::Setting { setting: "weight", value: weight, mend });
+                }
+                absorb(&mut triangle, &others[fold], weight);
+                if equation.joint == joint {
+                    if fold < self.folds {
+                        absorb(&mut rows, &own[fold], 1.0);
+                    } else {
+                        absorb(&mut rows, &others[fold], 1.0);
+                    }
+                }
+            }
+            let enough = rows.rows() > 0 && triangle.rows() > order.len();
+            if !enough {
+                return Err(EstimationError::TooFewRows {
+                    what: format!("cross-validation of joint {}", joints[joint]),
+                    rows: triangle.rows(),
+                    parameters: order.len() as f64,
+                });
+            }
+            folds.push((triangle, rows));
+        }
+        Ok(JointFolds { common: common.to_vec(), variable: variable.to_vec(), folds })
+    }
+}
+
+/// What all blocks but one hold, for each block, and (last) what all hold: from both ends towards the middle.
+fn all_but_one(own: &[TriangularFactor], columns: usize) -> Vec<TriangularFactor> {
+    let mut workspace = FactorWorkspace::default();
+    let mut after = vec![TriangularFactor::new(columns)];
+    for factor in own.iter().rev() {
+        let mut next = after[after.len() - 1].clone();
+        next.absorb_factor(&mut workspace, factor);
+        after.push(next);
+    }
+    after.reverse();
+    let mut before = TriangularFactor::new(columns);
+    let mut others = Vec::with_capacity(own.len() + 1);
+    for (fold, factor) in own.iter().enumerate() {
+        let mut rest = before.clone();
+        rest.absorb_factor(&mut workspace, &after[fold + 1]);
+        others.push(rest);
+        before.absorb_factor(&mut workspace, factor);
+    }
+    others.push(before);
+    others
+}
+
+impl JointFolds {
+    /// The columns to choose from, as given.
+    pub fn variable(&self) -> &[usize] {
+        &self.variable
+    }
+
+    /// The error of the model that has the candidate columns `chosen` (places in [`variable`](Self::variable)) beside the common ones; those with `nonnegative` set are
+    /// constrained to coefficients of zero or more.
+    ///
+    /// # Panics
+    /// If the slices' lengths differ or a place is out of range.
+    pub fn errors(&self, chosen: &[usize], nonnegative: &[bool]) -> FoldErrors {
+        assert_eq!(chosen.len(), nonnegative.len());
+        let last = self.folds.len() - 1;
+        let (mut squares, mut rows) = (Vec::with_capacity(last), Vec::with_capacity(last));
+        for (triangle, own) in &self.folds[..last] {
+            let coefficients = self.coefficients(triangle, chosen, nonnegative);
+            let theta = self.theta(triangle, chosen, &coefficients);
+            let rho = own.entry(own.columns(), own.columns());
+            squares.push(own.residual(&theta).norm_squared() + rho * rho);
+            rows.push(own.rows());
+        }
+        let coefficients = self.coefficients(&self.folds[last].0, chosen, nonnegative).iter().copied().collect();
+        FoldErrors { squares, rows, coefficients }
+    }
+
+    fn coefficients(&self, triangle: &TriangularFactor, chosen: &[usize], nonnegative: &[bool]) -> DVector<f64> {
+        let (start, end) = (self.common.len(), triangle.columns());
+        let columns =
+            DMatrix::from_fn(end - start, chosen.len(), |row, k| triangle.entry(start + row, start + chosen[k]));
+        let torque = DVector::from_fn(end - start, |row, _| triangle.entry(start + row, end));
+        nonnegative_least_squares(&columns.tr_mul(&columns), &columns.tr_mul(&torque), nonnegative)
+    }
+
+    /// All parameters: the candidate's as given, the others by substitution. A common column that the rows do not tell from earlier ones is zero.
+    fn theta(&self, triangle: &TriangularFactor, chosen: &[usize], coefficients: &DVector<f64>) -> Vec<f64> {
+        let (start, end) = (self.common.len(), triangle.columns());
+        let norms = triangle.column_norms();
+        let mut theta = vec![0.0; end];
+        for (&place, &value) in chosen.iter().zip(coefficients.iter()) {
+            theta[start + place] = value;
+        }
+        for row in (0..start).rev() {
+            let pivot = triangle.entry(row, row);
+            if pivot > DEPENDENT * norms[row] {
+                let sum: f64 = (row + 1..end).map(|k| triangle.entry(row, k) * theta[k]).sum();
+                theta[row] = (triangle.entry(row, end) - sum) / pivot;
+            }
+        }
+        theta
+    }
+}

@@ -1,0 +1,132 @@
+//! Rows that carry instruments: `[Z | W | τ]`, where Z are the same columns from a motion that is free of the noise in W.
+
+use super::problem::LinearProblem;
+use super::segmented::SegmentedFactor;
+use crate::error::EstimationError;
+use nalgebra::DMatrix;
+
+/// `τ_j = W_j θ + noise` with instruments `Z_j`, one column of Z for every column of W, held as factors of `[Z_j | W_j | τ_j]`.
+///
+/// Z is the regressor of another account of the same motion: simulated with the current model, smoothed much more strongly, averaged over periods or
+/// taken from a repeated run. It must be correlated with W and not with the noise of W and τ.
+///
+/// ```
+/// use dynident_estimation::{InstrumentedProblem, SegmentSettings, SegmentedFactor, instrumental_variables};
+/// // τ = 2 x with x measured as w = x ± 1: the instrument is x itself.
+/// let x: Vec<f64> = (0..64).map(|k| f64::from(k % 8) - 3.5).collect();
+/// let w: Vec<f64> = (0..64).map(|k| x[k] + if (k / 8) % 2 == 0 { 1.0 } else { -1.0 }).collect();
+/// let tau: Vec<f64> = x.iter().map(|x| 2.0 * x).collect();
+/// let mut rows = SegmentedFactor::new(2, SegmentSettings { max_segments: 4, first_length_rows: 16 })?;
+/// rows.absorb(&[x, w, tau].concat(), 64)?; // instrument, regressor, torque
+/// let mut problem = InstrumentedProblem::new(vec!["gain".into()], vec!["joint1".into()]);
+/// problem.add("run", 0, &[0], rows)?;
+/// let found = instrumental_variables(&problem, &Default::default())?;
+/// assert!((found.estimate.values[0] - 2.0).abs() < 1e-9);
+/// # Ok::<(), dynident_estimation::EstimationError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct InstrumentedProblem {
+    names: Vec<String>,
+    fallback: Vec<f64>,
+    /// Columns of Z, then those of W.
+    pub(crate) rows: LinearProblem,
+}
+
+impl InstrumentedProblem {
+    /// A problem without data: names of the columns (parameters) and of the joints.
+    pub fn new(columns: Vec<String>, joints: Vec<String>) -> Self {
+        let both = columns.iter().map(|name| format!("instrument of {name}")).chain(columns.iter().cloned()).collect();
+        Self { fallback: vec![0.0; columns.len()], names: columns, rows: LinearProblem::new(both, joints) }
+    }
+
+    /// Adds the rows of joint number `joint` in the log called `log`. The factor has the instruments first, one for each of `columns`, then the
+    /// regressor's columns in the same order, then the torque.
+    ///
+    /// # Errors
+    /// As [`LinearProblem::add`]; the factor must have twice as many columns as `columns` names.
+    pub fn add(
+        &mut self,
+        log: &str,
+        joint: usize,
+        columns: &[usize],
+        factor: SegmentedFactor,
+    ) -> Result<(), EstimationError> {
+        let count = self.names.len();
+        if let Some(&column) = columns.iter().find(|column| **column >= count) {
+            let joint = self.joints().get(joint).cloned().unwrap_or_default();
+            return Err(EstimationError::Column { log: log.into(), joint, column, columns: count });
+        }
+        let both = columns.iter().copied().chain(columns.iter().map(|column| column + count)).collect();
+        self.rows.add(log, joint, both, factor)
+    }
+
+    /// Values at which columns are fixed that the instruments do not tell apart; zero unless said otherwise.
+    ///
+    /// # Errors
+    /// As [`LinearProblem::with_fallback`].
+    pub fn with_fallback(mut self, values: Vec<f64>) -> Result<Self, EstimationError> {
+        let both = values.iter().chain(&values).copied().collect();
+        crate::error::expect("fallback values", self.names.len(), values.len())?;
+        self.rows = self.rows.with_fallback(both)?;
+        self.fallback = values;
+        Ok(self)
+    }
+
+    /// Names of the regressor's columns.
+    pub fn columns(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Names of the joints.
+    pub fn joints(&self) -> &[String] {
+        self.rows.joints()
+    }
+
+    /// Values for columns that are not estimated.
+    pub fn fallback(&self) -> &[f64] {
+        &self.fallback
+    }
+
+    /// The same rows without their instruments: what least squares would be made from.
+    ///
+    /// # Errors
+    /// None that the construction has not ruled out.
+    pub fn regressors(&self) -> Result<LinearProblem, EstimationError> {
+        let mut problem =
+            LinearProblem::new(self.names.clone(), self.joints().to_vec()).with_fallback(self.fallback.clone())?;
+        for equation in self.rows.equations() {
+            let count = equation.columns.len() / 2;
+            let mut choice = DMatrix::zeros(2 * count + 1, count + 1);
+            choice.view_mut((count, 0), (count + 1, count + 1)).fill_with_identity();
+            let factor = equation.factor.transformed(&[choice]);
+            let columns = equation.columns[..count].to_vec();
+            problem.add(&self.rows.logs()[equation.log], equation.joint, columns, factor)?;
+        }
+        Ok(problem)
+    }
+
+    /// `θ` of the regressor's columns as a vector over instruments and regressor.
+    pub(crate) fn over_both(&self, theta: &[f64]) -> Vec<f64> {
+        let mut both = vec![0.0; self.names.len()];
+        both.extend_from_slice(theta);
+        both
+    }
+
+    /// A problem over other columns, made of the same rows: `combination` gives for an equation's local columns `[Z | W | τ]` the new rows'
+    /// coefficients, shape (local columns + 1, names + 1).
+    pub(crate) fn combined(
+        &self,
+        names: Vec<String>,
+        fallback: Vec<f64>,
+        combination: impl Fn(&[usize]) -> DMatrix<f64>,
+    ) -> Result<LinearProblem, EstimationError> {
+        let count = names.len();
+        let mut problem = LinearProblem::new(names, self.joints().to_vec()).with_fallback(fallback)?;
+        for equation in self.rows.equations() {
+            let local = &equation.columns[..equation.columns.len() / 2];
+            let factor = equation.factor.transformed(&[combination(local)]);
+            problem.add(&self.rows.logs()[equation.log], equation.joint, (0..count).collect(), factor)?;
+        }
+        Ok(problem)
+    }
+}

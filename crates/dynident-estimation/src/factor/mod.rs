@@ -1,0 +1,24 @@
+//! **Rows in, triangles out.** What remains of a log of any length, and the problems that are assembled from it.
+//!
+//! A [`TriangularFactor`] holds all that least squares needs from rows `[W | τ]`: `RᵀR = [W | τ]ᵀ[W | τ]`. Rows of one
+//! joint in one log go into a [`SegmentedFactor`], which keeps at most K factors of consecutive time segments, so that
+//! a covariance can later ask how the segments differ. The factors of all joints and logs over one list of named
+//! columns make a [`LinearProblem`] (an [`InstrumentedProblem`] where instruments stand beside the regressor), with a
+//! [`Prior`] where there is one. [`RankSettings`] say when a column counts as excited, a [`RankReport`] what was decided.
+
+mod instrumented;
+mod problem;
+mod rank;
+mod reflect;
+mod segmented;
+mod triangular;
+
+pub use instrumented::InstrumentedProblem;
+pub(crate) use problem::StackedProblem;
+pub use problem::{JointRows, LinearProblem, Prior};
+pub use rank::{FixedColumn, RankReport, RankSettings};
+pub(crate) use rank::{Solution, Split, report, solve, split};
+pub(crate) use reflect::{CHUNK_ROWS, Chunk, TriangleOnPanel, row_start};
+pub use segmented::{SegmentSettings, SegmentedFactor};
+pub(crate) use triangular::check_columns;
+pub use triangular::{BLOCK_ROWS, FactorWorkspace, TriangularFactor};

@@ -1,0 +1,261 @@
+//! The linear problem that all estimators start from: which joint's rows see which columns, and what they hold.
+
+use super::segmented::SegmentedFactor;
+use super::triangular::{FactorWorkspace, TriangularFactor};
+use crate::error::{EstimationError, expect};
+use nalgebra::{DMatrix, DVector};
+
+/// The rows of one joint in one log.
+#[derive(Clone, Debug)]
+pub struct JointRows {
+    /// Number of the log in [`LinearProblem::logs`].
+    pub log: usize,
+    /// Number of the joint in [`LinearProblem::joints`].
+    pub joint: usize,
+    /// For every column of the factor its number among the problem's columns.
+    pub columns: Vec<usize>,
+    /// What the rows hold.
+    pub factor: SegmentedFactor,
+}
+
+/// A Gaussian belief about the parameters before the data: `S θ = S m + N(0, 1)`, that is mean m, information SᵀS.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prior {
+    mean: Vec<f64>,
+    sqrt_information: DMatrix<f64>,
+}
+
+/// `τ_j = W_j θ + noise` for every joint j of every log, held as factors.
+///
+/// ```
+/// use dynident_estimation::{LinearProblem, SegmentSettings, SegmentedFactor, ordinary_least_squares};
+/// let mut rows = SegmentedFactor::new(2, SegmentSettings { max_segments: 8, first_length_rows: 2 })?;
+/// // τ = 3 x - 1 with an error of ±0.1; columns x, 1, τ one after another.
+/// rows.absorb(&[0., 1., 2., 3., 4., 5., 1., 1., 1., 1., 1., 1., -0.9, 1.9, 5.1, 7.9, 10.9, 14.1], 6)?;
+/// let mut problem = LinearProblem::new(vec!["slope".into(), "offset".into()], vec!["joint1".into()]);
+/// problem.add("first run", 0, vec![0, 1], rows)?;
+/// let estimate = ordinary_least_squares(&problem, &Default::default())?;
+/// assert!((estimate.values[0] - 3.0).abs() < 0.05 && estimate.std[0] > 0.0);
+/// # Ok::<(), dynident_estimation::EstimationError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct LinearProblem {
+    columns: Vec<String>,
+    joints: Vec<String>,
+    logs: Vec<String>,
+    equations: Vec<JointRows>,
+    fallback: Vec<f64>,
+    prior: Option<Prior>,
+}
+
+impl LinearProblem {
+    /// A problem without data: names of the columns (parameters) and of the joints.
+    pub fn new(columns: Vec<String>, joints: Vec<String>) -> Self {
+        let fallback = vec![0.0; columns.len()];
+        Self { columns, joints, logs: Vec::new(), equations: Vec::new(), fallback, prior: None }
+    }
+
+    /// Adds the rows of joint number `joint` in the log called `log`; `columns` gives for every column of the factor its number in
+    /// the problem. Rows of several joints of one log are added under the same name.
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] for a joint out of range or a list of another length than the factor's columns;
+    /// [`EstimationError::Column`] for a column out of range or given twice.
+    pub fn add(
+        &mut self,
+        log: &str,
+        joint: usize,
+        columns: Vec<usize>,
+        factor: SegmentedFactor,
+    ) -> Result<(), EstimationError> {
+        if joint >= self.joints.len() {
+            let what = format!("log {log}: a joint number below the number of joints");
+            return Err(EstimationError::Mismatch { what, expected: self.joints.len(), found: joint });
+        }
+        if columns.len() != factor.columns() {
+            let what = format!("log {log}, joint {}: column numbers for the factor's columns", self.joints[joint]);
+            return Err(EstimationError::Mismatch { what, expected: factor.columns(), found: columns.len() });
+        }
+        let mut seen = vec![false; self.columns.len()];
+        for &column in &columns {
+            if column >= seen.len() || std::mem::replace(&mut seen[column], true) {
+                return Err(EstimationError::Column {
+                    log: log.into(),
+                    joint: self.joints[joint].clone(),
+                    column,
+                    columns: self.columns.len(),
+                });
+            }
+        }
+        let log = self.logs.iter().position(|name| name == log).unwrap_or_else(|| {
+            self.logs.push(log.into());
+            self.logs.len() - 1
+        });
+        self.equations.push(JointRows { log, joint, columns, factor });
+        Ok(())
+    }
+
+    /// Values at which columns are fixed that the data do not excite (zero unless said otherwise): the prior model's, say.
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] for another number of values than columns, [`EstimationError::Setting`] for one that is not finite.
+    pub fn with_fallback(mut self, values: Vec<f64>) -> Result<Self, EstimationError> {
+        expect("fallback values", self.columns.len(), values.len())?;
+        finite("fallback value", &values)?;
+        self.fallback = values;
+        Ok(self)
+    }
+
+    /// Adds a Gaussian prior with mean `mean` (one value per column) and square-root information `sqrt_information`, shape
+    /// (any, columns): rows `[S | S m]` with unit noise. A diagonal S holds 1/std of each parameter.
+    ///
+    /// # Errors
+    /// As [`with_fallback`](Self::with_fallback).
+    pub fn with_prior(mut self, mean: Vec<f64>, sqrt_information: DMatrix<f64>) -> Result<Self, EstimationError> {
+        expect("prior mean", self.columns.len(), mean.len())?;
+        expect("columns of the prior's square-root information", self.columns.len(), sqrt_information.ncols())?;
+        finite("prior mean", &mean)?;
+        finite("prior square-root information", sqrt_information.as_slice())?;
+        self.prior = Some(Prior { mean, sqrt_information });
+        Ok(self)
+    }
+
+    /// Names of the columns.
+    pub fn columns(&self) -> &[String] {
+        &self.columns
+    }
+
+    /// Names of the joints.
+    pub fn joints(&self) -> &[String] {
+        &self.joints
+    }
+
+    /// Names of the logs, in the order of their first rows.
+    pub fn logs(&self) -> &[String] {
+        &self.logs
+    }
+
+    /// The rows, one entry per joint and log.
+    pub fn equations(&self) -> &[JointRows] {
+        &self.equations
+    }
+
+    /// Values for columns that the data do not excite.
+    pub fn fallback(&self) -> &[f64] {
+        &self.fallback
+    }
+
+    /// The prior, if there is one.
+    pub fn prior(&self) -> Option<&Prior> {
+        self.prior.as_ref()
+    }
+
+    /// Rows of every joint over all logs, N_j.
+    pub fn joint_rows(&self) -> Vec<usize> {
+        let mut rows = vec![0; self.joints.len()];
+        for equation in &self.equations {
+            rows[equation.joint] += equation.factor.rows();
+        }
+        rows
+    }
+
+    /// The norm of every column over all rows of all joints.
+    pub fn column_norms(&self) -> Vec<f64> {
+        let mut squares = vec![0.0; self.columns.len()];
+        for equation in &self.equations {
+            for (norm, &column) in equation.factor.total().column_norms().iter().zip(&equation.columns) {
+                squares[column] += norm * norm;
+            }
+        }
+        squares.into_iter().map(f64::sqrt).collect()
+    }
+
+    /// One factor of all rows over all columns, those of joint j multiplied by `weights[j]` (1/σ_j for weighted least squares),
+    /// and the rows of the prior if there is one (with weight 1).
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] unless there is one weight per joint; [`EstimationError::Setting`] for one that is negative,
+    /// NaN or infinite.
+    pub fn combined(&self, weights: &[f64]) -> Result<TriangularFactor, EstimationError> {
+        self.stacked().combined(weights)
+    }
+
+    /// The totals of all equations, ready to be weighted again and again.
+    pub(crate) fn stacked(&self) -> StackedProblem<'_> {
+        StackedProblem { problem: self, totals: self.equations.iter().map(|e| e.factor.total()).collect() }
+    }
+}
+
+/// A problem with the total factor of every equation at hand.
+pub(crate) struct StackedProblem<'a> {
+    pub(crate) problem: &'a LinearProblem,
+    /// One per equation.
+    pub(crate) totals: Vec<TriangularFactor>,
+}
+
+impl StackedProblem<'_> {
+    pub(crate) fn combined(&self, weights: &[f64]) -> Result<TriangularFactor, EstimationError> {
+        let problem = self.problem;
+        expect("weights of joints", problem.joints.len(), weights.len())?;
+        let columns = problem.columns.len();
+        let mut workspace = FactorWorkspace::default();
+        let mut combined = TriangularFactor::new(columns);
+        for (equation, total) in problem.equations.iter().zip(&self.totals) {
+            let total = total.scaled(weights[equation.joint])?;
+            let mut place = vec![None; columns + 1];
+            for (local, &column) in equation.columns.iter().enumerate() {
+                place[column] = Some(local);
+            }
+            place[columns] = Some(total.columns());
+            combined.absorb_entries(&mut workspace, total.columns() + 1, |row, column| {
+                place[column].map_or(0.0, |local| total.entry(row, local))
+            });
+            combined.count(total.rows());
+        }
+        if let Some(prior) = &problem.prior {
+            let s = &prior.sqrt_information;
+            let rotated = s * DVector::from_column_slice(&prior.mean);
+            combined.absorb_entries(&mut workspace, s.nrows(), |row, column| {
+                if column == columns { rotated[row] } else { s[(row, column)] }
+            });
+        }
+        Ok(combined)
+    }
+
+    /// Residual sum of squares and `‖τ‖²` of every joint over all logs, without weights or prior.
+    pub(crate) fn joint_squares(&self, theta: &[f64]) -> Result<(Vec<f64>, Vec<f64>), EstimationError> {
+        let joints = self.problem.joints.len();
+        let (mut residual, mut torque) = (vec![0.0; joints], vec![0.0; joints]);
+        for (equation, total) in self.problem.equations.iter().zip(&self.totals) {
+            residual[equation.joint] += total.residual_sum_of_squares(&equation.local(theta))?;
+            torque[equation.joint] += total.torque_norm().powi(2);
+        }
+        Ok((residual, torque))
+    }
+}
+
+impl JointRows {
+    /// The part of a parameter vector that these rows see.
+    pub(crate) fn local(&self, theta: &[f64]) -> Vec<f64> {
+        self.columns.iter().map(|&column| theta[column]).collect()
+    }
+}
+
+impl Prior {
+    /// The mean, one value per column.
+    pub fn mean(&self) -> &[f64] {
+        &self.mean
+    }
+
+    /// S, shape (any, columns).
+    pub fn sqrt_information(&self) -> &DMatrix<f64> {
+        &self.sqrt_information
+    }
+}
+
+fn finite(setting: &'static str, values: &[f64]) -> Result<(), EstimationError> {
+    match values.iter().find(|value| !value.is_finite()) {
+        Some(&value) => Err(EstimationError::Setting { setting, value, mend: "give finite numbers" }),
+        None => Ok(()),
+    }
+}

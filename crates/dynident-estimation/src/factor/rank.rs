@@ -1,0 +1,201 @@
+//! Which columns the data excite, decided on scaled columns with a stated tolerance; and the solution on those.
+
+use super::triangular::{FactorWorkspace, TriangularFactor};
+use crate::error::EstimationError;
+use dynident_dynamics::independent_columns;
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// When a column counts as excited.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RankSettings {
+    /// A column is dependent when the part of it that no earlier column explains is at most this share of its norm. Default 1e-8:
+    /// far above rounding (1e-13 or so after scaling) and far below what any real motion that excites a parameter leaves.
+    pub tolerance: f64,
+    /// A column whose norm is at most this share of the largest column norm is taken for zero. Default 1e-12: only rounding
+    /// noise is that small, units of different parameters never differ so much.
+    pub negligible_column: f64,
+}
+
+impl Default for RankSettings {
+    fn default() -> Self {
+        Self { tolerance: 1.0e-8, negligible_column: 1.0e-12 }
+    }
+}
+
+impl RankSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`EstimationError::Setting`] unless both shares are at least 1e-14 (rounding) and below 1.
+    pub fn validate(&self) -> Result<(), EstimationError> {
+        for (setting, value) in [("rank.tolerance", self.tolerance), ("rank.negligible_column", self.negligible_column)]
+        {
+            if !(1.0e-14..1.0).contains(&value) {
+                return Err(EstimationError::Setting { setting, value, mend: "give a share from 1e-14 to below 1" });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A column that the data do not tell apart from earlier ones.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FixedColumn {
+    /// Its number.
+    pub column: usize,
+    /// Its name.
+    pub name: String,
+    /// The value at which it was fixed.
+    pub value: f64,
+}
+
+/// What was decided about the rank, and on which numbers.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RankReport {
+    /// Columns estimated.
+    pub rank: usize,
+    /// All columns.
+    pub columns: usize,
+    /// Columns that are not excited by these data, and the values at which they were fixed.
+    pub fixed: Vec<FixedColumn>,
+    /// Singular values of all columns after each was divided by its norm (a negligible column by the largest norm), descending.
+    pub singular_values: Vec<f64>,
+    /// How many of them exceed `tolerance` times the largest: a cross-check of `rank` by another criterion.
+    pub numerical_rank: usize,
+    /// The settings' tolerance.
+    pub tolerance: f64,
+    /// The smallest share of a column that was still called independent.
+    pub weakest_independent: f64,
+    /// The largest share of a column that was called dependent (0 when none was).
+    pub strongest_dependent: f64,
+    /// Largest over smallest singular value of the estimated columns as they are; depends on units.
+    pub condition_number_raw: f64,
+    /// The same after each column was divided by its norm.
+    pub condition_number_scaled: f64,
+}
+
+/// Which columns are estimated; the rest stay at their fallback values.
+#[derive(Clone, Debug)]
+pub(crate) struct Split {
+    pub(crate) free: Vec<usize>,
+    fixed: Vec<usize>,
+    weakest_independent: f64,
+    strongest_dependent: f64,
+}
+
+/// The least-squares solution on the free columns.
+#[derive(Clone, Debug)]
+pub(crate) struct Solution {
+    /// One value per column, fixed ones included.
+    pub(crate) values: Vec<f64>,
+    /// `R⁻¹` of the free columns: the inverse information is `R⁻¹ R⁻ᵀ`. Upper triangular, (free, free).
+    pub(crate) inverse: DMatrix<f64>,
+}
+
+/// Column norms with negligible ones replaced by the largest, so that dividing by them leaves those negligible.
+fn scales(triangle: &TriangularFactor, settings: &RankSettings) -> Vec<f64> {
+    let norms = triangle.column_norms();
+    let largest = norms.iter().copied().fold(0.0, f64::max);
+    let floor = settings.negligible_column * largest;
+    let replacement = if largest > 0.0 { largest } else { 1.0 };
+    norms.into_iter().map(|norm| if norm > floor { norm } else { replacement }).collect()
+}
+
+fn scaled_triangle(triangle: &TriangularFactor, scales: &[f64]) -> DMatrix<f64> {
+    DMatrix::from_fn(scales.len(), scales.len(), |row, column| triangle.entry(row, column) / scales[column])
+}
+
+/// Decides which columns of the stacked rows are excited.
+pub(crate) fn split(triangle: &TriangularFactor, settings: &RankSettings) -> Split {
+    let scales = scales(triangle, settings);
+    let found = independent_columns(&scaled_triangle(triangle, &scales), settings.tolerance);
+    Split {
+        free: found.independent,
+        fixed: found.dependent,
+        weakest_independent: found.weakest_independent,
+        strongest_dependent: found.strongest_dependent,
+    }
+}
+
+/// Solves for the free columns with the others at `fallback`: `min ‖r − R_fixed θ_fixed − R_free θ_free‖`.
+pub(crate) fn solve(triangle: &TriangularFactor, split: &Split, settings: &RankSettings, fallback: &[f64]) -> Solution {
+    let size = triangle.columns();
+    let free = split.free.len();
+    let scales = scales(triangle, settings);
+    let mut known = vec![0.0; size];
+    for &column in &split.fixed {
+        known[column] = fallback[column];
+    }
+    let torque = triangle.residual(&known);
+    // Triangular again after columns were left out; nothing changes when none was.
+    let mut reduced = TriangularFactor::new(free);
+    reduced.absorb_entries(&mut FactorWorkspace::default(), size, |row, column| {
+        if column == free {
+            torque[row]
+        } else {
+            let column = split.free[column];
+            triangle.entry(row, column) / scales[column]
+        }
+    });
+    let mut inverse = DMatrix::zeros(free, free);
+    for column in 0..free {
+        inverse[(column, column)] = 1.0 / reduced.entry(column, column);
+        for row in (0..column).rev() {
+            let sum: f64 = (row + 1..=column).map(|k| reduced.entry(row, k) * inverse[(k, column)]).sum();
+            inverse[(row, column)] = -sum / reduced.entry(row, row);
+        }
+    }
+    let mut solution = vec![0.0; free];
+    for row in (0..free).rev() {
+        let sum: f64 = (row + 1..free).map(|k| reduced.entry(row, k) * solution[k]).sum();
+        solution[row] = (reduced.entry(row, free) - sum) / reduced.entry(row, row);
+    }
+    let mut values = known;
+    for (k, &column) in split.free.iter().enumerate() {
+        values[column] = solution[k] / scales[column];
+        inverse.row_mut(k).scale_mut(1.0 / scales[column]);
+    }
+    Solution { values, inverse }
+}
+
+/// Singular values and conditions of the stacked rows beside the decision taken.
+pub(crate) fn report(
+    triangle: &TriangularFactor,
+    split: &Split,
+    settings: &RankSettings,
+    names: &[String],
+    fallback: &[f64],
+) -> RankReport {
+    let scales = scales(triangle, settings);
+    let scaled = scaled_triangle(triangle, &scales);
+    let mut singular_values: Vec<f64> = scaled.singular_values().iter().copied().collect();
+    singular_values.sort_by(|a, b| b.total_cmp(a));
+    let largest = singular_values.first().copied().unwrap_or(0.0);
+    RankReport {
+        rank: split.free.len(),
+        columns: names.len(),
+        fixed: split
+            .fixed
+            .iter()
+            .map(|&column| FixedColumn { column, name: names[column].clone(), value: fallback[column] })
+            .collect(),
+        numerical_rank: singular_values.iter().filter(|&&value| value > settings.tolerance * largest).count(),
+        singular_values,
+        tolerance: settings.tolerance,
+        weakest_independent: split.weakest_independent,
+        strongest_dependent: split.strongest_dependent,
+        condition_number_raw: condition(&triangle.regressor_triangle().select_columns(&split.free)),
+        condition_number_scaled: condition(&scaled.select_columns(&split.free)),
+    }
+}
+
+/// Largest over smallest singular value; 1 for no columns.
+fn condition(matrix: &DMatrix<f64>) -> f64 {
+    if matrix.ncols() == 0 {
+        return 1.0;
+    }
+    let values = matrix.singular_values();
+    values.max() / values.min()
+}

@@ -1,0 +1,378 @@
+//! A factor that remembers when: the rows of one joint in one log as at most K factors of consecutive time segments.
+
+use super::triangular::{FactorWorkspace, TriangularFactor, check_columns, check_panel};
+use crate::error::{EstimationError, expect};
+use core::ops::Range;
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+/// How a log is cut into segments.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SegmentSettings {
+    /// Segments kept at most; memory is bounded by this many factors. Default 64: enough for a covariance from segments, and
+    /// segments of any log worth fitting then last longer than its residuals are correlated.
+    pub max_segments: usize,
+    /// Rows of a segment at first; doubled whenever the log outgrows `max_segments`. Default 16. A multiple of
+    /// [`BLOCK_ROWS`](crate::BLOCK_ROWS) is faster for logs known to be long.
+    pub first_length_rows: usize,
+}
+
+impl Default for SegmentSettings {
+    fn default() -> Self {
+        Self { max_segments: 64, first_length_rows: 16 }
+    }
+}
+
+impl SegmentSettings {
+    /// The default number of segments, with a first length that a log of `rows` rows never outgrows: no merging, the fastest.
+    pub fn for_rows(rows: usize) -> Self {
+        let settings = Self::default();
+        let mut first_length_rows = settings.first_length_rows;
+        while first_length_rows.saturating_mul(settings.max_segments) < rows {
+            first_length_rows *= 2;
+        }
+        Self { first_length_rows, ..settings }
+    }
+
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`EstimationError::Setting`] for fewer than two segments or a length of zero.
+    pub fn validate(&self) -> Result<(), EstimationError> {
+        if self.max_segments < 2 {
+            let value = self.max_segments as f64;
+            return Err(EstimationError::Setting { setting: "max_segments", value, mend: "give at least 2" });
+        }
+        if self.first_length_rows == 0 {
+            return Err(EstimationError::Setting { setting: "first_length_rows", value: 0.0, mend: "give at least 1" });
+        }
+        Ok(())
+    }
+}
+
+/// Rows that a segment keeps as they are: they wait for neighbours, since one large block is reduced faster than small ones
+/// and their triangles. Six times the memory of the factor.
+const fn most_rows(columns: usize) -> usize {
+    3 * (columns + 1)
+}
+
+/// One segment: its rows while they are few, then their factor.
+#[derive(Clone, Debug, PartialEq)]
+enum Segment {
+    /// Row by row, columns + 1 numbers each.
+    Rows(Vec<f64>),
+    Factor(TriangularFactor),
+}
+
+/// A [`TriangularFactor`] kept as consecutive time segments of equal length (the last may be shorter).
+///
+/// When the log outgrows the allowed number of segments, neighbours are merged and the length doubles: memory stays bounded for a
+/// log of any length, and all that resampling of a time series needs (segments as clusters, jackknife, block bootstrap, leaving
+/// segments out) comes from these factors, without a second pass over the data. The result depends only on the rows and the
+/// settings, by rounding on how they are cut into calls.
+///
+/// ```
+/// use dynident_estimation::{SegmentSettings, SegmentedFactor};
+/// let settings = SegmentSettings { max_segments: 4, first_length_rows: 2 };
+/// let mut log = SegmentedFactor::new(1, settings)?;
+/// for k in 0..20 {
+///     log.absorb(&[1.0, f64::from(k)], 1)?; // one row: w = 1, τ = k
+/// }
+/// assert_eq!(log.segment_rows(), [8, 8, 4]);
+/// assert_eq!(log.total().rows(), 20);
+/// # Ok::<(), dynident_estimation::EstimationError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct SegmentedFactor {
+    columns: usize,
+    max_segments: usize,
+    length_rows: usize,
+    rows: usize,
+    segments: Vec<Segment>,
+    workspace: FactorWorkspace,
+}
+
+/// What one segment says about a parameter vector.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SegmentScore {
+    /// Rows in the segment.
+    pub rows: usize,
+    /// `Wᵀ(τ − Wθ)` over the segment's rows.
+    pub score: DVector<f64>,
+}
+
+impl SegmentedFactor {
+    /// No rows yet, for `columns` regressor columns and the torque.
+    ///
+    /// # Errors
+    /// As [`SegmentSettings::validate`].
+    pub fn new(columns: usize, settings: SegmentSettings) -> Result<Self, EstimationError> {
+        settings.validate()?;
+        Ok(Self {
+            columns,
+            max_segments: settings.max_segments,
+            length_rows: settings.first_length_rows,
+            rows: 0,
+            segments: Vec::new(),
+            workspace: FactorWorkspace::default(),
+        })
+    }
+
+    /// Regressor columns (without the torque).
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// Rows absorbed so far.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Rows in every segment, in order of time.
+    pub fn segment_rows(&self) -> Vec<usize> {
+        self.segments.iter().map(|segment| segment.rows(self.columns)).collect()
+    }
+
+    /// Absorbs the next `rows` rows of the log, column by column as in [`TriangularFactor::absorb`]; their order is time.
+    ///
+    /// # Errors
+    /// As [`TriangularFactor::absorb`]; nothing is absorbed then.
+    pub fn absorb(&mut self, panel: &[f64], rows: usize) -> Result<(), EstimationError> {
+        check_panel(self.columns, panel, rows)?;
+        let mut start = 0;
+        while start < rows {
+            let room = self.length_rows - self.segments.last().map_or(self.length_rows, |last| last.rows(self.columns));
+            if room == 0 {
+                if self.segments.len() == self.max_segments {
+                    self.halve();
+                } else {
+                    self.segments.push(Segment::Rows(Vec::new()));
+                }
+                continue;
+            }
+            let end = rows.min(start + room);
+            if let Some(last) = self.segments.last_mut() {
+                last.absorb(self.columns, &mut self.workspace, panel, rows, start..end);
+            }
+            start = end;
+        }
+        self.rows += rows;
+        Ok(())
+    }
+
+    /// Merges neighbours and doubles the length.
+    fn halve(&mut self) {
+        let mut merged = Vec::with_capacity(self.max_segments);
+        let mut old = std::mem::take(&mut self.segments).into_iter();
+        while let Some(mut first) = old.next() {
+            if let Some(second) = old.next() {
+                first.append(self.columns, &mut self.workspace, &second);
+            }
+            merged.push(first);
+        }
+        self.segments = merged;
+        self.length_rows *= 2;
+    }
+
+    /// The same rows and segments with only the given columns, in the order given: a smaller model from the factors of a larger one, without a second pass over the log.
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] for a column out of range.
+    pub fn selected(&self, columns: &[usize]) -> Result<Self, EstimationError> {
+        check_columns(columns, self.columns)?;
+        let segment = |segment: &Segment| match segment {
+            Segment::Factor(factor) => factor.selected(columns).map(Segment::Factor),
+            Segment::Rows(values) => {
+                let rows = values.chunks_exact(self.columns + 1);
+                let places = || columns.iter().copied().chain([self.columns]);
+                Ok(Segment::Rows(rows.flat_map(|row| places().map(|place| row[place])).collect()))
+            }
+        };
+        let segments = self.segments.iter().map(segment).collect::<Result<_, _>>()?;
+        Ok(Self { columns: columns.len(), segments, workspace: FactorWorkspace::default(), ..*self })
+    }
+
+    /// The factor of every segment, in order of time.
+    pub fn segment_factors(&self) -> Vec<TriangularFactor> {
+        let mut workspace = FactorWorkspace::default();
+        self.segments.iter().map(|segment| segment.factor(self.columns, &mut workspace)).collect()
+    }
+
+    /// The factor of all rows.
+    pub fn total(&self) -> TriangularFactor {
+        let mut workspace = FactorWorkspace::default();
+        let mut total = Segment::Rows(Vec::new());
+        for segment in &self.segments {
+            total.append(self.columns, &mut workspace, segment);
+        }
+        total.factor(self.columns, &mut workspace)
+    }
+
+    /// The rows `[W | τ] C` in the same segments: other columns, and another torque, made of these. C has shape (columns + 1, new columns + 1), its last column makes the torque. A load whose
+    /// columns are sums of others, a torque less a known part, or a unit of one joint need no second pass over the log.
+    ///
+    /// ```
+    /// use dynident_estimation::{SegmentSettings, SegmentedFactor};
+    /// use nalgebra::DMatrix;
+    /// let mut log = SegmentedFactor::new(1, SegmentSettings::default())?;
+    /// log.absorb(&[1.0, 2.0, 5.0, 9.0], 2)?; // w = 1, 2 and τ = 5, 9
+    /// // One column 2 w; torque τ - w = 4, 7.
+    /// let other = log.mapped(&DMatrix::from_row_slice(2, 2, &[2.0, -1.0, 0.0, 1.0]))?;
+    /// assert!((other.total().residual_sum_of_squares(&[1.5])? - 2.0).abs() < 1e-12);
+    /// # Ok::<(), dynident_estimation::EstimationError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] unless C has one row for each column and one for the torque, and at least one column; [`EstimationError::Setting`] for an entry that is not finite.
+    pub fn mapped(&self, map: &DMatrix<f64>) -> Result<Self, EstimationError> {
+        expect("rows of a map of columns", self.columns + 1, map.nrows())?;
+        if map.ncols() == 0 {
+            return Err(EstimationError::Mismatch {
+                what: "columns of a map of columns".into(),
+                expected: 1,
+                found: 0,
+            });
+        }
+        if let Some(&value) = map.iter().find(|value| !value.is_finite()) {
+            return Err(EstimationError::Setting { setting: "map of columns", value, mend: "give finite numbers" });
+        }
+        Ok(self.transformed(core::slice::from_ref(map)))
+    }
+
+    /// The same rows as one segment: all that values need, and little work for those who solve again and again.
+    #[must_use]
+    pub fn as_one_segment(&self) -> Self {
+        let segments = vec![Segment::Factor(self.total())];
+        Self { segments, length_rows: self.rows.max(1), workspace: FactorWorkspace::default(), ..*self }
+    }
+
+    /// The same columns and segments without their rows, for another pass over the same log.
+    pub(crate) fn emptied(&self) -> Self {
+        Self { rows: 0, segments: Vec::new(), workspace: FactorWorkspace::default(), ..*self }
+    }
+
+    /// The factor of other rows made of these: for every matrix C of `blocks`, shape (columns + 1, new columns + 1), the rows `[W | τ] C`, all blocks
+    /// stacked. Segments stay what they were in time; their numbers of rows are multiplied by the number of blocks.
+    pub(crate) fn transformed(&self, blocks: &[DMatrix<f64>]) -> Self {
+        let size = self.columns + 1;
+        let columns = blocks.first().map_or(0, |block| block.ncols().saturating_sub(1));
+        let mut workspace = FactorWorkspace::default();
+        let segments = self.segments.iter().map(|segment| {
+            let old = segment.factor(self.columns, &mut workspace);
+            let triangle = DMatrix::from_fn(size, size, |row, column| old.entry(row, column));
+            let mut new = TriangularFactor::new(columns);
+            for block in blocks {
+                let rows = &triangle * block;
+                new.absorb_entries(&mut workspace, size, |row, column| rows[(row, column)]);
+            }
+            new.count(old.rows() * blocks.len());
+            Segment::Factor(new)
+        });
+        let segments = segments.collect();
+        Self {
+            columns,
+            max_segments: self.max_segments,
+            length_rows: self.length_rows * blocks.len().max(1),
+            rows: self.rows * blocks.len(),
+            segments,
+            workspace: FactorWorkspace::default(),
+        }
+    }
+
+    /// `Wᵀ(τ − Wθ)` of every segment, in order of time: the sums that a covariance with correlated errors is made of.
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] when `theta` does not have one value per column.
+    pub fn scores(&self, theta: &[f64]) -> Result<Vec<SegmentScore>, EstimationError> {
+        if theta.len() != self.columns {
+            let what = "parameters for a factor's columns".into();
+            return Err(EstimationError::Mismatch { what, expected: self.columns, found: theta.len() });
+        }
+        let score = |segment: &Segment| match segment {
+            Segment::Factor(factor) => factor.score(theta),
+            Segment::Rows(values) => {
+                let mut score = DVector::zeros(self.columns);
+                for row in values.chunks_exact(self.columns + 1) {
+                    let predicted: f64 = row.iter().zip(theta).map(|(w, t)| w * t).sum();
+                    let residual = row[self.columns] - predicted;
+                    for (sum, w) in score.iter_mut().zip(row) {
+                        *sum += w * residual;
+                    }
+                }
+                score
+            }
+        };
+        Ok(self.segments.iter().map(|s| SegmentScore { rows: s.rows(self.columns), score: score(s) }).collect())
+    }
+}
+
+impl Segment {
+    fn rows(&self, columns: usize) -> usize {
+        match self {
+            Self::Rows(values) => values.len() / (columns + 1),
+            Self::Factor(factor) => factor.rows(),
+        }
+    }
+
+    fn absorb(
+        &mut self,
+        columns: usize,
+        workspace: &mut FactorWorkspace,
+        panel: &[f64],
+        stride: usize,
+        range: Range<usize>,
+    ) {
+        if self.rows(columns) + range.len() > most_rows(columns) {
+            self.condense(columns, workspace);
+        }
+        match self {
+            Self::Factor(factor) => factor.absorb_range(workspace, panel, stride, range),
+            Self::Rows(values) => {
+                let (size, start) = (columns + 1, values.len());
+                values.resize(start + range.len() * size, 0.0);
+                for (c, column) in panel.chunks_exact(stride).enumerate() {
+                    for (value, place) in column[range.clone()].iter().zip(values[start + c..].iter_mut().step_by(size))
+                    {
+                        *place = *value;
+                    }
+                }
+            }
+        }
+    }
+
+    fn append(&mut self, columns: usize, workspace: &mut FactorWorkspace, next: &Self) {
+        if let (Self::Rows(values), Self::Rows(more)) = (&mut *self, next) {
+            values.extend_from_slice(more);
+            if self.rows(columns) > most_rows(columns) {
+                self.condense(columns, workspace);
+            }
+            return;
+        }
+        self.condense(columns, workspace);
+        if let Self::Factor(factor) = self {
+            match next {
+                Self::Rows(more) => factor.absorb_row_by_row(workspace, more),
+                Self::Factor(other) => factor.absorb_factor(workspace, other),
+            }
+        }
+    }
+
+    /// From rows to their factor.
+    fn condense(&mut self, columns: usize, workspace: &mut FactorWorkspace) {
+        if let Self::Rows(_) = self {
+            *self = Self::Factor(self.factor(columns, workspace));
+        }
+    }
+
+    fn factor(&self, columns: usize, workspace: &mut FactorWorkspace) -> TriangularFactor {
+        match self {
+            Self::Factor(factor) => factor.clone(),
+            Self::Rows(values) => {
+                let mut factor = TriangularFactor::new(columns);
+                factor.absorb_row_by_row(workspace, values);
+                factor
+            }
+        }
+    }
+}

@@ -1,0 +1,381 @@
+//! The triangular factor of a stack of rows `[W | τ]`: all that linear estimation needs to remember of them.
+
+use super::reflect::{CHUNK_ROWS, Chunk, TriangleOnPanel, row_start};
+use crate::error::EstimationError;
+use dynident_lanes::{Level, dispatch};
+use nalgebra::{DMatrix, DVector};
+
+/// Rows absorbed at once. A block of 256 rows and 44 columns (a seven-joint arm) is 90 kB, which a second-level cache holds while the
+/// few columns at work are in the first; measured 15 % faster than 128 rows, because reflectors are made half as often.
+pub const BLOCK_ROWS: usize = 256;
+
+/// The largest magnitude that can be squared and summed without overflow.
+const LARGEST: f64 = 1.0e140;
+
+/// The upper triangular R of `[W | τ] = Q·R` (a square-root information array): `RᵀR = [W | τ]ᵀ[W | τ]`.
+///
+/// ```text
+///     R = [ R_W  r ]    R_Wᵀ R_W = WᵀW,  R_Wᵀ r = Wᵀτ,
+///         [  0   ρ ]    ‖τ − Wθ‖² = ‖r − R_W θ‖² + ρ²  for every θ
+/// ```
+///
+/// Rows come in blocks and are forgotten; factors of blocks, logs and machines [`merge`](Self::merge). The diagonal is never
+/// negative, so the factor of given rows is unique (up to rounding) where their columns are independent. With fewer rows than
+/// columns, or dependent columns, the identities above still hold and nothing becomes NaN; rank decisions are made later, with
+/// scaled columns and a stated tolerance (`rank.rs`), never from this diagonal.
+///
+/// Golub and Van Loan, Matrix Computations, 4th ed., 5.2 and 6.5; Bierman, Factorization Methods for Discrete Sequential
+/// Estimation (1977), ch. IV and V.
+///
+/// ```
+/// use dynident_estimation::TriangularFactor;
+/// // τ = 2 w on three rows, then an error of 3 in a fourth row where w = 0.
+/// let mut factor = TriangularFactor::new(1);
+/// factor.absorb(&[1.0, 2.0, 2.0, 2.0, 4.0, 4.0], 3)?; // column w, then column τ
+/// factor.absorb(&[0.0, 3.0], 1)?;
+/// assert_eq!(factor.rows(), 4);
+/// assert!((factor.residual_sum_of_squares(&[2.0])? - 9.0).abs() < 1e-12);
+/// # Ok::<(), dynident_estimation::EstimationError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct TriangularFactor {
+    columns: usize,
+    rows: usize,
+    /// Packed by rows, size columns + 1.
+    triangle: Vec<f64>,
+}
+
+/// Memory for a block of rows; keep one per thread and hand it to [`TriangularFactor::absorb_with`].
+#[derive(Clone, Debug)]
+pub struct FactorWorkspace {
+    level: Level,
+    panel: Vec<Chunk>,
+}
+
+impl Default for FactorWorkspace {
+    fn default() -> Self {
+        Self::new(Level::detect())
+    }
+}
+
+impl FactorWorkspace {
+    /// A workspace whose work runs at the given processor level; [`Default`] takes the best one.
+    pub fn new(level: Level) -> Self {
+        Self { level, panel: Vec::new() }
+    }
+
+    /// Room for a block; what it holds is left over from earlier work.
+    fn block(&mut self, rows: usize, columns: usize) -> &mut [Chunk] {
+        let length = rows.div_ceil(CHUNK_ROWS) * columns;
+        if self.panel.len() < length {
+            self.panel.resize(length, Chunk::ZERO);
+        }
+        &mut self.panel[..length]
+    }
+}
+
+impl TriangularFactor {
+    /// The factor of no rows, for `columns` regressor columns and the torque.
+    pub fn new(columns: usize) -> Self {
+        Self { columns, rows: 0, triangle: vec![0.0; row_start(columns + 1, columns + 1)] }
+    }
+
+    /// The factor of given rows: `panel` column by column (all rows of column 0 first; torque last).
+    ///
+    /// # Errors
+    /// As [`absorb`](Self::absorb).
+    pub fn from_rows(columns: usize, panel: &[f64], rows: usize) -> Result<Self, EstimationError> {
+        let mut factor = Self::new(columns);
+        factor.absorb(panel, rows)?;
+        Ok(factor)
+    }
+
+    /// Regressor columns (without the torque).
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// Rows absorbed so far, N.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Entry (`row`, `column`) of R; column [`columns()`](Self::columns) is the torque's. Zero below the diagonal.
+    ///
+    /// # Panics
+    /// If either number is above [`columns()`](Self::columns).
+    pub fn entry(&self, row: usize, column: usize) -> f64 {
+        let size = self.columns + 1;
+        assert!(row < size && column < size, "entry ({row}, {column}) of a factor of size {size}");
+        if column < row { 0.0 } else { self.triangle[row_start(size, row) + column - row] }
+    }
+
+    /// Absorbs `rows` rows of `[W | τ]` given column by column: `panel[c * rows + i]` is column c of row i, torque last.
+    ///
+    /// Takes about 2·rows·(columns + 1)² operations, in blocks of [`BLOCK_ROWS`]. How rows are cut into calls, and their
+    /// order, changes the result by rounding only.
+    ///
+    /// # Errors
+    /// [`EstimationError::Shape`] when the panel has another length; [`EstimationError::Unusable`] for a NaN, an infinity or a
+    /// magnitude above 1e140. The factor is then unchanged.
+    pub fn absorb(&mut self, panel: &[f64], rows: usize) -> Result<(), EstimationError> {
+        self.absorb_with(&mut FactorWorkspace::default(), panel, rows)
+    }
+
+    /// [`absorb`](Self::absorb) without allocation once the workspace has its size.
+    ///
+    /// # Errors
+    /// As [`absorb`](Self::absorb).
+    pub fn absorb_with(
+        &mut self,
+        workspace: &mut FactorWorkspace,
+        panel: &[f64],
+        rows: usize,
+    ) -> Result<(), EstimationError> {
+        check_panel(self.columns, panel, rows)?;
+        self.absorb_range(workspace, panel, rows, 0..rows);
+        Ok(())
+    }
+
+    /// Absorbs some of a panel's rows; the panel has passed [`check_panel`].
+    pub(crate) fn absorb_range(
+        &mut self,
+        workspace: &mut FactorWorkspace,
+        panel: &[f64],
+        stride: usize,
+        range: core::ops::Range<usize>,
+    ) {
+        let mut start = range.start;
+        while start < range.end {
+            let end = (start + BLOCK_ROWS).min(range.end);
+            let block = workspace.block(end - start, self.columns + 1);
+            for (column, out) in
+                panel.chunks_exact(stride).zip(block.chunks_exact_mut((end - start).div_ceil(CHUNK_ROWS)))
+            {
+                let (whole, rest) = column[start..end].as_chunks::<CHUNK_ROWS>();
+                for (values, chunk) in whole.iter().zip(&mut *out) {
+                    chunk.0 = *values;
+                }
+                if let Some(chunk) = out.get_mut(whole.len()) {
+                    chunk.0 = [0.0; CHUNK_ROWS];
+                    chunk.0[..rest.len()].copy_from_slice(rest);
+                }
+            }
+            self.reflect(workspace, end - start);
+            start = end;
+        }
+        self.rows += range.len();
+    }
+
+    /// Absorbs one block given by its entries, (row, column) to value. The caller counts the rows.
+    pub(crate) fn absorb_entries(
+        &mut self,
+        workspace: &mut FactorWorkspace,
+        rows: usize,
+        entry: impl Fn(usize, usize) -> f64,
+    ) {
+        let chunks = rows.div_ceil(CHUNK_ROWS);
+        let block = workspace.block(rows, self.columns + 1);
+        block.fill(Chunk::ZERO);
+        for column in 0..=self.columns {
+            for row in 0..rows {
+                block[column * chunks + row / CHUNK_ROWS].0[row % CHUNK_ROWS] = entry(row, column);
+            }
+        }
+        self.reflect(workspace, rows);
+    }
+
+    /// Counts rows whose entries were absorbed in another form.
+    pub(crate) fn count(&mut self, rows: usize) {
+        self.rows += rows;
+    }
+
+    fn reflect(&mut self, workspace: &mut FactorWorkspace, rows: usize) {
+        let (size, chunks) = (self.columns + 1, rows.div_ceil(CHUNK_ROWS));
+        if chunks == 0 {
+            return;
+        }
+        let panel = &mut workspace.panel[..size * chunks];
+        dispatch(workspace.level, TriangleOnPanel { triangle: &mut self.triangle, size, panel, chunks });
+    }
+
+    /// Adds what `other` has seen: afterwards this is the factor of both stacks of rows.
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] when the numbers of columns differ.
+    pub fn merge(&mut self, other: &Self) -> Result<(), EstimationError> {
+        self.merge_with(&mut FactorWorkspace::default(), other)
+    }
+
+    /// [`merge`](Self::merge) without allocation once the workspace has its size.
+    ///
+    /// # Errors
+    /// As [`merge`](Self::merge).
+    pub fn merge_with(&mut self, workspace: &mut FactorWorkspace, other: &Self) -> Result<(), EstimationError> {
+        if self.columns != other.columns {
+            return Err(EstimationError::Mismatch {
+                what: "columns of merged factors".into(),
+                expected: self.columns,
+                found: other.columns,
+            });
+        }
+        self.absorb_factor(workspace, other);
+        Ok(())
+    }
+
+    /// [`merge`](Self::merge) of a factor with as many columns.
+    pub(crate) fn absorb_factor(&mut self, workspace: &mut FactorWorkspace, other: &Self) {
+        if self.rows == 0 {
+            self.clone_from(other);
+        } else if other.rows > 0 {
+            self.absorb_entries(workspace, other.filled_rows(), |row, column| other.entry(row, column));
+            self.rows += other.rows;
+        }
+    }
+
+    /// Absorbs rows given one after another, `columns + 1` numbers each.
+    pub(crate) fn absorb_row_by_row(&mut self, workspace: &mut FactorWorkspace, values: &[f64]) {
+        let size = self.columns + 1;
+        let rows = values.len() / size;
+        let chunks = rows.div_ceil(CHUNK_ROWS);
+        let block = workspace.block(rows, size);
+        for (c, rows) in values.chunks(CHUNK_ROWS * size).enumerate() {
+            for column in 0..size {
+                let chunk = &mut block[column * chunks + c];
+                *chunk = Chunk::ZERO;
+                for (place, value) in chunk.0.iter_mut().zip(rows[column..].iter().step_by(size)) {
+                    *place = *value;
+                }
+            }
+        }
+        self.reflect(workspace, rows);
+        self.rows += rows;
+    }
+
+    /// The factor of the same rows multiplied by `weight` (finite, not negative): `weight · R`.
+    ///
+    /// # Errors
+    /// [`EstimationError::Setting`] for a weight that is negative, NaN or infinite.
+    pub fn scaled(&self, weight: f64) -> Result<Self, EstimationError> {
+        if !(weight.is_finite() && weight >= 0.0) {
+            return Err(EstimationError::Setting {
+                setting: "weight",
+                value: weight,
+                mend: "give a finite weight that is not negative",
+            });
+        }
+        let mut scaled = self.clone();
+        for value in &mut scaled.triangle {
+            *value *= weight;
+        }
+        Ok(scaled)
+    }
+
+    /// `‖τ − Wθ‖²` over all rows absorbed.
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] when `theta` does not have one value per column.
+    pub fn residual_sum_of_squares(&self, theta: &[f64]) -> Result<f64, EstimationError> {
+        if theta.len() != self.columns {
+            return Err(EstimationError::Mismatch {
+                what: "parameters for a factor's columns".into(),
+                expected: self.columns,
+                found: theta.len(),
+            });
+        }
+        let rho = self.entry(self.columns, self.columns);
+        Ok(self.residual(theta).norm_squared() + rho * rho)
+    }
+
+    /// `r − R_W θ`.
+    pub(crate) fn residual(&self, theta: &[f64]) -> DVector<f64> {
+        DVector::from_fn(self.columns, |row, _| {
+            let start = row_start(self.columns + 1, row);
+            let entries = &self.triangle[start..start + self.columns - row];
+            let predicted: f64 = entries.iter().zip(&theta[row..]).map(|(a, b)| a * b).sum();
+            self.triangle[start + self.columns - row] - predicted
+        })
+    }
+
+    /// `Wᵀ(τ − Wθ)`, from R alone.
+    pub(crate) fn score(&self, theta: &[f64]) -> DVector<f64> {
+        let residual = self.residual(theta);
+        let mut score = DVector::zeros(self.columns);
+        for row in 0..self.columns {
+            for column in row..self.columns {
+                score[column] += self.entry(row, column) * residual[row];
+            }
+        }
+        score
+    }
+
+    /// The factor of the same rows with only the given columns, in the order given.
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] for a column out of range.
+    pub fn selected(&self, columns: &[usize]) -> Result<Self, EstimationError> {
+        check_columns(columns, self.columns)?;
+        let mut selected = Self::new(columns.len());
+        selected.absorb_entries(&mut FactorWorkspace::default(), self.filled_rows(), |row, column| {
+            self.entry(row, columns.get(column).copied().unwrap_or(self.columns))
+        });
+        selected.rows = self.rows;
+        Ok(selected)
+    }
+
+    /// The norm of every column of W over all rows.
+    pub fn column_norms(&self) -> Vec<f64> {
+        (0..self.columns).map(|c| (0..=c).map(|r| self.entry(r, c).powi(2)).sum::<f64>().sqrt()).collect()
+    }
+
+    /// `‖τ‖` over all rows.
+    pub fn torque_norm(&self) -> f64 {
+        (0..=self.columns).map(|r| self.entry(r, self.columns).powi(2)).sum::<f64>().sqrt()
+    }
+
+    /// `R_W`, (columns, columns).
+    pub fn regressor_triangle(&self) -> DMatrix<f64> {
+        DMatrix::from_fn(self.columns, self.columns, |r, c| self.entry(r, c))
+    }
+
+    /// `r = Qᵀτ` in the rows of `R_W`.
+    pub fn rotated_torque(&self) -> DVector<f64> {
+        DVector::from_fn(self.columns, |r, _| self.entry(r, self.columns))
+    }
+
+    /// Rows of the triangle that can hold something: later ones are still zero when few rows were absorbed.
+    fn filled_rows(&self) -> usize {
+        let size = self.columns + 1;
+        (0..size)
+            .rev()
+            .find(|&r| self.triangle[row_start(size, r)..row_start(size, r + 1)].iter().any(|&x| x != 0.0))
+            .map_or(0, |r| r + 1)
+    }
+}
+
+/// That all column numbers of a selection are below `size`.
+pub(crate) fn check_columns(columns: &[usize], size: usize) -> Result<(), EstimationError> {
+    match columns.iter().find(|&&column| column >= size) {
+        Some(&found) => Err(EstimationError::Mismatch {
+            what: "a selected column below the number of columns".into(),
+            expected: size,
+            found,
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Checks the shape and the numbers of a panel with `columns` + 1 columns of `rows` rows.
+pub(crate) fn check_panel(columns: usize, panel: &[f64], rows: usize) -> Result<(), EstimationError> {
+    let expected = rows.saturating_mul(columns + 1);
+    if panel.len() != expected {
+        return Err(EstimationError::Shape { what: "a panel of rows", expected, found: panel.len() });
+    }
+    // Comparison is false for NaN; the loop without an early exit vectorises.
+    let usable = panel.iter().fold(true, |usable, value| usable & (value.abs() <= LARGEST));
+    if usable {
+        return Ok(());
+    }
+    let place = panel.iter().position(|value| value.is_nan() || value.abs() > LARGEST).unwrap_or(0);
+    Err(EstimationError::Unusable { row: place % rows, column: place / rows, value: panel[place], limit: LARGEST })
+}

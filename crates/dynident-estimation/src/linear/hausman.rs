@@ -1,0 +1,222 @@
+//! Was filtering enough? The augmented Durbin-Wu-Hausman test of least squares against instrumental variables.
+
+use super::instrumental::{InstrumentalEstimate, noisy_columns};
+use super::projection::Projection;
+use super::weighted::noise_of_joints;
+use crate::error::EstimationError;
+use crate::factor::{InstrumentedProblem, RankSettings, solve, split};
+use crate::uncertainty::{CovarianceMethod, Fitted, f_tail, joint_freedom};
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+/// Settings of [`hausman_test`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct HausmanSettings {
+    /// When a column counts as excited.
+    pub rank: RankSettings,
+    /// The covariance behind the test; from time segments by default. `white` is the textbook's test, which coloured residuals make reject far too often.
+    pub covariance: CovarianceMethod,
+    /// Probability of rejecting least squares where it is right. Default 0.01: with that many samples small doubts are easily raised.
+    pub level: f64,
+}
+
+impl Default for HausmanSettings {
+    fn default() -> Self {
+        Self { rank: RankSettings::default(), covariance: CovarianceMethod::default(), level: 0.01 }
+    }
+}
+
+impl HausmanSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`EstimationError::Setting`] for a level outside 1e-6 to 0.5 or rank settings out of range.
+    pub fn validate(&self) -> Result<(), EstimationError> {
+        self.rank.validate()?;
+        if !(1.0e-6..=0.5).contains(&self.level) {
+            let mend = "give a probability from 1e-6 to 0.5";
+            return Err(EstimationError::Setting { setting: "level", value: self.level, mend });
+        }
+        Ok(())
+    }
+}
+
+/// What the test says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HausmanVerdict {
+    /// Noise in the regressor does not show: filtering was enough, least squares may be used.
+    FilteringWasEnough,
+    /// Noise in the regressor (or feedback) biases least squares: it is rejected, use the instrumental estimate.
+    RejectLeastSquares,
+    /// Too few time segments for so many columns, or instruments that explain everything: nothing can be said.
+    Undecided,
+}
+
+/// The test with its numbers.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HausmanTest {
+    /// What follows.
+    pub verdict: HausmanVerdict,
+    /// The statistic; none when undecided.
+    pub f: Option<f64>,
+    /// Degrees of freedom: tested columns; time segments (or rows, with white residuals) less those.
+    pub degrees_of_freedom: [f64; 2],
+    /// Probability of such an F where least squares is right.
+    pub p_value: Option<f64>,
+    /// Columns tested, each with its own `t = γ/std(γ)`: where the noise is.
+    pub columns: Vec<HausmanColumn>,
+    /// Why nothing can be said, when undecided.
+    pub reason: Option<String>,
+}
+
+/// One tested column.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HausmanColumn {
+    /// Its name.
+    pub name: String,
+    /// γ: by how much the column's noise would be weighted differently from its motion.
+    pub contrast: f64,
+    /// γ over its standard deviation.
+    pub t: f64,
+}
+
+/// Regresses `τ` on `[W | V]`, where `V = W − Z(ZᵀZ)⁻¹ZᵀW` is what the instruments do not explain of the regressor, and tests whether V's coefficients γ are zero:
+///
+/// ```text
+///     τ = W θ + V γ + noise,    T² = γᵀ Cov(γ)⁻¹ γ,    F = T² (G − q)/(q (G − 1))  against F(q, G − q)
+/// ```
+///
+/// If W is free of noise that matters, V carries no other torque than W does and γ = 0; under noise in W (or noise fed back into the motion) the coefficients differ.
+/// Cov is that of G time segments, so that residuals correlated in time do not reject by themselves; F is Hotelling's form for a covariance that was estimated from G
+/// pieces. Rows are weighted by the joints' noise in `estimate`. Janot, Vandanjon and Gautier, Control Engineering Practice 48 (2016) 52; Hausman,
+/// Econometrica 46 (1978) 1251.
+///
+/// # Errors
+/// [`EstimationError::Setting`] and the errors of the covariance. A test that cannot be made is a verdict, not an error.
+pub fn hausman_test(
+    problem: &InstrumentedProblem,
+    estimate: &InstrumentalEstimate,
+    settings: &HausmanSettings,
+) -> Result<HausmanTest, EstimationError> {
+    settings.validate()?;
+    let sigma = &estimate.estimate.joint_sigma;
+    crate::error::expect("joints of the estimate", problem.joints().len(), sigma.len())?;
+    crate::error::expect("columns of the estimate", problem.columns().len(), estimate.estimate.values.len())?;
+    let weights: Vec<f64> = sigma.iter().map(|sigma| 1.0 / sigma).collect();
+    let projection = Projection::new(problem, &problem.rows.stacked(), &weights, &settings.rank)?;
+    let fixed: Vec<usize> = estimate.estimate.rank.fixed.iter().map(|fixed| fixed.column).collect();
+    let free: Vec<usize> = (0..problem.columns().len()).filter(|column| !fixed.contains(column)).collect();
+    let noisy = noisy_columns(&projection, &free);
+    if noisy.is_empty() {
+        return Ok(undecided(
+            "the instruments explain the regressor wholly: they hold the same noise".into(),
+            [0.0; 2],
+        ));
+    }
+    let names = problem.columns();
+    let all: Vec<String> = free
+        .iter()
+        .map(|&column| names[column].clone())
+        .chain(noisy.iter().map(|&column| format!("noise of {}", names[column])))
+        .collect();
+    let zeros = vec![0.0; all.len()];
+    let held: Vec<(usize, f64)> = fixed.iter().map(|&column| (column, estimate.estimate.values[column])).collect();
+    let augmented = problem.combined(all, zeros, |local| augmented_rows(&projection, local, &free, &noisy, &held))?;
+    let stacked = augmented.stacked();
+    let triangle = stacked.combined(&weights)?;
+    let choice = split(&triangle, &settings.rank);
+    let tested: Vec<usize> = choice.free.iter().copied().filter(|&column| column >= free.len()).collect();
+    if tested.is_empty() {
+        return Ok(undecided("nothing of the regressor's noise is independent of the regressor".into(), [0.0; 2]));
+    }
+    let freedom = match joint_freedom(&stacked, choice.free.len()) {
+        Ok(freedom) => freedom,
+        Err(error) => return Ok(undecided(error.to_string(), [tested.len() as f64, 0.0])),
+    };
+    let solution = solve(&triangle, &choice, &settings.rank, augmented.fallback());
+    let (squares, torque) = stacked.joint_squares(&solution.values)?;
+    let joint_sigma = noise_of_joints(&squares, &torque, &freedom);
+    let degrees = triangle.rows() - choice.free.len();
+    let weighted: f64 = squares.iter().zip(&weights).map(|(square, weight)| square * weight * weight).sum();
+    let fit = Fitted {
+        triangle,
+        split: choice,
+        solution,
+        weights,
+        joint_sigma,
+        weighted_variance: weighted / degrees as f64,
+        iterations: 1,
+        converged: true,
+    }
+    .into_estimate(&stacked, &settings.rank, settings.covariance)?;
+    let q = tested.len();
+    let pieces = if fit.clusters > 0 { fit.clusters } else { degrees + q };
+    let freedom = [q as f64, pieces.saturating_sub(q) as f64];
+    let columns: Vec<HausmanColumn> = tested
+        .iter()
+        .filter(|&&column| fit.std[column] > 0.0)
+        .map(|&column| HausmanColumn {
+            name: names[noisy[column - free.len()]].clone(),
+            contrast: fit.values[column],
+            t: fit.values[column] / fit.std[column],
+        })
+        .collect();
+    if pieces <= q {
+        let reason = format!("{pieces} time segments for {q} tested columns: use shorter segments or longer logs");
+        return Ok(HausmanTest { columns, ..undecided(reason, freedom) });
+    }
+    // On the scale of the standard deviations, where units do not matter.
+    let std: Vec<f64> = tested.iter().map(|&column| fit.std[column]).collect();
+    let correlation = DMatrix::from_fn(q, q, |i, j| fit.covariance[(tested[i], tested[j])] / (std[i] * std[j]));
+    let t = DVector::from_fn(q, |i, _| fit.values[tested[i]] / std[i]);
+    let square = correlation.cholesky().map(|factor| t.dot(&factor.solve(&t))).filter(|square| square.is_finite());
+    let Some(square) = square else {
+        let reason = "the covariance of the tested columns is singular: use shorter segments or longer logs".into();
+        return Ok(HausmanTest { columns, ..undecided(reason, freedom) });
+    };
+    let scale = if fit.clusters > 0 { freedom[1] / (pieces as f64 - 1.0) } else { 1.0 };
+    let f = square * scale / q as f64;
+    let p_value = f_tail(f, freedom[0], freedom[1]);
+    let verdict =
+        if p_value < settings.level { HausmanVerdict::RejectLeastSquares } else { HausmanVerdict::FilteringWasEnough };
+    Ok(HausmanTest { verdict, f: Some(f), degrees_of_freedom: freedom, p_value: Some(p_value), columns, reason: None })
+}
+
+/// Coefficients of an equation's `[Z | W | τ]` in `[W_free | V_noisy | τ − W_fixed θ_fixed]`.
+fn augmented_rows(
+    projection: &Projection,
+    local: &[usize],
+    free: &[usize],
+    noisy: &[usize],
+    held: &[(usize, f64)],
+) -> DMatrix<f64> {
+    let (_, left) = projection.parts(local);
+    let (size, count) = (left.nrows(), free.len() + noisy.len());
+    let mut rows = DMatrix::zeros(size, count + 1);
+    for (place, &column) in local.iter().enumerate() {
+        if let Some(k) = free.iter().position(|&free| free == column) {
+            rows[(local.len() + place, k)] = 1.0;
+        }
+        if let Some((_, value)) = held.iter().find(|(fixed, _)| *fixed == column) {
+            rows[(local.len() + place, count)] = -value;
+        }
+    }
+    for (k, &column) in noisy.iter().enumerate() {
+        rows.set_column(free.len() + k, &left.column(column));
+    }
+    rows[(size - 1, count)] = 1.0;
+    rows
+}
+
+fn undecided(reason: String, degrees_of_freedom: [f64; 2]) -> HausmanTest {
+    HausmanTest {
+        verdict: HausmanVerdict::Undecided,
+        f: None,
+        degrees_of_freedom,
+        p_value: None,
+        columns: Vec::new(),
+        reason: Some(reason),
+    }
+}

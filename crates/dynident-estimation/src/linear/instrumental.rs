@@ -1,0 +1,221 @@
+//! Instrumental variables: estimates that noise in the regressor does not pull towards zero.
+
+use super::projection::Projection;
+use super::weighted::{WeightedSettings, noise_change, noise_of_joints};
+use crate::error::EstimationError;
+use crate::factor::{FactorWorkspace, InstrumentedProblem, RankSettings, Split, TriangularFactor, solve, split};
+use crate::uncertainty::{CovarianceMethod, Estimate, EstimateStatus, Fitted, joint_freedom};
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+/// Settings of [`instrumental_variables`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct InstrumentalSettings {
+    /// When a column counts as excited; applied to the part of the regressor that the instruments explain.
+    pub rank: RankSettings,
+    /// The covariance to report; from time segments by default.
+    pub covariance: CovarianceMethod,
+    /// Largest relative change of any joint's σ at which the iteration of the weights ends. Default 1e-6.
+    pub tolerance: f64,
+    /// Most solutions made. Default 50.
+    pub max_iterations: usize,
+    /// First-stage F below which the instruments are called weak. Default 10, the rule of thumb of Staiger and Stock, Econometrica 65 (1997) 557.
+    pub weak_below: f64,
+}
+
+impl Default for InstrumentalSettings {
+    fn default() -> Self {
+        Self {
+            rank: RankSettings::default(),
+            covariance: CovarianceMethod::default(),
+            tolerance: 1.0e-6,
+            max_iterations: 50,
+            weak_below: 10.0,
+        }
+    }
+}
+
+impl InstrumentalSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`EstimationError::Setting`] for a tolerance outside 1e-12 to 1, no iterations, a limit of F that is not positive, or rank settings out of range.
+    pub fn validate(&self) -> Result<(), EstimationError> {
+        let (rank, covariance) = (self.rank, self.covariance);
+        let (tolerance, max_iterations) = (self.tolerance, self.max_iterations);
+        WeightedSettings { rank, covariance, tolerance, max_iterations }.validate()?;
+        if !(self.weak_below.is_finite() && self.weak_below > 0.0) {
+            let mend = "give a positive limit for the first-stage F, 10 by default";
+            return Err(EstimationError::Setting { setting: "weak_below", value: self.weak_below, mend });
+        }
+        Ok(())
+    }
+}
+
+/// How well the instruments explain the regressor.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct InstrumentReport {
+    /// Independent instruments.
+    pub instruments: usize,
+    /// Columns that hold noise which the instruments do not share. The others are explained wholly and are their own instruments.
+    pub noisy_columns: Vec<String>,
+    /// Smallest F of the first stage over all directions in the noisy columns (Cragg-Donald): `λ_min(Σ_V⁻¹ W̃ᵀW̃) / k` with
+    /// `Σ_V = VᵀV/(N − k)`, other columns taken out. None when no column is noisy.
+    pub weakest_f: Option<f64>,
+    /// The noisy column with the largest part in that direction, each column measured by its own noise.
+    pub weakest_column: Option<String>,
+    /// Whether the smallest F is below the settings' limit: the estimate is then biased towards least squares, and its error bars are too small.
+    pub weak: bool,
+}
+
+/// What [`instrumental_variables`] found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct InstrumentalEstimate {
+    /// Values with covariance; `joint_sigma` is that of `τ − W θ`, noise of W included.
+    pub estimate: Estimate,
+    /// The first stage.
+    pub instruments: InstrumentReport,
+}
+
+/// A part of a column that the instruments leave over counts as noise above this share of the column: rounding stays far below.
+pub(crate) const NOISY: f64 = 1.0e-7;
+
+/// `θ = (Σ_j Z_jᵀW_j/σ_j²)⁻¹ Σ_j Z_jᵀτ_j/σ_j²`, with `σ_j² = ‖τ_j − W_j θ‖²/(N_j − p/n)` iterated from one as in weighted least squares.
+///
+/// Solved in two stages from the triangle of `[Z | W | τ]`: `θ = argmin ‖Q_Zᵀτ − Q_ZᵀW θ‖`, which is the same as long as there are as many
+/// independent instruments as estimated columns, and two-stage least squares where there are more. Consistent when Z is uncorrelated with the noise of W and τ,
+/// where least squares is biased towards zero. The covariance is the sandwich `A⁻¹ (Σ_g s_g s_gᵀ) A⁻¹` with `A = W̃ᵀW̃`, `s_g = W̃_gᵀ(τ_g − W_g θ)`, `W̃ = Z(ZᵀZ)⁻¹ZᵀW`, or
+/// its leave-one-segment-out form.
+///
+/// For instruments that are simulated with the current model (IDIM-IV) call this again with new Z until θ settles. Janot, Vandanjon and Gautier, IEEE
+/// Trans. Control Syst. Technol. 22 (2014) 132; weak instruments: Cragg and Donald, Econometric Theory 9 (1993) 222.
+///
+/// # Errors
+/// As [`weighted_least_squares`](crate::weighted_least_squares). Columns that the instruments do not tell apart are fixed and named in the estimate's rank report; weak
+/// instruments are reported: neither is an error.
+pub fn instrumental_variables(
+    problem: &InstrumentedProblem,
+    settings: &InstrumentalSettings,
+) -> Result<InstrumentalEstimate, EstimationError> {
+    settings.validate()?;
+    let stacked = problem.rows.stacked();
+    let mut weights = vec![1.0; problem.joints().len()];
+    let mut projection = Projection::new(problem, &stacked, &weights, &settings.rank)?;
+    let choice = split(&projection.explained, &settings.rank);
+    let freedom = joint_freedom(&stacked, choice.free.len())?;
+    let mut solution = solve(&projection.explained, &choice, &settings.rank, problem.fallback());
+    let mut joint_sigma;
+    let (mut iterations, mut converged) = (1, false);
+    loop {
+        let (squares, torque) = stacked.joint_squares(&problem.over_both(&solution.values))?;
+        joint_sigma = noise_of_joints(&squares, &torque, &freedom);
+        if iterations > 1 {
+            converged = noise_change(&joint_sigma, &weights) <= settings.tolerance;
+        }
+        if converged || iterations == settings.max_iterations {
+            break;
+        }
+        for (weight, sigma) in weights.iter_mut().zip(&joint_sigma) {
+            *weight = 1.0 / sigma;
+        }
+        projection = Projection::new(problem, &stacked, &weights, &settings.rank)?;
+        solution = solve(&projection.explained, &choice, &settings.rank, problem.fallback());
+        iterations += 1;
+    }
+    let instruments = report(problem, &projection, &choice, settings);
+    // Least squares of τ − V θ on W̃ has the same solution, the residual τ − W θ, and so the sandwich of the instruments.
+    let theta = DVector::from_column_slice(&solution.values);
+    let second = problem.combined(problem.columns().to_vec(), problem.fallback().to_vec(), |local| {
+        let (fitted, left) = projection.parts(local);
+        let mut rows = DMatrix::zeros(fitted.nrows(), fitted.ncols() + 1);
+        rows.view_mut((0, 0), fitted.shape()).copy_from(&fitted);
+        let mut torque = -(left * &theta);
+        torque[2 * local.len()] += 1.0;
+        rows.set_column(fitted.ncols(), &torque);
+        rows
+    })?;
+    let second = second.stacked();
+    let estimate = Fitted {
+        triangle: projection.explained,
+        split: choice,
+        solution,
+        weights,
+        joint_sigma,
+        weighted_variance: 1.0,
+        iterations,
+        converged,
+    }
+    .into_estimate(&second, &settings.rank, settings.covariance)?;
+    Ok(InstrumentalEstimate { estimate, instruments })
+}
+
+impl InstrumentalEstimate {
+    /// Whether all columns were estimated with instruments that are strong enough.
+    pub fn sound(&self) -> bool {
+        self.estimate.status == EstimateStatus::Complete && !self.instruments.weak
+    }
+}
+
+/// Free columns that the instruments do not explain wholly.
+pub(crate) fn noisy_columns(projection: &Projection, free: &[usize]) -> Vec<usize> {
+    let (explained, left) = (projection.explained.column_norms(), projection.left.column_norms());
+    free.iter().copied().filter(|&column| left[column] > NOISY * explained[column].hypot(left[column])).collect()
+}
+
+fn report(
+    problem: &InstrumentedProblem,
+    projection: &Projection,
+    choice: &Split,
+    settings: &InstrumentalSettings,
+) -> InstrumentReport {
+    let noisy = noisy_columns(projection, &choice.free);
+    let k = projection.instruments;
+    let name = |column: usize| problem.columns()[column].clone();
+    let mut report = InstrumentReport {
+        instruments: k,
+        noisy_columns: noisy.iter().map(|&column| name(column)).collect(),
+        weakest_f: None,
+        weakest_column: None,
+        weak: false,
+    };
+    let rows = projection.left.rows();
+    if noisy.is_empty() || rows <= k {
+        return report;
+    }
+    // The explained part of the noisy columns with all others taken out: the last rows of a triangle with the others first.
+    let others: Vec<usize> = choice.free.iter().copied().filter(|column| !noisy.contains(column)).collect();
+    let order: Vec<usize> = others.iter().chain(&noisy).copied().collect();
+    let reordered = |source: &TriangularFactor, order: &[usize]| {
+        let mut factor = TriangularFactor::new(order.len());
+        factor.absorb_entries(&mut FactorWorkspace::default(), source.columns(), |row, column| {
+            order.get(column).map_or(0.0, |&column| source.entry(row, column))
+        });
+        factor.regressor_triangle()
+    };
+    let (first, count) = (others.len(), noisy.len());
+    let explained = reordered(&projection.explained, &order).view((first, first), (count, count)).into_owned();
+    let left = reordered(&projection.left, &noisy);
+    let scales: Vec<f64> = left.column_iter().map(|column| column.norm()).collect();
+    let scaled =
+        |matrix: DMatrix<f64>| DMatrix::from_fn(count, count, |row, column| matrix[(row, column)] / scales[column]);
+    let (explained, left) = (scaled(explained), scaled(left));
+    // Smallest σ of E V⁻¹ is the reciprocal of the largest of V E⁻¹; E is regular, for its columns were found independent.
+    let Some(inverse) = explained.clone().try_inverse() else { return report };
+    let decomposition = (left * &inverse).svd(false, true);
+    let (Some(largest), Some(right)) =
+        (decomposition.singular_values.iter().copied().reduce(f64::max), decomposition.v_t)
+    else {
+        return report;
+    };
+    if !(largest.is_finite() && largest > 0.0) {
+        return report;
+    }
+    let f = (rows - k) as f64 / k as f64 / (largest * largest);
+    let place = decomposition.singular_values.imax();
+    let direction = &inverse * right.row(place).transpose();
+    report.weakest_f = Some(f);
+    report.weakest_column = Some(name(noisy[direction.icamax()]));
+    report.weak = f < settings.weak_below;
+    report
+}

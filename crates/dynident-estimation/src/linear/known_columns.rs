@@ -1,0 +1,203 @@
+//! Weighted least squares where some parameters are known from other data, with the error bars that they have.
+
+use super::weighted::{WeightedSettings, weighted_least_squares};
+use crate::error::{EstimationError, expect};
+use crate::factor::LinearProblem;
+use crate::uncertainty::{Estimate, student_half_width};
+use nalgebra::{DMatrix, DVector};
+
+/// What other data say of some columns.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KnownColumns {
+    /// Their numbers among the problem's columns.
+    pub columns: Vec<usize>,
+    /// Their values.
+    pub values: Vec<f64>,
+    /// Covariance of the values, same order; zero for what is known exactly.
+    pub covariance: DMatrix<f64>,
+}
+
+/// Estimates the columns that are not known: `θ_u = argmin Σ_j ‖τ_j − W_k θ_k − W_u θ_u‖² / σ_j²`.
+///
+/// The known values are not changed by these data; their errors go into the others' error bars:
+///
+/// ```text
+///     V_u = V_own + G V_k Gᵀ,   cov(θ_u, θ_k) = G V_k,   G = ∂θ_u/∂θ_k = −(W_uᵀ Ω W_u)⁻¹ W_uᵀ Ω W_k,   Ω = diag(1/σ_j²)
+/// ```
+///
+/// with `V_own` of these data by the chosen method. Right where the known values come from other data. The residual holds `W_k` times their error as well, so that `V_own` counts some of it again:
+/// the bars are cautious. The estimate has all columns of the problem; `rank` speaks of those that were not known. Murphy and Topel, J. Business and Economic Statistics 3 (1985) 370 (two-step
+/// estimation, independent steps).
+///
+/// ```
+/// use dynident_estimation::*;
+/// use nalgebra::DMatrix;
+/// // τ = 2 x + 3 ± 0.1, the slope known as 2 ± 0.5: as the mean of x is 1.5, so uncertain is the offset, 1.5 · 0.5.
+/// let mut rows = SegmentedFactor::new(2, SegmentSettings { max_segments: 8, first_length_rows: 1 })?;
+/// rows.absorb(&[0., 1., 2., 3., 1., 1., 1., 1., 3.1, 4.9, 7.1, 8.9], 4)?;
+/// let mut problem = LinearProblem::new(vec!["slope".into(), "offset".into()], vec!["joint1".into()]);
+/// problem.add("run", 0, vec![0, 1], rows)?;
+/// let known = KnownColumns { columns: vec![0], values: vec![2.0], covariance: DMatrix::from_element(1, 1, 0.25) };
+/// let estimate = weighted_least_squares_with_known(&problem, &known, &WeightedSettings::default())?;
+/// assert!((estimate.values[1] - 3.0).abs() < 1e-9 && (estimate.std[1] - 0.75).abs() < 0.01);
+/// # Ok::<(), EstimationError>(())
+/// ```
+///
+/// # Errors
+/// [`EstimationError::Mismatch`] for numbers that do not fit, columns named twice, nothing left to estimate, or a problem with a prior; [`EstimationError::Setting`] for values that are not finite;
+/// and as [`weighted_least_squares`].
+pub fn weighted_least_squares_with_known(
+    problem: &LinearProblem,
+    known: &KnownColumns,
+    settings: &WeightedSettings,
+) -> Result<Estimate, EstimationError> {
+    check(problem, known)?;
+    let count = problem.columns().len();
+    let mut value = vec![None; count];
+    for (&column, &known) in known.columns.iter().zip(&known.values) {
+        value[column] = Some(known);
+    }
+    let free: Vec<usize> = (0..count).filter(|&column| value[column].is_none()).collect();
+    let place = |column: usize| free.iter().position(|&c| c == column);
+    let names = free.iter().map(|&column| problem.columns()[column].clone()).collect();
+    let mut rest = LinearProblem::new(names, problem.joints().to_vec())
+        .with_fallback(free.iter().map(|&column| problem.fallback()[column]).collect())?;
+    for equation in problem.equations() {
+        let columns: Vec<usize> = equation.columns.iter().filter_map(|&column| place(column)).collect();
+        let mut map = DMatrix::zeros(equation.columns.len() + 1, columns.len() + 1);
+        let mut next = 0;
+        for (local, &column) in equation.columns.iter().enumerate() {
+            if let Some(known) = value[column] {
+                map[(local, columns.len())] = -known;
+            } else {
+                map[(local, next)] = 1.0;
+                next += 1;
+            }
+        }
+        map[(equation.columns.len(), columns.len())] = 1.0;
+        rest.add(&problem.logs()[equation.log], equation.joint, columns, equation.factor.mapped(&map)?)?;
+    }
+    let own = weighted_least_squares(&rest, settings)?;
+    let sensitivity = sensitivity(problem, known, &free, &own)?;
+    Ok(joined(problem, known, &free, own, &sensitivity))
+}
+
+fn check(problem: &LinearProblem, known: &KnownColumns) -> Result<(), EstimationError> {
+    let count = problem.columns().len();
+    expect("values of known columns", known.columns.len(), known.values.len())?;
+    expect("rows of the known columns' covariance", known.columns.len(), known.covariance.nrows())?;
+    expect("columns of the known columns' covariance", known.columns.len(), known.covariance.ncols())?;
+    if problem.prior().is_some() {
+        let what = "priors beside known columns (state what is known once)".into();
+        return Err(EstimationError::Mismatch { what, expected: 0, found: 1 });
+    }
+    let mut seen = vec![false; count];
+    for &column in &known.columns {
+        if column >= count || std::mem::replace(&mut seen[column], true) {
+            let what = "a known column below the number of columns, named once".into();
+            return Err(EstimationError::Mismatch { what, expected: count, found: column });
+        }
+    }
+    if seen.iter().all(|&known| known) {
+        let what = "known columns, fewer than all".into();
+        return Err(EstimationError::Mismatch { what, expected: count.saturating_sub(1), found: count });
+    }
+    match known.values.iter().chain(known.covariance.iter()).find(|value| !value.is_finite()) {
+        Some(&value) => {
+            Err(EstimationError::Setting { setting: "known columns", value, mend: "give finite values and covariance" })
+        }
+        None => Ok(()),
+    }
+}
+
+/// G, shape (free columns, known columns); zero rows for columns that the data do not excite.
+fn sensitivity(
+    problem: &LinearProblem,
+    known: &KnownColumns,
+    free: &[usize],
+    own: &Estimate,
+) -> Result<DMatrix<f64>, EstimationError> {
+    let weights: Vec<f64> = own.joint_sigma.iter().map(|sigma| 1.0 / sigma).collect();
+    let triangle = problem.combined(&weights)?.regressor_triangle();
+    let told: Vec<usize> =
+        (0..free.len()).filter(|place| own.rank.fixed.iter().all(|fixed| fixed.column != *place)).collect();
+    let columns: Vec<usize> = told.iter().map(|&place| free[place]).collect();
+    let mut own_rows = triangle.select_columns(&columns);
+    let norms: Vec<f64> = own_rows.column_iter().map(|column| column.norm()).collect();
+    for (mut column, norm) in own_rows.column_iter_mut().zip(&norms) {
+        column /= if *norm > 0.0 { *norm } else { 1.0 };
+    }
+    let factor = own_rows.qr();
+    let (q, r) = (factor.q(), factor.r());
+    let mut solved = q.tr_mul(&triangle.select_columns(&known.columns));
+    // The columns are independent, so the triangle has no zero on its diagonal.
+    if !r.solve_upper_triangular_mut(&mut solved) {
+        return Err(EstimationError::Overflow { name: problem.columns()[free[0]].clone() });
+    }
+    let mut sensitivity = DMatrix::zeros(free.len(), known.columns.len());
+    for (row, (&place, norm)) in told.iter().zip(&norms).enumerate() {
+        sensitivity.set_row(place, &(-solved.row(row) / *norm));
+    }
+    Ok(sensitivity)
+}
+
+/// All columns together.
+fn joined(
+    problem: &LinearProblem,
+    known: &KnownColumns,
+    free: &[usize],
+    own: Estimate,
+    sensitivity: &DMatrix<f64>,
+) -> Estimate {
+    let count = problem.columns().len();
+    let carried = sensitivity * &known.covariance * sensitivity.transpose();
+    let cross = sensitivity * &known.covariance;
+    let spread = |rest: &DMatrix<f64>| {
+        let mut all = DMatrix::zeros(count, count);
+        for (i, &row) in free.iter().enumerate() {
+            for (j, &column) in free.iter().enumerate() {
+                all[(row, column)] = rest[(i, j)] + 0.5 * (carried[(i, j)] + carried[(j, i)]);
+            }
+            for (j, &column) in known.columns.iter().enumerate() {
+                all[(row, column)] = cross[(i, j)];
+                all[(column, row)] = cross[(i, j)];
+            }
+        }
+        for (i, &row) in known.columns.iter().enumerate() {
+            for (j, &column) in known.columns.iter().enumerate() {
+                all[(row, column)] = known.covariance[(i, j)];
+            }
+        }
+        all
+    };
+    let (covariance, covariance_white) = (spread(&own.covariance), spread(&own.covariance_white));
+    let std: Vec<f64> = DVector::from(covariance.diagonal()).iter().map(|variance| variance.max(0.0).sqrt()).collect();
+    let normal = student_half_width(0.95, f64::INFINITY);
+    let (mut values, mut half_width_95) = (vec![0.0; count], vec![0.0; count]);
+    let mut std_freedom = vec![f64::INFINITY; count];
+    for (&column, &value) in known.columns.iter().zip(&known.values) {
+        (values[column], half_width_95[column]) = (value, normal * std[column]);
+    }
+    for (place, &column) in free.iter().enumerate() {
+        values[column] = own.values[place];
+        half_width_95[column] = own.half_width_95[place].hypot(normal * carried[(place, place)].max(0.0).sqrt());
+        std_freedom[column] = own.std_freedom[place];
+    }
+    let mut rank = own.rank;
+    for fixed in &mut rank.fixed {
+        fixed.column = free[fixed.column];
+    }
+    let relative = |(std, value): (&f64, &f64)| (*std > 0.0 && *value != 0.0).then(|| 100.0 * std / value.abs());
+    Estimate {
+        names: problem.columns().to_vec(),
+        relative_std_percent: std.iter().zip(&values).map(relative).collect(),
+        values,
+        covariance,
+        covariance_white,
+        std,
+        std_freedom,
+        half_width_95,
+        rank,
+        ..own
+    }
+}

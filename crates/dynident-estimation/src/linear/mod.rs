@@ -1,0 +1,37 @@
+//! **Estimators of `τ = W θ + noise`**: each takes a problem and its settings and returns an
+//! [`Estimate`](crate::Estimate), those with findings of their own in a struct beside it.
+//!
+//! | what the noise is like | function |
+//! | --- | --- |
+//! | equal in all joints | [`ordinary_least_squares`] |
+//! | a level for each joint | [`weighted_least_squares`]; with some columns known [`weighted_least_squares_with_known`] |
+//! | correlated between joints | [`generalized_least_squares`] |
+//! | a level that depends on the speed | [`noise_weighted_least_squares`] |
+//! | gross errors | [`robust_least_squares`] |
+//! | in the columns too, of known size | [`total_least_squares`] |
+//! | in the columns too, of unknown size | [`instrumental_variables`]; [`hausman_test`] says whether it matters |
+//!
+//! [`joint_gains`] estimates the torque constants of the drives from the same rows.
+
+mod generalized;
+mod hausman;
+mod instrumental;
+mod joint_gains;
+mod known_columns;
+mod noise_levels;
+mod ordinary;
+mod projection;
+mod robust;
+mod total;
+mod weighted;
+
+pub use generalized::{CrossProblem, GeneralizedEstimate, generalized_least_squares};
+pub use hausman::{HausmanColumn, HausmanSettings, HausmanTest, HausmanVerdict, hausman_test};
+pub use instrumental::{InstrumentReport, InstrumentalEstimate, InstrumentalSettings, instrumental_variables};
+pub use joint_gains::{GainEstimate, GainProblem, JointGain, joint_gains};
+pub use known_columns::{KnownColumns, weighted_least_squares_with_known};
+pub use noise_levels::{NoiseLevelSettings, NoiseWeightedEstimate, noise_weighted_least_squares};
+pub use ordinary::{OrdinarySettings, ordinary_least_squares};
+pub use robust::{RobustEstimate, RobustSettings, RowBlock, RowVisitor, RowWeight, robust_least_squares};
+pub use total::{TotalEstimate, TotalSettings, total_least_squares};
+pub use weighted::{WeightedSettings, weighted_least_squares};

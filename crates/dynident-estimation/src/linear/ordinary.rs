@@ -1,0 +1,45 @@
+//! Ordinary least squares: every row counts the same.
+
+use crate::error::EstimationError;
+use crate::factor::{LinearProblem, RankSettings, solve, split};
+use crate::uncertainty::{CovarianceMethod, Estimate, Fitted, joint_freedom};
+use serde::{Deserialize, Serialize};
+
+/// Settings of [`ordinary_least_squares`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct OrdinarySettings {
+    /// When a column counts as excited.
+    pub rank: RankSettings,
+    /// The covariance to report; from time segments by default.
+    pub covariance: CovarianceMethod,
+}
+
+/// `θ = argmin Σ_j ‖τ_j − W_j θ‖²` by orthogonal reduction, never by normal equations.
+///
+/// The white-noise covariance is `s² (WᵀW)⁻¹` with `s² = RSS/(N − p)`. Golub and Van Loan, Matrix Computations, 5.3.
+///
+/// # Errors
+/// [`EstimationError::Empty`] and [`EstimationError::TooFewRows`] when there is nothing to estimate from,
+/// [`EstimationError::PriorWithoutNoiseLevel`] when the problem has a prior, [`EstimationError::Setting`], and the errors of the
+/// chosen covariance.
+pub fn ordinary_least_squares(
+    problem: &LinearProblem,
+    settings: &OrdinarySettings,
+) -> Result<Estimate, EstimationError> {
+    settings.rank.validate()?;
+    if problem.prior().is_some() {
+        return Err(EstimationError::PriorWithoutNoiseLevel);
+    }
+    let stacked = problem.stacked();
+    let weights = vec![1.0; problem.joints().len()];
+    let triangle = stacked.combined(&weights)?;
+    let split = split(&triangle, &settings.rank);
+    let freedom = joint_freedom(&stacked, split.free.len())?;
+    let solution = solve(&triangle, &split, &settings.rank, problem.fallback());
+    let (squares, _) = stacked.joint_squares(&solution.values)?;
+    let joint_sigma = squares.iter().zip(&freedom).map(|(square, freedom)| (square / freedom).sqrt()).collect();
+    let weighted_variance = squares.iter().sum::<f64>() / (triangle.rows() - split.free.len()) as f64;
+    Fitted { triangle, split, solution, weights, joint_sigma, weighted_variance, iterations: 1, converged: true }
+        .into_estimate(&stacked, &settings.rank, settings.covariance)
+}

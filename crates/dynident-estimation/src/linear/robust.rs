@@ -1,0 +1,423 @@
+//! Iteratively reweighted least squares: rows that no noise explains lose their say.
+
+use super::weighted::{WeightedSettings, weighted_least_squares};
+use crate::error::EstimationError;
+use crate::factor::{LinearProblem, RankSettings, SegmentedFactor, Split, solve, split};
+use crate::uncertainty::{CovarianceMethod, Estimate, Fitted, joint_freedom};
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// How a row's weight falls with its residual, measured by the joint's noise.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum RowWeight {
+    /// `w = min(1, k/|u|)`: large residuals count as if they were k. One minimum. Huber, Ann. Math. Stat. 35 (1964) 73.
+    Huber {
+        /// k; 1.345 by default, which costs 5 % efficiency where noise is normal.
+        #[serde(default = "huber_k")]
+        k: f64,
+    },
+    /// `w = (1 − (u/c)²)²` for `|u| < c`, else nothing: gross errors are left out. Starts from Huber's solution, for it has several minima. Beaton and Tukey,
+    /// Technometrics 16 (1974) 147.
+    Tukey {
+        /// c; 4.685 by default, which costs 5 % efficiency where noise is normal.
+        #[serde(default = "tukey_c")]
+        c: f64,
+    },
+}
+
+fn huber_k() -> f64 {
+    1.345
+}
+
+fn tukey_c() -> f64 {
+    4.685
+}
+
+impl RowWeight {
+    /// Huber's weights with k = 1.345.
+    pub fn huber() -> Self {
+        Self::Huber { k: huber_k() }
+    }
+
+    /// Tukey's weights with c = 4.685.
+    pub fn tukey() -> Self {
+        Self::Tukey { c: tukey_c() }
+    }
+
+    /// w(u), 0 to 1.
+    pub fn weight(&self, u: f64) -> f64 {
+        match *self {
+            Self::Huber { k } => {
+                if u.abs() <= k {
+                    1.0
+                } else {
+                    k / u.abs()
+                }
+            }
+            Self::Tukey { c } => {
+                if u.abs() < c {
+                    (1.0 - (u / c).powi(2)).powi(2)
+                } else {
+                    0.0
+                }
+            }
+        }
+    }
+
+    /// ψ'(u), the slope of ψ(u) = u w(u).
+    fn slope(&self, u: f64) -> f64 {
+        match *self {
+            Self::Huber { k } => f64::from(u.abs() <= k),
+            Self::Tukey { c } => {
+                let square = (u / c).powi(2);
+                if square < 1.0 { (1.0 - square) * (1.0 - 5.0 * square) } else { 0.0 }
+            }
+        }
+    }
+}
+
+/// Settings of [`robust_least_squares`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RobustSettings {
+    /// How weights fall; Huber's by default.
+    pub weight: RowWeight,
+    /// When a column counts as excited.
+    pub rank: RankSettings,
+    /// The covariance to report; from time segments by default.
+    pub covariance: CovarianceMethod,
+    /// Change, relative to the noise, at which the iteration ends. Default 1e-4: a ten-thousandth of an error bar.
+    pub tolerance: f64,
+    /// Most passes over the rows. Default 50.
+    pub max_passes: usize,
+}
+
+impl Default for RobustSettings {
+    fn default() -> Self {
+        Self {
+            weight: RowWeight::huber(),
+            rank: RankSettings::default(),
+            covariance: CovarianceMethod::default(),
+            tolerance: 1.0e-4,
+            max_passes: 50,
+        }
+    }
+}
+
+impl RobustSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`EstimationError::Setting`] for a constant outside 0.1 to 100, a tolerance outside 1e-13 to 1, fewer than two passes, or rank settings out of range.
+    pub fn validate(&self) -> Result<(), EstimationError> {
+        self.rank.validate()?;
+        let (setting, value) = match self.weight {
+            RowWeight::Huber { k } => ("weight.k", k),
+            RowWeight::Tukey { c } => ("weight.c", c),
+        };
+        if !(0.1..=100.0).contains(&value) {
+            return Err(EstimationError::Setting {
+                setting,
+                value,
+                mend: "give a number of deviations from 0.1 to 100",
+            });
+        }
+        if !(1.0e-13..=1.0).contains(&self.tolerance) {
+            let mend = "give a relative change from 1e-13 to 1";
+            return Err(EstimationError::Setting { setting: "tolerance", value: self.tolerance, mend });
+        }
+        if self.max_passes < 2 {
+            let value = self.max_passes as f64;
+            return Err(EstimationError::Setting { setting: "max_passes", value, mend: "give at least 2" });
+        }
+        Ok(())
+    }
+}
+
+/// Some rows of one joint in one log, as they were absorbed into the problem: same rows, same order.
+#[derive(Clone, Copy, Debug)]
+pub struct RowBlock<'a> {
+    /// Number of the log in [`LinearProblem::logs`].
+    pub log: usize,
+    /// Number of the joint in [`LinearProblem::joints`].
+    pub joint: usize,
+    /// Rows in this block.
+    pub rows: usize,
+    /// Column by column, torque last, as in [`TriangularFactor::absorb`](crate::TriangularFactor::absorb).
+    pub panel: &'a [f64],
+}
+
+/// What a pass hands every block of rows to.
+pub type RowVisitor<'a> = dyn FnMut(&RowBlock<'_>) -> Result<(), EstimationError> + 'a;
+
+/// What [`robust_least_squares`] found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RobustEstimate {
+    /// Values with covariance; `joint_sigma` is the MAD scale.
+    pub estimate: Estimate,
+    /// For every joint the share of rows whose weight is below one half.
+    pub outlier_share: Vec<f64>,
+    /// For every joint the mean weight of its rows.
+    pub mean_weight: Vec<f64>,
+}
+
+/// What one pass over the rows gathered.
+struct Gathered {
+    factors: Vec<SegmentedFactor>,
+    residuals: Vec<Vec<f64>>,
+    tally: Vec<Tally>,
+}
+
+/// Sums over a joint's rows.
+#[derive(Clone, Copy, Default)]
+struct Tally {
+    rows: usize,
+    weight: f64,
+    slope: f64,
+    /// ψ².
+    square: f64,
+    outliers: usize,
+}
+
+/// Normal noise has its median magnitude at this share of its standard deviation: Φ⁻¹(3/4).
+const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
+
+/// The scale never falls below this share of the torque's root mean square (most rows fitted exactly, as in a simulation).
+const SMALLEST_SCALE: f64 = 1.0e-9;
+
+/// `θ` with `Σ_i W_iᵀ w(u_i) (τ_i − W_i θ)/s_j² = 0`, `u_i = (τ_i − W_i θ)/s_j`, `s_j = median |τ_i − W_i θ| / 0.6745` over joint j's rows.
+///
+/// Starts from [`weighted_least_squares`] on `problem`'s factors; then every pass over the rows gives residuals, scales and the factors of the reweighted rows, from which the
+/// next θ follows. The scale of a pass is that of the θ before, which has the same limit and needs one pass each, not two. Regressors are never stored; residuals
+/// are, one number per row, for their median. `pass` hands every row that `problem` was made of to its visitor, as often as it is called.
+///
+/// The covariance is that of the reweighted rows times `(Σw/Σψ')²`, for an outlier's weight falls when the fit bends towards it (Huber, Robust Statistics (1981), 7.6). Rows
+/// are judged one by one: behind a filter that smears an outlier over its length, filter less.
+///
+/// # Errors
+/// As [`weighted_least_squares`]; [`EstimationError::Mismatch`] when a pass gives other rows than the problem holds; and whatever `pass` itself returns. Reaching `max_passes` is
+/// a status, not an error.
+///
+/// ```
+/// use dynident_estimation::*;
+/// // τ = 2 x, but every tenth row is far off.
+/// let x: Vec<f64> = (0..200).map(|k| f64::from(k % 13)).collect();
+/// let tau = (0..200).map(|k| 2.0 * x[k] + if k % 10 == 0 { 50.0 } else { 0.1 * (k as f64).sin() });
+/// let panel: Vec<f64> = x.iter().copied().chain(tau).collect();
+/// let mut rows = SegmentedFactor::new(1, SegmentSettings { max_segments: 8, first_length_rows: 25 })?;
+/// rows.absorb(&panel, 200)?;
+/// let mut problem = LinearProblem::new(vec!["gain".into()], vec!["joint1".into()]);
+/// problem.add("run", 0, vec![0], rows)?;
+/// let settings = RobustSettings { weight: RowWeight::tukey(), ..Default::default() };
+/// let found = robust_least_squares(&problem, &settings, |visit| {
+///     visit(&RowBlock { log: 0, joint: 0, rows: 200, panel: &panel })
+/// })?;
+/// assert!((found.estimate.values[0] - 2.0).abs() < 0.01);
+/// assert!((found.outlier_share[0] - 0.1).abs() < 0.02);
+/// # Ok::<(), EstimationError>(())
+/// ```
+pub fn robust_least_squares<E: From<EstimationError>>(
+    problem: &LinearProblem,
+    settings: &RobustSettings,
+    mut pass: impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
+) -> Result<RobustEstimate, E> {
+    settings.validate()?;
+    let start = WeightedSettings {
+        rank: settings.rank,
+        covariance: CovarianceMethod::White,
+        tolerance: 1.0e-3,
+        ..Default::default()
+    };
+    let mut theta = weighted_least_squares(problem, &start)?.values;
+    let floors = scale_floors(problem);
+    let mut scales = vec![f64::INFINITY; floors.len()];
+    // Tukey's weights have several solutions: Huber's, which has one, comes first.
+    let mut weight = RowWeight::huber();
+    let mut choice: Option<Split> = None;
+    let mut passes = 0;
+    loop {
+        let gathered = gather(problem, &theta, &scales, &weight, &mut pass)?;
+        passes += 1;
+        let new_scales: Vec<f64> =
+            gathered.residuals.into_iter().zip(&floors).map(|(r, floor)| median_scale(r).max(*floor)).collect();
+        if scales.iter().any(|scale| scale.is_infinite()) {
+            scales = new_scales;
+            continue;
+        }
+        let reweighted = with_factors(problem, gathered.factors)?;
+        let stacked = reweighted.stacked();
+        let weights: Vec<f64> = scales.iter().map(|scale| 1.0 / scale).collect();
+        let triangle = stacked.combined(&weights)?;
+        let choice = choice.get_or_insert_with(|| split(&triangle, &settings.rank));
+        joint_freedom(&stacked, choice.free.len())?;
+        let solution = solve(&triangle, choice, &settings.rank, problem.fallback());
+        let scale_change = new_scales.iter().zip(&scales).map(|(new, old)| (new / old - 1.0).abs()).fold(0.0, f64::max);
+        // Rows have unit noise: the norm is the change in error bars, over all directions.
+        let step: Vec<f64> = solution.values.iter().zip(&theta).map(|(new, old)| new - old).collect();
+        let change = (triangle.regressor_triangle() * nalgebra::DVector::from_vec(step)).norm()
+            / (choice.free.len().max(1) as f64).sqrt();
+        let largest = scale_change.max(change);
+        let preliminary = weight != settings.weight;
+        // A tenth of an error bar is near enough to start from.
+        let settled = largest <= if preliminary { settings.tolerance.max(0.1) } else { settings.tolerance };
+        let last = passes >= settings.max_passes;
+        if (settled && !preliminary) || last {
+            let fitted = Fitted {
+                weighted_variance: variance_factor(&gathered.tally),
+                triangle,
+                split: choice.clone(),
+                solution,
+                weights,
+                joint_sigma: scales,
+                iterations: passes,
+                converged: settled && !preliminary,
+            };
+            let estimate = fitted.into_estimate(&stacked, &settings.rank, settings.covariance)?;
+            return Ok(finished(estimate, &gathered.tally, settings.covariance));
+        }
+        if preliminary && (settled || 2 * passes >= settings.max_passes) {
+            weight = settings.weight;
+        }
+        theta = solution.values;
+        scales = new_scales;
+    }
+}
+
+/// One pass: residuals of θ, and the factors of the rows times √w.
+fn gather<E: From<EstimationError>>(
+    problem: &LinearProblem,
+    theta: &[f64],
+    scales: &[f64],
+    weight: &RowWeight,
+    pass: &mut impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
+) -> Result<Gathered, E> {
+    let equations = problem.equations();
+    let mut factors = Vec::with_capacity(equations.len());
+    for equation in equations {
+        factors.push(equation.factor.emptied());
+    }
+    let locals: Vec<Vec<f64>> = equations.iter().map(|equation| equation.local(theta)).collect();
+    let joints = problem.joints().len();
+    let (mut residuals, mut tally) = (vec![Vec::new(); joints], vec![Tally::default(); joints]);
+    let mut scaled = Vec::new();
+    let mut visit = |block: &RowBlock<'_>| -> Result<(), EstimationError> {
+        let found = equations.iter().position(|e| e.log == block.log && e.joint == block.joint);
+        let Some(at) = found else {
+            let what = "a block's log and joint in the problem".to_owned();
+            return Err(EstimationError::Mismatch { what, expected: equations.len(), found: block.log });
+        };
+        let local = &locals[at];
+        let expected = (local.len() + 1) * block.rows;
+        if block.panel.len() != expected {
+            return Err(EstimationError::Shape { what: "a block of rows", expected, found: block.panel.len() });
+        }
+        scaled.clear();
+        scaled.extend_from_slice(block.panel);
+        let scale = scales[block.joint];
+        let tally = &mut tally[block.joint];
+        for row in 0..block.rows {
+            let at_column = |column: usize| block.panel[column * block.rows + row];
+            let predicted: f64 = local.iter().enumerate().map(|(column, value)| value * at_column(column)).sum();
+            let residual = at_column(local.len()) - predicted;
+            residuals[block.joint].push(residual);
+            let u = residual / scale;
+            let w = weight.weight(u);
+            tally.rows += 1;
+            tally.weight += w;
+            tally.slope += weight.slope(u);
+            tally.square += (w * u).powi(2);
+            tally.outliers += usize::from(w < 0.5);
+            let root = w.sqrt();
+            if root < 1.0 {
+                scaled.iter_mut().skip(row).step_by(block.rows).for_each(|value| *value *= root);
+            }
+        }
+        factors[at].absorb(&scaled, block.rows)
+    };
+    pass(&mut visit)?;
+    for (equation, factor) in equations.iter().zip(&factors) {
+        if factor.rows() != equation.factor.rows() {
+            let (log, joint) = (&problem.logs()[equation.log], &problem.joints()[equation.joint]);
+            let what = format!("log {log}, joint {joint}: rows of another pass over the same log");
+            return Err(
+                EstimationError::Mismatch { what, expected: equation.factor.rows(), found: factor.rows() }.into()
+            );
+        }
+    }
+    Ok(Gathered { factors, residuals, tally })
+}
+
+/// The same problem over other factors; a prior stays.
+pub(crate) fn with_factors(
+    problem: &LinearProblem,
+    factors: Vec<SegmentedFactor>,
+) -> Result<LinearProblem, EstimationError> {
+    let mut new = LinearProblem::new(problem.columns().to_vec(), problem.joints().to_vec())
+        .with_fallback(problem.fallback().to_vec())?;
+    if let Some(prior) = problem.prior() {
+        new = new.with_prior(prior.mean().to_vec(), prior.sqrt_information().clone())?;
+    }
+    for (equation, factor) in problem.equations().iter().zip(factors) {
+        new.add(&problem.logs()[equation.log], equation.joint, equation.columns.clone(), factor)?;
+    }
+    Ok(new)
+}
+
+/// `median |r| / 0.6745`; zero for no rows.
+fn median_scale(mut residuals: Vec<f64>) -> f64 {
+    let count = residuals.len();
+    if count == 0 {
+        return 0.0;
+    }
+    for residual in &mut residuals {
+        *residual = residual.abs();
+    }
+    let (below, middle, _) = residuals.select_nth_unstable_by(count / 2, f64::total_cmp);
+    let median = if count % 2 == 1 { *middle } else { 0.5 * (*middle + below.iter().copied().fold(0.0, f64::max)) };
+    median / MEDIAN_OF_NORMAL
+}
+
+pub(crate) fn scale_floors(problem: &LinearProblem) -> Vec<f64> {
+    let mut squares = vec![0.0; problem.joints().len()];
+    for equation in problem.equations() {
+        squares[equation.joint] += equation.factor.total().torque_norm().powi(2);
+    }
+    let rows = problem.joint_rows();
+    let mut rms: Vec<f64> = squares.iter().zip(rows).map(|(s, rows)| (s / rows.max(1) as f64).sqrt()).collect();
+    let largest = rms.iter().copied().fold(0.0, f64::max);
+    for value in &mut rms {
+        if *value <= 0.0 {
+            *value = if largest > 0.0 { largest } else { 1.0 };
+        }
+        *value *= SMALLEST_SCALE;
+    }
+    rms
+}
+
+/// Variance of the reweighted rows under white noise that makes `A⁻¹` the covariance before the correction of [`finished`]: `E ψ² / E w`.
+fn variance_factor(tally: &[Tally]) -> f64 {
+    let (square, weight) = tally.iter().fold((0.0, 0.0), |(s, w), t| (s + t.square, w + t.weight));
+    if weight > 0.0 { square / weight } else { 1.0 }
+}
+
+fn finished(mut estimate: Estimate, tally: &[Tally], method: CovarianceMethod) -> RobustEstimate {
+    let (weight, slope) = tally.iter().fold((0.0, 0.0), |(w, s), t| (w + t.weight, s + t.slope));
+    // The slopes' sum falls below a tenth of the weights' only where most rows are outliers; no covariance means much then.
+    let correction = (weight / slope.max(0.1 * weight)).powi(2);
+    if correction.is_finite() {
+        let scale = |matrix: &mut DMatrix<f64>| *matrix *= correction;
+        scale(&mut estimate.covariance);
+        scale(&mut estimate.covariance_white);
+        let root = correction.sqrt();
+        estimate.std.iter_mut().chain(&mut estimate.half_width_95).for_each(|width| *width *= root);
+        estimate.relative_std_percent.iter_mut().flatten().for_each(|percent| *percent *= root);
+    }
+    estimate.covariance_method = method;
+    let share = |part: f64, rows: usize| if rows > 0 { part / rows as f64 } else { 0.0 };
+    RobustEstimate {
+        estimate,
+        outlier_share: tally.iter().map(|t| share(t.outliers as f64, t.rows)).collect(),
+        mean_weight: tally.iter().map(|t| share(t.weight, t.rows)).collect(),
+    }
+}

@@ -1,0 +1,114 @@
+//! Weighted least squares: the rows of each joint count by that joint's own noise.
+
+use crate::error::EstimationError;
+use crate::factor::{LinearProblem, RankSettings, solve, split};
+use crate::uncertainty::{CovarianceMethod, Estimate, Fitted, joint_freedom};
+use serde::{Deserialize, Serialize};
+
+/// Settings of [`weighted_least_squares`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct WeightedSettings {
+    /// When a column counts as excited.
+    pub rank: RankSettings,
+    /// The covariance to report; from time segments by default.
+    pub covariance: CovarianceMethod,
+    /// Largest relative change of any joint's σ at which the iteration ends. Default 1e-6: far below the accuracy of any σ.
+    pub tolerance: f64,
+    /// Most solutions made. Default 50; two to five are usual.
+    pub max_iterations: usize,
+}
+
+impl Default for WeightedSettings {
+    fn default() -> Self {
+        Self {
+            rank: RankSettings::default(),
+            covariance: CovarianceMethod::default(),
+            tolerance: 1.0e-6,
+            max_iterations: 50,
+        }
+    }
+}
+
+impl WeightedSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`EstimationError::Setting`] for a tolerance outside 1e-12 to 1, no iterations, or rank settings out of range.
+    pub fn validate(&self) -> Result<(), EstimationError> {
+        self.rank.validate()?;
+        if !(1.0e-12..=1.0).contains(&self.tolerance) {
+            let mend = "give a relative change from 1e-12 to 1";
+            return Err(EstimationError::Setting { setting: "tolerance", value: self.tolerance, mend });
+        }
+        if self.max_iterations == 0 {
+            return Err(EstimationError::Setting { setting: "max_iterations", value: 0.0, mend: "give at least 1" });
+        }
+        Ok(())
+    }
+}
+
+/// A joint's σ never falls below this share of its torque's root mean square: with noise-free (simulated) torque the residual is
+/// rounding error, and weights made of it would wander for ever.
+const SMALLEST_SIGMA: f64 = 1.0e-9;
+
+/// `θ = argmin Σ_j ‖τ_j − W_j θ‖² / σ_j²` with `σ_j² = ‖τ_j − W_j θ‖² / (N_j − p/n)`, iterated from σ_j = 1 until the σ_j settle;
+/// N_j are the joint's rows, p the estimated columns, n the joints. A [prior](LinearProblem::with_prior) adds `‖S(θ − m)‖²`.
+///
+/// The white-noise covariance is `(Σ_j W_jᵀW_j / σ_j² + SᵀS)⁻¹`. Which columns are excited is decided once, on the first solution.
+/// Gautier, "Dynamic identification of robots with power model", ICRA 1997; Swevers, Verdonck and De Schutter, IEEE Control
+/// Systems Magazine 27 (2007) 58.
+///
+/// # Errors
+/// [`EstimationError::Empty`] and [`EstimationError::TooFewRows`] when there is nothing to estimate from,
+/// [`EstimationError::Setting`], and the errors of the chosen covariance. Reaching `max_iterations` is a status, not an error.
+pub fn weighted_least_squares(
+    problem: &LinearProblem,
+    settings: &WeightedSettings,
+) -> Result<Estimate, EstimationError> {
+    settings.validate()?;
+    let stacked = problem.stacked();
+    let mut weights = vec![1.0; problem.joints().len()];
+    let mut triangle = stacked.combined(&weights)?;
+    let split = split(&triangle, &settings.rank);
+    let freedom = joint_freedom(&stacked, split.free.len())?;
+    let mut solution = solve(&triangle, &split, &settings.rank, problem.fallback());
+    let mut joint_sigma;
+    let (mut iterations, mut converged) = (1, false);
+    loop {
+        let (squares, torque) = stacked.joint_squares(&solution.values)?;
+        joint_sigma = noise_of_joints(&squares, &torque, &freedom);
+        // From the second solution on, the weights in use are the last σ's reciprocals.
+        if iterations > 1 {
+            converged = noise_change(&joint_sigma, &weights) <= settings.tolerance;
+        }
+        if converged || iterations == settings.max_iterations {
+            break;
+        }
+        for (weight, sigma) in weights.iter_mut().zip(&joint_sigma) {
+            *weight = 1.0 / sigma;
+        }
+        triangle = stacked.combined(&weights)?;
+        solution = solve(&triangle, &split, &settings.rank, problem.fallback());
+        iterations += 1;
+    }
+    // The rows were scaled by the last weights; what noise is left in them is one up to the tolerance, unless the limit came first.
+    Fitted { triangle, split, solution, weights, joint_sigma, weighted_variance: 1.0, iterations, converged }
+        .into_estimate(&stacked, &settings.rank, settings.covariance)
+}
+
+/// Largest relative change from the noise that the weights stand for to the noise that was found with them.
+pub(crate) fn noise_change(joint_sigma: &[f64], weights: &[f64]) -> f64 {
+    joint_sigma.iter().zip(weights).map(|(s, w)| (s * w - 1.0).abs()).fold(0.0, f64::max)
+}
+
+/// Noise of every joint, never below the rounding of its torque.
+pub(crate) fn noise_of_joints(squares: &[f64], torque: &[f64], freedom: &[f64]) -> Vec<f64> {
+    let largest = torque.iter().zip(freedom).map(|(t, f)| t / f).fold(0.0, f64::max);
+    let of_joint = |joint: usize| {
+        let rms = (if torque[joint] > 0.0 { torque[joint] / freedom[joint] } else { largest }).sqrt();
+        let floor = SMALLEST_SIGMA * if rms > 0.0 { rms } else { 1.0 };
+        (squares[joint] / freedom[joint]).sqrt().max(floor)
+    };
+    (0..squares.len()).map(of_joint).collect()
+}

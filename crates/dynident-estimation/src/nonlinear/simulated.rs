@@ -1,0 +1,312 @@
+//! Estimators that compare a simulation with the record: DIDIM, CLIE and CLOE, behind one seam.
+
+use crate::error::{EstimationError, expect};
+use crate::factor::{FactorWorkspace, RankReport, RankSettings, TriangularFactor, report, solve, split};
+use crate::uncertainty::EstimateStatus;
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+/// What a simulation of the experiment gives, at the record's own instants: rows of all channels and instants in one order, which is the record's as well.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SimulatedRows {
+    /// What is compared with the record: torque for DIDIM and CLIE, position for CLOE.
+    pub output: DVector<f64>,
+    /// W of the simulated motion, shape (rows, columns); DIDIM's rows only, and empty (no rows) for a simulation that does not give them.
+    pub regressor: DMatrix<f64>,
+}
+
+/// The experiment over again with other parameters: the same machine model, controller, reference and filters. `estimation` does not know how.
+pub trait SimulatedMotion {
+    /// What can go wrong in a simulation.
+    type Error: From<EstimationError>;
+
+    /// Simulates with parameters θ. None when the simulation does not get through (an unstable loop, a mass matrix that is none): the step is then halved.
+    ///
+    /// # Errors
+    /// Whatever no other parameters would mend.
+    fn simulate(&mut self, parameters: &[f64]) -> Result<Option<SimulatedRows>, Self::Error>;
+}
+
+/// Which distance between simulation and record is made small.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SimulatedCriterion {
+    /// `‖τ − W(q_s, q̇_s, q̈_s) θ‖`, the simulated motion taken for given in every step: direct and inverse dynamic identification. The measured position is not needed. A few simulations in all.
+    #[default]
+    Didim,
+    /// `‖y − y_s(θ)‖` with the Jacobian of the simulation by differences: closed-loop input error (y the torque) or output error (y the position), by what the simulation puts out. One
+    /// simulation for every parameter and step.
+    Output,
+}
+
+/// Settings of [`simulated_least_squares`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SimulatedSettings {
+    /// What is compared.
+    pub criterion: SimulatedCriterion,
+    /// When a column counts as excited.
+    pub rank: RankSettings,
+    /// Length of a step, in error bars over all directions, at which the iteration ends. Default 1e-3.
+    pub tolerance: f64,
+    /// Most steps. Default 30.
+    pub max_iterations: usize,
+    /// Step of the differences, relative to each parameter's `scale`. Default 1e-4.
+    pub difference: f64,
+}
+
+impl Default for SimulatedSettings {
+    fn default() -> Self {
+        Self {
+            criterion: SimulatedCriterion::default(),
+            rank: RankSettings::default(),
+            tolerance: 1.0e-3,
+            max_iterations: 30,
+            difference: 1.0e-4,
+        }
+    }
+}
+
+impl SimulatedSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`EstimationError::Setting`].
+    pub fn validate(&self) -> Result<(), EstimationError> {
+        self.rank.validate()?;
+        let error = |setting, value, mend| Err(EstimationError::Setting { setting, value, mend });
+        if !(1.0e-10..=1.0).contains(&self.tolerance) {
+            return error("tolerance", self.tolerance, "give a length in error bars from 1e-10 to 1");
+        }
+        if !(1.0e-9..=0.1).contains(&self.difference) {
+            return error("difference", self.difference, "give a relative step from 1e-9 to 0.1");
+        }
+        if self.max_iterations == 0 {
+            return error("max_iterations", 0.0, "give at least 1");
+        }
+        Ok(())
+    }
+}
+
+/// The record and where to begin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SimulatedProblem {
+    /// Names of the parameters.
+    pub names: Vec<String>,
+    /// Where the iteration begins: a description's values, or a least-squares estimate.
+    pub start: Vec<f64>,
+    /// The ordinary size of each parameter, greater than zero: the unit of its differences.
+    pub scale: Vec<f64>,
+    /// What was measured, rows as the simulation's.
+    pub measured: DVector<f64>,
+    /// Standard deviation of each row's noise.
+    pub noise_std: DVector<f64>,
+}
+
+/// What [`simulated_least_squares`] found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SimulatedEstimate {
+    /// Names of the parameters.
+    pub names: Vec<String>,
+    /// One value per parameter; that of a parameter which the data do not excite is its start.
+    pub values: Vec<f64>,
+    /// `s² (JᵀJ)⁻¹` of the rows over their noise, s² the mean square of what is left: for noise that is white over the rows.
+    #[serde(skip)]
+    pub covariance: DMatrix<f64>,
+    /// Square roots of its diagonal.
+    pub std: Vec<f64>,
+    /// Sum of squares of the rows' residuals over their noise.
+    pub cost: f64,
+    /// Steps made.
+    pub iterations: usize,
+    /// Simulations made.
+    pub simulations: usize,
+    /// How it ended. [`EstimateStatus::IterationLimit`] also when no shorter step lowers the cost any more although the step is not small.
+    pub status: EstimateStatus,
+    /// Rank decisions at the last point.
+    pub rank: RankReport,
+    /// What the outputs do with the parameters at the last point, shape (rows, parameters): W of the simulated motion for DIDIM, J for CLIE and CLOE.
+    #[serde(skip)]
+    pub jacobian: DMatrix<f64>,
+    /// What was measured there less `W θ` (DIDIM) or less the simulation's output, so that `jacobian · (θ' - values) ≈ residual` is the problem of the next step: what error bars for coloured residuals
+    /// can be made from.
+    #[serde(skip)]
+    pub residual: DVector<f64>,
+}
+
+/// Parameters with which the simulated experiment looks like the recorded one, by the method of Gauss and Newton:
+///
+/// ```text
+///     DIDIM:       θ_{k+1} = argmin ‖Σ^{-1/2} (τ − W(q_s(θ_k)) θ)‖        (the motion follows the reference whatever θ is: ∂y_s/∂θ ≈ W)
+///     CLIE, CLOE:  θ_{k+1} = θ_k + argmin ‖Σ^{-1/2} (y − y_s(θ_k) − J Δ)‖,  J = ∂y_s/∂θ by central differences
+/// ```
+///
+/// A step that does not lower `‖Σ^{-1/2} (y − y_s(θ))‖` is halved (for DIDIM, one that raises its square by more than 5 %). No noise of a measured position enters the regressor; instead the controller and its reference must be known. Gautier, Janot and
+/// Vandanjon, IEEE Trans. Control Syst. Technol. 21 (2013) 428 (DIDIM); Walter and Pronzato, Identification of Parametric Models from Experimental Data (1997), for output errors.
+///
+/// # Errors
+/// [`EstimationError::Mismatch`] for lists and rows of other lengths, [`EstimationError::Setting`], [`EstimationError::TooFewRows`], [`EstimationError::Unusable`], and whatever the simulation returns;
+/// [`EstimationError::NoSimulation`] when the start itself cannot be simulated.
+pub fn simulated_least_squares<S: SimulatedMotion>(
+    problem: &SimulatedProblem,
+    simulation: &mut S,
+    settings: &SimulatedSettings,
+) -> Result<SimulatedEstimate, S::Error> {
+    settings.validate()?;
+    problem.validate()?;
+    let (columns, rows) = (problem.names.len(), problem.measured.len());
+    let mut run = Run { problem, simulation, simulations: 0 };
+    let mut theta = DVector::from_column_slice(&problem.start);
+    let mut now = run.simulated(&theta)?.ok_or(EstimationError::NoSimulation)?;
+    let (mut iterations, mut converged) = (0, false);
+    let (mut triangle, mut choice);
+    let (mut last_jacobian, mut last_residual);
+    loop {
+        let jacobian = match settings.criterion {
+            SimulatedCriterion::Didim => {
+                expect("rows of the simulated regressor", rows, now.rows.regressor.nrows())?;
+                expect("columns of the simulated regressor", columns, now.rows.regressor.ncols())?;
+                now.rows.regressor.clone()
+            }
+            SimulatedCriterion::Output => run.jacobian(&theta, &now, settings.difference)?,
+        };
+        // DIDIM compares with W θ, which is the simulated torque but for friction at rest and filters.
+        let residual = match settings.criterion {
+            SimulatedCriterion::Didim => &problem.measured - &jacobian * &theta,
+            SimulatedCriterion::Output => &problem.measured - &now.rows.output,
+        };
+        let panel: Vec<f64> = jacobian
+            .column_iter()
+            .flat_map(|column| column.iter().zip(&problem.noise_std).map(|(v, s)| v / s).collect::<Vec<_>>())
+            .chain(residual.iter().zip(&problem.noise_std).map(|(v, s)| v / s))
+            .collect();
+        (last_jacobian, last_residual) = (jacobian, residual);
+        triangle = TriangularFactor::new(columns);
+        triangle.absorb_with(&mut FactorWorkspace::default(), &panel, rows)?;
+        choice = split(&triangle, &settings.rank);
+        if rows <= choice.free.len() {
+            let (what, parameters) = ("all channels".to_owned(), choice.free.len() as f64);
+            return Err(EstimationError::TooFewRows { what, rows, parameters }.into());
+        }
+        if converged || iterations == settings.max_iterations {
+            break;
+        }
+        iterations += 1;
+        let step = DVector::from_vec(solve(&triangle, &choice, &settings.rank, &vec![0.0; columns]).values);
+        let noise = (now.cost / (rows - choice.free.len()) as f64).sqrt().max(f64::MIN_POSITIVE);
+        let length = (triangle.regressor_triangle() * &step).norm() / (choice.free.len().max(1) as f64).sqrt();
+        converged = length <= settings.tolerance * noise;
+        let mut better = None;
+        let mut share = 1.0;
+        while better.is_none() && share > 1.0e-4 {
+            let candidate = &theta + &step * share;
+            // Within the tolerance costs differ by what the simulation's own accuracy leaves; and DIDIM's fixed point is not quite where the cost is least.
+            let most = match settings.criterion {
+                SimulatedCriterion::Didim => now.cost * DIDIM_RISE,
+                SimulatedCriterion::Output if converged => now.cost * (1.0 + settings.tolerance),
+                SimulatedCriterion::Output => now.cost,
+            };
+            better = run.simulated(&candidate)?.filter(|found| found.cost <= most).map(|found| (candidate, found));
+            share *= 0.5;
+        }
+        let Some((candidate, found)) = better else { break };
+        (theta, now) = (candidate, found);
+    }
+    let simulations = run.simulations;
+    let solution = solve(&triangle, &choice, &settings.rank, &vec![0.0; columns]);
+    let variance = now.cost / (rows - choice.free.len()) as f64;
+    let small = &solution.inverse * solution.inverse.transpose() * variance;
+    let mut covariance = DMatrix::zeros(columns, columns);
+    for (a, &i) in choice.free.iter().enumerate() {
+        for (b, &j) in choice.free.iter().enumerate() {
+            covariance[(i, j)] = small[(a, b)];
+        }
+    }
+    let std: Vec<f64> = covariance.diagonal().iter().map(|variance: &f64| variance.sqrt()).collect();
+    if let Some(k) = (0..columns).find(|&k| !(theta[k].is_finite() && std[k].is_finite())) {
+        return Err(EstimationError::Overflow { name: problem.names[k].clone() }.into());
+    }
+    let rank = report(&triangle, &choice, &settings.rank, &problem.names, &problem.start);
+    let status = if !converged {
+        EstimateStatus::IterationLimit
+    } else if rank.fixed.is_empty() {
+        EstimateStatus::Complete
+    } else {
+        EstimateStatus::NotAllExcited
+    };
+    Ok(SimulatedEstimate {
+        names: problem.names.clone(),
+        values: theta.iter().copied().collect(),
+        covariance,
+        std,
+        cost: now.cost,
+        iterations,
+        simulations,
+        status,
+        rank,
+        jacobian: last_jacobian,
+        residual: last_residual,
+    })
+}
+
+impl SimulatedProblem {
+    fn validate(&self) -> Result<(), EstimationError> {
+        expect("starting values", self.names.len(), self.start.len())?;
+        expect("scales", self.names.len(), self.scale.len())?;
+        expect("noise of rows", self.measured.len(), self.noise_std.len())?;
+        let usable = |setting, values: &[f64], positive: bool, mend| {
+            let bad = values.iter().find(|value| !value.is_finite() || positive && **value <= 0.0);
+            bad.map_or(Ok(()), |&value| Err(EstimationError::Setting { setting, value, mend }))
+        };
+        usable("start", &self.start, false, "give finite values")?;
+        usable("scale", &self.scale, true, "give each parameter's ordinary size, greater than zero")?;
+        usable("noise_std", self.noise_std.as_slice(), true, "give deviations greater than zero")?;
+        usable("measured", self.measured.as_slice(), false, "leave out rows that were not measured")
+    }
+}
+
+/// How much a step of DIDIM may raise the cost: with noise in the torque its fixed point lies beside the least cost by a part of an error bar.
+const DIDIM_RISE: f64 = 1.05;
+
+struct Run<'a, S> {
+    problem: &'a SimulatedProblem,
+    simulation: &'a mut S,
+    simulations: usize,
+}
+
+struct Simulated {
+    rows: SimulatedRows,
+    cost: f64,
+}
+
+impl<S: SimulatedMotion> Run<'_, S> {
+    fn simulated(&mut self, theta: &DVector<f64>) -> Result<Option<Simulated>, S::Error> {
+        self.simulations += 1;
+        let Some(rows) = self.simulation.simulate(theta.as_slice())? else { return Ok(None) };
+        let measured = &self.problem.measured;
+        expect("rows of the simulation", measured.len(), rows.output.len())?;
+        let cost = (measured - &rows.output).component_div(&self.problem.noise_std).norm_squared();
+        Ok(cost.is_finite().then_some(Simulated { rows, cost }))
+    }
+
+    /// Central differences; one-sided where one side cannot be simulated, zero where neither can.
+    fn jacobian(&mut self, theta: &DVector<f64>, now: &Simulated, relative: f64) -> Result<DMatrix<f64>, S::Error> {
+        let mut jacobian = DMatrix::zeros(self.problem.measured.len(), theta.len());
+        for k in 0..theta.len() {
+            let h = relative * self.problem.scale[k];
+            let mut side = |sign: f64| {
+                let mut at = theta.clone();
+                at[k] += sign * h;
+                self.simulated(&at)
+            };
+            let (above, below) = (side(1.0)?, side(-1.0)?);
+            let width = h * (f64::from(above.is_some()) + f64::from(below.is_some()));
+            if width > 0.0 {
+                let above = above.as_ref().map_or(&now.rows.output, |s| &s.rows.output);
+                let below = below.as_ref().map_or(&now.rows.output, |s| &s.rows.output);
+                jacobian.set_column(k, &((above - below) / width));
+            }
+        }
+        Ok(jacobian)
+    }
+}

@@ -1,0 +1,184 @@
+//! An estimate is never a bare vector: values with covariance, the noise found, and what was decided about the rank.
+
+use super::covariance::{CovarianceMethod, Fit, covariances};
+use super::distributions::student_half_width;
+use crate::error::EstimationError;
+use crate::factor::{RankReport, RankSettings, Solution, Split, StackedProblem, TriangularFactor, report};
+use nalgebra::DMatrix;
+use serde::{Serialize, Serializer, ser::SerializeSeq};
+
+/// How an estimator ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EstimateStatus {
+    /// All columns were estimated.
+    Complete,
+    /// Some columns are not excited by the data; they were fixed (see [`RankReport::fixed`]) and the others estimated.
+    NotAllExcited,
+    /// The iterations stopped at their limit before the weights settled.
+    IterationLimit,
+}
+
+/// What a linear estimator found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Names of the columns.
+    pub names: Vec<String>,
+    /// One value per column; a fixed column has its fallback value.
+    pub values: Vec<f64>,
+    /// Covariance of the values by the chosen method; zero rows and columns for fixed columns, which were not estimated.
+    #[serde(serialize_with = "rows_of")]
+    pub covariance: DMatrix<f64>,
+    /// Covariance if errors were independent from sample to sample.
+    #[serde(serialize_with = "rows_of")]
+    pub covariance_white: DMatrix<f64>,
+    /// The method behind `covariance`.
+    pub covariance_method: CovarianceMethod,
+    /// Clusters behind `covariance` (0 for the white one).
+    pub clusters: usize,
+    /// Square roots of the diagonal of `covariance`.
+    pub std: Vec<f64>,
+    /// How many independent squares the variance of each value was found from (Satterthwaite's degrees of freedom; N − p for white errors). With few, an interval is wider than 1.96 std.
+    pub std_freedom: Vec<f64>,
+    /// Half the width of the 95 % interval: `t₀.₉₇₅(std_freedom) · std`; zero for fixed columns.
+    pub half_width_95: Vec<f64>,
+    /// `100 std / |value|`; none for a fixed column or a value of zero.
+    pub relative_std_percent: Vec<Option<f64>>,
+    /// How the estimator ended.
+    pub status: EstimateStatus,
+    /// Solutions made: 1 for ordinary least squares.
+    pub iterations: usize,
+    /// For every joint the standard deviation of its residual, `√(RSS_j / (N_j − p/n))`, in N m (N for a prismatic joint).
+    pub joint_sigma: Vec<f64>,
+    /// For every joint how much larger the squared segment scores are than under white noise: about (1+ρ)/(1−ρ) for residuals with lag-1
+    /// correlation ρ, against slowly changing columns and in long segments.
+    pub score_inflation: Vec<f64>,
+    /// The ρ for which `score_inflation` is (1+ρ)/(1−ρ): an effective lag-1 correlation, between −1 and 1. It is what matters for the
+    /// error bars, and lower than the residual's own where the columns alternate fast.
+    pub effective_lag1: Vec<f64>,
+    /// For every joint the correlation between the scores of neighbouring segments, Σ s_gᵀA⁻¹s_{g+1} / Σ s_gᵀA⁻¹s_g. Above 0.2 or so the
+    /// segments are too short for the correlation of the residuals, and error bars still too small: use fewer, longer segments.
+    pub segment_correlation: Vec<f64>,
+    /// Rank decisions.
+    pub rank: RankReport,
+    /// N − p: all rows less the estimated columns.
+    pub degrees_of_freedom: usize,
+    /// Condition of the (weighted) rows in the estimated columns as they are; depends on units.
+    pub condition_number_raw: f64,
+    /// The same after each column was divided by its norm.
+    pub condition_number_scaled: f64,
+}
+
+/// All that an estimator decided, before uncertainty is put on it.
+pub(crate) struct Fitted {
+    pub(crate) triangle: TriangularFactor,
+    pub(crate) split: Split,
+    pub(crate) solution: Solution,
+    pub(crate) weights: Vec<f64>,
+    pub(crate) joint_sigma: Vec<f64>,
+    /// Variance of the weighted rows under white noise.
+    pub(crate) weighted_variance: f64,
+    pub(crate) iterations: usize,
+    pub(crate) converged: bool,
+}
+
+impl Fitted {
+    pub(crate) fn into_estimate(
+        self,
+        stacked: &StackedProblem<'_>,
+        rank: &RankSettings,
+        method: CovarianceMethod,
+    ) -> Result<Estimate, EstimationError> {
+        let problem = stacked.problem;
+        let fit = Fit {
+            split: &self.split,
+            solution: &self.solution,
+            weights: &self.weights,
+            joint_sigma: &self.joint_sigma,
+            weighted_variance: self.weighted_variance,
+            rows: self.triangle.rows(),
+        };
+        let covariances = covariances(stacked, &fit, method)?;
+        let std: Vec<f64> = covariances.chosen.diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect();
+        for (index, name) in problem.columns().iter().enumerate() {
+            let finite = self.solution.values[index].is_finite()
+                && covariances
+                    .chosen
+                    .row(index)
+                    .iter()
+                    .chain(covariances.white.row(index).iter())
+                    .all(|c| c.is_finite());
+            if !finite {
+                return Err(EstimationError::Overflow { name: name.clone() });
+            }
+        }
+        let relative = |(std, value): (&f64, &f64)| (*std > 0.0 && *value != 0.0).then(|| 100.0 * std / value.abs());
+        let rank = report(&self.triangle, &self.split, rank, problem.columns(), problem.fallback());
+        let status = if !self.converged {
+            EstimateStatus::IterationLimit
+        } else if rank.fixed.is_empty() {
+            EstimateStatus::Complete
+        } else {
+            EstimateStatus::NotAllExcited
+        };
+        Ok(Estimate {
+            names: problem.columns().to_vec(),
+            half_width_95: std
+                .iter()
+                .zip(&covariances.freedom)
+                .map(|(s, f)| student_half_width(0.95, *f) * s)
+                .collect(),
+            std_freedom: covariances.freedom,
+            relative_std_percent: std.iter().zip(&self.solution.values).map(relative).collect(),
+            std,
+            covariance: covariances.chosen,
+            covariance_white: covariances.white,
+            covariance_method: method,
+            clusters: covariances.clusters,
+            status,
+            iterations: self.iterations,
+            joint_sigma: self.joint_sigma,
+            effective_lag1: covariances.inflation.iter().map(|v| (v - 1.0) / (v + 1.0)).collect(),
+            score_inflation: covariances.inflation,
+            segment_correlation: covariances.neighbours,
+            degrees_of_freedom: self.triangle.rows() - self.split.free.len(),
+            condition_number_raw: rank.condition_number_raw,
+            condition_number_scaled: rank.condition_number_scaled,
+            rank,
+            values: self.solution.values,
+        })
+    }
+}
+
+/// Checks that all rows together and each joint's share leave freedom for the noise, and gives `N_j − p/n` for every joint.
+pub(crate) fn joint_freedom(stacked: &StackedProblem<'_>, free: usize) -> Result<Vec<f64>, EstimationError> {
+    let problem = stacked.problem;
+    let rows = problem.joint_rows();
+    let all: usize = rows.iter().sum();
+    if all == 0 || problem.joints().is_empty() {
+        return Err(EstimationError::Empty);
+    }
+    if all <= free {
+        return Err(EstimationError::TooFewRows { what: "all joints".into(), rows: all, parameters: free as f64 });
+    }
+    let share = free as f64 / rows.len() as f64;
+    rows.iter()
+        .zip(problem.joints())
+        .map(|(&rows, joint)| {
+            let freedom = rows as f64 - share;
+            if freedom > 0.0 {
+                Ok(freedom)
+            } else {
+                Err(EstimationError::TooFewRows { what: format!("joint {joint}"), rows, parameters: share })
+            }
+        })
+        .collect()
+}
+
+fn rows_of<S: Serializer>(matrix: &DMatrix<f64>, serializer: S) -> Result<S::Ok, S::Error> {
+    let mut rows = serializer.serialize_seq(Some(matrix.nrows()))?;
+    for row in matrix.row_iter() {
+        rows.serialize_element(&row.iter().copied().collect::<Vec<f64>>())?;
+    }
+    rows.end()
+}

@@ -1,0 +1,16 @@
+//! Physically consistent parameters: the bodies and friction that a robot can have (positive masses, pseudo-inertias positive definite, friction that
+//! takes energy out) and that explain the data best.
+//!
+//! [`consistent_parameters`] goes from the factors of an estimate to all parameters, [`nearest_consistent_parameters`] from an estimate of another kind;
+//! [`ConsistencySettings`] says what is known of the bodies beforehand.
+
+mod error;
+mod problem;
+mod settings;
+
+pub use error::ConsistencyError;
+pub use problem::{
+    consistency_problem, consistent_parameters, inconsistent_nominal_bodies, nearest_consistent_parameters,
+    typical_length_m,
+};
+pub use settings::{BodyKnowledge, ConsistencySettings, EllipsoidSettings};

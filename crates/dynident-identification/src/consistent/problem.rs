@@ -1,0 +1,152 @@
+//! From the factors of an estimate to physically consistent parameters of all bodies and terms.
+
+use super::error::ConsistencyError;
+use super::settings::{ConsistencySettings, EllipsoidSettings};
+use dynident_dynamics::ParametricModel;
+use dynident_estimation::LinearProblem;
+use dynident_estimation::consistent::{
+    BaseMap, Ellipsoid, PhysicalBody, PhysicalFit, PhysicalProblem, PhysicalScalar, physical_fit, rough_body,
+};
+use dynident_model::laws::Law;
+use dynident_model::{InertialParameters, Model};
+
+/// A joint's noise counts as at least this share of its torque's root mean square: no model is better, and with noise-free (simulated) torque the prior would
+/// otherwise vanish beside the data in double precision.
+const LEAST_RELATIVE_SIGMA: f64 = 1.0e-4;
+
+/// Share of a rough body that is mixed into a description's: bodies drawn as rods or plates have no extent at all in some direction.
+const ROUGH_SHARE: f64 = 1.0e-2;
+
+/// The possible set of parameters that fits the data best, from the factors that an estimate was made from and the noise of its joints (standard deviations, Nm); otherwise the reason why there is
+/// none. See [`physical_fit`].
+///
+/// # Errors
+/// In words: limits that exclude each other, a prior that is no possible body, names that are not there, numbers that are not finite.
+pub fn consistent_parameters(
+    robot: &ParametricModel,
+    problem: &LinearProblem,
+    joint_sigma: &[f64],
+    settings: &ConsistencySettings,
+) -> Result<PhysicalFit, ConsistencyError> {
+    let problem = consistency_problem(robot, problem, joint_sigma, settings)?;
+    Ok(physical_fit(&problem, &settings.fit())?)
+}
+
+/// The possible set of parameters whose base parameters are nearest to `theta` in the data's own metric: for estimates that are not those of least squares on the same factors.
+///
+/// # Errors
+/// As [`possible_parameters`].
+pub fn nearest_consistent_parameters(
+    robot: &ParametricModel,
+    problem: &LinearProblem,
+    joint_sigma: &[f64],
+    settings: &ConsistencySettings,
+    theta: &[f64],
+) -> Result<PhysicalFit, ConsistencyError> {
+    let problem = consistency_problem(robot, problem, joint_sigma, settings)?;
+    let around = problem.around(theta)?;
+    Ok(physical_fit(&around, &settings.fit())?)
+}
+
+/// Bodies that the description says are impossible: a rough body stands in for each as a prior unless the settings name another. Names with the least eigenvalue of the pseudo-inertia, kg m².
+pub fn inconsistent_nominal_bodies(robot: &ParametricModel, settings: &ConsistencySettings) -> Vec<(String, f64)> {
+    let bodies = robot.model().bodies().iter().enumerate();
+    let stated = bodies.filter(|(_, body)| {
+        let own = settings.bodies.get(body.name());
+        body.prior().is_some() && own.is_none_or(|own| own.prior.is_none() && own.known.is_none())
+    });
+    stated
+        .filter_map(|(index, body)| {
+            let (possible, least) = consistent_body(&robot.nominal()[10 * index..10 * index + 10]);
+            (!possible).then(|| (body.name().to_owned(), least))
+        })
+        .collect()
+}
+
+/// Whether ten parameters are those of a possible body, or of one that is as thin as a plate; and the least eigenvalue of their pseudo-inertia.
+fn consistent_body(own: &[f64]) -> (bool, f64) {
+    let stated = InertialParameters(core::array::from_fn(|k| own[k]));
+    let least = stated.pseudo_inertia().symmetric_eigenvalues().min();
+    (stated.mass_kg() > 0.0 && least >= -1.0e-9 * stated.mass_kg(), least)
+}
+
+/// What is asked of the machine's bodies and laws: what [`possible_parameters`] solves.
+///
+/// # Errors
+/// As [`possible_parameters`].
+pub fn consistency_problem(
+    robot: &ParametricModel,
+    problem: &LinearProblem,
+    joint_sigma: &[f64],
+    settings: &ConsistencySettings,
+) -> Result<PhysicalProblem, ConsistencyError> {
+    let (model, laws, base, prior) = (robot.model(), robot.laws(), robot.base(), robot.nominal());
+    settings.check_names(model, laws)?;
+    let mut squares = vec![0.0; problem.joints().len()];
+    for equation in problem.equations() {
+        squares[equation.joint] += equation.factor.total().torque_norm().powi(2);
+    }
+    let rows = problem.joint_rows();
+    let weights: Vec<f64> = joint_sigma
+        .iter()
+        .zip(squares.iter().zip(&rows))
+        .map(|(sigma, (square, &rows))| {
+            let least = LEAST_RELATIVE_SIGMA * (square / rows.max(1) as f64).sqrt();
+            let sigma = sigma.max(least);
+            if sigma > 0.0 { 1.0 / sigma } else { 1.0 }
+        })
+        .collect();
+    let factor = problem.combined(&weights)?;
+    let map = BaseMap::from_regrouping(base.independent(), base.dependent(), base.regrouping())?;
+    let length = typical_length_m(model);
+    let masses: Vec<f64> = (0..model.dof()).map(|body| prior[10 * body]).filter(|&mass| mass > 0.0).collect();
+    let mean_mass = if masses.is_empty() { 1.0 } else { masses.iter().sum::<f64>() / masses.len() as f64 };
+    let bodies = model.bodies().iter().enumerate().map(|(index, body)| {
+        let own = &prior[10 * index..10 * index + 10];
+        let knowledge = settings.bodies.get(body.name()).cloned().unwrap_or_default();
+        let reference = knowledge.prior.unwrap_or_else(|| {
+            if consistent_body(own).0 {
+                let rough = rough_body(own[0], length);
+                core::array::from_fn(|k| own[k] + ROUGH_SHARE * rough[k])
+            } else {
+                rough_body(mean_mass, length)
+            }
+        });
+        let inside = |ellipsoid: EllipsoidSettings| Ellipsoid {
+            centre_m: ellipsoid.centre_m,
+            semi_axes_m: ellipsoid.semi_axes_m,
+        };
+        PhysicalBody {
+            name: body.name().to_owned(),
+            reference,
+            known: knowledge.known,
+            mass_kg: knowledge.mass_kg,
+            com_box_m: knowledge.com_box_m,
+            inside: knowledge.inside.map(inside),
+        }
+    });
+    let scalars = laws.iter().zip(&prior[10 * model.dof()..]).map(|(law, &value)| {
+        let bounded = law.is_nonnegative();
+        let own = settings.laws.get(&law.symbol());
+        let scale = if matches!(law, Law::DriveInertia(_)) { mean_mass * length * length } else { 1.0 };
+        let lower = own.map(|limits| limits[0]);
+        PhysicalScalar {
+            name: law.symbol(),
+            lower: if bounded { Some(lower.unwrap_or(0.0).max(0.0)) } else { lower },
+            upper: own.map(|limits| limits[1]),
+            prior: if bounded { value.max(0.0) } else { value },
+            scale,
+        }
+    });
+    let described = PhysicalProblem::new(map, bodies.collect(), scalars.collect(), &factor)?;
+    match settings.total_mass_kg {
+        Some(limits) => Ok(described.with_total_mass_kg(limits)?),
+        None => Ok(described),
+    }
+}
+
+/// A length that the machine's links have: the mean distance between successive joints, at least a centimetre.
+pub fn typical_length_m(model: &Model) -> f64 {
+    let lengths: Vec<f64> = model.joints().iter().map(|joint| joint.placement.translation.norm()).collect();
+    (lengths.iter().sum::<f64>() / lengths.len().max(1) as f64).max(0.01)
+}

@@ -1,0 +1,230 @@
+//! Robots, records and the policy together.
+
+use crate::error::IterationError;
+use crate::estimate::identify_run;
+use crate::leg::IterationTask;
+use crate::policy::{self, Next, RunPlan};
+use crate::record::{ModelParameters, RunRecord, UsedController};
+use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest};
+use crate::settings::IterationSettings;
+use crate::status::IterationStatus;
+use crate::store::IterationStore;
+use dynident_simulation::Record;
+use dynident_simulation::controllers::ControllerModel;
+use dynident_simulation::{SimulationError, require_length};
+
+/// A torque this much above a limit is no matter of rounding or of the model's last digits.
+const BEYOND: f64 = 1.001;
+
+/// A task with its settings: what [`iterate()`] does.
+#[derive(Clone, Debug)]
+pub struct Iteration {
+    task: IterationTask,
+    settings: IterationSettings,
+}
+
+/// How an iteration went.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IterationOutcome {
+    /// How it ended.
+    pub status: IterationStatus,
+    /// Every run.
+    pub runs: Vec<RunRecord>,
+}
+
+/// What came of a plan.
+enum Made {
+    Run(Box<RunRecord>, Vec<RobotRun>),
+    Stopped(IterationStatus),
+}
+
+impl Iteration {
+    /// The iteration of a task.
+    ///
+    /// # Errors
+    /// As [`IterationTask::validate`] and [`IterationSettings::validate`].
+    pub fn new(task: IterationTask, settings: IterationSettings) -> Result<Self, SimulationError> {
+        task.validate()?;
+        settings.validate(task.machine.dof())?;
+        Ok(Self { task, settings })
+    }
+
+    /// The task.
+    pub fn task(&self) -> &IterationTask {
+        &self.task
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &IterationSettings {
+        &self.settings
+    }
+
+    /// What comes after these records: it depends on nothing else.
+    pub fn next(&self, records: &[RunRecord]) -> Next {
+        let next = policy::next(records, &self.settings, self.task.machine.nominal());
+        if let Next::Finished(IterationStatus::Converged | IterationStatus::RunsUsedUp) = next
+            && let Some(reason) = self.beyond_torque(records)
+        {
+            return Next::Finished(IterationStatus::Refused { reason });
+        }
+        next
+    }
+
+    /// Where the trajectories ask for more torque than the joints have, by the last good model.
+    fn beyond_torque(&self, records: &[RunRecord]) -> Option<String> {
+        let limits = self.task.torque_limits.as_ref()?;
+        let estimate = records.iter().rev().find(|record| record.accepted)?.estimate.as_ref()?;
+        let mut model = self.controller_model(&estimate.for_controller()?).ok()?;
+        let dof = self.task.machine.dof();
+        let mut tau = vec![0.0; dof];
+        for leg in &self.task.legs {
+            let (motion, rate_hz) = (leg.reference().motion(), leg.reference().rate_hz());
+            for sample in 0..motion.samples {
+                let at = |values: &[f64]| -> Vec<f64> {
+                    (0..dof).map(|joint| values[joint * motion.samples + sample]).collect()
+                };
+                model.reference_torque(&at(&motion.q), &at(&motion.dq), &at(&motion.ddq), &mut tau);
+                for (joint, (tau, limit)) in tau.iter().zip(limits).enumerate() {
+                    if tau.abs() > limit * BEYOND {
+                        let name = &self.task.machine.model().joints()[joint].name;
+                        return Some(format!(
+                            "the trajectory asks joint {name} for {:.3} Nm at {:.2} s by the model found, its limit is {limit:.3} Nm: give another trajectory",
+                            tau.abs(),
+                            sample as f64 / rate_hz
+                        ));
+                    }
+                }
+            }
+        }
+        None
+    }
+
+    /// The model of a controller with these parameters.
+    ///
+    /// # Errors
+    /// Parameters of another machine.
+    pub fn controller_model(&self, parameters: &ModelParameters) -> Result<ControllerModel, SimulationError> {
+        let machine = &self.task.machine;
+        match parameters {
+            ModelParameters::All(values) => ControllerModel::from_parameters(machine.model(), machine.laws(), values),
+            ModelParameters::Base(values) => {
+                ControllerModel::from_columns(machine.model(), &machine.base().base_columns(), values)
+            }
+        }
+    }
+
+    /// Makes one run: every leg on its robot, then the identification.
+    fn made(
+        &self,
+        robots: &mut [&mut dyn Robot],
+        plan: &RunPlan,
+        before: &[RunRecord],
+    ) -> Result<Made, IterationError> {
+        let legs = &self.task.legs;
+        let controller = plan.controller(&self.settings);
+        let model = plan.model.as_ref().map(|parameters| self.controller_model(parameters)).transpose()?;
+        let mut runs: Vec<RobotRun> = Vec::with_capacity(legs.len());
+        for (number, leg) in legs.iter().enumerate() {
+            let robot = if robots.len() == 1 { &mut robots[0] } else { &mut robots[number] };
+            // Numbers of runs differ from leg to leg: noise and folders go by them.
+            let run = (plan.run - 1) * legs.len() + number + 1;
+            let reference = leg.reference();
+            let came = robot.run(&RunRequest { run, reference, controller: &controller, model: model.as_ref() })?;
+            match &came.status {
+                RobotStatus::Waiting { .. } => {
+                    let reason = came.status.to_string();
+                    return Ok(Made::Stopped(IterationStatus::Waiting { reason }));
+                }
+                RobotStatus::Failed { fault } => {
+                    let reason = format!("run {}: {fault}", plan.run);
+                    return Ok(Made::Stopped(IterationStatus::Refused { reason }));
+                }
+                _ => {}
+            }
+            let done = came.status.is_done();
+            runs.push(came);
+            if !done {
+                break;
+            }
+        }
+        let mut record = self.recorded(plan, controller.name(), &runs);
+        if record.done {
+            let records: Vec<Record> = runs.iter().map(|run| run.record.clone()).collect();
+            match identify_run(&self.task, &records, &self.settings.identification) {
+                Ok(estimate) => record.estimate = Some(estimate),
+                Err(error @ (IterationError::File { .. } | IterationError::State { .. })) => return Err(error),
+                Err(error) => record.reason = Some(error.to_string()),
+            }
+        }
+        match policy::verdict(&record, before, &self.settings) {
+            Ok(()) => record.accepted = true,
+            Err(reason) => record.reason = Some(reason),
+        }
+        Ok(Made::Run(Box::new(record), runs))
+    }
+
+    fn recorded(&self, plan: &RunPlan, name: &str, runs: &[RobotRun]) -> RunRecord {
+        let joints = self.task.machine.dof();
+        let mut worst = vec![0.0_f64; joints];
+        for (run, leg) in runs.iter().zip(&self.task.legs) {
+            let own = match &run.truth {
+                Some(truth) => truth.max_error.clone(),
+                None => run.max_error(leg.reference()),
+            };
+            worst.iter_mut().zip(own).for_each(|(worst, own)| *worst = worst.max(own));
+        }
+        let done = runs.len() == self.task.legs.len() && runs.iter().all(|run| run.status.is_done());
+        RunRecord {
+            run: plan.run,
+            controller: UsedController {
+                name: name.to_owned(),
+                model: plan.model.clone(),
+                damping: plan.damping,
+                stiffness: plan.stiffness,
+            },
+            done,
+            outcome: runs.last().map_or_else(String::new, |run| run.status.to_string()),
+            max_tracking_error_rad: worst,
+            accepted: false,
+            reason: None,
+            estimate: None,
+        }
+    }
+}
+
+/// Runs, identifies and runs again until all has settled: the first run by a controller without a model or by the prior, then by the model-based controller with the newest estimate. A run that got
+/// worse (its tracking, a broken limit, divergence) is rejected: the step from the last good parameters to the new ones is halved, and if that does not help the controller without a model comes
+/// back, stiffer.
+///
+/// `robots` holds one robot for all legs, or one for each. With a `store`, runs that it holds are not made again, and each new one is kept before the next begins. `watch` hears of every new run.
+///
+/// # Errors
+/// Settings that do not fit, files that cannot be written. What the robot does wrong is in the records and in the status.
+pub fn iterate(
+    iteration: &Iteration,
+    robots: &mut [&mut dyn Robot],
+    store: Option<&IterationStore>,
+    watch: &mut dyn FnMut(&RunRecord, &[RobotRun]),
+) -> Result<IterationOutcome, IterationError> {
+    let legs = iteration.task.legs.len();
+    if robots.len() != 1 {
+        require_length("robots", legs, robots.len())?;
+    }
+    let mut records = store.map_or_else(|| Ok(Vec::new()), IterationStore::records)?;
+    loop {
+        let plan = match iteration.next(&records) {
+            Next::Run(plan) => plan,
+            Next::Finished(status) => return Ok(IterationOutcome { status, runs: records }),
+        };
+        match iteration.made(robots, &plan, &records)? {
+            Made::Stopped(status) => return Ok(IterationOutcome { status, runs: records }),
+            Made::Run(record, runs) => {
+                if let Some(store) = store {
+                    store.keep(&record, &runs)?;
+                }
+                watch(&record, &runs);
+                records.push(*record);
+            }
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! From a record to the motion that regressors take.
+
+use crate::error::IterationError;
+use crate::leg::Leg;
+use crate::settings::RunIdentificationSettings;
+use core::ops::Range;
+use dynident_recording::{Derivatives, DifferentiatorSettings, Place, cutoff};
+use dynident_simulation::Record;
+
+/// Times of a record count as uniform up to this share of their step.
+const UNIFORM: f64 = 1e-6;
+
+/// Positions, speeds and accelerations of a run, with torques, on a uniform clock; joint-major.
+#[derive(Clone, Debug)]
+pub struct MeasuredMotion {
+    /// Samples a second.
+    pub rate_hz: f64,
+    /// Time of the first sample, s.
+    pub first_time_s: f64,
+    /// Samples of each joint.
+    pub samples: usize,
+    /// Positions, rad (m), as the differentiator filtered them.
+    pub q: Vec<f64>,
+    /// Speeds.
+    pub dq: Vec<f64>,
+    /// Accelerations.
+    pub ddq: Vec<f64>,
+    /// Torques in force at the samples' instants, Nm (N).
+    pub tau: Vec<f64>,
+    /// Per sample: whether the differentiator applies to all joints there.
+    pub usable: Vec<bool>,
+}
+
+impl MeasuredMotion {
+    /// Time of a sample, s.
+    pub fn time_s(&self, sample: usize) -> f64 {
+        self.first_time_s + sample as f64 / self.rate_hz
+    }
+}
+
+/// Differentiates a record along `leg`. Where the record's times are not uniform, positions and torques are taken between samples by straight lines. Torques held from a sample to the next count at a
+/// sample's instant as the mean of the values before and after, less a twelfth of its second difference (the acceleration jumps there, and positions see both steps).
+///
+/// # Errors
+/// A record of other joints or of too few samples, a differentiator that does not exist at its rate or lacks what it needs.
+pub fn measured_motion(
+    record: &Record,
+    leg: &Leg,
+    settings: &RunIdentificationSettings,
+) -> Result<MeasuredMotion, IterationError> {
+    let joints = record.joints.len();
+    let wrong = |problem: String| IterationError::Record { joints: record.joints.clone(), problem };
+    if joints != leg.reference().joints() {
+        return Err(wrong(format!("the trajectory has {} joints", leg.reference().joints())));
+    }
+    if record.samples < 4 {
+        return Err(wrong(format!("{} samples are too few to differentiate", record.samples)));
+    }
+    let (q, tau) = (on_uniform_clock(record, &record.q), on_uniform_clock(record, &record.tau));
+    let samples = record.samples;
+    let rate_hz = (samples - 1) as f64 / (record.times_s[samples - 1] - record.times_s[0]);
+    if !(rate_hz.is_finite() && rate_hz > 0.0) {
+        return Err(wrong("its times do not increase".to_owned()));
+    }
+    // The nominal rate where the times are its own: their last digits are not to matter.
+    let rate_hz = if (rate_hz / record.rate_hz - 1.0).abs() < UNIFORM { record.rate_hz } else { rate_hz };
+    let first_time_s = record.times_s[0];
+    let differentiator = differentiator(&settings.differentiator, &q, joints, rate_hz)
+        .build_following(0.1 * rate_hz, Some(leg.commanded()))?;
+    if samples < differentiator.minimum_samples() {
+        return Err(wrong(format!(
+            "{samples} samples are too few for {}, which needs {}",
+            differentiator.name(),
+            differentiator.minimum_samples()
+        )));
+    }
+    let empty = || vec![0.0; joints * samples];
+    let mut motion = MeasuredMotion {
+        rate_hz,
+        first_time_s,
+        samples,
+        q: empty(),
+        dq: empty(),
+        ddq: empty(),
+        tau: empty(),
+        usable: vec![true; samples],
+    };
+    for joint in 0..joints {
+        let own = joint * samples..(joint + 1) * samples;
+        let out = Derivatives {
+            q: &mut motion.q[own.clone()],
+            dq: &mut motion.dq[own.clone()],
+            ddq: &mut motion.ddq[own.clone()],
+        };
+        let unusable: Vec<Range<usize>> =
+            differentiator.differentiate_at(Place { rate_hz, joint, first_time_s }, &q[own.clone()], out)?;
+        // A joint that nobody asks anything of where it rests does not spoil the rows of the others.
+        for sample in unusable.into_iter().flatten() {
+            motion.usable[sample] = false;
+        }
+        let (from, to) = (&tau[own.clone()], &mut motion.tau[own]);
+        to.copy_from_slice(from);
+        if settings.held_torque {
+            for sample in 2..samples - 1 {
+                to[sample] = held_torque(from, sample);
+            }
+        }
+    }
+    if settings.held_torque {
+        // The torques before and after are not known there.
+        for sample in [0, 1, samples - 1] {
+            motion.usable[sample] = false;
+        }
+    }
+    let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
+    if [&motion.q, &motion.dq, &motion.ddq, &motion.tau].into_iter().any(|values| !finite(values)) {
+        return Err(wrong("it holds numbers that are not finite".to_owned()));
+    }
+    Ok(motion)
+}
+
+/// The torque at a sample's instant of which the smooth curve through the positions is the motion, where torques u are held from each sample to the next.
+///
+/// With I q̈ + G(q) = u, second differences of the positions see the mean `ū` of the two values and G over the triangle of both steps:
+/// `I δ²q/h² + G + h² G''/12 = ū`. With `δ²q/h² = q̈ + h² q⁗/12` that is `ū - h²/12 (I q⁗ + G'') = ū - δ²ū/12`, exact to h⁴: without it the paper's arm at 1 kHz is 2e-6 off.
+fn held_torque(u: &[f64], sample: usize) -> f64 {
+    (13.0 * (u[sample - 1] + u[sample]) - u[sample - 2] - u[sample + 1]) / 24.0
+}
+
+/// The settings with a cut-off from the data, where they leave it open.
+fn differentiator(settings: &DifferentiatorSettings, q: &[f64], joints: usize, rate_hz: f64) -> DifferentiatorSettings {
+    if !settings.wants_cutoff() {
+        return settings.clone();
+    }
+    let columns: Vec<&[f64]> = q.chunks_exact(q.len() / joints.max(1)).collect();
+    settings.clone().with_cutoff(cutoff(&columns, rate_hz).cutoff_hz)
+}
+
+/// The values at as many equal steps from the first time to the last.
+fn on_uniform_clock(record: &Record, values: &[f64]) -> Vec<f64> {
+    let (samples, times) = (record.samples, &record.times_s);
+    let step = (times[samples - 1] - times[0]) / (samples - 1) as f64;
+    let uniform = times.iter().enumerate().all(|(k, t)| (t - times[0] - k as f64 * step).abs() <= UNIFORM * step);
+    if uniform {
+        return values.to_vec();
+    }
+    let mut out = Vec::with_capacity(values.len());
+    for own in values.chunks_exact(samples) {
+        let mut before = 0;
+        for k in 0..samples {
+            let time = times[0] + k as f64 * step;
+            while before + 2 < samples && times[before + 1] <= time {
+                before += 1;
+            }
+            let share = ((time - times[before]) / (times[before + 1] - times[before])).clamp(0.0, 1.0);
+            out.push(own[before] + share * (own[before + 1] - own[before]));
+        }
+    }
+    out
+}

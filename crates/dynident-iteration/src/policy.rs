@@ -1,0 +1,183 @@
+//! What the next run is: a pure function of the records so far.
+
+use crate::estimate::RunEstimate;
+use crate::record::{ModelParameters, RunRecord};
+use crate::settings::{IterationSettings, StartWith};
+use crate::status::IterationStatus;
+use dynident_simulation::PerJoint;
+use dynident_simulation::controllers::{ControllerSettings, JointPdSettings, JointPidSettings};
+
+/// A good run's estimate with error bars this many times wider than an earlier one's does not take its place.
+const FAR_WIDER: f64 = 3.0;
+
+/// A rejected run's estimate takes the place of a good one's where its error bars are this many times as wide.
+const CLEARLY_NARROWER: f64 = 0.5;
+
+/// What comes next.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Next {
+    /// A run.
+    Run(RunPlan),
+    /// Nothing.
+    Finished(IterationStatus),
+}
+
+/// A run to be made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunPlan {
+    /// Its number, from 1.
+    pub run: usize,
+    /// The model of its controller; none for the controller without a model.
+    pub model: Option<ModelParameters>,
+    /// Share of the step from the last good parameters to the new ones.
+    pub damping: f64,
+    /// Factor of the gains of the controller without a model.
+    pub stiffness: f64,
+}
+
+impl RunPlan {
+    fn with_model(run: usize, model: ModelParameters, damping: f64) -> Self {
+        Self { run, model: Some(model), damping, stiffness: 1.0 }
+    }
+
+    /// The controller's settings.
+    pub fn controller(&self, settings: &IterationSettings) -> ControllerSettings {
+        if self.model.is_some() {
+            let first = settings.first.as_ref().filter(|_| self.run == 1);
+            return first.unwrap_or(&settings.controller).clone();
+        }
+        stiffened(&settings.model_free, self.stiffness)
+    }
+}
+
+/// The run after `records`, or how the iteration has ended. `prior` is what the machine is believed to be before any run.
+pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &[f64]) -> Next {
+    let run = records.len() + 1;
+    let model_free = |stiffness| Next::Run(RunPlan { run, model: None, damping: 1.0, stiffness });
+    let Some(last) = records.last() else {
+        return match settings.start {
+            StartWith::ModelFree => model_free(1.0),
+            StartWith::Prior => Next::Run(RunPlan::with_model(run, ModelParameters::All(prior.to_vec()), 1.0)),
+        };
+    };
+    let newest = model_of(last);
+    if settled(records, settings) {
+        return Next::Finished(IterationStatus::Converged);
+    }
+    if !settings.reject {
+        return match newest {
+            _ if run > settings.max_runs => Next::Finished(IterationStatus::RunsUsedUp),
+            Some(model) if last.done => Next::Run(RunPlan::with_model(run, model, 1.0)),
+            _ => Next::Finished(IterationStatus::Refused { reason: failed(last) }),
+        };
+    }
+    let free_failures = records.iter().filter(|record| record.controller.model.is_none() && !record.accepted).count();
+    if free_failures >= settings.most_model_free {
+        return Next::Finished(IterationStatus::Refused { reason: failed(last) });
+    }
+    if run > settings.max_runs {
+        return Next::Finished(IterationStatus::RunsUsedUp);
+    }
+    // A model that was tried and rejected is not tried again.
+    let untried = |model: &ModelParameters| {
+        !records.iter().any(|record| !record.accepted && record.controller.model.as_ref() == Some(model))
+    };
+    let trusted = most_trusted(records).and_then(model_of);
+    if let Some(model) = trusted.into_iter().chain(newest.filter(|_| last.accepted)).find(untried) {
+        return Next::Run(RunPlan::with_model(run, model, 1.0));
+    }
+    // Rejected: back towards the last good model, as long as there is one to go back to.
+    let since = records.iter().rposition(|record| record.accepted).map_or(0, |place| place + 1);
+    let rejected = &records[since..];
+    let good = records[..since].iter().rev().find_map(|record| record.controller.model.clone());
+    let new = rejected.first().and_then(|record| record.controller.model.clone());
+    let halvings = rejected.len();
+    if let (Some(good), Some(new)) = (good, new)
+        && halvings <= settings.most_halvings
+        && rejected.iter().all(|record| record.controller.model.is_some())
+    {
+        let share = 0.5_f64.powi(halvings as i32);
+        return Next::Run(RunPlan::with_model(run, ModelParameters::between(&good, &new, share), share));
+    }
+    let before = records.iter().filter(|record| record.controller.model.is_none()).count();
+    model_free(settings.stiffen.powi(before as i32))
+}
+
+/// What a controller gets from a run.
+fn model_of(record: &RunRecord) -> Option<ModelParameters> {
+    record.estimate.as_ref().and_then(RunEstimate::for_controller)
+}
+
+/// The run whose estimate is worth most: the newest good one, unless its error bars are far wider than those of an earlier run; and a rejected one where its error bars are clearly narrower. Bad tracking
+/// says that the model which the run was made with is bad, not that the run tells little: a joint that is thrown about may tell more than one that hardly moves.
+fn most_trusted(records: &[RunRecord]) -> Option<&RunRecord> {
+    records.iter().filter(|record| model_of(record).is_some()).reduce(|best, record| {
+        let most = if record.accepted { FAR_WIDER } else { CLEARLY_NARROWER };
+        let (Some(old), Some(new)) = (&best.estimate, &record.estimate) else { return best };
+        if new.wider_than(old) <= most { record } else { best }
+    })
+}
+
+/// Whether a run counts as good beside those before it, and why not.
+pub(crate) fn verdict(record: &RunRecord, before: &[RunRecord], settings: &IterationSettings) -> Result<(), String> {
+    if !record.done {
+        return Err(record.outcome.clone());
+    }
+    let Some(estimate) = &record.estimate else {
+        return Err(record.reason.clone().unwrap_or_else(|| "it tells nothing of the parameters".to_owned()));
+    };
+    if let Some(reason) = &estimate.impossible {
+        return Err(format!("no possible machine fits it: {reason}"));
+    }
+    let Some(good) = before.iter().rev().find(|record| record.accepted) else { return Ok(()) };
+    let (now, then) = (record.tracking_error(), good.tracking_error());
+    let worst = (settings.worse_factor * then).max(settings.settled.tracking_tolerance);
+    // A controller without a model is what a bad one falls back to: its tracking is no reason to reject it.
+    if settings.reject && record.controller.model.is_some() && now > worst {
+        return Err(format!("it tracks worse: {now:.3e} rad after {then:.3e} rad"));
+    }
+    Ok(())
+}
+
+fn settled(records: &[RunRecord], settings: &IterationSettings) -> bool {
+    let [.., before, last] = records else { return false };
+    if !(before.accepted && last.accepted && last.controller.model.is_some() && last.controller.damping == 1.0) {
+        return false;
+    }
+    let (Some(old), Some(new)) = (&before.estimate, &last.estimate) else { return false };
+    let limits = &settings.settled;
+    let largest = new.values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    let parameters = new.values.iter().zip(&old.values).zip(new.std.iter().zip(&old.std));
+    let still = parameters.into_iter().all(|((new, old), (s, t))| {
+        // Nothing can be said to stand still that is hardly known.
+        s.max(*t) <= limits.most_uncertain * largest
+            && (new - old).abs() <= limits.parameter_sigmas * s.hypot(*t) + limits.parameter_tolerance * largest
+    });
+    let (now, then) = (last.tracking_error(), before.tracking_error());
+    still && (now <= limits.tracking_tolerance || limits.tracking_ratio * now >= then)
+}
+
+fn failed(record: &RunRecord) -> String {
+    let reason = record.reason.clone().unwrap_or_else(|| record.outcome.clone());
+    format!("run {} under {}: {reason}", record.run, record.controller.name)
+}
+
+/// Stiffness grows as `factor`, damping as its root, so that the damping ratio stays.
+fn stiffened(settings: &ControllerSettings, factor: f64) -> ControllerSettings {
+    let times = |gains: &PerJoint, by: f64| match gains {
+        PerJoint::All(gain) => PerJoint::All(by * gain),
+        PerJoint::Each(gains) => PerJoint::Each(gains.iter().map(|gain| by * gain).collect()),
+    };
+    match settings {
+        ControllerSettings::JointPd(pd) => {
+            ControllerSettings::JointPd(JointPdSettings { kp: times(&pd.kp, factor), kd: times(&pd.kd, factor.sqrt()) })
+        }
+        ControllerSettings::JointPid(pid) => ControllerSettings::JointPid(JointPidSettings {
+            kp: times(&pid.kp, factor),
+            ki: times(&pid.ki, factor),
+            kd: times(&pid.kd, factor.sqrt()),
+            ..pid.clone()
+        }),
+        other => other.clone(),
+    }
+}

@@ -1,0 +1,126 @@
+//! The files that a robot outside is handed: the trajectory with the model's torques, and the controller with its model.
+
+use super::law_description::describe;
+use super::{RobotFault, RunRequest};
+use core::fmt::Write as _;
+use dynident_model::INERTIAL_NAMES;
+use dynident_simulation::controllers::{ControllerModel, FrictionCompensation, Measured, Target};
+use dynident_simulation::{Reference, ReferenceSample};
+use serde_json::{Value, json};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Name and version of the schema of `controller.json`.
+pub const CONTROLLER_SCHEMA: &str = "dynident/controller/1";
+
+/// The reference as a table `t_s, q1.., dq1.., ddq1..`, with the torques `tau1..` that the model expects along it, if there is one: a feed-forward for controllers that have no model of their own.
+pub fn trajectory_csv(reference: &Reference, model: Option<&ControllerModel>) -> String {
+    let joints = reference.joints();
+    let mut model = model.cloned();
+    let mut text = String::from("t_s");
+    let prefixes: &[&str] = if model.is_some() { &["q", "dq", "ddq", "tau"] } else { &["q", "dq", "ddq"] };
+    for prefix in prefixes {
+        for joint in 1..=joints {
+            // Writing to a string cannot fail, here and below.
+            let _ = write!(text, ",{prefix}{joint}");
+        }
+    }
+    text.push('\n');
+    let mut sample = ReferenceSample::new(joints);
+    let mut tau = vec![0.0; joints];
+    for k in 0..reference.samples() {
+        sample.take(reference, k);
+        let Target { q, dq, ddq } = sample.target();
+        let _ = write!(text, "{}", k as f64 / reference.rate_hz());
+        for value in [q, dq, ddq].into_iter().flatten() {
+            let _ = write!(text, ",{value}");
+        }
+        if let Some(model) = &mut model {
+            let friction = FrictionCompensation::Reference;
+            model.torque(Measured { q, dq }, sample.target(), ddq, friction, &mut tau);
+            for value in &tau {
+                let _ = write!(text, ",{value}");
+            }
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// The controller's settings, the joints' order, and the model in numbers: enough to compute every torque of the controller elsewhere.
+pub fn controller_json(request: &RunRequest<'_>, joints: &[String]) -> Value {
+    json!({
+        "schema": CONTROLLER_SCHEMA,
+        "run": request.run,
+        "rate_hz": request.reference.rate_hz(),
+        "duration_s": request.reference.duration_s(),
+        "joints": joints,
+        "controller": request.controller,
+        "model": request.model.map(model_json),
+    })
+}
+
+fn model_json(model: &ControllerModel) -> Value {
+    let robot = model.model();
+    let joints: Vec<Value> = robot
+        .joints()
+        .iter()
+        .zip(robot.inertials())
+        .map(|(joint, inertial)| {
+            json!({
+                "name": joint.name,
+                "turns": joint.turns(),
+                "parent": joint.parent.map(|parent| &robot.joints()[parent].name),
+                "rotation": joint.placement.rotation.0,
+                "translation_m": joint.placement.translation.0,
+                "axis": joint.axis.0,
+                "inertial": inertial.0,
+            })
+        })
+        .collect();
+    let laws: Vec<Value> = model.laws().iter().map(|(law, value)| describe(robot, law, *value)).collect();
+    json!({
+        "gravity_m_s2": robot.gravity().0,
+        "inertial_order": INERTIAL_NAMES,
+        "joints": joints,
+        "laws": laws,
+    })
+}
+
+/// The two files of a request: where they go, and what is in them.
+fn files(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<[(PathBuf, String); 2], RobotFault> {
+    let [trajectory, controller] = ["trajectory.csv", "controller.json"].map(|name| folder.join(name));
+    let mut text = serde_json::to_string_pretty(&controller_json(request, joints))
+        .map_err(|error| RobotFault::File { path: controller.clone(), reason: error.to_string() })?;
+    text.push('\n');
+    Ok([(trajectory, trajectory_csv(request.reference, request.model)), (controller, text)])
+}
+
+/// Writes `trajectory.csv` and `controller.json` into a folder, each whole or not at all.
+pub(super) fn write(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<[PathBuf; 2], RobotFault> {
+    let [trajectory, controller] = files(request, joints, folder)?;
+    write_whole(&trajectory.0, &trajectory.1)?;
+    write_whole(&controller.0, &controller.1)?;
+    Ok([trajectory.0, controller.0])
+}
+
+/// The first file in the folder that is there and is another one.
+pub(super) fn other(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<Option<PathBuf>, RobotFault> {
+    let differs = |(path, text): &(PathBuf, String)| {
+        path.exists() && !std::fs::read_to_string(path).is_ok_and(|there| there == *text)
+    };
+    Ok(files(request, joints, folder)?.into_iter().find(differs).map(|(path, _)| path))
+}
+
+/// Writes under another name in the same folder, then renames; what is there already with the same text stays.
+fn write_whole(path: &Path, text: &str) -> Result<(), RobotFault> {
+    if std::fs::read_to_string(path).is_ok_and(|there| there == text) {
+        return Ok(());
+    }
+    let fault = |error: std::io::Error| RobotFault::File { path: path.to_owned(), reason: error.to_string() };
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(fault)?;
+    file.write_all(text.as_bytes()).and_then(|()| file.as_file().sync_all()).map_err(fault)?;
+    file.persist(path).map_err(|error| fault(error.error))?;
+    Ok(())
+}

@@ -1,0 +1,147 @@
+//! The log that a person drops: a table `t_s, q1.., tau1..`.
+
+use dynident_simulation::Record;
+use thiserror::Error;
+
+/// Largest log that is read, bytes.
+const LARGEST: u64 = 1 << 30;
+
+/// What is wrong with a log.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum LogTableError {
+    /// It cannot be read.
+    #[error("{reason}")]
+    Unreadable {
+        /// What the system says.
+        reason: String,
+    },
+    /// Its first line does not name a column.
+    #[error("line 1 has no column {column}: give {}", expected.join(","))]
+    NoColumn {
+        /// The column.
+        column: String,
+        /// All that are needed.
+        expected: Vec<String>,
+    },
+    /// A row of another length, or the last row without its end.
+    #[error("line {line}: {found} fields where the header has {expected}")]
+    Fields {
+        /// The line, from 1.
+        line: usize,
+        /// Columns of the header.
+        expected: usize,
+        /// Fields of the row.
+        found: usize,
+    },
+    /// A field that is no finite number.
+    #[error("line {line}, column {column}: `{field}` is not a finite number")]
+    NotANumber {
+        /// The line, from 1.
+        line: usize,
+        /// The column.
+        column: String,
+        /// The field.
+        field: String,
+    },
+    /// Time that does not go forward.
+    #[error("line {line}: time {time_s} s does not come after the line before")]
+    Time {
+        /// The line, from 1.
+        line: usize,
+        /// Its time.
+        time_s: f64,
+    },
+    /// No rows, or no end of the last line: it is still being written.
+    #[error("the log is not complete: {reason}")]
+    Incomplete {
+        /// What is missing.
+        reason: String,
+    },
+}
+
+/// Reads a log of the joints: columns `t_s`, `q1..`, `tau1..` by name, in any order, others ignored; seconds, rad (m), Nm (N).
+///
+/// # Errors
+/// [`LogTableError`] with the line; [`LogTableError::Incomplete`] if the last line does not end.
+pub fn read_log_table(path: &std::path::Path, joints: &[String], rate_hz: f64) -> Result<Record, LogTableError> {
+    let unreadable = |error: std::io::Error| LogTableError::Unreadable { reason: error.to_string() };
+    let size = std::fs::metadata(path).map_err(unreadable)?.len();
+    if size > LARGEST {
+        return Err(LogTableError::Unreadable { reason: "larger than a gigabyte".to_owned() });
+    }
+    parse(&std::fs::read_to_string(path).map_err(unreadable)?, joints, rate_hz)
+}
+
+fn parse(text: &str, joints: &[String], rate_hz: f64) -> Result<Record, LogTableError> {
+    let incomplete = |reason: &str| LogTableError::Incomplete { reason: reason.to_owned() };
+    if !text.ends_with('\n') {
+        return Err(incomplete("its last line has no end"));
+    }
+    let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+    let (_, header) = lines.next().ok_or_else(|| incomplete("it is empty"))?;
+    let header: Vec<&str> = header.trim_start_matches('\u{feff}').split(',').map(str::trim).collect();
+    let numbered = |prefix: &'static str| (1..=joints.len()).map(move |joint| format!("{prefix}{joint}"));
+    let expected: Vec<String> =
+        core::iter::once("t_s".to_owned()).chain(numbered("q")).chain(numbered("tau")).collect();
+    let places: Vec<usize> = expected
+        .iter()
+        .map(|column| {
+            header
+                .iter()
+                .position(|name| name == column)
+                .ok_or_else(|| LogTableError::NoColumn { column: column.clone(), expected: expected.clone() })
+        })
+        .collect::<Result<_, _>>()?;
+    // One row after the other, by columns.
+    let mut columns: Vec<Vec<f64>> = vec![Vec::new(); expected.len()];
+    for (line, text) in lines {
+        let line = line + 1;
+        let fields: Vec<&str> = text.split(',').map(str::trim).collect();
+        if fields.len() != header.len() {
+            return Err(LogTableError::Fields { line, expected: header.len(), found: fields.len() });
+        }
+        for (column, &place) in places.iter().enumerate() {
+            let value: Option<f64> = fields[place].parse().ok().filter(|x: &f64| x.is_finite());
+            let value = value.ok_or_else(|| LogTableError::NotANumber {
+                line,
+                column: expected[column].clone(),
+                field: fields[place].chars().take(40).collect(),
+            })?;
+            if column == 0 && columns[0].last().is_some_and(|&before| value <= before) {
+                return Err(LogTableError::Time { line, time_s: value });
+            }
+            columns[column].push(value);
+        }
+    }
+    let samples = columns[0].len();
+    if samples == 0 {
+        return Err(incomplete("it has no rows"));
+    }
+    let mut columns = columns.into_iter();
+    let times_s = columns.next().unwrap_or_default();
+    let q = columns.by_ref().take(joints.len()).flatten().collect();
+    Ok(Record { joints: joints.to_vec(), rate_hz, samples, times_s, q, tau: columns.flatten().collect() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn logs_are_read_by_name_and_refused_by_line() {
+        let joints = ["a".to_owned(), "b".to_owned()];
+        let read = |text: &str| parse(text, &joints, 100.0);
+        let good = "tau2,t_s,q1,q2,tau1,spare\n4,0,1,2,3,x\n8,0.01,5,6,7,x\n";
+        let record = read(good).unwrap();
+        assert_eq!((record.samples, &record.q, &record.tau), (2, &vec![1.0, 5.0, 2.0, 6.0], &vec![3.0, 7.0, 4.0, 8.0]));
+        let message = |text: &str| read(text).unwrap_err().to_string();
+        assert!(message(good.trim_end()).contains("no end"));
+        assert!(message("").contains("no end") && message("\n").contains("empty"));
+        assert!(message("t_s,q1,q2,tau1\n").contains("tau2"));
+        assert!(message(&good.replace("0.01", "0")).contains("line 3"));
+        assert!(message(&good.replace(",7,", ",nan,")).contains("column tau1"));
+        assert!(message(&good.replace(",7,", ",")).contains("line 3: 5 fields"));
+        assert!(message("t_s,q1,q2,tau1,tau2\n").contains("no rows"));
+    }
+}

@@ -1,0 +1,277 @@
+//! The robot as an experiment sees it: something that runs a trajectory under a controller and gives a record back. The built-in simulator, another process, or a person with a folder.
+
+mod conversation;
+mod folder;
+mod handover;
+mod law_description;
+mod log_table;
+mod process;
+mod protocol;
+mod simulated;
+
+pub use folder::{FolderRobot, FolderSettings};
+pub use handover::{CONTROLLER_SCHEMA, controller_json, trajectory_csv};
+pub use log_table::{LogTableError, read_log_table};
+pub use process::{ProcessLimits, ProcessMode, ProcessRobot, ProcessSettings};
+pub use protocol::{PROTOCOL, ToClient, ToHost};
+pub use simulated::SimulatedRobot;
+
+use dynident_simulation::Record;
+use dynident_simulation::Reference;
+use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
+use dynident_simulation::{Run, RunStatus};
+use dynident_simulation::{SimulationError, require_length};
+use serde::Serialize;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// What a robot is asked to do.
+#[derive(Clone, Copy, Debug)]
+pub struct RunRequest<'a> {
+    /// Number of the run, from 1: the name of its folder, and what a log can be matched by.
+    pub run: usize,
+    /// What to follow; its rate is the controller's.
+    pub reference: &'a Reference,
+    /// The controller.
+    pub controller: &'a ControllerSettings,
+    /// Its model, if it needs one.
+    pub model: Option<&'a ControllerModel>,
+}
+
+impl RunRequest<'_> {
+    /// Checks that reference, controller and model belong to so many joints.
+    ///
+    /// # Errors
+    /// [`SimulationError`].
+    pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
+        require_length("joints of the reference", joints, self.reference.joints())?;
+        self.controller.validate(joints)?;
+        match self.model {
+            Some(model) => model.check_joints(joints),
+            None if self.controller.needs_model() => {
+                Err(SimulationError::NoModel { controller: self.controller.name() })
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// What came back.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RobotRun {
+    /// How it ended.
+    pub status: RobotStatus,
+    /// What was recorded, up to the end or up to what went wrong. Joints in the model's order, all numbers finite.
+    pub record: Record,
+    /// What truly was, if the robot is the simulator.
+    pub truth: Option<Run>,
+}
+
+impl RobotRun {
+    /// Per joint: largest distance of the recorded positions from the reference at the record's times, rad (m); the reference between its samples by straight lines.
+    pub fn max_error(&self, reference: &Reference) -> Vec<f64> {
+        let samples = reference.samples();
+        (0..self.record.joints.len())
+            .map(|joint| {
+                let target = &reference.motion().q[joint * samples..(joint + 1) * samples];
+                let own = &self.record.q[self.record.of(joint)];
+                own.iter().zip(&self.record.times_s).fold(0.0_f64, |most, (q, time_s)| {
+                    let place = (time_s * reference.rate_hz()).clamp(0.0, (samples - 1) as f64);
+                    let from = place.floor() as usize;
+                    let next = (from + 1).min(samples - 1);
+                    let desired = target[from] + (place - from as f64) * (target[next] - target[from]);
+                    most.max((desired - q).abs())
+                })
+            })
+            .collect()
+    }
+}
+
+/// How a robot's run ended.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "end", rename_all = "kebab-case")]
+pub enum RobotStatus {
+    /// The whole trajectory was run.
+    Done,
+    /// The run stopped early: divergence or a limit of the simulator.
+    Simulated {
+        /// Its verdict.
+        verdict: RunStatus,
+    },
+    /// The robot stopped early and said why.
+    Stopped {
+        /// What it said.
+        reason: String,
+    },
+    /// The exchange with the robot failed.
+    Failed {
+        /// How.
+        fault: RobotFault,
+    },
+    /// The log is not there yet: somebody has to run the trajectory and drop it.
+    Waiting {
+        /// The run's folder.
+        folder: PathBuf,
+        /// What is missing.
+        reason: String,
+    },
+}
+
+impl RobotStatus {
+    /// Whether the whole trajectory was run.
+    pub fn is_done(&self) -> bool {
+        *self == Self::Done
+    }
+}
+
+impl core::fmt::Display for RobotStatus {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Done => write!(f, "done"),
+            Self::Simulated { verdict } => write!(f, "{verdict}"),
+            Self::Stopped { reason } => write!(f, "the robot stopped: {reason}"),
+            Self::Failed { fault } => write!(f, "{fault}"),
+            Self::Waiting { folder, reason } => write!(f, "{}: {reason}", folder.display()),
+        }
+    }
+}
+
+/// How an exchange with a robot outside can fail.
+#[derive(Clone, Debug, PartialEq, Error, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum RobotFault {
+    /// The program cannot be started.
+    #[error("robot program {program}: cannot be started: {reason}")]
+    NotStarted {
+        /// The program.
+        program: String,
+        /// What the system says.
+        reason: String,
+    },
+    /// The program ended in between.
+    #[error("the robot program ended while its {waiting_for} was awaited ({exit}){said}")]
+    Died {
+        /// What was awaited.
+        waiting_for: &'static str,
+        /// Its exit status.
+        exit: String,
+        /// The end of what it wrote to standard error, or nothing.
+        said: String,
+    },
+    /// No answer in time.
+    #[error("the robot program gave no {waiting_for} within {limit_s} s")]
+    Hung {
+        /// What was awaited.
+        waiting_for: &'static str,
+        /// The limit.
+        limit_s: f64,
+    },
+    /// A line that is no message of the protocol.
+    #[error("the robot program wrote a line that is no message ({reason}): {line}")]
+    Garbage {
+        /// The line, cut to 200 characters.
+        line: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A message at the wrong moment.
+    #[error("the robot program wrote a message of type {found} where {expected} was awaited")]
+    OutOfTurn {
+        /// What came.
+        found: &'static str,
+        /// What was awaited.
+        expected: &'static str,
+    },
+    /// A number that is none, or is missing.
+    #[error("sample {sample} of the robot: {what} is not a finite number")]
+    NotANumber {
+        /// The sample, from 0.
+        sample: usize,
+        /// Which number.
+        what: String,
+    },
+    /// Vectors of another length.
+    #[error("sample {sample} of the robot: {what} has {found} entries for {expected} joints")]
+    WrongJoints {
+        /// The sample, from 0.
+        sample: usize,
+        /// Which vector.
+        what: &'static str,
+        /// How many joints there are.
+        expected: usize,
+        /// How many entries came.
+        found: usize,
+    },
+    /// The robot has other joints.
+    #[error("the robot names its joints {}; expected {}", found.join(", "), expected.join(", "))]
+    OtherJoints {
+        /// The model's.
+        expected: Vec<String>,
+        /// The robot's.
+        found: Vec<String>,
+    },
+    /// Time that does not go forward.
+    #[error("sample {sample} of the robot: time {time_s} s comes after {before_s} s")]
+    Time {
+        /// The sample, from 0.
+        sample: usize,
+        /// Its time.
+        time_s: f64,
+        /// The time before.
+        before_s: f64,
+    },
+    /// More samples than any run has.
+    #[error("the robot sent more than {most} samples for a run of {duration_s} s")]
+    TooMuch {
+        /// How many are taken.
+        most: usize,
+        /// The run's length.
+        duration_s: f64,
+    },
+    /// Another version of the protocol, or a mode that it does not have.
+    #[error("the robot program speaks {found}, not {expected}")]
+    Protocol {
+        /// What it says.
+        found: String,
+        /// What is needed.
+        expected: String,
+    },
+    /// The record ends before the trajectory does.
+    #[error("the robot says done, but its record ends at {end_s} s of {duration_s} s")]
+    Short {
+        /// The record's last time.
+        end_s: f64,
+        /// The trajectory's.
+        duration_s: f64,
+    },
+    /// The controller gave a torque that is not a number.
+    #[error("the controller's torque at sample {sample} is not a finite number")]
+    Torque {
+        /// The sample, from 0.
+        sample: usize,
+    },
+    /// A file that cannot be written or read.
+    #[error("{}: {reason}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says, or what is wrong inside.
+        reason: String,
+    },
+}
+
+/// A robot: the seam between an experiment and what it runs on.
+pub trait Robot: core::fmt::Debug {
+    /// What it is, for messages.
+    fn name(&self) -> &str;
+
+    /// Names of its joints, in the model's order.
+    fn joints(&self) -> &[String];
+
+    /// Runs a trajectory. What the robot does wrong is the run's [`RobotStatus`], with the records so far.
+    ///
+    /// # Errors
+    /// Only a request without meaning: [`RunRequest::validate`], or settings of the robot that contradict it.
+    fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError>;
+}

@@ -1,0 +1,64 @@
+//! The built-in simulator as a robot.
+
+use super::{Robot, RobotRun, RobotStatus, RunRequest};
+use dynident_simulation::Plant;
+use dynident_simulation::SimulationError;
+use dynident_simulation::{LoopSettings, closed_loop};
+
+/// A [`Plant`] with its sensors and limits, for [`Robot`]. The seed of the noise is that of the settings and the run's number: runs differ, and the same run is the same again.
+#[derive(Debug)]
+pub struct SimulatedRobot {
+    plant: Plant,
+    settings: LoopSettings,
+    joints: Vec<String>,
+}
+
+impl SimulatedRobot {
+    /// The simulator of a robot.
+    ///
+    /// # Errors
+    /// As [`LoopSettings::validate`].
+    pub fn new(plant: Plant, settings: LoopSettings) -> Result<Self, SimulationError> {
+        settings.validate(plant.dof())?;
+        let joints = plant.model().joints().iter().map(|joint| joint.name.clone()).collect();
+        Ok(Self { plant, settings, joints })
+    }
+
+    /// The same with the named joints locked where a run begins, as [`Plant::with_locked`].
+    ///
+    /// # Errors
+    /// A joint that does not exist.
+    pub fn with_locked(self, joints: &[String]) -> Result<Self, SimulationError> {
+        Ok(Self { plant: self.plant.with_locked(joints)?, ..self })
+    }
+
+    /// The simulated robot.
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+}
+
+impl Robot for SimulatedRobot {
+    fn name(&self) -> &'static str {
+        "simulator"
+    }
+
+    fn joints(&self) -> &[String] {
+        &self.joints
+    }
+
+    fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
+        request.validate(self.joints.len())?;
+        let mut controller = request.controller.build(self.joints.len(), request.model)?;
+        let mut settings = self.settings.clone();
+        // Any odd number spreads neighbours over the seeds.
+        settings.sensors.seed ^= (request.run as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let run = closed_loop(&mut self.plant, controller.as_mut(), request.reference, &settings)?;
+        let record = settings.sensors.record(self.plant.model(), &run)?;
+        let status = match &run.status {
+            status if status.is_done() => RobotStatus::Done,
+            verdict => RobotStatus::Simulated { verdict: verdict.clone() },
+        };
+        Ok(RobotRun { status, record, truth: Some(run) })
+    }
+}

@@ -1,0 +1,212 @@
+//! Settings of an iteration.
+
+use dynident_estimation::{CovarianceMethod, RankSettings};
+use dynident_identification::consistent::ConsistencySettings;
+use dynident_recording::{DecimationSettings, DifferentiatorSettings};
+use dynident_simulation::controllers::{ControllerSettings, FiniteTimeSettings, JointPdSettings};
+use dynident_simulation::{SimulationError, require};
+use serde::{Deserialize, Serialize};
+
+/// Which parameters are looked for together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scheme {
+    /// All joints at once.
+    #[default]
+    AllJoints,
+    /// Joint by joint from tip to base, as in the paper (Eqs. 9, 10): the rows of one joint alone, columns that are known already subtracted.
+    StepByStep,
+}
+
+/// Which least squares.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RunEstimator {
+    /// Every joint's newton metre counts alike.
+    Ordinary,
+    /// Every joint counts by its own noise.
+    #[default]
+    Weighted,
+}
+
+/// How one run is identified.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RunIdentificationSettings {
+    /// All joints at once (the default), or step by step.
+    pub scheme: Scheme,
+    /// From positions to speeds and accelerations. Default `deviation`: the commanded motion's own derivatives and those of the smoothed deviation from it.
+    pub differentiator: DifferentiatorSettings,
+    /// Torque and every column pass the same low-pass and lose the same rows; default none.
+    pub parallel_filter: Option<DecimationSettings>,
+    /// Whether recorded torques are held from one sample to the next, as digital drives do: at a sample's instant the mean of the values before and after is in force. Default true.
+    pub held_torque: bool,
+    /// Default weighted.
+    pub estimator: RunEstimator,
+    /// Where error bars come from.
+    pub covariance: CovarianceMethod,
+    /// When a column counts as excited.
+    pub rank: RankSettings,
+    /// Whether the controller gets the possible machine that fits best (true by default) or the estimate as it is.
+    pub physical: bool,
+    /// What is known of that machine's bodies, and how it is found.
+    pub possible: ConsistencySettings,
+}
+
+impl Default for RunIdentificationSettings {
+    fn default() -> Self {
+        Self {
+            scheme: Scheme::default(),
+            differentiator: DifferentiatorSettings::Deviation {
+                reference: dynident_recording::ReferenceSettings::default(),
+                smoother: Box::default(),
+                max_lag_s: None,
+            },
+            parallel_filter: None,
+            held_torque: true,
+            estimator: RunEstimator::default(),
+            covariance: CovarianceMethod::default(),
+            rank: RankSettings::default(),
+            physical: true,
+            possible: ConsistencySettings::default(),
+        }
+    }
+}
+
+/// What controls the first run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StartWith {
+    /// A controller without a model.
+    #[default]
+    ModelFree,
+    /// The controller with the prior of the machine.
+    Prior,
+}
+
+/// When an iteration has settled. A run of the model-based controller must follow an accepted run, with
+/// `|θ_k - θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance · max|θ|` and `s ≤ most_uncertain · max|θ|` for every parameter, and a tracking error that is below
+/// `tracking_tolerance` or fell by less than `tracking_ratio`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SettledSettings {
+    /// Error bars within which a change counts as none. Default 3.
+    pub parameter_sigmas: f64,
+    /// Share of the largest parameter within which a change counts as none. Default 1e-6.
+    pub parameter_tolerance: f64,
+    /// Widest error bar (one standard deviation) as a share of the largest parameter: what is known worse than that cannot be said to stand still. Default 0.1.
+    pub most_uncertain: f64,
+    /// Tracking error that is good enough, rad (m). Default 1e-4.
+    pub tracking_tolerance: f64,
+    /// Tracking that falls by less than this factor from a run to the next has settled. Default 1.5.
+    pub tracking_ratio: f64,
+}
+
+impl Default for SettledSettings {
+    fn default() -> Self {
+        Self {
+            parameter_sigmas: 3.0,
+            parameter_tolerance: 1e-6,
+            most_uncertain: 0.1,
+            tracking_tolerance: 1e-4,
+            tracking_ratio: 1.5,
+        }
+    }
+}
+
+/// Settings of [`Iteration`](super::Iteration).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct IterationSettings {
+    /// How a run is identified.
+    pub identification: RunIdentificationSettings,
+    /// What controls the first run; default a controller without a model.
+    pub start: StartWith,
+    /// The controller of the first run where that has the prior as its model: a poor model asks for less trust than a good one. Default [`controller`](Self::controller).
+    pub first: Option<ControllerSettings>,
+    /// The controller without a model: joint PD (16 and 8) by default. It is also what a bad model falls back to.
+    pub model_free: ControllerSettings,
+    /// The controller with the model so far: the paper's finite-time law with its gains of joint 2 (4 and 4) by default.
+    pub controller: ControllerSettings,
+    /// Whether a run that got worse is rejected and its step halved; true by default.
+    pub reject: bool,
+    /// A run is worse when its tracking error (mean over the joints of the largest) is above this many times that of the last good run, and above `settled.tracking_tolerance`. Default 1.5.
+    pub worse_factor: f64,
+    /// How often a step is halved before the controller without a model comes back. Default 3.
+    pub most_halvings: usize,
+    /// By how much the gains of the controller without a model grow each time it has to come back. Default 2.
+    pub stiffen: f64,
+    /// Model-free runs that may fail before the robot counts as one that cannot follow. Default 4.
+    pub most_model_free: usize,
+    /// Most runs. Default 8.
+    pub max_runs: usize,
+    /// When all has settled.
+    pub settled: SettledSettings,
+}
+
+impl Default for IterationSettings {
+    fn default() -> Self {
+        Self {
+            identification: RunIdentificationSettings::default(),
+            start: StartWith::default(),
+            first: None,
+            model_free: ControllerSettings::JointPd(JointPdSettings { kp: 16.0.into(), kd: 8.0.into() }),
+            controller: ControllerSettings::FiniteTime(FiniteTimeSettings::with_gains(4.0, 4.0)),
+            reject: true,
+            worse_factor: 1.5,
+            most_halvings: 3,
+            stiffen: 2.0,
+            most_model_free: 4,
+            max_runs: 8,
+            settled: SettledSettings::default(),
+        }
+    }
+}
+
+impl IterationSettings {
+    /// The paper's scheme as it stands: speeds and accelerations by the map from position (Eqs. 15, 16) with the lag of at most `max_lag_s` estimated, step by step, every estimate straight into the
+    /// controller, nothing rejected.
+    pub fn literal(max_lag_s: f64) -> Self {
+        Self {
+            identification: RunIdentificationSettings {
+                scheme: Scheme::StepByStep,
+                differentiator: DifferentiatorSettings::PositionMap {
+                    reference: dynident_recording::ReferenceSettings::default(),
+                    max_lag_s,
+                },
+                estimator: RunEstimator::Ordinary,
+                physical: false,
+                ..RunIdentificationSettings::default()
+            },
+            reject: false,
+            ..Self::default()
+        }
+    }
+
+    /// Checks the numbers for so many joints.
+    ///
+    /// # Errors
+    /// Numbers out of range, controllers whose gains do not fit, a controller for the first run that needs a model.
+    pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
+        self.model_free.validate(joints)?;
+        self.controller.validate(joints)?;
+        self.first.as_ref().map_or(Ok(()), |first| first.validate(joints))?;
+        if self.model_free.needs_model() {
+            return Err(SimulationError::NoModel { controller: self.model_free.name() });
+        }
+        let within = |what: &str, value: f64, low: f64, high: f64, mend| {
+            require((low..=high).contains(&value), what, value, mend)
+        };
+        within("worse_factor", self.worse_factor, 1.0, 1e6, "give 1 to 1e6")?;
+        within("stiffen", self.stiffen, 1.0, 100.0, "give 1 to 100")?;
+        within("most_halvings", self.most_halvings as f64, 0.0, 50.0, "give at most 50")?;
+        within("most_model_free", self.most_model_free as f64, 1.0, 50.0, "give 1 to 50")?;
+        within("max_runs", self.max_runs as f64, 1.0, 1000.0, "give 1 to 1000")?;
+        let settled = &self.settled;
+        within("settled.parameter_sigmas", settled.parameter_sigmas, 0.0, 1e3, "give 0 to 1000")?;
+        within("settled.parameter_tolerance", settled.parameter_tolerance, 0.0, 1.0, "give 0 to 1")?;
+        within("settled.most_uncertain", settled.most_uncertain, 0.0, 1e6, "give 0 or a positive share")?;
+        within("settled.tracking_tolerance", settled.tracking_tolerance, 0.0, 1e3, "give 0 or a positive distance")?;
+        within("settled.tracking_ratio", settled.tracking_ratio, 1.0, 1e6, "give 1 or more")
+    }
+}

@@ -1,0 +1,166 @@
+//! The paper's order: the tip joint first, then each joint towards the base with what is known already taken off its torque.
+
+use crate::error::IterationError;
+use crate::leg::IterationTask;
+use crate::motion::MeasuredMotion;
+use crate::rows::visit_rows;
+use crate::settings::{RunEstimator, RunIdentificationSettings};
+use dynident_estimation::{
+    Estimate, LinearProblem, OrdinarySettings, SegmentedFactor, TriangularFactor, WeightedSettings,
+    ordinary_least_squares, weighted_least_squares,
+};
+use nalgebra::DMatrix;
+
+/// What the steps have found so far.
+pub(crate) struct Steps {
+    pub(crate) values: Vec<f64>,
+    pub(crate) covariance: DMatrix<f64>,
+    pub(crate) joint_sigma: Vec<f64>,
+    /// Whether each column was estimated.
+    pub(crate) found: Vec<bool>,
+    pub(crate) rows: usize,
+}
+
+/// Step by step: θ_k by least squares on `τ_k - B θ_known = A θ_k`, the rows of joint k alone (Eqs. 9, 10). What was estimated before enters with its covariance,
+/// `∂θ_k/∂θ_known = -A⁺ B`.
+pub(crate) fn step_by_step(
+    task: &IterationTask,
+    motions: &[MeasuredMotion],
+    settings: &RunIdentificationSettings,
+    names: &[String],
+    joints: &[String],
+    fallback: &[f64],
+) -> Result<Steps, IterationError> {
+    let count = fallback.len();
+    let given = task.known_values();
+    let mut steps = Steps {
+        values: fallback.to_vec(),
+        covariance: DMatrix::zeros(count, count),
+        joint_sigma: vec![0.0; joints.len()],
+        found: vec![false; count],
+        rows: 0,
+    };
+    for joint in (0..joints.len()).rev() {
+        let columns = task.machine.layout().joint_columns(joint);
+        let is_known = |column: usize| given[column].is_some() || steps.found[column];
+        let (known, unknown): (Vec<usize>, Vec<usize>) =
+            (0..columns.len()).partition(|&place| is_known(columns[place]));
+        let uncertain: Vec<usize> = known.iter().copied().filter(|&place| steps.found[columns[place]]).collect();
+        if unknown.is_empty() {
+            continue;
+        }
+        let mut factor = SegmentedFactor::new(unknown.len(), dynident_estimation::SegmentSettings::default())?;
+        let mut wide = TriangularFactor::new(unknown.len() + uncertain.len());
+        let (mut narrow_panel, mut wide_panel) = (Vec::new(), Vec::new());
+        for (leg, motion) in task.legs.iter().zip(motions) {
+            visit_rows(task, leg, motion, settings.parallel_filter.as_ref(), |of, rows, panel| {
+                if of != joint {
+                    return Ok(());
+                }
+                let column = |place: usize| &panel[place * rows..(place + 1) * rows];
+                let mut torque = column(columns.len()).to_vec();
+                for &place in &known {
+                    let value = given[columns[place]].unwrap_or(steps.values[columns[place]]);
+                    torque.iter_mut().zip(column(place)).for_each(|(torque, w)| *torque -= value * w);
+                }
+                narrow_panel.clear();
+                wide_panel.clear();
+                for &place in &unknown {
+                    narrow_panel.extend_from_slice(column(place));
+                }
+                wide_panel.extend_from_slice(&narrow_panel);
+                for &place in &uncertain {
+                    wide_panel.extend_from_slice(column(place));
+                }
+                narrow_panel.extend_from_slice(&torque);
+                wide_panel.extend_from_slice(&torque);
+                factor.absorb(&narrow_panel, rows)?;
+                wide.absorb(&wide_panel, rows)?;
+                Ok(())
+            })?;
+        }
+        if factor.rows() == 0 {
+            continue;
+        }
+        steps.rows += factor.rows();
+        let own = |values: &dyn Fn(usize) -> String| unknown.iter().map(|&place| values(columns[place])).collect();
+        let mut problem = LinearProblem::new(own(&|column| names[column].clone()), vec![joints[joint].clone()])
+            .with_fallback(unknown.iter().map(|&place| fallback[columns[place]]).collect())?;
+        problem.add("run", 0, (0..unknown.len()).collect(), factor)?;
+        let estimate = least_squares(&problem, settings)?;
+        steps.joint_sigma[joint] = estimate.joint_sigma[0];
+        let fixed: Vec<usize> = estimate.rank.fixed.iter().map(|fixed| fixed.column).collect();
+        let estimated: Vec<usize> = (0..unknown.len()).filter(|place| !fixed.contains(place)).collect();
+        for &place in &estimated {
+            steps.values[columns[unknown[place]]] = estimate.values[place];
+        }
+        let globals: Vec<usize> = unknown.iter().map(|&place| columns[place]).collect();
+        let before: Vec<usize> = uncertain.iter().map(|&place| columns[place]).collect();
+        propagate(&mut steps, &globals, &estimated, &before, &estimate, &wide);
+        for &place in &estimated {
+            steps.found[globals[place]] = true;
+        }
+    }
+    for (column, value) in given.iter().enumerate() {
+        if let Some(value) = value {
+            steps.values[column] = *value;
+        }
+    }
+    Ok(steps)
+}
+
+/// Adds this step's covariance and what it inherits from earlier ones.
+fn propagate(
+    steps: &mut Steps,
+    globals: &[usize],
+    estimated: &[usize],
+    before: &[usize],
+    estimate: &Estimate,
+    wide: &TriangularFactor,
+) {
+    let own = |place: usize| globals[estimated[place]];
+    for a in 0..estimated.len() {
+        for b in 0..estimated.len() {
+            steps.covariance[(own(a), own(b))] = estimate.covariance[(estimated[a], estimated[b])];
+        }
+    }
+    if before.is_empty() {
+        return;
+    }
+    let triangle = wide.regressor_triangle();
+    let left = DMatrix::from_fn(triangle.nrows(), estimated.len(), |row, place| triangle[(row, estimated[place])]);
+    let right = triangle.columns(globals.len(), before.len()).into_owned();
+    let Ok(inverse) = left.pseudo_inverse(1e-12) else { return };
+    let sensitivity = -(inverse * right);
+    let count = steps.values.len();
+    let earlier = DMatrix::from_fn(before.len(), count, |row, column| steps.covariance[(before[row], column)]);
+    let cross = &sensitivity * &earlier;
+    let inherited = &sensitivity
+        * DMatrix::from_fn(before.len(), before.len(), |a, b| earlier[(a, before[b])])
+        * sensitivity.transpose();
+    for a in 0..estimated.len() {
+        for column in 0..count {
+            if steps.found[column] {
+                steps.covariance[(own(a), column)] = cross[(a, column)];
+                steps.covariance[(column, own(a))] = cross[(a, column)];
+            }
+        }
+        for b in 0..estimated.len() {
+            steps.covariance[(own(a), own(b))] += inherited[(a, b)];
+        }
+    }
+}
+
+/// The least squares that the settings ask for.
+pub(crate) fn least_squares(
+    problem: &LinearProblem,
+    settings: &RunIdentificationSettings,
+) -> Result<Estimate, IterationError> {
+    let (rank, covariance) = (settings.rank, settings.covariance);
+    Ok(match settings.estimator {
+        RunEstimator::Ordinary => ordinary_least_squares(problem, &OrdinarySettings { rank, covariance })?,
+        RunEstimator::Weighted => {
+            weighted_least_squares(problem, &WeightedSettings { rank, covariance, ..WeightedSettings::default() })?
+        }
+    })
+}

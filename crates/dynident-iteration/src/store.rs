@@ -1,0 +1,144 @@
+//! An iteration on disk: every run whole or not at all.
+
+use crate::error::IterationError;
+use crate::record::RunRecord;
+use crate::robot::RobotRun;
+use serde::{Deserialize, Serialize};
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// What a run's folder begins with until it is whole.
+const UNFINISHED: &str = ".unfinished-";
+
+/// Schema of `runs/run_k/run.json`.
+const RUN_SCHEMA: &str = "dynident/run/1";
+
+/// The folder of an iteration: `runs/run_k/run.json` and the records beside it. A run appears in one step (rename of a finished folder, everything on the disk before), so that whoever is killed at
+/// any moment finds all runs up to one of them, and goes on with the next.
+#[derive(Debug)]
+pub struct IterationStore {
+    runs: PathBuf,
+    fingerprint: String,
+}
+
+#[derive(Serialize, Deserialize)]
+struct RunFile {
+    schema: String,
+    fingerprint: String,
+    #[serde(flatten)]
+    record: RunRecord,
+}
+
+impl IterationStore {
+    /// Opens or makes the folder. `fingerprint` stands for everything that the runs depend on; runs with another one are another iteration's. Without `resume`, runs that are there are removed.
+    ///
+    /// # Errors
+    /// A folder that cannot be written; runs of another iteration.
+    pub fn open(folder: &Path, fingerprint: &str, resume: bool) -> Result<Self, IterationError> {
+        let runs = folder.join("runs");
+        fs::create_dir_all(&runs).map_err(IterationError::file(&runs))?;
+        let store = Self { runs, fingerprint: fingerprint.to_owned() };
+        for entry in fs::read_dir(&store.runs).map_err(IterationError::file(&store.runs))? {
+            let entry = entry.map_err(IterationError::file(&store.runs))?;
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let left_over = name.starts_with(UNFINISHED);
+            if left_over || (!resume && name.starts_with("run_")) {
+                fs::remove_dir_all(entry.path()).map_err(IterationError::file(&entry.path()))?;
+            }
+        }
+        store.records()?;
+        Ok(store)
+    }
+
+    /// The runs that are there, in order.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is no run of this iteration.
+    pub fn records(&self) -> Result<Vec<RunRecord>, IterationError> {
+        let mut records = Vec::new();
+        loop {
+            let path = self.run_folder(records.len() + 1).join("run.json");
+            let text = match fs::read_to_string(&path) {
+                Ok(text) => text,
+                Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(records),
+                Err(error) => return Err(IterationError::file(&path)(error)),
+            };
+            let state = |problem: String| IterationError::State { path: path.clone(), problem };
+            let file: RunFile = serde_json::from_str(&text)
+                .map_err(|error| state(format!("is no run of an iteration ({error}); remove its folder")))?;
+            if file.schema != RUN_SCHEMA {
+                return Err(state(format!("has the schema {}, not {RUN_SCHEMA}", file.schema)));
+            }
+            if file.fingerprint != self.fingerprint {
+                return Err(state(
+                    "belongs to an iteration with other settings: start afresh, or give another folder".to_owned(),
+                ));
+            }
+            if file.record.run != records.len() + 1 {
+                return Err(state(format!("holds run {}", file.record.run)));
+            }
+            records.push(file.record);
+        }
+    }
+
+    /// Keeps a run: `run.json`, and `log.csv` of each leg (`log_2.csv` and so on for further legs).
+    ///
+    /// # Errors
+    /// A folder that cannot be written; then the run is not there.
+    pub fn keep(&self, record: &RunRecord, runs: &[RobotRun]) -> Result<(), IterationError> {
+        let fresh = tempfile::Builder::new()
+            .prefix(UNFINISHED)
+            .tempdir_in(&self.runs)
+            .map_err(IterationError::file(&self.runs))?;
+        for (leg, run) in runs.iter().enumerate() {
+            let name = if leg == 0 { "log.csv".to_owned() } else { format!("log_{}.csv", leg + 1) };
+            write_synced(&fresh.path().join(name), run.record.csv().as_bytes())?;
+        }
+        let file =
+            RunFile { schema: RUN_SCHEMA.to_owned(), fingerprint: self.fingerprint.clone(), record: record.clone() };
+        let path = fresh.path().join("run.json");
+        let text = serde_json::to_string_pretty(&file)
+            .map_err(|error| IterationError::State { path: path.clone(), problem: error.to_string() })?;
+        write_synced(&path, text.as_bytes())?;
+        sync_folder(fresh.path())?;
+        let folder = self.run_folder(record.run);
+        open_to_others(fresh.path())?;
+        fs::rename(fresh.path(), &folder).map_err(IterationError::file(&folder))?;
+        // It has another name now: there is nothing left to remove.
+        let _ = fresh.keep();
+        sync_folder(&self.runs)
+    }
+
+    /// The folder of a run.
+    pub fn run_folder(&self, run: usize) -> PathBuf {
+        self.runs.join(format!("run_{run}"))
+    }
+}
+
+fn write_synced(path: &Path, contents: &[u8]) -> Result<(), IterationError> {
+    let mut file = File::create(path).map_err(IterationError::file(path))?;
+    file.write_all(contents).map_err(IterationError::file(path))?;
+    file.sync_all().map_err(IterationError::file(path))
+}
+
+/// Names in a folder reach the disk with the folder itself, where the system knows such a thing.
+fn sync_folder(path: &Path) -> Result<(), IterationError> {
+    if cfg!(unix) {
+        let folder = File::open(path).map_err(IterationError::file(path))?;
+        folder.sync_all().map_err(IterationError::file(path))?;
+    }
+    Ok(())
+}
+
+/// A temporary folder is private to its owner; a result is for everybody whom the folder lets in.
+fn open_to_others(path: &Path) -> Result<(), IterationError> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        fs::set_permissions(path, fs::Permissions::from_mode(0o755)).map_err(IterationError::file(path))?;
+    }
+    #[cfg(not(unix))]
+    let _ = path;
+    Ok(())
+}

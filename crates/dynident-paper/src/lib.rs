@@ -1,0 +1,135 @@
+//! **What does the paper say, and is it so?** Every table and figure of *Iterative Identification of Robot Dynamic
+//! Parameters Based on Logistic Function*, computed through the same crates and studies as a user's own robot, with what
+//! the paper alone needs.
+//!
+//! [`reproduce`] is all of it, as the command `dynident reproduce` calls it.
+
+#![forbid(unsafe_code)]
+
+mod arm;
+mod base_parameters;
+mod deviations;
+mod fourier;
+mod joint_runs;
+mod optimisation;
+mod page;
+mod piece;
+mod strokes;
+mod verification;
+
+pub use piece::{Deviation, PaperCell, PaperFigure, PaperTable};
+
+use arm::Arm;
+use deviations::DEVIATIONS;
+use dynident::{Error, RunOptions, check_writable, write_whole};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Instant;
+
+/// Name and version of the schema of [`PaperFile`].
+pub const PAPER_SCHEMA: &str = "dynident/paper/1";
+
+/// What `reproduce` prints as JSON and writes as `paper.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct PaperFile {
+    /// [`PAPER_SCHEMA`].
+    pub schema: &'static str,
+    /// The program's version.
+    pub version: &'static str,
+    /// Seed of all that is random.
+    pub seed: u64,
+    /// What was to be reached.
+    pub reached: Vec<Reached>,
+    /// Tables 2 to 6, by number.
+    pub tables: BTreeMap<String, PaperTable>,
+    /// Figures 2 to 7, 9 to 17.
+    pub figures: Vec<PaperFigure>,
+    /// Where we depart from the paper, and why.
+    pub deviations: &'static [Deviation],
+    /// Seconds by the clock.
+    pub seconds: f64,
+}
+
+/// One goal.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Reached {
+    /// What is measured.
+    pub what: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// At most this was to be reached.
+    pub goal: f64,
+    /// Whether it was.
+    pub met: bool,
+}
+
+impl Reached {
+    fn at_most(what: &'static str, value: f64, goal: f64) -> Self {
+        Self { what, value, goal, met: value <= goal }
+    }
+}
+
+/// Computes every table and figure and writes `paper.json`, `report.html`, the pictures and the studies into `out`.
+///
+/// # Errors
+/// If a file cannot be written, or a study does not come out as it must.
+pub fn reproduce(out: &Path, seed: u64, options: &RunOptions<'_>) -> Result<PaperFile, Error> {
+    let begun = Instant::now();
+    check_writable(out)?;
+    let stage = |name: &str| options.progress.begin(name, None);
+    let done = || options.progress.end();
+    stage("base parameters and strokes");
+    let arm = Arm::written(out)?;
+    let (table_2, difference) = base_parameters::table_2(&arm);
+    done();
+    stage("genetic algorithm, and the optimum beside it");
+    let optimised = optimisation::optimised(&arm, seed, options)?;
+    done();
+    stage("runs of joint 2 and joint 1");
+    let runs = joint_runs::joint_runs(&arm, &optimised.optimum)?;
+    done();
+    stage("Fourier series");
+    let fourier = fourier::fourier(&arm, out, seed, options)?;
+    done();
+    stage("verification");
+    let verification = verification::figures_16_and_17(&arm, &runs.ours, &fourier.values);
+    done();
+    let [one, two] = &optimised.optimum;
+    let mut figures = vec![
+        strokes::figure_2(),
+        strokes::figure_3(),
+        strokes::figure_4(),
+        strokes::figure_5(),
+        strokes::figure_6(one.amplitude_rad, one.steepness_per_s, one.window_s.min(two.window_s)),
+        optimised.figure_7,
+    ];
+    figures.extend(runs.figures);
+    figures.push(fourier.figure_15);
+    figures.extend(verification);
+    let tables = [vec![table_2, optimised.table_3], runs.tables, vec![fourier.table_6]].concat();
+    let file = PaperFile {
+        schema: PAPER_SCHEMA,
+        version: env!("CARGO_PKG_VERSION"),
+        seed,
+        reached: vec![
+            Reached::at_most("observation matrix against Eq. 7", difference, 1e-12),
+            Reached::at_most("H of the optimum inside (18)", optimised.fitness[0], 161.3 * 1.001),
+            Reached::at_most("largest parameter error after three runs", runs.error_after_three, 0.007),
+            Reached::at_most("largest parameter error after six runs", runs.error_after_six, 1e-6),
+        ],
+        tables: tables.iter().map(|table| (table.number.to_string(), table.clone())).collect(),
+        figures,
+        deviations: DEVIATIONS,
+        seconds: begun.elapsed().as_secs_f64(),
+    };
+    for figure in &file.figures {
+        write_whole(&out.join(&figure.file), figure.plot.svg(WIDTH, HEIGHT)?.as_bytes())?;
+    }
+    write_whole(&out.join("report.html"), page::page(&file, &tables, &file.figures)?.as_bytes())?;
+    Ok(file)
+}
+
+/// Size of the pictures.
+const WIDTH: f64 = 720.0;
+const HEIGHT: f64 = 320.0;

@@ -1,0 +1,165 @@
+//! The columns of one table that a log's description asks for, found by name or index.
+
+use super::format::ColumnRef;
+use super::source::{LogPlace, LogTable};
+use crate::error::RecordingError;
+
+/// A table under way, and the columns of it that are wanted.
+#[derive(Debug)]
+pub(super) struct Selected {
+    pub(super) label: String,
+    pub(super) table: Box<dyn LogTable>,
+    /// Column of each slot.
+    fields: Vec<usize>,
+    /// The row last read, one value for each slot.
+    pub(super) values: Vec<f64>,
+    /// Rows passed so far.
+    pub(super) rows: u64,
+}
+
+impl Selected {
+    pub(super) fn new(label: String, table: Box<dyn LogTable>) -> Self {
+        Self { label, table, fields: Vec::new(), values: Vec::new(), rows: 0 }
+    }
+
+    /// Asks for `column`; its values appear at the returned slot of every row.
+    pub(super) fn want(&mut self, key: &str, column: &ColumnRef) -> Result<usize, RecordingError> {
+        let field = self.field(key, column)?;
+        if let Some(known) = self.fields.iter().position(|wanted| *wanted == field) {
+            return Ok(known);
+        }
+        self.fields.push(field);
+        Ok(self.fields.len() - 1)
+    }
+
+    /// Ends the asking.
+    pub(super) fn ready(&mut self) {
+        self.table.select(&self.fields);
+        self.values = vec![0.0; self.fields.len()];
+    }
+
+    fn field(&self, key: &str, column: &ColumnRef) -> Result<usize, RecordingError> {
+        let unknown = |wanted: String, hint: String| RecordingError::UnknownColumn {
+            place: self.table.place(),
+            key: key.to_owned(),
+            wanted,
+            hint,
+        };
+        let width = self.table.width();
+        match column {
+            ColumnRef::Index(index) if *index < width => Ok(*index),
+            ColumnRef::Index(index) => {
+                Err(unknown(index.to_string(), format!("there are {width} columns, 0 to {}", width.saturating_sub(1))))
+            }
+            ColumnRef::Name(name) => {
+                let Some(names) = self.table.names() else {
+                    let hint = match self.table.place() {
+                        LogPlace::Line { .. } => {
+                            "the file has no header line: give 0-based indices, or set header = true"
+                        }
+                        LogPlace::Whole { .. } | LogPlace::Row { .. } => {
+                            "its columns have no names: give 0-based indices"
+                        }
+                    };
+                    return Err(unknown(name.clone(), hint.to_owned()));
+                };
+                let mut places = names.iter().enumerate().filter(|(_, n)| *n == name).map(|(index, _)| index);
+                match (places.next(), places.next()) {
+                    (Some(first), Some(second)) => Err(RecordingError::DuplicateColumn {
+                        place: self.table.place(),
+                        name: name.clone(),
+                        first,
+                        second,
+                    }),
+                    (Some(first), None) => Ok(first),
+                    (None, _) => Err(unknown(name.clone(), existing_names(name, names))),
+                }
+            }
+        }
+    }
+
+    /// Reads one row into `values`; false at the end.
+    pub(super) fn next_row(&mut self) -> Result<bool, RecordingError> {
+        let found = self.table.next_row(&mut self.values)?;
+        self.rows += u64::from(found);
+        Ok(found)
+    }
+
+    /// Passes over one row; false at the end.
+    pub(super) fn skip_row(&mut self) -> Result<bool, RecordingError> {
+        let found = self.table.skip_row()?;
+        self.rows += u64::from(found);
+        Ok(found)
+    }
+
+    /// Whether the row last read has an empty, NaN or infinite field.
+    pub(super) fn missing(&self) -> bool {
+        !self.values.iter().all(|value| value.is_finite())
+    }
+
+    /// The error for the missing value in the row last read.
+    pub(super) fn missing_error(&self) -> RecordingError {
+        let slot = self.values.iter().position(|value| !value.is_finite()).unwrap_or(0);
+        let field = self.fields[slot];
+        RecordingError::Missing {
+            place: self.table.place(),
+            column: column_label(self.table.names(), field),
+            text: self.table.field_text(field).unwrap_or_else(|| self.values[slot].to_string()),
+        }
+    }
+
+    /// Name and index of a wanted column, for messages.
+    pub(super) fn label_of_slot(&self, slot: usize) -> String {
+        column_label(self.table.names(), self.fields[slot])
+    }
+}
+
+/// Name and index of a column, for messages.
+pub(super) fn column_label(names: Option<&[String]>, field: usize) -> String {
+    match names.and_then(|names| names.get(field)) {
+        Some(name) => format!("`{}` ({field})", name.escape_debug()),
+        None => field.to_string(),
+    }
+}
+
+fn existing_names(wanted: &str, names: &[String]) -> String {
+    const SHOWN: usize = 40;
+    // Bounded: a line of a megabyte may hold half a million names.
+    const COMPARED: usize = 1000;
+    let nearest = names.iter().take(COMPARED).min_by_key(|name| edit_distance(wanted, name)).map_or("", String::as_str);
+    let cut = |name: &str| name.chars().take(60).flat_map(char::escape_debug).collect::<String>();
+    let list = names.iter().take(SHOWN).map(|name| cut(name)).collect::<Vec<_>>().join(", ");
+    let more = if names.len() > SHOWN { format!(", and {} more", names.len() - SHOWN) } else { String::new() };
+    let delimiter = if names.len() == 1 { " (only one column: is `delimiter` right?)" } else { "" };
+    format!("did you mean `{}`? There are: {list}{more}{delimiter}", cut(nearest))
+}
+
+/// Levenshtein distance over the first 64 characters; another digit counts three: `tau1` is no misspelling of `tau2`.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().take(64).collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.chars().take(64).enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, y) in b.iter().enumerate() {
+            let cost = if x.is_ascii_digit() && y.is_ascii_digit() { 3 } else { 1 };
+            let substituted = diagonal + if x == *y { 0 } else { cost };
+            diagonal = row[j + 1];
+            row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edit_distance_counts_single_edits() {
+        assert_eq!(edit_distance("kitten", "sitting"), 3);
+        assert_eq!(edit_distance("", "abc"), 3);
+        assert_eq!(edit_distance("q1_rad", "q1_rad"), 0);
+        assert_eq!(edit_distance("tau1", "tau2"), 2);
+    }
+}

@@ -1,0 +1,136 @@
+//! From columns to joints: unit, sign, scale, matrix, offset.
+
+use super::format::ChannelGroup;
+use super::units::{Quantity, si_factor};
+use crate::error::FormatError;
+
+/// `joint = matrix · column + offset`, with unit, sign and scale already in the matrix.
+#[derive(Clone, Debug)]
+pub(crate) struct Mapping {
+    /// Per joint: the columns that enter, with their factors.
+    terms: Vec<Vec<(usize, f64)>>,
+    offset: Vec<f64>,
+}
+
+impl Mapping {
+    pub(crate) fn new(key: &str, group: &ChannelGroup, quantity: Quantity, joints: usize) -> Result<Self, FormatError> {
+        let columns = group.column_list(key)?.len();
+        let factor = |column: usize| {
+            let unit = group.unit.as_ref().and_then(|unit| unit.at(column));
+            let unit = unit.map_or(Some(1.0), |unit| si_factor(&unit, quantity)).unwrap_or(1.0);
+            let scale = group.scale.as_ref().and_then(|scale| scale.at(column)).unwrap_or(1.0);
+            let sign = group.sign.as_ref().and_then(|sign| sign.at(column)).unwrap_or(1.0);
+            unit * scale * sign
+        };
+        let matrix = match (&group.matrix, &group.inverse_matrix) {
+            (Some(matrix), _) => Some(matrix.clone()),
+            (None, Some(matrix)) => Some(inverse(matrix).ok_or_else(|| {
+                FormatError::new(
+                    format!("{key}.inverse_matrix"),
+                    "the matrix is singular",
+                    "give the square, invertible matrix with columns = M joint",
+                )
+            })?),
+            (None, None) => None,
+        };
+        let terms = (0..joints)
+            .map(|joint| match &matrix {
+                None => vec![(joint, factor(joint))],
+                Some(matrix) => (0..columns)
+                    .map(|column| (column, matrix[joint][column] * factor(column)))
+                    .filter(|(_, weight)| *weight != 0.0)
+                    .collect(),
+            })
+            .collect();
+        let offset = (0..joints).map(|joint| group.offset.as_ref().and_then(|o| o.at(joint)).unwrap_or(0.0)).collect();
+        Ok(Self { terms, offset })
+    }
+
+    /// Fills `out` (one vector for each joint) from raw `columns`.
+    pub(crate) fn apply(&self, columns: &[Vec<f64>], out: &mut [Vec<f64>]) {
+        for ((terms, offset), out) in self.terms.iter().zip(&self.offset).zip(out) {
+            out.clear();
+            match terms.split_first() {
+                None => out.resize(columns.first().map_or(0, Vec::len), *offset),
+                Some(((column, weight), rest)) => {
+                    out.extend(columns[*column].iter().map(|value| value * weight));
+                    for (column, weight) in rest {
+                        for (out, value) in out.iter_mut().zip(&columns[*column]) {
+                            *out += value * weight;
+                        }
+                    }
+                    if *offset != 0.0 {
+                        for out in out.iter_mut() {
+                            *out += offset;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Gauss-Jordan with row pivoting; `None` if a pivot falls below 1e-12 of the largest entry.
+fn inverse(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+    let n = matrix.len();
+    if matrix.iter().any(|row| row.len() != n) {
+        return None;
+    }
+    let scale = matrix.iter().flatten().fold(0.0_f64, |max, value| max.max(value.abs()));
+    let mut work: Vec<Vec<f64>> = matrix
+        .iter()
+        .enumerate()
+        .map(|(i, row)| row.iter().copied().chain((0..n).map(|j| if i == j { 1.0 } else { 0.0 })).collect())
+        .collect();
+    for k in 0..n {
+        let pivot = (k..n).max_by(|a, b| work[*a][k].abs().total_cmp(&work[*b][k].abs()))?;
+        let value = work[pivot][k];
+        if value.abs().partial_cmp(&(1e-12 * scale)) != Some(core::cmp::Ordering::Greater) {
+            return None;
+        }
+        work.swap(k, pivot);
+        work[k].iter_mut().for_each(|entry| *entry /= value);
+        let pivot_row = work[k].clone();
+        for (i, row) in work.iter_mut().enumerate() {
+            let factor = row[k];
+            if i != k && factor != 0.0 {
+                row.iter_mut().zip(&pivot_row).for_each(|(entry, pivot)| *entry -= factor * pivot);
+            }
+        }
+    }
+    Some(work.into_iter().map(|row| row[n..].to_vec()).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn group(toml: &str) -> ChannelGroup {
+        toml::from_str(toml).unwrap()
+    }
+
+    #[test]
+    fn inverse_matrix_undoes_the_joint_to_motor_matrix() {
+        let group = group("columns = [0, 1]\ninverse_matrix = [[45.0, 0.0], [32.0, 32.0]]\noffset = [0.0, 0.5]");
+        let mapping = Mapping::new("position", &group, Quantity::Position, 2).unwrap();
+        // Joints (0.1, 0.2) turn the motors by (4.5, 9.6).
+        let mut out = vec![Vec::new(), Vec::new()];
+        mapping.apply(&[vec![4.5], vec![9.6]], &mut out);
+        assert!((out[0][0] - 0.1).abs() < 1e-15 && (out[1][0] - 0.7).abs() < 1e-15, "{out:?}");
+    }
+
+    #[test]
+    fn unit_sign_and_scale_multiply_before_the_offset() {
+        let group = group("columns = [0]\nunit = \"deg\"\nsign = -1\nscale = 2.0\noffset = 1.0");
+        let mapping = Mapping::new("position", &group, Quantity::Position, 1).unwrap();
+        let mut out = vec![Vec::new()];
+        mapping.apply(&[vec![90.0]], &mut out);
+        assert!((out[0][0] - (1.0 - core::f64::consts::PI)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_singular_matrix_is_refused() {
+        let group = group("columns = [0, 1]\ninverse_matrix = [[1.0, 2.0], [2.0, 4.0]]");
+        assert!(Mapping::new("position", &group, Quantity::Position, 2).is_err());
+    }
+}

@@ -1,0 +1,321 @@
+//! Logs as a stream of blocks: paired files, ranges, mapping to joints. Memory does not grow with the log.
+
+use super::columns::Selected;
+use super::format::Missing;
+use super::mapping::Mapping;
+use super::source::LogSource;
+use super::{Log, file_source};
+use crate::error::RecordingError;
+use std::path::Path;
+
+/// Largest position or torque: its squares and its second differences per second squared are finite.
+const LARGEST: f64 = 1e60;
+
+/// Rows of a [`RawBlock`] at most.
+const BLOCK_ROWS: usize = 4096;
+
+/// Some successive rows of a log in joint values (SI), as they were logged: no filter, no resampling.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RawBlock {
+    /// 0-based data row in the file of each sample; holes where rows were left out.
+    pub row: Vec<u64>,
+    /// Seconds after the first data row of the file.
+    pub time_s: Vec<f64>,
+    /// Positions, one vector for each joint (rad, m).
+    pub q: Vec<Vec<f64>>,
+    /// Logged velocities; empty without a `velocity` group.
+    pub dq: Vec<Vec<f64>>,
+    /// Logged accelerations; empty without an `acceleration` group.
+    pub ddq: Vec<Vec<f64>>,
+    /// Torques (N m, N).
+    pub tau: Vec<Vec<f64>>,
+    /// Temperatures (°C); empty without a `temperature` group.
+    pub temperature_c: Vec<Vec<f64>>,
+}
+
+impl RawBlock {
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.row.len()
+    }
+}
+
+/// What the reader left out.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct LinesDropped {
+    /// Rows with an empty, NaN or infinite field, under `missing = "drop"`.
+    pub missing: u64,
+    /// File and line of a cut-off last row.
+    pub truncated: Option<String>,
+}
+
+#[derive(Debug)]
+struct Group {
+    key: &'static str,
+    table: usize,
+    slots: Vec<usize>,
+    mapping: Mapping,
+    columns: Vec<Vec<f64>>,
+}
+
+/// One pass over a log: raw columns become joint values in SI, ranges and missing values are dealt with.
+#[derive(Debug)]
+pub struct LogReader {
+    label: String,
+    joints: Vec<String>,
+    tables: Vec<Selected>,
+    groups: Vec<Group>,
+    /// Slot of the time column in the main table and its factor to seconds.
+    time: Option<(usize, f64)>,
+    period_s: f64,
+    first_stamp_s: Option<f64>,
+    rows: [u64; 2],
+    time_range_s: [f64; 2],
+    selection: String,
+    missing: Missing,
+    next_row: u64,
+    delivered: u64,
+    finished: bool,
+    dropped: LinesDropped,
+}
+
+impl LogReader {
+    /// Begins a pass over `log`.
+    ///
+    /// # Errors
+    /// If the description is wrong, a file is missing or empty, or a column does not exist.
+    pub fn open(log: &Log) -> Result<Self, RecordingError> {
+        let format = &log.format;
+        format.validate(&log.joints)?;
+        let main = log.source();
+        let mut tables = vec![Selected::new(main.label(), main.open()?)];
+        let time = match &format.time {
+            Some(time) => Some((tables[0].want("time.column", &time.column)?, time.unit.seconds() * time.scale)),
+            None => None,
+        };
+
+        // Channel groups in files of their own: each file is opened once.
+        let mut paths = vec![main.path().map(Path::to_owned)];
+        let mut groups = Vec::new();
+        for (key, group, quantity) in format.groups() {
+            let path = match &group.file {
+                None => main.path().map(Path::to_owned),
+                Some(name) => {
+                    let beside = main.path().ok_or_else(|| RecordingError::NoFolder { log: main.label(), key })?;
+                    Some(beside.parent().unwrap_or(Path::new("")).join(name))
+                }
+            };
+            let table = paths.iter().position(|known| *known == path).unwrap_or(paths.len());
+            if let (Some(path), true) = (&path, table == paths.len()) {
+                let source = file_source(path, format);
+                tables.push(Selected::new(source.label(), source.open()?));
+                paths.push(Some(path.clone()));
+            }
+            let list = group.column_list(key)?;
+            let slots = list.iter().map(|column| tables[table].want(&format!("{key}.columns"), column));
+            let slots = slots.collect::<Result<Vec<_>, _>>()?;
+            let mapping = Mapping::new(key, group, quantity, log.joints.len())?;
+            groups.push(Group { key, table, columns: vec![Vec::new(); slots.len()], slots, mapping });
+        }
+        tables.iter_mut().for_each(Selected::ready);
+
+        // The part of the log that is asked for, and what to call it in messages.
+        let mut selection = Vec::new();
+        let rows = match (format.rows, format.fraction) {
+            (Some(rows), _) => {
+                selection.push(format!("rows = {rows:?}"));
+                rows
+            }
+            (None, Some([from, to])) => {
+                selection.push(format!("fraction = [{from}, {to}]"));
+                let count = row_count(main)? as f64;
+                [(from * count).round() as u64, (to * count).round() as u64]
+            }
+            (None, None) => [0, u64::MAX],
+        };
+        if let Some(range) = format.time_range_s {
+            selection.push(format!("time_range_s = {range:?}"));
+        }
+        Ok(Self {
+            label: main.label(),
+            joints: log.joints.clone(),
+            tables,
+            groups,
+            time,
+            period_s: format.rate_hz.map_or(0.0, f64::recip),
+            first_stamp_s: None,
+            rows,
+            time_range_s: format.time_range_s.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
+            selection: selection.join(", "),
+            missing: format.missing,
+            next_row: 0,
+            delivered: 0,
+            finished: false,
+            dropped: LinesDropped::default(),
+        })
+    }
+
+    /// Rows and lines left out so far.
+    pub fn dropped(&self) -> &LinesDropped {
+        &self.dropped
+    }
+
+    /// Data rows of the file that were passed so far.
+    pub fn rows_passed(&self) -> u64 {
+        self.next_row
+    }
+
+    /// What messages call the log.
+    pub fn label(&self) -> &str {
+        &self.label
+    }
+
+    /// Name or index of the time column, for messages.
+    pub fn time_label(&self) -> String {
+        self.time.map_or_else(|| "none".to_owned(), |(slot, _)| self.tables[0].label_of_slot(slot))
+    }
+
+    /// Reads up to 4096 rows into `block`; false when the log has ended (and `block` is empty).
+    ///
+    /// # Errors
+    /// If a row cannot be read, files of one log differ in length, or the selection leaves no row at all.
+    pub fn next_block(&mut self, block: &mut RawBlock) -> Result<bool, RecordingError> {
+        block.row.clear();
+        block.time_s.clear();
+        for group in &mut self.groups {
+            group.columns.iter_mut().for_each(Vec::clear);
+        }
+        while !self.finished && block.row.len() < BLOCK_ROWS {
+            self.next_row_into(block)?;
+        }
+        for group in ["position", "velocity", "acceleration", "torque", "temperature"] {
+            let (out, finite) = match group {
+                "position" => (&mut block.q, "position"),
+                "velocity" => (&mut block.dq, "velocity"),
+                "acceleration" => (&mut block.ddq, "acceleration"),
+                "torque" => (&mut block.tau, "torque"),
+                _ => (&mut block.temperature_c, "temperature"),
+            };
+            let Some(group) = self.groups.iter().find(|candidate| candidate.key == group) else {
+                out.clear();
+                continue;
+            };
+            out.resize(self.joints.len(), Vec::new());
+            group.mapping.apply(&group.columns, out);
+            for (joint, values) in out.iter().enumerate() {
+                if let Some(at) = values.iter().position(|value| !(-LARGEST..=LARGEST).contains(value)) {
+                    return Err(RecordingError::Overflow {
+                        log: self.label.clone(),
+                        row: block.row[at],
+                        group: finite,
+                        joint: self.joints[joint].clone(),
+                    });
+                }
+            }
+        }
+        self.delivered += block.row.len() as u64;
+        if block.row.is_empty() && self.delivered == 0 {
+            return Err(if self.next_row == 0 && self.rows[1] > 0 {
+                RecordingError::NoRows { place: self.tables[0].table.place() }
+            } else {
+                RecordingError::EmptySelection {
+                    log: self.label.clone(),
+                    selection: if self.selection.is_empty() {
+                        "missing = \"drop\"".to_owned()
+                    } else {
+                        self.selection.clone()
+                    },
+                    rows: self.next_row,
+                }
+            });
+        }
+        Ok(!block.row.is_empty())
+    }
+
+    fn next_row_into(&mut self, block: &mut RawBlock) -> Result<(), RecordingError> {
+        if self.next_row >= self.rows[1] {
+            self.finished = true;
+            return Ok(());
+        }
+        // The first row is always read: times count from it.
+        if self.next_row > 0 && self.next_row < self.rows[0] {
+            let mut ended = None;
+            for (index, table) in self.tables.iter_mut().enumerate() {
+                if !table.skip_row()? {
+                    ended = Some(index);
+                }
+            }
+            self.finished = ended.is_some();
+            self.next_row += u64::from(!self.finished);
+            return ended.map_or(Ok(()), |index| self.check_ends(index));
+        }
+        let (mut ended, mut missing) = (None, None);
+        for (index, table) in self.tables.iter_mut().enumerate() {
+            if !table.next_row()? {
+                ended = Some(index);
+            } else if table.missing() {
+                missing = Some(index);
+            }
+        }
+        if let Some(index) = ended {
+            self.finished = true;
+            return self.check_ends(index);
+        }
+        let row = self.next_row;
+        self.next_row += 1;
+        if let Some(index) = missing {
+            if self.missing == Missing::Error {
+                return Err(self.tables[index].missing_error());
+            }
+            self.dropped.missing += u64::from(row >= self.rows[0]);
+            return Ok(());
+        }
+        let time_s = match self.time {
+            Some((slot, seconds)) => {
+                let stamp = self.tables[0].values[slot];
+                // The difference of the stamps first: nanoseconds since 1970 do not survive the multiplication.
+                (stamp - *self.first_stamp_s.get_or_insert(stamp)) * seconds
+            }
+            None => row as f64 * self.period_s,
+        };
+        if row < self.rows[0] || time_s < self.time_range_s[0] || time_s >= self.time_range_s[1] {
+            return Ok(());
+        }
+        block.row.push(row);
+        block.time_s.push(time_s);
+        for group in &mut self.groups {
+            let values = &self.tables[group.table].values;
+            for (column, slot) in group.columns.iter_mut().zip(&group.slots) {
+                column.push(values[*slot]);
+            }
+        }
+        Ok(())
+    }
+
+    /// The files of one log must end together; one cut-off last row is forgiven.
+    fn check_ends(&mut self, ended: usize) -> Result<(), RecordingError> {
+        for table in &self.tables {
+            if let Some(place) = table.table.truncated() {
+                self.dropped.truncated = Some(place.to_string());
+            }
+        }
+        let (rows, log) = (self.tables[ended].rows, self.tables[ended].label.clone());
+        let forgiven = u64::from(self.dropped.truncated.is_some());
+        for table in &mut self.tables {
+            let longer = table.rows > rows;
+            if longer && (table.rows > rows + forgiven || table.skip_row()?) {
+                return Err(RecordingError::UnequalFiles { log, rows, other: table.label.clone() });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Data rows of a log: one cheap pass without reading numbers.
+fn row_count(source: &dyn LogSource) -> Result<u64, RecordingError> {
+    let (mut table, mut rows) = (source.open()?, 0);
+    while table.skip_row()? {
+        rows += 1;
+    }
+    Ok(rows)
+}

@@ -1,0 +1,326 @@
+//! Text tables (CSV and its kin): delimiter and header found out, rows of numbers read one by one.
+
+use super::columns::column_label;
+use super::format::{Header, LogFormat};
+use super::lines::Lines;
+use super::source::{LogPlace, LogSource, LogTable};
+use crate::error::RecordingError;
+use std::path::{Path, PathBuf};
+
+/// A text file with one row of numbers a line.
+#[derive(Clone, Debug)]
+pub struct TextLog {
+    path: PathBuf,
+    header: Header,
+    delimiter: Option<char>,
+}
+
+impl TextLog {
+    /// The file at `path`, with `header` and `delimiter` of `format`. Nothing is read yet.
+    pub fn new(path: &Path, format: &LogFormat) -> Self {
+        Self { path: path.to_owned(), header: format.header, delimiter: format.delimiter }
+    }
+}
+
+impl LogSource for TextLog {
+    fn label(&self) -> String {
+        self.path.display().to_string()
+    }
+
+    fn open(&self) -> Result<Box<dyn LogTable>, RecordingError> {
+        Ok(Box::new(TextTable::open(self)?))
+    }
+
+    fn path(&self) -> Option<&Path> {
+        Some(&self.path)
+    }
+
+    /// From the file's size and the length of its first lines.
+    fn estimated_rows(&self) -> Option<u64> {
+        use std::io::Read;
+        let size = std::fs::metadata(&self.path).ok()?.len();
+        let mut head = Vec::new();
+        std::fs::File::open(&self.path).ok()?.take(1 << 16).read_to_end(&mut head).ok()?;
+        let lines = head.split(|byte| *byte == b'\n').count().max(2) - 1;
+        Some(size * lines as u64 / (head.len() as u64).max(1))
+    }
+}
+
+#[derive(Debug)]
+struct TextTable {
+    label: String,
+    lines: Lines,
+    delimiter: u8,
+    names: Option<Vec<String>>,
+    width: usize,
+    first_row_is_pending: bool,
+    wanted: Vec<usize>,
+    fields: Vec<(usize, usize)>,
+    rows: u64,
+    truncated_line: Option<u64>,
+}
+
+impl TextTable {
+    fn open(log: &TextLog) -> Result<Self, RecordingError> {
+        let label = log.label();
+        let mut lines = Lines::open(&log.path)?;
+        if !lines.advance()? {
+            return Err(RecordingError::NoRows { place: LogPlace::Line { log: label, line: lines.number() } });
+        }
+        let first = lines.line();
+        if first.contains(&0) {
+            return Err(RecordingError::Binary { file: log.path.clone(), line: lines.number() });
+        }
+        if first.contains(&b'\r') {
+            return Err(RecordingError::CarriageReturns { file: log.path.clone(), line: lines.number() });
+        }
+        let delimiter = log.delimiter.map_or_else(|| guessed_delimiter(first), |delimiter| delimiter as u8);
+        let mut fields = Vec::new();
+        split(first, delimiter, &mut fields);
+        let has_header = match log.header {
+            Header::Present => true,
+            Header::Absent => false,
+            Header::Auto => !fields.iter().all(|(from, to)| number(&first[*from..*to]).is_some()),
+        };
+        let names = has_header.then(|| {
+            fields.iter().map(|(from, to)| String::from_utf8_lossy(&first[*from..*to]).into_owned()).collect()
+        });
+        Ok(Self {
+            label,
+            delimiter,
+            names,
+            width: fields.len(),
+            first_row_is_pending: !has_header,
+            wanted: Vec::new(),
+            fields,
+            rows: 0,
+            truncated_line: None,
+            lines,
+        })
+    }
+
+    fn place_of_line(&self, line: u64) -> LogPlace {
+        LogPlace::Line { log: self.label.clone(), line }
+    }
+
+    fn not_a_number(&self, field: usize) -> RecordingError {
+        let text = self.shown(field);
+        let comma = text.contains(',') && text.bytes().all(|b| b.is_ascii_digit() || matches!(b, b',' | b'-' | b'+'));
+        let first_row = self.rows == 0;
+        RecordingError::NotANumber {
+            place: self.place(),
+            column: column_label(self.names.as_deref(), field),
+            text,
+            mend: if comma {
+                "write decimal points instead of decimal commas"
+            } else if first_row {
+                "mend the field; if this line is a header, set header = true"
+            } else {
+                "mend the field or delete the line"
+            },
+        }
+    }
+
+    fn shown(&self, field: usize) -> String {
+        let (from, to) = self.fields[field];
+        let text = String::from_utf8_lossy(&self.lines.line()[from..to]);
+        let mut short: String = text.chars().take(40).flat_map(char::escape_debug).collect();
+        if text.chars().nth(40).is_some() {
+            short.push_str("..");
+        }
+        short
+    }
+}
+
+impl LogTable for TextTable {
+    fn width(&self) -> usize {
+        self.width
+    }
+
+    fn names(&self) -> Option<&[String]> {
+        self.names.as_deref()
+    }
+
+    fn select(&mut self, fields: &[usize]) {
+        self.wanted = fields.to_vec();
+    }
+
+    fn skip_row(&mut self) -> Result<bool, RecordingError> {
+        let found = core::mem::take(&mut self.first_row_is_pending) || self.lines.advance()?;
+        self.rows += u64::from(found);
+        Ok(found)
+    }
+
+    fn next_row(&mut self, values: &mut [f64]) -> Result<bool, RecordingError> {
+        if !(core::mem::take(&mut self.first_row_is_pending) || self.lines.advance()?) {
+            return Ok(false);
+        }
+        split(self.lines.line(), self.delimiter, &mut self.fields);
+        if self.fields.len() != self.width {
+            if self.fields.len() < self.width && self.rows > 0 && self.lines.at_end()? {
+                self.truncated_line = Some(self.lines.number());
+                return Ok(false);
+            }
+            return Err(RecordingError::RaggedRow {
+                place: self.place(),
+                expected: self.width,
+                found: self.fields.len(),
+                hint: if self.delimiter == b',' && self.fields.len() == 2 * self.width {
+                    " (decimal commas? write decimal points)"
+                } else {
+                    ""
+                },
+            });
+        }
+        let line = self.lines.line();
+        for (value, &field) in values.iter_mut().zip(&self.wanted) {
+            let (from, to) = self.fields[field];
+            *value = match number(&line[from..to]) {
+                Some(value) => value,
+                None if from == to => f64::NAN,
+                None if !self.lines.complete() && self.rows > 0 => {
+                    self.truncated_line = Some(self.lines.number());
+                    return Ok(false);
+                }
+                None => return Err(self.not_a_number(field)),
+            };
+        }
+        self.rows += 1;
+        Ok(true)
+    }
+
+    fn place(&self) -> LogPlace {
+        self.place_of_line(self.lines.number())
+    }
+
+    fn field_text(&self, field: usize) -> Option<String> {
+        Some(self.shown(field))
+    }
+
+    fn truncated(&self) -> Option<LogPlace> {
+        self.truncated_line.map(|line| self.place_of_line(line))
+    }
+}
+
+fn guessed_delimiter(line: &[u8]) -> u8 {
+    // Tabs and semicolons first: where they stand, commas are decimal commas.
+    for delimiter in *b"\t;," {
+        if line.contains(&delimiter) {
+            return delimiter;
+        }
+    }
+    b' '
+}
+
+/// Splits `line` into trimmed, unquoted fields, as byte ranges.
+fn split(line: &[u8], delimiter: u8, fields: &mut Vec<(usize, usize)>) {
+    fields.clear();
+    if delimiter == b' ' {
+        let mut at = 0;
+        while let Some(skip) = line[at..].iter().position(|byte| !byte.is_ascii_whitespace()) {
+            let from = at + skip;
+            let length = line[from..].iter().position(u8::is_ascii_whitespace).unwrap_or(line.len() - from);
+            fields.push(trimmed(line, from, from + length));
+            at = from + length;
+        }
+        return;
+    }
+    let quotes = line.contains(&b'"');
+    let (mut from, mut quoted) = (0, false);
+    for (at, byte) in line.iter().enumerate() {
+        if quotes && *byte == b'"' {
+            quoted = !quoted;
+        } else if *byte == delimiter && !quoted {
+            fields.push(trimmed(line, from, at));
+            from = at + 1;
+        }
+    }
+    fields.push(trimmed(line, from, line.len()));
+}
+
+/// The range without outer blanks and one pair of quotes.
+fn trimmed(line: &[u8], mut from: usize, mut to: usize) -> (usize, usize) {
+    while from < to && line[from].is_ascii_whitespace() {
+        from += 1;
+    }
+    while from < to && line[to - 1].is_ascii_whitespace() {
+        to -= 1;
+    }
+    if to - from >= 2 && line[from] == b'"' && line[to - 1] == b'"' {
+        return (from + 1, to - 1);
+    }
+    (from, to)
+}
+
+/// A number as the standard library reads it, `nan` and `inf` included.
+fn number(field: &[u8]) -> Option<f64> {
+    short_decimal(field).or_else(|| core::str::from_utf8(field).ok()?.parse().ok())
+}
+
+/// The fast path for fields such as `-12.345678`: both the digits as an integer below 2⁵³ and the power of ten are exact, so
+/// that one division rounds correctly. `None` sends the field to the standard library.
+fn short_decimal(field: &[u8]) -> Option<f64> {
+    const POWERS: [f64; 16] = [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
+    let (negative, digits) = match field {
+        [b'-', rest @ ..] => (true, rest),
+        rest => (false, rest),
+    };
+    // Fifteen digits and a point stay below 2^53.
+    if digits.is_empty() || digits.len() > 16 {
+        return None;
+    }
+    let (mut integer, mut point) = (0_u64, None);
+    for (at, byte) in digits.iter().enumerate() {
+        match byte {
+            b'0'..=b'9' => integer = integer * 10 + u64::from(byte - b'0'),
+            b'.' if point.is_none() => point = Some(at),
+            _ => return None,
+        }
+    }
+    let decimals = match point {
+        None if digits.len() > 15 => return None,
+        None => 0,
+        Some(_) if digits.len() == 1 => return None,
+        Some(at) => digits.len() - 1 - at,
+    };
+    let value = integer as f64 / POWERS[decimals];
+    Some(if negative { -value } else { value })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fields(line: &str, delimiter: u8) -> Vec<String> {
+        let mut ranges = Vec::new();
+        split(line.as_bytes(), delimiter, &mut ranges);
+        ranges.into_iter().map(|(from, to)| line[from..to].to_owned()).collect()
+    }
+
+    #[test]
+    fn fields_are_split_trimmed_and_unquoted() {
+        assert_eq!(fields("a, \"b,c\" ,,d", b','), ["a", "b,c", "", "d"]);
+        assert_eq!(fields("  1 \t 2  3 ", b' '), ["1", "2", "3"]);
+        assert_eq!(fields("1;2,5;", b';'), ["1", "2,5", ""]);
+    }
+
+    #[test]
+    fn the_fast_path_reads_the_same_bits_as_the_standard_library() {
+        let mut state = 1_u64;
+        for _ in 0..20_000 {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            let integer = (state >> 3) % 10_u64.pow(1 + (state % 15) as u32);
+            let mut text = integer.to_string();
+            text.insert((state >> 40) as usize % (text.len() + 1), '.');
+            if state & 4 == 0 {
+                text.insert(0, '-');
+            }
+            let fast = short_decimal(text.as_bytes());
+            assert_eq!(fast.map(f64::to_bits), text.parse::<f64>().ok().map(f64::to_bits), "{text}");
+        }
+        for text in ["", "-", ".", "-.", "+1", "1e5", "nan", "1..2", "1234567890123456", "0x1", "--1"] {
+            assert_eq!(short_decimal(text.as_bytes()), None, "{text}");
+        }
+        assert_eq!(number(b"-0").map(f64::is_sign_negative), Some(true));
+    }
+}

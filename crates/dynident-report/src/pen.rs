@@ -1,0 +1,32 @@
+//! Lines of still pictures.
+
+use core::fmt::Write;
+
+/// A tenth of a pixel is finer than any screen.
+pub(crate) fn tenth(x: f64) -> f64 {
+    (10.0 * x).round() / 10.0
+}
+
+/// Draws a line through points, px; a point that is not finite leaves a gap.
+#[derive(Default)]
+pub(crate) struct Pen {
+    text: String,
+    down: bool,
+}
+
+impl Pen {
+    pub(crate) fn to(&mut self, [x, y]: [f64; 2]) {
+        let drawn = x.is_finite() && y.is_finite();
+        if drawn {
+            let command = if self.down { 'L' } else { 'M' };
+            // Writing to a string cannot fail.
+            let _ = write!(self.text, "{command}{x:.1} {y:.1}");
+        }
+        self.down = drawn;
+    }
+
+    /// The line as the `d` of a path.
+    pub(crate) fn path(self) -> String {
+        self.text
+    }
+}

@@ -1,0 +1,282 @@
+//! A controller on a simulated robot along a reference.
+
+use crate::controllers::Controller;
+use crate::error::{SimulationError, require_length};
+use crate::feedback::Feedback;
+use crate::per_joint::PerJoint;
+use crate::plant::{Integrator, Plant};
+use crate::reference::Reference;
+use crate::run::{Divergence, LimitedQuantity, Run, RunStatus};
+use crate::sensors::SensorSettings;
+use crate::tape::{Arrays, ReferenceTape, Row, Tape};
+use dynident_model::Model;
+use serde::{Deserialize, Serialize};
+
+/// A speed that no robot has: beyond it a run counts as diverged, rad/s (m/s).
+const BEYOND: f64 = 1e4;
+
+/// Where a run starts.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Start {
+    /// On the reference, with its speed.
+    #[default]
+    Reference,
+    /// On the reference's position, at rest.
+    AtRest,
+    /// Elsewhere.
+    At {
+        /// Positions, rad (m).
+        q: Vec<f64>,
+        /// Speeds, rad/s (m/s).
+        dq: Vec<f64>,
+    },
+}
+
+/// What stops a run, and what cuts its torques. Nothing by default.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RunLimits {
+    /// Largest torque, Nm (N): the loop cuts what the controller asks for, and counts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque: Option<PerJoint>,
+    /// Lowest position, rad (m).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lower: Option<PerJoint>,
+    /// Highest position, rad (m).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub upper: Option<PerJoint>,
+    /// Highest speed, rad/s (m/s).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speed: Option<PerJoint>,
+    /// Largest distance from the reference, rad (m).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tracking_error: Option<PerJoint>,
+}
+
+impl RunLimits {
+    /// Position, speed and torque limits of the description; where it has none, the largest number there is (infinity has no place in JSON).
+    pub fn of_model(model: &Model) -> Self {
+        let each = |of: fn(&dynident_model::JointLimits) -> Option<f64>, none: f64| {
+            Some(PerJoint::Each(model.joints().iter().map(|joint| of(&joint.limits).unwrap_or(none)).collect()))
+        };
+        Self {
+            torque: each(|limits| limits.effort, f64::MAX),
+            lower: each(|limits| limits.lower, f64::MIN),
+            upper: each(|limits| limits.upper, f64::MAX),
+            speed: each(|limits| limits.velocity, f64::MAX),
+            tracking_error: None,
+        }
+    }
+
+    /// Checks the numbers for so many joints.
+    ///
+    /// # Errors
+    /// Lists of another length, numbers that are not numbers, limits of torque, speed or error that are not positive.
+    pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
+        self.values(joints).map(|_| ())
+    }
+
+    fn values(&self, joints: usize) -> Result<Limits, SimulationError> {
+        let positive = |what: &str, limit: &Option<PerJoint>| match limit {
+            Some(limit) => limit.values(what, joints, "give a positive number", |x| x > 0.0),
+            None => Ok(vec![f64::INFINITY; joints]),
+        };
+        let place = |what: &str, limit: &Option<PerJoint>, none: f64| match limit {
+            Some(limit) => limit.values(what, joints, "give a number", |x| !x.is_nan()),
+            None => Ok(vec![none; joints]),
+        };
+        Ok(Limits {
+            torque: positive("limits.torque", &self.torque)?,
+            lower: place("limits.lower", &self.lower, f64::NEG_INFINITY)?,
+            upper: place("limits.upper", &self.upper, f64::INFINITY)?,
+            speed: positive("limits.speed", &self.speed)?,
+            error: positive("limits.tracking_error", &self.tracking_error)?,
+        })
+    }
+}
+
+/// How a run is made. The controller's rate is the reference's.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LoopSettings {
+    /// How the robot is integrated. Default one semi-implicit Euler step a sample.
+    pub integrator: Integrator,
+    /// Where it starts. Default on the reference.
+    pub start: Start,
+    /// What stops it. Default nothing but divergence.
+    pub limits: RunLimits,
+    /// What the controller sees, and what [`SensorSettings::record`] makes of the run. Default perfect.
+    pub sensors: SensorSettings,
+    /// Whether true accelerations are kept; default no.
+    pub accelerations: bool,
+}
+
+impl LoopSettings {
+    /// Checks the numbers for so many joints.
+    ///
+    /// # Errors
+    /// [`SimulationError`] that names the setting.
+    pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
+        self.integrator.validate()?;
+        self.limits.validate(joints)?;
+        self.sensors.validate(joints)
+    }
+}
+
+struct Limits {
+    torque: Vec<f64>,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+    speed: Vec<f64>,
+    error: Vec<f64>,
+}
+
+/// Runs the controller on the robot along the reference: at every sample it is read, the controller asks for torques, which are cut to their limits and hold until the next sample. The controller is reset
+/// first. Steps allocate nothing (but those of the adaptive integrator).
+///
+/// ```
+/// use dynident_simulation::{ControllerSettings, LoopSettings, Plant, Reference, closed_loop};
+/// use dynident_model::{InertialParameters, Mat3, Vec3, sample::planar_2r};
+/// let rod = InertialParameters::from_centre_of_mass(1.0, Vec3([1.0, 0.0, 0.0]), &Mat3::ZERO);
+/// let mut plant = Plant::new(&planar_2r(1.0, rod, rod), &[], &[])?;
+/// let settings: ControllerSettings = toml::from_str("kind = \"joint-pd\"\nkp = 400.0\nkd = 80.0").unwrap();
+/// let mut controller = settings.build(2, None)?;
+/// let reference = Reference::standing(&[-1.5, 0.0], 1000.0, 2.0)?;
+/// let run = closed_loop(&mut plant, controller.as_mut(), &reference, &LoopSettings::default())?;
+/// assert!(run.status.is_done() && run.max_error[0] < 0.02);
+/// # Ok::<(), dynident_simulation::SimulationError>(())
+/// ```
+///
+/// # Errors
+/// Settings without meaning, numbers of joints that differ. What happens during the run is its [`RunStatus`].
+pub fn closed_loop(
+    plant: &mut Plant,
+    controller: &mut dyn Controller,
+    reference: &Reference,
+    settings: &LoopSettings,
+) -> Result<Run, SimulationError> {
+    let joints = plant.dof();
+    settings.validate(joints)?;
+    let limits = settings.limits.values(joints)?;
+    require_length("joints of the reference", joints, reference.joints())?;
+    require_length("joints of the controller", joints, controller.joints())?;
+    let samples = reference.samples();
+    let mut target = ReferenceTape::new(reference);
+    target.go_to(0);
+    match &settings.start {
+        Start::Reference => plant.set_state(0.0, target.target().q, target.target().dq),
+        Start::AtRest => plant.set_state(0.0, target.target().q, &vec![0.0; joints]),
+        Start::At { q, dq } => {
+            plant.check_state(q, dq)?;
+            plant.set_state(0.0, q, dq);
+        }
+    }
+    controller.reset();
+    let zeros = || vec![0.0; joints * samples];
+    let mut run = Run {
+        joints: plant.model().joints().iter().map(|joint| joint.name.clone()).collect(),
+        rate_hz: reference.rate_hz(),
+        samples,
+        status: RunStatus::Done,
+        reference: reference.shared(),
+        q: zeros(),
+        dq: zeros(),
+        ddq: if settings.accelerations { zeros() } else { Vec::new() },
+        tau: zeros(),
+        measured_q: zeros(),
+        measured_dq: zeros(),
+        max_error: vec![0.0; joints],
+        rms_error: vec![0.0; joints],
+        saturated: vec![0; joints],
+        unsettled_steps: 0,
+    };
+    let mut feedback = Feedback::new(&settings.sensors, plant, reference.rate_hz());
+    let (mut tau, mut ddq) = (vec![0.0; joints], vec![0.0; joints]);
+    let mut tape = Tape::new(joints);
+    let mut kept = 0;
+    for sample in 0..samples {
+        let time_s = run.time_s(sample);
+        plant.set_time_s(time_s);
+        target.go_to(sample);
+        if let Some(status) = verdict(plant, &limits, target.target().q, time_s, &run.joints) {
+            run.status = status;
+            break;
+        }
+        feedback.read(plant.q(), plant.dq());
+        let measured = feedback.measured();
+        controller.torque(time_s, target.target(), measured, &mut tau);
+        if let Some(joint) = tau.iter().position(|tau| !tau.is_finite()) {
+            run.status = RunStatus::Diverged { time_s, reason: Divergence::Torque { joint } };
+            break;
+        }
+        for joint in 0..joints {
+            if tau[joint].abs() > limits.torque[joint] {
+                tau[joint] = limits.torque[joint].copysign(tau[joint]);
+                run.saturated[joint] += 1;
+            }
+            let error = (target.target().q[joint] - plant.q()[joint]).abs();
+            run.max_error[joint] = run.max_error[joint].max(error);
+            run.rms_error[joint] += error * error;
+        }
+        let row = Row { q: plant.q(), dq: plant.dq(), tau: &tau, measured_q: measured.q, measured_dq: measured.dq };
+        if tape.push(row) {
+            tape.flush(arrays(&mut run), samples);
+        }
+        if settings.accelerations {
+            if let Err(fault) = plant.accelerations(&tau, &mut ddq) {
+                run.status = RunStatus::Diverged { time_s, reason: Divergence::Plant { fault } };
+                break;
+            }
+            for joint in 0..joints {
+                run.ddq[joint * samples + sample] = ddq[joint];
+            }
+        }
+        kept = sample + 1;
+        if kept < samples
+            && let Err(fault) = plant.advance(&tau, 1.0 / reference.rate_hz(), settings.integrator)
+        {
+            run.status = RunStatus::Diverged { time_s, reason: Divergence::Plant { fault } };
+            break;
+        }
+    }
+    tape.flush(arrays(&mut run), samples);
+    for error in &mut run.rms_error {
+        *error = (*error / kept.max(1) as f64).sqrt();
+    }
+    run.unsettled_steps = plant.unsettled_steps();
+    run.cut(kept);
+    Ok(run)
+}
+
+fn arrays(run: &mut Run) -> Arrays<'_> {
+    [&mut run.q, &mut run.dq, &mut run.tau, &mut run.measured_q, &mut run.measured_dq]
+}
+
+/// Why the run must stop here, if it must.
+#[inline]
+fn verdict(plant: &Plant, limits: &Limits, target: &[f64], time_s: f64, names: &[String]) -> Option<RunStatus> {
+    for joint in 0..target.len() {
+        let (q, dq) = (plant.q()[joint], plant.dq()[joint]);
+        if dq.abs() > BEYOND {
+            return Some(RunStatus::Diverged { time_s, reason: Divergence::Speed { joint, value: dq } });
+        }
+        let error = target[joint] - q;
+        let broken = |quantity, value, limit| {
+            Some(RunStatus::LimitBroken { time_s, joint: names[joint].clone(), quantity, value, limit })
+        };
+        if q < limits.lower[joint] {
+            return broken(LimitedQuantity::Position, q, limits.lower[joint]);
+        }
+        if q > limits.upper[joint] {
+            return broken(LimitedQuantity::Position, q, limits.upper[joint]);
+        }
+        if dq.abs() > limits.speed[joint] {
+            return broken(LimitedQuantity::Speed, dq, limits.speed[joint]);
+        }
+        if error.abs() > limits.error[joint] {
+            return broken(LimitedQuantity::TrackingError, error, limits.error[joint]);
+        }
+    }
+    None
+}

@@ -1,0 +1,156 @@
+//! Controllers that run at a fixed rate: the trait, and the registry of all that are offered.
+
+mod computed_torque;
+mod finite_time;
+mod joint_pd;
+mod joint_pid;
+mod model;
+mod pd_gravity;
+mod slotine_li;
+
+pub use computed_torque::{ComputedTorque, ComputedTorqueSettings};
+pub use finite_time::{FiniteTime, FiniteTimeSettings};
+pub use joint_pd::{JointPd, JointPdSettings};
+pub use joint_pid::{JointPid, JointPidSettings};
+pub use model::{ControllerModel, FrictionCompensation};
+pub use pd_gravity::PdGravity;
+pub use slotine_li::{SlotineLi, SlotineLiSettings};
+
+use crate::error::SimulationError;
+use serde::{Deserialize, Serialize};
+
+/// What a joint controller should follow at one moment: rad, rad/s, rad/s² (m).
+#[derive(Clone, Copy, Debug)]
+pub struct Target<'a> {
+    /// Positions.
+    pub q: &'a [f64],
+    /// Speeds.
+    pub dq: &'a [f64],
+    /// Accelerations.
+    pub ddq: &'a [f64],
+}
+
+/// What a joint controller sees at one moment: rad, rad/s (m).
+#[derive(Clone, Copy, Debug)]
+pub struct Measured<'a> {
+    /// Positions.
+    pub q: &'a [f64],
+    /// Speeds.
+    pub dq: &'a [f64],
+}
+
+/// A controller of joint torques. It is called once a sample, in the order of time; torque limits are the loop's business.
+pub trait Controller: core::fmt::Debug + Send {
+    /// Its name in study files and results.
+    fn name(&self) -> &'static str;
+
+    /// Number of joints.
+    fn joints(&self) -> usize;
+
+    /// Forgets the run so far: integrals and adapted parameters go back to their start.
+    fn reset(&mut self);
+
+    /// The drives' torques at `time_s`, Nm (N). Allocates nothing.
+    ///
+    /// # Panics
+    /// If a vector has not one entry per joint.
+    fn torque(&mut self, time_s: f64, target: Target<'_>, measured: Measured<'_>, tau: &mut [f64]);
+
+    /// Takes another model for the next run. Controllers without a model ignore it.
+    ///
+    /// # Errors
+    /// A model of another number of joints.
+    fn set_model(&mut self, _model: &ControllerModel) -> Result<(), SimulationError> {
+        Ok(())
+    }
+}
+
+/// The registry: what a study file may ask for under `controller`.
+///
+/// ```
+/// use dynident_simulation::controllers::ControllerSettings;
+/// let settings: ControllerSettings = toml::from_str("kind = \"joint-pd\"\nkp = 16.0\nkd = [8.0, 4.0]").unwrap();
+/// let controller = settings.build(2, None)?;
+/// assert_eq!(controller.name(), "joint-pd");
+/// assert!(settings.build(3, None).is_err());
+/// assert!(!settings.needs_model());
+/// # Ok::<(), dynident_simulation::SimulationError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum ControllerSettings {
+    /// [`JointPd`]: `τ = K_p e + K_d ė`.
+    JointPd(JointPdSettings),
+    /// [`JointPid`]: with the error's integral.
+    JointPid(JointPidSettings),
+    /// [`PdGravity`]: joint PD and the model's gravity torque.
+    PdGravity(JointPdSettings),
+    /// [`ComputedTorque`]: `τ = M̂ (q̈_d + K_p e + K_d ė) + ĥ`.
+    ComputedTorque(ComputedTorqueSettings),
+    /// [`FiniteTime`]: the paper's law, with its signs mended.
+    FiniteTime(FiniteTimeSettings),
+    /// [`FiniteTime`] with the signs as Eq. 23 prints them: it drives the joints away from the path, and is here to show that.
+    FiniteTimeLiteral(FiniteTimeSettings),
+    /// [`SlotineLi`]: passivity-based, adaptive if asked.
+    SlotineLi(SlotineLiSettings),
+}
+
+impl ControllerSettings {
+    /// The name in files.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::JointPd(_) => joint_pd::NAME,
+            Self::JointPid(_) => joint_pid::NAME,
+            Self::PdGravity(_) => pd_gravity::NAME,
+            Self::ComputedTorque(_) => computed_torque::NAME,
+            Self::FiniteTime(_) => finite_time::NAME,
+            Self::FiniteTimeLiteral(_) => finite_time::LITERAL_NAME,
+            Self::SlotineLi(_) => slotine_li::NAME,
+        }
+    }
+
+    /// Whether it needs a model of the robot.
+    pub fn needs_model(&self) -> bool {
+        !matches!(self, Self::JointPd(_) | Self::JointPid(_))
+    }
+
+    /// Checks the numbers for so many joints.
+    ///
+    /// # Errors
+    /// Gains that are negative or not finite, lists of another length, exponents outside of their range.
+    pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
+        match self {
+            Self::JointPd(settings) | Self::PdGravity(settings) => settings.validate(joints),
+            Self::JointPid(settings) => settings.validate(joints),
+            Self::ComputedTorque(settings) => settings.validate(joints),
+            Self::FiniteTime(settings) | Self::FiniteTimeLiteral(settings) => settings.validate(joints),
+            Self::SlotineLi(settings) => settings.validate(joints),
+        }
+    }
+
+    /// The controller of so many joints, with the model it needs.
+    ///
+    /// # Errors
+    /// As [`validate`](Self::validate); [`SimulationError::NoModel`]; a model of another number of joints.
+    pub fn build(
+        &self,
+        joints: usize,
+        model: Option<&ControllerModel>,
+    ) -> Result<Box<dyn Controller>, SimulationError> {
+        self.validate(joints)?;
+        let model = || {
+            let model = model.ok_or(SimulationError::NoModel { controller: self.name() })?;
+            model.check_joints(joints)?;
+            Ok::<_, SimulationError>(model.clone())
+        };
+        Ok(match self {
+            Self::JointPd(settings) => Box::new(JointPd::new(joints, settings)?),
+            Self::JointPid(settings) => Box::new(JointPid::new(joints, settings)?),
+            Self::PdGravity(settings) => Box::new(PdGravity::new(model()?, settings)?),
+            Self::ComputedTorque(settings) => Box::new(ComputedTorque::new(model()?, settings)?),
+            Self::FiniteTime(settings) => Box::new(FiniteTime::new(model()?, settings)?),
+            Self::FiniteTimeLiteral(settings) => Box::new(FiniteTime::literal(model()?, settings)?),
+            Self::SlotineLi(settings) => Box::new(SlotineLi::new(model()?, settings)?),
+        })
+    }
+}

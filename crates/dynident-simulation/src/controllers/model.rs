@@ -1,0 +1,208 @@
+//! What a controller believes of the robot.
+
+use super::{Measured, Target};
+use crate::error::{SimulationError, require, require_length};
+use dynident_dynamics::{Column, Workspace, gravity_torque, inverse_dynamics};
+use dynident_model::laws::{JointMotion, Law, LawInput, LawMemory};
+use dynident_model::{InertialParameters, Model};
+use serde::{Deserialize, Serialize};
+
+/// At which speed a controller takes the friction of its model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FrictionCompensation {
+    /// Not at all.
+    None,
+    /// At the reference's: no noise and no feedback by friction.
+    #[default]
+    Reference,
+    /// At the measured: right while the joint lags, but a sign of a noisy speed chatters.
+    Measured,
+}
+
+/// A robot model for control: bodies and laws with their parameters. Torques are linear in the parameters, so that a vector of base parameters alone is enough: see
+/// [`from_columns`](Self::from_columns). It need not be physically possible.
+pub struct ControllerModel {
+    model: Model,
+    laws: Vec<(Law, f64)>,
+    memories: Vec<LawMemory>,
+    workspace: Workspace,
+    load: Vec<f64>,
+    zeros: Vec<f64>,
+}
+
+impl core::fmt::Debug for ControllerModel {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("ControllerModel")
+            .field("model", &self.model.name())
+            .field("laws", &self.laws)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Clone for ControllerModel {
+    fn clone(&self) -> Self {
+        Self::assembled(self.model.clone(), self.laws.clone())
+    }
+}
+
+impl ControllerModel {
+    /// The model with its own inertial parameters, and laws with theirs.
+    ///
+    /// # Errors
+    /// Counts that differ, numbers that are not finite, laws of joints that do not exist.
+    pub fn new(model: &Model, laws: &[Law], law_parameters: &[f64]) -> Result<Self, SimulationError> {
+        require_length("parameters of laws", laws.len(), law_parameters.len())?;
+        for (law, &value) in laws.iter().zip(law_parameters) {
+            require(value.is_finite(), law.symbol(), value, "give a finite number")?;
+            if law.joints().iter().any(|&joint| joint >= model.dof()) {
+                return Err(SimulationError::LawJoint { law: law.symbol(), joints: model.dof() });
+            }
+        }
+        Ok(Self::assembled(model.clone(), laws.iter().cloned().zip(law_parameters.iter().copied()).collect()))
+    }
+
+    /// The model with a vector of parameters: ten for each body from base to tip, then one for each law. Links and lengths are `model`'s.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn from_parameters(model: &Model, laws: &[Law], parameters: &[f64]) -> Result<Self, SimulationError> {
+        let bodies = 10 * model.dof();
+        require_length("parameters", bodies + laws.len(), parameters.len())?;
+        let inertials: Vec<InertialParameters> = parameters[..bodies]
+            .chunks_exact(10)
+            .map(|own| InertialParameters(core::array::from_fn(|k| own[k])))
+            .collect();
+        Self::new(&model.with_inertials(&inertials)?, laws, &parameters[bodies..])
+    }
+
+    /// The model with values of some columns of the regressor and zeros elsewhere, as an estimate of base parameters gives them
+    /// ([`BaseParameters::base_columns`](dynident_dynamics::BaseParameters::base_columns)): its torques are exactly `W θ`.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn from_columns(model: &Model, columns: &[Column], values: &[f64]) -> Result<Self, SimulationError> {
+        require_length("values of columns", columns.len(), values.len())?;
+        let mut inertials = vec![InertialParameters::ZERO; model.dof()];
+        let (mut laws, mut law_parameters) = (Vec::new(), Vec::new());
+        for (column, &value) in columns.iter().zip(values) {
+            match column {
+                Column::Body { body, parameter } => {
+                    require_length("bodies", model.dof(), model.dof().max(body + 1))?;
+                    inertials[*body].0[*parameter] = value;
+                }
+                Column::Law(law) => {
+                    laws.push(law.clone());
+                    law_parameters.push(value);
+                }
+            }
+        }
+        Self::new(&model.with_inertials(&inertials)?, &laws, &law_parameters)
+    }
+
+    fn assembled(model: Model, laws: Vec<(Law, f64)>) -> Self {
+        let dof = model.dof();
+        Self {
+            workspace: Workspace::new(&model),
+            memories: vec![LawMemory::default(); laws.len()],
+            load: vec![0.0; dof],
+            zeros: vec![0.0; dof],
+            laws,
+            model,
+        }
+    }
+
+    /// Number of joints.
+    pub fn dof(&self) -> usize {
+        self.zeros.len()
+    }
+
+    /// The bodies.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The laws and their parameters.
+    pub fn laws(&self) -> &[(Law, f64)] {
+        &self.laws
+    }
+
+    /// Ten parameters for each body, then one for each law.
+    pub fn parameters(&self) -> Vec<f64> {
+        self.model.parameter_vector().into_iter().chain(self.laws.iter().map(|(_, value)| *value)).collect()
+    }
+
+    /// That the model has so many joints.
+    ///
+    /// # Errors
+    /// If it has not.
+    pub fn check_joints(&self, joints: usize) -> Result<(), SimulationError> {
+        require_length("joints of the controller's model", joints, self.dof())
+    }
+
+    /// Springs of friction are undeflected.
+    pub(crate) fn restart(&mut self) {
+        self.memories.iter_mut().for_each(LawMemory::restart);
+    }
+
+    /// `M̂(q) a + ĥ(q, q̇)` at the measured motion with the accelerations `a`, and the torques of the laws: inertia and offset always, friction as asked.
+    pub fn torque(
+        &mut self,
+        measured: Measured<'_>,
+        target: Target<'_>,
+        acceleration: &[f64],
+        friction: FrictionCompensation,
+        tau: &mut [f64],
+    ) {
+        let Self { model, laws, memories, workspace, load, .. } = self;
+        tau.copy_from_slice(inverse_dynamics(model, workspace, measured.q, measured.dq, acceleration));
+        if laws.is_empty() {
+            return;
+        }
+        load.copy_from_slice(tau);
+        let [q, dq] = match friction {
+            FrictionCompensation::Measured => [measured.q, measured.dq],
+            _ => [target.q, target.dq],
+        };
+        let motion = JointMotion { samples: 1, q, dq, ddq: acceleration };
+        for ((law, value), memory) in laws.iter().zip(memories) {
+            if friction == FrictionCompensation::None && is_friction(law) {
+                continue;
+            }
+            for joint in 0..tau.len() {
+                if law.acts_on(joint) {
+                    let mut column = [0.0];
+                    let load = core::slice::from_ref(&load[joint]);
+                    let mut input = LawInput { load: Some(load), temperature_c: None, memory };
+                    law.column_following(joint, &motion, &mut input, &mut column);
+                    tau[joint] += value * column[0];
+                }
+            }
+        }
+    }
+
+    /// The torques that a motion asks for, with all laws.
+    pub fn reference_torque(&mut self, q: &[f64], dq: &[f64], ddq: &[f64], tau: &mut [f64]) {
+        let (measured, target) = (Measured { q, dq }, Target { q, dq, ddq });
+        self.torque(measured, target, ddq, FrictionCompensation::Reference, tau);
+    }
+
+    /// `ĝ(q)` and constant torques.
+    pub(crate) fn gravity(&mut self, q: &[f64], out: &mut [f64]) {
+        out.copy_from_slice(gravity_torque(&self.model, &mut self.workspace, q));
+        for (law, value) in &self.laws {
+            for (joint, out) in out.iter_mut().enumerate() {
+                *out += value * law.constant_torque(joint);
+            }
+        }
+    }
+}
+
+/// All but inertia and offset.
+pub(super) fn is_friction(law: &Law) -> bool {
+    use dynident_model::laws::{Coupling, CouplingEffect};
+    !matches!(
+        law,
+        Law::DriveInertia(_) | Law::Offset(_) | Law::Coupling(Coupling { effect: CouplingEffect::Inertia, .. })
+    )
+}

@@ -1,0 +1,198 @@
+//! Slotine and Li's passivity-based controller, adaptive if asked.
+
+use super::{Controller, ControllerModel, FrictionCompensation, Measured, Target, model::is_friction};
+use crate::error::{SimulationError, require};
+use crate::per_joint::PerJoint;
+use dynident_dynamics::{Workspace, torque_regressor};
+use dynident_model::laws::{JointMotion, Law, LawInput, LawMemory};
+use dynident_model::{Model, Vec3};
+use serde::{Deserialize, Serialize};
+
+pub(super) const NAME: &str = "slotine-li";
+
+/// Gains of [`SlotineLi`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SlotineLiSettings {
+    /// Λ, 1/s.
+    pub lambda: PerJoint,
+    /// K_D, Nm s/rad (N s/m).
+    pub kd: PerJoint,
+    /// Γ: how fast every parameter is adapted, in the parameter's unit squared per joule. Default 0, no adaptation.
+    #[serde(default)]
+    pub gamma: f64,
+    /// Which friction of the model is compensated; default at the reference's speed.
+    #[serde(default)]
+    pub friction: FrictionCompensation,
+}
+
+impl SlotineLiSettings {
+    /// Checks the numbers for so many joints.
+    ///
+    /// # Errors
+    /// Gains that are negative or not finite, lists of another length.
+    pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
+        self.lambda.gains("lambda", joints)?;
+        self.kd.gains("kd", joints)?;
+        require(
+            self.gamma >= 0.0 && self.gamma.is_finite(),
+            "gamma",
+            self.gamma,
+            "give zero or a finite positive number",
+        )
+    }
+}
+
+/// `τ = Y(q, q̇, q̇_r, q̈_r) θ̂ + K_D s` with `s = ė + Λ e`, `q̇_r = q̇_d + Λ e`, `q̈_r = q̈_d + Λ ė`; adapted by `θ̂' = Γ Yᵀ s` (Slotine and Li, IJRR 6 (1987) 49).
+///
+/// `Y` holds `C(q, q̇) q̇_r` with Christoffel's C, so that `Ṁ - 2C` is skew. That product is the symmetric bilinear form of the centrifugal torques, `C(q, u) v = c((u + v)/2) - c((u - v)/2)` with
+/// `c(w) = C(q, w) w`, and so a difference of two ordinary regressors. Adapted parameters start from the model's at every run and are those of the bodies, then of the laws. Load-dependent
+/// friction is left out: its torque is not linear in the parameters.
+#[derive(Debug)]
+pub struct SlotineLi {
+    start: ControllerModel,
+    /// Without gravity: for the centrifugal torques.
+    weightless: Model,
+    gains: [Vec<f64>; 2],
+    gamma: f64,
+    friction: FrictionCompensation,
+    workspace: Workspace,
+    parameters: Vec<f64>,
+    memories: Vec<LawMemory>,
+    /// dof rows of Y.
+    regressor: Vec<f64>,
+    vectors: [Vec<f64>; 5],
+    last_time_s: Option<f64>,
+}
+
+impl SlotineLi {
+    /// The controller with a model.
+    ///
+    /// # Errors
+    /// As [`SlotineLiSettings::validate`].
+    pub fn new(model: ControllerModel, settings: &SlotineLiSettings) -> Result<Self, SimulationError> {
+        let joints = model.dof();
+        settings.validate(joints)?;
+        let parameters = model.parameters();
+        Ok(Self {
+            weightless: model.model().clone().with_gravity(Vec3::ZERO)?,
+            gains: [settings.lambda.gains("lambda", joints)?, settings.kd.gains("kd", joints)?],
+            gamma: settings.gamma,
+            friction: settings.friction,
+            workspace: Workspace::new(model.model()),
+            memories: vec![LawMemory::default(); model.laws().len()],
+            regressor: vec![0.0; joints * parameters.len()],
+            parameters,
+            vectors: core::array::from_fn(|_| vec![0.0; joints]),
+            last_time_s: None,
+            start: model,
+        })
+    }
+
+    /// The parameters as adapted so far: ten for each body, then one for each law.
+    pub fn parameters(&self) -> &[f64] {
+        &self.parameters
+    }
+
+    fn fill_regressor(&mut self, target: Target<'_>, measured: Measured<'_>) {
+        let Self { start, weightless, workspace, regressor, vectors, memories, .. } = self;
+        let [reference_speed, reference_acceleration, mean, half, _] = vectors;
+        let (joints, columns) = (mean.len(), 10 * mean.len() + start.laws().len());
+        let bodies = 10 * joints;
+        for joint in 0..joints {
+            mean[joint] = 0.5 * (measured.dq[joint] + reference_speed[joint]);
+            half[joint] = 0.5 * (measured.dq[joint] - reference_speed[joint]);
+        }
+        regressor.fill(0.0);
+        let y = torque_regressor(start.model(), workspace, measured.q, mean, reference_acceleration);
+        for joint in 0..joints {
+            regressor[joint * columns..][..bodies].copy_from_slice(&y[joint * bodies..][..bodies]);
+        }
+        // The difference's half has neither gravity nor acceleration.
+        mean.fill(0.0);
+        let y = torque_regressor(weightless, workspace, measured.q, half, mean);
+        for joint in 0..joints {
+            for (to, from) in regressor[joint * columns..][..bodies].iter_mut().zip(&y[joint * bodies..]) {
+                *to -= from;
+            }
+        }
+        let [q, dq] = match self.friction {
+            FrictionCompensation::Measured => [measured.q, measured.dq],
+            _ => [target.q, target.dq],
+        };
+        let motion = JointMotion { samples: 1, q, dq, ddq: reference_acceleration };
+        for (place, ((law, _), memory)) in start.laws().iter().zip(memories).enumerate() {
+            // A load would make the column depend on the other parameters.
+            if self.friction == FrictionCompensation::None && is_friction(law) || matches!(law, Law::Load(_)) {
+                continue;
+            }
+            for joint in 0..joints {
+                if law.acts_on(joint) {
+                    let entry = &mut regressor[joint * columns + bodies + place..][..1];
+                    law.column_following(
+                        joint,
+                        &motion,
+                        &mut LawInput { load: None, temperature_c: None, memory },
+                        entry,
+                    );
+                }
+            }
+        }
+    }
+}
+
+impl Controller for SlotineLi {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn joints(&self) -> usize {
+        self.gains[0].len()
+    }
+
+    fn reset(&mut self) {
+        self.parameters = self.start.parameters();
+        self.memories.iter_mut().for_each(LawMemory::restart);
+        self.last_time_s = None;
+    }
+
+    fn torque(&mut self, time_s: f64, target: Target<'_>, measured: Measured<'_>, tau: &mut [f64]) {
+        let span_s = self.last_time_s.map_or(0.0, |last| time_s - last);
+        self.last_time_s = Some(time_s);
+        let [lambda, kd] = &self.gains;
+        for joint in 0..lambda.len() {
+            let error = target.q[joint] - measured.q[joint];
+            let speed_error = target.dq[joint] - measured.dq[joint];
+            self.vectors[0][joint] = target.dq[joint] + lambda[joint] * error;
+            self.vectors[1][joint] = target.ddq[joint] + lambda[joint] * speed_error;
+            self.vectors[4][joint] = speed_error + lambda[joint] * error;
+            tau[joint] = kd[joint] * self.vectors[4][joint];
+        }
+        self.fill_regressor(target, measured);
+        let columns = self.parameters.len();
+        let sliding = &self.vectors[4];
+        if self.gamma > 0.0 && span_s > 0.0 {
+            for (joint, s) in sliding.iter().enumerate() {
+                let row = &self.regressor[joint * columns..(joint + 1) * columns];
+                for (parameter, y) in self.parameters.iter_mut().zip(row) {
+                    *parameter += span_s * self.gamma * y * s;
+                }
+            }
+        }
+        for (tau, row) in tau.iter_mut().zip(self.regressor.chunks_exact(columns)) {
+            *tau += row.iter().zip(&self.parameters).map(|(y, p)| y * p).sum::<f64>();
+        }
+    }
+
+    fn set_model(&mut self, model: &ControllerModel) -> Result<(), SimulationError> {
+        model.check_joints(self.joints())?;
+        let settings = SlotineLiSettings {
+            lambda: PerJoint::Each(self.gains[0].clone()),
+            kd: PerJoint::Each(self.gains[1].clone()),
+            gamma: self.gamma,
+            friction: self.friction,
+        };
+        *self = Self::new(model.clone(), &settings)?;
+        Ok(())
+    }
+}

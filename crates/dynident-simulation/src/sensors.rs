@@ -1,0 +1,146 @@
+//! What sensors make of a motion.
+
+use crate::error::{SimulationError, require};
+use crate::per_joint::PerJoint;
+use dynident_model::sample::Random;
+use serde::{Deserialize, Serialize};
+
+/// Where the controller's speeds come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum SpeedSource {
+    /// A perfect tachometer.
+    #[default]
+    True,
+    /// Differences of the measured positions from sample to sample, through a low-pass of order 1.
+    Differences {
+        /// Its cut-off.
+        cutoff_hz: f64,
+    },
+}
+
+/// Sensors of a robot and of its log. The default is perfect: no noise, no quantisation, no delay, recorded at the controller's rate.
+///
+/// ```
+/// use dynident_simulation::SensorSettings;
+/// let settings: SensorSettings = toml::from_str("encoder_steps = 131072\ntorque_std = 0.05\nseed = 3").unwrap();
+/// assert_eq!(settings.position_std, 0.0.into());
+/// settings.validate(6)?;
+/// # Ok::<(), dynident_simulation::SimulationError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SensorSettings {
+    /// Steps of the encoders in a turn of the joint (in a metre). Default none: not quantised.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub encoder_steps: Option<PerJoint>,
+    /// Standard deviation of a position's white noise, rad (m), before quantisation. Default 0.
+    pub position_std: PerJoint,
+    /// Standard deviation of a torque's noise, Nm (N). Default 0.
+    pub torque_std: PerJoint,
+    /// Correlation of a torque's noise from one recorded sample to the next: AR(1), 0 (the default) for white noise.
+    pub torque_correlation: f64,
+    /// Step of recorded torques, Nm (N). Default none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque_step: Option<PerJoint>,
+    /// Where the controller's speeds come from. Default true speeds.
+    pub speed: SpeedSource,
+    /// How many samples late the controller sees positions and speeds. Default 0.
+    pub feedback_delay_samples: usize,
+    /// Samples a second of the record. Default the controller's rate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub record_rate_hz: Option<f64>,
+    /// Standard deviation of the record's instants against its clock, s. Default 0.
+    pub jitter_std_s: f64,
+    /// How late recorded positions are, s. Default 0.
+    pub position_delay_s: PerJoint,
+    /// How late recorded torques are, s. Default 0.
+    pub torque_delay_s: PerJoint,
+    /// By how many millionths the record's clock runs slow: its sample `k` is taken at `k/rate · (1 + 1e-6 · drift)`. Default 0.
+    pub clock_drift_ppm: f64,
+    /// Seed of all noise. Default 1.
+    pub seed: u64,
+}
+
+impl Default for SensorSettings {
+    fn default() -> Self {
+        Self {
+            encoder_steps: None,
+            position_std: 0.0.into(),
+            torque_std: 0.0.into(),
+            torque_correlation: 0.0,
+            torque_step: None,
+            speed: SpeedSource::True,
+            feedback_delay_samples: 0,
+            record_rate_hz: None,
+            jitter_std_s: 0.0,
+            position_delay_s: 0.0.into(),
+            torque_delay_s: 0.0.into(),
+            clock_drift_ppm: 0.0,
+            seed: 1,
+        }
+    }
+}
+
+impl SensorSettings {
+    /// The standard noise of BIRDy's protocol: positions 1e-3 degrees, torques 0.05 Nm, recorded at 1 kHz (Leboutet et al., Applied Sciences 11 (2021) 4303).
+    pub fn birdy_standard(seed: u64) -> Self {
+        Self {
+            position_std: 1e-3_f64.to_radians().into(),
+            torque_std: 0.05.into(),
+            record_rate_hz: Some(1000.0),
+            seed,
+            ..Self::default()
+        }
+    }
+
+    /// Checks the numbers for so many joints.
+    ///
+    /// # Errors
+    /// Numbers that are negative or not finite, lists of another length, steps that are not positive, a correlation outside [0, 1), delays above 10 s or 1000 samples, a drift of more than 10 %.
+    pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
+        let none_or_more = "give zero or a finite positive number";
+        for (what, values) in [("position_std", &self.position_std), ("torque_std", &self.torque_std)] {
+            values.gains(what, joints)?;
+        }
+        for (what, values) in [("position_delay_s", &self.position_delay_s), ("torque_delay_s", &self.torque_delay_s)] {
+            values.values(what, joints, "give 0 to 10 s", |x| (0.0..=10.0).contains(&x))?;
+        }
+        for (what, values) in [("encoder_steps", &self.encoder_steps), ("torque_step", &self.torque_step)] {
+            if let Some(values) = values {
+                values.values(what, joints, "give a finite positive number", |x| x > 0.0 && x.is_finite())?;
+            }
+        }
+        require(
+            (0.0..1.0).contains(&self.torque_correlation),
+            "torque_correlation",
+            self.torque_correlation,
+            "give 0 or more, below 1",
+        )?;
+        if let SpeedSource::Differences { cutoff_hz } = self.speed {
+            require(cutoff_hz > 0.0 && cutoff_hz.is_finite(), "speed.cutoff_hz", cutoff_hz, "give a positive cut-off")?;
+        }
+        let delay = self.feedback_delay_samples;
+        require(delay <= 1000, "feedback_delay_samples", delay as f64, "give at most 1000")?;
+        if let Some(rate) = self.record_rate_hz {
+            require((1e-3..=1e6).contains(&rate), "record_rate_hz", rate, "give 0.001 to 1e6 samples a second")?;
+        }
+        require((0.0..=1.0).contains(&self.jitter_std_s), "jitter_std_s", self.jitter_std_s, none_or_more)?;
+        let drift = self.clock_drift_ppm;
+        require(drift.abs() <= 1e5, "clock_drift_ppm", drift, "give -100000 to 100000")
+    }
+
+    /// What the encoder of a joint says of a position.
+    #[inline]
+    pub(crate) fn position(&self, joint: usize, q: f64, turns: bool, random: &mut Random) -> f64 {
+        let std = self.position_std.of(joint);
+        let q = if std > 0.0 { q + std * random.normal() } else { q };
+        match &self.encoder_steps {
+            Some(steps) => {
+                let step = if turns { core::f64::consts::TAU } else { 1.0 } / steps.of(joint);
+                (q / step).round() * step
+            }
+            None => q,
+        }
+    }
+}

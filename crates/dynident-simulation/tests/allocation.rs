@@ -1,0 +1,83 @@
+//! Steps of the closed loop allocate nothing: a run twice as long asks for memory as often.
+
+#![allow(unsafe_code, reason = "a global allocator cannot be written without")]
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use dynident_model::laws::{Coulomb, CoulombShape, DriveInertia, Law, MaxwellSlip, Stribeck, Viscous};
+use dynident_model::sample::random_tree;
+use dynident_simulation::controllers::{
+    ComputedTorqueSettings, FiniteTimeSettings, JointPdSettings, SlotineLiSettings,
+};
+use dynident_simulation::{
+    ControllerModel, ControllerSettings, FrictionCompensation, Integrator, LoopSettings, Plant, Reference,
+    SensorSettings, closed_loop,
+};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+thread_local! {
+    /// Requests of this thread alone: the test harness has threads of its own.
+    static REQUESTS: Cell<usize> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+// Sound: every request goes to the system's allocator as it came.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        REQUESTS.set(REQUESTS.get() + 1);
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        REQUESTS.set(REQUESTS.get() + 1);
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn longer_runs_allocate_no_more_often() {
+    let model = random_tree(3, 4);
+    let shape = CoulombShape::Sign { dead_band: 0.0 };
+    let laws = [
+        Law::Coulomb(Coulomb { joint: 0, shape }),
+        Law::Stribeck(Stribeck { joint: 0, speed: 0.1, exponent: 2.0, shape }),
+        Law::Coulomb(Coulomb { joint: 1, shape: CoulombShape::Smooth { width: 0.01 } }),
+        Law::Viscous(Viscous { joint: 2 }),
+        Law::MaxwellSlip(MaxwellSlip { joint: 3, yield_displacement: 0.01 }),
+        Law::DriveInertia(DriveInertia { joint: 3 }),
+    ];
+    let values = [0.5, 0.2, 0.3, 0.4, 0.1, 0.2];
+    let mut plant = Plant::new(&model, &laws, &values).unwrap();
+    let believed = ControllerModel::new(&model, &laws, &values).unwrap();
+    let friction = FrictionCompensation::Reference;
+    let controllers = [
+        ControllerSettings::JointPd(JointPdSettings { kp: 50.0.into(), kd: 20.0.into() }),
+        ControllerSettings::ComputedTorque(ComputedTorqueSettings { kp: 50.0.into(), kd: 10.0.into(), friction }),
+        ControllerSettings::FiniteTime(FiniteTimeSettings::with_gains(5.0, 5.0)),
+        ControllerSettings::SlotineLi(SlotineLiSettings { lambda: 3.0.into(), kd: 9.0.into(), gamma: 0.1, friction }),
+    ];
+    let sensors = SensorSettings { position_std: 1e-5.into(), feedback_delay_samples: 2, ..SensorSettings::default() };
+    for controller in &controllers {
+        let mut controller = controller.build(4, Some(&believed)).unwrap();
+        for integrator in
+            [Integrator::SemiImplicitEuler { steps_per_sample: 1 }, Integrator::Rk4 { steps_per_sample: 1 }]
+        {
+            let settings =
+                LoopSettings { integrator, sensors: sensors.clone(), accelerations: true, ..LoopSettings::default() };
+            let mut requests = |duration_s: f64| {
+                let reference = Reference::standing(&[0.1, 0.2, 0.3, 0.4], 1000.0, duration_s).unwrap();
+                let before = REQUESTS.get();
+                let run = closed_loop(&mut plant, controller.as_mut(), &reference, &settings).unwrap();
+                assert!(run.status.is_done(), "{} {integrator:?} {}", controller.name(), run.status);
+                REQUESTS.get() - before
+            };
+            assert_eq!(requests(0.2), requests(0.4), "{integrator:?}");
+        }
+    }
+}
