@@ -1,14 +1,14 @@
 //! Base parameters of real robots: against Pinocchio's regressors, against random states, and against a published study.
 
-use crate::golden::{ARMS, Golden, ROBOTS, repository, robot, text};
+use crate::golden::{ARMS, Golden, ROBOTS, robot, text};
 use dynident_dynamics::{
     BaseParameterSettings, BaseParameters, Column, Workspace, inverse_dynamics, numerical_rank, torque_regressor,
 };
 use dynident_model::laws::{CoulombShape, Coupling, CouplingEffect, DriveChoice, Law, laws_per_joint};
 use dynident_model::sample::Random;
 use dynident_model::{Model, load_robot, read_urdf};
+use dynident_testing::{recordings, repository};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
 const SIGN: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };
 
@@ -127,7 +127,7 @@ fn structure_agrees_with_random_states_and_the_split_is_clear() {
 #[test]
 fn rounded_right_angles_add_no_base_parameters() {
     for (name, count) in [("ur10", 36), ("panda_arm7", 43), ("iiwa14", 43)] {
-        let text = std::fs::read_to_string(repository().join("robots").join(format!("{name}.urdf"))).unwrap();
+        let text = std::fs::read_to_string(repository(&format!("robots/{name}.urdf"))).unwrap();
         let mut rounded = text.clone();
         for exact in [
             "1.570796326794896",
@@ -176,12 +176,6 @@ fn base_parameters_carry_the_full_torque() {
             }
         }
     }
-}
-
-/// The folder of recordings, if there is one.
-fn recordings() -> Option<PathBuf> {
-    let folder = std::env::var_os("DYNIDENT_DATA").map_or_else(|| repository().join("../shared/data"), PathBuf::from);
-    folder.is_dir().then_some(folder)
 }
 
 /// `Ixx2 - 1.0*Iyy2 - 0.050625*m3` as symbols and factors.

@@ -5,10 +5,10 @@ use dynident_estimation::{
     LinearProblem, OrdinarySettings, SegmentSettings, SegmentedFactor, WeightedSettings, ordinary_least_squares,
     weighted_least_squares,
 };
+use dynident_testing::count;
 
 const SAMPLES: usize = 6_400;
 const RHO: f64 = 0.9;
-const RUNS: usize = 400;
 const THETA: [f64; 4] = [2.0, -1.0, 0.5, 0.3];
 
 /// Two joints, noise AR(1) of different size; columns as slow as a robot's motion (periods of some 100 to 400 samples), the last one the
@@ -42,7 +42,8 @@ fn simulated(random: &mut Random, settings: SegmentSettings) -> LinearProblem {
 fn coverage(weighted: bool) -> (f64, f64, f64) {
     let mut random = Random::new(20_261_121);
     let (mut segments, mut white, mut lag1) = (0, 0, 0.0);
-    for _ in 0..RUNS {
+    let runs = count(100, 400);
+    for _ in 0..runs {
         let problem = simulated(&mut random, SegmentSettings::default());
         let estimate = if weighted {
             weighted_least_squares(&problem, &WeightedSettings::default()).unwrap()
@@ -56,15 +57,16 @@ fn coverage(weighted: bool) -> (f64, f64, f64) {
         }
         lag1 += estimate.effective_lag1.iter().sum::<f64>() / 2.0;
     }
-    let share = |count: usize| count as f64 / (RUNS * THETA.len()) as f64;
-    (share(segments), share(white), lag1 / RUNS as f64)
+    let share = |count: usize| count as f64 / (runs * THETA.len()) as f64;
+    (share(segments), share(white), lag1 / runs as f64)
 }
 
 /// With ρ = 0.9 and slow columns the white standard deviation is too small by up to √(1.9/0.1) = 4.4: its "95 %" interval holds
 /// P(|z| < 1.96/4.4) = 34 %, more for the faster columns; 75 % is far above that and far below 95 %. The interval from segments is
 /// asymptotically right; with some 50 segments a joint, normal instead of t quantiles and sums of neighbours that still correlate a
 /// little at the border it may fall a few percent short: 90 % is the least that deserves the name. 99 % would mean error bars a third
-/// too long. Sampling error of a share from 1600 intervals: 0.6 %.
+/// too long. Sampling error of a share: √(0.95·0.05/400) = 1.1 % from the 400 intervals of every day, 0.6 % from the 1,600 of the
+/// long run; 95 % itself lies four of the first above the lower limit and inside of the upper.
 fn assert_coverage(weighted: bool) {
     let (segments, white, lag1) = coverage(weighted);
     assert!((0.90..=0.99).contains(&segments), "segments {segments}");

@@ -1,6 +1,6 @@
 //! The audit: a clean arm passes, every seeded defect is found.
 
-use crate::common::{ARM, foreign_urdfs, robots_dir};
+use crate::common::{ARM, foreign_urdfs};
 use dynident_model::{AuditFinding, AuditLevel, audit, load_robot, read_urdf};
 
 fn findings(text: &str) -> Vec<AuditFinding> {
@@ -22,7 +22,7 @@ fn a_clean_arm_passes() {
 
 #[test]
 fn published_descriptions_of_common_arms_pass() {
-    let Some(directory) = robots_dir() else { return };
+    let directory = dynident_testing::repository("robots");
     for name in ["planar2r", "ur10", "panda", "panda_arm7", "iiwa14"] {
         let findings = audit(&load_robot(directory.join(format!("{name}.urdf"))).unwrap().model);
         assert!(above_info(&findings).is_empty(), "{name}: {findings:?}");

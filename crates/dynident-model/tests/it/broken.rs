@@ -2,6 +2,7 @@
 
 use crate::common::ARM;
 use dynident_model::{audit, link_changes, load_robot, read_dh, read_urdf, rewrite_urdf};
+use dynident_testing::count;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -157,7 +158,7 @@ fn mutations() -> impl Strategy<Value = Vec<Mutation>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(4000) })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(count(500, 4000) as u32) })]
 
     /// What is read after all is finite, can be audited, and can be rewritten without a change.
     #[test]

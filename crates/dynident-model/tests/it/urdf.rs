@@ -1,6 +1,6 @@
 //! The URDF reader: against totals from Pinocchio, and by hand.
 
-use crate::common::{ARM, foreign_urdfs, robots_dir};
+use crate::common::{ARM, foreign_urdfs};
 use dynident_model::{JointKind, Vec3, audit, load_robot, read_urdf, rewrite_urdf};
 
 /// Degrees of freedom and mass of the moving bodies in kg, as Pinocchio 4.1.0 reads the same files (`robots/README.md`).
@@ -17,7 +17,7 @@ const TOTALS: [(&str, usize, f64); 8] = [
 
 #[test]
 fn totals_agree_with_pinocchio() {
-    let Some(directory) = robots_dir() else { return };
+    let directory = dynident_testing::repository("robots");
     for (name, dof, mass) in TOTALS {
         let robot = load_robot(directory.join(format!("{name}.urdf"))).unwrap();
         let total: f64 = robot.model.inertials().iter().map(dynident_model::InertialParameters::mass_kg).sum();

@@ -2,17 +2,7 @@
 #![allow(clippy::print_stdout, reason = "helpers of tests; what was found is worth reading")]
 
 use dynident_recording::{ImportReport, Level, LogFormat, MotionBlock, MotionSettings, MotionStream};
-use std::path::PathBuf;
-
-fn data() -> Option<PathBuf> {
-    let folder = std::env::var_os("DYNIDENT_DATA")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    println!("SKIPPED: no recordings in {} (set DYNIDENT_DATA)", folder.display());
-    None
-}
+use dynident_testing::recordings;
 
 fn joints(n: usize) -> Vec<String> {
     (1..=n).map(|i| format!("joint_{i}")).collect()
@@ -31,7 +21,7 @@ fn import(file: &str, n: usize, format: &str) -> Option<Import> {
 }
 
 fn import_trimmed(file: &str, n: usize, format: &str, trim_s: f64) -> Option<Import> {
-    let file = data()?.join(file);
+    let file = recordings()?.join(file);
     let format: LogFormat = toml::from_str(format).unwrap();
     let settings = MotionSettings { trim_s, ..MotionSettings::default() };
     let mut stream = MotionStream::open(&format, &file, &joints(n), &settings).unwrap();

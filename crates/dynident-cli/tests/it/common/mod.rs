@@ -1,4 +1,5 @@
 //! Running the command.
+pub(crate) use dynident_testing::repository;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -12,11 +13,6 @@ pub(crate) struct Ran {
 /// The folder of broken inputs, which also holds a good study (`good.toml`) with its robot and log.
 pub(crate) fn broken() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/broken")
-}
-
-/// A file of the repository.
-pub(crate) fn repository(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path)
 }
 
 /// The command, in a folder.

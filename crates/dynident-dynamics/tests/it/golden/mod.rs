@@ -1,8 +1,8 @@
 //! The golden files of other people's programs, in the order of Dynident's model. `golden/README.md` says what every key means.
 
 use dynident_model::{Model, load_robot};
+use dynident_testing::repository;
 use serde_json::Value;
-use std::path::{Path, PathBuf};
 
 /// The robots of `robots/`, each with a golden file of Pinocchio.
 pub(crate) const ROBOTS: [&str; 8] =
@@ -11,14 +11,9 @@ pub(crate) const ROBOTS: [&str; 8] =
 /// Those with at most nine joints, whose files hold full regressors, derivatives and base parameters.
 pub(crate) const ARMS: [&str; 5] = ["planar2r", "ur10", "panda", "panda_arm7", "iiwa14"];
 
-/// The top folder of the repository.
-pub(crate) fn repository() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
-
 /// A robot as Dynident reads it.
 pub(crate) fn robot(name: &str) -> Model {
-    load_robot(repository().join("robots").join(format!("{name}.urdf"))).unwrap().model
+    load_robot(repository(&format!("robots/{name}.urdf"))).unwrap().model
 }
 
 /// A robot and what another program says about it.
@@ -32,7 +27,7 @@ pub(crate) struct Golden {
 impl Golden {
     /// The file of `program` (`pinocchio`, `mujoco`) for a robot.
     pub(crate) fn of(program: &str, name: &'static str) -> Self {
-        let path = repository().join("golden").join(program).join(format!("{name}.json"));
+        let path = repository(&format!("golden/{program}/{name}.json"));
         let file: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
         let model = robot(name);
         let names: Vec<&str> = file["joints"].as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect();

@@ -1,39 +1,12 @@
-//! Where the tests find robots and recordings, and a small arm.
+//! The robot descriptions at hand, and a small arm.
 
-#![allow(clippy::print_stdout, reason = "a skipped test says so")]
+use dynident_testing::{recordings, repository};
+use std::path::PathBuf;
 
-use std::path::{Path, PathBuf};
-
-fn workspace() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
-
-/// The robot descriptions: in the workspace, else beside it; `None`, said plainly, where there are none.
-pub(crate) fn robots_dir() -> Option<PathBuf> {
-    let found = [workspace().join("robots"), data_root().join("../robots")].into_iter().find(|path| path.is_dir());
-    if found.is_none() {
-        println!("skipped: no directory of robots");
-    }
-    found
-}
-
-/// The public recordings with their URDFs; `None`, said plainly, where there are none.
-pub(crate) fn data_dir() -> Option<PathBuf> {
-    let found = Some(data_root()).filter(|path| path.is_dir());
-    if found.is_none() {
-        println!("skipped: no recordings; set DYNIDENT_DATA");
-    }
-    found
-}
-
-fn data_root() -> PathBuf {
-    std::env::var_os("DYNIDENT_DATA").map_or_else(|| workspace().join("../shared/data"), PathBuf::from)
-}
-
-/// All URDF files at hand outside the repository.
+/// All URDF files at hand: of the repository, and beside the recordings.
 pub(crate) fn foreign_urdfs() -> Vec<PathBuf> {
-    let mut directories: Vec<PathBuf> = robots_dir().into_iter().collect();
-    if let Some(data) = data_dir() {
+    let mut directories = vec![repository("robots")];
+    if let Some(data) = recordings() {
         let entries = std::fs::read_dir(data).expect("data directory").filter_map(Result::ok);
         directories.extend(entries.map(|entry| entry.path()).filter(|path| path.is_dir()));
     }

@@ -2,29 +2,12 @@
 use dynident::dynamics::{Workspace, inverse_dynamics};
 use dynident::model::{InertialParameters, Model, load_robot};
 use dynident::{Identification, Machine, RunOptions, Silent, Study, identify};
+pub(crate) use dynident_testing::{recordings, repository};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// Width of the Coulomb step of the truth: the default of a study.
 const WIDTH: f64 = 0.02;
-
-/// A file of the repository.
-pub(crate) fn repository(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path)
-}
-
-/// The folder of the public recordings, or none with a plain word about it.
-pub(crate) fn recordings() -> Option<PathBuf> {
-    let folder = std::env::var_os("DYNIDENT_DATA").map_or_else(|| repository("../shared/data"), PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    #[allow(clippy::print_stdout, reason = "a skipped test says so")]
-    {
-        println!("SKIPPED: no recordings in {} (set DYNIDENT_DATA)", folder.display());
-    }
-    None
-}
 
 /// Pseudo-random numbers in [-1, 1): a linear congruential generator (Knuth's MMIX constants).
 pub(crate) struct Random(pub(crate) u64);
