@@ -46,3 +46,7 @@ pub use nonlinear::{
     simultaneous_bound, simultaneous_least_squares,
 };
 pub use uncertainty::{CovarianceMethod, Estimate, EstimateStatus, correlation, student_half_width};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}
