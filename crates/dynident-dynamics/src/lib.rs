@@ -43,3 +43,7 @@ pub use regressor::torque_regressor;
 pub use regressor_adjoint::{MotionGradient, regressor_panels_pull_back};
 pub use regressor_panels::{Column, PanelLayout, Panels, all_columns, regressor_panels, regressor_panels_following};
 pub use workspace::{BatchWorkspace, Workspace};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}

@@ -8,7 +8,8 @@
 #![allow(clippy::print_stdout, reason = "a benchmark prints")]
 #![allow(clippy::unwrap_used, reason = "a benchmark fails as tests do")]
 
-#[path = "../tests/physical_problems/mod.rs"]
+#[allow(dead_code, reason = "the tests use the rest")]
+#[path = "../tests/it/physical_problems/mod.rs"]
 mod physical_problems;
 
 use dynident_estimation::consistent::{PhysicalFit, PhysicalRoute, PhysicalSettings, physical_fit};

@@ -77,3 +77,7 @@ pub use nonlinear::{
     simulated_least_squares, simultaneous_bound, simultaneous_least_squares,
 };
 pub use uncertainty::{CovarianceMethod, Estimate, EstimateStatus, correlation, student_half_width};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}

@@ -108,13 +108,7 @@ fn killed_at(moments: usize) {
 
 #[test]
 fn killed_at_some_moments_it_goes_on_to_the_same_result() {
-    killed_at(4);
-}
-
-#[test]
-#[ignore = "takes a minute: run with --ignored"]
-fn killed_at_fifty_moments_it_goes_on_to_the_same_result() {
-    killed_at(50);
+    killed_at(dynident_testing::count(4, 50));
 }
 
 #[test]

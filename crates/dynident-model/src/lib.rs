@@ -32,3 +32,7 @@ pub use urdf::{
     JointChange, LinkChange, UnreadElement, UrdfError, UrdfFault, UrdfRobot, UrdfWriteError, link_changes, read_urdf,
     rewrite_urdf,
 };
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}

@@ -5,8 +5,8 @@ use dynident_model::{Model, load_robot};
 use std::path::{Path, PathBuf};
 
 /// The arm and its design study, as they lie in the examples.
-const ARM: &str = include_str!("../../../examples/robots/paper_2r.toml");
-const DESIGN: &str = include_str!("../../../examples/design_paper.toml");
+const ARM: &str = include_str!("../study/robots/paper_2r.toml");
+const DESIGN: &str = include_str!("../study/design_paper.toml");
 
 /// The arm's length between the joints, m, and gravity.
 pub(crate) const A1: f64 = 1.0;

@@ -58,3 +58,7 @@ pub use table::{Cell, Table};
 pub use text::Text;
 pub use ticks::short;
 pub use tone::Tone;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}

@@ -14,10 +14,10 @@ pub struct BenchmarkRobot {
 
 /// The registry: one line for each machine.
 pub const ROBOTS: &[BenchmarkRobot] = &[
-    BenchmarkRobot { name: "planar2r", urdf: include_str!("../../../../robots/planar2r.urdf") },
-    BenchmarkRobot { name: "ur10", urdf: include_str!("../../../../robots/ur10.urdf") },
-    BenchmarkRobot { name: "tx40", urdf: include_str!("../../../../robots/tx40.urdf") },
-    BenchmarkRobot { name: "panda", urdf: include_str!("../../../../robots/panda_arm7.urdf") },
+    BenchmarkRobot { name: "planar2r", urdf: include_str!("../../robots/planar2r.urdf") },
+    BenchmarkRobot { name: "ur10", urdf: include_str!("../../robots/ur10.urdf") },
+    BenchmarkRobot { name: "tx40", urdf: include_str!("../../robots/tx40.urdf") },
+    BenchmarkRobot { name: "panda", urdf: include_str!("../../robots/panda_arm7.urdf") },
 ];
 
 impl BenchmarkRobot {

@@ -1,0 +1,66 @@
+//! Broken studies and tables of states: exit status 2 in good time, and a message that says where.
+use crate::common::{broken, run_in};
+use std::time::{Duration, Instant};
+
+/// The lines of a table in `tests/broken`.
+fn table(name: &str) -> Vec<Vec<String>> {
+    let text = std::fs::read_to_string(broken().join(name)).unwrap();
+    text.lines().map(|line| line.split('\t').map(str::to_owned).collect()).collect()
+}
+
+/// Limit of the contract for one broken input.
+const LIMIT: Duration = Duration::from_secs(10);
+
+fn check(file: &str, arguments: &[&str], expected: &str) -> Option<String> {
+    let start = Instant::now();
+    let ran = run_in(&broken(), arguments);
+    let took = start.elapsed();
+    let good = ran.status == 2
+        && ran.stderr.starts_with("error: ")
+        && ran.stderr.contains(expected)
+        && ran.stderr.contains(file)
+        && !ran.stderr.contains("panicked")
+        && took < LIMIT;
+    (!good).then(|| format!("{file}: status {}, {took:?}, wanted `{expected}`\n{}", ran.status, ran.stderr))
+}
+
+#[test]
+fn every_broken_study_is_refused_with_its_place() {
+    let out = tempfile::tempdir().unwrap();
+    let out = out.path().join("result");
+    let studies = table("studies.tsv");
+    assert!(studies.len() >= 100, "{} studies", studies.len());
+    let listed: Vec<&String> = studies.iter().map(|line| &line[0]).collect();
+    for entry in std::fs::read_dir(broken()).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        let known = path.extension().is_none_or(|extension| extension != "toml")
+            || name == "good.toml"
+            || listed.contains(&&name);
+        assert!(known, "{name} is not in studies.tsv");
+    }
+    let failed: Vec<String> = studies
+        .iter()
+        .filter_map(|line| check(&line[0], &["identify", &line[0], "--out", out.to_str().unwrap()], &line[1]))
+        .collect();
+    assert!(failed.is_empty(), "{} failed:\n{}", failed.len(), failed.join("\n"));
+    assert!(!out.exists(), "a refused study left something behind");
+}
+
+#[test]
+fn the_study_that_they_were_made_from_is_good() {
+    let out = tempfile::tempdir().unwrap();
+    let ran = run_in(&broken(), &["identify", "good.toml", "--out", out.path().to_str().unwrap()]);
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+}
+
+#[test]
+fn every_broken_table_of_states_is_refused_with_its_place() {
+    let failed: Vec<String> = table("states.tsv")
+        .iter()
+        .filter_map(|line| {
+            check(&line[0], &["evaluate", "arm.urdf", "--states", &line[0], "--quantity", &line[1]], &line[2])
+        })
+        .collect();
+    assert!(failed.is_empty(), "{} failed:\n{}", failed.len(), failed.join("\n"));
+}

@@ -1,0 +1,12 @@
+//! The integration tests of this crate, linked once.
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
+
+mod broken_inputs;
+mod common;
+mod contract;
+mod design;
+mod design_check;
+mod design_paper;
+mod evaluation;
+mod iterate;
+mod reproduce;

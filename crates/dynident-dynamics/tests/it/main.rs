@@ -1,0 +1,8 @@
+//! The integration tests of this crate, linked once.
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
+
+mod base_parameters;
+mod golden;
+mod golden_base_parameters;
+mod invariants;
+mod pinocchio;

@@ -1,0 +1,23 @@
+//! The integration tests of this crate, linked once.
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
+
+mod common;
+mod coverage;
+mod cross_validation;
+mod errors_in_variables;
+mod factor;
+mod golden;
+mod golden_robust;
+mod honest;
+mod jackknife;
+mod joint_gains;
+mod known_columns;
+mod maximum_likelihood;
+mod noise_levels;
+mod physical_golden;
+mod physical_problems;
+mod physical_routes;
+mod physical_verdicts;
+mod rank;
+mod simulated;
+mod validation;

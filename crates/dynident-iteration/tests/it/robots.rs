@@ -1,0 +1,296 @@
+//! The seam: the same run by the simulator, by a program in either mode, and by a folder; and a verdict in time for everything that programs and people do wrong.
+
+use dynident_excitation::Motion;
+use dynident_iteration::robot::{
+    FolderRobot, FolderSettings, ProcessLimits, ProcessMode, ProcessRobot, ProcessSettings, ToClient, ToHost,
+    controller_json, trajectory_csv,
+};
+use dynident_iteration::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, SimulatedRobot};
+use dynident_model::laws::{Law, Viscous};
+use dynident_model::{Model, load_robot};
+use dynident_simulation::controllers::{ComputedTorqueSettings, FiniteTimeSettings, JointPdSettings};
+use dynident_simulation::{ControllerModel, ControllerSettings, LoopSettings, Plant, Reference};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+type IsExpected = fn(&RobotFault) -> bool;
+
+fn model() -> Model {
+    load_robot(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/planar2r.urdf")).unwrap().model
+}
+
+/// The example program beside this test: `cargo test` builds it.
+fn client() -> PathBuf {
+    let test = std::env::current_exe().unwrap();
+    test.parent()
+        .unwrap()
+        .parent()
+        .unwrap()
+        .join("examples")
+        .join(format!("robot_client{}", std::env::consts::EXE_SUFFIX))
+}
+
+fn settings(mode: ProcessMode, fault: &str) -> ProcessSettings {
+    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/planar2r.urdf");
+    let mut command = vec![client().to_str().unwrap().to_owned(), urdf.to_str().unwrap().to_owned()];
+    if !fault.is_empty() {
+        command.extend(["--fault".to_owned(), fault.to_owned()]);
+    }
+    let limits = ProcessLimits { hello_s: 20.0, message_s: 20.0, run_s: None, bye_s: 0.2 };
+    ProcessSettings { command, mode, limits, folder: None }
+}
+
+fn joints() -> Vec<String> {
+    vec!["joint1".to_owned(), "joint2".to_owned()]
+}
+
+fn pd() -> ControllerSettings {
+    ControllerSettings::JointPd(JointPdSettings { kp: vec![200.0, 80.0].into(), kd: vec![20.0, 8.0].into() })
+}
+
+fn reference() -> Reference {
+    Reference::standing(&[-0.4, 0.3], 500.0, 0.4).unwrap()
+}
+
+fn run(robot: &mut dyn Robot) -> RobotRun {
+    let (reference, controller) = (reference(), pd());
+    robot.run(&RunRequest { run: 1, reference: &reference, controller: &controller, model: None }).unwrap()
+}
+
+fn fault(mode: ProcessMode, name: &str) -> (RobotFault, RobotRun) {
+    let mut robot = ProcessRobot::new(settings(mode, name), joints()).unwrap();
+    let run = run(&mut robot);
+    let RobotStatus::Failed { fault } = run.status.clone() else { panic!("{name}: {}", run.status) };
+    (fault, run)
+}
+
+/// A program that serves the simulator gives what the simulator gives, bit for bit, whoever runs the loop, though its joints stand in another order; and again in a second run of the same program.
+#[test]
+fn programs_give_what_the_simulator_gives() {
+    let plant = Plant::new(&model(), &[], &[]).unwrap();
+    let own = run(&mut SimulatedRobot::new(plant, LoopSettings::default()).unwrap());
+    assert!(own.status.is_done());
+    for mode in [ProcessMode::Run, ProcessMode::Step] {
+        let mut robot = ProcessRobot::new(settings(mode, ""), joints()).unwrap();
+        for _ in 0..2 {
+            let theirs = run(&mut robot);
+            assert!(theirs.status.is_done(), "{mode:?}: {}", theirs.status);
+            assert!(theirs.record == own.record, "{mode:?}");
+            assert_eq!(theirs.max_error(&reference()), own.max_error(&reference()));
+        }
+    }
+}
+
+/// Everything a program can do wrong has its own verdict, and what came before is kept.
+#[test]
+fn programs_that_fail_have_a_verdict() {
+    let at_50: [(&str, IsExpected); 9] = [
+        (
+            "die",
+            |fault| matches!(fault, RobotFault::Died { exit, said, .. } if exit.contains('3') && said.contains("fire")),
+        ),
+        ("garbage", |fault| matches!(fault, RobotFault::Garbage { line, .. } if line.starts_with("Segmentation"))),
+        ("nan", |fault| matches!(fault, RobotFault::NotANumber { sample: 50, .. })),
+        ("null", |fault| matches!(fault, RobotFault::NotANumber { sample: 50, .. })),
+        ("joints", |fault| matches!(fault, RobotFault::WrongJoints { sample: 50, expected: 2, found: 3, .. })),
+        ("backwards", |fault| matches!(fault, RobotFault::Time { sample: 50, .. })),
+        ("megabyte", |fault| matches!(fault, RobotFault::Garbage { .. })),
+        ("turn", |fault| matches!(fault, RobotFault::OutOfTurn { found: "state", .. })),
+        ("short", |fault| matches!(fault, RobotFault::Short { .. })),
+    ];
+    for (name, expected) in at_50 {
+        let (fault, run) = fault(ProcessMode::Run, name);
+        assert!(expected(&fault), "{name}: {fault}");
+        assert_eq!((run.record.samples, run.record.q.len(), run.record.tau.len()), (50, 100, 100), "{name}");
+    }
+    let (flood, run) = fault(ProcessMode::Run, "flood");
+    assert!(matches!(flood, RobotFault::TooMuch { .. }) && run.record.samples == 100 * 201 + 1000, "{flood}");
+    for mode in [ProcessMode::Run, ProcessMode::Step] {
+        assert!(matches!(fault(mode, "protocol").0, RobotFault::Protocol { .. }));
+        assert!(matches!(fault(mode, "modes").0, RobotFault::Protocol { .. }));
+        assert!(matches!(fault(mode, "names").0, RobotFault::OtherJoints { .. }));
+    }
+    let (died, run) = fault(ProcessMode::Step, "die");
+    assert!(matches!(died, RobotFault::Died { .. }) && run.record.samples == 50, "{died}");
+    // A stop that the robot tells is no fault.
+    let stopped = self::run(&mut ProcessRobot::new(settings(ProcessMode::Run, "stop"), joints()).unwrap());
+    assert!(matches!(&stopped.status, RobotStatus::Stopped { reason } if reason == "protective stop"));
+    assert_eq!(stopped.record.samples, 50);
+}
+
+/// A program that hangs is given up at the limit and killed: the call returns long before the program's hour is over.
+#[test]
+fn programs_that_hang_are_given_up() {
+    let limits = |hello_s, message_s, run_s| ProcessLimits { hello_s, message_s, run_s, bye_s: 0.1 };
+    for (mode, name, limits) in [
+        (ProcessMode::Run, "hang", limits(20.0, 0.4, None)),
+        (ProcessMode::Step, "hang", limits(20.0, 0.4, None)),
+        (ProcessMode::Run, "hang", limits(20.0, 3000.0, Some(1.0))),
+        (ProcessMode::Run, "deaf", limits(0.4, 20.0, None)),
+    ] {
+        let start = Instant::now();
+        let mut robot = ProcessRobot::new(ProcessSettings { limits, ..settings(mode, name) }, joints()).unwrap();
+        let run = run(&mut robot);
+        assert!(matches!(run.status, RobotStatus::Failed { fault: RobotFault::Hung { .. } }), "{}", run.status);
+        // 3600 s without the limits.
+        assert!(start.elapsed().as_secs() < 600);
+    }
+}
+
+#[test]
+fn programs_that_are_not_there_are_named() {
+    let command = vec!["/nowhere/robot".to_owned()];
+    let settings = ProcessSettings { command, ..settings(ProcessMode::Run, "") };
+    let status = run(&mut ProcessRobot::new(settings.clone(), joints()).unwrap()).status;
+    assert!(matches!(&status, RobotStatus::Failed { fault: RobotFault::NotStarted { .. } }));
+    assert!(status.to_string().contains("/nowhere/robot"));
+    assert!(ProcessRobot::new(ProcessSettings { command: Vec::new(), ..settings }, joints()).is_err());
+}
+
+/// The folder waits for a whole log, takes it, and says what is wrong with one that cannot be read.
+#[test]
+fn a_folder_waits_for_its_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = FolderSettings { folder: folder.path().to_owned(), wait_s: 0.0 };
+    let mut robot = FolderRobot::new(settings, joints()).unwrap();
+    let waiting = |run: &RobotRun, what: &str| {
+        assert!(matches!(&run.status, RobotStatus::Waiting { reason, .. } if reason.contains(what)), "{}", run.status);
+    };
+    waiting(&run(&mut robot), "log.csv");
+    let own = robot.run_folder(1);
+    assert!(own.join("trajectory.csv").exists() && own.join("controller.json").exists());
+    let plant = Plant::new(&model(), &[], &[]).unwrap();
+    let simulated = run(&mut SimulatedRobot::new(plant, LoopSettings::default()).unwrap());
+    let csv = simulated.record.csv();
+    let log = own.join("log.csv");
+    // Still being copied: half a line, half a log.
+    std::fs::write(&log, &csv[..csv.len() / 2]).unwrap();
+    waiting(&run(&mut robot), "not complete");
+    let half: String = csv.lines().take(100).flat_map(|line| [line, "\n"]).collect();
+    std::fs::write(&log, &half).unwrap();
+    waiting(&run(&mut robot), "covers");
+    std::fs::write(&log, csv.replacen(",-0.4,", ",oops,", 1)).unwrap();
+    let broken = run(&mut robot).status;
+    assert!(matches!(broken, RobotStatus::Failed { .. }) && broken.to_string().contains("line 2"), "{broken}");
+    std::fs::write(&log, &csv).unwrap();
+    let done = run(&mut robot);
+    assert!(done.status.is_done());
+    assert_eq!(done.record, simulated.record);
+    // The log of another trajectory is not taken for this one's.
+    let other = Reference::standing(&[-0.4, 0.31], 500.0, 0.4).unwrap();
+    let controller = pd();
+    let request = RunRequest { run: 1, reference: &other, controller: &controller, model: None };
+    let refused = robot.run(&request).unwrap().status;
+    assert!(matches!(refused, RobotStatus::Failed { .. }) && refused.to_string().contains("another run"), "{refused}");
+    std::fs::write(&log, &half).unwrap();
+    std::fs::write(own.join("stopped.txt"), "protective stop\n").unwrap();
+    let stopped = run(&mut robot);
+    assert!(matches!(&stopped.status, RobotStatus::Stopped { reason } if reason == "protective stop"));
+    assert_eq!(stopped.record.samples, 99);
+}
+
+/// The book's lines are the protocol's: a program's can be read, and Dynident's are what it writes.
+#[test]
+fn the_book_tells_the_protocol() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/robot-protocol.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let (trajectory, controller) = ("/…/run_1/trajectory.csv".to_owned(), "/…/run_1/controller.json".to_owned());
+    let own = [
+        ToClient::Run { run: 1, rate_hz: 1000.0, duration_s: 10.0, trajectory, controller },
+        ToClient::Begin { run: 1, rate_hz: 1000.0, samples: 10_001, q: vec![0.1, 0.2], dq: vec![0.0, 0.0] },
+        ToClient::Torque { tau: vec![3.1, 0.4] },
+        ToClient::Finish {},
+        ToClient::Bye {},
+    ];
+    let mut own: Vec<String> = own.iter().map(|message| serde_json::to_string(message).unwrap()).collect();
+    assert!(page.contains(&own.pop().unwrap()));
+    let mut read = 0;
+    for line in page.lines().filter(|line| line.starts_with('{')) {
+        if !own.contains(&line.to_owned()) {
+            serde_json::from_str::<ToHost>(line).unwrap_or_else(|error| panic!("{line}: {error}"));
+            read += 1;
+        }
+    }
+    assert!(read >= 7 && own.iter().all(|line| page.contains(line)), "{read}");
+}
+
+/// What is handed over holds the controller's torque: the table's is the model's inverse dynamics, the file's numbers are the model's.
+#[test]
+fn what_is_handed_over_is_enough() {
+    let model = model();
+    let believed = ControllerModel::new(&model, &[], &[]).unwrap();
+    let reference = reference();
+    let csv = trajectory_csv(&reference, Some(&believed));
+    let mut lines = csv.lines();
+    assert_eq!(lines.next().unwrap(), "t_s,q1,q2,dq1,dq2,ddq1,ddq2,tau1,tau2");
+    let row: Vec<f64> = lines.next().unwrap().split(',').map(|x| x.parse().unwrap()).collect();
+    let mut workspace = dynident_dynamics::Workspace::new(&model);
+    let weight = dynident_dynamics::gravity_torque(&model, &mut workspace, &[-0.4, 0.3]);
+    assert_eq!((&row[1..3], &row[7..]), (&[-0.4, 0.3][..], weight));
+    assert_eq!(csv.lines().count(), 202);
+    let controller = ControllerSettings::ComputedTorque(ComputedTorqueSettings {
+        kp: 100.0.into(),
+        kd: 20.0.into(),
+        friction: dynident_simulation::FrictionCompensation::None,
+    });
+    let request = RunRequest { run: 3, reference: &reference, controller: &controller, model: Some(&believed) };
+    let file = controller_json(&request, &joints());
+    assert_eq!(file["schema"], "dynident/controller/1");
+    assert_eq!(file["controller"]["kind"], "computed-torque");
+    let inertial: Vec<f64> = serde_json::from_value(file["model"]["joints"][1]["inertial"].clone()).unwrap();
+    assert_eq!(inertial, model.inertials()[1].0);
+    assert_eq!(file["model"]["joints"][1]["parent"], "joint1");
+    // Requests without meaning are refused before anybody is spoken to.
+    let mut robot = ProcessRobot::new(settings(ProcessMode::Run, ""), joints()).unwrap();
+    assert!(robot.run(&RunRequest { model: None, ..request }).is_err());
+}
+
+/// MuJoCo behind the example program, in both modes and under four controllers, against the built-in simulator. Needs Python with MuJoCo: DYNIDENT_PYTHON names the interpreter.
+#[test]
+#[ignore = "needs Python with MuJoCo in DYNIDENT_PYTHON"]
+fn mujoco_is_a_robot() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let python = std::env::var("DYNIDENT_PYTHON").unwrap();
+    let path = |name: &str| root.join(name).to_str().unwrap().to_owned();
+    let urdf = "robots/panda_arm7.urdf";
+    let model = load_robot(root.join(urdf)).unwrap().model;
+    let names: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
+    let mut motion = Motion::default();
+    motion.reset(7, 501);
+    for at in 0..7 * 501 {
+        let (joint, time_s) = (at / 501, (at % 501) as f64 / 1000.0);
+        let omega = 2.0 + 0.5 * joint as f64;
+        let (sine, cosine) = (omega * time_s).sin_cos();
+        let centre = [0.1, 0.2, 0.3, -1.6, 0.5, 1.6, 0.7][joint];
+        (motion.q[at], motion.dq[at], motion.ddq[at]) =
+            (centre + 0.3 * sine, 0.3 * omega * cosine, -0.3 * omega * omega * sine);
+    }
+    let reference = Reference::new(1000.0, motion).unwrap();
+    let laws: Vec<Law> = (0..7).map(|joint| Law::Viscous(Viscous { joint })).collect();
+    let believed = ControllerModel::new(&model, &laws, &[0.4; 7]).unwrap();
+    let friction = dynident_simulation::FrictionCompensation::Measured;
+    let gains = JointPdSettings { kp: vec![300.0, 300.0, 200.0, 200.0, 60.0, 60.0, 10.0].into(), kd: 0.5.into() };
+    let controllers = [
+        ControllerSettings::JointPd(gains.clone()),
+        ControllerSettings::PdGravity(gains),
+        ControllerSettings::ComputedTorque(ComputedTorqueSettings { kp: 100.0.into(), kd: 20.0.into(), friction }),
+        ControllerSettings::FiniteTime(FiniteTimeSettings::with_gains(8.0, 6.0)),
+    ];
+    for mode in [ProcessMode::Run, ProcessMode::Step] {
+        let command = vec![python.clone(), path("examples/robots/mujoco_client.py"), path(urdf)];
+        let command = command.into_iter().chain(["--damping", "0.5"].map(str::to_owned)).collect();
+        let settings = ProcessSettings { command, ..settings(mode, "") };
+        let mut mujoco = ProcessRobot::new(settings, names.clone()).unwrap();
+        let plant = Plant::new(&model, &laws, &[0.5; 7]).unwrap();
+        let mut own = SimulatedRobot::new(plant, LoopSettings::default()).unwrap();
+        for controller in &controllers {
+            let request = RunRequest { run: 1, reference: &reference, controller, model: Some(&believed) };
+            let (theirs, own) = (mujoco.run(&request).unwrap(), own.run(&request).unwrap());
+            assert!(theirs.status.is_done(), "{}: {}", controller.name(), theirs.status);
+            let worst = theirs.record.q.iter().zip(&own.record.q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let error = own.max_error(&reference).into_iter().fold(0.0, f64::max);
+            println!("{mode:?} {}: {worst:.1e} rad; largest tracking error {error:.1e} rad", controller.name());
+            assert!(worst < 1e-9, "{mode:?} {}: {worst:e}", controller.name());
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! The integration tests of this crate, linked once.
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
+
+mod audit;
+mod broken;
+mod common;
+mod dh;
+mod friction_laws;
+mod urdf;
+mod urdf_write;

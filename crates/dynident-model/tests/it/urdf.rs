@@ -1,0 +1,143 @@
+//! The URDF reader: against totals from Pinocchio, and by hand.
+
+use crate::common::{ARM, foreign_urdfs};
+use dynident_model::{JointKind, Vec3, audit, load_robot, read_urdf, rewrite_urdf};
+
+/// Degrees of freedom and mass of the moving bodies in kg, as Pinocchio 4.1.0 reads the same files (`robots/README.md`).
+const TOTALS: [(&str, usize, f64); 8] = [
+    ("planar2r", 2, 3.5),
+    ("ur10", 6, 28.7),
+    ("panda", 9, 16.822),
+    ("panda_arm7", 7, 16.822),
+    ("iiwa14", 7, 25.61),
+    ("g1_29dof", 29, 29.527),
+    ("talos_reduced", 32, 76.734),
+    ("talos_full_v2", 44, 77.973),
+];
+
+#[test]
+fn totals_agree_with_pinocchio() {
+    let directory = dynident_testing::repository("robots");
+    for (name, dof, mass) in TOTALS {
+        let robot = load_robot(directory.join(format!("{name}.urdf"))).unwrap();
+        let total: f64 = robot.model.inertials().iter().map(dynident_model::InertialParameters::mass_kg).sum();
+        assert_eq!(robot.model.dof(), dof, "{name}");
+        // The totals are published with three digits after the point.
+        assert!((total - mass).abs() <= 0.0005 + 1e-12, "{name}: {total} kg, not {mass}");
+    }
+}
+
+#[test]
+fn every_description_at_hand_is_read_and_kept_by_an_empty_rewrite() {
+    for path in foreign_urdfs() {
+        let robot = load_robot(&path).unwrap();
+        assert!(robot.model.dof() > 0, "{}", path.display());
+        assert_eq!(rewrite_urdf(&robot.text, &[], &[]).unwrap(), robot.text, "{}", path.display());
+        assert!(!audit(&robot.model).is_empty());
+    }
+}
+
+#[test]
+fn the_arm_is_read_as_it_stands() {
+    let robot = read_urdf(ARM).unwrap();
+    let model = &robot.model;
+    assert!(robot.unread.is_empty(), "{:?}", robot.unread);
+    let names: Vec<&str> = model.joints().iter().map(|joint| joint.name.as_str()).collect();
+    assert_eq!(names, ["lift", "shoulder", "elbow"]);
+    let kinds: Vec<JointKind> = model.joints().iter().map(|joint| joint.kind).collect();
+    assert_eq!(kinds, [JointKind::Prismatic, JointKind::Revolute, JointKind::Continuous]);
+    // The axis `0 0 2` is normalised; the elbow has none, which means x.
+    assert_eq!(model.joints()[1].axis, Vec3([0.0, 0.0, 1.0]));
+    assert_eq!(model.joints()[2].axis, Vec3([1.0, 0.0, 0.0]));
+    assert_eq!(model.joints()[1].damping, Some(0.4));
+    assert_eq!(model.joints()[0].damping, None);
+    assert_eq!(model.joints()[0].limits.upper, Some(0.8));
+    assert_eq!(model.joints()[2].limits.upper, None);
+    // The tool and its tip ride on the forearm; the tip at 0.3 + 0.1 sin 0.5.
+    let links = &model.bodies()[2].links;
+    assert_eq!(links.iter().map(|link| link.name.as_str()).collect::<Vec<_>>(), ["fore", "tool", "tip"]);
+    assert!(links[2].inertial.is_none());
+    let tip = links[2].placement.translation;
+    assert!((tip[0] - (0.3 + 0.1 * 0.5_f64.sin())).abs() < 1e-15 && (tip[2] - 0.1 * 0.5_f64.cos()).abs() < 1e-15);
+    assert!((model.inertials()[2].mass_kg() - 2.1).abs() < 1e-15);
+    // m r of fore and tool: 1.5 · 0.15 + 0.6 (0.3 + 0.04 sin 0.5).
+    let moment = 1.5 * 0.15 + 0.6 * (0.3 + 0.04 * 0.5_f64.sin());
+    assert!((model.inertials()[2].first_moment()[0] - moment).abs() < 1e-15);
+}
+
+#[test]
+fn a_turned_inertial_is_that_of_a_rod_laid_along_the_turned_axis() {
+    // A slender rod along x of the inertial frame, turned by 0.7 about y: its direction is u = (cos, 0, -sin), and its inertia about the
+    // centre of mass is J (1 - u uᵀ).
+    let text = r#"<robot name="r"><link name="b"/><joint name="j" type="continuous"><parent link="b"/><child link="l"/></joint>
+        <link name="l"><inertial><origin rpy="0 0.7 0"/><mass value="2"/>
+        <inertia ixx="0" ixy="0" ixz="0" iyy="0.3" iyz="0" izz="0.3"/></inertial></link></robot>"#;
+    let inertia = read_urdf(text).unwrap().model.inertials()[0].inertia_at_origin();
+    let u = [0.7_f64.cos(), 0.0, -(0.7_f64.sin())];
+    for a in 0..3 {
+        for b in 0..3 {
+            let expected = 0.3 * (f64::from(u8::from(a == b)) - u[a] * u[b]);
+            // A few roundings of numbers below one.
+            assert!((inertia.0[a][b] - expected).abs() < 1e-15);
+        }
+    }
+}
+
+#[test]
+fn branches_stand_depth_first_in_document_order_wherever_links_stand() {
+    let text = r#"<robot name="r">
+        <joint name="b1" type="continuous"><parent link="root"/><child link="b"/></joint>
+        <joint name="a2" type="continuous"><parent link="a"/><child link="aa"/></joint>
+        <joint name="a1" type="continuous"><parent link="root"/><child link="a"/></joint>
+        <joint name="b2" type="prismatic"><parent link="b"/><child link="bb"/></joint>
+        <link name="aa"/><link name="a"/><link name="root"/><link name="b"/><link name="bb"/></robot>"#;
+    let model = read_urdf(text).unwrap().model;
+    let names: Vec<&str> = model.joints().iter().map(|joint| joint.name.as_str()).collect();
+    assert_eq!(names, ["b1", "b2", "a1", "a2"]);
+    assert_eq!(model.joints().iter().map(|joint| joint.parent).collect::<Vec<_>>(), [None, Some(0), None, Some(2)]);
+    assert_eq!(model.bodies_without_prior().len(), 4);
+}
+
+#[test]
+fn misspelt_elements_are_reported() {
+    let text = ARM.replace("<mass value=\"6.5\"/>", "<mass value=\"6.5\"/><inertai/>");
+    let unread = read_urdf(&text).unwrap().unread;
+    assert_eq!(unread.len(), 1);
+    assert_eq!((unread[0].element.as_str(), unread[0].parent.as_str(), unread[0].line), ("inertai", "inertial", 15));
+}
+
+/// A chain of `links` links under joints of one type.
+fn chain(links: usize, kind: &str) -> String {
+    let link = |i: usize| {
+        let before = i - 1;
+        format!(
+            "<link name=\"l{i}\"/><joint name=\"j{i}\" type=\"{kind}\"><parent link=\"l{before}\"/><child link=\"l{i}\"/></joint>"
+        )
+    };
+    let chain: Vec<String> = (1..links).map(link).collect();
+    format!("<robot name=\"chain\"><link name=\"l0\"/>{}</robot>", chain.concat())
+}
+
+#[test]
+fn a_hundred_thousand_links_neither_crash_nor_hang() {
+    let error = read_urdf(&chain(100_000, "revolute")).unwrap_err();
+    assert!(error.to_string().contains("more than 1000 moving joints"), "{error}");
+    // As many fixed links are only long.
+    let moving = "</robot>";
+    let tail = "<link name=\"end\"/><joint name=\"last\" type=\"continuous\"><parent link=\"l99999\"/><child link=\"end\"/></joint></robot>";
+    let model = read_urdf(&chain(100_000, "fixed").replace(moving, tail)).unwrap().model;
+    assert_eq!((model.dof(), model.base().links.len()), (1, 100_000));
+}
+
+#[test]
+fn elements_nested_a_hundred_thousand_deep_are_read_without_recursion() {
+    let depth = 100_000;
+    let text = format!("<robot name=\"r\">{}{}</robot>", "<a>".repeat(depth), "</a>".repeat(depth));
+    assert!(read_urdf(&text).is_err());
+}
+
+#[test]
+fn a_byte_order_mark_and_carriage_returns_do_not_matter() {
+    let text = format!("\u{feff}{}", ARM.replace('\n', "\r\n"));
+    assert_eq!(read_urdf(&text).unwrap().model, read_urdf(ARM).unwrap().model);
+}

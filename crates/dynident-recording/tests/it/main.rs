@@ -1,0 +1,8 @@
+//! The integration tests of this crate, linked once.
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
+
+mod broken_files;
+mod memory;
+mod real_logs;
+mod scipy;
+mod streaming;

@@ -1,0 +1,70 @@
+//! The whole page: nothing that it is given becomes markup or script, and it asks nothing of any network.
+use dynident_report::{
+    BarPlot, Cell, ConvergencePlot, Heading, HeatMap, KeyFigures, LinePlot, Report, Table, Text, Tone,
+};
+
+/// Ends every context that a page has: element, attribute, script, comment.
+const HOSTILE: &str =
+    "</script><script>alert(1)</script><!-- \"'><img src=x onerror=alert(2)> ${x} {{ 7*7 }} {% raw %} */";
+
+fn page_of(text: &str) -> String {
+    let mut report = Report::new(text).subtitle(text);
+    report.add(Heading::new(text)).add(Heading::new(text));
+    report.add(Text::new(text).point(Tone::Bad, text));
+    report.add(KeyFigures::new().judged(text, text, text, Tone::Good));
+    report.add(Table::new(text, [text, text]).note(text).row([Cell::judged(text, Tone::Warning), text.into()]));
+    report.add(LinePlot::new(text, text, text, vec![0.0, 1.0]).note(text).line(text, vec![1.0, 2.0]));
+    report.add(ConvergencePlot::new(text, text).note(text).curve(text, vec![1.0]));
+    report.add(BarPlot::new(text, text).note(text).reference_label(text).bar(text, 1.0, Some(0.5), Some(2.0)));
+    report.add(HeatMap::new(text, [text], [text], vec![vec![1.0]]).note(text));
+    report.html().unwrap()
+}
+
+#[test]
+fn names_never_become_markup_or_script() {
+    let (harmless, hostile) = (page_of("name"), page_of(HOSTILE));
+    for what in ["<script", "</script", "<img", "<!--", "onerror=alert(2)>"] {
+        assert_eq!(hostile.matches(what).count(), harmless.matches(what).count(), "{what}");
+    }
+    assert!(!hostile.contains("49 {%"), "a template ran twice");
+    // What is shown is what was given.
+    assert!(hostile.contains("script&gt;&lt;script&gt;alert(1)"));
+    for data in hostile.split("data-plot=").skip(1) {
+        let json = data.split_once('>').unwrap().1.split_once("</script>").unwrap().0;
+        let plot: serde_json::Value = serde_json::from_str(json).unwrap();
+        assert_eq!(plot["y_label"], HOSTILE);
+        assert_eq!(plot["curves"][0]["name"], HOSTILE);
+    }
+}
+
+#[test]
+fn the_page_needs_nothing_else() {
+    let page = page_of("name");
+    assert!(page.contains("default-src 'none'"));
+    assert!(page.contains("Leon Sorokin") && page.contains("Permission is hereby granted"));
+    for outside in ["src=\"http", "href=\"http", "@import", "url(http", "fetch(", "XMLHttpRequest"] {
+        assert!(!page.contains(outside), "{outside}");
+    }
+    // No plots, no plotting library.
+    let plain = Report::new("plain").html().unwrap();
+    assert!(!plain.contains("uPlot 1.6") && plain.len() < 20_000);
+}
+
+#[test]
+fn a_section_that_does_not_fit_is_named() {
+    let mut report = Report::new("t");
+    report.add(LinePlot::new("Elbow", "", "", vec![0.0, 1.0]).line("measured", vec![1.0]));
+    let message = report.html().unwrap_err().to_string();
+    assert!(message.contains("Elbow") && message.contains("measured"), "{message}");
+}
+
+#[test]
+fn a_million_samples_make_a_small_page() {
+    let n = 1_000_000;
+    let time: Vec<f64> = (0..n).map(|i| f64::from(i) * 1e-3).collect();
+    let curve = |phase: f64| time.iter().map(|t| (3.0 * t + phase).sin()).collect::<Vec<_>>();
+    let mut report = Report::new("long");
+    report.add(LinePlot::new("", "", "", time.clone()).line("a", curve(0.0)).line("b", curve(0.1)));
+    // 1200 columns, six samples each at most, three numbers of up to 14 letters; the library is 51 kB.
+    assert!(report.html().unwrap().len() < 60_000 + 1200 * 6 * 3 * 15);
+}

@@ -1,0 +1,210 @@
+//! A robot whose parameters are known, and logs of it: inverse dynamics of the bodies plus friction written out by hand.
+use dynident::dynamics::{Workspace, inverse_dynamics};
+use dynident::model::{InertialParameters, Model, load_robot};
+use dynident::{IdentificationOutcome, RunOptions, Silent, Study, StudyRobot, identify};
+pub(crate) use dynident_testing::{recordings, repository};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// Width of the Coulomb step of the truth: the default of a study.
+const WIDTH: f64 = 0.02;
+
+/// Pseudo-random numbers in [-1, 1): a linear congruential generator (Knuth's MMIX constants).
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    /// A sum of twelve uniform numbers of variance one: near enough to a normal one.
+    pub(crate) fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.next()).sum::<f64>() / 2.0
+    }
+}
+
+/// Bodies, and per joint drive inertia, viscous friction, Coulomb friction, offset.
+pub(crate) struct Truth {
+    pub(crate) model: Model,
+    pub(crate) drive: Vec<[f64; 4]>,
+}
+
+impl Truth {
+    /// The description's own bodies, each made other by `change` of its mass and size, and drives with friction.
+    pub(crate) fn near(description: &Path, change: f64, drive_inertia: bool) -> Self {
+        let model = load_robot(description).unwrap().model;
+        let mut random = Random(7);
+        let inertials: Vec<InertialParameters> = model
+            .inertials()
+            .iter()
+            .map(|body| {
+                let scale = 0.3 * body.mass_kg();
+                InertialParameters(core::array::from_fn(|k| {
+                    body.0[k] + change * random.next() * if k == 0 { body.mass_kg() } else { 0.2 * scale }
+                }))
+            })
+            .collect();
+        let drive = (0..model.dof())
+            .map(|_| {
+                let inertia = if drive_inertia { 0.3 + 0.1 * random.next() } else { 0.0 };
+                [inertia, 2.0 + random.next(), 1.5 + random.next(), 0.5 * random.next()]
+            })
+            .collect();
+        Self { model: model.with_inertials(&inertials).unwrap(), drive }
+    }
+
+    pub(crate) fn torque(&self, workspace: &mut Workspace, q: &[f64], dq: &[f64], ddq: &[f64]) -> Vec<f64> {
+        let bodies = inverse_dynamics(&self.model, workspace, q, dq, ddq);
+        let drives = self.drive.iter().enumerate().map(|(j, [inertia, viscous, coulomb, offset])| {
+            inertia * ddq[j] + viscous * dq[j] + coulomb * (dq[j] / WIDTH).tanh() + offset
+        });
+        bodies.iter().zip(drives).map(|(body, drive)| body + drive).collect()
+    }
+
+    /// What a perfect fit finds: the truth in the machine's base parameters.
+    pub(crate) fn base_values(&self, machine: &StudyRobot) -> Vec<f64> {
+        use dynident::model::laws::Law;
+        let mut all = self.model.parameter_vector();
+        all.extend(machine.laws().iter().map(|law| match law {
+            Law::DriveInertia(law) => self.drive[law.joint][0],
+            Law::Viscous(law) => self.drive[law.joint][1],
+            Law::Coulomb(law) => self.drive[law.joint][2],
+            Law::Offset(law) => self.drive[law.joint][3],
+            _ => 0.0,
+        }));
+        machine.base().values(&all)
+    }
+}
+
+/// Sums of sines, different for every seed.
+pub(crate) struct Motion {
+    amplitude: Vec<[f64; 5]>,
+    phase: Vec<[f64; 5]>,
+}
+
+impl Motion {
+    /// Slowest frequency, Hz; the fastest is five times as high.
+    const SLOWEST_HZ: f64 = 0.13;
+
+    pub(crate) fn new(dof: usize, seed: u64) -> Self {
+        let mut random = Random(seed);
+        let mut numbers = |scale: f64| -> Vec<[f64; 5]> {
+            (0..dof).map(|_| core::array::from_fn(|_| scale * random.next())).collect()
+        };
+        Self { amplitude: numbers(0.5), phase: numbers(3.1) }
+    }
+
+    pub(crate) fn at(&self, t: f64) -> [Vec<f64>; 3] {
+        let sum = |order: u32| {
+            let joint = |(amplitude, phase): (&[f64; 5], &[f64; 5])| {
+                (0..5)
+                    .map(|k| {
+                        let w = core::f64::consts::TAU * Self::SLOWEST_HZ * (k + 1) as f64;
+                        let quarter = core::f64::consts::FRAC_PI_2 * f64::from(order);
+                        amplitude[k] * w.powi(order as i32) * (w * t + phase[k] + quarter).sin()
+                    })
+                    .sum()
+            };
+            self.amplitude.iter().zip(&self.phase).map(joint).collect()
+        };
+        [sum(0), sum(1), sum(2)]
+    }
+}
+
+/// A log: what `row` makes of time, position and torque, line by line.
+pub(crate) fn write_log(
+    path: &Path,
+    truth: &Truth,
+    motion: &Motion,
+    (rate_hz, seconds): (f64, f64),
+    header: &str,
+    mut row: impl FnMut(&[f64], &[f64]) -> Vec<f64>,
+) {
+    let mut workspace = Workspace::new(&truth.model);
+    let mut text = format!("{header}\n");
+    for k in 0..(rate_hz * seconds) as usize {
+        let t = k as f64 / rate_hz;
+        let [q, dq, ddq] = motion.at(t);
+        let tau = truth.torque(&mut workspace, &q, &dq, &ddq);
+        write!(text, "{t}").unwrap();
+        for value in row(&q, &tau) {
+            write!(text, ",{value}").unwrap();
+        }
+        text.push('\n');
+    }
+    std::fs::write(path, text).unwrap();
+}
+
+/// `t,q1,..,tau1,..`.
+pub(crate) fn header(dof: usize) -> String {
+    let numbered = |name: &str| (1..=dof).map(|j| format!("{name}{j}")).collect::<Vec<_>>().join(",");
+    format!("t,{},{}", numbered("q"), numbered("tau"))
+}
+
+/// Positions and torques as they are.
+pub(crate) fn plain(q: &[f64], tau: &[f64]) -> Vec<f64> {
+    [q, tau].concat()
+}
+
+/// Columns, differences exact enough for 1e-6, and nothing else.
+pub(crate) fn format(dof: usize) -> String {
+    format!(
+        r#"
+        [motion]
+        differentiator = {{ method = "central-differences", order = 8 }}
+        [format]
+        time = {{ column = "t" }}
+        position = {{ columns = "q{{1..{dof}}}" }}
+        torque = {{ columns = "tau{{1..{dof}}}" }}
+        "#
+    )
+}
+
+pub(crate) struct Job {
+    pub(crate) study: Study,
+    pub(crate) path: PathBuf,
+}
+
+impl Job {
+    /// A study file in `folder`.
+    pub(crate) fn new(folder: &Path, text: &str) -> Self {
+        let path = folder.join("study.toml");
+        std::fs::write(&path, text).unwrap();
+        Self { study: Study::load(&path).unwrap_or_else(|error| panic!("{error}\n{text}")), path }
+    }
+
+    /// What is said of a study file that cannot be read.
+    pub(crate) fn new_error(folder: &Path, text: &str) -> String {
+        let path = folder.join("study.toml");
+        std::fs::write(&path, text).unwrap();
+        Study::load(&path).unwrap_err().to_string()
+    }
+
+    pub(crate) fn options(threads: usize) -> RunOptions<'static> {
+        RunOptions { data: None, threads, progress: &Silent }
+    }
+
+    pub(crate) fn identify(&self) -> IdentificationOutcome {
+        identify(&self.study, &self.path, &Self::options(1)).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    pub(crate) fn machine(&self) -> StudyRobot {
+        let folders = dynident::Folders::new(&self.study, &self.path, None);
+        StudyRobot::new(&self.study, &self.path, &folders).unwrap()
+    }
+}
+
+/// Every base parameter within `tolerance` of the truth, relative to itself or to a hundredth of its unit.
+pub(crate) fn assert_recovered(found: &IdentificationOutcome, expected: &[f64], tolerance: f64) {
+    assert_eq!(found.result.base_parameters.len(), expected.len());
+    for (parameter, truth) in found.result.base_parameters.iter().zip(expected) {
+        let error = (parameter.value - truth).abs() / truth.abs().max(0.01);
+        assert!(
+            error <= tolerance,
+            "{}: {} instead of {truth}, relative error {error:.2e}",
+            parameter.expression,
+            parameter.value
+        );
+    }
+}

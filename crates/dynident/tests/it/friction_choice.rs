@@ -1,0 +1,148 @@
+//! Friction that is known is put into the logs of a two-joint arm: cross-validation must find which it was.
+use crate::common::{Job, Random};
+use dynident::dynamics::{Workspace, inverse_dynamics};
+use dynident::model::load_robot;
+use dynident::{FrictionLaw, IdentificationOutcome, validate};
+use std::fmt::Write;
+use std::path::Path;
+
+const ARM: &str = r#"<robot name="arm"><link name="base"/>
+<link name="upper"><inertial><origin xyz="0.2 0.01 0"/><mass value="3"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.05" iyz="0" izz="0.05"/></inertial></link>
+<link name="lower"><inertial><origin xyz="0.15 0 0.02"/><mass value="2"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.03"/></inertial></link>
+<joint name="shoulder" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/></joint>
+<joint name="elbow" type="continuous"><parent link="upper"/><child link="lower"/><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/></joint></robot>"#;
+
+/// Nm of torque noise: a hundredth of the friction.
+const NOISE: f64 = 0.02;
+const STEP: f64 = 0.02;
+
+/// A log of `rows` rows at 200 Hz; `moving` scales the elbow's motion, `stribeck` is its extra friction near rest at a speed of 0.08 rad/s.
+fn write_log(path: &Path, arm: &Path, rows: usize, moving: f64, stribeck: f64, seed: u64) {
+    let model = load_robot(arm).unwrap().model;
+    let (mut workspace, mut random) = (Workspace::new(&model), Random(seed));
+    let mut text = "t,q1,q2,tau1,tau2\n".to_owned();
+    let waves = [[0.9, 1.3, 0.2], [0.5, 0.37, 1.0], [0.7, 1.7, 2.0], [0.4, 0.53, 0.7]];
+    for k in 0..rows {
+        let t = k as f64 / 200.0;
+        let joint = |from: usize, scale: f64| {
+            waves[from..from + 2].iter().fold([0.0; 3], |[q, dq, ddq], [a, w, p]| {
+                let (s, c) = (w * t + p + 0.1 * seed as f64).sin_cos();
+                [q + scale * a * s, dq + scale * a * w * c, ddq - scale * a * w * w * s]
+            })
+        };
+        let [a, b] = [joint(0, 1.0), joint(2, moving)];
+        let tau = inverse_dynamics(&model, &mut workspace, &[a[0], b[0]], &[a[1], b[1]], &[a[2], b[2]]).to_vec();
+        let shoulder = 1.0 * a[1] + 2.0 * (a[1] / STEP).tanh();
+        let near_rest = stribeck * (-(b[1] / 0.08).powi(2)).exp();
+        let elbow = 0.8 * b[1] + (1.0 + near_rest) * (b[1] / STEP).tanh();
+        let noise = [NOISE * random.normal(), NOISE * random.normal()];
+        writeln!(text, "{t},{},{},{},{}", a[0], b[0], tau[0] + shoulder + noise[0], tau[1] + elbow + noise[1]).unwrap();
+    }
+    std::fs::write(path, text).unwrap();
+}
+
+fn job(folder: &Path, drive: &str) -> Job {
+    let text = format!(
+        "log = [{{ file = \"a.csv\" }}, {{ file = \"b.csv\", role = \"validate\" }}]\n[robot]\nfile = \"arm.urdf\"\n{}\n\
+         [parallel_filter]\nenabled = false\n[drive]\n{drive}",
+        crate::common::format(2)
+    );
+    Job::new(folder, &text)
+}
+
+fn arm(folder: &Path) -> std::path::PathBuf {
+    let path = folder.join("arm.urdf");
+    std::fs::write(&path, ARM).unwrap();
+    path
+}
+
+fn all_finite(found: &IdentificationOutcome) -> bool {
+    found.result.base_parameters.iter().all(|p| p.value.is_finite() && p.std.is_finite())
+        && found.result.validation.iter().all(|log| log.model.rmse_nm.is_finite())
+}
+
+#[test]
+fn the_friction_that_was_put_in_is_chosen_and_the_model_can_be_tested_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let arm = arm(folder.path());
+    write_log(&folder.path().join("a.csv"), &arm, 6000, 1.0, 1.5, 1);
+    write_log(&folder.path().join("b.csv"), &arm, 2000, 1.0, 1.5, 2);
+    let job = job(folder.path(), "friction = \"auto\"");
+    let found = job.identify();
+    let [shoulder, elbow] = &found.result.friction_choice[..] else { panic!("two joints") };
+    assert_eq!(shoulder.chosen, "viscous + coulomb", "{shoulder:?}");
+    assert!(elbow.chosen.contains("stribeck"), "{elbow:?}");
+    let laws = elbow.drive.as_ref().unwrap().laws.clone().unwrap();
+    // 0.08 lies between 0.05 and 0.1 of the grid.
+    let near = |law: &FrictionLaw| matches!(law, FrictionLaw::Stribeck { speed, .. } if (0.05..=0.1).contains(speed));
+    assert!(laws.iter().any(near), "{laws:?}");
+    // The noise, and what a grid of speeds and widths leaves of friction forty times as large.
+    assert!(found.result.validation[0].model.rmse_nm < 2.0 * NOISE, "{:?}", found.result.validation[0].model);
+    let plain = job_with_stated(folder.path()).identify();
+    assert!(plain.result.validation[0].model.rmse_nm > 3.0 * NOISE);
+
+    let path = folder.path().join("result.json");
+    std::fs::write(&path, serde_json::to_string(&found.result).unwrap()).unwrap();
+    let again = validate(&path, &job.study, &job.path, &Job::options(1)).unwrap();
+    // Numbers pass through text without loss.
+    assert!((again.validation[0].model.rmse_nm - found.result.validation[0].model.rmse_nm).abs() < 1e-12);
+    let threads = dynident::identify(&job.study, &job.path, &Job::options(2)).unwrap();
+    assert_eq!(threads.estimate.values, found.estimate.values);
+}
+
+fn job_with_stated(folder: &Path) -> Job {
+    job(folder, "coulomb_width = 0.02")
+}
+
+#[test]
+fn a_joint_that_stands_and_a_log_that_is_short_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let arm = arm(folder.path());
+    write_log(&folder.path().join("a.csv"), &arm, 3000, 0.0, 0.0, 1);
+    write_log(&folder.path().join("b.csv"), &arm, 500, 0.0, 0.0, 2);
+    let found = job(folder.path(), "friction = \"auto\"").identify();
+    let elbow = &found.result.friction_choice[1];
+    assert!(elbow.joint == "elbow" && elbow.chosen.contains("does not move") && elbow.drive.is_none());
+    assert!(all_finite(&found));
+
+    write_log(&folder.path().join("a.csv"), &arm, 60, 1.0, 0.0, 1);
+    let found = job(folder.path(), "friction = \"auto\"").identify();
+    assert!(found.result.friction_choice.iter().all(|joint| joint.chosen.contains("too short")));
+    assert!(all_finite(&found));
+}
+
+#[test]
+fn stated_laws_are_fitted_and_bad_constants_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let arm = arm(folder.path());
+    write_log(&folder.path().join("a.csv"), &arm, 3000, 1.0, 1.0, 1);
+    write_log(&folder.path().join("b.csv"), &arm, 1000, 1.0, 1.0, 2);
+    let laws =
+        "laws = [{ law = \"stribeck\", speed = 0.08, exponent = 2.0 }, { law = \"load\" }, { law = \"quadratic\" },
+        { law = \"maxwell-slip\", yield_displacements = [0.001, 0.01] }]";
+    let job = job(folder.path(), laws);
+    let found = job.identify();
+    let elbow = &found.result.joints[1].laws;
+    let value = |symbol: &str| elbow.iter().find(|law| law.symbol == symbol).unwrap().value;
+    // Twenty standard deviations of a fit to 3000 rows, a tenth of which are near rest.
+    assert!((value("fs2") - 1.0).abs() < 0.05 && (value("fc2") - 1.0).abs() < 0.05, "{elbow:?}");
+    assert!(value("fl2").abs() < 0.05 && value("slip2_0.01").abs() < 0.05, "{elbow:?}");
+    assert!(found.result.method.load_parameters.is_some() && all_finite(&found));
+    let path = folder.path().join("result.json");
+    std::fs::write(&path, serde_json::to_string(&found.result).unwrap()).unwrap();
+    let again = validate(&path, &job.study, &job.path, &Job::options(1)).unwrap();
+    assert!((again.validation[0].model.rmse_nm - found.result.validation[0].model.rmse_nm).abs() < 1e-12);
+
+    for (bad, word) in [
+        ("{ law = \"stribeck\", speed = 0.0, exponent = 2.0 }", "speed"),
+        ("{ law = \"stribeck\", speed = nan, exponent = 2.0 }", "speed"),
+        ("{ law = \"maxwell-slip\", yield_displacements = [] }", "yield_displacements"),
+        ("{ law = \"maxwell-slip\", yield_displacements = [0.1, 0.1] }", "twice"),
+        ("{ law = \"sigmoid\", steepness = -1.0 }", "steepness"),
+        ("{ law = \"dahl\" }", "dahl"),
+    ] {
+        let text = format!("robot.file = \"arm.urdf\"\n[drive]\nlaws = [{bad}]");
+        let message = dynident::Study::parse(&text, Path::new("study.toml")).unwrap_err().to_string();
+        assert!(message.contains(word), "{message}");
+    }
+}

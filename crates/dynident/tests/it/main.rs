@@ -1,0 +1,27 @@
+//! The integration tests of this crate, linked once.
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
+
+mod benchmark;
+mod book;
+mod common;
+mod design_messages;
+mod design_tasks;
+mod drive_gains;
+mod estimators;
+mod friction_choice;
+mod instruments;
+mod iteration_legs;
+mod iteration_report;
+mod mutated_studies;
+mod payload;
+mod possible_intervals;
+mod possible_machine;
+mod real_logs;
+mod report;
+mod same_result;
+mod simulated_loop;
+mod synthetic_truth;
+mod temperature;
+mod torque_lag;
+mod ur10_example;
+mod ways;

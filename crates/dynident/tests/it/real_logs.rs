@@ -1,0 +1,180 @@
+//! The studies in `examples/` on the public recordings, where these are at hand.
+use crate::common::{recordings, repository};
+use dynident::recording::Level;
+use dynident::{FrictionChoice, IdentificationOutcome, RunOptions, Silent, Study, identify};
+use std::path::Path;
+
+fn run(study: &Study, path: &Path, data: &Path) -> IdentificationOutcome {
+    let options = RunOptions { data: Some(data.to_owned()), threads: 2, progress: &Silent };
+    identify(study, path, &options).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn example(name: &str) -> Option<IdentificationOutcome> {
+    let data = recordings()?;
+    let path = repository("examples").join(name);
+    let found = run(&Study::load(&path).unwrap(), &path, &data);
+    // A possible machine explains the torque with the sign that the study gives it.
+    let sign = found.result.physical.sign.unwrap();
+    assert!(!sign.is_reversed(), "{name}: {sign:?}");
+    Some(found)
+}
+
+/// The same with the friction that the study states in place of the one that the logs choose.
+fn with_stated_friction(name: &str) -> Option<IdentificationOutcome> {
+    let data = recordings()?;
+    let path = repository("examples").join(name);
+    let mut study = Study::load(&path).unwrap();
+    study.drive.friction = FrictionChoice::Stated;
+    Some(run(&study, &path, &data))
+}
+
+/// The held-out error is no worse than the limit: that of plain least squares on the same split, or what friction chosen from the training logs must reach.
+fn held_out(name: &str, limit_percent: f64) -> Option<IdentificationOutcome> {
+    let found = example(name)?;
+    let error = found.result.validation[0].model.relative_error_percent.unwrap();
+    assert!(error <= limit_percent, "{name}: {error:.3} % instead of at most {limit_percent} %");
+    Some(found)
+}
+
+#[test]
+fn lwr4plus_fitted_to_two_runs() {
+    held_out("lwr4plus_23_to_1.toml", 2.5);
+}
+
+#[test]
+fn lwr4plus_fitted_to_one_run() {
+    held_out("lwr4plus_1_to_2.toml", 2.12);
+}
+
+#[test]
+fn ur10_has_54_base_parameters() {
+    held_out("ur10.toml", 7.0);
+    let Some(found) = with_stated_friction("ur10.toml") else { return };
+    assert_eq!(found.result.base_parameters.len(), 54);
+}
+
+#[test]
+fn tx40_has_61_base_parameters() {
+    if let Some(found) = held_out("tx40.toml", 13.4) {
+        // Also joints with friction that differs by direction have a speed; half of the held-out rows stand still.
+        for joint in &found.result.validation[0].residuals {
+            let regimes = joint.regimes.unwrap();
+            assert_eq!(
+                regimes.at_rest.samples + regimes.reversal.samples + regimes.fast.samples,
+                193,
+                "{}",
+                joint.name
+            );
+            assert!((80..110).contains(&regimes.at_rest.samples), "{}: {regimes:?}", joint.name);
+        }
+    }
+    let Some(found) = with_stated_friction("tx40.toml") else { return };
+    assert_eq!(found.result.base_parameters.len(), 61);
+}
+
+#[test]
+fn panda_has_64_base_parameters() {
+    let Some(found) = held_out("panda.toml", 2.45) else { return };
+    assert_eq!(found.result.base_parameters.len(), 64);
+    let urdf = found.urdf.unwrap();
+    assert!(urdf.contains("holds with the joints locked behind which stand: panda_leftfinger, panda_rightfinger"));
+}
+
+#[test]
+fn the_lbr_med_torque_is_reversed() {
+    let Some(data) = recordings() else { return };
+    let path = repository("examples/lbr_med7.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let as_logged = text.replace(", sign = -1.0", "");
+    assert_ne!(text, as_logged);
+    for (text, reversed) in [(as_logged, true), (text, false)] {
+        let found = run(&Study::parse(&text, &path).unwrap(), &path, &data);
+        for log in &found.result.logs {
+            let seen =
+                log.model_findings.iter().any(|f| f.level == Level::Problem && f.message.contains("opposite sign"));
+            assert_eq!(seen, reversed, "{:?}", log.model_findings);
+        }
+    }
+}
+
+#[test]
+fn tiago_reports_its_dead_channels_and_its_jitter() {
+    let Some(found) = example("tiago.toml") else { return };
+    let import = &found.result.logs[0].import;
+    let dead: Vec<&str> =
+        import.findings.iter().filter(|f| f.message.contains("dead")).map(|f| &f.channel[..]).collect();
+    assert_eq!(dead, ["torque arm_5_joint", "torque arm_6_joint", "torque arm_7_joint"]);
+    // 7.7 to 12.3 ms by the publishers' own account of the whole log.
+    assert!(import.steps.min_s > 0.0076 && import.steps.min_s < 0.0095, "{:?}", import.steps);
+    assert!(import.steps.max_s > 0.0105 && import.steps.max_s < 0.0124, "{:?}", import.steps);
+    assert!((import.rate_hz - 100.0).abs() < 0.5);
+    assert_eq!(found.result.robot.joints.len(), 8);
+}
+
+#[test]
+fn the_double_pendulum_has_a_rotor_between_its_joints() {
+    let Some(found) = example("dfki_pendulum.toml") else { return };
+    let symbol = "Ia_rotor";
+    assert!(found.result.couplings.iter().any(|law| law.symbol == symbol));
+    assert!(found.result.base_parameters.iter().any(|p| p.expression.contains(symbol)));
+    // Steps of up to 8 ms at 500 Hz.
+    let longest = found.result.logs.iter().map(|log| log.import.steps.max_s).fold(0.0, f64::max);
+    assert!((0.006..0.009).contains(&longest), "{longest}");
+    // Published: m2 r2 = 0.56394 kg * 0.32127 m = 0.1812 kg m (axis y, hanging along -z). Least squares is biased towards zero here: 7 % at a cut-off of 6 Hz by
+    // the data set's own notes, 39 % at 12 Hz. Within 10 % the low cut-off does what it is there for.
+    let gravity = found.result.base_parameters.iter().find(|p| p.expression == "mz2").unwrap();
+    assert!((-gravity.value / 0.1812 - 1.0).abs() < 0.1, "{}", gravity.value);
+}
+
+/// The study of the double pendulum at a high cut-off, as text, and where it stands.
+fn pendulum_with_instruments() -> (String, std::path::PathBuf) {
+    let path = repository("examples/dfki_pendulum_iv.toml");
+    (std::fs::read_to_string(&path).unwrap(), path)
+}
+
+fn base_value(found: &IdentificationOutcome, start: &str) -> f64 {
+    found.result.base_parameters.iter().find(|p| p.expression.starts_with(start)).unwrap().value
+}
+
+#[test]
+fn instruments_undo_the_bias_of_the_double_pendulum() {
+    let Some(data) = recordings() else { return };
+    let (text, path) = pendulum_with_instruments();
+    let found = run(&Study::parse(&text, &path).unwrap(), &path, &data);
+    // The publishers' model 3.0 of design C.0: m2 r2 = 0.56394 * 0.32127, m1 r1 + 0.2 m2 = 0.64169 * 0.2 + 0.2 * 0.56394, I2 = 0.053878 less six times Ir = 9.937e-5.
+    // Limits: 3 % and 8 % are the project's goals for this set.
+    assert!((-base_value(&found, "mz2") / 0.181_18 - 1.0).abs() < 0.03, "{}", base_value(&found, "mz2"));
+    assert!((-base_value(&found, "mz1 - 0.2 m2") / 0.241_13 - 1.0).abs() < 0.08, "{}", base_value(&found, "mz1"));
+    let inertia = base_value(&found, "Iyy2 - 6 Ia_rotor");
+    assert!((inertia / (0.053_878 - 6.0 * 9.937e-5) - 1.0).abs() < 0.08, "{inertia}");
+    let noise = found.result.noise_in_regressor.as_ref().unwrap();
+    assert_eq!(noise.hausman.verdict, dynident::estimation::HausmanVerdict::RejectLeastSquares);
+    assert!(!noise.instruments.weak && noise.instruments.weakest_f.unwrap() > 10.0);
+    // With another method the instruments only test it; least squares on the same rows loses most of the second link's gravity.
+    let plain = text.replace("method = \"instrumental\"", "method = \"ordinary\"");
+    assert_ne!(plain, text);
+    let plain = run(&Study::parse(&plain, &path).unwrap(), &path, &data);
+    assert!(-base_value(&plain, "mz2") < 0.5 * 0.181_18, "{}", base_value(&plain, "mz2"));
+    let test = &plain.result.noise_in_regressor.as_ref().unwrap().hausman;
+    assert_eq!(test.verdict, dynident::estimation::HausmanVerdict::RejectLeastSquares);
+}
+
+#[test]
+fn every_estimator_is_at_hand_on_a_real_log() {
+    let Some(data) = recordings() else { return };
+    let path = repository("examples/dfki_pendulum.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let plain = run(&Study::parse(&text, &path).unwrap(), &path, &data);
+    for method in ["generalized", "huber", "tukey", "noise-weighted"] {
+        let text = text.replace("[format]", &format!("[estimator]\nmethod = \"{method}\"\n\n[format]"));
+        let found = run(&Study::parse(&text, &path).unwrap(), &path, &data);
+        assert_eq!(found.result.method.estimator, method);
+        assert_eq!(found.result.method.status, "complete");
+        // They weight the same rows differently: nothing moves by more than a few of the error bars, and those are of the same size.
+        for (a, b) in found.result.base_parameters.iter().zip(&plain.result.base_parameters) {
+            let bar = a.std.max(b.std);
+            assert!((a.value - b.value).abs() < 10.0 * bar, "{method} {}: {} and {}", a.expression, a.value, b.value);
+            assert!(a.std > 0.2 * b.std && a.std < 5.0 * b.std, "{method} {}: {} and {}", a.expression, a.std, b.std);
+        }
+    }
+}
