@@ -6,7 +6,6 @@
 
 #![forbid(unsafe_code)]
 
-pub mod benchmark;
 #[cfg(doctest)]
 pub mod book;
 mod cpu_time;
