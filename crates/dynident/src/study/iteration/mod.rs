@@ -1,7 +1,10 @@
 //! `[iteration]`: how a study's robot is run, identified and run again.
 
-use super::legs::{LegOrder, LegSection};
-use crate::study::{EstimatorMethod, Study};
+mod legs;
+
+pub use legs::{LegOrder, LegSection};
+
+use super::{EstimatorMethod, Study};
 use dynident_iteration::robot::{FolderSettings, ProcessSettings};
 use dynident_iteration::{
     IterationSettings, RunEstimator, RunIdentificationSettings, Scheme, SettledSettings, StartWith,
@@ -38,7 +41,7 @@ pub enum PriorChoice {
 /// `[iteration]`, all of it optional.
 ///
 /// ```
-/// let section: dynident::IterationSection = toml::from_str(
+/// let section: dynident::study::IterationSection = toml::from_str(
 ///     r#"
 ///     scheme = "step-by-step"
 ///     prior = "none"

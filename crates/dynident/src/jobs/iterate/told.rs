@@ -1,9 +1,8 @@
 //! From records to what `iterations.json` holds.
 
-use super::file::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile};
 use crate::jobs::options::study_name;
-use crate::study::Study;
-use crate::study::StudyRobot;
+use crate::result::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile};
+use crate::study::{Study, StudyRobot};
 use dynident_iteration::{IterationStatus, RunEstimate, RunRecord};
 use std::path::Path;
 

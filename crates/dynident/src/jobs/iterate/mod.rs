@@ -1,23 +1,18 @@
 //! Run, identify, load the better model, run again: a study's whole iteration.
 
 mod bound;
-mod file;
 mod legs;
-mod report;
-mod section;
 mod told;
 mod trajectory;
 
-pub use file::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile};
-pub use legs::{LegOrder, LegSection};
-pub use section::{IterationSection, PriorChoice, RobotChoice};
-pub(crate) use trajectory::Trajectory;
+pub(super) use trajectory::Trajectory;
 
 use crate::error::Error;
 use crate::jobs::options::RunOptions;
 use crate::output::write_whole;
-use crate::study::StudyRobot;
-use crate::study::{Folders, Study};
+use crate::pages::iteration::{RunName, RunTrace, TimeSpent, iteration_report};
+use crate::result::IterationsFile;
+use crate::study::{Folders, PriorChoice, RobotChoice, Study, StudyRobot};
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
 use dynident_iteration::{
@@ -25,7 +20,6 @@ use dynident_iteration::{
 };
 use dynident_iteration::{Robot, RobotRun};
 use fnv::FnvHasher;
-use report::{RunName, RunTrace, TimeSpent};
 use std::hash::Hasher;
 use std::path::Path;
 use std::time::Instant;
@@ -160,7 +154,7 @@ pub fn iterate_study(
     file.converged &= file.runs.last().is_some_and(|run| run.leg.is_none_or(|leg| leg == stages.len()));
     write_file(&target, &file)?;
     let time = TimeSpent { before_runs_s, all_s: begin.elapsed().as_secs_f64(), runs: made };
-    write_whole(&out.join("report.html"), report::iteration_report(&file, &traces, &time)?.as_bytes())?;
+    write_whole(&out.join("report.html"), iteration_report(&file, &traces, &time)?.as_bytes())?;
     Ok(file)
 }
 
