@@ -155,7 +155,7 @@ fn physical_verdict(
         .to_owned();
     }
     verdict.failure.clone_from(&consistent.failure);
-    verdict.sign = consistent.sign;
+    verdict.sign = found.examination.sign;
     verdict.impossible_priors = consistent
         .inconsistent_nominal
         .iter()
@@ -255,7 +255,7 @@ fn log_summaries(task: &IdentificationTask, found: &Identification) -> Vec<LogSu
     let pairs = found.training.logs.iter().zip(&found.examination.delays);
     let training = pairs.map(|(factors, delays)| {
         let mut summary = training_summary(&task.recordings[factors.index], factors, delays, &joints);
-        summary.model_findings.extend(found.consistent.sign.as_ref().and_then(sign_findings));
+        summary.model_findings.extend(found.examination.sign.as_ref().and_then(sign_findings));
         summary
     });
     let held_out = found.held_out.iter().map(|log| held_out_summary(&task.recordings[log.index], log, &joints));
