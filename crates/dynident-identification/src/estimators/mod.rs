@@ -1,7 +1,7 @@
 //! From the rows of the training logs to base parameters: every estimator that is offered, with its settings and its findings.
 //!
-//! **To add an estimator**: a file here with its settings, its findings and a function from [`TrainingRows`] to an [`Estimation`]; a variant of [`Estimator`], which the compiler
-//! then asks for here; and its name in the study file.
+//! **To add an estimator**, three files: one here with its settings and a function from [`TrainingRows`] to an [`Estimate`]; a variant of [`Estimator`], which the compiler
+//! then asks for here; and its name in the study file (`study/estimator.rs` of `dynident`), where the compiler asks for the rest.
 
 mod generalized;
 mod instrument_rows;
