@@ -53,6 +53,7 @@ pub enum ParametricModelError {
 /// assert_eq!(pendulum.nominal_base().unwrap()[1], -1.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+#[doc(alias("robot", "nominal model", "machine"))]
 #[derive(Clone, Debug)]
 pub struct ParametricModel {
     model: Model,

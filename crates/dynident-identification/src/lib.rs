@@ -1,5 +1,5 @@
-//! **Which model explains these samples?** From samples in memory or a stream to an identified model. No study files, no
-//! paths, no pages: these are the business of the crate `dynident`.
+//! **Which model explains these samples?** From samples in memory or a stream to an identified model. No study files,
+//! no paths, no pages: these are the business of the crate `dynident`.
 //!
 //! # A UR10 from arrays
 //!

@@ -4,6 +4,7 @@ use super::kind::{TermAction, TermConstant, TermJoints, TermKind};
 use super::{JointMotion, LawInput};
 
 /// Reflected drive inertia of one joint, kg m² (kg).
+#[doc(alias("rotor inertia", "armature"))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DriveInertia {
     /// The joint.

@@ -78,6 +78,7 @@ impl<'a> JointMotion<'a> {
 }
 
 /// One parameter of the drives, linear in the joint torques.
+#[doc(alias("friction", "torque term", "actuator"))]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Law {
     /// Torque in proportion to speed.

@@ -1,6 +1,6 @@
-//! The book: every code block has a kind that something checks, every TOML block is read by what it is meant for, every page is linked
-//! and every link leads somewhere, those of README, ARCHITECTURE and CONTRIBUTING too. Rust blocks run as documentation tests (`src/book.rs`). The studies and robots of `examples/` are
-//! read, too.
+//! The book: every code block has a kind that something checks, every TOML block is read by what it is meant for,
+//! every page is linked and every link leads somewhere, those of README, ARCHITECTURE and CONTRIBUTING too. Rust
+//! blocks run as documentation tests (`src/book.rs`). The studies and robots of `examples/` are read, too.
 
 use dynident::{EstimatorSection, Study};
 use dynident_recording::{DecimationSettings, DifferentiatorSettings, LogFormat, MotionSettings};
@@ -164,6 +164,18 @@ fn every_page_is_in_the_summary_and_every_link_leads_somewhere() {
     for (page, _) in pages.iter().filter(|(page, _)| page != "SUMMARY.md") {
         assert!(linked.contains(page.as_str()), "docs/src/SUMMARY.md does not link {page}");
     }
+}
+
+/// What README shows of Rust is part of an example that runs.
+#[test]
+fn the_readmes_rust_is_an_example_of_the_crate() {
+    let readme = std::fs::read_to_string(docs().join("../README.md")).unwrap();
+    let source = std::fs::read_to_string(docs().join("../crates/dynident-identification/src/lib.rs")).unwrap();
+    let example: Vec<&str> = source.lines().filter_map(|line| line.strip_prefix("//! ")).collect();
+    let shown = blocks("README.md", &readme);
+    let lines = shown.iter().filter(|block| block.info == "rust").flat_map(|block| block.text.lines());
+    let strange: Vec<&str> = lines.filter(|line| !line.is_empty() && !example.contains(line)).collect();
+    assert!(strange.is_empty(), "not in the example of dynident-identification: {strange:#?}");
 }
 
 #[test]
