@@ -28,7 +28,7 @@
 //! #   <joint name="shoulder" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/></joint>
 //! #   <joint name="elbow" type="continuous"><parent link="upper"/><child link="fore"/><axis xyz="0 1 0"/>
 //! #     <origin xyz="0 0 0.4"/></joint></robot>"#;
-//! let arm = dynident_model::read_urdf(text)?;
+//! let arm = dynident_model::read_urdf(text)?.model;
 //! let mut workspace = Workspace::new(&arm);
 //! let (q, dq, ddq) = ([0.3, -0.8], [0.5, 1.0], [2.0, -1.0]);
 //!

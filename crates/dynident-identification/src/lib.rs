@@ -15,10 +15,10 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
 //! # let urdf = std::fs::read_to_string(path)?;
-//! # let (q, tau) = recorded(&dynident_model::read_urdf(&urdf)?, 0.3);
-//! # let (q_test, tau_test) = recorded(&dynident_model::read_urdf(&urdf)?, 2.0);
+//! # let (q, tau) = recorded(&dynident_model::read_urdf(&urdf)?.model, 0.3);
+//! # let (q_test, tau_test) = recorded(&dynident_model::read_urdf(&urdf)?.model, 2.0);
 //!
-//! let arm = dynident_model::read_urdf(&urdf)?;
+//! let arm = dynident_model::read_urdf(&urdf)?.model;
 //! let friction = laws_per_joint(&arm, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
 //! let robot = ParametricModel::new(arm, friction)?;
 //!
@@ -57,7 +57,7 @@
 //! # use dynident_recording::JointSamples;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
-//! # let arm = dynident_model::read_urdf(&std::fs::read_to_string(path)?)?;
+//! # let arm = dynident_model::read_urdf(&std::fs::read_to_string(path)?)?.model;
 //! # let (train, test) = (recorded(&arm, 0.3), recorded(&arm, 2.0));
 //! # let friction = laws_per_joint(&arm, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
 //! # let truth = [true_arm(&arm).parameter_vector(), vec![VISCOUS; 6]].concat();

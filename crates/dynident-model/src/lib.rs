@@ -35,7 +35,7 @@
 //!     <limit lower="-2" upper="2" velocity="3" effort="20"/>
 //!   </joint>
 //! </robot>"#;
-//! let pendulum = read_urdf(text)?;
+//! let pendulum = read_urdf(text)?.model;
 //! let rod = pendulum.inertials()[0];
 //! assert_eq!((rod.mass_kg(), rod.first_moment().0[2]), (2.0, -1.0));
 //! assert!(audit(&pendulum).iter().all(|finding| finding.level != AuditLevel::Problem));

@@ -18,7 +18,7 @@
 //! #   <mass value="2"/><inertia ixx="0.2" iyy="0.2" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
 //! #   <joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint>
 //! # </robot>"#;
-//! let model = dynident_model::read_urdf(text)?;
+//! let model = dynident_model::read_urdf(text)?.model;
 //! let mut plant = Plant::new(&model, &[], &[])?;
 //! let mut controller = JointPd::new(1, &JointPdSettings { kp: 200.0.into(), kd: 40.0.into() })?;
 //!
