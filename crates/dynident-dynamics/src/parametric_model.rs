@@ -96,12 +96,22 @@ impl ParametricModel {
         Ok(self)
     }
 
-    /// The same robot with other torque terms and the description's nominal values.
+    /// The same robot with other torque terms. Nominal values of bodies and of terms that stay are kept; those of new
+    /// terms are the description's.
     ///
     /// # Errors
     /// As [`new`](Self::new).
     pub fn with_laws(&self, laws: Vec<Law>) -> Result<Self, ParametricModelError> {
-        Self::new(self.model.clone(), laws)
+        let mut other = Self::new(self.model.clone(), laws)?;
+        let bodies = 10 * self.model.dof();
+        other.nominal[..bodies].copy_from_slice(&self.nominal[..bodies]);
+        for (place, law) in other.laws.iter().enumerate() {
+            if let Some(known) = self.laws.iter().position(|kept| kept == law) {
+                other.nominal[bodies + place] = self.nominal[bodies + known];
+            }
+        }
+        other.nominal_base = self.nominal_base.as_ref().map(|_| other.base.values(&other.nominal));
+        Ok(other)
     }
 
     /// The same with further terms behind the base columns of the layout, whether they depend on these or not: one set of rows for choosing among them. Base parameters and terms stay as they are.

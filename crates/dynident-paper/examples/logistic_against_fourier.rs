@@ -73,8 +73,8 @@ fn compared(path: &Path, family: &str, duration_s: Option<f64>, seeds: u64) -> R
     let mut study = Study::load(path)?;
     let section = study.design.get_or_insert_default();
     section.family = toml::from_str(family)?;
-    section.criterion = dynident::CriterionChoice::DOptimal;
-    section.optimiser = dynident::OptimiserChoice::Gradient;
+    section.criterion = dynident::study::CriterionChoice::DOptimal;
+    section.optimiser = dynident::study::OptimiserChoice::Gradient;
     if let Some(duration_s) = duration_s {
         section.duration_s = duration_s;
     }
@@ -97,7 +97,7 @@ fn compared(path: &Path, family: &str, duration_s: Option<f64>, seeds: u64) -> R
             cutoff_hz: Some(CUTOFF_HZ),
             ..DecimationSettings::default()
         }),
-        physical: false,
+        consistency: None,
         ..RunIdentificationSettings::default()
     };
     let settings = ControllerSettings::FiniteTime(FiniteTimeSettings::with_gains(100.0, 20.0));

@@ -7,7 +7,8 @@
 
 use clap::Parser;
 use core::ops::ControlFlow;
-use dynident::{CriterionChoice, DesignFile, FamilyChoice, OptimiserChoice, RunOptions, Study, design_study};
+use dynident::study::{CriterionChoice, FamilyChoice, OptimiserChoice};
+use dynident::{DesignFile, RunOptions, Study, design_study};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 

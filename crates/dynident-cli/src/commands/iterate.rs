@@ -3,7 +3,8 @@
 use super::search::Search;
 use super::{Context, json, told, told_in};
 use crate::{Verdict, summary, terminal};
-use dynident::{IterationWatch, LegOrder, RunOptions, Study, check_writable, iterate_study};
+use dynident::study::LegOrder;
+use dynident::{IterationWatch, RunOptions, Study, check_writable, iterate_study};
 use std::path::PathBuf;
 
 /// Options of `iterate`.

@@ -2,7 +2,8 @@
 
 use super::text::{name, percent, shortened, table, wrapped};
 use core::fmt::Write;
-use dynident::{DesignFile, WindowedFile};
+use dynident::DesignFile;
+use dynident::result::WindowedFile;
 use std::path::Path;
 
 /// Limits and parameters shown; the rest stand in the file.
@@ -109,11 +110,11 @@ fn forecast(d: &DesignFile) -> String {
         known.retain(|p| p.relative_std_percent.is_some());
     }
     known.sort_by(|a, b| {
-        let key = |p: &dynident::ParameterForecast| p.relative_std_percent.unwrap_or(f64::INFINITY);
+        let key = |p: &dynident::result::ParameterForecast| p.relative_std_percent.unwrap_or(f64::INFINITY);
         key(a).total_cmp(&key(b))
     });
     let with_prior = d.forecast.iter().any(|p| p.std_with_prior.is_some());
-    let row = |p: &&dynident::ParameterForecast| {
+    let row = |p: &&dynident::result::ParameterForecast| {
         let short = |std: Option<f64>| std.map_or("-".to_owned(), |std| format!("{std:.2e}"));
         let std = short(p.std);
         let prior = p.prior.map_or("-".to_owned(), |prior| format!("{prior:.4}"));

@@ -1,8 +1,8 @@
 //! What the importer found, said once however many joints and logs it concerns.
 
 use super::text::wrapped;
-use dynident::LogSummary;
 use dynident::recording::Level;
+use dynident::result::LogSummary;
 
 /// Findings that differ in joint, log and numbers only.
 struct Group {

@@ -5,10 +5,11 @@ use super::noise::noise;
 use super::text::{WIDTH, listed, name, percent, shortened, table, with_deviation, wrapped};
 use super::validation::residuals;
 use core::fmt::Write;
+use dynident::ResultFile;
 use dynident::identification::consistent::ParameterInterval;
 use dynident::identification::examination::LogValidation;
 use dynident::identification::friction::FrictionCandidate;
-use dynident::{LogSummary, ResultFile};
+use dynident::result::LogSummary;
 use std::path::Path;
 
 /// Base parameters shown with their error bars; the rest stand in the file.

@@ -1,7 +1,8 @@
 //! The summaries of `iterate` and `simulate`.
 
 use super::text::{table, wrapped};
-use dynident::{IterationRun, IterationsFile, SimulationFile};
+use dynident::result::IterationRun;
+use dynident::{IterationsFile, SimulationFile};
 use std::path::Path;
 
 /// An iteration: its verdict, run by run, and where the files are.

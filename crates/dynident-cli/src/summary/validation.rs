@@ -2,9 +2,9 @@
 
 use super::findings::findings;
 use super::text::{name, percent, table, wrapped};
-use dynident::LogSummary;
 use dynident::estimation::ValidationReport;
 use dynident::identification::examination::{JointResiduals, LogValidation};
+use dynident::result::LogSummary;
 
 /// A test whose probability is below this counts as negative.
 const SIGNIFICANCE: f64 = 0.01;

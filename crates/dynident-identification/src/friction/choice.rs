@@ -23,7 +23,7 @@ const ROUNDS: usize = 2;
 const MOVING: f64 = 1.0e-3;
 
 /// How the friction of one joint was chosen.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointFriction {
     /// The joint.
     pub joint: String,
@@ -38,7 +38,7 @@ pub struct JointFriction {
 }
 
 /// One model of a joint's friction.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrictionCandidate {
     /// Its terms.
     pub law: String,
@@ -66,7 +66,10 @@ fn stated(columns: &[&CandidateColumn]) -> Vec<Law> {
 }
 
 /// The robot with the choice in force: a joint's friction is replaced, its drive inertia and offset stay.
-pub(crate) fn chosen_model(
+///
+/// # Errors
+/// Terms of joints that the robot does not have.
+pub fn chosen_model(
     robot: &ParametricModel,
     choice: &[JointFriction],
 ) -> Result<ParametricModel, ParametricModelError> {

@@ -1,7 +1,11 @@
 //! The jobs of the command: each reads files, calls the crates below, and returns what is written.
 
+pub(crate) mod design;
 pub(crate) mod evaluate;
 pub(crate) mod identify;
 pub(crate) mod inspect;
+pub(crate) mod iterate;
+mod log_summary;
 pub(crate) mod options;
+pub(crate) mod simulate;
 pub(crate) mod validate;

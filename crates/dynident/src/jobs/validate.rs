@@ -1,10 +1,10 @@
 //! A finished model against logs that were not used for its fit.
 
 use crate::error::Error;
+use crate::jobs::log_summary::held_out_summary;
 use crate::jobs::options::{RunOptions, study_name};
-use crate::result::log_summary::held_out_summary;
 use crate::result::stored::StoredModel;
-use crate::result::validation::{VALIDATION_SCHEMA, ValidationFile};
+use crate::result::{VALIDATION_SCHEMA, ValidationFile};
 use crate::study::{Folders, Study, StudyRobot};
 use dynident_identification::examination::{TestedModel, examine_held_out};
 use dynident_identification::{Logs, Role};

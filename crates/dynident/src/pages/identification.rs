@@ -1,8 +1,7 @@
 //! `report.html` of an identification.
 
 use crate::error::Error;
-use crate::jobs::identify::IdentificationOutcome;
-use crate::result::identification::{BaseParameterResult, LogSummary, ResultFile};
+use crate::result::{BaseParameterResult, LogSummary, ResultFile};
 use dynident_estimation::consistent::IntervalEnd;
 use dynident_identification::Role;
 use dynident_identification::consistent::ParameterInterval;
@@ -14,8 +13,7 @@ use dynident_report::{BarPlot, Cell, Heading, HeatMap, KeyFigures, LinePlot, Rep
 const MOST_CORRELATIONS: usize = 80;
 
 /// The whole page.
-pub(crate) fn identification_report(found: &IdentificationOutcome) -> Result<String, Error> {
-    let r = &found.result;
+pub(crate) fn identification_report(r: &ResultFile, traces: &[LogTrace]) -> Result<String, Error> {
     let mut page = Report::new(&r.name).subtitle(format!(
         "{}: {} joints, {} base parameters; estimator {}, error bars {}",
         r.robot.name,
@@ -30,7 +28,7 @@ pub(crate) fn identification_report(found: &IdentificationOutcome) -> Result<Str
     for log in &r.validation {
         page.add(held_out(log));
     }
-    torques(&mut page, &r.robot.joints, &found.traces);
+    torques(&mut page, &r.robot.joints, traces);
     page.add(Heading::new("Parameters"));
     parameters(&mut page, r);
     page.add(Heading::new("Friction and drives"));

@@ -1,4 +1,6 @@
-//! The pages that people look at: what stands in each `report.html`.
+//! The pages and pictures that people look at: what stands in each `report.html`, and beside a design.
 
+pub(crate) mod design;
 pub(crate) mod identification;
+pub(crate) mod iteration;
 mod payloads;

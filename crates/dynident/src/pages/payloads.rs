@@ -1,6 +1,6 @@
 //! Payloads, drive gains and offsets in `report.html`.
 
-use crate::result::identification::ResultFile;
+use crate::result::ResultFile;
 use dynident_identification::payload::{Measured, PayloadResult};
 use dynident_report::{Cell, Heading, Report, Table, Text, Tone, short};
 

@@ -1,8 +1,22 @@
-//! What jobs write: one type for each file, and how a result is read back.
+//! **What jobs write**: one type for each file, read back as it was written. Keys are added, never renamed, within a version of a schema.
 
-pub(crate) mod identification;
-pub(crate) mod log_summary;
-pub(crate) mod sections;
+mod design;
+mod identification;
+mod inspection;
+mod iterations;
+mod simulation;
 pub(crate) mod stored;
-pub(crate) mod urdf;
-pub(crate) mod validation;
+mod validation;
+
+pub use design::{
+    DESIGN_SCHEMA, DesignFile, DirectionForecast, ParameterForecast, StrokeFile, StrokeLimitFile, WindowedFile,
+};
+pub use identification::{
+    BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LawResult, LogOffset, LogSummary, MethodSummary,
+    PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, Timings,
+    TrainingJoint, TrainingResult,
+};
+pub use inspection::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary};
+pub use iterations::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile};
+pub use simulation::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};
+pub use validation::{VALIDATION_SCHEMA, ValidationFile};

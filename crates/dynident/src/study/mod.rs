@@ -1,11 +1,13 @@
-//! The study file: a robot, its drives, its logs and how to fit them, without code.
+//! **The study file**: a robot, its drives, its logs and how to fit them, without code.
 
 mod arrays;
+mod design;
 mod drive;
 mod estimator;
 mod folders;
-pub(crate) mod friction;
+mod friction;
 mod friction_keys;
+mod iteration;
 mod log;
 mod numbers;
 mod payload;
@@ -13,22 +15,27 @@ mod physical;
 mod robot;
 mod robot_model;
 mod simulated;
+mod simulation;
 mod task;
 
+pub use design::{
+    CriterionChoice, DesignSection, FamilyChoice, GivenStroke, JoinedChoice, OptimiserChoice, PriorSection,
+    StartPosture, TorqueNoise, WindowedCondition, WindowedProblem,
+};
 pub use drive::{CoulombChoice, CouplingSection, DriveSection, JointDrive};
 pub use estimator::{EstimatorMethod, EstimatorSection};
 pub use folders::Folders;
+pub use friction::{FrictionChoice, FrictionLaw};
+pub use iteration::{IterationSection, LegOrder, LegSection, PriorChoice, RobotChoice};
 pub use log::LogSection;
 pub use payload::{ArmSection, PayloadSection};
 pub use physical::PhysicalChoice;
 pub use robot::RobotSection;
 pub use robot_model::StudyRobot;
 pub use simulated::SimulatedSection;
+pub use simulation::{SimulatedTruth, SimulationSection};
 
-use crate::design::DesignSection;
 use crate::error::Error;
-use crate::iterate::IterationSection;
-use crate::simulate::section::SimulationSection;
 use dynident_identification::Role;
 use dynident_identification::rows::ParallelFilterSettings;
 use dynident_model::line_and_column;
@@ -224,11 +231,11 @@ impl Study {
     /// That friction which depends on the temperature is asked for where it can be had.
     fn check_temperature(&self) -> Result<(), String> {
         let laws = self.drive.joints.values().filter_map(|own| own.laws.as_ref()).chain([&self.drive.laws]).flatten();
-        if !laws.into_iter().any(|law| matches!(law, friction::FrictionLaw::Temperature { .. })) {
+        if !laws.into_iter().any(|law| matches!(law, FrictionLaw::Temperature { .. })) {
             return Ok(());
         }
         let own = self.drive.joints.values().filter_map(|own| own.friction);
-        if own.chain([self.drive.friction]).any(|choice| choice == friction::FrictionChoice::Auto) {
+        if own.chain([self.drive.friction]).any(|choice| choice == FrictionChoice::Auto) {
             return Err("drive: friction = \"auto\" does not go with the law `temperature`: let the logs choose friction without it, then state what they chose beside it".to_owned());
         }
         if self.estimator.method == EstimatorMethod::Instrumental || self.estimator.instruments.is_some() {

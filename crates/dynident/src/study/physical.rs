@@ -7,7 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 /// `true`, `false`, or a table of [`ConsistencySettings`], which stands for `true`.
 ///
 /// ```
-/// use dynident::{EstimatorSection, PhysicalChoice};
+/// use dynident::study::{EstimatorSection, PhysicalChoice};
 /// let off: EstimatorSection = toml::from_str("physical = false")?;
 /// assert_eq!(off.physical, PhysicalChoice::Switch(false));
 /// let known: EstimatorSection = toml::from_str("[physical]\nprior = \"pullback\"\nbodies.forearm.mass_kg = [1.0, 3.0]")?;

@@ -2,7 +2,8 @@
 //! and every link leads somewhere. Rust blocks run as documentation tests (`src/book.rs`). The studies and robots of `examples/` are
 //! read, too.
 
-use dynident::{EstimatorSection, Study};
+use dynident::Study;
+use dynident::study::EstimatorSection;
 use dynident_recording::{DecimationSettings, DifferentiatorSettings, LogFormat, MotionSettings};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

@@ -2,7 +2,8 @@
 use crate::common::{Job, Random};
 use dynident::dynamics::{Workspace, inverse_dynamics};
 use dynident::model::load_robot;
-use dynident::{FrictionLaw, IdentificationOutcome, validate};
+use dynident::study::FrictionLaw;
+use dynident::{IdentificationOutcome, validate};
 use std::fmt::Write;
 use std::path::Path;
 

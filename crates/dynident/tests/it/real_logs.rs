@@ -1,7 +1,8 @@
 //! The studies in `examples/` on the public recordings, where these are at hand.
 use crate::common::{recordings, repository};
 use dynident::recording::Level;
-use dynident::{FrictionChoice, IdentificationOutcome, RunOptions, Silent, Study, identify};
+use dynident::study::FrictionChoice;
+use dynident::{IdentificationOutcome, RunOptions, Silent, Study, identify};
 use std::path::Path;
 
 fn run(study: &Study, path: &Path, data: &Path) -> IdentificationOutcome {

@@ -1,10 +1,9 @@
 //! The trajectory of every run: from a file, or designed first.
 
-use crate::design::{design_study, trajectory_table};
 use crate::error::Error;
+use crate::jobs::design::{design_study, trajectory_table};
 use crate::jobs::options::RunOptions;
-use crate::study::StudyRobot;
-use crate::study::{Folders, Study};
+use crate::study::{Folders, Study, StudyRobot};
 use core::ops::ControlFlow;
 use dynident_excitation::{DesignProgress, Motion};
 use dynident_simulation::Reference;

@@ -1,23 +1,18 @@
 //! Run, identify, load the better model, run again: a study's whole iteration.
 
 mod bound;
-mod file;
 mod legs;
-mod report;
-mod section;
 mod told;
 mod trajectory;
 
-pub use file::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile};
-pub use legs::{LegOrder, LegSection};
-pub use section::{IterationSection, PriorChoice, RobotChoice};
-pub(crate) use trajectory::Trajectory;
+pub(super) use trajectory::Trajectory;
 
 use crate::error::Error;
 use crate::jobs::options::RunOptions;
 use crate::output::write_whole;
-use crate::study::StudyRobot;
-use crate::study::{Folders, Study};
+use crate::pages::iteration::{RunName, RunTrace, TimeSpent, iteration_report};
+use crate::result::IterationsFile;
+use crate::study::{Folders, PriorChoice, RobotChoice, Study, StudyRobot};
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
 use dynident_iteration::{
@@ -25,7 +20,6 @@ use dynident_iteration::{
 };
 use dynident_iteration::{Robot, RobotRun};
 use fnv::FnvHasher;
-use report::{RunName, RunTrace, TimeSpent};
 use std::hash::Hasher;
 use std::path::Path;
 use std::time::Instant;
@@ -62,9 +56,10 @@ pub fn iterate_study(
     let begin = Instant::now();
     let section = study.iteration.clone().unwrap_or_default();
     let simulation = study.simulation.clone().unwrap_or_default();
-    let settings = section.settings(study).map_err(|why| Error::study(study_path, why))?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let machine = StudyRobot::new(study, study_path, &folders)?;
+    let identification = study.settings(study_path, &machine)?;
+    let settings = section.settings(study, identification).map_err(|why| Error::study(study_path, why))?;
     let truth = match section.robot {
         RobotChoice::Simulation => Some(simulation.truth(&machine).map_err(|why| wrong("simulation", &why))?),
         _ => None,
@@ -126,7 +121,13 @@ pub fn iterate_study(
         let outcome = iterate(&iteration, &mut robots, Some(&stores[number]), &mut |record, runs| {
             so_far.push(record.clone());
             let status = IterationStatus::Waiting { reason: "for the next run".to_owned() };
-            let now = told.file(&Stage { leg, records: &so_far, status: &status, known_std: &known_std });
+            let now = told.file(&Stage {
+                leg,
+                robot: &iteration.robot(&so_far),
+                records: &so_far,
+                status: &status,
+                known_std: &known_std,
+            });
             let all: Vec<IterationsFile> = files.iter().cloned().chain([now]).collect();
             unwritten = joined(all).and_then(|file| write_file(&target, &file).err());
             run(record, runs);
@@ -137,7 +138,8 @@ pub fn iterate_study(
         }
         made += outcome.runs.len() - runs_before;
         let (records, status) = (&outcome.runs[..], &outcome.status);
-        files.push(told.file(&Stage { leg, records, status, known_std: &known_std }));
+        let robot = &iteration.robot(records);
+        files.push(told.file(&Stage { leg, robot, records, status, known_std: &known_std }));
         for record in records {
             for (place, own) in iteration.task().legs.iter().enumerate() {
                 let name = RunName { run: record.run, leg: leg.or((members.len() > 1).then_some(place + 1)), place };
@@ -149,7 +151,8 @@ pub fn iterate_study(
             break;
         }
         let Some(last) = last else { break };
-        for column in (0..known_std.len()).filter(|column| !last.fixed.contains(column)) {
+        let told = known_std.len().min(last.values.len());
+        for column in (0..told).filter(|column| !last.fixed.contains(column)) {
             if known_std[column].is_none() {
                 known_std[column] = Some(last.std[column]);
                 known.push((column, last.values[column]));
@@ -160,7 +163,7 @@ pub fn iterate_study(
     file.converged &= file.runs.last().is_some_and(|run| run.leg.is_none_or(|leg| leg == stages.len()));
     write_file(&target, &file)?;
     let time = TimeSpent { before_runs_s, all_s: begin.elapsed().as_secs_f64(), runs: made };
-    write_whole(&out.join("report.html"), report::iteration_report(&file, &traces, &time)?.as_bytes())?;
+    write_whole(&out.join("report.html"), iteration_report(&file, &traces, &time)?.as_bytes())?;
     Ok(file)
 }
 

@@ -1,12 +1,10 @@
 //! What a search and the check of a given motion start with: robot, limits, noise, prior and criterion of a study.
 
 use super::outcome::Stopwatch;
-use super::section::{CriterionChoice, DesignSection, TorqueNoise};
-use super::table;
+use super::{prior, table};
 use crate::error::Error;
 use crate::jobs::options::{RunOptions, study_name};
-use crate::study::StudyRobot;
-use crate::study::{CoulombChoice, Folders, Study};
+use crate::study::{CoulombChoice, CriterionChoice, DesignSection, Folders, Study, StudyRobot, TorqueNoise};
 use dynident_excitation::criteria::{Criterion, DOptimal, Prediction};
 use dynident_excitation::limits::{LimitSet, Limits};
 use dynident_excitation::{Family, Information, Motion};
@@ -64,7 +62,7 @@ impl DesignSetup {
         let limits = Limits::from_model(machine.model()).overlaid(&section.limits);
         let set = LimitSet::new(&limits, machine.model()).map_err(|why| wrong("design.limits", &why))?;
         let torque_std_nm = torque_std(&section, &machine, &mut notes).map_err(|why| wrong("design", &why))?;
-        let prior = section.prior.information(&machine, study_path, &folders, &mut notes)?;
+        let prior = prior::information(&section.prior, &machine, study_path, &folders, &mut notes)?;
         let criteria = match &section.criterion {
             CriterionChoice::Prediction { trajectory } => {
                 let path = folders.find(trajectory, None)?;

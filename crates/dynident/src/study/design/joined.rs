@@ -1,6 +1,6 @@
 //! `family = { kind = "joined", .. }`: families one after another within the duration.
 
-use super::section::FamilyChoice;
+use super::FamilyChoice;
 use dynident_excitation::families::{FamilyError, Joined, JoinedSettings};
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,8 @@
 //! The search for the motion that a study asks for.
 
 use super::setup::DesignSetup;
-use super::windows::WindowedFile;
 use crate::error::Error;
+use crate::result::WindowedFile;
 use core::ops::ControlFlow;
 use dynident_excitation::criteria::Criterion;
 use dynident_excitation::families::StartingAt;

@@ -1,15 +1,13 @@
 //! Logs to a model: the main job.
 
+mod sections;
+mod urdf;
+
 use crate::error::Error;
+use crate::jobs::log_summary::{held_out_summary, training_summary};
 use crate::jobs::options::{RunOptions, study_name};
-use crate::result::identification::{LogSummary, PhysicalVerdict, RESULT_SCHEMA, ResultFile, Timings};
-use crate::result::log_summary::{held_out_summary, training_summary};
-use crate::result::sections::{
-    base_parameters, bodies, friction_results, joint_results, law_results, method_summary, offset_results,
-    physical_fit_result, robot_summary, training_result, verdict,
-};
 use crate::result::stored::StoredModel;
-use crate::result::urdf::written_urdf;
+use crate::result::{LogSummary, PhysicalVerdict, RESULT_SCHEMA, ResultFile, Timings, TrainingResult};
 use crate::study::{ArmSection, EstimatorMethod, Folders, Study, StudyRobot};
 use dynident_estimation::{Estimate, strongest_correlations};
 use dynident_identification::estimators::{Findings, InstrumentSource};
@@ -19,8 +17,13 @@ use dynident_identification::{
     identify_with_instruments as identify_task_with_instruments,
 };
 use dynident_model::InertialParameters;
+use sections::{
+    base_parameters, bodies, friction_results, joint_results, law_results, method_summary, offset_results,
+    physical_fit_result, robot_summary, training_result, verdict,
+};
 use std::path::Path;
 use std::time::Instant;
+use urdf::written_urdf;
 
 /// Correlations that a result tells.
 const CORRELATIONS: usize = 10;
@@ -46,7 +49,7 @@ impl IdentificationOutcome {
     /// # Errors
     /// [`Error::Report`], which would be a defect of this program.
     pub fn report(&self) -> Result<String, Error> {
-        crate::pages::identification::identification_report(self)
+        crate::pages::identification::identification_report(&self.result, &self.traces)
     }
 }
 
@@ -152,7 +155,7 @@ fn physical_verdict(
         .to_owned();
     }
     verdict.failure.clone_from(&consistent.failure);
-    verdict.sign = consistent.sign;
+    verdict.sign = found.examination.sign;
     verdict.impossible_priors = consistent
         .inconsistent_nominal
         .iter()
@@ -188,7 +191,7 @@ struct Parts<'a> {
     verdict: PhysicalVerdict,
     no_urdf: Option<String>,
     inertials: &'a [InertialParameters],
-    training: crate::result::identification::TrainingResult,
+    training: TrainingResult,
 }
 
 fn result_file(
@@ -252,7 +255,7 @@ fn log_summaries(task: &IdentificationTask, found: &Identification) -> Vec<LogSu
     let pairs = found.training.logs.iter().zip(&found.examination.delays);
     let training = pairs.map(|(factors, delays)| {
         let mut summary = training_summary(&task.recordings[factors.index], factors, delays, &joints);
-        summary.model_findings.extend(found.consistent.sign.as_ref().and_then(sign_findings));
+        summary.model_findings.extend(found.examination.sign.as_ref().and_then(sign_findings));
         summary
     });
     let held_out = found.held_out.iter().map(|log| held_out_summary(&task.recordings[log.index], log, &joints));

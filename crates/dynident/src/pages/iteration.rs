@@ -1,7 +1,7 @@
 //! `report.html` of an iteration.
 
-use super::file::{IterationParameter, IterationRun, IterationsFile};
 use crate::error::Error;
+use crate::result::{IterationParameter, IterationRun, IterationsFile};
 use dynident_iteration::IterationStore;
 use dynident_iteration::robot::read_log_table;
 use dynident_report::{
@@ -17,27 +17,27 @@ const CURVES: usize = 6;
 
 /// Which trajectory of which run.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) struct RunName {
+pub(crate) struct RunName {
     /// The run's number.
-    pub(super) run: usize,
+    pub(crate) run: usize,
     /// The leg's number, where there are several.
-    pub(super) leg: Option<usize>,
+    pub(crate) leg: Option<usize>,
     /// Place of the leg within the run, from 0.
-    pub(super) place: usize,
+    pub(crate) place: usize,
 }
 
 /// How far a run was from its trajectory.
-pub(super) struct RunTrace {
+pub(crate) struct RunTrace {
     name: RunName,
     /// Times of the trajectory, s.
-    pub(super) times_s: Vec<f64>,
+    pub(crate) times_s: Vec<f64>,
     /// For each joint the desired less the measured position at these times; NaN where the run had ended.
-    pub(super) error: Vec<Vec<f64>>,
+    pub(crate) error: Vec<Vec<f64>>,
 }
 
 impl RunTrace {
     /// From the log that was kept of the run. A log that cannot be read draws nothing: the page is to be written all the same.
-    pub(super) fn new(name: RunName, store: &IterationStore, reference: &Reference, joints: &[String]) -> Self {
+    pub(crate) fn new(name: RunName, store: &IterationStore, reference: &Reference, joints: &[String]) -> Self {
         let log = if name.place == 0 { "log.csv".to_owned() } else { format!("log_{}.csv", name.place + 1) };
         let (motion, rate_hz) = (reference.motion(), reference.rate_hz());
         let times_s: Vec<f64> = (0..motion.samples).map(|sample| sample as f64 / rate_hz).collect();
@@ -68,17 +68,17 @@ fn between(times_s: &[f64], values: &[f64], time_s: f64) -> f64 {
 }
 
 /// What the computation took.
-pub(super) struct TimeSpent {
+pub(crate) struct TimeSpent {
     /// Until the first run: robot, base parameters, the trajectory's design; s.
-    pub(super) before_runs_s: f64,
+    pub(crate) before_runs_s: f64,
     /// Everything but this page, s.
-    pub(super) all_s: f64,
+    pub(crate) all_s: f64,
     /// Runs that were made; others were there already.
-    pub(super) runs: usize,
+    pub(crate) runs: usize,
 }
 
 /// The whole page.
-pub(super) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time: &TimeSpent) -> Result<String, Error> {
+pub(crate) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time: &TimeSpent) -> Result<String, Error> {
     let mut page = Report::new(&file.name).subtitle(format!("{} joints; {}", file.joints.len(), file.reason));
     page.add(figures(file));
     page.add(Heading::new("Runs"));

@@ -6,7 +6,7 @@ use dynident_model::laws::JointProperty;
 use dynident_model::{DescriptionFormat, InertialParameters, JointChange, LinkChange, link_changes, rewrite_urdf};
 
 /// The user's URDF with the new values; joints that were locked keep theirs. Otherwise the reason why there is none.
-pub(crate) fn written_urdf(
+pub(super) fn written_urdf(
     robot: &StudyRobot,
     model: &ParametricModel,
     inertials: &[InertialParameters],

@@ -1,6 +1,6 @@
 //! From an estimate to the sections of `result.json`.
 
-use super::identification::{
+use crate::result::{
     BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LawResult, LogOffset, MethodSummary,
     PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RobotSummary, TrainingJoint, TrainingResult,
 };
@@ -13,7 +13,7 @@ use dynident_identification::{Identification, Recording, RegressorModel};
 use dynident_model::laws::Law;
 use dynident_model::{INERTIAL_NAMES, InertialParameters};
 
-pub(crate) fn robot_summary(robot: &StudyRobot) -> RobotSummary {
+pub(super) fn robot_summary(robot: &StudyRobot) -> RobotSummary {
     RobotSummary {
         name: robot.model().name().to_owned(),
         file: robot.robot.path.display().to_string(),
@@ -24,7 +24,7 @@ pub(crate) fn robot_summary(robot: &StudyRobot) -> RobotSummary {
     }
 }
 
-pub(crate) fn method_summary(identification: &Identification, estimator: &str) -> MethodSummary {
+pub(super) fn method_summary(identification: &Identification, estimator: &str) -> MethodSummary {
     let (model, estimate, motion) = (identification.model(), identification.estimate(), &identification.motion);
     let (weakest, strongest) = model.base().gap();
     MethodSummary {
@@ -53,7 +53,7 @@ pub(crate) fn method_summary(identification: &Identification, estimator: &str) -
     }
 }
 
-pub(crate) fn base_parameters(
+pub(super) fn base_parameters(
     model: &RegressorModel,
     estimate: &Estimate,
     physical: Option<&[f64]>,
@@ -77,7 +77,7 @@ pub(crate) fn base_parameters(
         .collect()
 }
 
-pub(crate) fn bodies(model: &RegressorModel, inertials: &[InertialParameters]) -> Vec<BodyResult> {
+pub(super) fn bodies(model: &RegressorModel, inertials: &[InertialParameters]) -> Vec<BodyResult> {
     model
         .model()
         .bodies()
@@ -96,7 +96,7 @@ pub(crate) fn bodies(model: &RegressorModel, inertials: &[InertialParameters]) -
         .collect()
 }
 
-pub(crate) fn law_results(
+pub(super) fn law_results(
     model: &RegressorModel,
     estimate: &Estimate,
     parameters: &[f64],
@@ -126,7 +126,7 @@ pub(crate) fn law_results(
 }
 
 /// Deviations of single logs' offsets from their mean; the last log's is what the others leave.
-pub(crate) fn offset_results(identification: &Identification, recordings: &[Recording]) -> Vec<LogOffset> {
+pub(super) fn offset_results(identification: &Identification, recordings: &[Recording]) -> Vec<LogOffset> {
     let (model, columns, estimate) =
         (identification.model(), &identification.training.columns, identification.estimate());
     let training: Vec<usize> = identification.training.logs.iter().map(|log| log.index).collect();
@@ -154,7 +154,7 @@ pub(crate) fn offset_results(identification: &Identification, recordings: &[Reco
     offsets
 }
 
-pub(crate) fn joint_results(
+pub(super) fn joint_results(
     model: &RegressorModel,
     estimate: &Estimate,
     parameters: &[f64],
@@ -175,7 +175,7 @@ pub(crate) fn joint_results(
         .collect()
 }
 
-pub(crate) fn training_result(
+pub(super) fn training_result(
     identification: &Identification,
     recordings: &[Recording],
 ) -> Result<TrainingResult, dynident_estimation::EstimationError> {
@@ -208,7 +208,7 @@ pub(crate) fn training_result(
     })
 }
 
-pub(crate) fn verdict(model: &RegressorModel, inertials: &[InertialParameters], parameters: &[f64]) -> PhysicalVerdict {
+pub(super) fn verdict(model: &RegressorModel, inertials: &[InertialParameters], parameters: &[f64]) -> PhysicalVerdict {
     let mut violations = Vec::new();
     for (body, inertial) in model.model().bodies().iter().zip(inertials) {
         let least = inertial.pseudo_inertia().symmetric_eigenvalues().min();
@@ -237,7 +237,7 @@ pub(crate) fn verdict(model: &RegressorModel, inertials: &[InertialParameters], 
 }
 
 /// The section of `result.json` about the fit.
-pub(crate) fn physical_fit_result(fit: &PhysicalFit, estimate: &Estimate) -> PhysicalFitResult {
+pub(super) fn physical_fit_result(fit: &PhysicalFit, estimate: &Estimate) -> PhysicalFitResult {
     PhysicalFitResult {
         status: match fit.status {
             PhysicalStatus::Solved => "solved",
@@ -266,7 +266,7 @@ pub(crate) fn physical_fit_result(fit: &PhysicalFit, estimate: &Estimate) -> Phy
     }
 }
 
-pub(crate) fn friction_results(choice: &[JointFriction]) -> Vec<JointFrictionResult> {
+pub(super) fn friction_results(choice: &[JointFriction]) -> Vec<JointFrictionResult> {
     let of_joint = |joint: &JointFriction| JointFrictionResult {
         joint: joint.joint.clone(),
         chosen: joint.chosen.clone(),

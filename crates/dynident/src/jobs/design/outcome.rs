@@ -1,14 +1,14 @@
 //! All that is known of a motion in the end.
 
-use super::file::{DESIGN_SCHEMA, DesignFile};
 use super::forecast::named_forecast;
 use super::limit_check::LimitCheck;
 use super::search::SearchResult;
-use super::section::FamilyChoice;
 use super::setup::{DesignSetup, MotionInformation};
-use super::windows::WindowedFile;
 use crate::cpu_time::cpu_seconds;
-use crate::study::StudyRobot;
+use crate::error::Error;
+use crate::pages::design as pictures;
+use crate::result::{DESIGN_SCHEMA, DesignFile, WindowedFile};
+use crate::study::{FamilyChoice, StudyRobot};
 use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_excitation::criteria::{ConditionNumber, Criterion, DOptimal};
 use dynident_excitation::families::Given;
@@ -17,6 +17,9 @@ use dynident_excitation::optimisers::Generation;
 use dynident_excitation::{Family, Motion};
 use nalgebra::DMatrix;
 use std::time::Instant;
+
+/// Rate of the pictures, Hz.
+const PICTURES_HZ: f64 = 100.0;
 
 /// What a job has cost so far.
 pub(super) struct Stopwatch {
@@ -201,5 +204,32 @@ impl DesignOutcome {
             }
         }
         Some(torque)
+    }
+
+    /// `preview.svg`: position, velocity, acceleration and, where the inertials are known, torque of every joint over
+    /// time, limits dashed.
+    ///
+    /// # Errors
+    /// A motion that cannot be drawn.
+    pub fn preview_svg(&self) -> Result<String, Error> {
+        let (times_s, motion) = self.sampled(PICTURES_HZ);
+        pictures::preview(&self.file, &self.limits, (&times_s, &motion), self.torque_nm(&motion).as_deref())
+    }
+
+    /// `path.svg`: the tool's path and some poses of the arm in the base frame, from above and from the side, with
+    /// floor, column and boxes. The tool is the frame farthest out on every last body.
+    ///
+    /// # Errors
+    /// A motion that cannot be drawn.
+    pub fn path_svg(&self) -> Result<String, Error> {
+        pictures::path(&self.file, &self.limits, self.machine.model(), &self.sampled(PICTURES_HZ).1)
+    }
+
+    /// `fitness.svg`: best and mean fitness by generation (the paper's Fig. 7); none for a search without generations.
+    ///
+    /// # Errors
+    /// A curve that cannot be drawn.
+    pub fn fitness_svg(&self) -> Result<Option<String>, Error> {
+        pictures::fitness(&self.file, &self.history)
     }
 }

@@ -1,6 +1,6 @@
 //! What is said of a log in a result.
 
-use super::identification::LogSummary;
+use crate::result::LogSummary;
 use dynident_identification::examination::{
     HeldOutExamination, PriorAgreement, TorqueLag, agreement_findings, delay_findings,
 };
@@ -8,7 +8,7 @@ use dynident_identification::rows::LogStatistics;
 use dynident_identification::{LogFactors, Recording};
 
 /// A log that was fitted to.
-pub(crate) fn training_summary(
+pub(super) fn training_summary(
     recording: &Recording,
     factors: &LogFactors,
     delays: &[Option<TorqueLag>],
@@ -18,7 +18,7 @@ pub(crate) fn training_summary(
 }
 
 /// A log that was tested on.
-pub(crate) fn held_out_summary(
+pub(super) fn held_out_summary(
     recording: &Recording,
     examination: &HeldOutExamination,
     joints: &[String],

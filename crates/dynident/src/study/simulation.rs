@@ -1,6 +1,6 @@
 //! `[simulation]`: the robot that is simulated, where it differs from its description, its sensors and limits.
 
-use crate::study::StudyRobot;
+use super::StudyRobot;
 use dynident_iteration::SimulatedRobot;
 use dynident_model::laws::{JointProperty, Law, TermAction};
 use dynident_model::sample::Random;
@@ -18,7 +18,7 @@ const SHAPE_SHARE: f64 = 1.0 / 3.0;
 /// `[simulation]`, all of it optional: a robot as described, without friction, with perfect sensors.
 ///
 /// ```
-/// let section: dynident::SimulationSection = toml::from_str(
+/// let section: dynident::study::SimulationSection = toml::from_str(
 ///     "off_percent = 30.0\nviscous = 5.0\ncoulomb = [8.0, 8.0]\nsensors = { position_std = 1.7e-5, torque_std = 0.05 }",
 /// )?;
 /// assert!(section.validate(2).is_ok() && section.validate(3).is_err());

@@ -1,20 +1,16 @@
 //! The paper's criterion over windows as a study asks for it, solved by any optimiser, with the optimum beside it.
 
-use super::optimiser::OptimiserChoice;
 use super::search::SearchResult;
-use super::section::{DesignSection, FamilyChoice};
-use crate::study::StudyRobot;
+use crate::result::{StrokeFile, StrokeLimitFile, WindowedFile};
+use crate::study::{DesignSection, FamilyChoice, GivenStroke, OptimiserChoice, StudyRobot, WindowedCondition};
 use core::ops::ControlFlow;
 use dynident_excitation::families::{SplicedLogisticSettings, Step, StepWiseLogistic};
 use dynident_excitation::limits::Limits;
 use dynident_excitation::optimisers::{
     BinaryGeneticSettings, CmaEsSettings, Generation, Progress, binary_genetic, cma_es,
 };
-use dynident_excitation::step_wise::{
-    StepWiseJoint, StepWiseProblem, Stroke, StrokeConstants, StrokeQuantity, gravity_across,
-};
+use dynident_excitation::step_wise::{StepWiseJoint, StepWiseProblem, Stroke, StrokeConstants, gravity_across};
 use dynident_excitation::{DesignProgress, Family};
-use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// Random starts of the gradient optimiser for each joint.
@@ -22,157 +18,6 @@ const STARTS: usize = 4;
 
 /// A joint without position limits: more than any range of amplitudes.
 const FREE_RAD: f64 = 1e6;
-
-/// Which joints move while others rest.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum WindowedProblem {
-    /// One joint after another makes its stroke, from the tip to the base, while all others rest at their offsets: the
-    /// paper's Q for the tip joint, then M for the base joint.
-    #[default]
-    StepWise,
-}
-
-/// The sum of condition numbers over windows around the mid-points of the strokes (the paper's equation 19 and Fig. 6).
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct WindowedCondition {
-    /// Which joints move while others rest; `"step-wise"` is the one there is.
-    pub problem: WindowedProblem,
-    /// The joints that take part, in the order in which they move. Default: all, from the tip to the base.
-    pub joints: Option<Vec<String>>,
-    /// ε: what a broken limit adds to the fitness. Default 1000.
-    pub penalty: f64,
-    /// Bound of speed and acceleration at rest (equation 17), rad/s and rad/s². Default 1e-4.
-    pub rest_limit: f64,
-    /// Range of A, rad. Default 0.1 to π.
-    pub amplitude_range: [f64; 2],
-    /// Range of ω, 1/s. Default 0.1 to 3.
-    pub steepness_range: [f64; 2],
-    /// Range of δ, s. Default 0.1 to 10.
-    pub window_range: [f64; 2],
-}
-
-impl Default for WindowedCondition {
-    fn default() -> Self {
-        Self {
-            problem: WindowedProblem::StepWise,
-            joints: None,
-            penalty: 1000.0,
-            rest_limit: 1e-4,
-            amplitude_range: [0.1, core::f64::consts::PI],
-            steepness_range: [0.1, 3.0],
-            window_range: [0.1, 10.0],
-        }
-    }
-}
-
-/// A stroke that the study gives, so that nothing is searched.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct GivenStroke {
-    /// The joint.
-    pub joint: String,
-    /// A, rad.
-    pub amplitude_rad: f64,
-    /// ω, 1/s.
-    pub steepness_per_s: f64,
-    /// δ, s.
-    pub window_s: f64,
-}
-
-/// What `design.json` holds of a windowed design under `windowed`.
-#[derive(Clone, Debug, Serialize)]
-pub struct WindowedFile {
-    /// Which joints move while others rest.
-    pub problem: WindowedProblem,
-    /// `gradient`, `cma-es`, `genetic`, or `given` where the study gives the strokes.
-    pub optimiser: &'static str,
-    /// H of equation 19: the sum of the condition numbers, with the penalty where a limit is broken.
-    pub fitness: f64,
-    /// The sum of the condition numbers alone.
-    pub condition_sum: f64,
-    /// H of the best strokes inside the limits, by exact gradients; none if nothing inside the limits was found.
-    pub optimum: Option<f64>,
-    /// How far `condition_sum` is above it, percent (below zero only for strokes that break limits).
-    pub above_optimum_percent: Option<f64>,
-    /// The strokes, in the order in which the joints move.
-    pub strokes: Vec<StrokeFile>,
-    /// The strokes of the optimum.
-    pub optimum_strokes: Vec<StrokeFile>,
-}
-
-/// One joint's stroke.
-#[derive(Clone, Debug, Serialize)]
-pub struct StrokeFile {
-    /// The joint.
-    pub joint: String,
-    /// A, rad.
-    pub amplitude_rad: f64,
-    /// ω, 1/s.
-    pub steepness_per_s: f64,
-    /// h, rad.
-    pub offset_rad: f64,
-    /// T, s.
-    pub period_s: f64,
-    /// δ, s.
-    pub window_s: f64,
-    /// Condition number of the window.
-    pub condition_number: f64,
-    /// What the stroke makes of each limit, on the whole stroke and not only at samples.
-    pub limits: Vec<StrokeLimitFile>,
-}
-
-/// One limit of a stroke.
-#[derive(Clone, Debug, Serialize)]
-pub struct StrokeLimitFile {
-    /// What is bounded.
-    pub quantity: StrokeQuantity,
-    /// Its peak; positions count from the offset. rad and s.
-    pub value: f64,
-    /// What it must stay below.
-    pub limit: f64,
-    /// By how much it is exceeded, percent of the limit; negative inside.
-    pub excess_percent: f64,
-    /// Whether it is kept.
-    pub kept: bool,
-}
-
-impl WindowedFile {
-    /// Whether every stroke keeps its limits.
-    pub fn kept(&self) -> bool {
-        self.strokes.iter().flat_map(|stroke| &stroke.limits).all(|limit| limit.kept)
-    }
-
-    /// Every broken limit in a sentence.
-    pub(crate) fn sentences(&self) -> Vec<String> {
-        let mut sentences = Vec::new();
-        for stroke in &self.strokes {
-            for limit in stroke.limits.iter().filter(|limit| !limit.kept) {
-                let what = match limit.quantity {
-                    StrokeQuantity::Position => "reach (rad)",
-                    StrokeQuantity::Speed => "peak speed (rad/s)",
-                    StrokeQuantity::Acceleration => "peak acceleration (rad/s\u{b2})",
-                    StrokeQuantity::RestSpeed => "speed at rest (rad/s)",
-                    StrokeQuantity::RestAcceleration => "acceleration at rest (rad/s\u{b2})",
-                };
-                sentences.push(format!(
-                    "The stroke of `{}`, {what}: {} where less than {} is allowed, {:.0} % too much.",
-                    stroke.joint,
-                    digits(limit.value),
-                    digits(limit.limit),
-                    limit.excess_percent
-                ));
-            }
-        }
-        sentences
-    }
-}
-
-/// Four decimals, or as many digits of a small number.
-fn digits(value: f64) -> String {
-    if value < 1e-2 { format!("{value:.3e}") } else { format!("{value:.4}") }
-}
 
 /// Solves the step-wise problem of a study.
 pub(crate) fn step_wise(

@@ -2,36 +2,23 @@
 //! forecast.
 
 mod check;
-mod file;
 mod forecast;
-mod joined;
 mod limit_check;
-mod name_or_table;
-mod optimiser;
 mod outcome;
-mod pictures;
 mod prior;
 mod search;
-mod section;
 mod setup;
-mod start_posture;
+mod step_wise;
 mod table;
-mod windows;
 
 pub use check::{check_log, check_trajectory};
-pub use file::{DESIGN_SCHEMA, DesignFile, DirectionForecast, ParameterForecast};
-pub use joined::JoinedChoice;
-pub use optimiser::OptimiserChoice;
 pub use outcome::DesignOutcome;
-pub use prior::PriorSection;
-pub use section::{CriterionChoice, DesignSection, FamilyChoice, TorqueNoise};
-pub use start_posture::StartPosture;
-pub(crate) use table::trajectory as trajectory_table;
-pub use windows::{GivenStroke, StrokeFile, StrokeLimitFile, WindowedCondition, WindowedFile, WindowedProblem};
+pub(super) use table::trajectory as trajectory_table;
 
 use crate::error::Error;
 use crate::jobs::options::RunOptions;
-use crate::study::Study;
+use crate::result::WindowedFile;
+use crate::study::{CriterionChoice, Study};
 use core::ops::ControlFlow;
 use dynident_excitation::check::CHECK_RATE_HZ;
 use dynident_excitation::{DesignProgress, Motion, grid};
@@ -40,7 +27,7 @@ use outcome::{MotionOrigin, MotionReview};
 use search::search;
 use setup::DesignSetup;
 use std::path::Path;
-use windows::step_wise;
+use step_wise::step_wise;
 
 /// Designs the motion that a study's `[design]` asks for (its defaults where the section is absent). `watch` hears how
 /// far the search is and may end it: the best so far is the result.

@@ -1,6 +1,6 @@
 //! The forecast under the parameters' names.
 
-use super::file::{DirectionForecast, ParameterForecast};
+use crate::result::{DirectionForecast, ParameterForecast};
 use crate::study::StudyRobot;
 use dynident_excitation::forecast;
 use nalgebra::DMatrix;

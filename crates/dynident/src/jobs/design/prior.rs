@@ -1,13 +1,12 @@
-//! `[design.prior]`: what is known before the motion, so that the next one looks for what is not.
+//! The information that `[design.prior]` stands for.
 
 use crate::error::Error;
-use crate::result::identification::{BaseParameterResult, RESULT_SCHEMA};
-use crate::study::Folders;
-use crate::study::StudyRobot;
+use crate::result::{BaseParameterResult, RESULT_SCHEMA};
+use crate::study::{Folders, PriorSection, StudyRobot};
 use dynident_dynamics::Column;
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use serde::Deserialize;
+use std::path::Path;
 
 /// A value below this share of the largest of its kind in its body is known no better than one of this size.
 const FLOOR: f64 = 0.1;
@@ -16,69 +15,39 @@ const FLOOR: f64 = 0.1;
 /// measurement.
 const UNKNOWN: f64 = 1e3;
 
-/// `[design.prior]`. What several sources say adds up.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct PriorSection {
-    /// `result.json` of an earlier identification of the same machine: its covariance says how well each base parameter
-    /// is known. Found as the study's logs are.
-    pub result: Option<PathBuf>,
-    /// The description's own inertial parameters, good to so many percent each (one standard deviation, independent of
-    /// each other). A parameter that is smaller than a tenth of the largest of its kind (first moments, moments of
-    /// inertia) in its body counts as if it were of that tenth; of a kind that the body has nothing of, the largest of
-    /// the robot counts. Friction is taken from the description where it says something, else it is unknown.
-    pub cad_std_percent: Option<f64>,
-}
-
-impl PriorSection {
-    /// Whether it says anything.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.result.is_none() && self.cad_std_percent.is_none()
+/// The information about the machine's base parameters, inverse covariance, and a sentence on each source. None if
+/// nothing is said.
+pub(super) fn information(
+    section: &PriorSection,
+    machine: &StudyRobot,
+    study_path: &Path,
+    folders: &Folders,
+    notes: &mut Vec<String>,
+) -> Result<Option<DMatrix<f64>>, Error> {
+    let mut total: Option<DMatrix<f64>> = None;
+    let mut add = |information: DMatrix<f64>| {
+        total = Some(total.take().map_or_else(|| information.clone(), |sum| sum + &information));
+    };
+    if let Some(result) = &section.result {
+        let path = folders.find(result, None)?;
+        add(of_result(&path, machine)?);
+        notes.push(format!("prior: the covariance of {}", result.display()));
     }
-
-    pub(crate) fn validate(&self) -> Result<(), String> {
-        match self.cad_std_percent {
-            Some(percent) if !(1e-3..=1e6).contains(&percent) => {
-                Err(format!("prior.cad_std_percent = {percent}: give 0.001 to 1000000"))
-            }
-            _ => Ok(()),
+    if let Some(percent) = section.cad_std_percent {
+        let unknown = machine.model().bodies_without_prior();
+        if !unknown.is_empty() {
+            let message = format!(
+                "[design.prior]: cad_std_percent, but the inertial parameters of {} are unknown: give them in the description, or leave cad_std_percent out",
+                unknown.join(", ")
+            );
+            return Err(Error::study(study_path, message));
         }
+        let covariance = cad_covariance(machine, percent / 100.0);
+        add(inverse(&covariance)
+            .ok_or_else(|| Error::study(study_path, "[design.prior]: cad_std_percent is too small".to_owned()))?);
+        notes.push(format!("prior: the description's inertial parameters, good to {percent} % each"));
     }
-
-    /// The information about the machine's base parameters, inverse covariance, and a sentence on each source. None if
-    /// nothing is said.
-    pub(crate) fn information(
-        &self,
-        machine: &StudyRobot,
-        study_path: &Path,
-        folders: &Folders,
-        notes: &mut Vec<String>,
-    ) -> Result<Option<DMatrix<f64>>, Error> {
-        let mut total: Option<DMatrix<f64>> = None;
-        let mut add = |information: DMatrix<f64>| {
-            total = Some(total.take().map_or_else(|| information.clone(), |sum| sum + &information));
-        };
-        if let Some(result) = &self.result {
-            let path = folders.find(result, None)?;
-            add(of_result(&path, machine)?);
-            notes.push(format!("prior: the covariance of {}", result.display()));
-        }
-        if let Some(percent) = self.cad_std_percent {
-            let unknown = machine.model().bodies_without_prior();
-            if !unknown.is_empty() {
-                let message = format!(
-                    "[design.prior]: cad_std_percent, but the inertial parameters of {} are unknown: give them in the description, or leave cad_std_percent out",
-                    unknown.join(", ")
-                );
-                return Err(Error::study(study_path, message));
-            }
-            let covariance = cad_covariance(machine, percent / 100.0);
-            add(inverse(&covariance)
-                .ok_or_else(|| Error::study(study_path, "[design.prior]: cad_std_percent is too small".to_owned()))?);
-            notes.push(format!("prior: the description's inertial parameters, good to {percent} % each"));
-        }
-        Ok(total)
-    }
+    Ok(total)
 }
 
 /// `K diag(σ²) Kᵀ` of the base parameters: the independent ones with their own variance, and what is regrouped into

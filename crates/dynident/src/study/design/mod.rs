@@ -1,11 +1,18 @@
 //! `[design]`: which motion is looked for, by what measure, within which limits.
 
-use super::joined::JoinedChoice;
-use super::name_or_table::name_or_table;
-use super::optimiser::OptimiserChoice;
-use super::prior::PriorSection;
-use super::start_posture::StartPosture;
-use super::windows::{GivenStroke, WindowedCondition};
+mod joined;
+mod name_or_table;
+mod optimiser;
+mod prior;
+mod start_posture;
+mod windows;
+
+pub use joined::JoinedChoice;
+pub use optimiser::OptimiserChoice;
+pub use prior::PriorSection;
+pub use start_posture::StartPosture;
+pub use windows::{GivenStroke, WindowedCondition, WindowedProblem};
+
 use dynident_excitation::criteria::{AOptimal, ConditionNumber, Criterion, DOptimal, EOptimal};
 use dynident_excitation::families::{
     BSpline, BSplineSettings, FamilyError, Fourier, FourierSettings, FrictionLadder, FrictionLadderSettings,
@@ -14,6 +21,7 @@ use dynident_excitation::families::{
 };
 use dynident_excitation::limits::Limits;
 use dynident_excitation::{DesignSettings, Family};
+use name_or_table::name_or_table;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -29,7 +37,7 @@ const MAX_COUNT: usize = 1_000_000;
 /// `[design]`, all of it optional.
 ///
 /// ```
-/// let section: dynident::DesignSection = toml::from_str(
+/// let section: dynident::study::DesignSection = toml::from_str(
 ///     r#"
 ///     family = { kind = "fourier", harmonics = 7 }
 ///     duration_s = 20.0

@@ -1,8 +1,8 @@
 //! What `design.json` holds.
 
-use super::section::FamilyChoice;
-use super::windows::WindowedFile;
+use crate::study::{FamilyChoice, WindowedProblem};
 use dynident_excitation::check::LimitReport;
+use dynident_excitation::step_wise::StrokeQuantity;
 use serde::Serialize;
 
 /// Name and version of the schema of [`DesignFile`].
@@ -105,4 +105,97 @@ pub struct DirectionForecast {
     pub inflation: f64,
     /// Symbols of the columns that make it, the largest share first, and their shares.
     pub terms: Vec<(String, f64)>,
+}
+
+/// What `design.json` holds of a windowed design under `windowed`.
+#[derive(Clone, Debug, Serialize)]
+pub struct WindowedFile {
+    /// Which joints move while others rest.
+    pub problem: WindowedProblem,
+    /// `gradient`, `cma-es`, `genetic`, or `given` where the study gives the strokes.
+    pub optimiser: &'static str,
+    /// H of equation 19: the sum of the condition numbers, with the penalty where a limit is broken.
+    pub fitness: f64,
+    /// The sum of the condition numbers alone.
+    pub condition_sum: f64,
+    /// H of the best strokes inside the limits, by exact gradients; none if nothing inside the limits was found.
+    pub optimum: Option<f64>,
+    /// How far `condition_sum` is above it, percent (below zero only for strokes that break limits).
+    pub above_optimum_percent: Option<f64>,
+    /// The strokes, in the order in which the joints move.
+    pub strokes: Vec<StrokeFile>,
+    /// The strokes of the optimum.
+    pub optimum_strokes: Vec<StrokeFile>,
+}
+
+/// One joint's stroke.
+#[derive(Clone, Debug, Serialize)]
+pub struct StrokeFile {
+    /// The joint.
+    pub joint: String,
+    /// A, rad.
+    pub amplitude_rad: f64,
+    /// ω, 1/s.
+    pub steepness_per_s: f64,
+    /// h, rad.
+    pub offset_rad: f64,
+    /// T, s.
+    pub period_s: f64,
+    /// δ, s.
+    pub window_s: f64,
+    /// Condition number of the window.
+    pub condition_number: f64,
+    /// What the stroke makes of each limit, on the whole stroke and not only at samples.
+    pub limits: Vec<StrokeLimitFile>,
+}
+
+/// One limit of a stroke.
+#[derive(Clone, Debug, Serialize)]
+pub struct StrokeLimitFile {
+    /// What is bounded.
+    pub quantity: StrokeQuantity,
+    /// Its peak; positions count from the offset. rad and s.
+    pub value: f64,
+    /// What it must stay below.
+    pub limit: f64,
+    /// By how much it is exceeded, percent of the limit; negative inside.
+    pub excess_percent: f64,
+    /// Whether it is kept.
+    pub kept: bool,
+}
+
+impl WindowedFile {
+    /// Whether every stroke keeps its limits.
+    pub fn kept(&self) -> bool {
+        self.strokes.iter().flat_map(|stroke| &stroke.limits).all(|limit| limit.kept)
+    }
+
+    /// Every broken limit in a sentence.
+    pub(crate) fn sentences(&self) -> Vec<String> {
+        let mut sentences = Vec::new();
+        for stroke in &self.strokes {
+            for limit in stroke.limits.iter().filter(|limit| !limit.kept) {
+                let what = match limit.quantity {
+                    StrokeQuantity::Position => "reach (rad)",
+                    StrokeQuantity::Speed => "peak speed (rad/s)",
+                    StrokeQuantity::Acceleration => "peak acceleration (rad/s\u{b2})",
+                    StrokeQuantity::RestSpeed => "speed at rest (rad/s)",
+                    StrokeQuantity::RestAcceleration => "acceleration at rest (rad/s\u{b2})",
+                };
+                sentences.push(format!(
+                    "The stroke of `{}`, {what}: {} where less than {} is allowed, {:.0} % too much.",
+                    stroke.joint,
+                    digits(limit.value),
+                    digits(limit.limit),
+                    limit.excess_percent
+                ));
+            }
+        }
+        sentences
+    }
+}
+
+/// Four decimals, or as many digits of a small number.
+fn digits(value: f64) -> String {
+    if value < 1e-2 { format!("{value:.3e}") } else { format!("{value:.4}") }
 }

@@ -1,68 +1,18 @@
-//! `[[iteration.leg]]`: trajectories of which some joints are held, together in every run or one after another.
+//! The legs of an iteration: their trajectories, stages and robots.
 
-use super::section::{IterationSection, RobotChoice};
 use super::trajectory::Trajectory;
-use crate::design::DesignSection;
 use crate::error::Error;
 use crate::jobs::options::RunOptions;
-use crate::simulate::section::SimulationSection;
-use crate::study::Study;
-use crate::study::StudyRobot;
+use crate::study::{IterationSection, LegOrder, LegSection, RobotChoice, SimulationSection, Study, StudyRobot};
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
 use dynident_iteration::Leg;
 use dynident_iteration::Robot;
 use dynident_iteration::robot::{FolderRobot, ProcessRobot};
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Spreads the seeds of legs that have an iteration each.
 const SEED_OF_LEG: u64 = 0xd1b5_4a32_d192_ed03;
-
-/// What becomes of several legs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum LegOrder {
-    /// Every run has all of them, and is identified from all.
-    #[default]
-    Together,
-    /// Each has an iteration of its own, until that has settled or its runs are used up; what it has found is held in those after it. The paper's way: tip first.
-    OneAfterAnother,
-}
-
-/// `[[iteration.leg]]`: one trajectory.
-///
-/// ```
-/// let section: dynident::IterationSection = toml::from_str(
-///     r#"
-///     order = "one-after-another"
-///     leg = [{ hold = { joint1 = 0.0 } }, { hold = { joint2 = 0.5 }, trajectory = "joint1.csv", windows = { joint1 = [[2.0, 8.0]] } }]
-///     "#,
-/// )?;
-/// assert_eq!(section.leg[1].hold["joint2"], 0.5);
-/// # Ok::<(), toml::de::Error>(())
-/// ```
-#[derive(Clone, Debug, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LegSection {
-    /// Joints that are held, and where, rad (m); none by default. Their torque does not count. Of a windowed design only the strokes of the other joints are run.
-    pub hold: BTreeMap<String, f64>,
-    /// Whether the simulator locks them (the default), or the controller has to hold them. A robot outside gets them as joints that are to rest.
-    pub locked: bool,
-    /// Its trajectory, in place of the study's.
-    pub trajectory: Option<PathBuf>,
-    /// Its design, in place of the study's `[design]`.
-    pub design: Option<DesignSection>,
-    /// For joints by name the times (from, to; s) that count; what the design says by default, or everything. Joints that are not named do not count then.
-    pub windows: BTreeMap<String, Vec<[f64; 2]>>,
-}
-
-impl Default for LegSection {
-    fn default() -> Self {
-        Self { hold: BTreeMap::new(), locked: true, trajectory: None, design: None, windows: BTreeMap::new() }
-    }
-}
 
 /// The trajectory of each leg; the study's own is looked for once.
 pub(super) fn trajectories(
@@ -164,7 +114,8 @@ impl IterationSection {
                 None => Leg::whole(reference),
                 Some(windows) => Leg::windowed(reference, windows),
             };
-            legs.push(leg.map_err(|error| error.to_string())?);
+            let leg = leg.map_err(|error| error.to_string())?;
+            legs.push(leg.with_payload(section.payload.clone()));
         }
         Ok(legs)
     }

@@ -1,0 +1,95 @@
+//! What `inspect` prints: the schema of its JSON.
+
+use serde::Serialize;
+
+/// Name and version of the schema of [`Inspection`].
+pub const INSPECTION_SCHEMA: &str = "dynident/inspection/1";
+
+/// What `inspect` prints as JSON.
+#[derive(Clone, Debug, Serialize)]
+pub struct Inspection {
+    /// [`INSPECTION_SCHEMA`].
+    pub schema: &'static str,
+    /// The machine's name.
+    pub name: String,
+    /// The file.
+    pub file: String,
+    /// Degrees of freedom.
+    pub dof: usize,
+    /// Mass of the moving bodies with known inertials.
+    pub moving_mass_kg: f64,
+    /// Gravity in the base frame.
+    pub gravity_m_s2: [f64; 3],
+    /// Joints in the order of all vectors.
+    pub joints: Vec<JointSummary>,
+    /// Moving bodies; body `i` moves with joint `i`.
+    pub bodies: Vec<BodySummary>,
+    /// Base parameters of the bodies.
+    pub base_parameters: BaseSummary,
+    /// Findings of the audit.
+    pub audit: Vec<AuditEntry>,
+}
+
+/// One joint.
+#[derive(Clone, Debug, Serialize)]
+pub struct JointSummary {
+    /// Its name.
+    pub name: String,
+    /// `revolute`, `continuous` or `prismatic`.
+    #[serde(rename = "type")]
+    pub kind: &'static str,
+    /// Body that it stands on; none for the base.
+    pub parent: Option<String>,
+    /// Lowest position, rad or m.
+    pub lower: Option<f64>,
+    /// Highest position, rad or m.
+    pub upper: Option<f64>,
+    /// Highest speed, rad/s or m/s.
+    pub velocity: Option<f64>,
+    /// Highest torque, Nm or N.
+    pub effort: Option<f64>,
+    /// The joint that it mimics.
+    pub mimic: Option<String>,
+}
+
+/// One body.
+#[derive(Clone, Debug, Serialize)]
+pub struct BodySummary {
+    /// Name of its own link.
+    pub name: String,
+    /// Mass; none when no link of it has an inertial.
+    pub mass_kg: Option<f64>,
+    /// Centre of mass in the body frame.
+    pub com_m: Option<[f64; 3]>,
+    /// All links lumped into it.
+    pub links: Vec<String>,
+}
+
+/// Base parameters.
+#[derive(Clone, Debug, Serialize)]
+pub struct BaseSummary {
+    /// How many.
+    pub count: usize,
+    /// What each sums.
+    pub expressions: Vec<String>,
+    /// Parameters that no motion can tell.
+    pub unidentifiable: Vec<String>,
+    /// Rank of the bodies' regressor at random states, by [`numerical_rank_by_body`](dynident_dynamics::numerical_rank_by_body): the cross-check.
+    pub numerical_rank: usize,
+    /// Smallest share of a column that counted as independent, largest that counted as dependent.
+    pub gap: [f64; 2],
+}
+
+/// One finding.
+#[derive(Clone, Debug, Serialize)]
+pub struct AuditEntry {
+    /// `info`, `warning` or `problem`.
+    pub level: &'static str,
+    /// Short name of the check.
+    pub check: &'static str,
+    /// Which link or joint.
+    #[serde(rename = "where")]
+    pub place: String,
+    /// What, why it matters, and the mend.
+    pub what: String,
+}
