@@ -162,8 +162,8 @@ fn motion_and_parameters_together_are_better_where_positions_are_noisy() {
     let series = found.result.series.as_ref().unwrap();
     assert_eq!((series.len(), series[0].torque_autoregression.len()), (2, 2));
     for log in series {
-        // The motion has five harmonics; a weak one may be beneath the noise, and the cut-off is no exact figure.
-        assert!((4..=8).contains(&log.harmonics), "{log:?}");
+        // The motion has five harmonics; what the cut-off lets through beyond them costs a little, and biases nothing.
+        assert!((5..=12).contains(&log.harmonics), "{log:?}");
         assert_eq!(log.samples_of_row, (250.0 * PERIOD_S / (60.0 * log.harmonics as f64)) as usize);
         // Means of n samples have noise smaller by √n.
         let std = 2e-3 / (log.samples_of_row as f64).sqrt();
