@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 pub const RESULT_SCHEMA: &str = "dynident/result/1";
 
 /// A finished identification.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ResultFile {
     /// [`RESULT_SCHEMA`].
     pub schema: String,
@@ -40,6 +40,7 @@ pub struct ResultFile {
     /// The base parameters, in the order of the tree.
     pub base_parameters: Vec<BaseParameterResult>,
     /// Covariance of the base parameters by the method's own account, rows and columns in their order, symmetric; zero where a parameter is not excited.
+    #[serde(default)]
     pub base_parameter_covariance: Vec<Vec<f64>>,
     /// The bodies: one of the full sets that give these base parameters, the nearest to the prior.
     pub bodies: Vec<BodyResult>,
@@ -48,24 +49,31 @@ pub struct ResultFile {
     /// What was held at zero because the data hardly tell it; none unless asked for.
     pub essential: Option<EssentialReport>,
     /// The strongest correlations between estimates, strongest first.
+    #[serde(default)]
     pub correlations: Vec<CorrelatedPair>,
     /// Friction and drives.
     pub joints: Vec<JointResult>,
     /// How friction was chosen, for the joints where the study asks for it.
+    #[serde(default)]
     pub friction_choice: Vec<JointFrictionResult>,
     /// Payloads that were estimated.
+    #[serde(default)]
     pub payloads: Vec<PayloadResult>,
     /// Offsets log by log; empty unless the study asks for them. The base parameters hold their mean.
+    #[serde(default)]
     pub offsets: Vec<LogOffset>,
     /// Drive gains, joint by joint; none unless the study says that they are unknown.
     pub drive_gains: Option<Vec<DriveGain>>,
     /// Drives that turn with two joints.
+    #[serde(default)]
     pub couplings: Vec<LawResult>,
     /// The fit on the logs that it was made from.
     pub training: TrainingResult,
     /// The test on logs that were not used.
+    #[serde(default)]
     pub validation: Vec<LogValidation>,
     /// How well the 95 % band of the predicted torque holds on held-out logs.
+    #[serde(default)]
     pub torque_band: Vec<TorqueBand>,
     /// Whether the full set is physically possible.
     pub physical: PhysicalVerdict,
@@ -78,7 +86,7 @@ pub struct ResultFile {
 }
 
 /// The machine of a result.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RobotSummary {
     /// Its name.
     pub name: String,
@@ -95,7 +103,7 @@ pub struct RobotSummary {
 }
 
 /// How a fit was made.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MethodSummary {
     /// The study's `estimator.method`.
     pub estimator: String,
@@ -118,6 +126,7 @@ pub struct MethodSummary {
     /// Smallest share of a column that counted as independent, largest that counted as dependent.
     pub base_gap: [f64; 2],
     /// Base parameters that the data do not excite; they were held at the prior (or zero).
+    #[serde(default)]
     pub not_excited: Vec<String>,
     /// With load-dependent friction: the base parameters, by the estimate without it, whose torque is the load.
     pub load_parameters: Option<Vec<f64>>,
@@ -153,7 +162,7 @@ pub struct BaseParameterResult {
 }
 
 /// One body of the full set.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct BodyResult {
     /// Name of its own link.
     pub name: String,
@@ -174,7 +183,7 @@ pub struct BodyResult {
 }
 
 /// A parameter of a law.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LawResult {
     /// Its symbol.
     pub symbol: String,
@@ -189,7 +198,7 @@ pub struct LawResult {
 }
 
 /// Friction and drive of one joint.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct JointResult {
     /// The joint.
     pub name: String,
@@ -204,7 +213,7 @@ pub struct JointResult {
 }
 
 /// The offset of one joint in one log.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LogOffset {
     /// The log.
     pub log: String,
@@ -217,7 +226,7 @@ pub struct LogOffset {
 }
 
 /// Figures of the fit on its own data.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TrainingResult {
     /// The logs.
     pub logs: Vec<String>,
@@ -230,7 +239,7 @@ pub struct TrainingResult {
 }
 
 /// One joint of [`TrainingResult`].
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TrainingJoint {
     /// The joint.
     pub name: String,
@@ -241,11 +250,12 @@ pub struct TrainingJoint {
 }
 
 /// Whether a full set is possible.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PhysicalVerdict {
     /// All pseudo-inertias positive definite, no negative friction or drive inertia.
     pub consistent: bool,
     /// What is not.
+    #[serde(default)]
     pub violations: Vec<String>,
     /// What the verdict is about.
     pub note: String,
@@ -254,13 +264,14 @@ pub struct PhysicalVerdict {
     /// Why it failed.
     pub failure: Option<String>,
     /// Bodies whose description is no possible body, so that a rough one of ordinary mass stands in as their prior.
+    #[serde(default)]
     pub impossible_priors: Vec<String>,
     /// Which sign of the torque a possible machine explains; none without a possible machine for either.
     pub sign: Option<SignEvidence>,
 }
 
 /// A physically consistent fit.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PhysicalFitResult {
     /// `solved`, `stalled` or `iteration-limit`; all of them meet every constraint.
     pub status: String,
@@ -275,13 +286,14 @@ pub struct PhysicalFitResult {
     /// The largest move of a base parameter in units of its reported standard deviation.
     pub largest_move_std: Option<f64>,
     /// Limits that hold with equality and push: friction or drive inertia at zero.
+    #[serde(default)]
     pub active: Vec<String>,
     /// Body by body.
     pub bodies: Vec<PhysicalBodyResult>,
 }
 
 /// How possible a body is.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PhysicalBodyResult {
     /// Its name.
     pub name: String,
@@ -292,7 +304,7 @@ pub struct PhysicalBodyResult {
 }
 
 /// What is known of a log.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LogSummary {
     /// Its name.
     pub log: String,
@@ -311,17 +323,21 @@ pub struct LogSummary {
     /// The log against the description's own inertials.
     pub prior_agreement: Option<PriorAgreement>,
     /// Lag of torque behind motion by joint, seconds, estimated together with the model from this log alone; none where the log does not tell.
+    #[serde(default)]
     pub torque_lag_s: Vec<Option<f64>>,
     /// Standard deviations of the lags.
+    #[serde(default)]
     pub torque_lag_std_s: Vec<Option<f64>>,
     /// Half the widths of their 95 % intervals.
+    #[serde(default)]
     pub torque_lag_half_width_95_s: Vec<Option<f64>>,
     /// What follows from both.
+    #[serde(default)]
     pub model_findings: Vec<Finding>,
 }
 
 /// Where the time went, in seconds.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Timings {
     /// Reading the robot, base parameters.
     pub machine: f64,

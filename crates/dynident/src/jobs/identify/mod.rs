@@ -6,7 +6,6 @@ mod urdf;
 use crate::error::Error;
 use crate::jobs::log_summary::{held_out_summary, training_summary};
 use crate::jobs::options::{RunOptions, study_name};
-use crate::result::stored::StoredModel;
 use crate::result::{LogSummary, PhysicalVerdict, RESULT_SCHEMA, ResultFile, Timings, TrainingResult};
 use crate::study::{ArmSection, EstimatorMethod, Folders, Study, StudyRobot};
 use dynident_estimation::{Estimate, strongest_correlations};
@@ -130,9 +129,9 @@ fn identified(
 }
 
 /// The earlier result of an arm, and where it lies.
-fn known_arm(section: &ArmSection, folders: &Folders) -> Result<(std::path::PathBuf, StoredModel), Error> {
+fn known_arm(section: &ArmSection, folders: &Folders) -> Result<(std::path::PathBuf, ResultFile), Error> {
     let path = folders.find(&section.result, None)?;
-    let stored = StoredModel::read(&path)?;
+    let stored = ResultFile::read(&path)?;
     Ok((path, stored))
 }
 
