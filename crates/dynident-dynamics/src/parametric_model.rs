@@ -45,7 +45,7 @@ pub enum ParametricModelError {
 /// # let text = r#"<robot name="pendulum"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="2"/>
 /// #   <inertia ixx="0.2" iyy="0.2" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
 /// #   <joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>"#;
-/// let model = dynident_model::read_urdf(text)?;
+/// let model = dynident_model::read_urdf(text)?.model;
 /// let friction = laws_per_joint(&model, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
 /// let pendulum = ParametricModel::new(model, friction)?;
 /// assert_eq!(pendulum.base().expressions(), ["mx1", "mz1", "Iyy1", "fv1"]);
@@ -53,6 +53,7 @@ pub enum ParametricModelError {
 /// assert_eq!(pendulum.nominal_base().unwrap()[1], -1.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+#[doc(alias("robot", "nominal model", "machine"))]
 #[derive(Clone, Debug)]
 pub struct ParametricModel {
     model: Model,
@@ -96,12 +97,22 @@ impl ParametricModel {
         Ok(self)
     }
 
-    /// The same robot with other torque terms and the description's nominal values.
+    /// The same robot with other torque terms. Nominal values of bodies and of terms that stay are kept; those of new
+    /// terms are the description's.
     ///
     /// # Errors
     /// As [`new`](Self::new).
     pub fn with_laws(&self, laws: Vec<Law>) -> Result<Self, ParametricModelError> {
-        Self::new(self.model.clone(), laws)
+        let mut other = Self::new(self.model.clone(), laws)?;
+        let bodies = 10 * self.model.dof();
+        other.nominal[..bodies].copy_from_slice(&self.nominal[..bodies]);
+        for (place, law) in other.laws.iter().enumerate() {
+            if let Some(known) = self.laws.iter().position(|kept| kept == law) {
+                other.nominal[bodies + place] = self.nominal[bodies + known];
+            }
+        }
+        other.nominal_base = self.nominal_base.as_ref().map(|_| other.base.values(&other.nominal));
+        Ok(other)
     }
 
     /// The same with further terms behind the base columns of the layout, whether they depend on these or not: one set of rows for choosing among them. Base parameters and terms stay as they are.

@@ -48,8 +48,6 @@ pub struct ConsistentParameters {
     pub intervals: Option<Vec<ParameterInterval>>,
     /// Bodies whose nominal parameters are no body's, with the least eigenvalue of their pseudo-inertia.
     pub inconsistent_nominal: Vec<(String, f64)>,
-    /// How well consistent sets explain the torque with either sign.
-    pub sign: Option<SignEvidence>,
 }
 
 /// What the training recordings say of the estimate.
@@ -61,6 +59,8 @@ pub struct TrainingExamination {
     pub traces: Vec<LogTrace>,
     /// The delays of all recordings together, joint by joint.
     pub pooled_delays: Vec<Option<TorqueLag>>,
+    /// How well consistent sets explain the torque with either sign; none where a fit fails, and for payloads.
+    pub sign: Option<SignEvidence>,
 }
 
 /// An identified model with everything that was found on the way.
@@ -210,15 +210,19 @@ fn identified(
     }
 
     // Bodies, friction and drives that a robot can have.
-    let consistent = match job {
-        Job::Payload(_) => held_arm(task, &training, &estimation.estimate),
-        Job::Model(_) => consistent_stage(&logs, &training, &estimation.estimate)?,
+    let (consistent, sign) = match job {
+        Job::Payload(_) => (held_arm(task, &training, &estimation.estimate), None),
+        Job::Model(_) => {
+            let consistent = consistent_stage(&logs, &training, &estimation.estimate)?;
+            (consistent, torque_sign(&training, &estimation.estimate)?)
+        }
     };
     times.estimation_s += started.elapsed().as_secs_f64();
 
     // What training and held-out recordings say of it.
     let started = Instant::now();
-    let examination = examine_all_training(&logs, &training, &estimation.estimate)?;
+    let mut examination = examine_all_training(&logs, &training, &estimation.estimate)?;
+    examination.sign = sign;
     let physical = consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
     let held_out = examine_all_held_out(&logs, &training, &estimation.estimate, physical)?;
     times.examination_s = started.elapsed().as_secs_f64();
@@ -245,11 +249,10 @@ fn held_arm(task: &IdentificationTask, training: &Training, estimate: &Estimate)
         parameters: nearest_to_nominal(robot, &estimate.values[..training.columns.base()]),
         intervals: None,
         inconsistent_nominal: settings.map_or_else(Vec::new, |settings| inconsistent_nominal_bodies(robot, settings)),
-        sign: None,
     }
 }
 
-/// Consistent parameters for an estimate over the columns of `training`: the best set, its intervals if asked for, and which sign of the torque a robot can have at all.
+/// Consistent parameters for an estimate over the columns of `training`: the best set, and its intervals if asked for.
 ///
 /// # Errors
 /// Factors that do not belong to the estimate, intervals that cannot be had. That there is no consistent set is part of the result.
@@ -258,11 +261,9 @@ pub fn consistent_stage(
     training: &Training,
     estimate: &Estimate,
 ) -> Result<ConsistentParameters, IdentificationError> {
-    let (settings, robot, columns) = (logs.settings, &training.model.parametric, &training.columns);
-    // Without the columns of payloads and offsets of single logs.
-    let alone: Option<LinearProblem> =
-        (!columns.is_plain()).then(|| columns.arm_problem(&training.problem, &estimate.values)).transpose()?;
-    let (problem, arm) = (alone.as_ref().unwrap_or(&training.problem), columns.arm_estimate(estimate));
+    let (settings, robot) = (logs.settings, &training.model.parametric);
+    let (alone, arm) = arm_alone(training, estimate)?;
+    let problem = alone.as_ref().unwrap_or(&training.problem);
     let plain = settings.estimation.estimator.is_plain();
     let fit = settings
         .consistency
@@ -285,13 +286,28 @@ pub fn consistent_stage(
     let knowledge = settings.consistency.as_ref();
     Ok(ConsistentParameters {
         parameters: parameters.unwrap_or_else(|| nearest_to_nominal(robot, &arm.values)),
-        sign: sign_evidence(robot, problem, &arm),
         inconsistent_nominal: knowledge
             .map_or_else(Vec::new, |knowledge| inconsistent_nominal_bodies(robot, knowledge)),
         fit,
         failure,
         intervals,
     })
+}
+
+/// The problem and the estimate without the columns of payloads and offsets of single logs; `None` where the problem has none.
+fn arm_alone(
+    training: &Training,
+    estimate: &Estimate,
+) -> Result<(Option<LinearProblem>, Estimate), IdentificationError> {
+    let columns = &training.columns;
+    let alone = (!columns.is_plain()).then(|| columns.arm_problem(&training.problem, &estimate.values)).transpose()?;
+    Ok((alone, columns.arm_estimate(estimate)))
+}
+
+/// How well consistent sets explain the torque with either sign; none where a fit fails.
+fn torque_sign(training: &Training, estimate: &Estimate) -> Result<Option<SignEvidence>, IdentificationError> {
+    let (alone, arm) = arm_alone(training, estimate)?;
+    Ok(sign_evidence(&training.model.parametric, alone.as_ref().unwrap_or(&training.problem), &arm))
 }
 
 /// [`examine_training`] of every training recording, side by side.
@@ -312,7 +328,7 @@ fn examine_all_training(
     let (delays, traces): (Vec<Vec<Option<TorqueLag>>>, Vec<LogTrace>) = found.into_iter().unzip();
     let of_joint = |joint: usize| -> Vec<TorqueLag> { delays.iter().filter_map(|log| log[joint]).collect() };
     let pooled_delays = (0..training.model.dof()).map(|joint| pooled_delay(&of_joint(joint))).collect();
-    Ok(TrainingExamination { delays, traces, pooled_delays })
+    Ok(TrainingExamination { delays, traces, pooled_delays, sign: None })
 }
 
 /// [`examine_held_out`] of every recording to test on.

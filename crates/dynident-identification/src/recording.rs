@@ -34,7 +34,7 @@ pub enum Samples {
     /// Raw samples of a file, a stream or of arrays: clock, filters and derivatives are made here. Joints are found by name.
     Log(Log),
     /// A motion that is made already, joints in the model's order.
-    Motion(MotionRecord),
+    Motion(Box<MotionRecord>),
 }
 
 /// One recording.
@@ -65,7 +65,7 @@ impl Recording {
 
     /// A motion that is made already, to fit to.
     pub fn of_motion(name: impl Into<String>, motion: MotionRecord) -> Self {
-        Self::new(name.into(), Role::Identify, Samples::Motion(motion))
+        Self::new(name.into(), Role::Identify, Samples::Motion(Box::new(motion)))
     }
 
     fn new(name: String, role: Role, samples: Samples) -> Self {
@@ -85,6 +85,18 @@ impl Recording {
         match &self.samples {
             Samples::Log(log) => log.source().estimated_rows(),
             Samples::Motion(record) => Some(record.motion.rows as u64),
+        }
+    }
+
+    /// The same with every row, where only a few samples at the ends do not count: for what needs rows without a gap.
+    /// `None` where rows inside do not count.
+    pub fn with_every_row(&self) -> Option<Self> {
+        match &self.samples {
+            Samples::Log(_) => Some(self.clone()),
+            Samples::Motion(record) => {
+                let record = record.with_every_row()?;
+                Some(Self { samples: Samples::Motion(Box::new(record)), ..self.clone() })
+            }
         }
     }
 
@@ -117,12 +129,19 @@ impl Recording {
         }
     }
 
-    /// Its log on the way to a motion, with these settings; the commanded motion goes along where the differentiator needs it. `None` for a motion that is made already.
+    /// Its log on the way to a motion, with these settings; the commanded motion goes along where the differentiator needs it. `None` for a motion that is made already
+    /// and whose raw samples are not at hand.
     ///
     /// # Errors
     /// What opening it can give.
     pub fn open(&self, model: &Model, motion: &MotionSettings) -> Result<Option<MotionStream>, IdentificationError> {
-        let Samples::Log(log) = &self.samples else { return Ok(None) };
+        let log = match &self.samples {
+            Samples::Log(log) => log,
+            Samples::Motion(record) => match &record.raw {
+                Some(log) => log,
+                None => return Ok(None),
+            },
+        };
         let reference = match &self.commanded {
             Some(commanded) if motion.differentiator.reference().is_some() => {
                 let mut order = vec![0; model.dof()];

@@ -48,9 +48,16 @@ pub struct EstimationSettings {
     pub exogeneity_test: Option<InstrumentSettings>,
     /// Hold parameters that the data hardly tell at zero; not by default.
     pub essential: Option<EssentialSettings>,
+    /// Base columns that are held at given values (place among the base columns, value); none by default.
+    pub held: Vec<(usize, f64)>,
 }
 
 impl EstimationSettings {
+    /// An estimator with the defaults of all else.
+    pub fn of(estimator: Estimator) -> Self {
+        Self { estimator, ..Self::default() }
+    }
+
     /// Settings of weighted least squares with this rank rule and covariance.
     pub(crate) fn weighted(&self) -> WeightedSettings {
         WeightedSettings { rank: self.rank, covariance: self.covariance, ..WeightedSettings::default() }

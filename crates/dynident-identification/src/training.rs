@@ -13,8 +13,12 @@ use dynident_dynamics::Column;
 use dynident_estimation::{
     Estimate, EstimationError, LinearProblem, SegmentedFactor, ordinary_least_squares, weighted_least_squares,
 };
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::time::Instant;
+
+/// How closely given values are held, as a share of the largest of them.
+const HELD: f64 = 1e-6;
 
 /// What is left of one recording for fitting.
 #[derive(Clone, Debug)]
@@ -36,6 +40,8 @@ pub struct Training {
     pub model: RegressorModel,
     /// The recordings, in the order of the problem's logs.
     pub logs: Vec<LogFactors>,
+    /// The joints that the problem's joints are: all of them, unless windows leave some without a row.
+    pub joints: Vec<usize>,
     /// All of them over one set of columns.
     pub problem: LinearProblem,
     /// Columns beside the base parameters: payloads and offsets of single logs.
@@ -118,7 +124,8 @@ impl Job<'_> {
         let columns = self.columns(&model)?;
         let problem = self.problem(&model, &columns, &logs)?;
         let timings_s = [read_s, first.timings_s[1] + started.elapsed().as_secs_f64()];
-        Ok(Training { model, logs, problem, columns, friction_choice, gains: None, timings_s })
+        let joints = joints_with_rows(&logs, model.dof());
+        Ok(Training { model, logs, joints, problem, columns, friction_choice, gains: None, timings_s })
     }
 
     fn fit_once(&self, model: RegressorModel) -> Result<(Training, Estimate), IdentificationError> {
@@ -130,7 +137,9 @@ impl Job<'_> {
         let problem = self.problem(&model, &columns, &logs)?;
         let estimate = plain_estimate(&self.logs.settings.estimation, &problem)?;
         let timings_s = [read_s, started.elapsed().as_secs_f64()];
-        let training = Training { model, logs, problem, columns, friction_choice: Vec::new(), gains: None, timings_s };
+        let joints = joints_with_rows(&logs, model.dof());
+        let training =
+            Training { model, joints, logs, problem, columns, friction_choice: Vec::new(), gains: None, timings_s };
         Ok((training, estimate))
     }
 
@@ -158,25 +167,50 @@ impl Job<'_> {
         columns: &LoadColumns,
         logs: &[LogFactors],
     ) -> Result<LinearProblem, EstimationError> {
-        let mut problem = LinearProblem::new(columns.symbols(model), model.joint_names());
+        let joints = joints_with_rows(logs, model.dof());
+        let all_names = model.joint_names();
+        let names = joints.iter().map(|&joint| all_names[joint].clone()).collect();
+        let mut problem = LinearProblem::new(columns.symbols(model), names);
         let keep_known = self.logs.settings.gains == GainChoice::Unknown;
         for log in logs {
             // Two recordings may share a name; their numbers keep them apart.
             let name = format!("{} ({})", self.logs.recordings[log.index].name, log.index + 1);
-            for (joint, factor) in log.factors.iter().enumerate() {
-                let own = model.layout().joint_columns(joint);
-                columns.add(&mut problem, (log.index, &name), joint, (own, factor), keep_known)?;
+            for (place, &joint) in joints.iter().enumerate() {
+                let (own, factor) = (model.layout().joint_columns(joint), &log.factors[joint]);
+                if factor.rows() > 0 {
+                    columns.add(&mut problem, (log.index, &name), place, (own, factor), keep_known)?;
+                }
             }
         }
-        match model.parametric.nominal_base() {
-            Some(nominal) => {
-                let mut nominal = nominal.to_vec();
-                nominal.resize(columns.count(), 0.0);
-                problem.with_fallback(nominal)
-            }
-            None => Ok(problem),
+        if let Some(nominal) = model.parametric.nominal_base() {
+            let mut nominal = nominal.to_vec();
+            nominal.resize(columns.count(), 0.0);
+            problem = problem.with_fallback(nominal)?;
         }
+        hold(problem, &self.logs.settings.estimation.held)
     }
+}
+
+/// Joints of which some recording has rows: where windows leave a joint none, it is not in the problem.
+fn joints_with_rows(logs: &[LogFactors], dof: usize) -> Vec<usize> {
+    (0..dof).filter(|&joint| logs.iter().any(|log| log.factors[joint].rows() > 0)).collect()
+}
+
+/// The problem with columns held at given values, by a prior that is far narrower than any data.
+fn hold(problem: LinearProblem, held: &[(usize, f64)]) -> Result<LinearProblem, EstimationError> {
+    if held.is_empty() {
+        return Ok(problem);
+    }
+    let largest = held.iter().fold(0.0_f64, |most, (_, value)| most.max(value.abs()));
+    let largest = if largest > 0.0 { largest } else { 1.0 };
+    let count = problem.columns().len();
+    let mut mean = vec![0.0; count];
+    let mut information = DMatrix::zeros(held.len(), count);
+    for (row, &(column, value)) in held.iter().enumerate() {
+        mean[column] = value;
+        information[(row, column)] = 1.0 / (HELD * largest);
+    }
+    problem.with_prior(mean, information)
 }
 
 /// The estimate that friction is chosen and loads are taken by: least squares, whatever estimator comes in the end.

@@ -1,17 +1,21 @@
 //! Robots, records and the policy together.
 
 use crate::error::IterationError;
-use crate::estimate::identify_run;
+use crate::estimate::{RunEstimate, identify_run};
 use crate::leg::IterationTask;
 use crate::policy::{self, Next, RunPlan};
 use crate::record::{ModelParameters, RunRecord, UsedController};
 use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest};
-use crate::settings::IterationSettings;
+use crate::settings::{IterationSettings, RunIdentificationSettings};
 use crate::status::IterationStatus;
 use crate::store::IterationStore;
+use dynident_dynamics::ParametricModel;
+use dynident_identification::friction::chosen_model;
 use dynident_simulation::Record;
 use dynident_simulation::controllers::ControllerModel;
 use dynident_simulation::{SimulationError, require_length};
+
+use std::borrow::Cow;
 
 /// A torque this much above a limit is no matter of rounding or of the model's last digits.
 const BEYOND: f64 = 1.001;
@@ -61,7 +65,7 @@ impl Iteration {
 
     /// What comes after these records: it depends on nothing else.
     pub fn next(&self, records: &[RunRecord]) -> Next {
-        let next = policy::next(records, &self.settings, self.task.machine.nominal());
+        let next = policy::next(records, &self.settings, self.robot(records).nominal());
         if let Next::Finished(IterationStatus::Converged | IterationStatus::RunsUsedUp) = next
             && let Some(reason) = self.beyond_torque(records)
         {
@@ -74,7 +78,7 @@ impl Iteration {
     fn beyond_torque(&self, records: &[RunRecord]) -> Option<String> {
         let limits = self.task.torque_limits.as_ref()?;
         let estimate = records.iter().rev().find(|record| record.accepted)?.estimate.as_ref()?;
-        let mut model = self.controller_model(&estimate.for_controller()?).ok()?;
+        let mut model = self.controller_model(records, &estimate.for_controller()?).ok()?;
         let dof = self.task.machine.dof();
         let mut tau = vec![0.0; dof];
         for leg in &self.task.legs {
@@ -99,12 +103,39 @@ impl Iteration {
         None
     }
 
-    /// The model of a controller with these parameters.
+    /// The robot with the friction that a run before chose.
+    pub fn robot(&self, records: &[RunRecord]) -> Cow<'_, ParametricModel> {
+        let estimates = records.iter().filter_map(|record| record.estimate.as_ref());
+        let choice = estimates.map(|estimate| &estimate.friction).find(|choice| !choice.is_empty());
+        match choice.map(|choice| chosen_model(&self.task.machine, choice)) {
+            Some(Ok(robot)) => Cow::Owned(robot),
+            _ => Cow::Borrowed(&self.task.machine),
+        }
+    }
+
+    /// What of a run's records: with the friction that a run before chose, if one did.
+    fn identified(&self, records: &[Record], before: &[RunRecord]) -> Result<RunEstimate, IterationError> {
+        match self.robot(before) {
+            Cow::Borrowed(_) => identify_run(&self.task, records, &self.settings.identification),
+            Cow::Owned(machine) => {
+                let task = IterationTask { machine, ..self.task.clone() };
+                let settings = &self.settings.identification;
+                let settings = RunIdentificationSettings { friction: Vec::new(), ..settings.clone() };
+                identify_run(&task, records, &settings)
+            }
+        }
+    }
+
+    /// The model of a controller with these parameters, after these records.
     ///
     /// # Errors
     /// Parameters of another machine.
-    pub fn controller_model(&self, parameters: &ModelParameters) -> Result<ControllerModel, SimulationError> {
-        let machine = &self.task.machine;
+    pub fn controller_model(
+        &self,
+        records: &[RunRecord],
+        parameters: &ModelParameters,
+    ) -> Result<ControllerModel, SimulationError> {
+        let machine = self.robot(records);
         match parameters {
             ModelParameters::All(values) => ControllerModel::from_parameters(machine.model(), machine.laws(), values),
             ModelParameters::Base(values) => {
@@ -122,7 +153,7 @@ impl Iteration {
     ) -> Result<Made, IterationError> {
         let legs = &self.task.legs;
         let controller = plan.controller(&self.settings);
-        let model = plan.model.as_ref().map(|parameters| self.controller_model(parameters)).transpose()?;
+        let model = plan.model.as_ref().map(|parameters| self.controller_model(before, parameters)).transpose()?;
         let mut runs: Vec<RobotRun> = Vec::with_capacity(legs.len());
         for (number, leg) in legs.iter().enumerate() {
             let robot = if robots.len() == 1 { &mut robots[0] } else { &mut robots[number] };
@@ -150,7 +181,7 @@ impl Iteration {
         let mut record = self.recorded(plan, controller.name(), &runs);
         if record.done {
             let records: Vec<Record> = runs.iter().map(|run| run.record.clone()).collect();
-            match identify_run(&self.task, &records, &self.settings.identification) {
+            match self.identified(&records, before) {
                 Ok(estimate) => record.estimate = Some(estimate),
                 Err(error @ (IterationError::File { .. } | IterationError::State { .. })) => return Err(error),
                 Err(error) => record.reason = Some(error.to_string()),

@@ -2,6 +2,7 @@
 
 use dynident_dynamics::ParametricModelError;
 use dynident_estimation::EstimationError;
+use dynident_identification::IdentificationError;
 use dynident_recording::FilterError;
 use dynident_simulation::SimulationError;
 use std::path::{Path, PathBuf};
@@ -17,6 +18,9 @@ pub enum IterationError {
     /// A robot whose parts do not fit.
     #[error(transparent)]
     Model(#[from] ParametricModelError),
+    /// Rows that do not carry a model.
+    #[error(transparent)]
+    Identification(#[from] IdentificationError),
     /// A differentiator or a filter.
     #[error(transparent)]
     Filter(#[from] FilterError),

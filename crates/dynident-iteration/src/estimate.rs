@@ -2,20 +2,23 @@
 
 use crate::error::IterationError;
 use crate::leg::IterationTask;
-use crate::motion::{MeasuredMotion, measured_motion};
+use crate::motion::measured_motion;
 use crate::record::ModelParameters;
-use crate::rows::visit_rows;
 use crate::settings::{RunIdentificationSettings, Scheme};
-use crate::step_by_step::{least_squares, step_by_step};
-use dynident_estimation::{LinearProblem, SegmentSettings, SegmentedFactor};
-use dynident_identification::consistent::consistent_parameters;
-use dynident_simulation::Record;
-use dynident_simulation::require_length;
-use nalgebra::DMatrix;
+use crate::step_by_step::step_by_step;
+use dynident_dynamics::ParametricModel;
+use dynident_estimation::LinearProblem;
+use dynident_identification::consistent::{ConsistencySettings, consistent_parameters};
+use dynident_identification::estimators::{TrainingRows, estimate};
+use dynident_identification::examination::{TorqueLag, examine_training, pooled_delay};
+use dynident_identification::friction::JointFriction;
+use dynident_identification::rows::ParallelFilterSettings;
+use dynident_identification::{
+    Execution, IdentificationSettings, Logs, Recording, Training, consistent_stage, training_rows,
+};
+use dynident_simulation::{Record, require_length};
 use serde::{Deserialize, Serialize};
-
-/// How closely given values are held, as a share of the largest of them.
-const HELD: f64 = 1e-6;
+use std::sync::Arc;
 
 /// What a run tells of the base parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,6 +39,12 @@ pub struct RunEstimate {
     pub possible: Option<Vec<f64>>,
     /// Why there is none although it was asked for.
     pub impossible: Option<String>,
+    /// The friction that this run chose, for itself and the runs after it; empty where it was stated or chosen before.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub friction: Vec<JointFriction>,
+    /// By how much each joint's torque comes after the motion, where the run tells; empty where windows leave rows out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub torque_lags: Vec<Option<TorqueLag>>,
 }
 
 impl RunEstimate {
@@ -57,109 +66,149 @@ impl RunEstimate {
     }
 }
 
-/// Base parameters from the records of one run, one record for each leg of the task: differentiate, make rows within the windows that count, fit all joints at once or step by step, and find the
-/// possible machine that fits the same rows best.
+/// Base parameters from the records of one run, one record for each leg of the task: the same identification as of any
+/// log ([`dynident_identification`]), on records in memory. Rows count within the windows; joints without rows are left
+/// out; known columns are held.
 ///
 /// # Errors
-/// Records that do not belong to the task, a differentiator that cannot be applied, rows that do not carry an estimate. A possible machine that does not exist is part of the result.
+/// Records that do not belong to the task, a differentiator that cannot be applied, rows that do not carry an estimate.
+/// That there is no consistent set is part of the result.
 pub fn identify_run(
     task: &IterationTask,
     records: &[Record],
     settings: &RunIdentificationSettings,
 ) -> Result<RunEstimate, IterationError> {
     require_length("records of the run's legs", task.legs.len(), records.len())?;
-    let joints: Vec<String> = task.machine.model().joints().iter().map(|joint| joint.name.clone()).collect();
-    let motions = task
-        .legs
-        .iter()
-        .zip(records)
-        .map(|(leg, record)| measured_motion(record, leg, settings))
-        .collect::<Result<Vec<_>, _>>()?;
-    let names = task.machine.base().expressions();
-    let fallback = task.machine.base().values(task.machine.nominal());
-    let Rows { problem, joints: with_rows } = all_rows(task, &motions, settings, &names, &joints, &fallback)?;
-    let count = names.len();
-    if problem.joint_rows().iter().sum::<usize>() == 0 {
+    let recordings = recordings(task, records, settings)?;
+    let all: Vec<usize> = (0..recordings.len()).collect();
+    let identification = identification_settings(task, settings);
+    let (robot, execution) = (&task.machine, Execution::default());
+    let logs = Logs::new(robot.model(), &recordings, &identification, &all, None, execution)?;
+    let training = training_rows(&logs, robot.clone().into(), &all, &settings.payloads, None)?;
+    if training.problem.joint_rows().iter().sum::<usize>() == 0 {
         let problem = "no sample counts: the differentiator applies nowhere in the windows; look at its settings and at the tracking error".to_owned();
-        return Err(IterationError::Record { joints, problem });
+        return Err(IterationError::Record { joints: robot.joint_names(), problem });
     }
-    let (values, covariance, joint_sigma, fixed, rows) = match settings.scheme {
-        Scheme::AllJoints => {
-            let estimate = least_squares(&problem, settings)?;
-            let fixed = estimate.rank.fixed.iter().map(|fixed| fixed.column).collect();
-            let rows = problem.joint_rows().iter().sum();
-            let mut joint_sigma = vec![0.0; joints.len()];
-            with_rows.iter().zip(&estimate.joint_sigma).for_each(|(&joint, sigma)| joint_sigma[joint] = *sigma);
-            (estimate.values, estimate.covariance, joint_sigma, fixed, rows)
-        }
-        Scheme::StepByStep => {
-            let steps = step_by_step(task, &motions, settings, &names, &joints, &fallback)?;
-            let given = task.known_values();
-            let fixed = (0..count).filter(|&k| !steps.found[k] && given[k].is_none()).collect();
-            (steps.values, steps.covariance, steps.joint_sigma, fixed, steps.rows)
-        }
-    };
-    let (possible, impossible) = if settings.physical {
-        let own_sigma: Vec<f64> = with_rows.iter().map(|&joint| joint_sigma[joint]).collect();
-        match consistent_parameters(&task.machine, &problem, &own_sigma, &settings.possible) {
-            Ok(fit) => (Some(fit.parameters), None),
-            Err(reason) => (None, Some(reason.to_string())),
-        }
-    } else {
-        (None, None)
-    };
-    let std = (0..count).map(|k| covariance[(k, k)].max(0.0).sqrt()).collect();
-    let covariance = covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
-    Ok(RunEstimate { values, std, covariance, rows, joint_sigma, fixed, possible, impossible })
+    match settings.scheme {
+        Scheme::AllJoints => all_joints(&logs, training, &all),
+        Scheme::StepByStep => joint_by_joint(task, &logs, &training, settings),
+    }
 }
 
-/// Rows, and which joints have any.
-struct Rows {
-    problem: LinearProblem,
-    joints: Vec<usize>,
-}
-
-/// The problem of all rows that count, over the joints that have any; given values as a prior that holds them.
-fn all_rows(
+/// The records as recordings of motions that are made already.
+fn recordings(
     task: &IterationTask,
-    motions: &[MeasuredMotion],
+    records: &[Record],
     settings: &RunIdentificationSettings,
-    names: &[String],
-    joints: &[String],
-    fallback: &[f64],
-) -> Result<Rows, IterationError> {
-    let layout = task.machine.layout();
-    let mut all = Vec::new();
-    for (leg, motion) in task.legs.iter().zip(motions) {
-        let mut factors = (0..joints.len())
-            .map(|joint| SegmentedFactor::new(layout.joint_columns(joint).len(), SegmentSettings::default()))
-            .collect::<Result<Vec<_>, _>>()?;
-        visit_rows(task, leg, motion, settings.parallel_filter.as_ref(), |joint, rows, panel| {
-            factors[joint].absorb(panel, rows)?;
-            Ok(())
-        })?;
-        all.push(factors);
+) -> Result<Vec<Recording>, IterationError> {
+    let one = |(number, (leg, record)): (usize, (&crate::leg::Leg, &Record))| {
+        let motion = measured_motion(record, leg, settings)?;
+        let mut recording = Recording::of_motion(format!("leg {}", number + 1), motion);
+        recording.commanded = Some(Arc::clone(leg.commanded()));
+        recording.payload = leg.payload().map(str::to_owned);
+        Ok(recording)
+    };
+    task.legs.iter().zip(records).enumerate().map(one).collect()
+}
+
+/// What the identification is told.
+fn identification_settings(task: &IterationTask, settings: &RunIdentificationSettings) -> IdentificationSettings {
+    let mut identification = IdentificationSettings::default();
+    identification.motion.differentiator = settings.differentiator.clone();
+    identification.parallel_filter = ParallelFilterSettings::from(settings.parallel_filter.as_ref());
+    identification.estimation = settings.estimation.clone();
+    identification.estimation.held.clone_from(&task.known);
+    identification.consistency.clone_from(&settings.consistency);
+    identification.friction.clone_from(&settings.friction);
+    identification
+}
+
+/// All joints at once.
+fn all_joints(logs: &Logs<'_>, training: Training, all: &[usize]) -> Result<RunEstimate, IterationError> {
+    let rows = TrainingRows { logs, model: &training.model, training: all, problem: &training.problem };
+    let estimate = estimate(&rows, None)?.estimate;
+    let consistent = consistent_stage(logs, &training, &estimate)?;
+    let arm = training.columns.arm_estimate(&estimate);
+    let mut joint_sigma = vec![0.0; training.model.dof()];
+    training.joints.iter().zip(&arm.joint_sigma).for_each(|(&joint, sigma)| joint_sigma[joint] = *sigma);
+    let fixed = arm.rank.fixed.iter().map(|fixed| fixed.column).filter(|&column| column < arm.values.len()).collect();
+    let torque_lags = torque_lags(logs, &training, &estimate.values, all)?;
+    Ok(RunEstimate {
+        std: (0..arm.values.len()).map(|k| arm.covariance[(k, k)].max(0.0).sqrt()).collect(),
+        covariance: arm.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        rows: training.problem.joint_rows().iter().sum(),
+        joint_sigma,
+        fixed,
+        possible: consistent.fit.map(|fit| fit.parameters),
+        impossible: consistent.failure,
+        friction: training.friction_choice,
+        torque_lags,
+        values: arm.values,
+    })
+}
+
+/// The paper's order: each joint from its own rows, tip first.
+fn joint_by_joint(
+    task: &IterationTask,
+    logs: &Logs<'_>,
+    training: &Training,
+    settings: &RunIdentificationSettings,
+) -> Result<RunEstimate, IterationError> {
+    let robot = &task.machine;
+    let (names, joints) = (robot.base().expressions(), robot.joint_names());
+    let fallback = robot.base().values(robot.nominal());
+    let steps = step_by_step(task, logs, &names, &joints, &fallback)?;
+    let given = task.known_values();
+    let fixed = (0..names.len()).filter(|&k| !steps.found[k] && given[k].is_none()).collect();
+    let sigma: Vec<f64> = training.joints.iter().map(|&joint| steps.joint_sigma[joint]).collect();
+    let (possible, impossible) = match &settings.consistency {
+        Some(knowledge) => consistent(robot, &training.problem, &sigma, knowledge),
+        None => (None, None),
+    };
+    Ok(RunEstimate {
+        std: (0..names.len()).map(|k| steps.covariance[(k, k)].max(0.0).sqrt()).collect(),
+        covariance: steps.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        values: steps.values,
+        rows: steps.rows,
+        joint_sigma: steps.joint_sigma,
+        fixed,
+        possible,
+        impossible,
+        friction: Vec::new(),
+        torque_lags: Vec::new(),
+    })
+}
+
+/// All parameters of the consistent set that fits best, or why there is none.
+fn consistent(
+    robot: &ParametricModel,
+    problem: &LinearProblem,
+    sigma: &[f64],
+    settings: &ConsistencySettings,
+) -> (Option<Vec<f64>>, Option<String>) {
+    match consistent_parameters(robot, problem, sigma, settings) {
+        Ok(fit) => (Some(fit.parameters), None),
+        Err(reason) => (None, Some(reason.to_string())),
     }
-    let has_rows = |joint: usize| all.iter().any(|factors| factors[joint].rows() > 0);
-    let with_rows: Vec<usize> = (0..joints.len()).filter(|&joint| has_rows(joint)).collect();
-    let own_names = with_rows.iter().map(|&joint| joints[joint].clone()).collect();
-    let mut problem = LinearProblem::new(names.to_vec(), own_names).with_fallback(fallback.to_vec())?;
-    for (number, factors) in all.into_iter().enumerate() {
-        for (joint, factor) in factors.into_iter().enumerate().filter(|(_, factor)| factor.rows() > 0) {
-            let Some(place) = with_rows.iter().position(|&other| other == joint) else { continue };
-            problem.add(&format!("leg {}", number + 1), place, layout.joint_columns(joint).to_vec(), factor)?;
-        }
-    }
-    if task.known.is_empty() {
-        return Ok(Rows { problem, joints: with_rows });
-    }
-    let largest = task.known.iter().fold(0.0_f64, |most, (_, value)| most.max(value.abs()));
-    let largest = if largest > 0.0 { largest } else { 1.0 };
-    let mut mean = vec![0.0; names.len()];
-    let mut information = DMatrix::zeros(task.known.len(), names.len());
-    for (row, (column, value)) in task.known.iter().enumerate() {
-        mean[*column] = *value;
-        information[(row, *column)] = 1.0 / (HELD * largest);
-    }
-    Ok(Rows { problem: problem.with_prior(mean, information)?, joints: with_rows })
+}
+
+/// Delays of the torque over all legs, where every row counts; nothing otherwise, for they need rows without a gap.
+fn torque_lags(
+    logs: &Logs<'_>,
+    training: &Training,
+    values: &[f64],
+    all: &[usize],
+) -> Result<Vec<Option<TorqueLag>>, IterationError> {
+    let Some(whole) = logs.recordings.iter().map(Recording::with_every_row).collect::<Option<Vec<_>>>() else {
+        return Ok(Vec::new());
+    };
+    let (robot, execution) = (training.model.model(), logs.execution);
+    let whole = Logs::new(robot, &whole, logs.settings, all, logs.motion.differentiator.cutoff_hz(), execution)?;
+    let of_leg = |&index: &usize| {
+        let theta = training.columns.base_values(index, values);
+        examine_training(&whole, &training.model, index, &theta).map(|(delays, _)| delays)
+    };
+    let delays: Vec<Vec<Option<TorqueLag>>> = all.iter().map(of_leg).collect::<Result<_, _>>()?;
+    let of_joint = |joint: usize| -> Vec<TorqueLag> { delays.iter().filter_map(|leg| leg[joint]).collect() };
+    Ok((0..training.model.dof()).map(|joint| pooled_delay(&of_joint(joint))).collect())
 }

@@ -13,6 +13,7 @@ pub struct Leg {
     commanded: Arc<dynident_recording::Reference>,
     windows: Option<Vec<Vec<[f64; 2]>>>,
     differentiator: Option<Arc<dyn Differentiator>>,
+    payload: Option<String>,
 }
 
 impl Leg {
@@ -39,7 +40,7 @@ impl Leg {
             .map(|joint| [&motion.q, &motion.dq, &motion.ddq].map(|values| values[motion.of(joint)].to_vec()))
             .collect();
         let commanded = Arc::new(dynident_recording::Reference::sampled(&times, &joints)?);
-        Ok(Self { reference, commanded, windows, differentiator: None })
+        Ok(Self { reference, commanded, windows, differentiator: None, payload: None })
     }
 
     /// The same with the commanded motion as differentiators are to know it: strokes in closed form in place of samples.
@@ -54,6 +55,18 @@ impl Leg {
     pub fn with_differentiator(mut self, differentiator: Arc<dyn Differentiator>) -> Self {
         self.differentiator = Some(differentiator);
         self
+    }
+
+    /// The same with a payload that the robot carries on it, by its name among the settings' payloads.
+    #[must_use]
+    pub fn with_payload(mut self, payload: Option<String>) -> Self {
+        self.payload = payload;
+        self
+    }
+
+    /// What the robot carries.
+    pub fn payload(&self) -> Option<&str> {
+        self.payload.as_deref()
     }
 
     /// What is followed.

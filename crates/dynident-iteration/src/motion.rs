@@ -4,39 +4,14 @@ use crate::error::IterationError;
 use crate::leg::Leg;
 use crate::settings::RunIdentificationSettings;
 use core::ops::Range;
-use dynident_recording::{Derivatives, DifferentiatorSettings, Place, cutoff};
+use dynident_identification::rows::MotionRecord;
+use dynident_recording::log::JointSamples;
+use dynident_recording::{Derivatives, DifferentiatorSettings, Log, MotionBlock, Place, RecordingError, cutoff};
 use dynident_simulation::Record;
+use std::sync::Arc;
 
 /// Times of a record count as uniform up to this share of their step.
 const UNIFORM: f64 = 1e-6;
-
-/// Positions, speeds and accelerations of a run, with torques, on a uniform clock; joint-major.
-#[derive(Clone, Debug)]
-pub struct MeasuredMotion {
-    /// Samples a second.
-    pub rate_hz: f64,
-    /// Time of the first sample, s.
-    pub first_time_s: f64,
-    /// Samples of each joint.
-    pub samples: usize,
-    /// Positions, rad (m), as the differentiator filtered them.
-    pub q: Vec<f64>,
-    /// Speeds.
-    pub dq: Vec<f64>,
-    /// Accelerations.
-    pub ddq: Vec<f64>,
-    /// Torques in force at the samples' instants, Nm (N).
-    pub tau: Vec<f64>,
-    /// Per sample: whether the differentiator applies to all joints there.
-    pub usable: Vec<bool>,
-}
-
-impl MeasuredMotion {
-    /// Time of a sample, s.
-    pub fn time_s(&self, sample: usize) -> f64 {
-        self.first_time_s + sample as f64 / self.rate_hz
-    }
-}
 
 /// Differentiates a record along `leg`. Where the record's times are not uniform, positions and torques are taken between samples by straight lines. Torques held from a sample to the next count at a
 /// sample's instant as the mean of the values before and after, less a twelfth of its second difference (the acceleration jumps there, and positions see both steps).
@@ -47,7 +22,7 @@ pub fn measured_motion(
     record: &Record,
     leg: &Leg,
     settings: &RunIdentificationSettings,
-) -> Result<MeasuredMotion, IterationError> {
+) -> Result<MotionRecord, IterationError> {
     let joints = record.joints.len();
     let wrong = |problem: String| IterationError::Record { joints: record.joints.clone(), problem };
     if joints != leg.reference().joints() {
@@ -81,16 +56,18 @@ pub fn measured_motion(
         )));
     }
     let empty = || vec![0.0; joints * samples];
-    let mut motion = MeasuredMotion {
+    let mut motion = MotionBlock {
         rate_hz,
         first_time_s,
-        samples,
+        rows: samples,
+        joints,
         q: empty(),
         dq: empty(),
         ddq: empty(),
         tau: empty(),
-        usable: vec![true; samples],
+        ..MotionBlock::default()
     };
+    let mut all_usable = vec![true; samples];
     for joint in 0..joints {
         let own = joint * samples..(joint + 1) * samples;
         let out = Derivatives {
@@ -102,7 +79,7 @@ pub fn measured_motion(
             differentiator.differentiate_at(Place { rate_hz, joint, first_time_s }, &q[own.clone()], out)?;
         // A joint that nobody asks anything of where it rests does not spoil the rows of the others.
         for sample in unusable.into_iter().flatten() {
-            motion.usable[sample] = false;
+            all_usable[sample] = false;
         }
         let (from, to) = (&tau[own.clone()], &mut motion.tau[own]);
         to.copy_from_slice(from);
@@ -115,14 +92,36 @@ pub fn measured_motion(
     if settings.held_torque {
         // The torques before and after are not known there.
         for sample in [0, 1, samples - 1] {
-            motion.usable[sample] = false;
+            all_usable[sample] = false;
         }
     }
     let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
     if [&motion.q, &motion.dq, &motion.ddq, &motion.tau].into_iter().any(|values| !finite(values)) {
         return Err(wrong("it holds numbers that are not finite".to_owned()));
     }
-    Ok(motion)
+    let raw = (!settings.estimation.estimator.is_plain()).then(|| raw_samples(record, (rate_hz, first_time_s), q, tau));
+    Ok(MotionRecord {
+        label: format!("record of joints {}", record.joints.join(", ")),
+        motion: Arc::new(motion),
+        usable: all_usable,
+        windows: leg.windows().map(<[_]>::to_vec),
+        raw: raw.transpose()?,
+    })
+}
+
+/// The record's samples on its uniform clock, for estimators that smooth or simulate anew.
+fn raw_samples(
+    record: &Record,
+    (rate_hz, first_time_s): (f64, f64),
+    q: Vec<f64>,
+    tau: Vec<f64>,
+) -> Result<Log, IterationError> {
+    let samples = record.samples;
+    let joints = |values: Vec<f64>| values.chunks_exact(samples).map(<[f64]>::to_vec).collect::<Vec<_>>();
+    let times = (0..samples).map(|sample| first_time_s + sample as f64 / rate_hz).collect();
+    let wrong =
+        |error: RecordingError| IterationError::Record { joints: record.joints.clone(), problem: error.to_string() };
+    JointSamples::at_times(times, joints(q), joints(tau)).into_log("record", &record.joints).map_err(wrong)
 }
 
 /// The torque at a sample's instant of which the smooth curve through the positions is the motion, where torques u are held from each sample to the next.

@@ -1,7 +1,10 @@
 //! Settings of an iteration.
 
-use dynident_estimation::{CovarianceMethod, RankSettings};
+use dynident_identification::EstimationSettings;
 use dynident_identification::consistent::ConsistencySettings;
+use dynident_identification::estimators::Estimator;
+use dynident_identification::friction::FrictionSearch;
+use dynident_identification::payload::Payload;
 use dynident_recording::{DecimationSettings, DifferentiatorSettings};
 use dynident_simulation::controllers::{ControllerSettings, FiniteTimeSettings, JointPdSettings};
 use dynident_simulation::{SimulationError, require};
@@ -18,39 +21,28 @@ pub enum Scheme {
     StepByStep,
 }
 
-/// Which least squares.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum RunEstimator {
-    /// Every joint's newton metre counts alike.
-    Ordinary,
-    /// Every joint counts by its own noise.
-    #[default]
-    Weighted,
-}
-
-/// How one run is identified.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+/// How one run is identified: the motion as it follows from a record, then all that an identification can be told.
+#[derive(Clone, Debug)]
 pub struct RunIdentificationSettings {
     /// All joints at once (the default), or step by step.
     pub scheme: Scheme,
-    /// From positions to speeds and accelerations. Default `deviation`: the commanded motion's own derivatives and those of the smoothed deviation from it.
+    /// From positions to velocities and accelerations. Default `deviation`: the commanded motion's own derivatives and
+    /// those of the smoothed deviation from it.
     pub differentiator: DifferentiatorSettings,
     /// Torque and every column pass the same low-pass and lose the same rows; default none.
     pub parallel_filter: Option<DecimationSettings>,
-    /// Whether recorded torques are held from one sample to the next, as digital drives do: at a sample's instant the mean of the values before and after is in force. Default true.
+    /// Whether recorded torques are held from one sample to the next, as digital drives do: at a sample's instant the
+    /// mean of the values before and after is in force. Default true.
     pub held_torque: bool,
-    /// Default weighted.
-    pub estimator: RunEstimator,
-    /// Where error bars come from.
-    pub covariance: CovarianceMethod,
-    /// When a column counts as excited.
-    pub rank: RankSettings,
-    /// Whether the controller gets the possible machine that fits best (true by default) or the estimate as it is.
-    pub physical: bool,
-    /// What is known of that machine's bodies, and how it is found.
-    pub possible: ConsistencySettings,
+    /// The estimator, what counts as excited, where error bars come from. Default weighted least squares. Step by step
+    /// takes ordinary or weighted least squares.
+    pub estimation: EstimationSettings,
+    /// Joints whose friction the first run that can tell chooses, for itself and all runs after it. Default none.
+    pub friction: Vec<FrictionSearch>,
+    /// What is known of the bodies of the consistent set that controllers get; `None` gives them the estimate as it is.
+    pub consistency: Option<ConsistencySettings>,
+    /// What legs carry. Default nothing.
+    pub payloads: Vec<Payload>,
 }
 
 impl Default for RunIdentificationSettings {
@@ -64,11 +56,10 @@ impl Default for RunIdentificationSettings {
             },
             parallel_filter: None,
             held_torque: true,
-            estimator: RunEstimator::default(),
-            covariance: CovarianceMethod::default(),
-            rank: RankSettings::default(),
-            physical: true,
-            possible: ConsistencySettings::default(),
+            estimation: EstimationSettings::default(),
+            friction: Vec::new(),
+            consistency: Some(ConsistencySettings::default()),
+            payloads: Vec::new(),
         }
     }
 }
@@ -115,8 +106,7 @@ impl Default for SettledSettings {
 }
 
 /// Settings of [`Iteration`](super::Iteration).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug)]
 pub struct IterationSettings {
     /// How a run is identified.
     pub identification: RunIdentificationSettings,
@@ -174,8 +164,8 @@ impl IterationSettings {
                     reference: dynident_recording::ReferenceSettings::default(),
                     max_lag_s,
                 },
-                estimator: RunEstimator::Ordinary,
-                physical: false,
+                estimation: EstimationSettings::of(Estimator::Ordinary),
+                consistency: None,
                 ..RunIdentificationSettings::default()
             },
             reject: false,

@@ -2,13 +2,13 @@
 
 use crate::error::IterationError;
 use crate::leg::IterationTask;
-use crate::motion::MeasuredMotion;
-use crate::rows::visit_rows;
-use crate::settings::{RunEstimator, RunIdentificationSettings};
 use dynident_estimation::{
     Estimate, LinearProblem, OrdinarySettings, SegmentedFactor, TriangularFactor, WeightedSettings,
     ordinary_least_squares, weighted_least_squares,
 };
+use dynident_identification::estimators::Estimator;
+use dynident_identification::rows::{JointRows, RowConsumer};
+use dynident_identification::{EstimationSettings, IdentificationError, Logs, RegressorModel};
 use nalgebra::DMatrix;
 
 /// What the steps have found so far.
@@ -25,8 +25,7 @@ pub(crate) struct Steps {
 /// `∂θ_k/∂θ_known = -A⁺ B`.
 pub(crate) fn step_by_step(
     task: &IterationTask,
-    motions: &[MeasuredMotion],
-    settings: &RunIdentificationSettings,
+    logs: &Logs<'_>,
     names: &[String],
     joints: &[String],
     fallback: &[f64],
@@ -52,9 +51,11 @@ pub(crate) fn step_by_step(
         let mut factor = SegmentedFactor::new(unknown.len(), dynident_estimation::SegmentSettings::default())?;
         let mut wide = TriangularFactor::new(unknown.len() + uncertain.len());
         let (mut narrow_panel, mut wide_panel) = (Vec::new(), Vec::new());
-        for (leg, motion) in task.legs.iter().zip(motions) {
-            visit_rows(task, leg, motion, settings.parallel_filter.as_ref(), |of, rows, panel| {
-                if of != joint {
+        let model = RegressorModel::from(task.machine.clone());
+        for leg in 0..task.legs.len() {
+            let visit = |JointRows { joint: of, rows, panel }: &JointRows<'_>| {
+                let rows = *rows;
+                if *of != joint {
                     return Ok(());
                 }
                 let column = |place: usize| &panel[place * rows..(place + 1) * rows];
@@ -77,7 +78,8 @@ pub(crate) fn step_by_step(
                 factor.absorb(&narrow_panel, rows)?;
                 wide.absorb(&wide_panel, rows)?;
                 Ok(())
-            })?;
+            };
+            logs.pass(&model, leg).run(&mut Visit(visit))?;
         }
         if factor.rows() == 0 {
             continue;
@@ -87,7 +89,7 @@ pub(crate) fn step_by_step(
         let mut problem = LinearProblem::new(own(&|column| names[column].clone()), vec![joints[joint].clone()])
             .with_fallback(unknown.iter().map(|&place| fallback[columns[place]]).collect())?;
         problem.add("run", 0, (0..unknown.len()).collect(), factor)?;
-        let estimate = least_squares(&problem, settings)?;
+        let estimate = least_squares(&problem, &logs.settings.estimation)?;
         steps.joint_sigma[joint] = estimate.joint_sigma[0];
         let fixed: Vec<usize> = estimate.rank.fixed.iter().map(|fixed| fixed.column).collect();
         let estimated: Vec<usize> = (0..unknown.len()).filter(|place| !fixed.contains(place)).collect();
@@ -152,15 +154,19 @@ fn propagate(
 }
 
 /// The least squares that the settings ask for.
-pub(crate) fn least_squares(
-    problem: &LinearProblem,
-    settings: &RunIdentificationSettings,
-) -> Result<Estimate, IterationError> {
+fn least_squares(problem: &LinearProblem, settings: &EstimationSettings) -> Result<Estimate, IterationError> {
     let (rank, covariance) = (settings.rank, settings.covariance);
     Ok(match settings.estimator {
-        RunEstimator::Ordinary => ordinary_least_squares(problem, &OrdinarySettings { rank, covariance })?,
-        RunEstimator::Weighted => {
-            weighted_least_squares(problem, &WeightedSettings { rank, covariance, ..WeightedSettings::default() })?
-        }
+        Estimator::Ordinary => ordinary_least_squares(problem, &OrdinarySettings { rank, covariance })?,
+        _ => weighted_least_squares(problem, &WeightedSettings { rank, covariance, ..WeightedSettings::default() })?,
     })
+}
+
+/// Hands rows to a function.
+struct Visit<F>(F);
+
+impl<F: FnMut(&JointRows<'_>) -> Result<(), IdentificationError>> RowConsumer for Visit<F> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
+        (self.0)(rows)
+    }
 }

@@ -97,7 +97,7 @@ fn compared(path: &Path, family: &str, duration_s: Option<f64>, seeds: u64) -> R
             cutoff_hz: Some(CUTOFF_HZ),
             ..DecimationSettings::default()
         }),
-        physical: false,
+        consistency: None,
         ..RunIdentificationSettings::default()
     };
     let settings = ControllerSettings::FiniteTime(FiniteTimeSettings::with_gains(100.0, 20.0));

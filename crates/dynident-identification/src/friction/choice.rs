@@ -23,7 +23,7 @@ const ROUNDS: usize = 2;
 const MOVING: f64 = 1.0e-3;
 
 /// How the friction of one joint was chosen.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointFriction {
     /// The joint.
     pub joint: String,
@@ -38,7 +38,7 @@ pub struct JointFriction {
 }
 
 /// One model of a joint's friction.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrictionCandidate {
     /// Its terms.
     pub law: String,
@@ -66,7 +66,10 @@ fn stated(columns: &[&CandidateColumn]) -> Vec<Law> {
 }
 
 /// The robot with the choice in force: a joint's friction is replaced, its drive inertia and offset stay.
-pub(crate) fn chosen_model(
+///
+/// # Errors
+/// Terms of joints that the robot does not have.
+pub fn chosen_model(
     robot: &ParametricModel,
     choice: &[JointFriction],
 ) -> Result<ParametricModel, ParametricModelError> {
@@ -219,11 +222,15 @@ fn tuned(folds: &JointFolds, columns: &[CandidateColumn], terms: Vec<Term>, befo
             .flat_map(|chosen| options.iter().map(move |option| [chosen.as_slice(), option].concat()))
             .collect();
     }
-    let evaluated = choices.into_iter().map(|places| {
-        let nonnegative: Vec<bool> = places.iter().map(|&place| columns[place].law.is_nonnegative()).collect();
-        let errors = folds.errors(&places, &nonnegative);
-        Evaluated { terms: terms.clone(), places, errors }
-    });
+    let nonnegative: Vec<Vec<bool>> = choices
+        .iter()
+        .map(|places| places.iter().map(|&place| columns[place].law.is_nonnegative()).collect())
+        .collect();
+    let models: Vec<(&[usize], &[bool])> =
+        choices.iter().zip(&nonnegative).map(|(places, nonnegative)| (&places[..], &nonnegative[..])).collect();
+    let errors = folds.errors_of_all(&models);
+    let evaluated =
+        choices.into_iter().zip(errors).map(|(places, errors)| Evaluated { terms: terms.clone(), places, errors });
     // The first of equals, so that the choice is the same everywhere.
     evaluated
         .reduce(|best, next| if next.errors.rms() < best.errors.rms() { next } else { best })

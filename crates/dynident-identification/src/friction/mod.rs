@@ -4,7 +4,7 @@ mod candidates;
 mod choice;
 
 pub use candidates::FrictionSearch;
-pub use choice::{FrictionCandidate, JointFriction};
+pub use choice::{FrictionCandidate, JointFriction, chosen_model};
 
 pub(crate) use candidates::candidate_columns;
-pub(crate) use choice::{choose_friction, chosen_model};
+pub(crate) use choice::choose_friction;

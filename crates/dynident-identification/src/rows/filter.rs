@@ -13,13 +13,27 @@ pub struct ParallelFilterSettings {
     pub factor: Option<usize>,
     /// Frequency at which the filter's gain is one half; by default 0.4 of the rate that remains.
     pub cutoff_hz: Option<f64>,
+    /// Width of the transition band; by default 0.4 of the rate that remains.
+    pub transition_hz: Option<f64>,
     /// Attenuation in the stop band, dB; 60 by default.
     pub stop_band_db: f64,
 }
 
 impl Default for ParallelFilterSettings {
     fn default() -> Self {
-        Self { enabled: true, factor: None, cutoff_hz: None, stop_band_db: 60.0 }
+        Self { enabled: true, factor: None, cutoff_hz: None, transition_hz: None, stop_band_db: 60.0 }
+    }
+}
+
+impl From<Option<&DecimationSettings>> for ParallelFilterSettings {
+    /// The same filter at any rate; `None` lets every sample count.
+    fn from(filter: Option<&DecimationSettings>) -> Self {
+        match filter {
+            Some(&DecimationSettings { factor, cutoff_hz, transition_hz, stop_band_db }) => {
+                Self { enabled: true, factor: Some(factor), cutoff_hz, transition_hz, stop_band_db }
+            }
+            None => Self { enabled: false, ..Self::default() },
+        }
     }
 }
 
@@ -48,8 +62,8 @@ impl ParallelFilterSettings {
         (factor > 1 || self.cutoff_hz.is_some()).then(|| DecimationSettings {
             factor,
             cutoff_hz: self.cutoff_hz,
+            transition_hz: self.transition_hz,
             stop_band_db: self.stop_band_db,
-            ..DecimationSettings::default()
         })
     }
 }

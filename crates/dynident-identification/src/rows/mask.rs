@@ -1,10 +1,10 @@
 //! A motion that is made already, and which of its rows count.
 
-use dynident_recording::MotionBlock;
+use dynident_recording::{Log, MotionBlock};
 use std::sync::Arc;
 
 /// A motion that is made already, with its torques: joints in the model's order, one uninterrupted piece.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct MotionRecord {
     /// What messages call it.
     pub label: String,
@@ -14,9 +14,20 @@ pub struct MotionRecord {
     pub usable: Vec<bool>,
     /// For each joint the times (from, to; s) at which its torque counts; `None` if it always does.
     pub windows: Option<Vec<Vec<[f64; 2]>>>,
+    /// The raw samples that it was made from, for estimators that smooth or simulate anew; joints in the model's order.
+    pub raw: Option<Log>,
 }
 
 impl MotionRecord {
+    /// The same with every row, where only samples at the ends do not count.
+    pub(crate) fn with_every_row(&self) -> Option<Self> {
+        let first = self.usable.iter().position(|usable| *usable).unwrap_or(0);
+        let last = self.usable.iter().rposition(|usable| *usable).unwrap_or(0);
+        let inside = self.usable.get(first..=last).unwrap_or_default();
+        let whole = self.windows.is_none() && inside.iter().all(|usable| *usable);
+        whole.then(|| Self { usable: Vec::new(), ..self.clone() })
+    }
+
     /// The mask of its rows behind a filter that reaches `half` samples to either side and keeps every `factor`-th row; `None` where all count.
     pub(crate) fn mask(&self, half: usize, factor: usize) -> Option<RowMask<'_>> {
         if self.usable.is_empty() && self.windows.is_none() {

@@ -30,6 +30,8 @@ fn estimate(value: f64, std: f64) -> RunEstimate {
         fixed: Vec::new(),
         possible: Some(vec![value; 20]),
         impossible: None,
+        friction: Vec::new(),
+        torque_lags: Vec::new(),
     }
 }
 

@@ -5,9 +5,11 @@ use super::kind::{
     TermKind, halves,
 };
 use super::{JointMotion, LawInput};
+use serde::{Deserialize, Serialize};
 
 /// The step near zero speed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum CoulombShape {
     /// `sign(q̇)`, and zero while `|q̇|` is at most `dead_band` (rad/s or m/s; may be zero).
     Sign {
@@ -64,7 +66,7 @@ impl SpeedFunction for CoulombShape {
 }
 
 /// Coulomb friction of one joint, Nm (N).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Coulomb {
     /// The joint.
     pub joint: usize,

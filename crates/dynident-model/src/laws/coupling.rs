@@ -8,9 +8,11 @@
 
 use super::kind::{MotionFunction, SpeedFriction, TermAction, TermConstant, TermJoints, TermKind};
 use super::{CoulombShape, JointMotion, LawInput};
+use serde::{Deserialize, Serialize};
 
 /// What the shared drive adds.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum CouplingEffect {
     /// Cross inertia, kg m².
     Inertia,
@@ -21,7 +23,7 @@ pub enum CouplingEffect {
 }
 
 /// One effect of one drive that turns with two joints.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Coupling {
     /// Name of the drive, used in the parameter's symbol.
     pub name: String,

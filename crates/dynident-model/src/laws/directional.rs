@@ -7,9 +7,11 @@ use super::kind::{
     MotionFunction, SpeedCurve, SpeedFriction, SpeedFunction, TermAction, TermConstant, TermJoints, TermKind, halves,
 };
 use super::{CoulombShape, JointMotion, LawInput};
+use serde::{Deserialize, Serialize};
 
 /// Sense of motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Direction {
     /// Positive speed.
     Forward,
@@ -60,7 +62,7 @@ impl Direction {
 }
 
 /// Viscous friction of one joint in one direction, Nm s/rad (N s/m).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DirectionalViscous {
     /// The joint.
     pub joint: usize,
@@ -121,7 +123,7 @@ impl TermKind for DirectionalViscous {
 }
 
 /// Coulomb friction of one joint in one direction, Nm (N).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DirectionalCoulomb {
     /// The joint.
     pub joint: usize,

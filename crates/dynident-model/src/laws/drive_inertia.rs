@@ -2,9 +2,11 @@
 
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind};
 use super::{JointMotion, LawInput};
+use serde::{Deserialize, Serialize};
 
 /// Reflected drive inertia of one joint, kg m² (kg).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[doc(alias("rotor inertia", "armature"))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DriveInertia {
     /// The joint.
     pub joint: usize,

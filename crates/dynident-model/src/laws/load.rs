@@ -5,9 +5,10 @@
 
 use super::kind::{SpeedFriction, TermAction, TermConstant, TermJoints, TermKind};
 use super::{CoulombShape, JointMotion, LawInput};
+use serde::{Deserialize, Serialize};
 
 /// Share of the load that one joint loses to friction; no unit.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LoadFriction {
     /// The joint.
     pub joint: usize,

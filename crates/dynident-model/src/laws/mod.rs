@@ -35,6 +35,7 @@ pub use viscous::Viscous;
 
 use crate::tree::Model;
 use kind::TermKind;
+use serde::{Deserialize, Serialize};
 
 /// Joint motion of a block of samples, joint-major: joint `j`, sample `s` stands at `j * samples + s`.
 #[derive(Clone, Copy, Debug)]
@@ -78,7 +79,9 @@ impl<'a> JointMotion<'a> {
 }
 
 /// One parameter of the drives, linear in the joint torques.
-#[derive(Clone, Debug, PartialEq)]
+#[doc(alias("friction", "torque term", "actuator"))]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Law {
     /// Torque in proportion to speed.
     Viscous(Viscous),

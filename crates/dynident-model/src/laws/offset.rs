@@ -2,9 +2,10 @@
 
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind};
 use super::{JointMotion, LawInput};
+use serde::{Deserialize, Serialize};
 
 /// Constant torque of one joint, Nm (N).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Offset {
     /// The joint.
     pub joint: usize,

@@ -4,9 +4,10 @@
 
 use super::kind::{SpeedCurve, SpeedFriction, SpeedFunction, TermAction, TermConstant, TermJoints, TermKind};
 use super::{JointMotion, LawInput};
+use serde::{Deserialize, Serialize};
 
 /// Friction of one joint by a power of its speed, Nm (s/rad)^p.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Power {
     /// The joint.
     pub joint: usize,
@@ -22,7 +23,8 @@ impl Power {
 }
 
 /// The powers in use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum PowerExponent {
     /// `p = 1/3`.
     CubeRoot,

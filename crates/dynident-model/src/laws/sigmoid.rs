@@ -5,9 +5,10 @@
 
 use super::kind::{SpeedCurve, SpeedFriction, SpeedFunction, TermAction, TermConstant, TermJoints, TermKind};
 use super::{JointMotion, LawInput};
+use serde::{Deserialize, Serialize};
 
 /// The step of one joint, Nm (N).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sigmoid {
     /// The joint.
     pub joint: usize,

@@ -7,9 +7,10 @@
 
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind};
 use super::{JointMotion, LawInput};
+use serde::{Deserialize, Serialize};
 
 /// Yield torque of one element of one joint, Nm (N).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MaxwellSlip {
     /// The joint.
     pub joint: usize,

@@ -5,9 +5,10 @@
 
 use super::kind::{SpeedFriction, SpeedFunction, TermAction, TermConstant, TermJoints, TermKind};
 use super::{CoulombShape, JointMotion, LawInput};
+use serde::{Deserialize, Serialize};
 
 /// Extra friction of one joint near rest, Nm (N).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stribeck {
     /// The joint.
     pub joint: usize,

@@ -7,9 +7,10 @@
 
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind};
 use super::{CoulombShape, JointMotion, LawInput};
+use serde::{Deserialize, Serialize};
 
 /// Change of viscous friction with temperature, Nm s/(rad K) (N s/(m K)).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TemperatureViscous {
     /// The joint.
     pub joint: usize,
@@ -18,7 +19,7 @@ pub struct TemperatureViscous {
 }
 
 /// Change of Coulomb friction with temperature, Nm/K (N/K).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TemperatureCoulomb {
     /// The joint.
     pub joint: usize,

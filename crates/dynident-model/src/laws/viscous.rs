@@ -4,9 +4,10 @@ use super::kind::{
     JointProperty, MotionFunction, SpeedFunction, TermAction, TermConstant, TermJoints, TermKind, halves,
 };
 use super::{JointMotion, LawInput};
+use serde::{Deserialize, Serialize};
 
 /// Viscous friction of one joint, Nm s/rad (N s/m).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Viscous {
     /// The joint.
     pub joint: usize,

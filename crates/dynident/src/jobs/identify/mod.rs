@@ -154,7 +154,7 @@ fn physical_verdict(
         .to_owned();
     }
     verdict.failure.clone_from(&consistent.failure);
-    verdict.sign = consistent.sign;
+    verdict.sign = found.examination.sign;
     verdict.impossible_priors = consistent
         .inconsistent_nominal
         .iter()
@@ -204,12 +204,13 @@ fn result_file(
     let parameters = &found.consistent.parameters;
     let covariance = estimate.covariance.view((0, 0), (base, base)).into_owned();
     let (mut gross_errors, mut noise_correlation, mut noise_levels) = (None, None, None);
-    let (mut periodic, mut simulated) = (None, None);
+    let (mut periodic, mut series, mut simulated) = (None, None, None);
     match found.estimation.findings.clone() {
         Findings::GrossErrors(found) => gross_errors = Some(found),
         Findings::NoiseCorrelation(found) => noise_correlation = Some(found),
         Findings::NoiseLevels(found) => noise_levels = Some(found),
         Findings::Periodic(found) => periodic = Some(found),
+        Findings::Series(found) => series = Some(found),
         Findings::Simulated(found) => simulated = Some(found),
         _ => {}
     }
@@ -225,6 +226,7 @@ fn result_file(
         noise_correlation,
         noise_levels,
         periodic,
+        series,
         simulated,
         base_parameters: base_parameters(model, estimate, found.consistent_base_values()),
         base_parameter_covariance: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
@@ -254,7 +256,7 @@ fn log_summaries(task: &IdentificationTask, found: &Identification) -> Vec<LogSu
     let pairs = found.training.logs.iter().zip(&found.examination.delays);
     let training = pairs.map(|(factors, delays)| {
         let mut summary = training_summary(&task.recordings[factors.index], factors, delays, &joints);
-        summary.model_findings.extend(found.consistent.sign.as_ref().and_then(sign_findings));
+        summary.model_findings.extend(found.examination.sign.as_ref().and_then(sign_findings));
         summary
     });
     let held_out = found.held_out.iter().map(|log| held_out_summary(&task.recordings[log.index], log, &joints));

@@ -114,7 +114,8 @@ impl IterationSection {
                 None => Leg::whole(reference),
                 Some(windows) => Leg::windowed(reference, windows),
             };
-            legs.push(leg.map_err(|error| error.to_string())?);
+            let leg = leg.map_err(|error| error.to_string())?;
+            legs.push(leg.with_payload(section.payload.clone()));
         }
         Ok(legs)
     }

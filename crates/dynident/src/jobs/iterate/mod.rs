@@ -56,9 +56,10 @@ pub fn iterate_study(
     let begin = Instant::now();
     let section = study.iteration.clone().unwrap_or_default();
     let simulation = study.simulation.clone().unwrap_or_default();
-    let settings = section.settings(study).map_err(|why| Error::study(study_path, why))?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let machine = StudyRobot::new(study, study_path, &folders)?;
+    let identification = study.settings(study_path, &machine)?;
+    let settings = section.settings(study, identification).map_err(|why| Error::study(study_path, why))?;
     let truth = match section.robot {
         RobotChoice::Simulation => Some(simulation.truth(&machine).map_err(|why| wrong("simulation", &why))?),
         _ => None,
@@ -120,7 +121,13 @@ pub fn iterate_study(
         let outcome = iterate(&iteration, &mut robots, Some(&stores[number]), &mut |record, runs| {
             so_far.push(record.clone());
             let status = IterationStatus::Waiting { reason: "for the next run".to_owned() };
-            let now = told.file(&Stage { leg, records: &so_far, status: &status, known_std: &known_std });
+            let now = told.file(&Stage {
+                leg,
+                robot: &iteration.robot(&so_far),
+                records: &so_far,
+                status: &status,
+                known_std: &known_std,
+            });
             let all: Vec<IterationsFile> = files.iter().cloned().chain([now]).collect();
             unwritten = joined(all).and_then(|file| write_file(&target, &file).err());
             run(record, runs);
@@ -131,7 +138,8 @@ pub fn iterate_study(
         }
         made += outcome.runs.len() - runs_before;
         let (records, status) = (&outcome.runs[..], &outcome.status);
-        files.push(told.file(&Stage { leg, records, status, known_std: &known_std }));
+        let robot = &iteration.robot(records);
+        files.push(told.file(&Stage { leg, robot, records, status, known_std: &known_std }));
         for record in records {
             for (place, own) in iteration.task().legs.iter().enumerate() {
                 let name = RunName { run: record.run, leg: leg.or((members.len() > 1).then_some(place + 1)), place };
@@ -143,7 +151,8 @@ pub fn iterate_study(
             break;
         }
         let Some(last) = last else { break };
-        for column in (0..known_std.len()).filter(|column| !last.fixed.contains(column)) {
+        let told = known_std.len().min(last.values.len());
+        for column in (0..told).filter(|column| !last.fixed.contains(column)) {
             if known_std[column].is_none() {
                 known_std[column] = Some(last.std[column]);
                 known.push((column, last.values[column]));

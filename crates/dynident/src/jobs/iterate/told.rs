@@ -3,6 +3,7 @@
 use crate::jobs::options::study_name;
 use crate::result::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile};
 use crate::study::{Study, StudyRobot};
+use dynident_dynamics::ParametricModel;
 use dynident_iteration::{IterationStatus, RunEstimate, RunRecord};
 use std::path::Path;
 
@@ -33,6 +34,8 @@ pub(super) struct Told<'a> {
 pub(super) struct Stage<'a> {
     /// The leg's number from 1, where each has an iteration of its own.
     pub(super) leg: Option<usize>,
+    /// With the friction in force.
+    pub(super) robot: &'a ParametricModel,
     pub(super) records: &'a [RunRecord],
     pub(super) status: &'a IterationStatus,
     /// For each base parameter the error bar by an earlier leg, if that told it.
@@ -41,10 +44,12 @@ pub(super) struct Stage<'a> {
 
 impl Told<'_> {
     pub(super) fn file(&self, stage: &Stage<'_>) -> IterationsFile {
-        let Stage { leg, records, status, known_std } = *stage;
-        let bound = self.bound.as_deref();
-        let columns = self.machine.layout().columns();
-        let expressions = self.machine.base().expressions();
+        let Stage { leg, robot, records, status, known_std } = *stage;
+        // The truth of a simulated robot is one of the stated terms.
+        let stated = robot.laws() == self.machine.laws();
+        let (bound, truth) = (self.bound.as_deref().filter(|_| stated), self.truth.as_ref().filter(|_| stated));
+        let columns = robot.layout().columns();
+        let expressions = robot.base().expressions();
         let parameters = |record: &RunRecord| {
             let Some(estimate) = &record.estimate else { return Vec::new() };
             let one = |k: usize| IterationParameter {
@@ -52,8 +57,12 @@ impl Told<'_> {
                 expression: expressions[k].clone(),
                 unit: columns[k].unit().to_owned(),
                 value: estimate.values[k],
-                std: known_std[k].or_else(|| (!estimate.fixed.contains(&k)).then_some(estimate.std[k])),
-                error: self.truth.as_ref().map(|truth| estimate.values[k] - truth[k]),
+                std: known_std
+                    .get(k)
+                    .copied()
+                    .flatten()
+                    .or_else(|| (!estimate.fixed.contains(&k)).then_some(estimate.std[k])),
+                error: truth.map(|truth| estimate.values[k] - truth[k]),
             };
             (0..columns.len()).map(one).collect()
         };
@@ -80,7 +89,7 @@ impl Told<'_> {
             _ => None,
         };
         let last = good.last().and_then(|record| record.estimate.as_ref());
-        let error_over_bound = last.zip(self.truth.as_ref()).zip(bound).and_then(|((estimate, truth), bound)| {
+        let error_over_bound = last.zip(truth).zip(bound).and_then(|((estimate, truth), bound)| {
             let ratios: Vec<f64> = (0..bound.len())
                 .filter(|&k| bound[k] > 0.0 && !estimate.fixed.contains(&k))
                 .map(|k| ((estimate.values[k] - truth[k]) / bound[k]).powi(2))

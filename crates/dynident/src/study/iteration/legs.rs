@@ -41,10 +41,19 @@ pub struct LegSection {
     pub design: Option<DesignSection>,
     /// For joints by name the times (from, to; s) that count; what the design says by default, or everything. Joints that are not named do not count then.
     pub windows: BTreeMap<String, Vec<[f64; 2]>>,
+    /// The `[[payload]]` that the robot carries on it, by name; none by default.
+    pub payload: Option<String>,
 }
 
 impl Default for LegSection {
     fn default() -> Self {
-        Self { hold: BTreeMap::new(), locked: true, trajectory: None, design: None, windows: BTreeMap::new() }
+        Self {
+            hold: BTreeMap::new(),
+            locked: true,
+            trajectory: None,
+            design: None,
+            windows: BTreeMap::new(),
+            payload: None,
+        }
     }
 }

@@ -4,11 +4,10 @@ mod legs;
 
 pub use legs::{LegOrder, LegSection};
 
-use super::{EstimatorMethod, Study};
+use super::Study;
+use dynident_identification::IdentificationSettings;
 use dynident_iteration::robot::{FolderSettings, ProcessSettings};
-use dynident_iteration::{
-    IterationSettings, RunEstimator, RunIdentificationSettings, Scheme, SettledSettings, StartWith,
-};
+use dynident_iteration::{IterationSettings, RunIdentificationSettings, Scheme, SettledSettings, StartWith};
 use dynident_recording::{DecimationSettings, DifferentiatorSettings};
 use dynident_simulation::ControllerSettings;
 use serde::{Deserialize, Serialize};
@@ -140,35 +139,41 @@ impl Default for IterationSection {
 }
 
 impl IterationSection {
-    /// The settings of the iteration, with the study's `[controller]` and `[estimator]`.
+    /// The settings of the iteration, with the study's `[controller]`; runs are identified as `identification` says, with the iteration's own differentiator and filter.
     ///
     /// # Errors
-    /// In words: an estimator that a run cannot be identified with.
-    pub(crate) fn settings(&self, study: &Study) -> Result<IterationSettings, String> {
-        let estimator = match study.estimator.method {
-            EstimatorMethod::Ordinary => RunEstimator::Ordinary,
-            EstimatorMethod::Weighted => RunEstimator::Weighted,
-            other => {
-                return Err(format!(
-                    "[estimator] method = \"{}\": an iteration takes \"ordinary\" or \"weighted\"",
-                    other.name()
-                ));
-            }
-        };
+    /// In words: what a run cannot be identified with.
+    pub(crate) fn settings(
+        &self,
+        study: &Study,
+        identification: IdentificationSettings,
+    ) -> Result<IterationSettings, String> {
         self.differentiator.validate().map_err(|error| format!("[iteration] differentiator: {error}"))?;
+        let IdentificationSettings { mut estimation, consistency, friction, .. } = identification;
+        if self.scheme == Scheme::StepByStep && !estimation.estimator.is_plain() {
+            return Err(format!(
+                "[estimator] method = \"{}\": scheme = \"step-by-step\" takes \"ordinary\" or \"weighted\"",
+                estimation.estimator.name()
+            ));
+        }
+        let in_turn =
+            self.scheme == Scheme::StepByStep || self.order == LegOrder::OneAfterAnother && self.leg.len() > 1;
+        if in_turn && !friction.is_empty() {
+            return Err("[drive] friction = \"auto\": only runs that tell of all joints at once can choose; state the friction, or take out scheme and order of [iteration]".to_owned());
+        }
+        // A run's estimate is made, not tested.
+        (estimation.exogeneity_test, estimation.essential) = (None, None);
         let default = IterationSettings::default();
-        let possible = study.estimator.physical.settings();
         Ok(IterationSettings {
             identification: RunIdentificationSettings {
                 scheme: self.scheme,
                 differentiator: self.differentiator.clone(),
                 parallel_filter: self.parallel_filter.clone(),
                 held_torque: self.held_torque,
-                estimator,
-                covariance: study.estimator.covariance,
-                rank: study.estimator.rank,
-                physical: possible.is_some() && !self.literal,
-                possible: possible.unwrap_or_default(),
+                estimation,
+                friction,
+                consistency: consistency.filter(|_| !self.literal),
+                payloads: study.payloads(),
             },
             start: self.start,
             first: self.first.clone(),
