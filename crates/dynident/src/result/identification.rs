@@ -1,5 +1,6 @@
 //! What `identify` writes: the schema of `result.json`.
 
+use super::numbers::{number, rows};
 use crate::study::JointDrive;
 use dynident_estimation::{CorrelatedPair, EssentialReport};
 use dynident_identification::Role;
@@ -43,7 +44,7 @@ pub struct ResultFile {
     /// The base parameters, in the order of the tree.
     pub base_parameters: Vec<BaseParameterResult>,
     /// Covariance of the base parameters by the method's own account, rows and columns in their order, symmetric; zero where a parameter is not excited.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "rows")]
     pub base_parameter_covariance: Vec<Vec<f64>>,
     /// The bodies: one of the full sets that give these base parameters, the nearest to the prior.
     pub bodies: Vec<BodyResult>,
@@ -121,8 +122,10 @@ pub struct MethodSummary {
     /// From positions to accelerations, with the cut-off in force for all logs.
     pub motion: MotionSettings,
     /// Condition number of the weighted regressor's base columns.
+    #[serde(deserialize_with = "number")]
     pub condition_number: f64,
     /// The same after each column was divided by its norm.
+    #[serde(deserialize_with = "number")]
     pub condition_number_scaled: f64,
     /// How the base columns were chosen.
     pub base_columns: String,
@@ -145,13 +148,16 @@ pub struct BaseParameterResult {
     /// Its unit at a turning joint.
     pub unit: String,
     /// The estimate.
+    #[serde(deserialize_with = "number")]
     pub value: f64,
     /// Its standard deviation, by the method's covariance.
+    #[serde(deserialize_with = "number")]
     pub std: f64,
     /// The same if residuals were white: what a naive tool would print.
+    #[serde(deserialize_with = "number")]
     pub std_white: f64,
     /// Half the width of the 95 % interval.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "number")]
     pub half_width_95: f64,
     /// `100 std / |value|`.
     pub relative_std_percent: Option<f64>,
@@ -208,6 +214,7 @@ pub struct JointResult {
     /// Its laws.
     pub laws: Vec<LawResult>,
     /// Standard deviation of its filtered residual, Nm (N).
+    #[serde(deserialize_with = "number")]
     pub residual_std_nm: f64,
     /// How strongly its residual is correlated in time: the lag-1 correlation that matters for the error bars.
     pub residual_correlation: Option<f64>,
@@ -225,6 +232,7 @@ pub struct LogOffset {
     /// What it differs from the mean over the training logs, Nm (N).
     pub deviation_nm: f64,
     /// The deviation's standard deviation.
+    #[serde(deserialize_with = "number")]
     pub std_nm: f64,
 }
 
@@ -281,10 +289,13 @@ pub struct PhysicalFitResult {
     /// Iterations of the solver.
     pub iterations: usize,
     /// Stationarity of its certificate, relative.
+    #[serde(deserialize_with = "number")]
     pub stationarity: f64,
     /// Duality gap of its certificate, relative.
+    #[serde(deserialize_with = "number")]
     pub duality_gap: f64,
     /// How far the base parameters moved from the estimate in all, in standard deviations of white residuals.
+    #[serde(deserialize_with = "number")]
     pub moved_sigma: f64,
     /// The largest move of a base parameter in units of its reported standard deviation.
     pub largest_move_std: Option<f64>,

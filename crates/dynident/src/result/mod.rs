@@ -4,6 +4,7 @@ mod design;
 mod identification;
 mod inspection;
 mod iterations;
+mod numbers;
 mod simulation;
 mod stored;
 mod validation;
