@@ -146,12 +146,12 @@ fn physical_verdict(
     if let Some(fit) = &consistent.fit {
         let arm_estimate = found.training.columns.arm_estimate(found.estimate());
         verdict.fit = Some(physical_fit_result(fit, &arm_estimate));
-        verdict.note = if task.settings.estimation.estimator.is_plain() && study.arm.is_none() {
+        let is_fitted_to_logs = task.settings.estimation.estimator.is_plain() && study.arm.is_none();
+        verdict.note = String::from(if is_fitted_to_logs {
             "of the possible set that fits the logs best; the base parameters above it are the unconstrained estimate"
         } else {
             "of the possible set nearest to the estimate; the base parameters above it are that unconstrained estimate"
-        }
-        .to_owned();
+        });
     }
     verdict.failure.clone_from(&consistent.failure);
     verdict.sign = found.examination.sign;
