@@ -9,7 +9,7 @@ use crate::limits::{JointLimit, LimitError, LimitKind, Limits, LinkPoint};
 use crate::motion::Motion;
 use dynident_dynamics::{Workspace, body_placements, inverse_dynamics};
 use dynident_model::{Body, Model, Transform, Vec3};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A ratio above 1 by more than this is a violation.
 pub const VIOLATION: f64 = 1e-6;
@@ -24,7 +24,7 @@ const MOST_SAMPLES: f64 = 1e8;
 const BLOCK: usize = 1000;
 
 /// How near a motion comes to one limit.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LimitReport {
     /// What is limited.
     pub kind: LimitKind,
@@ -32,11 +32,17 @@ pub struct LimitReport {
     pub joint: String,
     /// 1 on the limit, above it in violation: `|x - middle| / half range`, `|x| / limit`; for distances `2 - distance /
     /// least`, for the floor 1 plus the metres below it. Infinite if the motion is not finite.
+    #[serde(deserialize_with = "finite_or_infinite")]
     pub worst_ratio: f64,
     /// When the ratio is worst, s.
     pub at_s: f64,
     /// True if the limit is broken by more than [`VIOLATION`].
     pub violated: bool,
+}
+
+/// A ratio as JSON has it, which knows no infinity and writes null.
+fn finite_or_infinite<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::INFINITY))
 }
 
 /// What is checked at each sample.

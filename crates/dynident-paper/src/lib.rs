@@ -22,9 +22,9 @@ mod verification;
 pub use piece::{Deviation, PaperCell, PaperFigure, PaperTable};
 
 use arm::Arm;
-use deviations::DEVIATIONS;
+use deviations::deviations;
 use dynident::{Error, RunOptions, check_writable, write_whole};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
@@ -33,12 +33,12 @@ use std::time::Instant;
 pub const PAPER_SCHEMA: &str = "dynident/paper/1";
 
 /// What `reproduce` prints as JSON and writes as `paper.json`.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PaperFile {
     /// [`PAPER_SCHEMA`].
-    pub schema: &'static str,
+    pub schema: String,
     /// The program's version.
-    pub version: &'static str,
+    pub version: String,
     /// Seed of all that is random.
     pub seed: u64,
     /// What was to be reached.
@@ -48,16 +48,16 @@ pub struct PaperFile {
     /// Figures 2 to 7, 9 to 17.
     pub figures: Vec<PaperFigure>,
     /// Where we depart from the paper, and why.
-    pub deviations: &'static [Deviation],
+    pub deviations: Vec<Deviation>,
     /// Seconds by the clock.
     pub seconds: f64,
 }
 
 /// One goal.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Reached {
     /// What is measured.
-    pub what: &'static str,
+    pub what: String,
     /// Its value.
     pub value: f64,
     /// At most this was to be reached.
@@ -67,8 +67,8 @@ pub struct Reached {
 }
 
 impl Reached {
-    fn at_most(what: &'static str, value: f64, goal: f64) -> Self {
-        Self { what, value, goal, met: value <= goal }
+    fn at_most(what: &str, value: f64, goal: f64) -> Self {
+        Self { what: what.to_owned(), value, goal, met: value <= goal }
     }
 }
 
@@ -111,8 +111,8 @@ pub fn reproduce(out: &Path, seed: u64, options: &RunOptions<'_>) -> Result<Pape
     figures.extend(verification);
     let tables = [vec![table_2, optimised.table_3], runs.tables, vec![fourier.table_6]].concat();
     let file = PaperFile {
-        schema: PAPER_SCHEMA,
-        version: env!("CARGO_PKG_VERSION"),
+        schema: PAPER_SCHEMA.to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
         seed,
         reached: vec![
             Reached::at_most("observation matrix against Eq. 7", difference, 1e-12),
@@ -122,7 +122,7 @@ pub fn reproduce(out: &Path, seed: u64, options: &RunOptions<'_>) -> Result<Pape
         ],
         tables: tables.iter().map(|table| (table.number.to_string(), table.clone())).collect(),
         figures,
-        deviations: DEVIATIONS,
+        deviations: deviations(),
         seconds: begun.elapsed().as_secs_f64(),
     };
     for figure in &file.figures {

@@ -12,7 +12,7 @@ pub(crate) fn page(file: &PaperFile, tables: &[PaperTable], figures: &[PaperFigu
     let mut key = KeyFigures::new();
     for figure in &file.reached {
         let tone = if figure.met { Tone::Good } else { Tone::Bad };
-        key = key.judged(figure.what, shown(figure.value), format!("goal: at most {}", shown(figure.goal)), tone);
+        key = key.judged(&figure.what, shown(figure.value), format!("goal: at most {}", shown(figure.goal)), tone);
     }
     page.add(key);
     for (title, table_numbers, figure_numbers) in CHAPTERS {
@@ -28,8 +28,8 @@ pub(crate) fn page(file: &PaperFile, tables: &[PaperTable], figures: &[PaperFigu
     }
     page.add(Heading::new("Where we depart from the paper, and why"));
     let mut departures = Table::new("", ["place", "in the paper", "here"]);
-    for deviation in file.deviations {
-        departures = departures.row([deviation.place, deviation.trouble, deviation.here]);
+    for deviation in &file.deviations {
+        departures = departures.row([&deviation.place, &deviation.trouble, &deviation.here]);
     }
     page.add(departures);
     page.add(Text::new(format!(

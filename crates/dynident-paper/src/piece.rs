@@ -1,11 +1,11 @@
 //! Tables and figures of the paper, as data: the same for `paper.json`, the page and the pictures.
 
 use dynident_report::LinePlot;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// What a cell of a table holds.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum PaperCell {
     /// A number.
@@ -43,7 +43,7 @@ impl From<&str> for PaperCell {
 }
 
 /// A table of the paper, our values beside the paper's.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PaperTable {
     /// Its number in the paper.
     #[serde(skip)]
@@ -70,7 +70,7 @@ impl PaperTable {
 }
 
 /// A figure of the paper.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PaperFigure {
     /// Its number in the paper.
     pub number: usize,
@@ -79,7 +79,7 @@ pub struct PaperFigure {
     /// What it shows.
     pub title: String,
     /// Figures to compare with the paper's, by name.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub values: BTreeMap<String, f64>,
     /// What to know when looking at it.
     pub note: String,
@@ -102,12 +102,12 @@ impl PaperFigure {
 }
 
 /// Where this reproduction departs from the paper's text, and why.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Deviation {
     /// Where in the paper.
-    pub place: &'static str,
+    pub place: String,
     /// What the paper says or leaves out, and what is wrong with it.
-    pub trouble: &'static str,
+    pub trouble: String,
     /// What is done here.
-    pub here: &'static str,
+    pub here: String,
 }

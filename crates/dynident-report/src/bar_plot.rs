@@ -123,7 +123,7 @@ impl BarPlot {
             ticks: ticks(low, high, 5).into_iter().map(|x| (at(x), short(x, 3))).collect(),
             bars: bars.collect(),
         };
-        crate::page::rendered("bar_plot.svg", &view)
+        crate::templates::rendered("bar_plot.svg", &view)
     }
 }
 

@@ -68,7 +68,7 @@ impl FitnessPicture<'_> {
             generations: shown.into_iter().map(|generation| (tenth(x_of(generation)), generation)).collect(),
             known: self.optimum.map(|optimum| format!("{optimum:.3}")),
         };
-        crate::page::rendered("fitness_picture.svg", &view)
+        crate::templates::rendered("fitness_picture.svg", &view)
     }
 }
 

@@ -111,7 +111,7 @@ impl HeatMap {
             rows: names(&self.rows),
             cells: cells.collect(),
         };
-        crate::page::rendered("heat_map.svg", &view)
+        crate::templates::rendered("heat_map.svg", &view)
     }
 }
 

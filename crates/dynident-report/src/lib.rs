@@ -38,6 +38,7 @@ mod path_picture;
 mod pen;
 mod plot_data;
 mod table;
+mod templates;
 mod text;
 mod ticks;
 mod tone;

@@ -27,7 +27,7 @@ pub struct Line {
 ///
 /// Of more than 4800 samples the page holds the least and the largest of each of 1200 pixel columns
 /// ([`kept_samples`](crate::kept_samples)): nothing that shows is lost, but zooming in adds no detail.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct LinePlot {
     /// Headline.
     pub title: String,
@@ -179,7 +179,7 @@ impl LinePlot {
             y_ticks: ticks(low, high, 5).into_iter().map(|y| (tenth(at_y(y)), short(exact(y), 3))).collect(),
             lines: lines.collect(),
         };
-        crate::page::rendered("line_plot.svg", &view)
+        crate::templates::rendered("line_plot.svg", &view)
     }
 }
 

@@ -91,7 +91,7 @@ impl<'a> MotionPicture<'a> {
             first: format!("{:.2}", self.times_s.first().unwrap_or(&0.0)),
             last: format!("{:.2}", self.times_s.last().unwrap_or(&0.0)),
         };
-        crate::page::rendered("motion_picture.svg", &view)
+        crate::templates::rendered("motion_picture.svg", &view)
     }
 }
 

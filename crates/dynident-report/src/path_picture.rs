@@ -75,7 +75,7 @@ impl PathPicture<'_> {
             size: VIEW,
             views: views.collect(),
         };
-        crate::page::rendered("path_picture.svg", &picture)
+        crate::templates::rendered("path_picture.svg", &picture)
     }
 
     /// All points, the base, and what limits add near them.

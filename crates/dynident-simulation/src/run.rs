@@ -2,11 +2,11 @@
 
 use crate::plant::PlantFault;
 use dynident_excitation::Motion;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// How a run ended.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "status", rename_all = "kebab-case")]
 pub enum RunStatus {
     /// At the reference's end.
@@ -34,7 +34,7 @@ pub enum RunStatus {
 }
 
 /// What a run may not exceed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LimitedQuantity {
     /// Position.
@@ -56,7 +56,7 @@ impl LimitedQuantity {
 }
 
 /// Why a run counts as diverged.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Divergence {
     /// The simulated robot cannot go on.

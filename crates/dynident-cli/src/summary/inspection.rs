@@ -20,7 +20,7 @@ pub(crate) fn inspection(i: &Inspection) -> String {
         let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.2}"));
         vec![
             name(&joint.name),
-            joint.kind.to_owned(),
+            joint.kind.clone(),
             number(joint.lower),
             number(joint.upper),
             number(joint.velocity),

@@ -13,7 +13,7 @@ pub(crate) fn reproduction(file: &PaperFile, out: &Path) -> String {
         .map(|goal| {
             let number = |value: f64| if value.abs() < 1e-2 { format!("{value:.1e}") } else { format!("{value:.3}") };
             let verdict = if goal.met { "reached" } else { "missed" };
-            vec![goal.what.to_owned(), number(goal.value), number(goal.goal), verdict.to_owned()]
+            vec![goal.what.clone(), number(goal.value), number(goal.goal), verdict.to_owned()]
         })
         .collect();
     let words = format!(

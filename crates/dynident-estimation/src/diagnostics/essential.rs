@@ -41,7 +41,7 @@ impl EssentialSettings {
 }
 
 /// A parameter that was dropped, that is held at zero.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DroppedParameter {
     /// Its name.
     pub name: String,
@@ -58,7 +58,7 @@ pub struct DroppedParameter {
 }
 
 /// Why dropping ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EssentialEnd {
     /// All relative standard deviations are below the ratio.
@@ -70,7 +70,7 @@ pub enum EssentialEnd {
 }
 
 /// What was dropped and why no more.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EssentialReport {
     /// Parameters kept.
     pub kept: usize,

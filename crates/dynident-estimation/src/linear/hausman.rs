@@ -45,7 +45,7 @@ impl HausmanSettings {
 }
 
 /// What the test says.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum HausmanVerdict {
     /// Noise in the regressor does not show: filtering was enough, least squares may be used.
@@ -57,7 +57,7 @@ pub enum HausmanVerdict {
 }
 
 /// The test with its numbers.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HausmanTest {
     /// What follows.
     pub verdict: HausmanVerdict,
@@ -74,7 +74,7 @@ pub struct HausmanTest {
 }
 
 /// One tested column.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HausmanColumn {
     /// Its name.
     pub name: String,

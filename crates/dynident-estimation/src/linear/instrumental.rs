@@ -56,7 +56,7 @@ impl InstrumentalSettings {
 }
 
 /// How well the instruments explain the regressor.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InstrumentReport {
     /// Independent instruments.
     pub instruments: usize,

@@ -6,7 +6,7 @@
 
 use super::singular_values::Singular3;
 use crate::optimisers::OptimiserError;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The variables of one joint: the stroke of equation 14 with h = 0, and the window of Fig. 6.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,7 +35,7 @@ impl Stroke {
 }
 
 /// What the limits of equations 17 and 18 bound.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StrokeQuantity {
     /// Highest position, A/(1 + e^(-ωT/4)), in rad. The lowest is above zero for every stroke.

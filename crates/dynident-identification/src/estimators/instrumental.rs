@@ -50,7 +50,7 @@ impl InstrumentSettings {
 }
 
 /// What was found out about noise in the regressor.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct NoiseInRegressor {
     /// Lowest and highest cut-off of the instruments over the logs, Hz; none when they do not come from a filter.
     pub instrument_cutoff_hz: Option<[f64; 2]>,

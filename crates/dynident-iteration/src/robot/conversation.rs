@@ -70,7 +70,9 @@ pub(super) fn run(
                 }
                 return Ok(RobotStatus::Done);
             }
-            other => return Err(RobotFault::OutOfTurn { found: other.kind(), expected: "sample" }),
+            other => {
+                return Err(RobotFault::OutOfTurn { found: other.kind().to_owned(), expected: "sample".to_owned() });
+            }
         }
     }
 }
@@ -107,7 +109,9 @@ pub(super) fn steps(
                 vector(client, &dq, "dq", sample)?,
             ),
             ToHost::End { reason, .. } => return Ok(RobotStatus::Stopped { reason }),
-            other => return Err(RobotFault::OutOfTurn { found: other.kind(), expected: "state" }),
+            other => {
+                return Err(RobotFault::OutOfTurn { found: other.kind().to_owned(), expected: "state".to_owned() });
+            }
         };
         target.take(reference, sample);
         let due_s = sample as f64 / reference.rate_hz();
@@ -129,7 +133,7 @@ pub(super) fn steps(
     match client.next("end")? {
         ToHost::End { status: EndStatus::Done, .. } => Ok(RobotStatus::Done),
         ToHost::End { reason, .. } => Ok(RobotStatus::Stopped { reason }),
-        other => Err(RobotFault::OutOfTurn { found: other.kind(), expected: "end" }),
+        other => Err(RobotFault::OutOfTurn { found: other.kind().to_owned(), expected: "end".to_owned() }),
     }
 }
 
@@ -154,7 +158,7 @@ fn time(t_s: Option<f64>, sample: usize, before: Option<&f64>) -> Result<f64, Ro
 fn vector(client: &Client, values: &[Option<f64>], what: &'static str, sample: usize) -> Result<Vec<f64>, RobotFault> {
     let expected = client.places.len();
     if values.len() != expected {
-        return Err(RobotFault::WrongJoints { sample, what, expected, found: values.len() });
+        return Err(RobotFault::WrongJoints { sample, what: what.to_owned(), expected, found: values.len() });
     }
     let one = |&place: &usize| {
         let not_a_number = || RobotFault::NotANumber { sample, what: format!("{what}[{place}]") };

@@ -21,7 +21,7 @@ use dynident_simulation::Reference;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{Run, RunStatus};
 use dynident_simulation::{SimulationError, require_length};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -88,7 +88,7 @@ impl RobotRun {
 }
 
 /// How a robot's run ended.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "end", rename_all = "kebab-case")]
 pub enum RobotStatus {
     /// The whole trajectory was run.
@@ -137,7 +137,7 @@ impl core::fmt::Display for RobotStatus {
 }
 
 /// How an exchange with a robot outside can fail.
-#[derive(Clone, Debug, PartialEq, Error, Serialize)]
+#[derive(Clone, Debug, PartialEq, Error, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum RobotFault {
@@ -153,7 +153,7 @@ pub enum RobotFault {
     #[error("the robot program ended while its {waiting_for} was awaited ({exit}){said}")]
     Died {
         /// What was awaited.
-        waiting_for: &'static str,
+        waiting_for: String,
         /// Its exit status.
         exit: String,
         /// The end of what it wrote to standard error, or nothing.
@@ -163,7 +163,7 @@ pub enum RobotFault {
     #[error("the robot program gave no {waiting_for} within {limit_s} s")]
     Hung {
         /// What was awaited.
-        waiting_for: &'static str,
+        waiting_for: String,
         /// The limit.
         limit_s: f64,
     },
@@ -179,9 +179,9 @@ pub enum RobotFault {
     #[error("the robot program wrote a message of type {found} where {expected} was awaited")]
     OutOfTurn {
         /// What came.
-        found: &'static str,
+        found: String,
         /// What was awaited.
-        expected: &'static str,
+        expected: String,
     },
     /// A number that is none, or is missing.
     #[error("sample {sample} of the robot: {what} is not a finite number")]
@@ -197,7 +197,7 @@ pub enum RobotFault {
         /// The sample, from 0.
         sample: usize,
         /// Which vector.
-        what: &'static str,
+        what: String,
         /// How many joints there are.
         expected: usize,
         /// How many entries came.

@@ -207,7 +207,7 @@ impl Client {
         };
         let hello = client.receive("hello", settings.limits.hello_s)?;
         let ToHost::Hello { protocol, joints: found, modes, .. } = hello else {
-            return Err(RobotFault::OutOfTurn { found: hello.kind(), expected: "hello" });
+            return Err(RobotFault::OutOfTurn { found: hello.kind().to_owned(), expected: "hello".to_owned() });
         };
         if protocol != PROTOCOL {
             return Err(RobotFault::Protocol { found: protocol, expected: PROTOCOL.to_owned() });
@@ -254,7 +254,9 @@ impl Client {
             Ok(Ok(line)) => message(&line)
                 .map_err(|error| RobotFault::Garbage { line: shortened(&line), reason: error.to_string() }),
             Ok(Err(reason)) => Err(RobotFault::Garbage { line: String::new(), reason }),
-            Err(RecvTimeoutError::Timeout) => Err(RobotFault::Hung { waiting_for, limit_s: wait.1 }),
+            Err(RecvTimeoutError::Timeout) => {
+                Err(RobotFault::Hung { waiting_for: waiting_for.to_owned(), limit_s: wait.1 })
+            }
             Err(RecvTimeoutError::Disconnected) => Err(self.died(waiting_for)),
         }
     }
@@ -269,7 +271,7 @@ impl Client {
         std::thread::sleep(Duration::from_millis(20));
         let words = self.last_words.lock().map(|words| String::from_utf8_lossy(&words).trim().to_owned());
         let said = words.ok().filter(|words| !words.is_empty()).map(|words| format!("; it said: {words}"));
-        RobotFault::Died { waiting_for, exit, said: said.unwrap_or_default() }
+        RobotFault::Died { waiting_for: waiting_for.to_owned(), exit, said: said.unwrap_or_default() }
     }
 }
 

@@ -24,11 +24,11 @@ use dynident_model::Model;
 use dynident_model::laws::Law;
 use equations::{At, Equations, Mode};
 use runge_kutta::Stages;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Why a simulated robot cannot go on. Its state is then that of the last moment which could be computed, or not a number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PlantFault {
     /// The mass matrix is not positive definite.

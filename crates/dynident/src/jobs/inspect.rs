@@ -18,7 +18,7 @@ pub fn inspect(path: &Path) -> Result<Inspection, Error> {
     let (weakest, strongest) = base.gap();
     let joints = model.joints().iter().map(|joint| JointSummary {
         name: joint.name.clone(),
-        kind: joint.kind.name(),
+        kind: joint.kind.name().to_owned(),
         parent: joint.parent.map(|parent| model.bodies()[parent].name().to_owned()),
         lower: joint.limits.lower,
         upper: joint.limits.upper,
@@ -38,20 +38,20 @@ pub fn inspect(path: &Path) -> Result<Inspection, Error> {
     let mut entries: Vec<AuditEntry> = audit(model)
         .into_iter()
         .map(|finding| AuditEntry {
-            level: finding.level.name(),
-            check: finding.check,
+            level: finding.level.name().to_owned(),
+            check: finding.check.to_owned(),
             place: finding.place,
             what: finding.message,
         })
         .collect();
     entries.extend(robot.unread.iter().map(|unread| AuditEntry {
-        level: "info",
-        check: "not-read",
+        level: "info".to_owned(),
+        check: "not-read".to_owned(),
         place: format!("line {}", unread.line),
         what: format!("<{}> under <{}> was not read: misspelt, or given twice", unread.element, unread.parent),
     }));
     Ok(Inspection {
-        schema: INSPECTION_SCHEMA,
+        schema: INSPECTION_SCHEMA.to_owned(),
         name: model.name().to_owned(),
         file: path.display().to_string(),
         dof: model.dof(),

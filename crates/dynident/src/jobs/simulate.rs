@@ -50,7 +50,7 @@ pub fn simulate_study(
     let run = truth.robot.run(&request).map_err(|why| wrong("simulation", &why))?;
     let own = |values: &[f64], expressions: Vec<String>, units: Vec<&'static str>| {
         let named = expressions.into_iter().zip(units).zip(values);
-        named.map(|((expression, unit), &value)| ParameterTruth { expression, value, unit }).collect()
+        named.map(|((expression, unit), &value)| ParameterTruth { expression, value, unit: unit.to_owned() }).collect()
     };
     let bodies = machine.model().bodies().iter().zip(truth.parameters.chunks_exact(10));
     let (max_error, saturated) = run
@@ -58,9 +58,9 @@ pub fn simulate_study(
         .as_ref()
         .map_or_else(|| (Vec::new(), Vec::new()), |truth| (truth.max_error.clone(), truth.saturated.clone()));
     let file = SimulationFile {
-        schema: SIMULATION_SCHEMA,
+        schema: SIMULATION_SCHEMA.to_owned(),
         name: study_name(study, study_path),
-        controller: controller.name(),
+        controller: controller.name().to_owned(),
         done: run.status.is_done(),
         status: run.status,
         joints: machine.parametric.joint_names(),

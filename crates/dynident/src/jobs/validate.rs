@@ -3,8 +3,7 @@
 use crate::error::Error;
 use crate::jobs::log_summary::held_out_summary;
 use crate::jobs::options::{RunOptions, study_name};
-use crate::result::stored::StoredModel;
-use crate::result::{VALIDATION_SCHEMA, ValidationFile};
+use crate::result::{ResultFile, VALIDATION_SCHEMA, ValidationFile};
 use crate::study::{Folders, Study, StudyRobot};
 use dynident_identification::examination::{TestedModel, examine_held_out};
 use dynident_identification::{Logs, Role};
@@ -22,7 +21,7 @@ pub fn validate(
 ) -> Result<ValidationFile, Error> {
     study.require_log(study_path)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
-    let stored = StoredModel::read(result_path)?;
+    let stored = ResultFile::read(result_path)?;
     let study = &stored.friction_of(study);
     let robot = StudyRobot::new(study, study_path, &folders)?;
     let theta = stored.base_values(result_path, &robot.parametric)?;

@@ -127,7 +127,7 @@ fn largest_error(run: &IterationRun) -> Option<f64> {
 }
 
 fn figures(file: &IterationsFile) -> KeyFigures {
-    let tone = match file.status {
+    let tone = match &file.status[..] {
         "converged" => Tone::Good,
         "refused" => Tone::Bad,
         _ => Tone::Warning,
@@ -255,8 +255,8 @@ fn parameters(page: &mut Report, file: &IterationsFile) {
     }
     let mut units: Vec<&str> = Vec::new();
     for parameter in &last.parameters {
-        if !units.contains(&parameter.unit) {
-            units.push(parameter.unit);
+        if !units.contains(&&*parameter.unit) {
+            units.push(&parameter.unit);
         }
     }
     for of_unit in units {
@@ -357,7 +357,7 @@ fn table(file: &IterationsFile, last: &IterationRun, known: bool) -> Table {
     let optional = |value: Option<f64>| Cell::from(value.map_or_else(|| "–".to_owned(), |value| short(value, 3)));
     let mut table = Table::new("All runs", columns);
     for (place, parameter) in last.parameters.iter().enumerate() {
-        let mut row = vec![Cell::from(&parameter.expression), Cell::from(unit(parameter.unit))];
+        let mut row = vec![Cell::from(&parameter.expression), Cell::from(unit(&parameter.unit))];
         row.extend(file.runs.iter().map(|run| match run.parameters.get(place) {
             Some(own) if own.std.is_some() => Cell::from(short(own.value, 5)),
             _ => Cell::from("–"),

@@ -3,22 +3,22 @@
 use crate::study::{FamilyChoice, WindowedProblem};
 use dynident_excitation::check::LimitReport;
 use dynident_excitation::step_wise::StrokeQuantity;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Name and version of the schema of [`DesignFile`].
 pub const DESIGN_SCHEMA: &str = "dynident/design/1";
 
 /// What `design` prints as JSON and writes as `design.json`.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DesignFile {
     /// [`DESIGN_SCHEMA`].
-    pub schema: &'static str,
+    pub schema: String,
     /// Name of the study.
     pub name: String,
     /// Joints in the order of all vectors.
     pub joints: Vec<String>,
     /// The family; `given` for a trajectory or log that was only looked at.
-    pub family: &'static str,
+    pub family: String,
     /// The trajectory or log that was looked at; none for a search.
     pub given: Option<String>,
     /// The family's settings, as a study would have them; none for a motion that was given.
@@ -28,9 +28,9 @@ pub struct DesignFile {
     /// Where the study lets each joint start, rad (m): none for a joint that is free, empty where all are.
     pub start_posture: Vec<Option<f64>>,
     /// What looked for the motion; `none` for one that was given.
-    pub optimiser: &'static str,
+    pub optimiser: String,
     /// The criterion.
-    pub criterion: &'static str,
+    pub criterion: String,
     /// The criterion's figure, smaller is better; none where a parameter is not excited.
     pub criterion_figure: Option<f64>,
     /// Condition number of the stacked base regressor, SI units, no weights.
@@ -54,7 +54,7 @@ pub struct DesignFile {
     /// Rate of that check, Hz.
     pub check_rate_hz: f64,
     /// What was checked: the motion itself, or how a given one was understood between its samples.
-    pub check_of: &'static str,
+    pub check_of: String,
     /// Every limit, and how much of it the motion uses.
     pub limits: Vec<LimitReport>,
     /// Error bars that this motion will give, or that a log gives, white torque noise assumed.
@@ -79,14 +79,14 @@ pub struct DesignFile {
 }
 
 /// What will be known of one base parameter.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ParameterForecast {
     /// Symbol of its column.
     pub symbol: String,
     /// What it sums.
     pub expression: String,
     /// Unit.
-    pub unit: &'static str,
+    pub unit: String,
     /// Expected standard deviation from the motion alone; none if the motion does not excite it.
     pub std: Option<f64>,
     /// The same with what the prior knows; none without a prior.
@@ -98,7 +98,7 @@ pub struct ParameterForecast {
 }
 
 /// A direction in the space of column-scaled parameters.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DirectionForecast {
     /// How many times less is known in it than of a column that stood alone: `1 / √λ` of the correlation-scaled
     /// information.
@@ -108,12 +108,12 @@ pub struct DirectionForecast {
 }
 
 /// What `design.json` holds of a windowed design under `windowed`.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct WindowedFile {
     /// Which joints move while others rest.
     pub problem: WindowedProblem,
     /// `gradient`, `cma-es`, `genetic`, or `given` where the study gives the strokes.
-    pub optimiser: &'static str,
+    pub optimiser: String,
     /// H of equation 19: the sum of the condition numbers, with the penalty where a limit is broken.
     pub fitness: f64,
     /// The sum of the condition numbers alone.
@@ -129,7 +129,7 @@ pub struct WindowedFile {
 }
 
 /// One joint's stroke.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct StrokeFile {
     /// The joint.
     pub joint: String,
@@ -150,7 +150,7 @@ pub struct StrokeFile {
 }
 
 /// One limit of a stroke.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct StrokeLimitFile {
     /// What is bounded.
     pub quantity: StrokeQuantity,

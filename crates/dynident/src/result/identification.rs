@@ -1,5 +1,6 @@
 //! What `identify` writes: the schema of `result.json`.
 
+use super::numbers::{number, rows};
 use crate::study::JointDrive;
 use dynident_estimation::{CorrelatedPair, EssentialReport};
 use dynident_identification::Role;
@@ -15,7 +16,7 @@ use serde::{Deserialize, Serialize};
 pub const RESULT_SCHEMA: &str = "dynident/result/1";
 
 /// A finished identification.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ResultFile {
     /// [`RESULT_SCHEMA`].
     pub schema: String,
@@ -43,6 +44,7 @@ pub struct ResultFile {
     /// The base parameters, in the order of the tree.
     pub base_parameters: Vec<BaseParameterResult>,
     /// Covariance of the base parameters by the method's own account, rows and columns in their order, symmetric; zero where a parameter is not excited.
+    #[serde(default, deserialize_with = "rows")]
     pub base_parameter_covariance: Vec<Vec<f64>>,
     /// The bodies: one of the full sets that give these base parameters, the nearest to the prior.
     pub bodies: Vec<BodyResult>,
@@ -51,24 +53,31 @@ pub struct ResultFile {
     /// What was held at zero because the data hardly tell it; none unless asked for.
     pub essential: Option<EssentialReport>,
     /// The strongest correlations between estimates, strongest first.
+    #[serde(default)]
     pub correlations: Vec<CorrelatedPair>,
     /// Friction and drives.
     pub joints: Vec<JointResult>,
     /// How friction was chosen, for the joints where the study asks for it.
+    #[serde(default)]
     pub friction_choice: Vec<JointFrictionResult>,
     /// Payloads that were estimated.
+    #[serde(default)]
     pub payloads: Vec<PayloadResult>,
     /// Offsets log by log; empty unless the study asks for them. The base parameters hold their mean.
+    #[serde(default)]
     pub offsets: Vec<LogOffset>,
     /// Drive gains, joint by joint; none unless the study says that they are unknown.
     pub drive_gains: Option<Vec<DriveGain>>,
     /// Drives that turn with two joints.
+    #[serde(default)]
     pub couplings: Vec<LawResult>,
     /// The fit on the logs that it was made from.
     pub training: TrainingResult,
     /// The test on logs that were not used.
+    #[serde(default)]
     pub validation: Vec<LogValidation>,
     /// How well the 95 % band of the predicted torque holds on held-out logs.
+    #[serde(default)]
     pub torque_band: Vec<TorqueBand>,
     /// Whether the full set is physically possible.
     pub physical: PhysicalVerdict,
@@ -81,7 +90,7 @@ pub struct ResultFile {
 }
 
 /// The machine of a result.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RobotSummary {
     /// Its name.
     pub name: String,
@@ -98,7 +107,7 @@ pub struct RobotSummary {
 }
 
 /// How a fit was made.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MethodSummary {
     /// The study's `estimator.method`.
     pub estimator: String,
@@ -113,14 +122,17 @@ pub struct MethodSummary {
     /// From positions to accelerations, with the cut-off in force for all logs.
     pub motion: MotionSettings,
     /// Condition number of the weighted regressor's base columns.
+    #[serde(deserialize_with = "number")]
     pub condition_number: f64,
     /// The same after each column was divided by its norm.
+    #[serde(deserialize_with = "number")]
     pub condition_number_scaled: f64,
     /// How the base columns were chosen.
     pub base_columns: String,
     /// Smallest share of a column that counted as independent, largest that counted as dependent.
     pub base_gap: [f64; 2],
     /// Base parameters that the data do not excite; they were held at the prior (or zero).
+    #[serde(default)]
     pub not_excited: Vec<String>,
     /// With load-dependent friction: the base parameters, by the estimate without it, whose torque is the load.
     pub load_parameters: Option<Vec<f64>>,
@@ -136,13 +148,16 @@ pub struct BaseParameterResult {
     /// Its unit at a turning joint.
     pub unit: String,
     /// The estimate.
+    #[serde(deserialize_with = "number")]
     pub value: f64,
     /// Its standard deviation, by the method's covariance.
+    #[serde(deserialize_with = "number")]
     pub std: f64,
     /// The same if residuals were white: what a naive tool would print.
+    #[serde(deserialize_with = "number")]
     pub std_white: f64,
     /// Half the width of the 95 % interval.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "number")]
     pub half_width_95: f64,
     /// `100 std / |value|`.
     pub relative_std_percent: Option<f64>,
@@ -156,7 +171,7 @@ pub struct BaseParameterResult {
 }
 
 /// One body of the full set.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct BodyResult {
     /// Name of its own link.
     pub name: String,
@@ -177,7 +192,7 @@ pub struct BodyResult {
 }
 
 /// A parameter of a law.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LawResult {
     /// Its symbol.
     pub symbol: String,
@@ -192,13 +207,14 @@ pub struct LawResult {
 }
 
 /// Friction and drive of one joint.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct JointResult {
     /// The joint.
     pub name: String,
     /// Its laws.
     pub laws: Vec<LawResult>,
     /// Standard deviation of its filtered residual, Nm (N).
+    #[serde(deserialize_with = "number")]
     pub residual_std_nm: f64,
     /// How strongly its residual is correlated in time: the lag-1 correlation that matters for the error bars.
     pub residual_correlation: Option<f64>,
@@ -207,7 +223,7 @@ pub struct JointResult {
 }
 
 /// The offset of one joint in one log.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LogOffset {
     /// The log.
     pub log: String,
@@ -216,11 +232,12 @@ pub struct LogOffset {
     /// What it differs from the mean over the training logs, Nm (N).
     pub deviation_nm: f64,
     /// The deviation's standard deviation.
+    #[serde(deserialize_with = "number")]
     pub std_nm: f64,
 }
 
 /// Figures of the fit on its own data.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TrainingResult {
     /// The logs.
     pub logs: Vec<String>,
@@ -233,7 +250,7 @@ pub struct TrainingResult {
 }
 
 /// One joint of [`TrainingResult`].
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TrainingJoint {
     /// The joint.
     pub name: String,
@@ -244,11 +261,12 @@ pub struct TrainingJoint {
 }
 
 /// Whether a full set is possible.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PhysicalVerdict {
     /// All pseudo-inertias positive definite, no negative friction or drive inertia.
     pub consistent: bool,
     /// What is not.
+    #[serde(default)]
     pub violations: Vec<String>,
     /// What the verdict is about.
     pub note: String,
@@ -257,34 +275,39 @@ pub struct PhysicalVerdict {
     /// Why it failed.
     pub failure: Option<String>,
     /// Bodies whose description is no possible body, so that a rough one of ordinary mass stands in as their prior.
+    #[serde(default)]
     pub impossible_priors: Vec<String>,
     /// Which sign of the torque a possible machine explains; none without a possible machine for either.
     pub sign: Option<SignEvidence>,
 }
 
 /// A physically consistent fit.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PhysicalFitResult {
     /// `solved`, `stalled` or `iteration-limit`; all of them meet every constraint.
     pub status: String,
     /// Iterations of the solver.
     pub iterations: usize,
     /// Stationarity of its certificate, relative.
+    #[serde(deserialize_with = "number")]
     pub stationarity: f64,
     /// Duality gap of its certificate, relative.
+    #[serde(deserialize_with = "number")]
     pub duality_gap: f64,
     /// How far the base parameters moved from the estimate in all, in standard deviations of white residuals.
+    #[serde(deserialize_with = "number")]
     pub moved_sigma: f64,
     /// The largest move of a base parameter in units of its reported standard deviation.
     pub largest_move_std: Option<f64>,
     /// Limits that hold with equality and push: friction or drive inertia at zero.
+    #[serde(default)]
     pub active: Vec<String>,
     /// Body by body.
     pub bodies: Vec<PhysicalBodyResult>,
 }
 
 /// How possible a body is.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PhysicalBodyResult {
     /// Its name.
     pub name: String,
@@ -295,7 +318,7 @@ pub struct PhysicalBodyResult {
 }
 
 /// What is known of a log.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LogSummary {
     /// Its name.
     pub log: String,
@@ -314,17 +337,21 @@ pub struct LogSummary {
     /// The log against the description's own inertials.
     pub prior_agreement: Option<PriorAgreement>,
     /// Lag of torque behind motion by joint, seconds, estimated together with the model from this log alone; none where the log does not tell.
+    #[serde(default)]
     pub torque_lag_s: Vec<Option<f64>>,
     /// Standard deviations of the lags.
+    #[serde(default)]
     pub torque_lag_std_s: Vec<Option<f64>>,
     /// Half the widths of their 95 % intervals.
+    #[serde(default)]
     pub torque_lag_half_width_95_s: Vec<Option<f64>>,
     /// What follows from both.
+    #[serde(default)]
     pub model_findings: Vec<Finding>,
 }
 
 /// Where the time went, in seconds.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Timings {
     /// Reading the robot, base parameters.
     pub machine: f64,

@@ -1,15 +1,15 @@
 //! What `inspect` prints: the schema of its JSON.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Name and version of the schema of [`Inspection`].
 pub const INSPECTION_SCHEMA: &str = "dynident/inspection/1";
 
 /// What `inspect` prints as JSON.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Inspection {
     /// [`INSPECTION_SCHEMA`].
-    pub schema: &'static str,
+    pub schema: String,
     /// The machine's name.
     pub name: String,
     /// The file.
@@ -31,13 +31,13 @@ pub struct Inspection {
 }
 
 /// One joint.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct JointSummary {
     /// Its name.
     pub name: String,
     /// `revolute`, `continuous` or `prismatic`.
     #[serde(rename = "type")]
-    pub kind: &'static str,
+    pub kind: String,
     /// Body that it stands on; none for the base.
     pub parent: Option<String>,
     /// Lowest position, rad or m.
@@ -53,7 +53,7 @@ pub struct JointSummary {
 }
 
 /// One body.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct BodySummary {
     /// Name of its own link.
     pub name: String,
@@ -66,7 +66,7 @@ pub struct BodySummary {
 }
 
 /// Base parameters.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct BaseSummary {
     /// How many.
     pub count: usize,
@@ -81,12 +81,12 @@ pub struct BaseSummary {
 }
 
 /// One finding.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct AuditEntry {
     /// `info`, `warning` or `problem`.
-    pub level: &'static str,
+    pub level: String,
     /// Short name of the check.
-    pub check: &'static str,
+    pub check: String,
     /// Which link or joint.
     #[serde(rename = "where")]
     pub place: String,

@@ -1,21 +1,21 @@
 //! What `iterations.json` holds.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Schema of `iterations.json`.
 pub const ITERATIONS_SCHEMA: &str = "dynident/iterations/1";
 
 /// `iterations.json`.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct IterationsFile {
     /// [`ITERATIONS_SCHEMA`].
-    pub schema: &'static str,
+    pub schema: String,
     /// Name of the study.
     pub name: String,
     /// Whether tracking and parameters have settled.
     pub converged: bool,
     /// `converged`, `runs-used-up`, `refused` or `waiting`.
-    pub status: &'static str,
+    pub status: String,
     /// The status in words.
     pub reason: String,
     /// Names of the joints.
@@ -35,7 +35,7 @@ pub struct IterationsFile {
 }
 
 /// One run.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct IterationRun {
     /// Its number, from 1.
     pub run: usize,
@@ -64,14 +64,14 @@ pub struct IterationRun {
 }
 
 /// One base parameter by one run.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct IterationParameter {
     /// Symbol of its column.
     pub symbol: String,
     /// What it sums.
     pub expression: String,
     /// Unit.
-    pub unit: &'static str,
+    pub unit: String,
     /// Value.
     pub value: f64,
     /// Standard deviation; none where the run does not tell it.

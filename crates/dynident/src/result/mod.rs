@@ -4,8 +4,9 @@ mod design;
 mod identification;
 mod inspection;
 mod iterations;
+mod numbers;
 mod simulation;
-pub(crate) mod stored;
+mod stored;
 mod validation;
 
 pub use design::{
@@ -19,4 +20,7 @@ pub use identification::{
 pub use inspection::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary};
 pub use iterations::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile};
 pub use simulation::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};
+// What the files hold of the crates below.
+pub use dynident_excitation::check::LimitReport;
+pub use dynident_iteration::{RobotFault, RobotStatus};
 pub use validation::{VALIDATION_SCHEMA, ValidationFile};

@@ -1,20 +1,20 @@
 //! What `simulate` writes as `truth.json`.
 
 use dynident_iteration::RobotStatus;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Schema of `truth.json`.
 pub const SIMULATION_SCHEMA: &str = "dynident/simulation/1";
 
 /// What `truth.json` holds.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SimulationFile {
     /// [`SIMULATION_SCHEMA`].
-    pub schema: &'static str,
+    pub schema: String,
     /// Name of the study.
     pub name: String,
     /// The controller.
-    pub controller: &'static str,
+    pub controller: String,
     /// How the run ended.
     pub status: RobotStatus,
     /// Whether it reached the trajectory's end.
@@ -38,7 +38,7 @@ pub struct SimulationFile {
 }
 
 /// A body as it truly is.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct BodyTruth {
     /// Its name.
     pub name: String,
@@ -47,12 +47,12 @@ pub struct BodyTruth {
 }
 
 /// A parameter as it truly is.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ParameterTruth {
     /// What it is.
     pub expression: String,
     /// Value.
     pub value: f64,
     /// Unit.
-    pub unit: &'static str,
+    pub unit: String,
 }

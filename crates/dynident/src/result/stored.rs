@@ -1,58 +1,20 @@
-//! A finished model, read back from `result.json`.
+//! A finished model, read back from `result.json`: what later jobs take from it.
 
-use super::identification::{BaseParameterResult, JointFrictionResult, RESULT_SCHEMA};
+use super::identification::{RESULT_SCHEMA, ResultFile};
 use crate::error::Error;
 use crate::study::{JointDrive, Study};
 use dynident_dynamics::ParametricModel;
 use dynident_identification::RegressorModel;
 use dynident_identification::payload::{KnownArm, Refit, known_payloads};
-use dynident_recording::MotionSettings;
 use nalgebra::DMatrix;
-use serde::Deserialize;
 use std::path::Path;
 
-/// The part of `result.json` that a model is.
-#[derive(Clone, Debug, Deserialize)]
-pub(crate) struct StoredModel {
-    schema: String,
-    method: StoredMethod,
-    #[serde(default)]
-    friction_choice: Vec<JointFrictionResult>,
-    base_parameters: Vec<BaseParameterResult>,
-    #[serde(default)]
-    base_parameter_covariance: Vec<Vec<f64>>,
-    #[serde(default)]
-    payloads: Vec<StoredPayload>,
-    #[serde(default)]
-    drive_gains: Option<Vec<StoredGain>>,
-}
-
-/// The part of a stored gain that a model needs.
-#[derive(Clone, Debug, Deserialize)]
-struct StoredGain {
-    gain: f64,
-}
-
-/// The part of a stored payload that a model needs.
-#[derive(Clone, Debug, Deserialize)]
-struct StoredPayload {
-    name: String,
-    base_parameters_added: Vec<f64>,
-}
-
-#[derive(Clone, Debug, Deserialize)]
-struct StoredMethod {
-    motion: MotionSettings,
-    #[serde(default)]
-    load_parameters: Option<Vec<f64>>,
-}
-
-impl StoredModel {
+impl ResultFile {
     /// Reads a result of `identify`.
     ///
     /// # Errors
     /// A file that cannot be read, is no result, or is one of another version.
-    pub(crate) fn read(path: &Path) -> Result<Self, Error> {
+    pub fn read(path: &Path) -> Result<Self, Error> {
         let wrong = |message: String| Error::Result { path: path.to_owned(), message };
         let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
         let stored: Self = serde_json::from_slice(&bytes).map_err(|error| {

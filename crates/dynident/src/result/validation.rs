@@ -2,13 +2,13 @@
 
 use super::identification::LogSummary;
 use dynident_identification::examination::LogValidation;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Name and version of the schema of [`ValidationFile`].
 pub const VALIDATION_SCHEMA: &str = "dynident/validation/1";
 
 /// What `validate` prints as JSON.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ValidationFile {
     /// [`VALIDATION_SCHEMA`].
     pub schema: String,

@@ -1,5 +1,5 @@
 //! Priors, start postures, tasks, joined families and the check of given motions, each against what must hold.
-use crate::common::{Job, Motion, Truth, header, plain, repository, write_log};
+use crate::common::{Job, Motion, Truth, assert_reads_back, header, plain, repository, write_log};
 use core::ops::ControlFlow;
 use dynident::excitation::export::{Sampled, trajectory_csv, waypoints_csv};
 use dynident::{DesignOutcome, StudyRobot, check_log, check_trajectory, design_study};
@@ -22,8 +22,10 @@ fn job(folder: &Path, design: &str, further: &str) -> Job {
 }
 
 fn designed(job: &Job) -> DesignOutcome {
-    design_study(&job.study, &job.path, &Job::options(2), |_| ControlFlow::Continue(()))
-        .unwrap_or_else(|error| panic!("{error}"))
+    let outcome = design_study(&job.study, &job.path, &Job::options(2), |_| ControlFlow::Continue(()))
+        .unwrap_or_else(|error| panic!("{error}"));
+    assert_reads_back(&outcome.file);
+    outcome
 }
 
 fn stds(outcome: &DesignOutcome) -> [Vec<f64>; 2] {
@@ -60,7 +62,7 @@ fn ladders_postures_and_joined_families_are_designed() {
     let family = "duration_s = 40.0\nfamily = { kind = \"joined\", move_s = 1.5, shares = [2.0, 2.0, 1.0], parts = [{ kind = \"fourier\", harmonics = 4 }, { kind = \"friction-ladder\", rungs = 3 }, { kind = \"static-postures\", postures = 4 }] }";
     let outcome = designed(&job(folder.path(), family, ""));
     assert!(outcome.file.feasible, "{:?}", outcome.file.diagnosis);
-    assert_eq!((outcome.file.family, outcome.file.duration_s), ("joined", 40.0));
+    assert_eq!((&outcome.file.family[..], outcome.file.duration_s), ("joined", 40.0));
     // Three joints: 7 numbers of the series, 2 of the ladder, 4 of the postures.
     assert_eq!(outcome.file.parameters.len(), 3 * (7 + 2 + 4));
     assert!(outcome.file.forecast.iter().all(|p| p.std.is_some()));
@@ -144,7 +146,7 @@ fn a_result_is_a_prior_for_the_next_run() {
     // The same log, judged: its rate, all samples, no search.
     let checked = check_log(&first.study, &first.path, "run", &Job::options(1)).unwrap();
     assert_eq!(
-        (checked.file.family, checked.file.given.as_deref(), checked.file.evaluations),
+        (&checked.file.family[..], checked.file.given.as_deref(), checked.file.evaluations),
         ("given", Some("run"), 0)
     );
     assert!((checked.file.check_rate_hz - 100.0).abs() < 1e-6 && (checked.file.duration_s - 29.99).abs() < 0.1);
@@ -206,7 +208,7 @@ fn a_written_trajectory_is_judged_as_the_design_was() {
     std::fs::write(&path, trajectory_csv(&sampled).unwrap()).unwrap();
     let checked = check_trajectory(&job.study, &job.path, &path, &Job::options(1)).unwrap();
     let (own, found) = (&outcome.file, &checked.file);
-    assert_eq!((found.family, found.feasible, found.evaluations, &found.notes), ("given", true, 0, &own.notes));
+    assert_eq!((&found.family[..], found.feasible, found.evaluations, &found.notes), ("given", true, 0, &own.notes));
     let near =
         |a: Option<f64>, b: Option<f64>, tolerance: f64| (a.unwrap() - b.unwrap()).abs() < tolerance * b.unwrap().abs();
     // The same samples, with 17 digits.

@@ -1,5 +1,7 @@
 //! Drive gains from logs in an unknown unit, without and with a known payload.
-use crate::common::{Job, Motion, Random, Truth, assert_recovered, format, header, repository, write_log};
+use crate::common::{
+    Job, Motion, Random, Truth, assert_reads_back, assert_recovered, format, header, repository, write_log,
+};
 use dynident::model::{InertialParameters, Mat3, Vec3};
 use dynident::validate;
 use std::path::Path;
@@ -73,6 +75,7 @@ fn gains_of_six_joints_without_noise() {
     let stored = folder.path().join("result.json");
     std::fs::write(&stored, serde_json::to_string(&found.result).unwrap()).unwrap();
     let tested = validate(&stored, &job.study, &job.path, &Job::options(1)).unwrap();
+    assert_reads_back(&tested);
     assert!((tested.validation[0].model.rmse_nm - held_out.model.rmse_nm).abs() < 1e-9);
     // Without a log that carries nothing there is nothing to compare with.
     let text = study(&robot, "tool0", 6, "").replace("{ file = \"empty.csv\" },", "");

@@ -1,5 +1,5 @@
 //! The report of an iteration: every run and joint drawn, rejected runs named, hostile names harmless.
-use crate::common::repository;
+use crate::common::{assert_reads_back, repository};
 use core::fmt::Write;
 use core::ops::ControlFlow;
 use dynident::{IterationWatch, IterationsFile, RunOptions, Silent, Study, iterate_study};
@@ -55,6 +55,7 @@ fn iterated(folder: &Path, more: &str) -> (IterationsFile, String) {
     let mut watch = IterationWatch { design: &|_| ControlFlow::Continue(()), run: &mut |_, _| {} };
     let out = folder.join("out");
     let file = iterate_study(&study, &path, &out, true, &options, &mut watch).unwrap();
+    assert_reads_back(&file);
     // A second call makes no run, and draws the same curves from the logs that are there.
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
     let again = iterate_study(&study, &path, &out, true, &options, &mut watch).unwrap();

@@ -60,12 +60,12 @@ fn the_written_urdf_gives_the_torques_of_the_base_parameters() {
         parameters[column] = parameter.physical.unwrap();
     }
     let (mut workspace, mut random) = (Workspace::new(&written), Random(3));
-    let mut workspace_of_study = Workspace::new(&machine.model());
+    let mut workspace_of_study = Workspace::new(machine.model());
     for _ in 0..20 {
         let mut vector = |scale: f64| -> Vec<f64> { (0..6).map(|_| scale * random.next()).collect() };
         let (q, dq, ddq) = (vector(3.0), vector(2.0), vector(5.0));
         let from_urdf = inverse_dynamics(&written, &mut workspace, &q, &dq, &ddq).to_vec();
-        let regressor = torque_regressor(&machine.model(), &mut workspace_of_study, &q, &dq, &ddq);
+        let regressor = torque_regressor(machine.model(), &mut workspace_of_study, &q, &dq, &ddq);
         let largest = from_urdf.iter().fold(0.0_f64, |max, t| max.max(t.abs()));
         for row in 0..6 {
             let base: f64 = (0..60).map(|k| regressor[60 * row + k] * parameters[k]).sum();

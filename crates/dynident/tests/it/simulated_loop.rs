@@ -1,5 +1,5 @@
 //! DIDIM, CLIE and CLOE through a study: logs of a simulated closed loop with noise, and what is said when there is nothing to simulate.
-use crate::common::{Job, Motion, repository};
+use crate::common::{Job, Motion, assert_reads_back, repository};
 use core::ops::ControlFlow;
 use dynident::{Error, IdentificationOutcome, identify, simulate_study};
 use std::fmt::Write;
@@ -59,6 +59,7 @@ fn recorded(folder: &Path) -> Vec<f64> {
     let job = Job::new(folder, &study("weighted", CONTROLLER));
     let run = simulate_study(&job.study, &job.path, &Job::options(1), &|_| ControlFlow::Continue(())).unwrap();
     assert!(run.file.done, "{:?}", run.file.status);
+    assert_reads_back(&run.file);
     std::fs::write(folder.join("log.csv"), run.log).unwrap();
     run.file.base_parameters.iter().map(|parameter| parameter.value).collect()
 }

@@ -31,7 +31,7 @@ pub(super) fn named_forecast(
         let (std, prior) = (alone.std[index], machine.nominal_base().map(|prior| prior[index]));
         let size = prior.map(f64::abs).filter(|size| *size > NEGLIGIBLE * largest);
         let relative = std.zip(size).map(|(std, size)| 100.0 * std / size);
-        let (symbol, unit) = (columns[index].symbol(), columns[index].unit());
+        let (symbol, unit) = (columns[index].symbol(), columns[index].unit().to_owned());
         let std_with_prior = all.as_ref().and_then(|all| all.std[index]);
         ParameterForecast { symbol, expression, unit, std, std_with_prior, relative_std_percent: relative, prior }
     });

@@ -41,12 +41,12 @@ impl Stopwatch {
 pub(super) struct MotionOrigin {
     motion: Box<dyn Family>,
     parameters: Vec<f64>,
-    family: &'static str,
+    family: String,
     family_settings: Option<FamilyChoice>,
     given: Option<String>,
     start_posture: Vec<Option<f64>>,
-    optimiser: &'static str,
-    criterion: &'static str,
+    optimiser: String,
+    criterion: String,
     figure: Option<f64>,
     windowed: Option<WindowedFile>,
     history: Vec<Generation>,
@@ -60,11 +60,11 @@ impl MotionOrigin {
         let section = &setup.section;
         let windowed = found.windowed.as_ref();
         Self {
-            family: windowed.map_or(section.family.name(), |_| found.family.name()),
+            family: windowed.map_or(section.family.name(), |_| found.family.name()).to_owned(),
             family_settings: Some(section.family.clone()),
             given: None,
-            optimiser: windowed.map_or(section.optimiser.name(), |file| file.optimiser),
-            criterion: windowed.map_or(setup.criterion(), |_| "windowed-condition"),
+            optimiser: windowed.map_or(section.optimiser.name(), |file| &file.optimiser).to_owned(),
+            criterion: windowed.map_or(setup.criterion(), |_| "windowed-condition").to_owned(),
             motion: found.family,
             parameters: found.parameters,
             start_posture: found.start_posture,
@@ -79,11 +79,11 @@ impl MotionOrigin {
     /// The trajectory or log called `name`.
     pub(super) fn given(setup: &DesignSetup, name: String, motion: Given, known: &MotionInformation) -> Self {
         Self {
-            family: "given",
+            family: "given".to_owned(),
             family_settings: None,
             given: Some(name),
-            optimiser: "none",
-            criterion: setup.criterion(),
+            optimiser: "none".to_owned(),
+            criterion: setup.criterion().to_owned(),
             motion: Box::new(motion),
             parameters: Vec::new(),
             start_posture: Vec::new(),
@@ -131,7 +131,7 @@ impl DesignOutcome {
         let all = setup.prior.as_ref().map(|prior| prior + weighted);
         let (forecast, worst_directions) = named_forecast(&setup.machine, weighted, all.as_ref());
         let file = DesignFile {
-            schema: DESIGN_SCHEMA,
+            schema: DESIGN_SCHEMA.to_owned(),
             name: setup.name,
             joints: setup.machine.parametric.joint_names(),
             family: origin.family,
@@ -152,7 +152,7 @@ impl DesignOutcome {
             torque_std_nm: setup.torque_std_nm,
             feasible: review.check.kept(),
             check_rate_hz: review.check.rate_hz,
-            check_of: review.check.of,
+            check_of: review.check.of.to_owned(),
             limits: review.check.reports,
             forecast,
             worst_directions,

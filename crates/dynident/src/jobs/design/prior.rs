@@ -1,11 +1,10 @@
 //! The information that `[design.prior]` stands for.
 
 use crate::error::Error;
-use crate::result::{BaseParameterResult, RESULT_SCHEMA};
+use crate::result::{BaseParameterResult, ResultFile};
 use crate::study::{Folders, PriorSection, StudyRobot};
 use dynident_dynamics::Column;
 use nalgebra::DMatrix;
-use serde::Deserialize;
 use std::path::Path;
 
 /// A value below this share of the largest of its kind in its body is known no better than one of this size.
@@ -102,28 +101,16 @@ fn inverse(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     symmetric.iter().all(|x| x.is_finite()).then_some(symmetric)
 }
 
-/// The part of `result.json` that says how well the parameters are known.
-#[derive(Deserialize)]
-struct StoredUncertainty {
-    schema: String,
-    base_parameters: Vec<BaseParameterResult>,
-    base_parameter_covariance: Option<Vec<Vec<f64>>>,
-}
-
 /// Inverse covariance of an earlier result in the machine's columns; zero for those that it did not excite.
 fn of_result(path: &Path, machine: &StudyRobot) -> Result<DMatrix<f64>, Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
-    let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
-    let stored: StoredUncertainty = serde_json::from_slice(&bytes).map_err(|error| {
-        wrong(format!("line {}, column {}: not a result of `identify`: {error}", error.line(), error.column()))
-    })?;
-    if stored.schema != RESULT_SCHEMA {
-        return Err(wrong(format!("schema `{}`, not `{RESULT_SCHEMA}`: identify again", stored.schema)));
-    }
+    let stored = ResultFile::read(path)?;
     let place = places(&stored.base_parameters, machine).map_err(wrong)?;
-    let rows = stored.base_parameter_covariance.ok_or_else(|| {
-        wrong("no base_parameter_covariance: made by an earlier version, identify again with this one".to_owned())
-    })?;
+    let rows = &stored.base_parameter_covariance;
+    if rows.is_empty() {
+        let message = "no base_parameter_covariance: made by an earlier version, identify again with this one";
+        return Err(wrong(message.to_owned()));
+    }
     let count = place.len();
     if rows.len() != count || rows.iter().any(|row| row.len() != count) {
         return Err(wrong(format!("base_parameter_covariance is not {count} rows of {count} numbers: identify again")));

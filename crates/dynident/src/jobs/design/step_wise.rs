@@ -114,7 +114,7 @@ pub(crate) fn step_wise(
     let parameters = strokes.iter().flat_map(|stroke| [stroke.amplitude_rad, stroke.steepness_per_s]).collect();
     let file = WindowedFile {
         problem: windowed.problem,
-        optimiser,
+        optimiser: optimiser.to_owned(),
         fitness: problem.fitness(&x),
         condition_sum,
         optimum: best,

@@ -6,7 +6,6 @@ mod urdf;
 use crate::error::Error;
 use crate::jobs::log_summary::{held_out_summary, training_summary};
 use crate::jobs::options::{RunOptions, study_name};
-use crate::result::stored::StoredModel;
 use crate::result::{LogSummary, PhysicalVerdict, RESULT_SCHEMA, ResultFile, Timings, TrainingResult};
 use crate::study::{ArmSection, EstimatorMethod, Folders, Study, StudyRobot};
 use dynident_estimation::{Estimate, strongest_correlations};
@@ -130,9 +129,9 @@ fn identified(
 }
 
 /// The earlier result of an arm, and where it lies.
-fn known_arm(section: &ArmSection, folders: &Folders) -> Result<(std::path::PathBuf, StoredModel), Error> {
+fn known_arm(section: &ArmSection, folders: &Folders) -> Result<(std::path::PathBuf, ResultFile), Error> {
     let path = folders.find(&section.result, None)?;
-    let stored = StoredModel::read(&path)?;
+    let stored = ResultFile::read(&path)?;
     Ok((path, stored))
 }
 
@@ -147,12 +146,12 @@ fn physical_verdict(
     if let Some(fit) = &consistent.fit {
         let arm_estimate = found.training.columns.arm_estimate(found.estimate());
         verdict.fit = Some(physical_fit_result(fit, &arm_estimate));
-        verdict.note = if task.settings.estimation.estimator.is_plain() && study.arm.is_none() {
+        let is_fitted_to_logs = task.settings.estimation.estimator.is_plain() && study.arm.is_none();
+        verdict.note = String::from(if is_fitted_to_logs {
             "of the possible set that fits the logs best; the base parameters above it are the unconstrained estimate"
         } else {
             "of the possible set nearest to the estimate; the base parameters above it are that unconstrained estimate"
-        }
-        .to_owned();
+        });
     }
     verdict.failure.clone_from(&consistent.failure);
     verdict.sign = found.examination.sign;

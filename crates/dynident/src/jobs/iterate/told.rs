@@ -55,7 +55,7 @@ impl Told<'_> {
             let one = |k: usize| IterationParameter {
                 symbol: columns[k].symbol(),
                 expression: expressions[k].clone(),
-                unit: columns[k].unit(),
+                unit: columns[k].unit().to_owned(),
                 value: estimate.values[k],
                 std: known_std
                     .get(k)
@@ -97,7 +97,7 @@ impl Told<'_> {
             (!ratios.is_empty()).then(|| (ratios.iter().sum::<f64>() / ratios.len() as f64).sqrt())
         });
         IterationsFile {
-            schema: ITERATIONS_SCHEMA,
+            schema: ITERATIONS_SCHEMA.to_owned(),
             name: study_name(self.study, self.study_path),
             converged: status.is_converged(),
             status: match status {
@@ -105,7 +105,8 @@ impl Told<'_> {
                 IterationStatus::RunsUsedUp => "runs-used-up",
                 IterationStatus::Refused { .. } => "refused",
                 IterationStatus::Waiting { .. } => "waiting",
-            },
+            }
+            .to_owned(),
             reason: status.to_string(),
             joints: self.machine.parametric.joint_names(),
             duration_s: self.duration_s,
@@ -122,7 +123,8 @@ impl Told<'_> {
 pub(super) fn joined(stages: Vec<IterationsFile>) -> Option<IterationsFile> {
     let converged = stages.iter().all(|stage| stage.converged);
     let improvement = stages.iter().filter_map(|stage| stage.tracking_improvement).reduce(f64::min);
-    let unsettled = stages.iter().find(|stage| !stage.converged).map(|stage| (stage.status, stage.reason.clone()));
+    let unsettled =
+        stages.iter().find(|stage| !stage.converged).map(|stage| (stage.status.clone(), stage.reason.clone()));
     let mut runs = Vec::new();
     let mut last = None;
     for stage in stages {
@@ -133,7 +135,7 @@ pub(super) fn joined(stages: Vec<IterationsFile>) -> Option<IterationsFile> {
     let last = last?;
     let (status, reason) = match (last.converged, unsettled) {
         (true, Some(unsettled)) => unsettled,
-        _ => (last.status, last.reason.clone()),
+        _ => (last.status.clone(), last.reason.clone()),
     };
     Some(IterationsFile { converged, status, reason, runs, tracking_improvement: improvement, ..last })
 }

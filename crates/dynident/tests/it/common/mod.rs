@@ -3,6 +3,8 @@ use dynident::dynamics::{Workspace, inverse_dynamics};
 use dynident::model::{InertialParameters, Model, load_robot};
 use dynident::{IdentificationOutcome, RunOptions, Silent, Study, StudyRobot, identify};
 pub(crate) use dynident_testing::{recordings, repository};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -186,13 +188,22 @@ impl Job {
     }
 
     pub(crate) fn identify(&self) -> IdentificationOutcome {
-        identify(&self.study, &self.path, &Self::options(1)).unwrap_or_else(|error| panic!("{error}"))
+        let found = identify(&self.study, &self.path, &Self::options(1)).unwrap_or_else(|error| panic!("{error}"));
+        assert_reads_back(&found.result);
+        found
     }
 
     pub(crate) fn machine(&self) -> StudyRobot {
         let folders = dynident::Folders::new(&self.study, &self.path, None);
         StudyRobot::new(&self.study, &self.path, &folders).unwrap()
     }
+}
+
+/// What is written is read, and written again byte for byte.
+pub(crate) fn assert_reads_back<T: Serialize + DeserializeOwned>(file: &T) {
+    let text = serde_json::to_string_pretty(file).unwrap();
+    let read: T = serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    assert_eq!(serde_json::to_string_pretty(&read).unwrap(), text);
 }
 
 /// Every base parameter within `tolerance` of the truth, relative to itself or to a hundredth of its unit.

@@ -1,0 +1,99 @@
+//! Arrows between modules run one way: no top-level module of a crate uses one that uses it, directly or by way of others.
+
+use super::common::repository;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Crates with modules that use each other.
+const TANGLED: [&str; 3] = ["dynident-identification", "dynident-iteration", "dynident-lanes"];
+
+type Uses = BTreeMap<String, BTreeSet<String>>;
+
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+/// The first part of every `crate::` path on a line of code.
+fn used(line: &str) -> impl Iterator<Item = &str> {
+    let code = if line.trim_start().starts_with("//") { "" } else { line };
+    code.split("crate::").skip(1).map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap())
+}
+
+/// Which top-level modules each top-level module of the crate uses, tests inside of files left out.
+fn uses(src: &Path) -> Uses {
+    let mut files = Vec::new();
+    sources(src, &mut files);
+    let top = |file: &Path| {
+        let first = file.strip_prefix(src).unwrap().components().next().unwrap();
+        Path::new(&first).file_stem().unwrap().to_str().unwrap().to_owned()
+    };
+    let mut uses: Uses = files.iter().map(|file| (top(file), BTreeSet::new())).collect();
+    for root in ["lib", "main", "bin"] {
+        uses.remove(root);
+    }
+    let modules: BTreeSet<String> = uses.keys().cloned().collect();
+    for file in &files {
+        let own = top(file);
+        let Some(uses) = uses.get_mut(&own) else { continue };
+        let text = std::fs::read_to_string(file).unwrap();
+        let code = text.split("#[cfg(test)]\nmod ").next().unwrap();
+        let others = code.lines().flat_map(used).filter(|name| *name != own && modules.contains(*name));
+        uses.extend(others.map(str::to_owned));
+    }
+    uses
+}
+
+/// Modules that come back to themselves.
+fn cycle(uses: &Uses) -> Vec<&str> {
+    let returns = |start: &String| {
+        let (mut seen, mut open) = (BTreeSet::new(), vec![start]);
+        while let Some(module) = open.pop() {
+            open.extend(uses[module].iter().filter(|next| seen.insert(*next)));
+        }
+        seen.contains(start)
+    };
+    uses.keys().filter(|module| returns(module)).map(String::as_str).collect()
+}
+
+#[test]
+fn no_module_is_above_and_below_another() {
+    let mut crates: Vec<PathBuf> =
+        std::fs::read_dir(repository("crates")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    crates.sort();
+    assert!(crates.len() > 10);
+    for folder in crates.iter().filter(|folder| folder.join("src").is_dir()) {
+        let name = folder.file_name().unwrap().to_str().unwrap();
+        let uses = uses(&folder.join("src"));
+        let cycle = cycle(&uses);
+        assert_eq!(!cycle.is_empty(), TANGLED.contains(&name), "{name}: {cycle:?} use each other: {uses:#?}");
+    }
+}
+
+#[test]
+fn rooms_of_the_facade_stand_in_their_order() {
+    let uses = uses(&repository("crates/dynident/src"));
+    let allowed =
+        [("study", &["error"][..]), ("result", &["error", "study"]), ("pages", &["error", "result", "study"])];
+    for (room, below) in allowed {
+        assert!(uses[room].iter().all(|used| below.contains(&used.as_str())), "{room} uses {:?}", uses[room]);
+    }
+}
+
+#[test]
+fn a_circle_is_found() {
+    let uses = |pairs: &[(&str, &[&str])]| -> Uses {
+        let one = |(name, used): &(&str, &[&str])| ((*name).to_owned(), used.iter().map(|u| (*u).to_owned()).collect());
+        pairs.iter().map(one).collect()
+    };
+    assert_eq!(cycle(&uses(&[("a", &["b"]), ("b", &["c"]), ("c", &["b"])])), ["b", "c"]);
+    assert!(cycle(&uses(&[("a", &["b", "c"]), ("b", &["c"]), ("c", &[])])).is_empty());
+    assert_eq!(used("    crate::study::Study, crate::error").collect::<Vec<_>>(), ["study", "error"]);
+    assert_eq!(used("/// [`crate::study`]").count(), 0);
+}
