@@ -34,7 +34,6 @@
 
 #![forbid(unsafe_code)]
 
-pub mod benchmark;
 #[cfg(doctest)]
 pub mod book;
 mod cpu_time;

@@ -17,6 +17,7 @@
 use super::nonnegative::nonnegative_least_squares;
 use crate::error::EstimationError;
 use crate::factor::{FactorWorkspace, LinearProblem, TriangularFactor};
+use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use nalgebra::{DMatrix, DVector};
 
 /// A column of which earlier ones leave a smaller share than this has no value of its own.
@@ -36,10 +37,29 @@ pub struct CrossValidation<'a> {
 pub struct JointFolds {
     common: Vec<usize>,
     variable: Vec<usize>,
-    /// Per block and, last, with no block left out: the triangle; and the joint's rows of the block (of all blocks), in
-    /// the order common, variable.
-    folds: Vec<(TriangularFactor, TriangularFactor)>,
+    /// Per block and, last, with no block left out.
+    folds: Vec<Fold>,
 }
+
+/// What all candidates share when one block is left out; columns in the order common, variable.
+#[derive(Debug)]
+struct Fold {
+    /// All rows that are fitted to.
+    triangle: TriangularFactor,
+    /// The joint's rows of the block (of all blocks).
+    rows: TriangularFactor,
+    /// `R_vvᵀ R_vv` and `R_vvᵀ r_v`.
+    gram: DMatrix<f64>,
+    right: DVector<f64>,
+    /// Whether a common column is told from earlier ones.
+    independent: Vec<bool>,
+}
+
+/// Candidates that are computed side by side.
+const SIDE_BY_SIDE: usize = 8;
+
+/// A number for each candidate at work.
+type Side = [f64; SIDE_BY_SIDE];
 
 /// What a candidate model leaves of the joint's torque.
 #[derive(Clone, Debug, PartialEq)]
@@ -175,7 +195,7 @@ impl<'a> CrossValidation<'a> {
                     parameters: order.len() as f64,
                 });
             }
-            folds.push((triangle, rows));
+            folds.push(Fold::new(triangle, rows, common.len()));
         }
         Ok(JointFolds { common: common.to_vec(), variable: variable.to_vec(), folds })
     }
@@ -215,44 +235,126 @@ impl JointFolds {
     /// # Panics
     /// If the slices' lengths differ or a place is out of range.
     pub fn errors(&self, chosen: &[usize], nonnegative: &[bool]) -> FoldErrors {
-        assert_eq!(chosen.len(), nonnegative.len());
+        self.side_by_side(Level::detect(), &[(chosen, nonnegative)]).swap_remove(0)
+    }
+
+    /// [`errors`](Self::errors) of many models, each given as (chosen, nonnegative), in their order.
+    ///
+    /// # Panics
+    /// As [`errors`](Self::errors).
+    pub fn errors_of_all(&self, models: &[(&[usize], &[bool])]) -> Vec<FoldErrors> {
+        let level = Level::detect();
+        models.chunks(SIDE_BY_SIDE).flat_map(|some| self.side_by_side(level, some)).collect()
+    }
+
+    fn side_by_side(&self, level: Level, models: &[(&[usize], &[bool])]) -> Vec<FoldErrors> {
         let last = self.folds.len() - 1;
-        let (mut squares, mut rows) = (Vec::with_capacity(last), Vec::with_capacity(last));
-        for (triangle, own) in &self.folds[..last] {
-            let coefficients = self.coefficients(triangle, chosen, nonnegative);
-            let theta = self.theta(triangle, chosen, &coefficients);
-            let rho = own.entry(own.columns(), own.columns());
-            squares.push(own.residual(&theta).norm_squared() + rho * rho);
-            rows.push(own.rows());
-        }
-        let coefficients = self.coefficients(&self.folds[last].0, chosen, nonnegative).iter().copied().collect();
-        FoldErrors { squares, rows, coefficients }
-    }
-
-    fn coefficients(&self, triangle: &TriangularFactor, chosen: &[usize], nonnegative: &[bool]) -> DVector<f64> {
-        let (start, end) = (self.common.len(), triangle.columns());
-        let columns =
-            DMatrix::from_fn(end - start, chosen.len(), |row, k| triangle.entry(start + row, start + chosen[k]));
-        let torque = DVector::from_fn(end - start, |row, _| triangle.entry(start + row, end));
-        nonnegative_least_squares(&columns.tr_mul(&columns), &columns.tr_mul(&torque), nonnegative)
-    }
-
-    /// All parameters: the candidate's as given, the others by substitution. A common column that the rows do not tell
-    /// from earlier ones is zero.
-    fn theta(&self, triangle: &TriangularFactor, chosen: &[usize], coefficients: &DVector<f64>) -> Vec<f64> {
-        let (start, end) = (self.common.len(), triangle.columns());
-        let norms = triangle.column_norms();
-        let mut theta = vec![0.0; end];
-        for (&place, &value) in chosen.iter().zip(coefficients.iter()) {
-            theta[start + place] = value;
-        }
-        for row in (0..start).rev() {
-            let pivot = triangle.entry(row, row);
-            if pivot > DEPENDENT * norms[row] {
-                let sum: f64 = (row + 1..end).map(|k| triangle.entry(row, k) * theta[k]).sum();
-                theta[row] = (triangle.entry(row, end) - sum) / pivot;
+        let mut places: Vec<usize> = models.iter().flat_map(|(chosen, _)| *chosen).copied().collect();
+        places.sort_unstable();
+        places.dedup();
+        let none = FoldErrors { squares: Vec::with_capacity(last), rows: Vec::with_capacity(last), coefficients: vec![] };
+        let mut errors = vec![none; models.len()];
+        let mut theta = vec![[0.0; SIDE_BY_SIDE]; self.common.len() + self.variable.len()];
+        for (number, fold) in self.folds.iter().enumerate() {
+            for (k, (chosen, nonnegative)) in models.iter().enumerate() {
+                let coefficients = fold.coefficients(chosen, nonnegative);
+                if number == last {
+                    errors[k].coefficients = coefficients.iter().copied().collect();
+                    continue;
+                }
+                for (&place, &value) in chosen.iter().zip(&coefficients) {
+                    theta[self.common.len() + place][k] = value;
+                }
+            }
+            if number < last {
+                let residuals = dispatch(level, Residuals { fold, places: &places, theta: &mut theta });
+                let rho = fold.rows.row(fold.rows.columns())[0];
+                for (error, residual) in errors.iter_mut().zip(residuals.column_iter()) {
+                    error.squares.push(residual.norm_squared() + rho * rho);
+                    error.rows.push(fold.rows.rows());
+                }
             }
         }
-        theta
+        errors
     }
+}
+
+impl Fold {
+    fn new(triangle: TriangularFactor, rows: TriangularFactor, common: usize) -> Self {
+        let (start, end) = (common, triangle.columns());
+        let columns = DMatrix::from_fn(end - start, end - start, |row, k| triangle.entry(start + row, start + k));
+        let torque = DVector::from_fn(end - start, |row, _| triangle.entry(start + row, end));
+        let norms = triangle.column_norms();
+        let independent = (0..start).map(|row| triangle.entry(row, row) > DEPENDENT * norms[row]).collect();
+        Self { gram: columns.tr_mul(&columns), right: columns.tr_mul(&torque), independent, triangle, rows }
+    }
+
+    fn coefficients(&self, chosen: &[usize], nonnegative: &[bool]) -> DVector<f64> {
+        assert_eq!(chosen.len(), nonnegative.len());
+        let count = chosen.len();
+        let gram = DMatrix::from_fn(count, count, |i, j| self.gram[(chosen[i], chosen[j])]);
+        nonnegative_least_squares(&gram, &DVector::from_fn(count, |i, _| self.right[chosen[i]]), nonnegative)
+    }
+}
+
+/// What the candidates at work leave of the block's torque, a column each.
+struct Residuals<'a> {
+    fold: &'a Fold,
+    /// Places of the columns that any of them has; all others are zero in `theta`.
+    places: &'a [usize],
+    /// Coefficients of the candidates' columns; those of the common ones come from here.
+    theta: &'a mut [Side],
+}
+
+impl Kernel for Residuals<'_> {
+    type Output = DMatrix<f64>;
+
+    /// The loops over candidates become vector instructions; each candidate's own sums keep their order.
+    #[inline(always)]
+    fn run<T: Lane>(self) -> Self::Output {
+        let Self { fold, places, theta } = self;
+        let (start, end) = (fold.independent.len(), theta.len());
+        // All parameters: a common column that the rows do not tell from earlier ones is zero.
+        for row in (0..start).rev() {
+            let entries = fold.triangle.row(row);
+            let mut value = [0.0; SIDE_BY_SIDE];
+            if fold.independent[row] {
+                let sum = products(entries, row, row + 1..start, places, theta);
+                for k in 0..SIDE_BY_SIDE {
+                    value[k] = (entries[end - row] - sum[k]) / entries[0];
+                }
+            }
+            theta[row] = value;
+        }
+        let mut residuals = DMatrix::zeros(end, SIDE_BY_SIDE);
+        for row in 0..end {
+            let entries = fold.rows.row(row);
+            let sum = products(entries, row, row.min(start)..start, places, theta);
+            for k in 0..SIDE_BY_SIDE {
+                residuals[(row, k)] = entries[end - row] - sum[k];
+            }
+        }
+        residuals
+    }
+}
+
+/// The sums of products of a triangle's row, whose entries begin at column `row`, with the parameters of the common columns `range` and of those at `places`.
+#[inline(always)]
+fn products(entries: &[f64], row: usize, range: core::ops::Range<usize>, places: &[usize], theta: &[Side]) -> Side {
+    let mut sum = [0.0; SIDE_BY_SIDE];
+    let common = range.end;
+    for (entry, theta) in entries[range.start - row.min(range.start)..].iter().zip(&theta[range]) {
+        for k in 0..SIDE_BY_SIDE {
+            sum[k] += entry * theta[k];
+        }
+    }
+    for place in places {
+        let column = common + place;
+        if column >= row {
+            for k in 0..SIDE_BY_SIDE {
+                sum[k] += entries[column - row] * theta[column][k];
+            }
+        }
+    }
+    sum
 }

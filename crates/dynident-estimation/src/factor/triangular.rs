@@ -112,6 +112,12 @@ impl TriangularFactor {
         if column < row { 0.0 } else { self.triangle[row_start(size, row) + column - row] }
     }
 
+    /// The entries of row `row` of R from its diagonal to the torque's column.
+    pub(crate) fn row(&self, row: usize) -> &[f64] {
+        let size = self.columns + 1;
+        &self.triangle[row_start(size, row)..row_start(size, row + 1)]
+    }
+
     /// Absorbs `rows` rows of `[W | τ]` given column by column: `panel[c * rows + i]` is column c of row i, torque
     /// last.
     ///

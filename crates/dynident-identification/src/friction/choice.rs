@@ -222,11 +222,15 @@ fn tuned(folds: &JointFolds, columns: &[CandidateColumn], terms: Vec<Term>, befo
             .flat_map(|chosen| options.iter().map(move |option| [chosen.as_slice(), option].concat()))
             .collect();
     }
-    let evaluated = choices.into_iter().map(|places| {
-        let nonnegative: Vec<bool> = places.iter().map(|&place| columns[place].law.is_nonnegative()).collect();
-        let errors = folds.errors(&places, &nonnegative);
-        Evaluated { terms: terms.clone(), places, errors }
-    });
+    let nonnegative: Vec<Vec<bool>> = choices
+        .iter()
+        .map(|places| places.iter().map(|&place| columns[place].law.is_nonnegative()).collect())
+        .collect();
+    let models: Vec<(&[usize], &[bool])> =
+        choices.iter().zip(&nonnegative).map(|(places, nonnegative)| (&places[..], &nonnegative[..])).collect();
+    let errors = folds.errors_of_all(&models);
+    let evaluated =
+        choices.into_iter().zip(errors).map(|(places, errors)| Evaluated { terms: terms.clone(), places, errors });
     // The first of equals, so that the choice is the same everywhere.
     evaluated
         .reduce(|best, next| if next.errors.rms() < best.errors.rms() { next } else { best })
