@@ -252,7 +252,8 @@ impl JointFolds {
         let mut places: Vec<usize> = models.iter().flat_map(|(chosen, _)| *chosen).copied().collect();
         places.sort_unstable();
         places.dedup();
-        let none = FoldErrors { squares: Vec::with_capacity(last), rows: Vec::with_capacity(last), coefficients: vec![] };
+        let none =
+            FoldErrors { squares: Vec::with_capacity(last), rows: Vec::with_capacity(last), coefficients: vec![] };
         let mut errors = vec![none; models.len()];
         let mut theta = vec![[0.0; SIDE_BY_SIDE]; self.common.len() + self.variable.len()];
         for (number, fold) in self.folds.iter().enumerate() {
