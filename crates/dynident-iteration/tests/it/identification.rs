@@ -16,7 +16,9 @@ use dynident_model::sample::planar_2r;
 use dynident_model::{InertialParameters, Model};
 use dynident_recording::DifferentiatorSettings;
 use dynident_simulation::controllers::{ComputedTorqueSettings, JointPdSettings};
-use dynident_simulation::{ControllerSettings, FrictionCompensation, LoopSettings, Plant, Record, Reference, SensorSettings};
+use dynident_simulation::{
+    ControllerSettings, FrictionCompensation, LoopSettings, Plant, Record, Reference, SensorSettings,
+};
 
 const RATE_HZ: f64 = 500.0;
 
