@@ -55,7 +55,7 @@ impl<'a> Rows<'a> {
         cutoff_hz: Option<f64>,
     ) -> Result<Self, BenchmarkError> {
         let motion = Arc::new(motion.clone());
-        let record = MotionRecord { label: LOG.to_owned(), motion, usable: Vec::new(), windows: None };
+        let record = MotionRecord { label: LOG.to_owned(), motion, usable: Vec::new(), windows: None, raw: None };
         let recordings = [Recording::of_motion(LOG, record)];
         let mut settings = IdentificationSettings::default();
         match cutoff_hz {

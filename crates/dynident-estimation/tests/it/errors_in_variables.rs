@@ -2,10 +2,10 @@
 
 use crate::common::Random;
 use dynident_estimation::{
-    CovarianceMethod, CrossProblem, EstimateStatus, EstimationError, HausmanSettings, HausmanVerdict,
-    InstrumentalSettings, InstrumentedProblem, LinearProblem, RankSettings, RobustSettings, RowBlock, RowWeight,
-    SegmentSettings, SegmentedFactor, WeightedSettings, generalized_least_squares, hausman_test,
-    instrumental_variables, robust_least_squares, weighted_least_squares,
+    CrossProblem, EstimateStatus, EstimationError, HausmanSettings, HausmanVerdict, InstrumentalSettings,
+    InstrumentedProblem, LinearProblem, RobustSettings, RowBlock, RowWeight, SegmentSettings, SegmentedFactor,
+    WeightedSettings, generalized_least_squares, hausman_test, instrumental_variables, robust_least_squares,
+    weighted_least_squares,
 };
 
 const THETA: [f64; 2] = [2.0, -1.0];
