@@ -85,7 +85,8 @@
 //! let held_out = examine_held_out(&logs, &training.model, 1, &tested)?;
 //! assert!(held_out.validation.model.relative_error_percent.unwrap() < 1.0);
 //! # for (value, truth) in estimate.values.iter().zip(robot.base().values(&truth)) {
-//! #     assert!((value - truth).abs() < 0.02 * truth.abs().max(1.0), "{value} and {truth}");
+//! #     // What the low-pass takes off the motion, and nothing off the torque.
+//! #     assert!((value - truth).abs() < 0.05 * truth.abs().max(1.0), "{value} and {truth}");
 //! # }
 //! # Ok(())
 //! # }

@@ -12,6 +12,49 @@
 //! | kept on disk, and resumed to the same result | [`IterationStore`] |
 //!
 //! The crate `dynident` wraps it as `dynident iterate`, with trajectories, robots and controllers from a study file.
+//!
+//! ```
+//! use dynident_dynamics::ParametricModel;
+//! use dynident_excitation::Motion;
+//! use dynident_iteration::{Iteration, IterationSettings, IterationStatus, IterationTask, SimulatedRobot, iterate};
+//! use dynident_model::laws::{DriveChoice, laws_per_joint};
+//! use dynident_simulation::{LoopSettings, Plant, Reference};
+//! # let text = r#"<robot name="pendulum"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 -0.5"/>
+//! #   <mass value="2"/><inertia ixx="0.2" iyy="0.2" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+//! #   <joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint>
+//! # </robot>"#;
+//! let rod = dynident_model::read_urdf(text)?.model;
+//! let friction = laws_per_joint(&rod, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
+//!
+//! // The true pendulum has friction that nobody has told the controller of.
+//! let plant = Plant::new(&rod, &friction, &[0.5])?;
+//! let mut robot = SimulatedRobot::new(plant, LoopSettings::default())?;
+//!
+//! // Ten seconds at 500 Hz, from rest to rest.
+//! # let mut motion = Motion::default();
+//! # motion.reset(1, 5001);
+//! # for sample in 0..5001 {
+//! #     let (t, w) = (f64::from(sample as u32) * 0.002, 0.2 * core::f64::consts::TAU);
+//! #     let series = [(0.6, w), (-0.5, 2.0 * w), (0.25, 3.0 * w), (-0.35, 4.0 * w)];
+//! #     for (a, w) in series {
+//! #         motion.q[sample] += a * (1.0 - (w * t).cos());
+//! #         motion.dq[sample] += a * w * (w * t).sin();
+//! #         motion.ddq[sample] += a * w * w * (w * t).cos();
+//! #         motion.dddq[sample] -= a * w * w * w * (w * t).sin();
+//! #     }
+//! # }
+//! let reference = Reference::new(500.0, motion)?;
+//! let task = IterationTask::new(ParametricModel::new(rod, friction)?, reference)?;
+//! let iteration = Iteration::new(task, IterationSettings::default())?;
+//! let outcome = iterate(&iteration, &mut [&mut robot], None, &mut |_, _| {})?;
+//!
+//! assert_eq!(outcome.status, IterationStatus::Converged);
+//! let (first, last) = (&outcome.runs[0], outcome.runs.last().unwrap());
+//! assert!(last.tracking_error() < 0.1 * first.tracking_error());
+//! let found = &last.estimate.as_ref().unwrap().values; // m r_x, m r_z, I_yy, viscous friction
+//! assert!((found[1] + 1.0).abs() < 0.01 && (found[3] - 0.5).abs() < 0.01, "{found:?}");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 #![forbid(unsafe_code)]
 

@@ -10,6 +10,7 @@
 //! | the motion to record | [`design_study()`]; judge one that is there: [`check_trajectory()`], [`check_log()`] |
 //! | one run of a simulated robot | [`simulate_study()`] |
 //! | run, identify, run again | [`iterate_study()`] |
+//! | the sections of a study, the parts of results | [`study`], [`result`] |
 //! | a progress bar | [`Progress`] in [`RunOptions`] |
 //!
 //! Who has samples in memory needs no study: [`identification`] takes arrays. The crates below are re-exported:

@@ -34,7 +34,7 @@ pub fn consistent_parameters(
 /// The possible set of parameters whose base parameters are nearest to `theta` in the data's own metric: for estimates that are not those of least squares on the same factors.
 ///
 /// # Errors
-/// As [`possible_parameters`].
+/// As [`consistent_parameters`].
 pub fn nearest_consistent_parameters(
     robot: &ParametricModel,
     problem: &LinearProblem,
@@ -69,10 +69,10 @@ fn consistent_body(own: &[f64]) -> (bool, f64) {
     (stated.mass_kg() > 0.0 && least >= -1.0e-9 * stated.mass_kg(), least)
 }
 
-/// What is asked of the machine's bodies and laws: what [`possible_parameters`] solves.
+/// What is asked of the machine's bodies and laws: what [`consistent_parameters`] solves.
 ///
 /// # Errors
-/// As [`possible_parameters`].
+/// As [`consistent_parameters`].
 pub fn consistency_problem(
     robot: &ParametricModel,
     problem: &LinearProblem,
