@@ -3,16 +3,9 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing figures is what this program is for")]
 
-mod batch;
-mod clock;
-mod closed_loop;
-mod excitation;
-mod identification;
-mod motion;
-mod single;
+mod speed;
 
 use clap::Parser;
-use clock::Report;
 use dynident_lanes::Level;
 use dynident_model::load_robot;
 use std::path::PathBuf;
@@ -52,7 +45,7 @@ fn main() -> ExitCode {
         eprintln!("--level {}: this processor has {}", options.level.unwrap_or_default(), names.join(", "));
         return ExitCode::from(2);
     }
-    println!("{}", clock::environment(&available));
+    println!("{}", speed::environment(&available));
     for name in &options.names {
         let model = match load_robot(options.robots.join(format!("{name}.urdf"))) {
             Ok(robot) => robot.model,
@@ -61,23 +54,9 @@ fn main() -> ExitCode {
                 return ExitCode::from(2);
             }
         };
-        for &level in &levels {
-            let report = Report { robot: name, dof: model.dof(), level, only: &options.only };
-            single::time_all(&model, &report);
-            batch::time_all(&model, &report, usize::from(options.block));
-            if level == Level::detect() && name != "talos_reduced" {
-                excitation::time_all(&model, &report);
-                if let Err(error) = closed_loop::time_all(&model, &report) {
-                    eprintln!("{name}: closed loop: {error}");
-                    return ExitCode::FAILURE;
-                }
-            }
-            if name == "panda_arm7"
-                && let Err(error) = identification::time_all(&model, &report)
-            {
-                eprintln!("factors_10000: {error}");
-                return ExitCode::FAILURE;
-            }
+        if let Err(error) = speed::time_robot(name, &model, &levels, usize::from(options.block), &options.only) {
+            eprintln!("{error}");
+            return ExitCode::FAILURE;
         }
     }
     ExitCode::SUCCESS

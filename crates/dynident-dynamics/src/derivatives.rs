@@ -26,6 +26,7 @@ pub struct InverseDynamicsDerivatives<'w> {
 ///
 /// # Panics
 /// If a vector's length is not the number of joints, or the workspace was made for another size.
+#[doc(alias("jacobian", "rnea derivatives"))]
 pub fn inverse_dynamics_derivatives<'w>(
     model: &Model,
     workspace: &'w mut Workspace,

@@ -13,6 +13,7 @@ use dynident_model::{Mat3, Model, Transform, Vec3};
 ///
 /// # Panics
 /// If a vector's length is not the number of joints, or the workspace was made for another size.
+#[doc(alias("aba", "articulated body"))]
 pub fn forward_dynamics<'w>(
     model: &Model,
     workspace: &'w mut Workspace,

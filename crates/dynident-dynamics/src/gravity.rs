@@ -8,6 +8,7 @@ use dynident_model::Model;
 ///
 /// # Panics
 /// If `q` has not one entry per joint, or the workspace was made for another size.
+#[doc(alias("generalized gravity", "gravity vector"))]
 pub fn gravity_torque<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]) -> &'w [f64] {
     // A joint vector of zeros without allocating: machines in this field have at most some tens of joints.
     const ZEROS: [f64; 1024] = [0.0; 1024];

@@ -29,6 +29,7 @@ use dynident_model::{InertialParameters, JointMap, Mat3, Model, Transform, Vec3}
 ///
 /// # Panics
 /// If a vector's length is not the number of joints, or the workspace was made for another size.
+#[doc(alias("rnea", "newton-euler", "id"))]
 pub fn inverse_dynamics<'w>(
     model: &Model,
     workspace: &'w mut Workspace,
@@ -46,6 +47,7 @@ pub fn inverse_dynamics<'w>(
 ///
 /// # Panics
 /// If an array's length is not joints × samples, or the workspace was made for another size.
+#[doc(alias("rnea"))]
 pub fn inverse_dynamics_batch(
     model: &Model,
     workspace: &mut BatchWorkspace,

@@ -7,6 +7,7 @@ use dynident_model::{Model, Transform};
 ///
 /// # Panics
 /// If `q` has not one entry per joint, or the workspace was made for another size.
+#[doc(alias("forward kinematics", "fk"))]
 pub fn body_placements<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]) -> &'w [Transform] {
     workspace.check(model, &[q]);
     for (index, (map, &q)) in model.maps().iter().zip(q).enumerate() {

@@ -1,8 +1,45 @@
-//! **What torque does a motion need?** Rigid-body algorithms, the torque regressor and base parameters.
+//! **What torque does a motion need, and which parameters can torque tell?** Rigid-body algorithms, the torque
+//! regressor and base parameters.
 //!
-//! Free functions named after the quantity, over an immutable [`Model`](dynident_model::Model) and a per-thread [`Workspace`]:
-//! [`inverse_dynamics()`], [`mass_matrix()`], [`forward_dynamics()`], [`torque_regressor`], … They allocate nothing once the workspace exists. Each
-//! algorithm is written once over a small scalar trait and runs on one sample, on lanes of samples, and on dual numbers (the tests' oracle).
+//! Free functions named after the quantity, over an immutable [`Model`](dynident_model::Model) and a per-thread
+//! [`Workspace`]. They allocate nothing once the workspace exists. Each algorithm is written once over a small scalar
+//! trait and runs on one sample, on lanes of samples, and on dual numbers (the tests' oracle).
+//!
+//! | quantity | function | algorithm |
+//! | --- | --- | --- |
+//! | joint torques of a motion | [`inverse_dynamics()`]; of many samples: [`inverse_dynamics_batch`] | recursive Newton-Euler (RNEA) |
+//! | accelerations under torques | [`forward_dynamics()`] | articulated bodies (ABA) |
+//! | mass matrix | [`mass_matrix()`]; with the bias torque: [`mass_matrix_and_bias`] | composite bodies (CRBA) |
+//! | torque of gravity, energies | [`gravity_torque`], [`kinetic_energy`], [`potential_energy`] | |
+//! | derivatives of the torque by q, q̇, q̈ | [`inverse_dynamics_derivatives`] | analytic |
+//! | where the bodies are | [`body_placements`] | forward kinematics |
+//! | torque regressor, all ten parameters of each body | [`torque_regressor`] | linear in the parameters |
+//! | regressor of chosen columns, many samples | [`regressor_panels()`] with a [`PanelLayout`]; derivatives: [`regressor_panels_pull_back`] | |
+//! | base parameters | [`BaseParameters`]; cross-check: [`numerical_rank`] | from the robot's structure |
+//! | **all of it for identification** | [`ParametricModel`] | robot, torque terms, base parameters, layout, nominal values |
+//!
+//! ```
+//! use dynident_dynamics::{Workspace, forward_dynamics, inverse_dynamics, mass_matrix};
+//! # let text = r#"<robot name="arm"><link name="base"/>
+//! #   <link name="upper"><inertial><origin xyz="0 0 0.2"/><mass value="2"/>
+//! #     <inertia ixx="0.02" iyy="0.02" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+//! #   <link name="fore"><inertial><origin xyz="0 0 0.2"/><mass value="1"/>
+//! #     <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+//! #   <joint name="shoulder" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/></joint>
+//! #   <joint name="elbow" type="continuous"><parent link="upper"/><child link="fore"/><axis xyz="0 1 0"/>
+//! #     <origin xyz="0 0 0.4"/></joint></robot>"#;
+//! let arm = dynident_model::read_urdf(text)?.model;
+//! let mut workspace = Workspace::new(&arm);
+//! let (q, dq, ddq) = ([0.3, -0.8], [0.5, 1.0], [2.0, -1.0]);
+//!
+//! let tau = inverse_dynamics(&arm, &mut workspace, &q, &dq, &ddq).to_vec();
+//! let again = forward_dynamics(&arm, &mut workspace, &q, &dq, &tau);
+//! assert!(again.iter().zip(ddq).all(|(found, ddq)| (found - ddq).abs() < 1e-12));
+//!
+//! let inertia = mass_matrix(&arm, &mut workspace, &q);
+//! assert!(inertia[0] > inertia[3] && inertia[1] == inertia[2]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 #![forbid(unsafe_code)]
 

@@ -11,6 +11,7 @@ use dynident_model::{Model, Vec3};
 ///
 /// # Panics
 /// If `q` has not one entry per joint, or the workspace was made for another size.
+#[doc(alias("crba", "inertia matrix", "joint-space inertia"))]
 pub fn mass_matrix<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]) -> &'w [f64] {
     workspace.check(model, &[q]);
     let Workspace { level, scratch, matrices, .. } = workspace;

@@ -12,6 +12,7 @@ use dynident_model::Model;
 ///
 /// # Panics
 /// If a vector's length is not the number of joints, or the workspace was made for another size.
+#[doc(alias("nonlinear effects", "coriolis", "nle"))]
 pub fn mass_matrix_and_bias<'w>(
     model: &Model,
     workspace: &'w mut Workspace,

@@ -45,7 +45,7 @@ pub enum ParametricModelError {
 /// # let text = r#"<robot name="pendulum"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="2"/>
 /// #   <inertia ixx="0.2" iyy="0.2" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
 /// #   <joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>"#;
-/// let model = dynident_model::read_urdf(text)?;
+/// let model = dynident_model::read_urdf(text)?.model;
 /// let friction = laws_per_joint(&model, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
 /// let pendulum = ParametricModel::new(model, friction)?;
 /// assert_eq!(pendulum.base().expressions(), ["mx1", "mz1", "Iyy1", "fv1"]);
@@ -53,6 +53,7 @@ pub enum ParametricModelError {
 /// assert_eq!(pendulum.nominal_base().unwrap()[1], -1.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+#[doc(alias("robot", "nominal model", "machine"))]
 #[derive(Clone, Debug)]
 pub struct ParametricModel {
     model: Model,

@@ -18,6 +18,7 @@ use dynident_model::{Mat3, Model, Transform, Vec3};
 ///
 /// # Panics
 /// If a vector's length is not the number of joints, or the workspace was made for another tree.
+#[doc(alias("joint torque regressor", "observation matrix", "idm"))]
 pub fn torque_regressor<'w>(
     model: &Model,
     workspace: &'w mut Workspace,

@@ -189,6 +189,7 @@ impl Panels {
 ///
 /// # Panics
 /// If an array's length is not joints × samples, or layout or workspace belong to a model with another tree.
+#[doc(alias("regressor", "observation matrix"))]
 pub fn regressor_panels(
     model: &Model,
     workspace: &mut BatchWorkspace,

@@ -102,11 +102,6 @@ pub enum EstimationError {
         /// The column.
         name: String,
     },
-    /// Total least squares has no solution.
-    #[error(
-        "total least squares has no solution: the errors given are as large as a combination of columns; give smaller standard deviations for columns, or larger ones for torque"
-    )]
-    NoTotalSolution,
     /// The parameters that an iteration begins with cannot be simulated.
     #[error(
         "the simulation does not get through with the starting values; start from a description or an estimate that is a possible machine"

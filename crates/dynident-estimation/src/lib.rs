@@ -25,7 +25,7 @@
 //! | --- | --- |
 //! | parameters, noise of every joint unknown | [`weighted_least_squares`] |
 //! | gross errors set aside | [`robust_least_squares`] |
-//! | noise in position as well as in torque | [`instrumental_variables`], [`hausman_test`], [`total_least_squares`] |
+//! | noise in position as well as in torque | [`instrumental_variables`], [`hausman_test`] |
 //! | the motion estimated as well | [`simultaneous_least_squares`], [`maximum_likelihood`] |
 //! | a simulation that looks like the record | [`simulated_least_squares`] |
 //! | errors correlated between joints | [`generalized_least_squares`] |
@@ -65,10 +65,9 @@ pub use factor::{
 pub use linear::{
     CrossProblem, GainProblem, GeneralizedEstimate, HausmanSettings, HausmanTest, HausmanVerdict, InstrumentReport,
     InstrumentalEstimate, InstrumentalSettings, JointGain, KnownColumns, NoiseLevelSettings, NoiseWeightedEstimate,
-    OrdinarySettings, RobustEstimate, RobustSettings, RowBlock, RowVisitor, RowWeight, TotalEstimate, TotalSettings,
-    WeightedSettings, generalized_least_squares, hausman_test, instrumental_variables, joint_gains,
-    noise_weighted_least_squares, ordinary_least_squares, robust_least_squares, total_least_squares,
-    weighted_least_squares, weighted_least_squares_with_known,
+    OrdinarySettings, RobustEstimate, RobustSettings, RowBlock, RowVisitor, RowWeight, WeightedSettings,
+    generalized_least_squares, hausman_test, instrumental_variables, joint_gains, noise_weighted_least_squares,
+    ordinary_least_squares, robust_least_squares, weighted_least_squares, weighted_least_squares_with_known,
 };
 pub use nonlinear::{
     ChannelNoise, ChannelRows, InstantRows, InstantVisitor, MaximumLikelihoodEstimate, MaximumLikelihoodSettings,

@@ -1,4 +1,116 @@
-//! **Which model explains these samples?** From samples in memory or a stream to an identified model.
+//! **Which model explains these samples?** From samples in memory or a stream to an identified model. No study files,
+//! no paths, no pages: these are the business of the crate `dynident`.
+//!
+//! # A UR10 from arrays
+//!
+//! `q` and `tau` hold one array for each joint (rad, N m), sampled at 200 Hz; a second recording tests what the first
+//! one gives.
+//!
+//! ```
+//! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/ur10_arrays.rs"));
+//! use dynident_dynamics::ParametricModel;
+//! use dynident_identification::{Execution, IdentificationTask, Recording, identify};
+//! use dynident_model::laws::{DriveChoice, laws_per_joint};
+//! use dynident_recording::JointSamples;
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
+//! # let urdf = std::fs::read_to_string(path)?;
+//! # let (q, tau) = recorded(&dynident_model::read_urdf(&urdf)?.model, 0.3);
+//! # let (q_test, tau_test) = recorded(&dynident_model::read_urdf(&urdf)?.model, 2.0);
+//!
+//! let arm = dynident_model::read_urdf(&urdf)?.model;
+//! let friction = laws_per_joint(&arm, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
+//! let robot = ParametricModel::new(arm, friction)?;
+//!
+//! let train = JointSamples::at_rate(200.0, q, tau).into_log("train", &robot.joint_names())?;
+//! let test = JointSamples::at_rate(200.0, q_test, tau_test).into_log("test", &robot.joint_names())?;
+//! let recordings = vec![Recording::training("train", train), Recording::held_out("test", test)];
+//! let found = identify(&IdentificationTask::new(robot, recordings), Execution::default())?;
+//!
+//! // The description is 20 % off; the identified model predicts motion that it was not fitted to.
+//! let test = &found.held_out[0].validation;
+//! assert!(test.prior.as_ref().unwrap().relative_error_percent.unwrap() > 15.0);
+//! assert!(test.model.relative_error_percent.unwrap() < 0.5);
+//!
+//! // Every base parameter has a readable name, a value and an error bar; every body is one that can be real.
+//! let (names, estimate) = (found.model().base().expressions(), found.estimate());
+//! let viscous = names.iter().position(|name| name == "fv1").unwrap();
+//! assert!((estimate.values[viscous] - 2.0).abs() < 0.05, "{} ± {}", estimate.values[viscous], estimate.std[viscous]);
+//! assert!(found.inertials().iter().all(|body| body.mass_kg() > 0.0));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Stage by stage
+//!
+//! [`identify()`] is five stages, each a public function with a plain struct for its result. Here they are called alone
+//! on the same recordings:
+//!
+//! ```
+//! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/ur10_arrays.rs"));
+//! use dynident_identification::estimators::{TrainingRows, estimate};
+//! use dynident_identification::examination::{TestedModel, examine_held_out, examine_training};
+//! use dynident_identification::{Execution, IdentificationSettings, Logs, consistent_stage, training_rows};
+//! # use dynident_dynamics::ParametricModel;
+//! # use dynident_identification::Recording;
+//! # use dynident_model::laws::{DriveChoice, laws_per_joint};
+//! # use dynident_recording::JointSamples;
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
+//! # let arm = dynident_model::read_urdf(&std::fs::read_to_string(path)?)?.model;
+//! # let (train, test) = (recorded(&arm, 0.3), recorded(&arm, 2.0));
+//! # let friction = laws_per_joint(&arm, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
+//! # let truth = [true_arm(&arm).parameter_vector(), vec![VISCOUS; 6]].concat();
+//! # let robot = ParametricModel::new(arm, friction)?;
+//! # let log = |(q, tau)| JointSamples::at_rate(RATE_HZ, q, tau).into_log("arrays", &robot.joint_names());
+//! # let recordings = [Recording::training("train", log(train)?), Recording::held_out("test", log(test)?)];
+//! let settings = IdentificationSettings::default();
+//!
+//! // Rows of the regressor, kept as triangular factors; one cut-off frequency for all recordings.
+//! let logs = Logs::new(robot.model(), &recordings, &settings, &[0], None, Execution::default())?;
+//! let training = training_rows(&logs, robot.clone().into(), &[0], &[], None)?;
+//!
+//! // Base parameters with their covariance, by the estimator of the settings.
+//! let rows = TrainingRows { logs: &logs, model: &training.model, training: &[0], problem: &training.problem };
+//! let estimate = estimate(&rows, None)?.estimate;
+//!
+//! // Bodies and friction that can be real and explain the rows best.
+//! let consistent = consistent_stage(&logs, &training, &estimate)?;
+//! let fit = consistent.fit.expect("a consistent set explains what a real arm did");
+//!
+//! // What the recordings say of it: the lag of the torque, and the error on motion that was not used.
+//! let (lags, _) = examine_training(&logs, &training.model, 0, &estimate.values)?;
+//! assert_eq!(lags.len(), 6);
+//! let tested = TestedModel { theta: &fit.base_values, physical: None, uncertainty: None, traced: false };
+//! let held_out = examine_held_out(&logs, &training.model, 1, &tested)?;
+//! assert!(held_out.validation.model.relative_error_percent.unwrap() < 1.0);
+//! # for (value, truth) in estimate.values.iter().zip(robot.base().values(&truth)) {
+//! #     assert!((value - truth).abs() < 0.02 * truth.abs().max(1.0), "{value} and {truth}");
+//! # }
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # By task
+//!
+//! | task | take |
+//! | --- | --- |
+//! | a model from recordings | [`identify()`] of an [`IdentificationTask`] |
+//! | a log file, a stream, arrays | [`Recording`] over a [`Log`](dynident_recording::Log); a motion made elsewhere: [`Recording::of_motion`] |
+//! | another estimator | [`Estimator`](estimators::Estimator) in [`EstimationSettings`]; what it alone finds: [`Findings`](estimators::Findings) |
+//! | instruments from a simulated loop or a second run | [`identify_with_instruments`] |
+//! | friction chosen by the training logs | [`IdentificationSettings::friction`] |
+//! | what is known of the bodies | [`ConsistencySettings`](consistent::ConsistencySettings) |
+//! | how far a mass could be off | [`IdentificationSettings::intervals`] |
+//! | zeros of torque sensors that drift | [`OffsetChoice::PerLog`] |
+//! | motor constants | [`GainChoice::Unknown`], with a known payload on some of the logs |
+//! | a payload on a known arm | [`identify_payload`] with a [`KnownArm`](payload::KnownArm) |
+//! | the lag of the torque, its sign, its residuals | [`TrainingExamination`], [`examination`] |
+//! | the rows themselves | [`LogPass`](rows::LogPass) with a [`RowConsumer`](rows::RowConsumer) of one's own |
+//! | a progress bar | [`Progress`] in [`Execution`] |
+//!
+//! A recording that fits into memory is read and differentiated once, however many passes there are over its rows; of a
+//! longer one only factors stay. The result is the same for any number of threads.
 
 #![forbid(unsafe_code)]
 

@@ -1,8 +1,19 @@
-//! **The iteration**: run, identify, load the better model, run again.
+//! **Run it again, better.** Run, identify, load the better model, run again; robots outside, and a store of every run.
 //!
-//! One run's identification ([`identify_run`]): record → differentiator → regressor rows → estimate with covariance, all joints at once or step by step from tip to base as in the paper. The policy
-//! ([`Iteration::next`]) is a pure function of the records so far: which controller and model the next run has, whether a run got worse, when all has settled. [`iterate()`] drives robots with it;
-//! an [`IterationStore`] keeps every run on disk, so that a killed iteration resumes to the same result.
+//! | task | take |
+//! | --- | --- |
+//! | the loop | [`iterate()`] of an [`IterationTask`] with [`IterationSettings`] |
+//! | what is run | [`Leg`]: a trajectory and which of its rows count |
+//! | a simulated robot | [`SimulatedRobot`] |
+//! | a program that speaks the line protocol, or a person with a folder | [`robot`] |
+//! | a robot of one's own | a type with [`Robot`] |
+//! | one run's identification | [`identify_run`]: all joints at once, or step by step from tip to base as in the paper |
+//! | what the next run is | [`Iteration::next`], a pure function of the records so far: which controller and model it has, whether a run got worse, when all has settled |
+//! | kept on disk, and resumed to the same result | [`IterationStore`] |
+//!
+//! The crate `dynident` wraps it as `dynident iterate`, with trajectories, robots and controllers from a study file.
+
+#![forbid(unsafe_code)]
 
 mod drive;
 mod error;

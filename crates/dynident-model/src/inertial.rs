@@ -9,6 +9,7 @@ pub const INERTIAL_NAMES: [&str; 10] = ["m", "mx", "my", "mz", "Ixx", "Ixy", "Ix
 /// `[m, m r_x, m r_y, m r_z, I_xx, I_xy, I_xz, I_yy, I_yz, I_zz]` of one rigid body: mass in kg, first moment in kg m,
 /// inertia **about the origin of the body frame** in kg m², all in the axes of the body frame. `r` is the centre of mass and
 /// the products of inertia are entries of the inertia matrix: `I_xy = -∫ x y dm`.
+#[doc(alias("barycentric parameters", "standard parameters", "inertia tensor"))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InertialParameters(pub [f64; 10]);
 

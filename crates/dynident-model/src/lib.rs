@@ -1,8 +1,51 @@
-//! **What is this machine?** Spatial algebra, joints, the link tree, the ten inertial parameters of a body, the laws of friction,
-//! drives and couplings; readers and writers of robot descriptions; the audit of a model's physics.
+//! **What is this robot?** Spatial algebra, joints, the link tree, the ten inertial parameters of a body, torque
+//! terms of friction, drives and couplings; readers and writers of robot descriptions; the audit of a model's
+//! physics.
 //!
-//! One convention everywhere: inertial parameters in the order [`INERTIAL_NAMES`], inertia about the body frame's origin; SI units and
-//! radians; joints by name.
+//! One convention everywhere: inertial parameters in the order [`INERTIAL_NAMES`], inertia about the body frame's
+//! origin; SI units and radians; joints by name.
+//!
+//! | task | take |
+//! | --- | --- |
+//! | read a robot from a file | [`load_robot`]: URDF or Denavit-Hartenberg table |
+//! | read it from a text | [`read_urdf`], [`read_dh`] |
+//! | make one in code | [`Model::new`] of [`Joint`]s and [`Body`]s |
+//! | gravity, mounting, locked joints | [`Model::with_gravity`], [`Model::with_base_orientation`], [`Model::locked`] |
+//! | masses, centres of mass, inertias | [`Model::inertials`], [`InertialParameters`] |
+//! | other ones in their place | [`Model::with_inertials`] |
+//! | friction, drive inertia, offsets of every joint | [`laws::laws_per_joint`]; one by one: [`laws::Law`] |
+//! | can these bodies be real? | [`audit()`], [`InertialParameters::pseudo_inertia`] |
+//! | new inertials into the user's own URDF | [`link_changes`], [`rewrite_urdf`] |
+//!
+//! ```
+//! use dynident_model::laws::{CoulombShape, DriveChoice, laws_per_joint};
+//! use dynident_model::{AuditLevel, audit, read_urdf};
+//!
+//! let text = r#"
+//! <robot name="pendulum">
+//!   <link name="base"/>
+//!   <link name="rod">
+//!     <inertial>
+//!       <origin xyz="0 0 -0.5"/> <mass value="2"/>
+//!       <inertia ixx="0.2" iyy="0.2" izz="0.01" ixy="0" ixz="0" iyz="0"/>
+//!     </inertial>
+//!   </link>
+//!   <joint name="hinge" type="revolute">
+//!     <parent link="base"/> <child link="rod"/> <axis xyz="0 1 0"/>
+//!     <limit lower="-2" upper="2" velocity="3" effort="20"/>
+//!   </joint>
+//! </robot>"#;
+//! let pendulum = read_urdf(text)?.model;
+//! let rod = pendulum.inertials()[0];
+//! assert_eq!((rod.mass_kg(), rod.first_moment().0[2]), (2.0, -1.0));
+//! assert!(audit(&pendulum).iter().all(|finding| finding.level != AuditLevel::Problem));
+//!
+//! // What acts on its joint beside the rigid bodies, each with one parameter.
+//! let coulomb = Some(CoulombShape::Smooth { width: 0.01 });
+//! let terms = laws_per_joint(&pendulum, |_| DriveChoice { viscous: true, coulomb, ..DriveChoice::default() });
+//! assert_eq!(terms.iter().map(|term| term.symbol()).collect::<Vec<_>>(), ["fv1", "fc1"]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 #![forbid(unsafe_code)]
 

@@ -94,6 +94,7 @@ pub enum ReadError {
 ///
 /// # Errors
 /// If the file cannot be read, is too large, empty, or no UTF-8, or if its content is faulty; every message names the file.
+#[doc(alias("urdf", "denavit-hartenberg"))]
 pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
     let path = path.as_ref();
     let named = || path.to_owned();

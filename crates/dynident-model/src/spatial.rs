@@ -233,6 +233,7 @@ impl Mat3<f64> {
 }
 
 /// A rigid transform `parent_from_child`: a point `p` of the child frame lies at `rotation · p + translation` in the parent.
+#[doc(alias("se3", "placement"))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transform<T = f64> {
     /// Columns are the child's axes in the parent frame.

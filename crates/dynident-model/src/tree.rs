@@ -43,6 +43,7 @@ impl Body {
 
 /// A machine on a fixed base: joints and bodies in an order where parents come before children. Body `i` moves with joint `i`;
 /// positions, velocities and torques are vectors in this order.
+#[doc(alias("robot", "kinematic tree", "multibody"))]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
     name: String,

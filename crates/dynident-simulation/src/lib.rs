@@ -1,8 +1,38 @@
-//! **What would it do?** Controllers at a fixed rate, a simulated robot with friction that sticks, sensors as robots have them, and the closed loop
-//! of the three.
+//! **What would it do?** Controllers at a fixed rate, a simulated robot with friction that sticks, sensors as robots
+//! have them, and the closed loop of the three.
 //!
-//! [`closed_loop()`] runs a [`Controller`] on a [`Plant`] along a [`Reference`] and gives a [`Run`]: what truly was, what the controller saw, how
-//! well the joints followed, and a [`RunStatus`]. [`SensorSettings::record`] makes of it what a log would hold.
+//! | task | take |
+//! | --- | --- |
+//! | the robot that is simulated | [`Plant`]: a model, torque terms and their values, disturbances, locked joints |
+//! | one that differs from its description | [`with_length_errors`], [`with_placements`] |
+//! | what it is to follow | [`Reference`]: samples, or a family of trajectories |
+//! | how it is controlled | [`ControllerSettings`], or a type of one's own with [`Controller`] |
+//! | what stops a run | [`RunLimits`] in [`LoopSettings`] |
+//! | the run | [`closed_loop()`] gives a [`Run`]: what truly was, what the controller saw, how well the joints followed, a [`RunStatus`] |
+//! | what a log of it would hold | [`SensorSettings::record`]: quantised, noisy, late |
+//!
+//! ```
+//! use dynident_simulation::controllers::{JointPd, JointPdSettings};
+//! use dynident_simulation::{LoopSettings, Plant, Reference, SensorSettings, closed_loop};
+//! # let text = r#"<robot name="pendulum"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 -0.5"/>
+//! #   <mass value="2"/><inertia ixx="0.2" iyy="0.2" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+//! #   <joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint>
+//! # </robot>"#;
+//! let model = dynident_model::read_urdf(text)?.model;
+//! let mut plant = Plant::new(&model, &[], &[])?;
+//! let mut controller = JointPd::new(1, &JointPdSettings { kp: 200.0.into(), kd: 40.0.into() })?;
+//!
+//! // One second at 1 kHz, held out level against gravity.
+//! let reference = Reference::standing(&[1.57], 1000.0, 1.0)?;
+//! let run = closed_loop(&mut plant, &mut controller, &reference, &LoopSettings::default())?;
+//! assert!(run.status.is_done());
+//! // A spring of 200 N m/rad gives by 2 kg · 9.81 m/s² · 0.5 m.
+//! assert!((run.max_error[0] - 9.81 / 200.0).abs() < 0.005);
+//!
+//! let log = SensorSettings::birdy_standard(1).record(&model, &run)?;
+//! assert!(log.csv().lines().count() > 900);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 #![forbid(unsafe_code)]
 

@@ -1,12 +1,39 @@
-//! **The whole job**: a study file in, a dynamic model with error bars and its proof out.
+//! **The whole job**: a study file in; a dynamic model with error bars and its proof out.
 //!
-//! [`identify()`] fits a [`Study`]'s model to its logs and tests it on the held-out ones; [`validate()`] tests a finished model; [`inspect()`] audits a robot
-//! description; [`evaluate()`] computes dynamics for a table of states; [`design_study()`] finds the motion to record, [`check_trajectory()`] and [`check_log()`] judge one that is there. The rooms below are re-exported: [`model`],
-//! [`dynamics`], [`recording`], [`estimation`], [`excitation`], [`simulation`], [`identification`], [`iteration`].
+//! | task | take |
+//! | --- | --- |
+//! | read a study file | [`Study::load`], [`Study::parse`] |
+//! | logs to a model | [`identify()`]; its result: [`ResultFile`], a page: [`IdentificationOutcome::report`] |
+//! | a finished model on other logs | [`validate()`] |
+//! | look at a robot description | [`inspect()`] |
+//! | dynamics for a table of states | [`evaluate()`] |
+//! | the motion to record | [`design_study()`]; judge one that is there: [`check_trajectory()`], [`check_log()`] |
+//! | one run of a simulated robot | [`simulate_study()`] |
+//! | run, identify, run again | [`iterate_study()`] |
+//! | a progress bar | [`Progress`] in [`RunOptions`] |
+//!
+//! Who has samples in memory needs no study: [`identification`] takes arrays. The crates below are re-exported:
+//! [`model`], [`dynamics`], [`recording`], [`estimation`], [`excitation`], [`simulation`], [`identification`],
+//! [`iteration`].
+//!
+//! ```
+//! use dynident::{RunOptions, Silent, Study, identify};
+//! use std::path::Path;
+//!
+//! # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/ur10_simulated.toml");
+//! let path = Path::new(path); // examples/ur10_simulated.toml
+//! let study = Study::load(path)?;
+//! let found = identify(&study, path, &RunOptions { data: None, threads: 1, progress: &Silent })?;
+//!
+//! let test = &found.result.validation[0];
+//! let prior = test.prior.as_ref().expect("the description has all inertials");
+//! assert!(test.model.relative_error_percent < prior.relative_error_percent);
+//! assert!(found.result.physical.consistent && found.urdf.is_some());
+//! # Ok::<(), dynident::Error>(())
+//! ```
 
 #![forbid(unsafe_code)]
 
-pub mod benchmark;
 #[cfg(doctest)]
 pub mod book;
 mod cpu_time;

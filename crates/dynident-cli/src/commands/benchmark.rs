@@ -2,8 +2,8 @@
 
 use super::{Context, json, pretty_json, told};
 use crate::{Verdict, summary, terminal};
-use dynident::benchmark::{BenchmarkSettings, benchmark, cells_csv};
 use dynident::{check_writable, write_whole};
+use dynident_benchmark::accuracy::{BenchmarkSettings, benchmark, cells_csv};
 use std::path::PathBuf;
 
 /// Options of `benchmark`.

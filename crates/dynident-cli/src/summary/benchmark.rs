@@ -1,7 +1,7 @@
 //! The summary of `benchmark`.
 
 use super::text::{table, wrapped};
-use dynident::benchmark::BenchmarkFile;
+use dynident_benchmark::accuracy::BenchmarkFile;
 
 /// One line for every estimator at every noise level of every robot.
 pub(crate) fn benchmark(file: &BenchmarkFile) -> String {

@@ -33,6 +33,7 @@ impl Default for BaseParameterSettings {
 }
 
 /// The base parameters of a machine with its laws.
+#[doc(alias("minimal parameters", "identifiable parameters"))]
 #[derive(Clone, Debug)]
 pub struct BaseParameters {
     columns: Vec<Column>,

@@ -9,8 +9,7 @@
 //! | correlated between joints | [`generalized_least_squares`] |
 //! | a level that depends on the speed | [`noise_weighted_least_squares`] |
 //! | gross errors | [`robust_least_squares`] |
-//! | in the columns too, of known size | [`total_least_squares`] |
-//! | in the columns too, of unknown size | [`instrumental_variables`]; [`hausman_test`] says whether it matters |
+//! | in the columns too | [`instrumental_variables`]; [`hausman_test`] says whether it matters |
 //!
 //! A function takes a problem, its settings and, where rows are needed again, a source of rows at last: a pass over the
 //! log as often as it is called. [`joint_gains`] estimates the torque constants of the drives from the same rows.
@@ -24,7 +23,6 @@ mod noise_levels;
 mod ordinary;
 mod projection;
 mod robust;
-mod total;
 mod weighted;
 
 pub use generalized::{CrossProblem, GeneralizedEstimate, generalized_least_squares};
@@ -35,5 +33,4 @@ pub use known_columns::{KnownColumns, weighted_least_squares_with_known};
 pub use noise_levels::{NoiseLevelSettings, NoiseWeightedEstimate, noise_weighted_least_squares};
 pub use ordinary::{OrdinarySettings, ordinary_least_squares};
 pub use robust::{RobustEstimate, RobustSettings, RowBlock, RowVisitor, RowWeight, robust_least_squares};
-pub use total::{TotalEstimate, TotalSettings, total_least_squares};
 pub use weighted::{WeightedSettings, weighted_least_squares};

@@ -2,10 +2,10 @@
 
 use crate::common::Random;
 use dynident_estimation::{
-    CovarianceMethod, CrossProblem, EstimateStatus, EstimationError, HausmanSettings, HausmanVerdict,
-    InstrumentalSettings, InstrumentedProblem, LinearProblem, RankSettings, RobustSettings, RowBlock, RowWeight,
-    SegmentSettings, SegmentedFactor, TotalSettings, WeightedSettings, generalized_least_squares, hausman_test,
-    instrumental_variables, robust_least_squares, student_half_width, total_least_squares, weighted_least_squares,
+    CrossProblem, EstimateStatus, EstimationError, HausmanSettings, HausmanVerdict, InstrumentalSettings,
+    InstrumentedProblem, LinearProblem, RobustSettings, RowBlock, RowWeight, SegmentSettings, SegmentedFactor,
+    WeightedSettings, generalized_least_squares, hausman_test, instrumental_variables, robust_least_squares,
+    weighted_least_squares,
 };
 
 const THETA: [f64; 2] = [2.0, -1.0];
@@ -224,55 +224,4 @@ fn gross_errors_cost_reweighting_at_most_a_fifth() {
         // The project's own goal.
         assert!(robust <= 1.2 * clean, "{weight:?}: {robust} against {clean}");
     }
-}
-
-#[test]
-fn total_least_squares_is_consistent_where_the_errors_are_known() {
-    let mut random = Random::new(31);
-    let (runs, rows) = (60, 1500);
-    let (mut mean, mut covered) = ([0.0; 3], 0);
-    let truth = [2.0, -1.0, 0.5];
-    for _ in 0..runs {
-        let mut panel = vec![0.0; 4 * rows];
-        for row in 0..rows {
-            let (a, b) = (random.normal(), 2.0 * random.normal());
-            panel[row] = a + 0.4 * random.normal();
-            panel[rows + row] = b + 0.2 * random.normal();
-            panel[2 * rows + row] = 1.0;
-            panel[3 * rows + row] = truth[0] * a + truth[1] * b + truth[2] + 0.3 * random.normal();
-        }
-        let settings = SegmentSettings { max_segments: 64, first_length_rows: 30 };
-        let mut factor = SegmentedFactor::new(3, settings).unwrap();
-        factor.absorb(&panel, rows).unwrap();
-        let names = vec!["a".into(), "b".into(), "offset".into()];
-        let mut problem = LinearProblem::new(names, vec!["joint1".into()]);
-        problem.add("run", 0, vec![0, 1, 2], factor).unwrap();
-        let settings = TotalSettings {
-            column_std: vec![0.4, 0.2, 0.0],
-            torque_std: vec![0.3],
-            rank: RankSettings::default(),
-            covariance: CovarianceMethod::Segments,
-        };
-        let found = total_least_squares(&problem, &settings).unwrap();
-        // N − p = 1497 squares: their root is known to 1.8 %; four of those.
-        assert!((found.error_scale - 1.0).abs() < 0.08, "{}", found.error_scale);
-        for c in 0..3 {
-            mean[c] += found.estimate.values[c] / f64::from(runs);
-            covered += i32::from((found.estimate.values[c] - truth[c]).abs() < 1.96 * found.estimate.std[c]);
-            // The interval is that of the standard deviation reported, to the last bit but one.
-            let half_width = student_half_width(0.95, found.estimate.std_freedom[c]) * found.estimate.std[c];
-            assert!((found.estimate.half_width_95[c] / half_width - 1.0).abs() < 1e-12);
-        }
-        // Errors as large as the column itself leave nothing.
-        let absurd = TotalSettings { column_std: vec![50.0, 0.2, 0.0], ..settings };
-        let absurd = total_least_squares(&problem, &absurd);
-        assert!(absurd.is_err() || absurd.unwrap().estimate.std.iter().all(|std| std.is_finite()));
-    }
-    for c in 0..3 {
-        // One run's error is about √(1.2/1500) = 0.028; of the mean of 60 runs 0.0037. Four of those; least squares is
-        // off by 0.28 in the first column.
-        assert!((mean[c] - truth[c]).abs() < 0.015, "column {c}: {}", mean[c]);
-    }
-    // 180 intervals: 95 % is 171, with a standard deviation of 2.9.
-    assert!((159..=180).contains(&covered), "{covered} of 180");
 }

@@ -33,6 +33,8 @@ pub struct PeriodSettings {
     pub period_s: Option<f64>,
     /// Seconds at the start of every log that are left out, until the motion repeats; 0 by default.
     pub skip_s: f64,
+    /// Harmonics of the motion's Fourier series, for the simultaneous fit alone; by default those that stand out of the noise.
+    pub harmonics: Option<usize>,
 }
 
 impl PeriodSettings {
@@ -48,6 +50,9 @@ impl PeriodSettings {
         }
         if !(self.skip_s >= 0.0 && self.skip_s.is_finite()) {
             return Err(format!("skip_s = {}: give 0 or more seconds", self.skip_s));
+        }
+        if let Some(harmonics) = self.harmonics.filter(|harmonics| !(1..=200).contains(harmonics)) {
+            return Err(format!("harmonics = {harmonics}: give 1 to 200"));
         }
         Ok(())
     }

@@ -9,17 +9,21 @@ mod instrumental;
 mod instruments;
 mod maximum_likelihood;
 mod noise_weighted;
+mod periodic_model;
 mod robust;
 mod row_pass;
 mod simulated;
 mod simulated_loop;
+mod simultaneous;
 
 pub use instrumental::{InstrumentSettings, NoiseInRegressor};
 pub use instruments::{InstrumentSource, SmoothedMotion};
 pub use maximum_likelihood::{PeriodSettings, PeriodicFit};
 pub use noise_weighted::NoiseLevels;
+pub use periodic_model::{FourierSeries, PeriodicModel, PeriodicRecord};
 pub use robust::GrossErrors;
 pub use simulated::{SimulatedFit, SimulatedLoopSettings, SimulationStart};
+pub use simultaneous::SeriesFit;
 
 use crate::error::IdentificationError;
 use crate::logs::Logs;
@@ -50,6 +54,8 @@ pub enum Estimator {
     Instrumental(InstrumentSettings),
     /// Maximum likelihood for a motion that repeats: noise of motion and torque from how the periods differ.
     MaximumLikelihood(PeriodSettings),
+    /// Motion and parameters together, for a motion that is a Fourier series: noise of positions and torques weighed against each other.
+    Simultaneous(PeriodSettings),
     /// Regression on the motion of the simulated closed loop: no measured position enters the regressor.
     Didim(Box<SimulatedLoopSettings>),
     /// The simulated closed loop's torque fitted to the measured one (closed-loop input error).
@@ -70,6 +76,7 @@ impl Estimator {
             Self::NoiseWeighted(_) => "noise-weighted",
             Self::Instrumental(_) => "instrumental",
             Self::MaximumLikelihood(_) => "maximum-likelihood",
+            Self::Simultaneous(_) => "simultaneous",
             Self::Didim(_) => "didim",
             Self::Clie(_) => "clie",
             Self::Cloe(_) => "cloe",
@@ -86,6 +93,7 @@ impl Estimator {
             | Self::NoiseWeighted(_)
             | Self::Instrumental(_)
             | Self::MaximumLikelihood(_)
+            | Self::Simultaneous(_)
             | Self::Didim(_)
             | Self::Clie(_)
             | Self::Cloe(_) => false,
@@ -108,6 +116,8 @@ pub enum Findings {
     NoiseLevels(Vec<[f64; 2]>),
     /// What the periods of a repeated motion say.
     Periodic(PeriodicFit),
+    /// Motion and noise of every training log by the simultaneous fit.
+    Series(Vec<SeriesFit>),
     /// How the fit to a simulated closed loop went.
     Simulated(SimulatedFit),
 }
@@ -186,6 +196,7 @@ pub fn estimate(
             let (estimate, found) = maximum_likelihood::periodic(rows, periods)?;
             (estimate, Findings::Periodic(found))
         }
+        Estimator::Simultaneous(periods) => simultaneous::simultaneous(rows, periods)?,
         Estimator::Didim(settings) => simulated(settings, Compared::TorqueRows)?,
         Estimator::Clie(settings) => simulated(settings, Compared::Torque)?,
         Estimator::Cloe(settings) => simulated(settings, Compared::Position)?,

@@ -5,6 +5,7 @@ use super::{JointMotion, LawInput};
 use serde::{Deserialize, Serialize};
 
 /// Reflected drive inertia of one joint, kg m² (kg).
+#[doc(alias("rotor inertia", "armature"))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DriveInertia {
     /// The joint.

@@ -79,6 +79,7 @@ impl<'a> JointMotion<'a> {
 }
 
 /// One parameter of the drives, linear in the joint torques.
+#[doc(alias("friction", "torque term", "actuator"))]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Law {

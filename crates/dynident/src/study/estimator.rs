@@ -3,9 +3,12 @@
 use super::numbers::positive;
 use super::physical::PhysicalChoice;
 use super::simulated::SimulatedSection;
+use crate::error::Error;
 use dynident_estimation::{CovarianceMethod, EssentialSettings, RankSettings, SegmentSettings};
 use dynident_identification::EstimationSettings;
-use dynident_identification::estimators::{InstrumentSettings, NoiseLevels, PeriodSettings};
+use dynident_identification::estimators::{
+    Estimator, InstrumentSettings, NoiseLevels, PeriodSettings, SimulatedLoopSettings,
+};
 use serde::{Deserialize, Serialize};
 
 /// How base parameters are estimated.
@@ -29,6 +32,8 @@ pub enum EstimatorMethod {
     Instrumental,
     /// Maximum likelihood for a motion that repeats: noise of motion and torque from how the periods differ.
     MaximumLikelihood,
+    /// Motion and parameters together, for a motion that is a Fourier series: noise of positions and torques weighed against each other.
+    Simultaneous,
     /// Regression on the motion of the simulated closed loop: no measured position enters the regressor.
     Didim,
     /// The simulated closed loop's torque fitted to the measured one (closed-loop input error).
@@ -49,6 +54,7 @@ impl EstimatorMethod {
             Self::NoiseWeighted => "noise-weighted",
             Self::Instrumental => "instrumental",
             Self::MaximumLikelihood => "maximum-likelihood",
+            Self::Simultaneous => "simultaneous",
             Self::Didim => "didim",
             Self::Clie => "clie",
             Self::Cloe => "cloe",
@@ -79,7 +85,7 @@ pub struct EstimatorSection {
     pub instruments: Option<InstrumentSettings>,
     /// How `method = "noise-weighted"` finds the noise around a row.
     pub noise_levels: NoiseLevels,
-    /// The repeated motion of `method = "maximum-likelihood"`.
+    /// The repeated motion of `method = "maximum-likelihood"` and `"simultaneous"`.
     pub periods: PeriodSettings,
     /// How the loop is simulated for `method = "didim"`, `"clie"` and `"cloe"`.
     pub simulated: SimulatedSection,
@@ -92,6 +98,42 @@ impl EstimatorSection {
         (settings.rank, settings.covariance, settings.segments) = (self.rank, self.covariance, self.segments);
         settings.essential.clone_from(&self.essential);
         settings
+    }
+
+    /// The estimator that `method` names, with its settings; `simulated` is asked for the closed loop where it needs one.
+    pub(crate) fn estimator(
+        &self,
+        simulated: impl FnOnce() -> Result<Box<SimulatedLoopSettings>, Error>,
+    ) -> Result<Estimator, Error> {
+        Ok(match self.method {
+            EstimatorMethod::Ordinary => Estimator::Ordinary,
+            EstimatorMethod::Weighted => Estimator::Weighted,
+            EstimatorMethod::Generalized => Estimator::Generalized,
+            EstimatorMethod::Huber => Estimator::Huber,
+            EstimatorMethod::Tukey => Estimator::Tukey,
+            EstimatorMethod::NoiseWeighted => Estimator::NoiseWeighted(self.noise_levels.clone()),
+            EstimatorMethod::Instrumental => Estimator::Instrumental(self.instruments.clone().unwrap_or_default()),
+            EstimatorMethod::MaximumLikelihood => Estimator::MaximumLikelihood(self.periods.clone()),
+            EstimatorMethod::Simultaneous => Estimator::Simultaneous(self.periods.clone()),
+            EstimatorMethod::Didim => Estimator::Didim(simulated()?),
+            EstimatorMethod::Clie => Estimator::Clie(simulated()?),
+            EstimatorMethod::Cloe => Estimator::Cloe(simulated()?),
+        })
+    }
+
+    /// Whether the method cannot do without the motion that was commanded.
+    pub(crate) fn needs_commanded_motion(&self) -> bool {
+        match self.method {
+            EstimatorMethod::MaximumLikelihood | EstimatorMethod::Simultaneous => self.periods.period_s.is_none(),
+            EstimatorMethod::Didim | EstimatorMethod::Clie | EstimatorMethod::Cloe => true,
+            EstimatorMethod::Ordinary
+            | EstimatorMethod::Weighted
+            | EstimatorMethod::Generalized
+            | EstimatorMethod::Huber
+            | EstimatorMethod::Tukey
+            | EstimatorMethod::NoiseWeighted
+            | EstimatorMethod::Instrumental => false,
+        }
     }
 
     pub(crate) fn validate(&self) -> Result<(), String> {

@@ -2,9 +2,9 @@
 
 use super::friction::FrictionChoice;
 use super::robot_model::drive_choice;
-use super::{EstimatorMethod, Folders, Study, StudyRobot};
+use super::{Folders, Study, StudyRobot};
 use crate::error::Error;
-use dynident_identification::estimators::{Estimator, SimulatedLoopSettings};
+use dynident_identification::estimators::SimulatedLoopSettings;
 use dynident_identification::friction::FrictionSearch;
 use dynident_identification::payload::Payload;
 use dynident_identification::{IdentificationSettings, IdentificationTask, Recording};
@@ -53,7 +53,7 @@ impl Study {
         let mut recording = Recording::training(self.log_name(index), log);
         recording.role = self.log[index].role;
         recording.payload.clone_from(&self.log[index].payload);
-        if self.needs_commanded_motion() {
+        if self.estimator.needs_commanded_motion() || self.motion.differentiator.reference().is_some() {
             recording.commanded = self.commanded(robot, folders, index)?.map(Arc::new);
         }
         Ok(recording)
@@ -67,21 +67,6 @@ impl Study {
             known: section.known(),
         };
         self.payload.iter().map(payload).collect()
-    }
-
-    fn needs_commanded_motion(&self) -> bool {
-        let by_estimator = match self.estimator.method {
-            EstimatorMethod::MaximumLikelihood => self.estimator.periods.period_s.is_none(),
-            EstimatorMethod::Didim | EstimatorMethod::Clie | EstimatorMethod::Cloe => true,
-            EstimatorMethod::Ordinary
-            | EstimatorMethod::Weighted
-            | EstimatorMethod::Generalized
-            | EstimatorMethod::Huber
-            | EstimatorMethod::Tukey
-            | EstimatorMethod::NoiseWeighted
-            | EstimatorMethod::Instrumental => false,
-        };
-        by_estimator || self.motion.differentiator.reference().is_some()
     }
 
     /// The motion that was commanded in log number `index`, its joints in the model's order: the log's own `reference`, or the differentiator's; `None` if neither is given.
@@ -114,31 +99,13 @@ impl Study {
         settings.motion = self.motion.clone();
         settings.parallel_filter = self.parallel_filter.clone();
         settings.estimation = self.estimator.common();
-        settings.estimation.estimator = self.estimator(path, robot)?;
+        settings.estimation.estimator = self.estimator.estimator(|| self.simulated_loop(path, robot).map(Box::new))?;
         settings.estimation.exogeneity_test.clone_from(&self.estimator.instruments);
         settings.consistency = self.estimator.physical.settings();
         settings.intervals = self.estimator.intervals;
         settings.friction = self.friction_searches(robot);
         (settings.offsets, settings.gains) = (self.drive.offsets, self.drive.gains);
         Ok(settings)
-    }
-
-    fn estimator(&self, path: &Path, robot: &StudyRobot) -> Result<Estimator, Error> {
-        let section = &self.estimator;
-        let simulated = || self.simulated_loop(path, robot).map(Box::new);
-        Ok(match section.method {
-            EstimatorMethod::Ordinary => Estimator::Ordinary,
-            EstimatorMethod::Weighted => Estimator::Weighted,
-            EstimatorMethod::Generalized => Estimator::Generalized,
-            EstimatorMethod::Huber => Estimator::Huber,
-            EstimatorMethod::Tukey => Estimator::Tukey,
-            EstimatorMethod::NoiseWeighted => Estimator::NoiseWeighted(section.noise_levels.clone()),
-            EstimatorMethod::Instrumental => Estimator::Instrumental(section.instruments.clone().unwrap_or_default()),
-            EstimatorMethod::MaximumLikelihood => Estimator::MaximumLikelihood(section.periods.clone()),
-            EstimatorMethod::Didim => Estimator::Didim(simulated()?),
-            EstimatorMethod::Clie => Estimator::Clie(simulated()?),
-            EstimatorMethod::Cloe => Estimator::Cloe(simulated()?),
-        })
     }
 
     /// The experiment of estimators that simulate the closed loop: `[controller]`, `[simulation]` and `[estimator.simulated]`.

@@ -1,6 +1,6 @@
-//! The book: every code block has a kind that something checks, every TOML block is read by what it is meant for, every page is linked
-//! and every link leads somewhere. Rust blocks run as documentation tests (`src/book.rs`). The studies and robots of `examples/` are
-//! read, too.
+//! The book: every code block has a kind that something checks, every TOML block is read by what it is meant for,
+//! every page is linked and every link leads somewhere, those of README, ARCHITECTURE and CONTRIBUTING too. Rust
+//! blocks run as documentation tests (`src/book.rs`). The studies and robots of `examples/` are read, too.
 
 use dynident::Study;
 use dynident::study::EstimatorSection;
@@ -164,6 +164,33 @@ fn every_page_is_in_the_summary_and_every_link_leads_somewhere() {
     let linked: BTreeSet<&str> = links(summary).into_iter().collect();
     for (page, _) in pages.iter().filter(|(page, _)| page != "SUMMARY.md") {
         assert!(linked.contains(page.as_str()), "docs/src/SUMMARY.md does not link {page}");
+    }
+}
+
+/// What README shows of Rust is part of an example that runs.
+#[test]
+fn the_readmes_rust_is_an_example_of_the_crate() {
+    let readme = std::fs::read_to_string(docs().join("../README.md")).unwrap();
+    let source = std::fs::read_to_string(docs().join("../crates/dynident-identification/src/lib.rs")).unwrap();
+    let example: Vec<&str> = source.lines().filter_map(|line| line.strip_prefix("//! ")).collect();
+    let shown = blocks("README.md", &readme);
+    let lines = shown.iter().filter(|block| block.info == "rust").flat_map(|block| block.text.lines());
+    let strange: Vec<&str> = lines.filter(|line| !line.is_empty() && !example.contains(line)).collect();
+    assert!(strange.is_empty(), "not in the example of dynident-identification: {strange:#?}");
+}
+
+#[test]
+fn links_and_paths_of_the_guides_lead_somewhere() {
+    let root = docs().join("..");
+    for guide in ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md"] {
+        let text = std::fs::read_to_string(root.join(guide)).unwrap();
+        let (links, paths) = (links(&text), text.split('`').filter(|word| word.starts_with("crates/")));
+        for target in links.into_iter().chain(paths) {
+            let file = target.split('#').next().unwrap_or(target);
+            // A file that is still to be written stands in a folder that is there.
+            let there = if file.contains("NAME") { Path::new(file).parent().unwrap() } else { Path::new(file) };
+            assert!(target.starts_with("https://") || root.join(there).exists(), "{guide}: `{target}` leads nowhere");
+        }
     }
 }
 

@@ -139,6 +139,68 @@ fn the_period_may_come_from_the_commanded_motion() {
     assert!(backwards.contains("[estimator.periods]") && backwards.contains("-1"), "{backwards}");
 }
 
+/// Positions with noise of 2 mrad: at the motion's highest frequency, 0.65 Hz, that is 0.03 rad/s² of the motion's own few, and far more behind a filter that must let the motion through.
+fn write_noisy(folder: &Path, name: &str, truth: &Truth, seed: u64, seconds: f64) {
+    let mut random = Random(seed);
+    write_log(&folder.join(name), truth, &Motion::new(2, seed), (250.0, seconds), &header(2), |q, tau| {
+        let q: Vec<f64> = q.iter().map(|q| q + 2e-3 * random.normal()).collect();
+        q.into_iter().chain(tau.iter().map(|t| t + 0.05 * random.normal())).collect()
+    });
+}
+
+#[test]
+fn motion_and_parameters_together_are_better_where_positions_are_noisy() {
+    let (folder, truth) = (tempfile::tempdir().unwrap(), truth());
+    write_noisy(folder.path(), "log.csv", &truth, 3, 16.0);
+    write_noisy(folder.path(), "other.csv", &truth, 5, 12.0);
+    let two = |method: &str| study(method, "").replace("[estimator]", "[[log]]\nfile = \"other.csv\"\n[estimator]");
+    let plain = run(folder.path(), &two("weighted")).unwrap();
+    assert!(plain.result.series.is_none());
+    let job = Job::new(folder.path(), &(two("simultaneous") + &format!("periods.period_s = {PERIOD_S}")));
+    let found = job.identify();
+    let values = truth.base_values(&job.machine());
+    let series = found.result.series.as_ref().unwrap();
+    assert_eq!((series.len(), series[0].torque_autoregression.len()), (2, 2));
+    for log in series {
+        // The motion has five harmonics; a weak one may be beneath the noise, and the cut-off is no exact figure.
+        assert!((4..=8).contains(&log.harmonics), "{log:?}");
+        assert_eq!(log.samples_of_row, (250.0 * PERIOD_S / (60.0 * log.harmonics as f64)) as usize);
+        // Means of n samples have noise smaller by √n.
+        let std = 2e-3 / (log.samples_of_row as f64).sqrt();
+        assert!(log.position_std.iter().all(|found| (found / std - 1.0).abs() < 0.2), "{log:?} {std}");
+    }
+    let bars = &found.estimate.std;
+    let (together, weighted) = (score(&found, &values, bars), score(&plain, &values, bars));
+    // Nine squares of mean one: below 1.8 by four deviations.
+    assert!(together < 1.8, "{together}");
+    assert!(weighted > 2.0 * together, "{weighted} and {together}");
+}
+
+#[test]
+fn logs_without_a_series_are_refused_with_the_fix() {
+    let (folder, truth) = (tempfile::tempdir().unwrap(), truth());
+    write_noisy(folder.path(), "log.csv", &truth, 3, 16.0);
+    let text = study("simultaneous", "");
+    let message = |text: &str| run(folder.path(), text).unwrap_err().to_string();
+    let unknown = message(&text);
+    assert!(unknown.contains("period_s") && unknown.contains("log `log`"), "{unknown}");
+    let another = message(&(text.clone() + "periods = { period_s = 5.0, harmonics = 5 }"));
+    assert!(another.contains("mend period_s") && another.contains("joint1"), "{another}");
+    let short = message(&(text.clone() + "periods = { period_s = 7.69, skip_s = 12.0 }"));
+    assert!(short.contains("less than one period"), "{short}");
+    let none = Job::new_error(folder.path(), &(text.clone() + "periods.harmonics = 0"));
+    assert!(none.contains("[estimator.periods]") && none.contains("harmonics = 0"), "{none}");
+    let remembered = text
+        .replace("drive.coulomb = \"none\"", "drive.laws = [{ law = \"maxwell-slip\", yield_displacements = [0.01] }]");
+    let remembered = message(&(remembered + "periods.period_s = 7.69"));
+    assert!(remembered.contains("the motion of one instant"), "{remembered}");
+    let log = std::fs::read_to_string(folder.path().join("log.csv")).unwrap();
+    let lines = log.lines().enumerate().filter(|(row, _)| !(2000..2200).contains(row)).map(|(_, line)| line);
+    std::fs::write(folder.path().join("log.csv"), lines.collect::<Vec<_>>().join("\n") + "\n").unwrap();
+    let gap = message(&(text + &format!("periods.period_s = {PERIOD_S}")));
+    assert!(gap.contains("has a gap") && gap.contains("time_range_s"), "{gap}");
+}
+
 /// Studies of the new methods on any log that `write` makes; the simulated ones follow `reference.csv`.
 fn with_each_new_method(
     folder: &Path,

@@ -1,7 +1,6 @@
 //! The integration tests of this crate, linked once.
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
-mod benchmark;
 mod book;
 mod common;
 mod design_messages;

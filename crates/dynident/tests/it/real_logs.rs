@@ -29,7 +29,7 @@ fn with_stated_friction(name: &str) -> Option<IdentificationOutcome> {
     Some(run(&study, &path, &data))
 }
 
-/// The held-out error is no worse than the limit: that of plain least squares on the same split, or what friction chosen from the training logs must reach.
+/// The held-out error is no worse than the limit: the figure in README, and 5 % of it for what other processors round otherwise.
 fn held_out(name: &str, limit_percent: f64) -> Option<IdentificationOutcome> {
     let found = example(name)?;
     let error = found.result.validation[0].model.relative_error_percent.unwrap();
@@ -39,7 +39,7 @@ fn held_out(name: &str, limit_percent: f64) -> Option<IdentificationOutcome> {
 
 #[test]
 fn lwr4plus_fitted_to_two_runs() {
-    held_out("lwr4plus_23_to_1.toml", 2.5);
+    held_out("lwr4plus_23_to_1.toml", 2.34);
 }
 
 #[test]
@@ -49,14 +49,14 @@ fn lwr4plus_fitted_to_one_run() {
 
 #[test]
 fn ur10_has_54_base_parameters() {
-    held_out("ur10.toml", 7.0);
+    held_out("ur10.toml", 2.95);
     let Some(found) = with_stated_friction("ur10.toml") else { return };
     assert_eq!(found.result.base_parameters.len(), 54);
 }
 
 #[test]
 fn tx40_has_61_base_parameters() {
-    if let Some(found) = held_out("tx40.toml", 13.4) {
+    if let Some(found) = held_out("tx40.toml", 12.8) {
         // Also joints with friction that differs by direction have a speed; half of the held-out rows stand still.
         for joint in &found.result.validation[0].residuals {
             let regimes = joint.regimes.unwrap();
@@ -75,7 +75,7 @@ fn tx40_has_61_base_parameters() {
 
 #[test]
 fn panda_has_64_base_parameters() {
-    let Some(found) = held_out("panda.toml", 2.45) else { return };
+    let Some(found) = held_out("panda.toml", 2.13) else { return };
     assert_eq!(found.result.base_parameters.len(), 64);
     let urdf = found.urdf.unwrap();
     assert!(urdf.contains("holds with the joints locked behind which stand: panda_leftfinger, panda_rightfinger"));

@@ -1,24 +1,53 @@
 //! Unknown motion and unknown parameters of a record whose motion is a Fourier series: what the simultaneous fit asks of a robot.
 
-use super::scenario::{RATE_HZ, Scenario};
+use crate::regressor_model::RegressorModel;
 use core::f64::consts::TAU;
-use dynident_dynamics::{
-    BatchWorkspace, MotionGradient, PanelLayout, Panels, regressor_panels, regressor_panels_pull_back,
-};
+use dynident_dynamics::{BatchWorkspace, MotionGradient, Panels, regressor_panels, regressor_panels_pull_back};
 use dynident_estimation::{ChannelRows, EstimationError, SimultaneousModel};
-use dynident_model::Model;
 use dynident_model::laws::JointMotion;
 use nalgebra::{DMatrix, DVector};
 
 /// Samples whose regressor is made at a time.
 const BLOCK: usize = 256;
 
-/// Positions and torques of one record over joints' Fourier coefficients (offset, then sine and cosine of every harmonic) and base parameters.
+/// Rows in a period of the highest harmonic, at least: so many that over one row the series hardly changes.
+const ROWS_OF_HARMONIC: f64 = 60.0;
+
+/// Positions and torques as they were logged, on a uniform clock and without a gap.
+#[derive(Clone, Debug)]
+pub struct PeriodicRecord {
+    /// Samples a second.
+    pub rate_hz: f64,
+    /// Positions (rad, m), joint after joint in the model's order, as many samples each.
+    pub q: Vec<f64>,
+    /// Torques (N m, N), likewise.
+    pub tau: Vec<f64>,
+}
+
+/// The functions of a Fourier series: a constant, then sine and cosine of every harmonic.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FourierSeries {
+    /// Period of the first harmonic, s.
+    pub period_s: f64,
+    /// Number of harmonics.
+    pub harmonics: usize,
+}
+
+impl FourierSeries {
+    /// How many successive samples may count as one row: at least sixty rows remain in a period of the highest harmonic.
+    pub fn samples_of_row(&self, rate_hz: f64) -> usize {
+        (rate_hz * self.period_s / (ROWS_OF_HARMONIC * self.harmonics as f64)).floor().max(1.0) as usize
+    }
+}
+
+/// Positions and torques of one record over joints' Fourier coefficients (constant, then sine and cosine of every harmonic) and base parameters.
 ///
 /// A row is the mean of `mean_of` successive samples: below the rate of rows nothing is lost, and there are fewer. Channels are the joints' positions, then their torques.
-pub(super) struct PeriodicModel<'a> {
-    model: &'a Model,
-    layout: &'a PanelLayout,
+/// Torque terms must depend on the motion of one instant alone.
+#[derive(Debug)]
+pub struct PeriodicModel<'a> {
+    model: &'a RegressorModel,
+    record: &'a PeriodicRecord,
     mean_of: usize,
     /// Angular frequency of every harmonic, rad/s.
     omega: Vec<f64>,
@@ -28,39 +57,37 @@ pub(super) struct PeriodicModel<'a> {
     row_basis: DMatrix<f64>,
     /// Means of the positions, (rows, joints).
     row_q: DMatrix<f64>,
-    tau: &'a [f64],
     workspace: BatchWorkspace,
 }
 
 impl<'a> PeriodicModel<'a> {
-    /// For positions and torques, joint-major, of as many samples each; the motion's period is `period_s`.
-    pub(super) fn new(
-        scenario: &'a Scenario,
-        (q, tau): (&[f64], &'a [f64]),
-        (period_s, harmonics): (f64, usize),
-        mean_of: usize,
-    ) -> Self {
-        let joints = scenario.parametric.model().dof();
-        let samples = q.len() / joints;
-        let omega: Vec<f64> = (1..=harmonics).map(|h| TAU * h as f64 / period_s).collect();
-        let mut basis = DMatrix::from_element(samples, 1 + 2 * harmonics, 1.0);
+    /// For a record whose motion is this series.
+    pub fn new(model: &'a RegressorModel, record: &'a PeriodicRecord, series: FourierSeries, mean_of: usize) -> Self {
+        let joints = model.dof();
+        let samples = record.q.len() / joints.max(1);
+        let omega: Vec<f64> = (1..=series.harmonics).map(|h| TAU * h as f64 / series.period_s).collect();
+        let mut basis = DMatrix::from_element(samples, 1 + 2 * series.harmonics, 1.0);
         for (h, omega) in omega.iter().enumerate() {
             for k in 0..samples {
-                let (sin, cos) = (omega * k as f64 / RATE_HZ).sin_cos();
+                let (sin, cos) = (omega * k as f64 / record.rate_hz).sin_cos();
                 (basis[(k, 1 + 2 * h)], basis[(k, 2 + 2 * h)]) = (sin, cos);
             }
         }
         Self {
-            model: scenario.parametric.model(),
-            layout: scenario.parametric.layout(),
+            model,
+            record,
             mean_of,
             omega,
             row_basis: means(&basis, mean_of),
-            row_q: means(&DMatrix::from_column_slice(samples, joints, q), mean_of),
+            row_q: means(&DMatrix::from_column_slice(samples, joints, &record.q), mean_of),
             basis,
-            tau,
-            workspace: BatchWorkspace::new(scenario.parametric.model()),
+            workspace: BatchWorkspace::new(model.model()),
         }
+    }
+
+    /// Rows of each channel.
+    pub fn rows(&self) -> usize {
+        self.row_basis.nrows()
     }
 
     /// Unknowns of one joint's motion.
@@ -72,8 +99,8 @@ impl<'a> PeriodicModel<'a> {
         self.model.dof()
     }
 
-    /// Coefficients of the series that fit the positions best, joint by joint.
-    pub(super) fn fitted_motion(&self) -> Option<Vec<f64>> {
+    /// Coefficients of the series that fit the positions best, joint by joint; `None` where the record does not tell them apart.
+    pub fn fitted_motion(&self) -> Option<Vec<f64>> {
         let normal = self.row_basis.tr_mul(&self.row_basis).cholesky()?;
         Some(normal.solve(&self.row_basis.tr_mul(&self.row_q)).as_slice().to_vec())
     }
@@ -102,12 +129,13 @@ impl<'a> PeriodicModel<'a> {
             let basis = self.basis.rows(first, count);
             let [q, dq, ddq] = [&coefficients, &rate, &second].map(|c| basis * c);
             let motion = JointMotion { samples: count, q: q.as_slice(), dq: dq.as_slice(), ddq: ddq.as_slice() };
-            regressor_panels(self.model, &mut self.workspace, self.layout, &motion, &mut panels);
+            regressor_panels(self.model.model(), &mut self.workspace, self.model.layout(), &motion, &mut panels);
             visit(&mut self.workspace, first, &motion, &panels);
         }
     }
 
-    fn position_residuals(&self, motion: &[f64]) -> DMatrix<f64> {
+    /// Means of the positions less the series, (rows, joints).
+    pub(super) fn position_residuals(&self, motion: &[f64]) -> DMatrix<f64> {
         &self.row_q - &self.row_basis * DMatrix::from_column_slice(self.own(), self.joints(), motion)
     }
 }
@@ -116,7 +144,7 @@ impl SimultaneousModel for PeriodicModel<'_> {
     type Error = EstimationError;
 
     fn residuals(&mut self, motion: &[f64], parameters: &[f64]) -> Result<Vec<Vec<f64>>, EstimationError> {
-        let (joints, samples, layout, tau) = (self.joints(), self.basis.nrows(), self.layout, self.tau);
+        let (joints, samples, layout, tau) = (self.joints(), self.basis.nrows(), self.model.layout(), &self.record.tau);
         let mut torque = DMatrix::from_column_slice(samples, joints, tau);
         self.walk(motion, |_, first, block, panels| {
             for joint in 0..joints {
@@ -137,7 +165,8 @@ impl SimultaneousModel for PeriodicModel<'_> {
     }
 
     fn linearised(&mut self, motion: &[f64], parameters: &[f64]) -> Result<Vec<ChannelRows>, EstimationError> {
-        let (joints, own, mean_of, model, layout) = (self.joints(), self.own(), self.mean_of, self.model, self.layout);
+        let (joints, own, mean_of) = (self.joints(), self.own(), self.mean_of);
+        let (model, layout) = (self.model.model(), self.model.layout());
         let rows = self.row_basis.nrows();
         let mut by_parameters: Vec<DMatrix<f64>> =
             (0..joints).map(|_| DMatrix::zeros(rows, parameters.len())).collect();
@@ -224,6 +253,34 @@ impl PeriodicModel<'_> {
     }
 }
 
+/// Several records, each with a motion of its own, and one set of parameters. Channels and unknowns follow one another record by record.
+pub(super) struct PeriodicRecords<'a>(pub(super) Vec<PeriodicModel<'a>>);
+
+impl SimultaneousModel for PeriodicRecords<'_> {
+    type Error = EstimationError;
+
+    fn residuals(&mut self, motion: &[f64], parameters: &[f64]) -> Result<Vec<Vec<f64>>, EstimationError> {
+        let (mut first, mut all) = (0, Vec::new());
+        for record in &mut self.0 {
+            let unknowns = record.own() * record.joints();
+            all.extend(record.residuals(&motion[first..first + unknowns], parameters)?);
+            first += unknowns;
+        }
+        Ok(all)
+    }
+
+    fn linearised(&mut self, motion: &[f64], parameters: &[f64]) -> Result<Vec<ChannelRows>, EstimationError> {
+        let (mut first, mut all) = (0, Vec::new());
+        for record in &mut self.0 {
+            let unknowns = record.own() * record.joints();
+            let rows = record.linearised(&motion[first..first + unknowns], parameters)?;
+            all.extend(rows.into_iter().map(|rows| ChannelRows { first_motion: first + rows.first_motion, ..rows }));
+            first += unknowns;
+        }
+        Ok(all)
+    }
+}
+
 /// Means of `count` successive rows; what is left at the end is dropped, for its mean would be noisier.
 fn means(matrix: &DMatrix<f64>, count: usize) -> DMatrix<f64> {
     let rows = matrix.nrows() / count;
@@ -235,23 +292,35 @@ fn means(matrix: &DMatrix<f64>, count: usize) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::benchmark::robots::ROBOTS;
+    use dynident_dynamics::ParametricModel;
+    use dynident_model::laws::{CoulombShape, DriveChoice, laws_per_joint};
+    use dynident_model::read_urdf;
+    use dynident_model::sample::Random;
 
     /// Against differences of the residuals, which know nothing of slopes: their error is rounding over the step, 1e-7 to 1e-6 of entries that are of order one to a hundred.
     #[test]
     fn derivatives_are_those_of_the_residuals() {
-        let mut scenario = Scenario::new(&ROBOTS[0], 1).unwrap();
-        let joints = scenario.parametric.model().dof();
-        // The first second is enough.
-        let cut = |x: &[f64]| -> Vec<f64> {
-            x.chunks_exact(scenario.motion.samples).flat_map(|joint| joint[..1000].iter().copied()).collect()
+        let robot = read_urdf(include_str!("../../../../robots/planar2r.urdf")).unwrap().model;
+        let drive = DriveChoice {
+            drive_inertia: true,
+            viscous: true,
+            coulomb: Some(CoulombShape::Smooth { width: 0.02 }),
+            offset: true,
         };
-        let (q, tau) = (cut(&scenario.motion.q), cut(&scenario.torque));
-        let theta = core::mem::take(&mut scenario.truth);
+        let laws = laws_per_joint(&robot, |_| drive);
+        let model = RegressorModel::from(ParametricModel::new(robot, laws).unwrap());
+        let mut random = Random::new(1);
+        let theta: Vec<f64> = model.layout().columns().iter().map(|_| 1.0 + random.normal()).collect();
+        let record = PeriodicRecord {
+            rate_hz: 1000.0,
+            q: (0..2000).map(|k| (0.004 * f64::from(k)).sin() + 1e-3 * random.normal()).collect(),
+            tau: (0..2000).map(|_| random.normal()).collect(),
+        };
         for mean_of in [1, 3] {
-            let mut model = PeriodicModel::new(&scenario, (&q, &tau), (1.5, 3), mean_of);
-            let start = model.fitted_motion().unwrap();
-            let rows = model.linearised(&start, &theta).unwrap();
+            let series = FourierSeries { period_s: 1.5, harmonics: 3 };
+            let mut records = PeriodicRecords(vec![PeriodicModel::new(&model, &record, series, mean_of)]);
+            let start = records.0[0].fitted_motion().unwrap();
+            let rows = records.linearised(&start, &theta).unwrap();
             let step = 1e-7;
             for unknown in 0..start.len() + theta.len() {
                 let mut at = |sign: f64| {
@@ -260,7 +329,7 @@ mod tests {
                         None => c[unknown] += sign * step,
                         Some(place) => p[place] += sign * step,
                     }
-                    model.residuals(&c, &p).unwrap()
+                    records.residuals(&c, &p).unwrap()
                 };
                 let (above, below) = (at(1.0), at(-1.0));
                 for (place, channel) in rows.iter().enumerate() {
@@ -280,10 +349,7 @@ mod tests {
                     // Means of products against products of means: the series turns by ωΔt = 0.04 rad over three samples.
                     let tolerance = if mean_of == 1 { 1e-5 } else { 2e-2 };
                     let error = (&found - &differences).amax();
-                    assert!(
-                        error <= tolerance * scale,
-                        "unknown {unknown} of {joints} joints, channel {place}: {error}"
-                    );
+                    assert!(error <= tolerance * scale, "unknown {unknown}, channel {place}: {error}");
                 }
             }
         }

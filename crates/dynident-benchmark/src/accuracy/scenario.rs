@@ -9,6 +9,8 @@ use super::robots::BenchmarkRobot;
 use dynident_dynamics::{BatchWorkspace, PanelLayout, Panels, ParametricModel, regressor_panels};
 use dynident_excitation::families::{Fourier, FourierSettings};
 use dynident_excitation::{Family, Motion};
+use dynident_identification::RegressorModel;
+use dynident_identification::estimators::FourierSeries;
 use dynident_model::Model;
 use dynident_model::laws::{CoulombShape, DriveChoice, JointMotion, Law, TermAction, laws_per_joint};
 use dynident_model::sample::Random;
@@ -20,6 +22,8 @@ pub const RATE_HZ: f64 = 1000.0;
 pub const DURATION_S: f64 = 10.0;
 /// Harmonics of the excitation, of 0.1 Hz each.
 pub const HARMONICS: usize = 20;
+/// The excitation's frequencies, which are known before a run.
+pub(super) const SERIES: FourierSeries = FourierSeries { period_s: DURATION_S, harmonics: HARMONICS };
 /// Random trajectories among which the most informative is taken.
 const CANDIDATES: usize = 24;
 /// Rate at which candidates are compared.
@@ -37,7 +41,7 @@ pub struct Scenario {
     /// The robot's name.
     pub robot: &'static str,
     /// The robot.
-    pub parametric: ParametricModel,
+    pub model: RegressorModel,
     /// What the controller was told to do.
     pub reference: Motion,
     pub(super) truth: Vec<f64>,
@@ -68,10 +72,11 @@ impl Scenario {
             offset: true,
         };
         let laws = laws_per_joint(&model, |_| drive);
-        let parametric = ParametricModel::new(model, laws).map_err(|source| BenchmarkError::Excitation {
+        let made = ParametricModel::new(model, laws).map_err(|source| BenchmarkError::Excitation {
             robot: robot.name.to_owned(),
             reason: source.to_string(),
         })?;
+        let parametric = RegressorModel::from(made);
         let (model, laws, layout) = (parametric.model(), parametric.laws(), parametric.layout());
         let (base, reference) = (parametric.base(), excitation(robot, model, layout, seed)?);
         let motion = followed(&reference);
@@ -85,7 +90,7 @@ impl Scenario {
         }
         let truth = base.values(&parameters);
         let torque = torque(model, layout, &motion, &truth);
-        Ok(Self { robot: robot.name, parametric, reference, truth, motion, torque })
+        Ok(Self { robot: robot.name, model: parametric, reference, truth, motion, torque })
     }
 
     /// One run's record.
@@ -117,7 +122,7 @@ impl Scenario {
 
     /// What a drawing office knows: bodies with a wrong density, no drives.
     pub(super) fn prior(&self, random: &mut Random, spread: f64) -> Vec<f64> {
-        let mut prior = self.parametric.model().parameter_vector();
+        let mut prior = self.model.model().parameter_vector();
         for body in prior.chunks_exact_mut(10) {
             // Four standard deviations below, a body would weigh less than nothing.
             let factor = (1.0 + spread * random.normal()).max(0.25);
@@ -125,7 +130,7 @@ impl Scenario {
                 *value *= factor;
             }
         }
-        prior.extend(vec![0.0; self.parametric.laws().len()]);
+        prior.extend(vec![0.0; self.model.laws().len()]);
         prior
     }
 
@@ -134,19 +139,13 @@ impl Scenario {
     pub(super) fn bound(&self, noise: &NoiseLevel) -> Option<Vec<f64>> {
         let (count, samples) = (self.truth.len(), self.motion.samples);
         let mut panels = Panels::default();
-        let mut workspace = BatchWorkspace::new(self.parametric.model());
-        regressor_panels(
-            self.parametric.model(),
-            &mut workspace,
-            self.parametric.layout(),
-            &self.motion.view(),
-            &mut panels,
-        );
+        let mut workspace = BatchWorkspace::new(self.model.model());
+        regressor_panels(self.model.model(), &mut workspace, self.model.layout(), &self.motion.view(), &mut panels);
         let rho = noise.torque_correlation;
         let fresh = noise.torque_std_nm * (1.0 - rho * rho).sqrt();
         let mut information = DMatrix::<f64>::zeros(count, count);
-        for joint in 0..self.parametric.model().dof() {
-            let columns = self.parametric.layout().joint_columns(joint);
+        for joint in 0..self.model.model().dof() {
+            let columns = self.model.layout().joint_columns(joint);
             let whitened: Vec<Vec<f64>> = panels.joint(joint)[..columns.len() * samples]
                 .chunks_exact(samples)
                 .map(|y| {

@@ -1,7 +1,7 @@
 //! The Monte Carlo benchmark: seeds, threads, and figures that are what they must be.
 
-use dynident::Silent;
-use dynident::benchmark::{BenchmarkError, BenchmarkFile, BenchmarkSettings, benchmark};
+use dynident_benchmark::accuracy::{BenchmarkError, BenchmarkFile, BenchmarkSettings, benchmark};
+use dynident_identification::Silent;
 
 fn settings() -> BenchmarkSettings {
     let one = |name: &str| vec![name.to_owned()];

@@ -1,7 +1,7 @@
 //! What an identification takes from 10,000 samples: the regressor, and the triangular factors of every joint.
 
-use crate::clock::Report;
-use crate::motion::Motion;
+use super::clock::Report;
+use super::motion::Motion;
 use dynident_dynamics::{
     BaseParameterSettings, BaseParameters, BatchWorkspace, Column, PanelLayout, Panels, all_columns,
     inverse_dynamics_batch, regressor_panels,

@@ -1,9 +1,9 @@
 //! The Cramér-Rao bound for estimators that are not told the motion.
 
 use super::noise::NoiseLevel;
-use super::periodic_model::PeriodicModel;
-use super::scenario::{DURATION_S, HARMONICS, Scenario};
+use super::scenario::{RATE_HZ, SERIES, Scenario};
 use dynident_estimation::{ChannelNoise, ChannelRows, EstimationError, SimultaneousModel, simultaneous_bound};
+use dynident_identification::estimators::{PeriodicModel, PeriodicRecord};
 
 /// Rows of positions and torques at the truth, sample by sample.
 pub(super) struct BoundWithMotion<'a> {
@@ -15,11 +15,11 @@ pub(super) struct BoundWithMotion<'a> {
 
 impl<'a> BoundWithMotion<'a> {
     pub(super) fn new(scenario: &Scenario, names: &'a [String]) -> Result<Self, EstimationError> {
-        let record = (&scenario.motion.q[..], &scenario.torque[..]);
-        let mut model = PeriodicModel::new(scenario, record, (DURATION_S, HARMONICS), 1);
+        let record = PeriodicRecord { rate_hz: RATE_HZ, q: scenario.motion.q.clone(), tau: scenario.torque.clone() };
+        let mut model = PeriodicModel::new(&scenario.model, &record, SERIES, 1);
         let motion = model.fitted_motion().ok_or(EstimationError::Empty)?;
         let rows = model.linearised(&motion, &scenario.truth)?;
-        Ok(Self { names, motion: motion.len(), joints: scenario.parametric.model().dof(), rows })
+        Ok(Self { names, motion: motion.len(), joints: scenario.model.dof(), rows })
     }
 
     /// The bound on every base parameter's standard deviation: the motion is a Fourier series of the excitation's frequencies with unknown coefficients.

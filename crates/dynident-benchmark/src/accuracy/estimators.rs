@@ -1,13 +1,12 @@
 //! What the benchmark compares. **To add an estimator, add one line to [`ESTIMATORS`].**
 
-use super::answers::{
-    generalized, instrumental, noise_weighted, ordinary, physical, robust, simultaneous, total, true_motion, weighted,
-    wide,
-};
+use super::answers::{estimated, instrumental, physical, robust, simultaneous, true_motion, weighted, wide};
 use super::rows::Rows;
 use super::scenario::{Record, Scenario};
 use super::shared::Shared;
-use dynident_estimation::{CovarianceMethod, EstimationError, LinearProblem, RowWeight};
+use dynident_estimation::{CovarianceMethod, RowWeight};
+use dynident_identification::IdentificationError;
+use dynident_identification::estimators::{Estimator, NoiseLevels};
 use dynident_recording::MotionBlock;
 
 /// One simulated experiment, as estimators see it.
@@ -23,8 +22,6 @@ pub struct Trial<'a> {
     pub cutoff_hz: f64,
     /// The pipeline's filtered rows.
     pub rows: &'a Rows<'a>,
-    /// The same as triangular factors.
-    pub problem: &'a LinearProblem,
     /// Where an iterative estimator starts: the true base parameters with 15 % Gaussian error.
     pub start: &'a [f64],
     /// A drawing office's idea of the machine: every body's ten true parameters times a common factor with 15 % Gaussian error, no friction and no drives.
@@ -51,34 +48,36 @@ pub struct BenchmarkEstimator {
     pub name: &'static str,
     /// What it is.
     pub what: &'static str,
-    pub(super) answer: fn(&Trial<'_>) -> Result<Answer, EstimationError>,
+    pub(super) answer: fn(&Trial<'_>) -> Result<Answer, IdentificationError>,
 }
 
 const fn entry(
     name: &'static str,
     what: &'static str,
-    answer: fn(&Trial<'_>) -> Result<Answer, EstimationError>,
+    answer: fn(&Trial<'_>) -> Result<Answer, IdentificationError>,
 ) -> BenchmarkEstimator {
     BenchmarkEstimator { name, what, answer }
 }
 
 /// The registry: one line for each estimator, or for each kind of error bar of one.
 pub const ESTIMATORS: &[BenchmarkEstimator] = &[
-    entry("ordinary", "ordinary least squares, jackknife error bars", |trial| ordinary(trial.problem)),
+    entry("ordinary", "ordinary least squares, jackknife error bars", |trial| {
+        estimated(trial.rows, Estimator::Ordinary, CovarianceMethod::Jackknife)
+    }),
     entry("weighted", "weighted least squares, jackknife error bars", |trial| {
-        weighted(trial.problem, CovarianceMethod::Jackknife)
+        weighted(trial.rows, CovarianceMethod::Jackknife)
     }),
     entry("weighted-white", "the same, error bars for white residuals", |trial| {
-        weighted(trial.problem, CovarianceMethod::White)
+        weighted(trial.rows, CovarianceMethod::White)
     }),
     entry("weighted-segments", "the same, error bars from segments (CR1)", |trial| {
-        weighted(trial.problem, CovarianceMethod::Segments)
+        weighted(trial.rows, CovarianceMethod::Segments)
     }),
     entry("weighted-newey-west", "the same, error bars by Newey and West", |trial| {
-        weighted(trial.problem, CovarianceMethod::NeweyWest)
+        weighted(trial.rows, CovarianceMethod::NeweyWest)
     }),
     entry("weighted-bootstrap", "the same, error bars by block bootstrap", |trial| {
-        weighted(trial.problem, CovarianceMethod::Bootstrap)
+        weighted(trial.rows, CovarianceMethod::Bootstrap)
     }),
     entry(
         "weighted-wide",
@@ -91,14 +90,15 @@ pub const ESTIMATORS: &[BenchmarkEstimator] = &[
         true_motion,
     ),
     entry("huber", "reweighted least squares with Huber's weights on the pipeline's rows", |trial| {
-        robust(trial.rows, trial.problem, RowWeight::huber())
+        robust(trial.rows, RowWeight::huber())
     }),
-    entry("tukey", "the same with Tukey's weights", |trial| robust(trial.rows, trial.problem, RowWeight::tukey())),
+    entry("tukey", "the same with Tukey's weights", |trial| robust(trial.rows, RowWeight::tukey())),
     entry("noise-weighted", "rows weighted by the noise around them (Feng)", |trial| {
-        noise_weighted(trial.rows, trial.problem)
+        estimated(trial.rows, Estimator::NoiseWeighted(NoiseLevels::default()), CovarianceMethod::Jackknife)
     }),
-    entry("generalized", "generalised least squares: joints' errors correlated", |trial| generalized(trial.rows)),
-    entry("total-least-squares", "total least squares, columns' errors by propagation of the positions' noise", total),
+    entry("generalized", "generalised least squares: joints' errors correlated", |trial| {
+        estimated(trial.rows, Estimator::Generalized, CovarianceMethod::default())
+    }),
     entry("instrumental", "instrumental variables, instruments from the reference motion", instrumental),
     entry(
         "weighted-fourier",
@@ -106,19 +106,17 @@ pub const ESTIMATORS: &[BenchmarkEstimator] = &[
         |trial| weighted(&trial.shared.periodic_filtered(trial)?, CovarianceMethod::Jackknife),
     ),
     entry("weighted-fourier-all-rows", "the same on all rows, neither filtered nor decimated", |trial| {
-        weighted(&trial.shared.periodic(trial)?.problem, CovarianceMethod::Jackknife)
+        weighted(trial.shared.periodic(trial)?, CovarianceMethod::Jackknife)
     }),
     entry("huber-fourier-all-rows", "Huber's weights on those rows", |trial| {
-        let periodic = trial.shared.periodic(trial)?;
-        robust(&periodic.rows, &periodic.problem, RowWeight::huber())
+        robust(trial.shared.periodic(trial)?, RowWeight::huber())
     }),
     entry("tukey-fourier-all-rows", "Tukey's weights on those rows", |trial| {
-        let periodic = trial.shared.periodic(trial)?;
-        robust(&periodic.rows, &periodic.problem, RowWeight::tukey())
+        robust(trial.shared.periodic(trial)?, RowWeight::tukey())
     }),
     entry("noise-weighted-fourier-all-rows", "those rows weighted by the noise around them", |trial| {
-        let periodic = trial.shared.periodic(trial)?;
-        noise_weighted(&periodic.rows, &periodic.problem)
+        let rows = trial.shared.periodic(trial)?;
+        estimated(rows, Estimator::NoiseWeighted(NoiseLevels::default()), CovarianceMethod::Jackknife)
     }),
     entry("physical", "the possible machine that fits those rows best", physical),
     entry(

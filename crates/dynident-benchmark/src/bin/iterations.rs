@@ -1,7 +1,7 @@
 //! What the iteration reaches under noise: every example's robot over many seeds, the error of its parameters in units of the Cramér-Rao bound, tracking, and runs.
 //!
 //! ```text
-//! cargo run --release -p dynident --example iteration_over_bound [SEEDS] [STUDY.toml ..]
+//! cargo run --release -p dynident-benchmark --bin iterations -- [SEEDS] [STUDY.toml ..]
 //! ```
 //!
 //! The trajectory is looked for once. Every seed has its own noise and, where the robot differs from its description, its own robot.

@@ -1,6 +1,6 @@
 //! A step of the closed loop: controller, friction-free arm, record.
 
-use crate::clock::Report;
+use super::clock::Report;
 use dynident_dynamics::{Workspace, mass_matrix};
 use dynident_excitation::Motion;
 use dynident_model::Model;

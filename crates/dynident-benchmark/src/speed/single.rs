@@ -1,7 +1,7 @@
 //! One sample at a time.
 
-use crate::clock::Report;
-use crate::motion::{Motion, STATES};
+use super::clock::Report;
+use super::motion::{Motion, STATES};
 use dynident_dynamics::{
     Workspace, forward_dynamics, inverse_dynamics, inverse_dynamics_derivatives, mass_matrix, torque_regressor,
 };

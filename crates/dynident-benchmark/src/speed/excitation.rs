@@ -1,6 +1,6 @@
 //! What one step of an excitation design takes: cost, limits and exact gradient of a trajectory.
 
-use crate::clock::Report;
+use super::clock::Report;
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, PanelLayout};
 use dynident_excitation::criteria::{Criterion, DOptimal};
 use dynident_excitation::families::{Fourier, FourierSettings};

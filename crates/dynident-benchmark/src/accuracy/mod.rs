@@ -1,4 +1,4 @@
-//! `dynident benchmark`: estimators × noise levels × robots, Monte Carlo after the protocol of BIRDy (Leboutet et al., Applied Sciences 11 (2021) 4303).
+//! How accurate estimators are: estimators × noise levels × robots, Monte Carlo after the protocol of BIRDy (Leboutet et al., Applied Sciences 11 (2021) 4303).
 //!
 //! The registries are [`ESTIMATORS`], [`NOISE_LEVELS`] and [`ROBOTS`]: one line each adds to the benchmark.
 
@@ -7,12 +7,12 @@ mod bound_with_motion;
 mod estimators;
 mod figures;
 mod noise;
-mod periodic_model;
 mod pipeline;
 mod robots;
 mod rows;
 mod scenario;
 mod shared;
+mod thread_time;
 
 pub use estimators::{Answer, BenchmarkEstimator, ESTIMATORS, Trial};
 pub use figures::{CellFigures, ParameterFigures, cells_csv};
@@ -23,9 +23,8 @@ pub use scenario::{DURATION_S, HARMONICS, RATE_HZ, Record, Scenario};
 
 use bound_with_motion::BoundWithMotion;
 use shared::Shared;
+use thread_time::thread_seconds;
 
-use crate::cpu_time::thread_seconds;
-use dynident_estimation::EstimationError;
 use dynident_identification::{IdentificationError, Progress};
 use dynident_model::UrdfError;
 use dynident_model::sample::Random;
@@ -92,17 +91,15 @@ pub enum BenchmarkError {
         /// Why.
         source: FilterError,
     },
-    /// Rows that cannot be used.
-    #[error("robot {robot}: {source}")]
-    Estimation {
-        /// The robot.
-        robot: String,
-        /// Why.
-        source: EstimationError,
-    },
     /// An error of the pipeline.
     #[error(transparent)]
     Pipeline(Box<IdentificationError>),
+}
+
+impl From<IdentificationError> for BenchmarkError {
+    fn from(source: IdentificationError) -> Self {
+        Self::Pipeline(Box::new(source))
+    }
 }
 
 /// What is compared.
@@ -204,7 +201,7 @@ pub fn benchmark(settings: &BenchmarkSettings, progress: &dyn Progress) -> Resul
     for robot in &robots {
         let scenario = Scenario::new(robot, settings.seed)?;
         let symbols: Vec<String> =
-            scenario.parametric.layout().columns().iter().map(dynident_dynamics::Column::symbol).collect();
+            scenario.model.layout().columns().iter().map(dynident_dynamics::Column::symbol).collect();
         let bounds = BoundWithMotion::new(&scenario, &symbols)
             .map_err(|_| BenchmarkError::NoBound { robot: robot.name.to_owned() })?;
         for level in &levels {
@@ -266,8 +263,6 @@ fn one_run(
     let (motion, cutoff_hz) = pipeline::motion(&record)
         .map_err(|source| BenchmarkError::Filter { robot: scenario.robot.to_owned(), source })?;
     let rows = Rows::new(scenario, &motion, Some(cutoff_hz))?;
-    let problem =
-        rows.problem().map_err(|source| BenchmarkError::Estimation { robot: scenario.robot.to_owned(), source })?;
     let shared = Shared::default();
     let trial = Trial {
         scenario,
@@ -275,7 +270,6 @@ fn one_run(
         motion: &motion,
         cutoff_hz,
         rows: &rows,
-        problem: &problem,
         start: &start,
         prior,
         shared: &shared,

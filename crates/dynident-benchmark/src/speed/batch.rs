@@ -1,7 +1,7 @@
 //! Lanes of samples: nanoseconds a sample.
 
-use crate::clock::Report;
-use crate::motion::{Motion, STATES};
+use super::clock::Report;
+use super::motion::{Motion, STATES};
 use dynident_dynamics::{BatchWorkspace, PanelLayout, Panels, all_columns, inverse_dynamics_batch, regressor_panels};
 use dynident_model::Model;
 use std::hint::black_box;

@@ -1,0 +1,46 @@
+//! Times of dynamics, of the way from samples to triangular factors, of a step of an excitation design and of one of the closed loop, as JSON lines.
+
+mod batch;
+mod clock;
+mod closed_loop;
+mod excitation;
+mod identification;
+mod motion;
+mod single;
+
+pub(crate) use clock::environment;
+
+use clock::Report;
+use dynident_lanes::Level;
+use dynident_model::Model;
+
+/// Robots that are only timed for their dynamics.
+const DYNAMICS_ONLY: &str = "talos_reduced";
+/// The robot whose way to factors is timed.
+const FACTORS_OF: &str = "panda_arm7";
+
+/// Times everything of one robot on these processor levels, `block` samples in a batch; only quantities of `only`, unless it is empty.
+///
+/// # Errors
+/// In words, if a quantity cannot be computed.
+pub(crate) fn time_robot(
+    name: &str,
+    model: &Model,
+    levels: &[Level],
+    block: usize,
+    only: &[String],
+) -> Result<(), String> {
+    for &level in levels {
+        let report = Report { robot: name, dof: model.dof(), level, only };
+        single::time_all(model, &report);
+        batch::time_all(model, &report, block);
+        if level == Level::detect() && name != DYNAMICS_ONLY {
+            excitation::time_all(model, &report);
+            closed_loop::time_all(model, &report).map_err(|error| format!("{name}: closed loop: {error}"))?;
+        }
+        if name == FACTORS_OF {
+            identification::time_all(model, &report).map_err(|error| format!("factors_10000: {error}"))?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,214 @@
+//! Motion and parameters from one likelihood: logs whose motion is a Fourier series, raw positions and torques, noise of both.
+
+use super::periodic_model::{FourierSeries, PeriodicModel, PeriodicRecord, PeriodicRecords};
+use super::simulated::torque_sigma;
+use super::{Findings, PeriodSettings, TrainingRows};
+use crate::error::IdentificationError;
+use dynident_estimation::{
+    Estimate, SimultaneousModel, SimultaneousProblem, SimultaneousSettings, simultaneous_least_squares,
+    weighted_least_squares,
+};
+use dynident_recording::{DifferentiatorSettings, MotionBlock, MotionSettings};
+use serde::{Deserialize, Serialize};
+
+/// Positions further from the series than this share of their own size are not those of such a motion.
+const MOST_REMAINDER: f64 = 0.1;
+/// A motion smaller than this counts as none, rad (m).
+const NO_MOTION: f64 = 1e-4;
+/// Most harmonics that are taken unasked: with more the motion's unknowns, and the time they take, are many.
+const MOST_HARMONICS: usize = 60;
+
+/// What the simultaneous fit found of one log's motion and noise.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct SeriesFit {
+    /// Period of the first harmonic, s.
+    pub period_s: f64,
+    /// Harmonics of the series.
+    pub harmonics: usize,
+    /// Rows of each channel.
+    pub rows: usize,
+    /// How many samples a row is the mean of.
+    pub samples_of_row: usize,
+    /// For each joint the standard deviation of a row's position from the series, rad (m).
+    pub position_std: Vec<f64>,
+    /// For each joint the standard deviation of a row's torque from the model's, N m (N).
+    pub torque_std: Vec<f64>,
+    /// For each joint the order of the autoregression that its torque noise was found to be; 0 for white noise.
+    pub torque_autoregression: Vec<usize>,
+}
+
+/// One log as it was recorded.
+struct Recorded {
+    record: PeriodicRecord,
+    series: FourierSeries,
+}
+
+/// The estimate, and what was found of each log's motion.
+pub(super) fn simultaneous(
+    rows: &TrainingRows<'_>,
+    periods: &PeriodSettings,
+) -> Result<(Estimate, Findings), IdentificationError> {
+    let TrainingRows { logs, model, problem, .. } = *rows;
+    let wrong = |message: String| IdentificationError::Estimator { method: "simultaneous", message };
+    let terms = model.laws().iter();
+    if let Some(term) = terms.clone().find(|t| t.has_memory() || t.needs_load() || t.needs_temperature()) {
+        return Err(wrong(format!(
+            "{} depends on more than the motion of one instant: leave that law out, or take another method",
+            term.symbol()
+        )));
+    }
+    rows.begin("motion and torque");
+    let recorded: Vec<Recorded> =
+        rows.training.iter().map(|&index| read(rows, index, periods, &wrong)).collect::<Result<_, _>>()?;
+    logs.end();
+    let of = |log: &Recorded| log.series.samples_of_row(log.record.rate_hz);
+    let models = recorded.iter().map(|log| PeriodicModel::new(model, &log.record, log.series, of(log)));
+    let mut records = PeriodicRecords(models.collect());
+    let mut motion = Vec::new();
+    for (record, &index) in records.0.iter().zip(rows.training) {
+        let name = &logs.recordings[index].name;
+        let Some(fitted) = record.fitted_motion() else {
+            return Err(wrong(format!(
+                "log `{name}` does not tell the harmonics of its motion apart: give fewer with [estimator.periods] harmonics = ..., or a longer log"
+            )));
+        };
+        check_motion(record, &fitted).map_err(|(joint, message)| {
+            wrong(format!("log `{name}`: positions of {} {message}", model.joint_names()[joint]))
+        })?;
+        motion.extend(fitted);
+    }
+    let estimation = &logs.settings.estimation;
+    let start = weighted_least_squares(problem, &estimation.weighted())?;
+    let channel = |log: &usize| {
+        let name = &logs.recordings[*log].name;
+        let of = |what: &str| -> Vec<String> {
+            model.joint_names().iter().map(|joint| format!("{what} of {joint} in {name}")).collect()
+        };
+        [of("position"), of("torque")].concat()
+    };
+    let channels = rows.training.iter().flat_map(channel).collect();
+    let begun = SimultaneousProblem { names: problem.columns().to_vec(), channels, motion, parameters: start.values };
+    let settings = SimultaneousSettings {
+        rank: estimation.rank,
+        covariance: estimation.covariance,
+        ..SimultaneousSettings::default()
+    };
+    let found = simultaneous_least_squares(&begun, &settings, &mut records)?;
+    let left = records.residuals(&found.motion, &found.estimate.values)?;
+    let dof = model.dof();
+    let std = |channel: usize| {
+        let rows = &left[channel];
+        (rows.iter().map(|x| x * x).sum::<f64>() / rows.len().max(1) as f64).sqrt()
+    };
+    let series = |(log, recorded): (usize, &Recorded)| {
+        let [position, torque] = [0, 1].map(|part| (2 * log + part) * dof..(2 * log + part + 1) * dof);
+        SeriesFit {
+            period_s: recorded.series.period_s,
+            harmonics: recorded.series.harmonics,
+            rows: records.0[log].rows(),
+            samples_of_row: of(recorded),
+            position_std: position.map(std).collect(),
+            torque_std: torque.clone().map(std).collect(),
+            torque_autoregression: found.noise[torque].iter().map(|noise| noise.autoregression.len()).collect(),
+        }
+    };
+    let fits = recorded.iter().enumerate().map(series).collect();
+    // Channels are each log's positions and torques; an estimate speaks of joints, by their torque.
+    let of_joints = |channels: &[f64]| -> Vec<f64> {
+        let mean = |joint: usize| {
+            let of_logs = (0..recorded.len()).filter_map(|log| channels.get((2 * log + 1) * dof + joint));
+            of_logs.sum::<f64>() / recorded.len().max(1) as f64
+        };
+        (0..dof).map(mean).collect()
+    };
+    let mut estimate = found.estimate;
+    estimate.joint_sigma = torque_sigma(problem, &estimate.values)?;
+    estimate.score_inflation = of_joints(&estimate.score_inflation);
+    estimate.effective_lag1 = of_joints(&estimate.effective_lag1);
+    estimate.segment_correlation = of_joints(&estimate.segment_correlation);
+    Ok((estimate, Findings::Series(fits)))
+}
+
+/// Log number `index` as it was recorded, and the series of its motion: the harmonics that stand out of the noise, unless their number is given.
+fn read(
+    rows: &TrainingRows<'_>,
+    index: usize,
+    periods: &PeriodSettings,
+    wrong: &dyn Fn(String) -> IdentificationError,
+) -> Result<Recorded, IdentificationError> {
+    let TrainingRows { logs, model, .. } = *rows;
+    let recording = &logs.recordings[index];
+    let name = &recording.name;
+    let commanded = || recording.commanded.as_ref().and_then(|commanded| commanded.period_s());
+    let Some(period_s) = periods.period_s.or_else(commanded) else {
+        return Err(wrong(format!(
+            "log `{name}`: say after how many seconds the motion repeats: [estimator.periods] period_s = ..., or name the commanded motion of one period as the log's reference"
+        )));
+    };
+    // Central differences leave positions as they are.
+    let differentiator = DifferentiatorSettings::CentralDifferences { order: 4 };
+    let motion = MotionSettings { differentiator, smooth_torque: false, ..logs.motion.clone() };
+    let Some(mut stream) = recording.open(model.model(), &motion)? else {
+        return Err(wrong(format!(
+            "log `{name}`: the positions of a motion that is made already are smoothed: give its raw samples"
+        )));
+    };
+    let (rate_hz, places) = (stream.rate_hz(), recording.places(model.model())?);
+    let mut channels = vec![Vec::new(); 2 * places.len()];
+    let (mut block, mut segment) = (MotionBlock::default(), None);
+    while stream.next_block(&mut block).map_err(|source| IdentificationError::recording(name, source))? {
+        if *segment.get_or_insert(block.segment) != block.segment {
+            return Err(wrong(format!(
+                "log `{name}` has a gap, and its noise is followed from sample to sample: cut the longest piece out with time_range_s"
+            )));
+        }
+        let skipped = ((periods.skip_s - block.first_time_s).max(0.0) * rate_hz).ceil() as usize;
+        for (part, values) in [&block.q, &block.tau].into_iter().enumerate() {
+            for (joint, &place) in places.iter().enumerate() {
+                let gain = if part == 0 { None } else { model.torque_gains.get(joint) }.copied().unwrap_or(1.0);
+                let kept = block.joint(values, place).iter().skip(skipped).map(|x| gain * x);
+                channels[part * places.len() + joint].extend(kept);
+            }
+        }
+        logs.execution.progress.advance(block.rows as u64);
+    }
+    let length_s = channels.first().map_or(0, Vec::len) as f64 / rate_hz;
+    if length_s < period_s * (1.0 - 1e-9) {
+        return Err(wrong(format!(
+            "log `{name}`: {length_s:.2} s are left, less than one period of {period_s} s: record at least one, or give the true period_s"
+        )));
+    }
+    // The cut-off is twice the highest frequency that stands out of the noise.
+    let highest = (0.5 * stream.cutoff().cutoff_hz * period_s).ceil() as usize;
+    let harmonics = periods.harmonics.unwrap_or_else(|| highest.clamp(1, MOST_HARMONICS));
+    if 4.0 * harmonics as f64 > rate_hz * period_s {
+        return Err(wrong(format!(
+            "log `{name}`: {harmonics} harmonics of {:.3} Hz at {rate_hz:.1} samples a second: give fewer, [estimator.periods] harmonics = ...",
+            period_s.recip()
+        )));
+    }
+    let tau = channels.split_off(places.len());
+    let record = PeriodicRecord { rate_hz, q: channels.concat(), tau: tau.concat() };
+    Ok(Recorded { record, series: FourierSeries { period_s, harmonics } })
+}
+
+/// Whether the positions are those of the fitted series; if not, the joint and what is wrong.
+fn check_motion(record: &PeriodicModel<'_>, fitted: &[f64]) -> Result<(), (usize, String)> {
+    let root_mean = |values: &[f64]| (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt();
+    let left = record.position_residuals(fitted);
+    let unknowns = fitted.len() / left.ncols().max(1);
+    for (joint, left) in left.column_iter().enumerate() {
+        // Sine and cosine have the mean square one half.
+        let size = root_mean(&fitted[joint * unknowns + 1..(joint + 1) * unknowns]) * (0.5 * unknowns as f64).sqrt();
+        let remainder = root_mean(left.as_slice());
+        if remainder > MOST_REMAINDER * size.max(NO_MOTION) {
+            return Err((
+                joint,
+                format!(
+                    "are {remainder:.2e} from the Fourier series of that period and move by {size:.2e} rad (root mean squares): mend period_s, give more harmonics, or skip the start with skip_s"
+                ),
+            ));
+        }
+    }
+    Ok(())
+}

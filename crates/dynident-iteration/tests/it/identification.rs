@@ -1,0 +1,184 @@
+//! A run is identified as any log is: every estimator, chosen friction, delays, payloads.
+
+use dynident_dynamics::ParametricModel;
+use dynident_excitation::Motion;
+use dynident_identification::EstimationSettings;
+use dynident_identification::estimators::{Estimator, InstrumentSettings, NoiseLevels};
+use dynident_identification::friction::FrictionSearch;
+use dynident_identification::payload::Payload;
+use dynident_iteration::robot::RunRequest;
+use dynident_iteration::{
+    Iteration, IterationSettings, IterationTask, Leg, Robot, RunEstimate, RunIdentificationSettings, SimulatedRobot,
+    identify_run, iterate,
+};
+use dynident_model::laws::{Coulomb, CoulombShape, Law, Viscous};
+use dynident_model::sample::planar_2r;
+use dynident_model::{InertialParameters, Model};
+use dynident_recording::DifferentiatorSettings;
+use dynident_simulation::controllers::{ComputedTorqueSettings, JointPdSettings};
+use dynident_simulation::{
+    ControllerSettings, FrictionCompensation, LoopSettings, Plant, Record, Reference, SensorSettings,
+};
+
+const RATE_HZ: f64 = 500.0;
+
+fn arm(tip_kg: f64) -> Model {
+    let rod = InertialParameters([1.0, 1.0, 0.0, 0.0, 0.1, 0.0, 0.0, 1.0, 0.0, 1.0]);
+    let tip = InertialParameters(rod.0.map(|value| tip_kg * value));
+    planar_2r(1.0, rod, tip)
+}
+
+/// Viscous and Coulomb friction of both joints with this step.
+fn friction(shape: CoulombShape) -> Vec<Law> {
+    let of_joint = |joint| [Law::Viscous(Viscous { joint }), Law::Coulomb(Coulomb { joint, shape })];
+    (0..2).flat_map(of_joint).collect()
+}
+
+/// Sums of sines that start and end at rest, 20 s.
+fn reference() -> Reference {
+    let samples = (20.0 * RATE_HZ) as usize;
+    let mut motion = Motion { samples, joints: 2, ..Motion::default() };
+    for (amplitude, first) in [(0.6, 1.0), (0.8, 1.4)] {
+        for sample in 0..samples {
+            let t = sample as f64 / RATE_HZ;
+            let term = |w: f64| {
+                [amplitude * (1.0 - (w * t).cos()), amplitude * w * (w * t).sin(), amplitude * w * w * (w * t).cos()]
+            };
+            let (a, b) = (term(first), term(2.3 * first));
+            motion.q.push(a[0] + 0.4 * b[0]);
+            motion.dq.push(a[1] + 0.4 * b[1]);
+            motion.ddq.push(a[2] + 0.4 * b[2]);
+        }
+    }
+    Reference::new(RATE_HZ, motion).unwrap()
+}
+
+fn robot(model: &Model, shape: CoulombShape, sensors: SensorSettings) -> SimulatedRobot {
+    let plant = Plant::new(model, &friction(shape), &[0.8, 1.5, 0.5, 1.0]).unwrap();
+    SimulatedRobot::new(plant, LoopSettings { sensors, ..LoopSettings::default() }).unwrap()
+}
+
+fn pd() -> ControllerSettings {
+    ControllerSettings::JointPd(JointPdSettings { kp: vec![400.0, 200.0].into(), kd: vec![60.0, 30.0].into() })
+}
+
+fn computed_torque() -> ControllerSettings {
+    let (kp, kd) = (100.0.into(), 20.0.into());
+    ControllerSettings::ComputedTorque(ComputedTorqueSettings { kp, kd, friction: FrictionCompensation::default() })
+}
+
+fn noise() -> SensorSettings {
+    SensorSettings { position_std: 1e-5.into(), torque_std: 0.05.into(), ..SensorSettings::default() }
+}
+
+fn record(model: &Model, shape: CoulombShape) -> Record {
+    let reference = reference();
+    let controller = pd();
+    let request = RunRequest { run: 1, reference: &reference, controller: &controller, model: None };
+    robot(model, shape, noise()).run(&request).unwrap().record
+}
+
+fn task(shape: CoulombShape) -> IterationTask {
+    let machine = ParametricModel::new(arm(1.0), friction(shape)).unwrap();
+    IterationTask::new(machine, reference()).unwrap()
+}
+
+fn settings(estimator: Estimator) -> RunIdentificationSettings {
+    RunIdentificationSettings {
+        differentiator: DifferentiatorSettings::Butterworth { order: 4, cutoff_hz: Some(15.0) },
+        estimation: EstimationSettings::of(estimator),
+        ..RunIdentificationSettings::default()
+    }
+}
+
+fn friction_of(task: &IterationTask, estimate: &RunEstimate) -> Vec<f64> {
+    let symbols: Vec<String> = task.machine.layout().columns().iter().map(|column| column.symbol()).collect();
+    let value = |symbol: &str| estimate.values[symbols.iter().position(|other| other == symbol).unwrap()];
+    ["fv1", "fc1", "fv2", "fc2"].map(value).to_vec()
+}
+
+#[test]
+fn every_estimator_that_needs_no_more_than_a_log_identifies_a_run() {
+    let shape = CoulombShape::Smooth { width: 0.02 };
+    let (task, record) = (task(shape), record(&arm(1.0), shape));
+    let instruments = InstrumentSettings { cutoff_hz: Some(6.0), ..InstrumentSettings::default() };
+    let estimators = [
+        Estimator::Ordinary,
+        Estimator::Weighted,
+        Estimator::Generalized,
+        Estimator::Huber,
+        Estimator::Tukey,
+        Estimator::NoiseWeighted(NoiseLevels::default()),
+        Estimator::Instrumental(instruments),
+    ];
+    for estimator in estimators {
+        let name = estimator.name();
+        let found = identify_run(&task, std::slice::from_ref(&record), &settings(estimator)).unwrap();
+        // The step of Coulomb friction is sharper than a filter of 15 Hz passes: a few percent of 1.5 Nm are its share.
+        for (found, truth) in friction_of(&task, &found).iter().zip([0.8, 1.5, 0.5, 1.0]) {
+            assert!((found - truth).abs() < 0.15, "{name}: {found} for {truth}");
+        }
+        assert!(found.possible.is_some(), "{name}: {:?}", found.impossible);
+        // The record has no delay but the half sample of a held torque, which is taken out.
+        let lags: Vec<f64> = found.torque_lags.iter().flatten().map(|lag| lag.lag_s).collect();
+        assert!(lags.iter().all(|lag| lag.abs() < 1e-3), "{name}: {lags:?}");
+    }
+}
+
+#[test]
+fn friction_is_chosen_once_and_kept_by_the_runs_after() {
+    let (stated, true_step) = (CoulombShape::Smooth { width: 0.5 }, CoulombShape::Smooth { width: 0.01 });
+    let task = task(stated);
+    let mut identification = settings(Estimator::Weighted);
+    identification.friction = ["joint1", "joint2"]
+        .iter()
+        .zip(task.machine.joint_names())
+        .map(|(_, name)| FrictionSearch { coulomb: Some(stated), ..FrictionSearch::of(name) })
+        .collect();
+    let settings = IterationSettings {
+        identification,
+        model_free: pd(),
+        controller: computed_torque(),
+        max_runs: 2,
+        ..IterationSettings::default()
+    };
+    let iteration = Iteration::new(task, settings).unwrap();
+    let mut simulated = robot(&arm(1.0), true_step, noise());
+    let outcome = iterate(&iteration, &mut [&mut simulated], None, &mut |_, _| {}).unwrap();
+    let [first, second] = &outcome.runs[..] else { panic!("{:?}", outcome.status) };
+    let (first, second) = (first.estimate.as_ref().unwrap(), second.estimate.as_ref().unwrap());
+    assert!(first.friction.iter().all(|joint| joint.terms.is_some()), "{:?}", first.friction);
+    assert!(second.friction.is_empty());
+    let chosen = iteration.robot(&outcome.runs);
+    // A step fifty times narrower than the stated one is told apart from it.
+    let widths: Vec<CoulombShape> = chosen
+        .laws()
+        .iter()
+        .filter_map(|law| if let Law::Coulomb(law) = law { Some(law.shape) } else { None })
+        .collect();
+    assert!(widths.iter().all(|shape| *shape != stated), "{widths:?}");
+    assert_eq!(second.values.len(), chosen.base().count());
+    // Stored runs read back: a killed iteration goes on with the chosen terms.
+    let text = serde_json::to_string(&outcome.runs).unwrap();
+    let read: Vec<dynident_iteration::RunRecord> = serde_json::from_str(&text).unwrap();
+    assert_eq!(iteration.robot(&read).laws(), chosen.laws());
+}
+
+#[test]
+fn a_payload_that_is_known_is_taken_off() {
+    let shape = CoulombShape::Smooth { width: 0.02 };
+    let mut task = task(shape);
+    let link = task.machine.model().bodies()[1].links[0].name.clone();
+    // A tip of twice the mass is the arm with a payload of the same ten parameters.
+    let known = Some(task.machine.model().inertials()[1]);
+    let mut settings = settings(Estimator::Weighted);
+    settings.payloads = vec![Payload { name: "weight".to_owned(), link, known }];
+    task.legs = vec![Leg::whole(reference()).unwrap().with_payload(Some("weight".to_owned()))];
+    let record = record(&arm(2.0), shape);
+    let found = identify_run(&task, std::slice::from_ref(&record), &settings).unwrap();
+    let truth = task.machine.nominal_base().unwrap();
+    for (k, (found, truth)) in found.values.iter().zip(truth).enumerate() {
+        let is_friction = *truth == 0.0;
+        assert!(is_friction || (found - truth).abs() < 0.05, "{k}: {found} for {truth}");
+    }
+}
