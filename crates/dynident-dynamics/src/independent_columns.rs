@@ -2,6 +2,8 @@
 
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use nalgebra::{DMatrix, DVector, DVectorView};
+use std::num::NonZero;
+use std::thread::available_parallelism;
 
 /// What sums of some hundred products in double precision leave of an exact zero, with room.
 const ROUNDING: f64 = 1e-12;
@@ -145,19 +147,40 @@ impl Column {
 /// Dependent columns that are solved side by side.
 const SIDE_BY_SIDE: usize = 32;
 
-/// Back-substitution with the independent columns' triangle gives the regrouping. Each dependent column has entries for the independent ones before it.
+/// Products from which on further threads are worth their start: some milliseconds of work.
+const WORTH_THREADS: usize = 20_000_000;
+
+/// Back-substitution with the independent columns' triangle gives the regrouping. Each dependent column has entries for the independent ones before it. Groups of columns are independent, so
+/// the result does not depend on the threads that share them.
 fn solved(triangle: &[Vec<f64>], dependent: &[Vec<f64>]) -> DMatrix<f64> {
-    let level = Level::detect();
-    let mut regrouping = DMatrix::zeros(triangle.len(), dependent.len());
-    for (group, columns) in dependent.chunks(SIDE_BY_SIDE).enumerate() {
+    let (level, rank) = (Level::detect(), triangle.len());
+    let mut regrouping = DMatrix::zeros(rank, dependent.len());
+    let places = regrouping.as_mut_slice().chunks_mut((rank * SIDE_BY_SIDE).max(1));
+    let groups = dependent.chunks(SIDE_BY_SIDE).zip(places);
+    let solve = |(columns, places): (&[Vec<f64>], &mut [f64])| {
         let solved = dispatch(level, BackSubstitution { triangle, columns });
-        for (k, column) in dependent[group * SIDE_BY_SIDE..].iter().take(SIDE_BY_SIDE).enumerate() {
-            let mut to = regrouping.column_mut(group * SIDE_BY_SIDE + k);
-            for (b, row) in solved[..column.len()].iter().enumerate() {
-                to[b] = row[k];
+        for (k, (column, to)) in columns.iter().zip(places.chunks_mut(rank)).enumerate() {
+            for (to, row) in to.iter_mut().zip(&solved[..column.len()]) {
+                *to = row[k];
             }
         }
+    };
+    let products: usize = dependent.iter().map(|column| column.len() * column.len() / 2).sum();
+    let threads = if products < WORTH_THREADS { 1 } else { available_parallelism().map_or(1, NonZero::get) };
+    if threads == 1 {
+        groups.for_each(solve);
+        return regrouping;
     }
+    // Later groups are longer: every thread gets some of all.
+    let mut shares: Vec<Vec<_>> = (0..threads).map(|_| Vec::new()).collect();
+    for (number, group) in groups.enumerate() {
+        shares[number % threads].push(group);
+    }
+    std::thread::scope(|scope| {
+        for share in shares {
+            scope.spawn(|| share.into_iter().for_each(solve));
+        }
+    });
     regrouping
 }
 

@@ -210,22 +210,26 @@ fn identified(
     }
 
     // Bodies, friction and drives that a robot can have.
-    let (consistent, sign) = match job {
-        Job::Payload(_) => (held_arm(task, &training, &estimation.estimate), None),
-        Job::Model(_) => {
+    let held = job.arm().is_some();
+    let bodies = || -> Result<_, IdentificationError> {
+        let found = if held {
+            (held_arm(task, &training, &estimation.estimate), None)
+        } else {
             let consistent = consistent_stage(&logs, &training, &estimation.estimate)?;
             (consistent, torque_sign(&training, &estimation.estimate)?)
-        }
+        };
+        Ok((found, started.elapsed().as_secs_f64()))
     };
-    times.estimation_s += started.elapsed().as_secs_f64();
-
-    // What training and held-out recordings say of it.
-    let started = Instant::now();
-    let mut examination = examine_all_training(&logs, &training, &estimation.estimate)?;
+    // Beside that, what training recordings say of the estimate; then what held-out ones do.
+    let examined = || examine_all_training(&logs, &training, &estimation.estimate);
+    let (bodies, examined) = if execution.parallel() { rayon::join(bodies, examined) } else { (bodies(), examined()) };
+    let ((consistent, sign), estimation_s) = bodies?;
+    let mut examination = examined?;
     examination.sign = sign;
+    times.estimation_s += estimation_s;
     let physical = consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
     let held_out = examine_all_held_out(&logs, &training, &estimation.estimate, physical)?;
-    times.examination_s = started.elapsed().as_secs_f64();
+    times.examination_s = started.elapsed().as_secs_f64() - estimation_s;
     Ok(Identification {
         payloads: payload_results((recordings, payloads), &chosen, &training.columns, &estimation.estimate),
         motion: logs.motion.clone(),

@@ -166,8 +166,8 @@ impl<'a> CrossValidation<'a> {
                 for (local, &column) in equation.columns.iter().enumerate() {
                     place[column] = Some(local);
                 }
-                let mut absorb = |to: &mut TriangularFactor, from: &TriangularFactor, weight: f64| {
-                    to.absorb_entries(&mut workspace, from.columns() + 1, |row, column| {
+                let mut absorb = |to: &mut TriangularFactor, from: &TriangularFactor, weight: f64, rows: usize| {
+                    to.absorb_entries(&mut workspace, rows, |row, column| {
                         let local = order.get(column).map_or(Some(from.columns()), |&global| place[global]);
                         weight * local.map_or(0.0, |local| from.entry(row, local))
                     });
@@ -178,13 +178,12 @@ impl<'a> CrossValidation<'a> {
                     let mend = "give a finite weight that is not negative";
                     return Err(EstimationError::Setting { setting: "weight", value: weight, mend });
                 }
-                absorb(&mut triangle, &others[fold], weight);
+                // Later rows have nothing but torque, and what the triangle cannot explain does not count.
+                let seen = order.iter().filter_map(|&global| place[global]).max().map_or(0, |local| local + 1);
+                absorb(&mut triangle, &others[fold], weight, seen);
                 if equation.joint == joint {
-                    if fold < self.folds {
-                        absorb(&mut rows, &own[fold], 1.0);
-                    } else {
-                        absorb(&mut rows, &others[fold], 1.0);
-                    }
+                    let from = if fold < self.folds { &own[fold] } else { &others[fold] };
+                    absorb(&mut rows, from, 1.0, from.columns() + 1);
                 }
             }
             let enough = rows.rows() > 0 && triangle.rows() > order.len();

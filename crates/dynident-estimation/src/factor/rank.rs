@@ -3,6 +3,7 @@
 use super::triangular::{FactorWorkspace, TriangularFactor};
 use crate::error::EstimationError;
 use dynident_dynamics::independent_columns;
+use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -141,18 +142,12 @@ pub(crate) fn solve(triangle: &TriangularFactor, split: &Split, settings: &RankS
             triangle.entry(row, column) / scales[column]
         }
     });
-    let mut inverse = DMatrix::zeros(free, free);
-    for column in 0..free {
-        inverse[(column, column)] = 1.0 / reduced.entry(column, column);
-        for row in (0..column).rev() {
-            let sum: f64 = (row + 1..=column).map(|k| reduced.entry(row, k) * inverse[(k, column)]).sum();
-            inverse[(row, column)] = -sum / reduced.entry(row, row);
-        }
-    }
+    let mut inverse = dispatch(Level::detect(), Inverse { triangle: &reduced });
     let mut solution = vec![0.0; free];
     for row in (0..free).rev() {
-        let sum: f64 = (row + 1..free).map(|k| reduced.entry(row, k) * solution[k]).sum();
-        solution[row] = (reduced.entry(row, free) - sum) / reduced.entry(row, row);
+        let entries = reduced.row(row);
+        let sum: f64 = entries[1..].iter().zip(&solution[row + 1..]).map(|(entry, known)| entry * known).sum();
+        solution[row] = (entries[free - row] - sum) / entries[0];
     }
     let mut values = known;
     for (k, &column) in split.free.iter().enumerate() {
@@ -160,6 +155,45 @@ pub(crate) fn solve(triangle: &TriangularFactor, split: &Split, settings: &RankS
         inverse.row_mut(k).scale_mut(1.0 / scales[column]);
     }
     Solution { values, inverse }
+}
+
+/// The inverse of a factor's `R_W`, by back-substitution.
+struct Inverse<'a> {
+    triangle: &'a TriangularFactor,
+}
+
+/// Columns of the inverse that are computed side by side.
+const SIDE_BY_SIDE: usize = 8;
+
+impl Kernel for Inverse<'_> {
+    type Output = DMatrix<f64>;
+
+    /// The loops over columns become vector instructions; each column's own sums keep their order.
+    #[inline(always)]
+    fn run<T: Lane>(self) -> Self::Output {
+        let size = self.triangle.columns();
+        let mut inverse = DMatrix::zeros(size, size);
+        let mut x = vec![[0.0; SIDE_BY_SIDE]; size];
+        for first in (0..size).step_by(SIDE_BY_SIDE) {
+            let end = size.min(first + SIDE_BY_SIDE);
+            x[..end].fill([0.0; SIDE_BY_SIDE]);
+            for row in (0..end).rev() {
+                let entries = self.triangle.row(row);
+                let mut sum = [0.0; SIDE_BY_SIDE];
+                for (entry, below) in entries[1..].iter().zip(&x[row + 1..end]) {
+                    for k in 0..SIDE_BY_SIDE {
+                        sum[k] += entry * below[k];
+                    }
+                }
+                for column in row.max(first)..end {
+                    let k = column - first;
+                    x[row][k] = if row == column { 1.0 / entries[0] } else { -sum[k] / entries[0] };
+                    inverse[(row, column)] = x[row][k];
+                }
+            }
+        }
+        inverse
+    }
 }
 
 /// Singular values and conditions of the stacked rows beside the decision taken.
@@ -175,6 +209,10 @@ pub(crate) fn report(
     let mut singular_values: Vec<f64> = scaled.singular_values().iter().copied().collect();
     singular_values.sort_by(|a, b| b.total_cmp(a));
     let largest = singular_values.first().copied().unwrap_or(0.0);
+    let condition_number_scaled = match singular_values.last() {
+        Some(least) if split.fixed.is_empty() => largest / least,
+        _ => condition(&scaled.select_columns(&split.free)),
+    };
     RankReport {
         rank: split.free.len(),
         columns: names.len(),
@@ -189,7 +227,7 @@ pub(crate) fn report(
         weakest_independent: split.weakest_independent,
         strongest_dependent: split.strongest_dependent,
         condition_number_raw: condition(&triangle.regressor_triangle().select_columns(&split.free)),
-        condition_number_scaled: condition(&scaled.select_columns(&split.free)),
+        condition_number_scaled,
     }
 }
 

@@ -31,6 +31,8 @@ impl Piece {
 /// One joint's rows `[Y | −∂(Yθ)/∂t | τ at the six nodes]`, filtered alike; the last node stands where a factor has its torque.
 pub(crate) struct DelayRows {
     pub(crate) factor: SegmentedFactor,
+    /// The same rows as one segment.
+    pub(crate) merged: SegmentedFactor,
     /// The sample after which the lag lies, give or take one.
     pub(crate) centre: isize,
     /// Root mean square of the filtered slope, Nm (N) per sample.
@@ -69,8 +71,9 @@ impl DelayRows {
                 first += rows;
             }
         }
-        let slope_rms = factor.total().column_norms()[columns] / (factor.rows().max(1) as f64).sqrt();
-        Ok(Self { factor, centre, slope_rms })
+        let merged = factor.as_one_segment();
+        let slope_rms = merged.total().column_norms()[columns] / (factor.rows().max(1) as f64).sqrt();
+        Ok(Self { factor, merged, centre, slope_rms })
     }
 
     /// Whether the nodes still surround a lag of `shift` samples.

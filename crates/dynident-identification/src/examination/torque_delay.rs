@@ -14,6 +14,7 @@ use dynident_estimation::{
 };
 use dynident_recording::{DecimationSettings, Decimator, Finding, Level, MotionSettings, best_lag};
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Samples that are looked at: some tens of seconds of any log.
@@ -96,8 +97,10 @@ impl<'a> DelayCheck<'a> {
         let joints = self.model.model().dof();
         let filter = settings.parallel_filter.decimation(self.rate_hz, motion_band_hz(motion));
         let longest = LONGEST_DELAY_S * self.rate_hz;
-        let start = (0..joints).map(|joint| self.coarse(joint, motion.differentiator.cutoff_hz()).unwrap_or(0.0));
-        let start = start.map(|lag| lag.clamp(-longest, longest)).collect();
+        let start = (0..joints)
+            .into_par_iter()
+            .map(|joint| self.coarse(joint, motion.differentiator.cutoff_hz()).unwrap_or(0.0).clamp(-longest, longest))
+            .collect();
         // A log too short to fit to has no lag either.
         self.estimated(settings, filter.as_ref(), start, longest).unwrap_or_else(|_| vec![None; joints])
     }
@@ -125,10 +128,10 @@ impl<'a> DelayCheck<'a> {
         mut shift: Vec<f64>,
         longest: f64,
     ) -> Result<Vec<Option<TorqueLag>>, EstimationError> {
-        let mut rows: Vec<DelayRows> = Vec::new();
-        for joint in 0..shift.len() {
-            rows.push(self.rows(settings, filter, joint, shift[joint])?);
-        }
+        let mut rows: Vec<DelayRows> = (0..shift.len())
+            .into_par_iter()
+            .map(|joint| self.rows(settings, filter, joint, shift[joint]))
+            .collect::<Result<_, _>>()?;
         let quick = WeightedSettings {
             rank: settings.estimation.rank,
             covariance: CovarianceMethod::White,
@@ -136,8 +139,7 @@ impl<'a> DelayCheck<'a> {
         };
         let base = self.model.layout().columns().len();
         for _ in 0..MOST_STEPS {
-            let merged = |rows: &DelayRows| rows.factor.as_one_segment();
-            let step = weighted_least_squares(&self.problem(&rows, &shift, merged)?, &quick)?;
+            let step = weighted_least_squares(&self.problem(&rows, &shift, |rows| &rows.merged)?, &quick)?;
             let mut settled = true;
             for joint in 0..shift.len() {
                 let (rest, std) = (step.values[base + joint], step.std[base + joint]);
@@ -152,7 +154,7 @@ impl<'a> DelayCheck<'a> {
             }
         }
         let last_step = WeightedSettings { covariance: settings.estimation.covariance, ..quick };
-        let last = weighted_least_squares(&self.problem(&rows, &shift, |rows| rows.factor.clone())?, &last_step)?;
+        let last = weighted_least_squares(&self.problem(&rows, &shift, |rows| &rows.factor)?, &last_step)?;
         Ok((0..shift.len()).map(|joint| self.joint_delay(&last, &rows[joint], joint, shift[joint], longest)).collect())
     }
 
@@ -199,7 +201,7 @@ impl<'a> DelayCheck<'a> {
         &self,
         rows: &[DelayRows],
         shift: &[f64],
-        factor: impl Fn(&DelayRows) -> SegmentedFactor,
+        factor: impl Fn(&DelayRows) -> &SegmentedFactor,
     ) -> Result<LinearProblem, EstimationError> {
         let layout = self.model.layout();
         let base = layout.columns().len();

@@ -28,12 +28,15 @@ pub fn best_lag(a: &[f64], b: &[f64], max_lag_samples: usize, rate_hz: f64) -> O
         return None;
     }
     let limit = max_lag_samples as isize;
-    let correlations = (-limit..=limit)
-        .map(|lag| {
-            let from = max_lag_samples.wrapping_add_signed(lag);
-            correlation(&a[max_lag_samples..n - max_lag_samples], &b[from..n - 2 * max_lag_samples + from])
-        })
-        .collect::<Option<Vec<f64>>>()?;
+    let still = &a[max_lag_samples..n - max_lag_samples];
+    let mut correlations = Vec::with_capacity(2 * max_lag_samples + 1);
+    for first in (0..=2 * max_lag_samples).step_by(SIDE_BY_SIDE) {
+        let lags = SIDE_BY_SIDE.min(2 * max_lag_samples + 1 - first);
+        correlations.extend_from_slice(&side_by_side(still, &b[first..n])[..lags]);
+    }
+    if !correlations.iter().all(|correlation| correlation.is_finite()) {
+        return None;
+    }
     let best = (0..correlations.len()).max_by(|x, y| correlations[*x].abs().total_cmp(&correlations[*y].abs()))?;
     let peak = correlations[best];
     let mut samples = (best as isize - limit) as f64;
@@ -62,19 +65,35 @@ impl Lag {
     }
 }
 
-/// Pearson's correlation; `None` if a signal is constant or not finite.
-fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
+/// Lags that are computed side by side.
+const SIDE_BY_SIDE: usize = 8;
+
+/// Pearson's correlation of `a` with `b` from its samples 0, 1, ... on; not finite if a signal is constant or not
+/// finite, of no meaning where `b` is too short. The loops over lags become vector instructions; each lag's own sums
+/// keep their order.
+fn side_by_side(a: &[f64], b: &[f64]) -> [f64; SIDE_BY_SIDE] {
     let n = a.len() as f64;
-    let (mean_a, mean_b) = (a.iter().sum::<f64>() / n, b.iter().sum::<f64>() / n);
-    let (mut aa, mut bb, mut ab) = (0.0, 0.0, 0.0);
-    for (a, b) in a.iter().zip(b) {
-        let (a, b) = (a - mean_a, b - mean_b);
-        aa += a * a;
-        bb += b * b;
-        ab += a * b;
+    let mut padded = b.to_vec();
+    padded.resize(a.len() + SIDE_BY_SIDE - 1, 0.0);
+    let mean_a = a.iter().sum::<f64>() / n;
+    let mut mean_b = [0.0; SIDE_BY_SIDE];
+    for b in padded.windows(SIDE_BY_SIDE) {
+        for k in 0..SIDE_BY_SIDE {
+            mean_b[k] += b[k];
+        }
     }
-    let value = ab / (aa.sqrt() * bb.sqrt());
-    value.is_finite().then_some(value)
+    let mean_b = mean_b.map(|sum| sum / n);
+    let (mut aa, mut bb, mut ab) = (0.0, [0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE]);
+    for (a, b) in a.iter().zip(padded.windows(SIDE_BY_SIDE)) {
+        let a = a - mean_a;
+        aa += a * a;
+        for k in 0..SIDE_BY_SIDE {
+            let b = b[k] - mean_b[k];
+            bb[k] += b * b;
+            ab[k] += a * b;
+        }
+    }
+    core::array::from_fn(|k| ab[k] / (aa.sqrt() * bb[k].sqrt()))
 }
 
 #[cfg(test)]
