@@ -1,8 +1,9 @@
-//! The last word on limits: every limit looked at again, sample by sample, by code that shares nothing with the optimiser's.
+//! The last word on limits: every limit looked at again, sample by sample, by code that shares nothing with the
+//! optimiser's.
 //!
-//! Plain loops over the description: names are looked up here, torques come from single-sample inverse dynamics, distances of capsules from a search that knows no
-//! closed form. Only the choice of fitted capsules and their pairs, which is part of what the limit *is*, comes from
-//! [`SelfCollision::resolve`](crate::limits::SelfCollision::resolve).
+//! Plain loops over the description: names are looked up here, torques come from single-sample inverse dynamics,
+//! distances of capsules from a search that knows no closed form. Only the choice of fitted capsules and their pairs,
+//! which is part of what the limit *is*, comes from [`SelfCollision`](crate::limits::SelfCollision).
 
 use crate::limits::{JointLimit, LimitError, LimitKind, Limits, LinkPoint};
 use crate::motion::Motion;
@@ -29,7 +30,8 @@ pub struct LimitReport {
     pub kind: LimitKind,
     /// The joint; for places the point, for self-collision the pair of links.
     pub joint: String,
-    /// 1 on the limit, above it in violation: `|x - middle| / half range`, `|x| / limit`; for distances `2 - distance / least`, for the floor 1 plus the metres below it. Infinite if the motion is not finite.
+    /// 1 on the limit, above it in violation: `|x - middle| / half range`, `|x| / limit`; for distances `2 - distance /
+    /// least`, for the floor 1 plus the metres below it. Infinite if the motion is not finite.
     pub worst_ratio: f64,
     /// When the ratio is worst, s.
     pub at_s: f64,
@@ -59,7 +61,8 @@ struct Rod {
     ends: [Vec3; 2],
 }
 
-/// Checks all limits from 0 to `duration_s` at `rate_hz` ([`CHECK_RATE_HZ`]), the end included. `motion` gives the exact motion at a list of times.
+/// Checks all limits from 0 to `duration_s` at `rate_hz` ([`CHECK_RATE_HZ`]), the end included. `motion` gives the
+/// exact motion at a list of times.
 ///
 /// # Errors
 /// As [`Limits::validate`]; a duration or rate that is not positive and finite, or more than 10⁸ samples.
@@ -246,7 +249,8 @@ impl Probe {
     }
 }
 
-/// Distance of two rods: the distance of a point from the second is convex along the first, so thirds of an interval close in on it.
+/// Distance of two rods: the distance of a point from the second is convex along the first, so thirds of an interval
+/// close in on it.
 fn rods_apart(a: [Vec3; 2], b: [Vec3; 2]) -> f64 {
     let from_second = |s: f64| {
         let p = a[0] + (a[1] - a[0]).scale(s);

@@ -5,8 +5,8 @@ use dynident_lanes::{Kernel, Lane, Level, dispatch};
 /// Columns of a tile: sixteen sums stay in registers.
 const TILE: usize = 4;
 
-/// Adds `weight · Pᵀ P` to the square matrix `gram` (row-major, `size` wide) at rows and columns `columns`; `panel` holds the columns of `P` one after another, `rows` values each.
-/// Both triangles are filled.
+/// Adds `weight · Pᵀ P` to the square matrix `gram` (row-major, `size` wide) at rows and columns `columns`; `panel`
+/// holds the columns of `P` one after another, `rows` values each. Both triangles are filled.
 pub(crate) fn add_gram(
     level: Level,
     panel: &[f64],
@@ -91,7 +91,8 @@ fn column_tile(panel: &[f64], rows: usize, first: usize, count: usize) -> [&[f64
     [of(0), of(1), of(2), of(3)]
 }
 
-/// `out = factor · P G[columns, columns]`, in the shape of `P`; `matrix` is `G`, row-major, `size` wide; `packed` is scratch.
+/// `out = factor · P G[columns, columns]`, in the shape of `P`; `matrix` is `G`, row-major, `size` wide; `packed` is
+/// scratch.
 #[allow(clippy::too_many_arguments, reason = "one product with its shapes")]
 pub(crate) fn times_matrix(
     level: Level,
@@ -121,7 +122,8 @@ struct Times<'a> {
     panel: &'a [f64],
     rows: usize,
     count: usize,
-    /// Scaled entries of the matrix for these columns: tile after tile of four target columns, source columns one after another within.
+    /// Scaled entries of the matrix for these columns: tile after tile of four target columns, source columns one after
+    /// another within.
     packed: &'a [f64],
     out: &'a mut [f64],
 }

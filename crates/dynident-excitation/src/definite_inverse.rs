@@ -5,8 +5,9 @@ use nalgebra::DMatrix;
 
 /// `log det D` and `D⁻¹`; `None` when `D` is not positive definite.
 ///
-/// Gauss and Jordan's elimination in place, without pivoting: a positive definite matrix needs none, and every row operation is one stream over a row (measured: 43 × 43 in a fifth of
-/// the time of a general library's factorisation and inverse).
+/// Gauss and Jordan's elimination in place, without pivoting: a positive definite matrix needs none, and every row
+/// operation is one stream over a row (measured: 43 × 43 in a fifth of the time of a general library's factorisation
+/// and inverse).
 pub(crate) fn log_det_and_inverse(matrix: &DMatrix<f64>) -> Option<(f64, DMatrix<f64>)> {
     let size = matrix.nrows();
     let stride = size.next_multiple_of(8);

@@ -1,8 +1,9 @@
-//! The same design by optimisers without derivatives, for comparison: the paper's genetic algorithm and CMA-ES, with penalties for what is broken.
+//! The same design by optimisers without derivatives, for comparison: the paper's genetic algorithm and CMA-ES, with
+//! penalties for what is broken.
 
 use crate::criteria::Criterion;
 use crate::design::assess::assess;
-use crate::design::{DesignProgress, DesignSettings, DesignTask, Designed, grid, ranges};
+use crate::design::{Design, DesignProgress, DesignSettings, DesignTask, grid, ranges};
 use crate::information::Information;
 use crate::limits::LimitWorkspace;
 use crate::motion::Motion;
@@ -36,11 +37,13 @@ const SEARCHES: usize = 3;
 const SIZED_BY: usize = 100;
 const WIDER: f64 = 1.3;
 
-/// Searches for [`design`](crate::design())'s task without gradients: the last criterion's [`fitness`](Criterion::fitness) plus 1000 times the sum of the largest violation of each limit.
+/// Searches for [`design`](crate::design())'s task without gradients: the last criterion's
+/// [`fitness`](Criterion::fitness) plus 1000 times the sum of the largest violation of each limit.
 ///
-/// Parameters are looked for in a box: the family's bounds, where they are finite, else what 100 random starts of the family span, 1.3 times as wide. The search grid is that of the settings; seed and
-/// time limit are theirs, too (a seed in the optimiser's own settings is not used). Up to three searches, with wider margins while something is broken between samples; the best motion by the
-/// check between samples is kept.
+/// Parameters are looked for in a box: the family's bounds, where they are finite, else what 100 random starts of the
+/// family span, 1.3 times as wide. The search grid is that of the settings; seed and time limit are theirs, too (a seed
+/// in the optimiser's own settings is not used). Up to three searches, with wider margins while something is broken
+/// between samples; the best motion by the check between samples is kept.
 ///
 /// Also gives one [`Generation`] of the first search after another (for CMA-ES the best so far, three times).
 ///
@@ -51,7 +54,7 @@ pub fn design_without_gradients(
     settings: &DesignSettings,
     optimiser: &DerivativeFree,
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
-) -> Result<(Designed, Vec<Generation>), OptimiserError> {
+) -> Result<(Design, Vec<Generation>), OptimiserError> {
     let begun = Instant::now();
     let late = || settings.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > limit);
     let criterion = task.criteria[task.criteria.len() - 1];
@@ -70,13 +73,13 @@ pub fn design_without_gradients(
         let mut curve = Vec::new();
         let mut hear = |progress: &Progress<'_>| {
             curve.push(Generation { best: progress.value, best_so_far: progress.value, mean: progress.value });
-            let told = DesignProgress {
+            let so_far = DesignProgress {
                 round: "generations",
                 value: progress.value,
                 violation: 0.0,
                 evaluations: (evaluations + progress.evaluations) as u64,
             };
-            stopped = watch(&told).is_break() || late();
+            stopped = watch(&so_far).is_break() || late();
             if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let seed = settings.seed.wrapping_add(search as u64);
@@ -111,7 +114,7 @@ pub fn design_without_gradients(
         }
     }
     let kept = kept.ok_or(OptimiserError::Start)?;
-    let designed = Designed {
+    let designed = Design {
         figure: kept.figure,
         information: kept.information,
         violation: kept.violation,
@@ -231,7 +234,8 @@ mod tests {
             assert!(designed.violation <= 0.0, "{optimiser:?}: {}", designed.violation);
             assert!(history.len() >= generations);
             assert!(history.windows(2).all(|w| w[1].best_so_far <= w[0].best_so_far));
-            // The median random start is inside position and speed limits; a search must beat it by more than a factor e in the determinant.
+            // The median random start is inside position and speed limits; a search must beat it by more than a factor
+            // e in the determinant.
             let (positions, speeds) = ranges(&set);
             let logged = grid(6.0, 601);
             let mut figures: Vec<f64> = (0..21)

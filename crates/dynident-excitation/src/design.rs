@@ -1,8 +1,9 @@
 //! The design itself: the best trajectory of a family by a criterion, inside all limits.
 //!
-//! Many random starts, each an augmented-Lagrangian descent with exact gradients: parameters → motion → regressor and limits, and one reverse sweep back. Rounds follow one another
-//! (random starts on a coarse grid, restarts around the best, a polish on the fine grid), each within an evaluation budget, so that the result depends on the seed alone; a deadline only
-//! ends it early, with the best feasible trajectory so far.
+//! Many random starts, each an augmented-Lagrangian descent with exact gradients: parameters → motion → regressor and
+//! limits, and one reverse sweep back. Rounds follow one another (random starts on a coarse grid, restarts around the
+//! best, a polish on the fine grid), each within an evaluation budget, so that the result depends on the seed alone; a
+//! deadline only ends it early, with the best feasible trajectory so far.
 
 pub(crate) mod assess;
 mod clear_starts;
@@ -39,8 +40,9 @@ pub struct DesignSettings {
     pub evaluations_per_start: usize,
     /// Evaluations of one polish at most (up to six, while something is broken between samples). Default 1,000.
     pub polish_evaluations: usize,
-    /// Samples of the search grid. Default 96, at least five per free number of a joint, for families that move fast, and 12.5 a second where places are limited, so that the ways between
-    /// samples, on which columns are looked for, are nearly straight.
+    /// Samples of the search grid. Default 96, at least five per free number of a joint, for families that move fast,
+    /// and 12.5 a second where places are limited, so that the ways between samples, on which columns are looked for,
+    /// are nearly straight.
     pub search_samples: Option<usize>,
     /// Rate at which the robot will be logged, Hz: every sample counts for the information. Default 100.
     pub rate_hz: f64,
@@ -83,7 +85,8 @@ const PLACE_RATE_HZ: f64 = 12.5;
 pub struct DesignTask<'a> {
     /// The family.
     pub family: &'a dyn Family,
-    /// Criteria one after another: each round goes on with the next (a smooth norm first, then a sharp one); the last stays.
+    /// Criteria one after another: each round goes on with the next (a smooth norm first, then a sharp one); the last
+    /// stays.
     pub criteria: &'a [&'a dyn Criterion],
     /// Everything that must be kept.
     pub limits: &'a LimitSet,
@@ -97,7 +100,7 @@ pub struct DesignTask<'a> {
 
 /// The best trajectory found.
 #[derive(Clone, Debug)]
-pub struct Designed {
+pub struct Design {
     /// Parameters of the family.
     pub parameters: Vec<f64>,
     /// Information of the trajectory, every logged sample counted.
@@ -125,7 +128,8 @@ pub struct DesignProgress {
     pub evaluations: u64,
 }
 
-/// Searches. `watch` hears of every better point, from any thread, and may end the search; the best so far is then still led inside the limits.
+/// Searches. `watch` hears of every better point, from any thread, and may end the search; the best so far is then
+/// still led inside the limits.
 ///
 /// # Errors
 /// If settings are out of range or no start can be evaluated at all.
@@ -133,7 +137,7 @@ pub fn design(
     task: &DesignTask<'_>,
     settings: &DesignSettings,
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
-) -> Result<Designed, OptimiserError> {
+) -> Result<Design, OptimiserError> {
     let begun = Instant::now();
     let late = || settings.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > limit);
     let evaluations = AtomicU64::new(0);
@@ -192,8 +196,9 @@ pub fn design(
         };
         starts = core::iter::once(best.state.clone()).chain((0..(settings.starts / 2).max(2)).map(moved)).collect();
     }
-    // The polish on a finer grid, again with tighter limits while something is broken between its samples. What is kept is the best trajectory whose limits were found kept everywhere, the
-    // search's own best included; only if there is none, the least broken one.
+    // The polish on a finer grid, again with tighter limits while something is broken between its samples. What is kept
+    // is the best trajectory whose limits were found kept everywhere, the search's own best included; only if there is
+    // none, the least broken one.
     let criterion = task.criteria[task.criteria.len() - 1];
     let fine = grid(task.family.duration_s(), 2 * coarse.len() - 1);
     let rounds = Rounds { task, times: &fine, logged: logged.len(), shaped: true };
@@ -231,7 +236,7 @@ pub fn design(
         (kept, used) = restored(task, settings, kept, [&fine, &logged], &stop)?;
         evaluations.fetch_add(used as u64, Ordering::Relaxed);
     }
-    Ok(Designed {
+    Ok(Design {
         figure: kept.figure,
         information: kept.information,
         violation: kept.violation,
@@ -260,7 +265,8 @@ pub fn grid(duration_s: f64, count: usize) -> Vec<f64> {
     (0..count).map(|k| duration_s * k as f64 / (count.max(2) - 1) as f64).collect()
 }
 
-/// For every parameter the root mean square of its joint's, for the size of noise (joint after joint, as families store them).
+/// For every parameter the root mean square of its joint's, for the size of noise (joint after joint, as families store
+/// them).
 fn joint_scales(parameters: &[f64], joints: usize) -> Vec<f64> {
     let per_joint = (parameters.len() / joints.max(1)).max(1);
     let rms = |part: &[f64]| (part.iter().map(|p| p * p).sum::<f64>() / part.len() as f64).sqrt();

@@ -6,8 +6,8 @@ use nalgebra::DMatrix;
 
 /// A family of trajectories of all joints over one duration, with a vector of free parameters.
 ///
-/// Parameters are stored joint after joint unless the family says otherwise. Every family gives q, q̇, q̈ and jerk exactly (no differences), and pulls a cost's derivatives
-/// by the motion back to its parameters exactly.
+/// Parameters are stored joint after joint unless the family says otherwise. Every family gives q, q̇, q̈ and jerk
+/// exactly (no differences), and pulls a cost's derivatives by the motion back to its parameters exactly.
 pub trait Family: core::fmt::Debug + Send + Sync {
     /// The family's name in study files and results.
     fn name(&self) -> &'static str;
@@ -21,10 +21,12 @@ pub trait Family: core::fmt::Debug + Send + Sync {
     /// Number of free parameters, all joints together.
     fn parameters(&self) -> usize;
 
-    /// Lower and upper bound of each parameter that the family itself needs (not the robot's limits); infinite where there is none.
+    /// Lower and upper bound of each parameter that the family itself needs (not the robot's limits); infinite where
+    /// there is none.
     fn bounds(&self) -> Vec<[f64; 2]>;
 
-    /// A random start of sensible size for joints with the given position range `[lower, upper]` and speed limit; inside [`bounds`](Family::bounds).
+    /// A random start of sensible size for joints with the given position range `[lower, upper]` and speed limit;
+    /// inside [`bounds`](Family::bounds).
     fn random(&self, ranges: &[[f64; 2]], speeds: &[f64], random: &mut Random) -> Vec<f64>;
 
     /// The motion at `times_s`, within the duration.
@@ -39,8 +41,10 @@ pub trait Family: core::fmt::Debug + Send + Sync {
     /// If lengths differ.
     fn pull_back(&self, parameters: &[f64], times_s: &[f64], cotangent: &MotionCotangent, gradient: &mut [f64]);
 
-    /// Adds `Σ_s Σ_o w_o(s) b_o(s) b_o(s)ᵀ` of one joint to `out` (square, the joint's parameters), where `b_o` are the derivatives of that joint's q, q̇, q̈ and jerk by its parameters
-    /// and `w_o` the numbers of `weights` in the same arrays. Returns false, with nothing added, if the family does not offer it: optimisers then learn the curvature of limits step by step.
+    /// Adds `Σ_s Σ_o w_o(s) b_o(s) b_o(s)ᵀ` of one joint to `out` (square, the joint's parameters), where `b_o` are the
+    /// derivatives of that joint's q, q̇, q̈ and jerk by its parameters and `w_o` the numbers of `weights` in the same
+    /// arrays. Returns false, with nothing added, if the family does not offer it: optimisers then learn the curvature
+    /// of limits step by step.
     ///
     /// Only for families whose joints have parameters of their own, equally many, joint after joint.
     ///
@@ -57,7 +61,8 @@ pub trait Family: core::fmt::Debug + Send + Sync {
         false
     }
 
-    /// Whether the motion is linear in the parameters, so that [`curvature`](Family::curvature) does not depend on them.
+    /// Whether the motion is linear in the parameters, so that [`curvature`](Family::curvature) does not depend on
+    /// them.
     fn is_linear(&self) -> bool {
         false
     }

@@ -9,7 +9,8 @@ use dynident_lanes::Level;
 use dynident_model::Model;
 use nalgebra::DMatrix;
 
-/// `D = D₀ + Σ_j W_jᵀ W_j / σ_j²` over all samples of a motion: the information about the columns of a layout, and its reverse.
+/// `D = D₀ + Σ_j W_jᵀ W_j / σ_j²` over all samples of a motion: the information about the columns of a layout, and its
+/// reverse.
 pub struct Information<'a> {
     model: &'a Model,
     layout: &'a PanelLayout,
@@ -25,7 +26,8 @@ pub struct Information<'a> {
 }
 
 impl<'a> Information<'a> {
-    /// For the columns of `layout`, with the standard deviation of each joint's torque (Nm, N), and the information that is there before (shape columns × columns), if any.
+    /// For the columns of `layout`, with the standard deviation of each joint's torque (Nm, N), and the information
+    /// that is there before (shape columns × columns), if any.
     ///
     /// # Panics
     /// If there is not one standard deviation per joint, one is not positive, or the prior has another shape.
@@ -50,7 +52,8 @@ impl<'a> Information<'a> {
         }
     }
 
-    /// `D` of the motion; its regressor stays for [`pull_back`](Information::pull_back). `weight` counts every sample so many times.
+    /// `D` of the motion; its regressor stays for [`pull_back`](Information::pull_back). `weight` counts every sample
+    /// so many times.
     pub fn of(&mut self, motion: &Motion, weight: f64) -> DMatrix<f64> {
         let count = self.layout.columns().len();
         regressor_panels(self.model, &mut self.workspace, self.layout, &motion.view(), &mut self.panels);
@@ -63,8 +66,9 @@ impl<'a> Information<'a> {
         DMatrix::from_vec(count, count, gram)
     }
 
-    /// Adds the derivatives of a cost by the motion of the last [`of`](Information::of), given its symmetric derivative `by_information = ∂f/∂D`: the regressor's entries get
-    /// `2 W_j G / σ_j²`, and one reverse sweep takes them to the motion.
+    /// Adds the derivatives of a cost by the motion of the last [`of`](Information::of), given its symmetric derivative
+    /// `by_information = ∂f/∂D`: the regressor's entries get `2 W_j G / σ_j²`, and one reverse sweep takes them to the
+    /// motion.
     pub fn pull_back(
         &mut self,
         motion: &Motion,

@@ -1,4 +1,81 @@
-//! **How should it move?** Trajectory families, criteria, limits, optimisers and the forecast of every parameter's error bar.
+//! **How should it move?** The motion that makes a robot's parameters known, inside every limit, and how well it will.
+//!
+//! | task | where |
+//! | --- | --- |
+//! | describe a motion by few numbers | a [`Family`] of [`families`]: Fourier series, splines, multisines, strokes, .. |
+//! | say what the robot may do | [`limits::Limits`]: joints, boxes, floor, column, the arm's own links |
+//! | choose what makes a motion good | a [`Criterion`](criteria::Criterion) of [`criteria`]: D-, A-, E-optimal, prediction |
+//! | find the best motion | [`design()`], or [`design_without_gradients()`] to compare with |
+//! | look at all limits again | [`check::check_limits`], which shares no code with the search |
+//! | learn why no motion keeps them | [`limits::diagnose()`] |
+//! | know the error bars beforehand | [`Information`] of the motion, [`forecast()`] of every parameter |
+//! | move one joint after another | [`step_wise`]: strokes over windows, as in the paper |
+//! | hand the motion to a robot | [`export`]: CSV, ROS 2, URScript |
+//!
+//! A [`Motion`] is plain arrays: q, q̇, q̈ and jerk, joint after joint. All searches are deterministic by their seed, on
+//! any number of threads. A family, a criterion or a limit of one's own is a type with the trait: [`design()`] takes
+//! references to traits.
+//!
+//! A motion for a robot from memory, its limits checked, its error bars predicted:
+//!
+//! ```
+//! use core::ops::ControlFlow;
+//! use dynident_dynamics::ParametricModel;
+//! use dynident_excitation::check::{CHECK_RATE_HZ, check_limits};
+//! use dynident_excitation::criteria::DOptimal;
+//! use dynident_excitation::families::{Fourier, FourierSettings};
+//! use dynident_excitation::limits::{LimitSet, Limits};
+//! use dynident_excitation::{DesignSettings, DesignTask, Family, design, forecast};
+//!
+//! // An arm with two level axes, and limits beside those of its description.
+//! let arm = dynident_model::read_urdf(
+//!     r#"<robot name="arm">
+//!       <link name="base"/>
+//!       <link name="upper"/>
+//!       <link name="fore"/>
+//!       <joint name="shoulder" type="revolute">
+//!         <parent link="base"/> <child link="upper"/> <axis xyz="0 1 0"/>
+//!         <limit lower="-2" upper="2" velocity="2" effort="100"/>
+//!       </joint>
+//!       <joint name="elbow" type="revolute">
+//!         <parent link="upper"/> <child link="fore"/> <axis xyz="0 1 0"/> <origin xyz="0 0 0.5"/>
+//!         <limit lower="-2" upper="2" velocity="2" effort="50"/>
+//!       </joint>
+//!     </robot>"#,
+//! )?;
+//! let robot = ParametricModel::new(arm.model, Vec::new())?;
+//! let mut limits = Limits::from_model(robot.model());
+//! for joint in &mut limits.joints {
+//!     joint.acceleration = Some(8.0);
+//!     // Torque can be limited only where the inertials are known.
+//!     joint.torque = None;
+//! }
+//!
+//! // The most informative Fourier series of 6 s with rest at both ends.
+//! let family = Fourier::new(2, 6.0, &FourierSettings { harmonics: 3, ..FourierSettings::default() })?;
+//! let task = DesignTask {
+//!     family: &family,
+//!     criteria: &[&DOptimal],
+//!     limits: &LimitSet::new(&limits, robot.model())?,
+//!     layout: robot.layout(),
+//!     torque_std_nm: &[0.5, 0.5],
+//!     prior: None,
+//! };
+//! let settings = DesignSettings { starts: 2, rounds: 0, evaluations_per_start: 300, ..DesignSettings::default() };
+//! let best = design(&task, &settings, |_| ControlFlow::Continue(()))?;
+//!
+//! // Every limit, 10,000 times a second.
+//! let reports = check_limits(&limits, robot.model(), family.duration_s(), CHECK_RATE_HZ, |times, motion| {
+//!     family.motion(&best.parameters, times, motion);
+//! })?;
+//! assert!(reports.iter().all(|report| !report.violated), "{reports:?}");
+//!
+//! // Standard deviations of m r_x, m r_z and I_yy of either link, white torque noise assumed: none worse than 0.1.
+//! let predicted = forecast(&best.information, 1);
+//! assert_eq!(predicted.std.len(), 6);
+//! assert!(predicted.std.iter().all(|std| std.is_some_and(|std| std < 0.1)), "{predicted:?}");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 #![forbid(unsafe_code)]
 
@@ -16,11 +93,10 @@ mod information;
 pub mod limits;
 mod motion;
 pub mod optimisers;
-pub mod paper_problem;
 pub mod step_wise;
 
 pub use derivative_free::{DerivativeFree, design_without_gradients};
-pub use design::{DesignProgress, DesignSettings, DesignTask, Designed, design, grid};
+pub use design::{Design, DesignProgress, DesignSettings, DesignTask, design, grid};
 pub use family::Family;
 pub use forecast::{Direction, Forecast, forecast};
 pub use information::Information;

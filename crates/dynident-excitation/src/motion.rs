@@ -2,7 +2,8 @@
 
 use dynident_model::laws::JointMotion;
 
-/// Position, velocity, acceleration and jerk of all joints, joint-major: joint `j`, sample `s` stands at `j * samples + s`. rad (m) and seconds.
+/// Position, velocity, acceleration and jerk of all joints, joint-major: joint `j`, sample `s` stands at `j * samples +
+/// s`. rad (m) and seconds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Motion {
     /// Number of samples.

@@ -1,7 +1,7 @@
 //! What the robot is asked to follow in every run, and which rows count.
 
 use dynident_dynamics::ParametricModel;
-use dynident_recording::FilterError;
+use dynident_recording::{Differentiator, FilterError};
 use dynident_simulation::Reference;
 use dynident_simulation::{SimulationError, require, require_length};
 use std::sync::Arc;
@@ -12,6 +12,7 @@ pub struct Leg {
     reference: Reference,
     commanded: Arc<dynident_recording::Reference>,
     windows: Option<Vec<Vec<[f64; 2]>>>,
+    differentiator: Option<Arc<dyn Differentiator>>,
 }
 
 impl Leg {
@@ -38,13 +39,20 @@ impl Leg {
             .map(|joint| [&motion.q, &motion.dq, &motion.ddq].map(|values| values[motion.of(joint)].to_vec()))
             .collect();
         let commanded = Arc::new(dynident_recording::Reference::sampled(&times, &joints)?);
-        Ok(Self { reference, commanded, windows })
+        Ok(Self { reference, commanded, windows, differentiator: None })
     }
 
     /// The same with the commanded motion as differentiators are to know it: strokes in closed form in place of samples.
     #[must_use]
     pub fn with_commanded(mut self, commanded: dynident_recording::Reference) -> Self {
         self.commanded = Arc::new(commanded);
+        self
+    }
+
+    /// The same with a differentiator of one's own in place of the settings'.
+    #[must_use]
+    pub fn with_differentiator(mut self, differentiator: Arc<dyn Differentiator>) -> Self {
+        self.differentiator = Some(differentiator);
         self
     }
 
@@ -56,6 +64,11 @@ impl Leg {
     /// The same for differentiators that know the commanded motion.
     pub fn commanded(&self) -> &Arc<dynident_recording::Reference> {
         &self.commanded
+    }
+
+    /// The differentiator of one's own, if there is one.
+    pub fn differentiator(&self) -> Option<&dyn Differentiator> {
+        self.differentiator.as_deref()
     }
 
     /// Whether the torque of `joint` at `time_s` counts.

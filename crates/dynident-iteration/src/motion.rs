@@ -65,8 +65,14 @@ pub fn measured_motion(
     // The nominal rate where the times are its own: their last digits are not to matter.
     let rate_hz = if (rate_hz / record.rate_hz - 1.0).abs() < UNIFORM { record.rate_hz } else { rate_hz };
     let first_time_s = record.times_s[0];
-    let differentiator = differentiator(&settings.differentiator, &q, joints, rate_hz)
-        .build_following(0.1 * rate_hz, Some(leg.commanded()))?;
+    let built;
+    let differentiator = if let Some(own) = leg.differentiator() {
+        own
+    } else {
+        built = differentiator(&settings.differentiator, &q, joints, rate_hz)
+            .build_following(0.1 * rate_hz, Some(leg.commanded()))?;
+        &*built
+    };
     if samples < differentiator.minimum_samples() {
         return Err(wrong(format!(
             "{samples} samples are too few for {}, which needs {}",

@@ -8,7 +8,8 @@ use dynident_model::sample::Random;
 /// The paper's expressions.
 const PAPER: [&str; 6] = ["I1zz + m2 a1²", "m1 r1x + m2 a1", "m1 r1y", "I2zz", "m2 r2x", "m2 r2y"];
 
-/// Where θ₁ to θ₆ stand among the base columns, which keep the order of the inertial parameters: m r_x, m r_y, I_zz of each link.
+/// Where θ₁ to θ₆ stand among the base columns, which keep the order of the inertial parameters: m r_x, m r_y, I_zz of
+/// each link.
 pub(crate) const COLUMNS: [usize; 6] = [2, 0, 1, 5, 3, 4];
 
 /// Random states of the comparison with Eq. 7.

@@ -54,7 +54,7 @@ const RUNS: usize = 3;
 /// The paper's Table 6.
 const PAPER: [f64; 6] = [1.98, 2.0, 0.0, 1.007, 1.00, 0.009];
 
-/// What the Fourier series told.
+/// What the Fourier series gives.
 pub(crate) struct FourierRuns {
     pub(crate) figure_15: PaperFigure,
     pub(crate) table_6: PaperTable,

@@ -1,21 +1,25 @@
-//! Tables 4, 5 and Figs. 9 to 14: three runs of joint 2 while joint 1 rests, then three of joint 1, by the iteration that serves every robot.
+//! Tables 4, 5 and Figs. 9 to 14: three runs of joint 2 while joint 1 rests, then three of joint 1, by the iteration
+//! that serves every robot.
 
 use crate::arm::{Arm, TRUTH};
 use crate::base_parameters::{COLUMNS, theta};
+use crate::literal_map::LiteralMap;
 use crate::piece::{PaperCell, PaperFigure, PaperTable};
+use crate::problem::table_3;
 use dynident::Error;
 use dynident_dynamics::ParametricModel;
 use dynident_excitation::families::{SplicedLogistic, SplicedLogisticSettings};
-use dynident_excitation::paper_problem::{PaperProblem, Stroke};
+use dynident_excitation::step_wise::Stroke;
 use dynident_iteration::{Iteration, IterationError, IterationSettings, IterationTask, Leg, Scheme, iterate};
 use dynident_iteration::{Robot, SimulatedRobot};
-use dynident_recording::{DifferentiatorSettings, LogisticPath, ReferenceSettings};
+use dynident_recording::LogisticPath;
 use dynident_report::LinePlot;
 use dynident_simulation::controllers::{FiniteTimeSettings, JointPdSettings};
 use dynident_simulation::{ControllerSettings, Integrator, LoopSettings, Plant, Reference, Run};
 use std::path::Path;
+use std::sync::Arc;
 
-/// What the runs told.
+/// What the runs give.
 pub(crate) struct JointRuns {
     pub(crate) tables: Vec<PaperTable>,
     pub(crate) figures: Vec<PaperFigure>,
@@ -44,7 +48,8 @@ struct Runs {
 /// Gains of Eq. 23: `K_p`, `K_d` of joint 1 and 2.
 const GAINS: [[f64; 2]; 2] = [[2.0, 20.0], [4.0, 4.0]];
 
-/// Gains of the first run, of a joint PD: with these the errors of Fig. 12 come about (the paper's own first run gives no torque at all).
+/// Gains of the first run, of a joint PD: with these the errors of Fig. 12 come about (the paper's own first run gives
+/// no torque at all).
 const FIRST: [[f64; 2]; 2] = [[100.0, 60.0], [16.0, 8.0]];
 
 /// The paper's Tables 4 and 5: identified values after each run.
@@ -61,13 +66,7 @@ const SHOWN: usize = 3;
 
 /// Both schemes, both joints: the paper's own with its Table 3, and ours inside the limits (18).
 pub(crate) fn joint_runs(arm: &Arm, optimum: &[Stroke; 2]) -> Result<JointRuns, Error> {
-    let paper = Protocol {
-        rate_hz: 100.0,
-        steps_per_sample: 10,
-        runs: SHOWN,
-        strokes: PaperProblem::table_3(100.0),
-        literal: true,
-    };
+    let paper = Protocol { rate_hz: 100.0, steps_per_sample: 10, runs: SHOWN, strokes: table_3(100.0), literal: true };
     let ours = Protocol { rate_hz: 1000.0, steps_per_sample: 1, runs: 6, strokes: *optimum, literal: false };
     let [as_paper, own] = [&paper, &ours].map(|protocol| -> Result<[Runs; 2], Error> {
         let two = one_joint(arm, protocol, 1, &[]).map_err(|why| failed(&arm.description, &why))?;
@@ -124,7 +123,10 @@ fn one_joint(arm: &Arm, protocol: &Protocol, joint: usize, known: &[(usize, f64)
     };
     let mut paths = [LogisticPath { amplitude: 0.0, ..path }; 2];
     paths[joint] = path;
-    let leg = Leg::windowed(reference, windows)?.with_commanded(dynident_recording::Reference::logistic(&paths)?);
+    let mut leg = Leg::windowed(reference, windows)?.with_commanded(dynident_recording::Reference::logistic(&paths)?);
+    if protocol.literal {
+        leg = leg.with_differentiator(Arc::new(LiteralMap { paths: paths.to_vec() }));
+    }
     let machine = ParametricModel::new(arm.model.clone(), Vec::new())?.with_nominal(prior(protocol.literal))?;
     let task = IterationTask { machine, legs: vec![leg], known: known.to_vec(), torque_limits: None };
     let iteration = Iteration::new(task, iteration_settings(protocol))?;
@@ -164,8 +166,6 @@ fn iteration_settings(protocol: &Protocol) -> IterationSettings {
     let mut settings = IterationSettings::default();
     if protocol.literal {
         settings = IterationSettings::literal(0.5);
-        settings.identification.differentiator =
-            DifferentiatorSettings::LiteralMap { reference: ReferenceSettings::default() };
     }
     // Only one joint's rows count.
     settings.identification.scheme = Scheme::StepByStep;
@@ -179,7 +179,8 @@ fn iteration_settings(protocol: &Protocol) -> IterationSettings {
     settings
 }
 
-/// What is believed before the first run. The paper begins with zeros; a possible machine needs a mass: half a kilogram half way along each link.
+/// What is believed before the first run. The paper begins with zeros; a possible machine needs a mass: half a kilogram
+/// half way along each link.
 pub(crate) fn prior(literal: bool) -> Vec<f64> {
     let link = if literal { [0.0; 10] } else { [0.5, 0.25, 0.0, 0.0, 0.02, 0.0, 0.0, 0.2, 0.0, 0.2] };
     [link, link].concat()

@@ -1,6 +1,6 @@
 //! **What does the paper say, and is it so?** Every table and figure of *Iterative Identification of Robot Dynamic
-//! Parameters Based on Logistic Function*, computed through the same crates and studies as a user's own robot, with what
-//! the paper alone needs.
+//! Parameters Based on Logistic Function*, computed through the same crates and studies as a user's own robot, with
+//! what the paper alone needs.
 //!
 //! [`reproduce`] is all of it, as the command `dynident reproduce` calls it.
 
@@ -11,9 +11,11 @@ mod base_parameters;
 mod deviations;
 mod fourier;
 mod joint_runs;
+mod literal_map;
 mod optimisation;
 mod page;
 mod piece;
+mod problem;
 mod strokes;
 mod verification;
 

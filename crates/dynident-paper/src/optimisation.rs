@@ -2,10 +2,11 @@
 
 use crate::arm::Arm;
 use crate::piece::{PaperCell, PaperFigure, PaperTable};
+use crate::problem;
 use core::ops::ControlFlow;
 use dynident::{Error, RunOptions, StrokeFile, Study, WindowedFile, design_study};
 use dynident_excitation::optimisers::Generation;
-use dynident_excitation::paper_problem::{PaperProblem, Stroke};
+use dynident_excitation::step_wise::Stroke;
 use dynident_report::LinePlot;
 
 /// Rate at which the paper's δ is read as a number of samples, Hz.
@@ -64,8 +65,8 @@ fn figure_7(history: &[Generation], optimum: f64) -> PaperFigure {
 }
 
 fn table_3(file: &WindowedFile, optimum: [Stroke; 2], genetic: [Stroke; 2]) -> PaperTable {
-    let paper = PaperProblem::table_3(DELTA_RATE_HZ);
-    let problem = PaperProblem::default();
+    let paper = problem::table_3(DELTA_RATE_HZ);
+    let constants = problem::constants();
     let note = format!(
         "H of the optimum inside (18) is {:.2}, the genetic algorithm ends {:.0} % above it; the paper's own values break (18)",
         file.optimum.unwrap_or(f64::NAN),
@@ -82,13 +83,15 @@ fn table_3(file: &WindowedFile, optimum: [Stroke; 2], genetic: [Stroke; 2]) -> P
         row(format!("A{index}, rad"), &|stroke| stroke.amplitude_rad);
         row(format!("ω{index}, 1/s"), &|stroke| stroke.steepness_per_s);
         row(format!("δ{index}, s"), &|stroke| stroke.window_s);
-        row(format!("condition number, joint {}", joint + 1), &|stroke| problem.condition_number(stroke));
+        row(format!("condition number, joint {}", joint + 1), &|stroke| constants.condition_number(stroke));
         row(format!("peak speed over its limit, joint {}", joint + 1), &|stroke| {
-            0.25 * stroke.amplitude_rad * stroke.steepness_per_s / problem.speed_limit
+            0.25 * stroke.amplitude_rad * stroke.steepness_per_s / constants.speed_limit
         });
         row(format!("peak acceleration over its limit, joint {}", joint + 1), &|stroke| {
             // The largest of f(1-f)(1-2f) is 1/(6√3).
-            stroke.amplitude_rad * stroke.steepness_per_s.powi(2) / (6.0 * 3.0_f64.sqrt()) / problem.acceleration_limit
+            stroke.amplitude_rad * stroke.steepness_per_s.powi(2)
+                / (6.0 * 3.0_f64.sqrt())
+                / constants.acceleration_limit
         });
     }
     table

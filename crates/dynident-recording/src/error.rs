@@ -1,6 +1,6 @@
 //! What can go wrong between a log file and a motion: each message names the file, the place and the mend.
 
-use crate::log::LogPlace;
+use crate::place::LogPlace;
 use std::path::PathBuf;
 
 /// A [`LogFormat`](crate::LogFormat) that contradicts itself or the list of joints.

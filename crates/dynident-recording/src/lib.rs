@@ -1,9 +1,27 @@
-//! **What was measured?** From log files to a motion: readers, column mapping, units, clock and gaps, filters, every way from q
-//! to dq and ddq, and the parallel filter that decimates regressor and torque alike.
+//! **What was measured?** From a log to a motion: sources of rows, column mapping, units, clock and gaps, filters,
+//! every way from q to dq and ddq, and the parallel filter that decimates regressor and torque alike. All values are
+//! SI.
 //!
-//! [`LogFormat`] describes a log (it is part of the study file), [`MotionStream`] turns it into blocks of q, dq, ddq and torque on a uniform
-//! clock with memory that does not grow with the log, and [`ImportReport`] tells what was found on the way. Joints are known
-//! by name only; what moves them is other rooms' business. All values are SI.
+//! # Tour
+//!
+//! | task | take |
+//! | --- | --- |
+//! | q, dq, ddq and torque of a log file | [`MotionStream::open`] with a [`LogFormat`] |
+//! | the same of arrays in memory | [`JointSamples`], or [`MemoryLog`] for a table whose columns a format explains |
+//! | the same of anything else that gives rows | a type with [`LogSource`], made a [`Log`] |
+//! | the samples as logged, no filter | [`LogReader`] |
+//! | another way from q to dq and ddq | [`DifferentiatorSettings`] ([`derivative`] lists them); one's own: [`Differentiator`] |
+//! | ways that use the commanded motion | [`Reference`], [`MotionStream::following`] |
+//! | what was found on the way: gaps, dead channels, lags | [`MotionStream::report`], [`report`] |
+//! | a cut-off from the data | [`cutoff()`] |
+//! | regressor and torque through one filter, decimated | [`Decimator`] |
+//! | the mean period of a periodic record and its noise | [`averaged_periods`] |
+//!
+//! The life of a log: [`LogSource`] → [`LogReader`] (units, signs, gears, ranges, missing values) → [`RawBlock`]s →
+//! pieces on a uniform clock ([`clock`]) → [`Differentiator`] → [`MotionBlock`]s. Memory does not grow with the log.
+//! Joints are known by name only; what moves them is the business of other crates.
+//!
+//! # A file
 //!
 //! ```
 //! use dynident_recording::{LogFormat, MotionBlock, MotionSettings, MotionStream};
@@ -29,81 +47,40 @@
 //! assert_eq!((report.rows, report.rate_hz.round()), (200, 1000.0));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! # Arrays
+//!
+//! ```
+//! use dynident_recording::{DifferentiatorSettings, JointSamples, MotionBlock, MotionSettings, MotionStream};
+//!
+//! let q: Vec<f64> = (0..500).map(|i| (f64::from(i) * 0.01).sin()).collect();
+//! let tau = vec![2.0; 500];
+//! let log = JointSamples::at_rate(500.0, vec![q], vec![tau]).into_log("bench run", &["elbow".to_owned()])?;
+//! let differentiator = DifferentiatorSettings::SavitzkyGolay { window: 21, degree: 4 };
+//! let settings = MotionSettings { differentiator, ..MotionSettings::default() };
+//! let mut stream = MotionStream::new(&log, &settings)?;
+//! let mut block = MotionBlock::default();
+//! assert!(stream.next_block(&mut block)?);
+//! assert!((block.dq[0] - 5.0).abs() < 1e-3);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![forbid(unsafe_code)]
 
-mod bridge;
-mod butterworth;
-mod central_differences;
-mod channel_checks;
 pub mod clock;
-mod comparison;
-pub mod cutoff;
-mod decimation;
-mod deviation;
-mod differentiator;
+pub mod derivative;
 mod error;
-mod five_point_cubic;
-mod fourier_fit;
-mod frequency_domain;
-mod harmonic_fit;
-mod lag;
-mod literal_map;
-mod log;
-mod logistic_path;
-mod low_pass;
-mod marks;
-mod orthonormal;
-mod periods;
-mod position_map;
-mod reference;
-mod reference_lag;
-mod reference_settings;
-mod report;
-mod resampler;
-mod savitzky_golay;
-mod sections;
-mod segments;
-mod smoothed_differences;
-mod speed_series;
-mod stream;
-mod stroke;
-#[cfg(test)]
-mod test_signals;
-mod time_checks;
-mod time_warp;
+pub mod filter;
+pub mod log;
+mod motion;
+mod place;
+pub mod reference;
+pub mod report;
 
-pub use butterworth::ButterworthZeroPhase;
-pub use central_differences::CentralDifferences;
-pub use channel_checks::ChannelReport;
-pub use clock::Clock;
-pub use comparison::DerivativeComparison;
-pub use cutoff::{CutoffChoice, cutoff};
-pub use decimation::{DecimationSettings, Decimator};
-pub use deviation::Deviation;
-pub use differentiator::{Derivatives, Differentiator, DifferentiatorSettings, Place};
+pub use derivative::{Derivatives, Differentiator, DifferentiatorSettings, Place, SampleRanges};
 pub use error::{FilterError, FormatError, RecordingError};
-pub use five_point_cubic::FivePointCubic;
-pub use fourier_fit::FourierFit;
-pub use frequency_domain::{Ends, FrequencyDomain};
-pub use lag::{Lag, best_lag};
-pub use literal_map::LiteralMap;
-pub use log::{
-    ChannelGroup, ClockRule, ColumnRef, Columns, Header, JointSamples, LinesDropped, Log, LogFormat, LogPlace,
-    LogReader, LogSource, LogTable, MemoryLog, Missing, OneOrMany, Quantity, RawBlock, SampleClock, TextLog,
-    TimeColumn, TimeUnit, si_factor, unit_names,
-};
-pub use logistic_path::LogisticPath;
-pub use low_pass::LowPass;
-pub use periods::{AveragedPeriods, averaged_periods};
-pub use position_map::PositionMap;
-pub use reference::Reference;
-pub use reference_lag::{StrokeLag, stroke_lags};
-pub use reference_settings::ReferenceSettings;
-pub use report::{Finding, Gap, ImportReport, Level, Steps};
-pub use savitzky_golay::SavitzkyGolay;
-pub use sections::{Section, butterworth_low_pass};
-pub use smoothed_differences::SmoothedDifferences;
-pub use speed_series::SpeedSeries;
-pub use stream::{MotionBlock, MotionSettings, MotionStream};
-pub use stroke::Stroke;
-pub use time_warp::TimeWarp;
+pub use filter::{AveragedPeriods, DecimationSettings, Decimator, averaged_periods, cutoff};
+pub use log::{JointSamples, Log, LogFormat, LogReader, LogSource, LogTable, MemoryLog, RawBlock};
+pub use motion::{MotionBlock, MotionSettings, MotionStream};
+pub use place::LogPlace;
+pub use reference::{LogisticPath, Reference, ReferenceSettings};
+pub use report::{Finding, ImportReport, Level, best_lag};

@@ -22,7 +22,8 @@ pub struct ConvergencePlot {
     pub y_label: String,
     /// Number of the first run; 1 unless changed.
     pub first: u32,
-    /// Name, values by run (NaN where there is none) and half widths of the error bars (as many; or none) of each curve.
+    /// Name, values by run (NaN where there is none) and half widths of the error bars (as many; or none) of each
+    /// curve.
     pub curves: Vec<(String, Vec<f64>, Vec<f64>)>,
     /// Logarithmic y axis.
     pub log_y: bool,

@@ -1,7 +1,9 @@
 //! Which samples of a long log a plot needs: the least and the largest of every pixel column.
 
-/// The samples to draw of curves over a common axis, ascending: all if there are at most `4 · columns`; otherwise, for each of `columns` equal stretches of x and each curve, its least and its largest
-/// value, the first and the last sample of the stretch, and where a gap (a value that is not finite) begins and ends. So every peak and every gap of the log shows, however long it is, and every point drawn was measured.
+/// The samples to draw of curves over a common axis, ascending: all if there are at most `4 · columns`; otherwise, for
+/// each of `columns` equal stretches of x and each curve, its least and its largest value, the first and the last
+/// sample of the stretch, and where a gap (a value that is not finite) begins and ends. So every peak and every gap of
+/// the log shows, however long it is, and every point drawn was measured.
 ///
 /// ```
 /// // One spike in a million samples.
@@ -87,7 +89,8 @@ mod tests {
     }
 
     proptest! {
-        /// Against a plain search: in every column the kept samples span what all its samples span, and a gap stays a gap.
+        /// Against a plain search: in every column the kept samples span what all its samples span, and a gap stays a
+        /// gap.
         #[test]
         fn every_column_keeps_its_span(values in prop::collection::vec(prop_oneof![9 => -1e3_f64..1e3, 1 => Just(f64::NAN)], 100..2000)) {
             let x: Vec<f64> = (0..values.len()).map(|i| i as f64 * 0.5).collect();

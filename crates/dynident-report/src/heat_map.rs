@@ -11,7 +11,8 @@ const CELLS: f64 = 560.0;
 const LETTERS: usize = 22;
 const LETTER: f64 = 6.5;
 
-/// A matrix in colours: blue below zero, red above, as strong as the value against the largest; gaps stay empty. The value stands under the pointer.
+/// A matrix in colours: blue below zero, red above, as strong as the value against the largest; gaps stay empty. The
+/// value stands under the pointer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeatMap {
     /// Headline.

@@ -25,7 +25,8 @@ pub struct Line {
 
 /// Curves over a common axis: zoomed by dragging, values under the pointer, curves switched in the legend.
 ///
-/// Of more than 4800 samples the page holds the least and the largest of each of 1200 pixel columns ([`kept_samples`](crate::kept_samples)): nothing that shows is lost, but zooming in adds no detail.
+/// Of more than 4800 samples the page holds the least and the largest of each of 1200 pixel columns
+/// ([`kept_samples`](crate::kept_samples)): nothing that shows is lost, but zooming in adds no detail.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinePlot {
     /// Headline.
@@ -150,7 +151,9 @@ impl LinePlot {
         let kept = kept_samples(&self.x, &views, (right - left).max(1.0) as usize);
         let path = |curve: &Vec<f64>| {
             let mut pen = Pen::default();
-            kept.iter().for_each(|&i| pen.to([at_x(self.x[i]), at_y(curve[i])]));
+            for &i in &kept {
+                pen.to([at_x(self.x[i]), at_y(curve[i])]);
+            }
             pen.path()
         };
         let lines = self.lines.iter().zip(&curves).enumerate().map(|(k, (line, curve))| {

@@ -96,7 +96,8 @@ impl Report {
         self
     }
 
-    /// The page: one HTML file with all scripts, styles and data inside. It asks nothing of any network, and its security policy forbids that.
+    /// The page: one HTML file with all scripts, styles and data inside. It asks nothing of any network, and its
+    /// security policy forbids that.
     ///
     /// # Errors
     /// A section whose lists do not belong together, or whose axis runs backwards; the message names it.
@@ -165,7 +166,7 @@ pub(crate) fn rendered(name: &str, view: &impl Serialize) -> Result<String, Repo
         environment.add_template(name, source)?;
     }
     let mut text = environment.get_template(name)?.render(view)?;
-    if name.ends_with(".svg") {
+    if text.starts_with("<svg") {
         // XML has no place for control characters.
         text.retain(|letter| letter == '\n' || !letter.is_control());
     }

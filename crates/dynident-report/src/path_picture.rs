@@ -141,7 +141,9 @@ impl View<'_> {
 
     fn line<'p>(&self, points: impl IntoIterator<Item = &'p Place>) -> String {
         let mut pen = Pen::default();
-        points.into_iter().for_each(|point| pen.to(self.at(point)));
+        for point in points {
+            pen.to(self.at(point));
+        }
         pen.path()
     }
 

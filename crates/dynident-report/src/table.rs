@@ -26,7 +26,8 @@ impl Cell {
     }
 }
 
-/// A table with named columns; columns whose cells are all numbers (or empty) stand to the right. A click on a column's name sorts by it.
+/// A table with named columns; columns whose cells are all numbers (or empty) stand to the right. A click on a column's
+/// name sorts by it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Table {
     /// Headline; may be empty.

@@ -1,6 +1,7 @@
 //! Round numbers for axes, and numbers as text.
 
-/// About `count` round numbers (1, 2 or 5 times a power of ten apart) inside `[low, high]`, ascending; none unless both are finite and low < high.
+/// About `count` round numbers (1, 2 or 5 times a power of ten apart) inside `[low, high]`, ascending; none unless both
+/// are finite and low < high.
 pub(crate) fn ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
     let span = high - low;
     if !(span.is_finite() && span > 0.0) {
@@ -17,7 +18,8 @@ pub(crate) fn ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
     (0..=(last - first).max(0.0) as usize).map(|k| (first + k as f64) * step).collect()
 }
 
-/// A number to `digits` significant digits, with an exponent where that is shorter; a dash for what is no finite number.
+/// A number to `digits` significant digits, with an exponent where that is shorter; a dash for what is no finite
+/// number.
 ///
 /// ```
 /// assert_eq!(dynident_report::short(0.123456, 3), "0.123");

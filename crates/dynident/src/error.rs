@@ -1,6 +1,7 @@
 //! Everything that can stop a job, each with the file, the place and the mend in its message.
 
 use dynident_estimation::EstimationError;
+use dynident_identification::IdentificationError;
 use dynident_model::{ModelError, ReadError};
 use dynident_recording::{FilterError, RecordingError};
 use std::path::{Path, PathBuf};
@@ -165,6 +166,22 @@ impl Error {
     /// A log that cannot be read.
     pub(crate) fn recording(log: &str, source: RecordingError) -> Self {
         Self::Recording { log: log.to_owned(), source: Box::new(source) }
+    }
+
+    /// What stops an identification, as an error of the study at `path`.
+    pub(crate) fn identification(path: &Path, error: IdentificationError) -> Self {
+        let path = path.to_owned();
+        match error {
+            IdentificationError::Recording { log, source } => Self::Recording { log, source },
+            IdentificationError::Filter { log, source } => Self::Filter { log, source },
+            IdentificationError::NoTemperature { log, joint } => Self::NoTemperature { log, joint },
+            IdentificationError::NothingLeft { log, rows, needed } => Self::NothingLeft { log, rows, needed },
+            IdentificationError::Rows { log, source } => Self::Estimation { path: log.into(), source },
+            IdentificationError::Estimation(source) => Self::Estimation { path, source },
+            IdentificationError::Estimator { method, message } => Self::Method { path, method, message },
+            IdentificationError::Instruments { log, message } => Self::Instruments { log, message },
+            other => Self::Study { path, message: other.to_string() },
+        }
     }
 
     pub(crate) fn study(path: &Path, message: String) -> Self {

@@ -13,7 +13,8 @@ pub(crate) mod validate;
 
 use crate::progress::Bar;
 use crate::{Verdict, terminal};
-use dynident::{LogValidation, Progress, Silent};
+use dynident::identification::examination::LogValidation;
+use dynident::{Progress, Silent};
 use serde::Serialize;
 use std::path::Path;
 

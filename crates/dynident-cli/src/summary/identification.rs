@@ -5,7 +5,10 @@ use super::noise::noise;
 use super::text::{WIDTH, listed, name, percent, shortened, table, with_deviation, wrapped};
 use super::validation::residuals;
 use core::fmt::Write;
-use dynident::{FrictionCandidate, LogSummary, LogValidation, PossibleIntervalResult, ResultFile};
+use dynident::identification::consistent::ParameterInterval;
+use dynident::identification::examination::LogValidation;
+use dynident::identification::friction::FrictionCandidate;
+use dynident::{LogSummary, ResultFile};
 use std::path::Path;
 
 /// Base parameters shown with their error bars; the rest stand in the file.
@@ -239,7 +242,7 @@ fn physics(r: &ResultFile) -> String {
 }
 
 /// The bodies' masses as far as data and physics hold them.
-fn masses(intervals: &[PossibleIntervalResult]) -> String {
+fn masses(intervals: &[ParameterInterval]) -> String {
     let end = |end: Option<f64>, open: &str| end.map_or_else(|| open.to_owned(), |end| format!("{end:.3}"));
     let rows = intervals.iter().filter(|interval| interval.unit == "kg").map(|interval| {
         vec![
@@ -258,7 +261,11 @@ fn data(log: &LogSummary) -> String {
     let motion = log.motion_cutoff_hz.map_or(String::new(), |cutoff| format!(", motion below {cutoff:.1}\u{a0}Hz"));
     format!(
         "{} ({}): {} rows at {:.1}\u{a0}Hz{motion}, {} filtered",
-        log.log, log.role, log.import.rows, log.import.rate_hz, log.filtered_rows
+        log.log,
+        log.role.name(),
+        log.import.rows,
+        log.import.rate_hz,
+        log.filtered_rows
     )
 }
 

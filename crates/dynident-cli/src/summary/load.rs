@@ -1,7 +1,8 @@
 //! Payloads and drive gains in the summary of `identify`.
 
 use super::text::{name, table, with_deviation, wrapped};
-use dynident::{Measured, PayloadResult, ResultFile};
+use dynident::ResultFile;
+use dynident::identification::payload::{Measured, PayloadResult};
 
 /// What was found of payloads and gains; nothing where there are none.
 pub(super) fn loads(r: &ResultFile) -> String {

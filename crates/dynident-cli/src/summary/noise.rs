@@ -1,8 +1,9 @@
 //! What the summary says of noise in the regressor and of rows that were set aside.
 
 use super::text::{percent, wrapped};
+use dynident::ResultFile;
 use dynident::estimation::HausmanVerdict;
-use dynident::{NoiseInRegressor, ResultFile};
+use dynident::identification::estimators::NoiseInRegressor;
 
 /// Whether noise in the regressor shows, how many rows a robust estimator gave little weight, and what the study's estimator alone can tell; empty when that is nothing.
 pub(crate) fn noise(r: &ResultFile) -> String {

@@ -2,8 +2,9 @@
 
 use super::findings::findings;
 use super::text::{name, percent, table, wrapped};
+use dynident::LogSummary;
 use dynident::estimation::ValidationReport;
-use dynident::{JointResiduals, LogSummary, LogValidation};
+use dynident::identification::examination::{JointResiduals, LogValidation};
 
 /// A test whose probability is below this counts as negative.
 const SIGNIFICANCE: f64 = 0.01;

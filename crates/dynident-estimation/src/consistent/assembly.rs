@@ -145,8 +145,8 @@ impl Assembled {
         if self.program.strictly_inside(&x) { Ok(x) } else { self.roomiest(&x) }
     }
 
-    /// Maximises t with `S_k ⪰ t 1` and every unit row at least t. Not positive: the constraints exclude each other, and those with multipliers are at odds
-    /// (a theorem of the alternative: Boyd and Vandenberghe 5.8).
+    /// Maximises t with `S_k ⪰ t 1` and every unit row at least t. Not positive: the constraints exclude each other,
+    /// and those with multipliers are at odds (a theorem of the alternative: Boyd and Vandenberghe 5.8).
     fn roomiest(&self, x: &DVector<f64>) -> Result<DVector<f64>, PhysicalError> {
         let phase = RoomProgram::new(&self.program, x);
         let solved =

@@ -5,11 +5,13 @@ use nalgebra::{Matrix4, Vector4};
 
 /// The scaling of Nesterov and Todd for a pair `S, Z ≻ 0`: R with `R⁻¹ S R⁻ᵀ = Rᵀ Z R = diag(λ)`.
 ///
-/// Nesterov and Todd, SIAM J. Optimization 8 (1998) 324; computed as in Vandenberghe's CVXOPT notes (2010), section 5.3: with `S = L Lᵀ`,
-/// `Z = M Mᵀ` and `MᵀL = U diag(λ) Vᵀ`, `R = L V diag(λ)^{-1/2}` and `R⁻¹ = diag(λ)^{-1/2} Uᵀ Mᵀ`.
+/// Nesterov and Todd, SIAM J. Optimization 8 (1998) 324; computed as in Vandenberghe's CVXOPT notes (2010), section
+/// 5.3: with `S = L Lᵀ`, `Z = M Mᵀ` and `MᵀL = U diag(λ) Vᵀ`, `R = L V diag(λ)^{-1/2}` and `R⁻¹ = diag(λ)^{-1/2} Uᵀ
+/// Mᵀ`.
 ///
-/// L is lower and M upper triangular, and both are carried from step to step by triangular factors near one: small eigenvalues beside large ones keep their digits. R itself
-/// mixes them (its columns may turn freely where the λ are alike), so that variables are seen in the frame of L.
+/// L is lower and M upper triangular, and both are carried from step to step by triangular factors near one: small
+/// eigenvalues beside large ones keep their digits. R itself mixes them (its columns may turn freely where the λ are
+/// alike), so that variables are seen in the frame of L.
 #[derive(Clone, Debug)]
 pub(super) struct Scaling {
     pub(super) lambda: Vector4<f64>,
@@ -39,7 +41,8 @@ impl Scaling {
         (usable && finite).then_some(Self { lambda, l, m, product, u, v, r_inverse })
     }
 
-    /// The scaling of the pair after a step, given in scaled coordinates: `S = R (diag(λ) + ΔS) Rᵀ`, `Z = R⁻ᵀ (diag(λ) + ΔZ) R⁻¹`. The pair itself is never formed.
+    /// The scaling of the pair after a step, given in scaled coordinates: `S = R (diag(λ) + ΔS) Rᵀ`, `Z = R⁻ᵀ (diag(λ)
+    /// + ΔZ) R⁻¹`. The pair itself is never formed.
     pub(super) fn moved(&self, ds: &Matrix4<f64>, dz: &Matrix4<f64>) -> Option<Self> {
         let inverse_root = Matrix4::from_diagonal(&self.lambda.map(|value| 1.0 / value.sqrt()));
         // Seen from L and M: one, and the change.
@@ -141,8 +144,8 @@ pub(super) fn upper_factor(s: &Matrix4<f64>) -> Option<Matrix4<f64>> {
     Some(Matrix4::from_fn(|i, j| l[(3 - i, 3 - j)]))
 }
 
-/// Singular values and both sets of vectors of `A = U diag(σ) Vᵀ` by one-sided Jacobi rotations (Golub and Van Loan 8.6.3): small values come out with as many digits as
-/// large ones, which a bidiagonal method does not give.
+/// Singular values and both sets of vectors of `A = U diag(σ) Vᵀ` by one-sided Jacobi rotations (Golub and Van Loan
+/// 8.6.3): small values come out with as many digits as large ones, which a bidiagonal method does not give.
 fn singular_values(a: &Matrix4<f64>) -> (Vector4<f64>, Matrix4<f64>, Matrix4<f64>) {
     let (mut b, mut v) = (*a, Matrix4::identity());
     // Six to eight sweeps settle a 4 × 4 matrix; the limit only guards the loop.

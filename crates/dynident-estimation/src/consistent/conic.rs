@@ -5,9 +5,10 @@
 //!     subject to  S_k(x) = mat(M_k x + o_k) ⪰ 0,   a_l·x + o_l ≥ 0
 //! ```
 //!
-//! With multipliers Z_k ⪰ 0 and z_l ≥ 0 the optimum is where the gradient of the smooth part equals `Σ M_kᵀ vec(Z_k) + Σ a_l z_l`, where
-//! `S_k Z_k = γ_k 1`, and `s_l z_l = 0` (Boyd and Vandenberghe, Convex Optimization, 5.9.2). A block with γ > 0 is an entropic prior: its own barrier keeps it
-//! inside, and it stops on its central path at γ instead of zero.
+//! With multipliers Z_k ⪰ 0 and z_l ≥ 0 the optimum is where the gradient of the smooth part equals `Σ M_kᵀ vec(Z_k) +
+//! Σ a_l z_l`, where `S_k Z_k = γ_k 1`, and `s_l z_l = 0` (Boyd and Vandenberghe, Convex Optimization, 5.9.2). A block
+//! with γ > 0 is an entropic prior: its own barrier keeps it inside, and it stops on its central path at γ instead of
+//! zero.
 
 use super::cone::log_determinant;
 use super::coordinates::{Vector10, matrix_of, vector_of};
@@ -172,7 +173,8 @@ impl Program {
             && self.rows.iter().all(|row| row.value(x) > 0.0)
     }
 
-    /// Judges a point strictly inside with positive multipliers; the routes share nothing else. Slacks are known better to a solver than as the difference of x and its limits.
+    /// Judges a point strictly inside with positive multipliers; the routes share nothing else. Slacks are known better
+    /// to a solver than as the difference of x and its limits.
     pub(super) fn certificate_of(
         &self,
         x: &Precise,

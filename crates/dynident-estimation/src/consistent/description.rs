@@ -9,12 +9,14 @@ use nalgebra::{DMatrix, DVector};
 /// An interval of a mass or a coordinate, lower limit first.
 pub type Limits = [f64; 2];
 
-/// Ten consecutive standard parameters `[m, m rx, m ry, m rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz]` of one body, about its frame's origin.
+/// Ten consecutive standard parameters `[m, m rx, m ry, m rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz]` of one body, about its
+/// frame's origin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhysicalBody {
     /// Its name in messages.
     pub name: String,
-    /// The prior body P0, which is also the unit that the margin is measured in: from CAD, or a rough one from [`rough_body`].
+    /// The prior body P0, which is also the unit that the margin is measured in: from CAD, or a rough one from
+    /// [`rough_body`].
     pub reference: [f64; 10],
     /// Its values, when they are not to be fitted (all zero for a body without mass).
     pub known: Option<[f64; 10]>,
@@ -22,7 +24,8 @@ pub struct PhysicalBody {
     pub mass_kg: Option<Limits>,
     /// Corners of a box (axes of the body frame, metres) that holds the centre of mass.
     pub com_box_m: Option<[[f64; 3]; 2]>,
-    /// An ellipsoid that holds all of the mass, and so the centre of mass too: `tr(P Q) ≥ 0` (Wensing, Kim and Slotine 2018, eq. 24).
+    /// An ellipsoid that holds all of the mass, and so the centre of mass too: `tr(P Q) ≥ 0` (Wensing, Kim and Slotine
+    /// 2018, eq. 24).
     pub inside: Option<Ellipsoid>,
 }
 
@@ -66,10 +69,12 @@ impl BaseMap {
         Ok(Self { matrix })
     }
 
-    /// From `θ = π[independent] + K π[dependent]`, as base parameters of a structure are given; K has shape (independent, dependent).
+    /// From `θ = π[independent] + K π[dependent]`, as base parameters of a structure are given; K has shape
+    /// (independent, dependent).
     ///
     /// # Errors
-    /// [`PhysicalError::Mismatch`] unless K fits and every column stands in one of the lists, once; [`PhysicalError::NotFinite`].
+    /// [`PhysicalError::Mismatch`] unless K fits and every column stands in one of the lists, once;
+    /// [`PhysicalError::NotFinite`].
     pub fn from_regrouping(
         independent: &[usize],
         dependent: &[usize],
@@ -106,8 +111,8 @@ impl BaseMap {
 
 /// Bodies first (ten columns each), then scalars: the standard parameters π in order.
 ///
-/// The data are rows `R₁ θ ≈ ρ₁` over the base parameters `θ = B π`, each row in units of its own noise, so that `½‖R₁ B π − ρ₁‖²` is half the squared distance
-/// from the least-squares solution in standard deviations.
+/// The data are rows `R₁ θ ≈ ρ₁` over the base parameters `θ = B π`, each row in units of its own noise, so that `½‖R₁
+/// B π − ρ₁‖²` is half the squared distance from the least-squares solution in standard deviations.
 #[derive(Clone, Debug)]
 pub struct PhysicalProblem {
     pub(super) base: BaseMap,
@@ -123,11 +128,13 @@ pub struct PhysicalProblem {
 const LEAST_WIDTH: f64 = 1.0e-6;
 
 impl PhysicalProblem {
-    /// A problem from a weighted factor over the base parameters ([`LinearProblem::combined`](crate::LinearProblem::combined) with weights 1/σ_j).
+    /// A problem from a weighted factor over the base parameters
+    /// ([`LinearProblem::combined`](crate::LinearProblem::combined) with weights 1/σ_j).
     ///
     /// # Errors
     /// [`PhysicalError::Mismatch`] if the shapes differ, and everything that is wrong with a single body or scalar:
-    /// [`PhysicalError::InfeasiblePrior`], [`PhysicalError::InfeasibleKnown`], [`PhysicalError::EmptyInterval`], [`PhysicalError::NotFinite`].
+    /// [`PhysicalError::InfeasiblePrior`], [`PhysicalError::InfeasibleKnown`], [`PhysicalError::EmptyInterval`],
+    /// [`PhysicalError::NotFinite`].
     pub fn new(
         base: BaseMap,
         bodies: Vec<PhysicalBody>,
@@ -163,7 +170,8 @@ impl PhysicalProblem {
         Ok(self)
     }
 
-    /// The same problem with the data's optimum at the base parameters `theta`: what is nearest to them in the data's own metric?
+    /// The same problem with the data's optimum at the base parameters `theta`: what is nearest to them in the data's
+    /// own metric?
     ///
     /// # Errors
     /// [`PhysicalError::Mismatch`], [`PhysicalError::NotFinite`].
@@ -189,7 +197,8 @@ impl PhysicalProblem {
     }
 }
 
-/// A body of a given mass spread evenly about the frame's origin with radius of gyration `length_m` along each axis: a reference where nothing better is known.
+/// A body of a given mass spread evenly about the frame's origin with radius of gyration `length_m` along each axis: a
+/// reference where nothing better is known.
 ///
 /// ```
 /// let body = dynident_estimation::consistent::rough_body(2.0, 0.1);

@@ -11,7 +11,8 @@ use super::{PhysicalError, PhysicalRoute, PhysicalSettings};
 use nalgebra::DVector;
 use serde::Serialize;
 
-/// How a fit ended. Every fit satisfies the constraints, whatever its status; the status says how near to the optimum it is.
+/// How a fit ended. Every fit satisfies the constraints, whatever its status; the status says how near to the optimum
+/// it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PhysicalStatus {
@@ -28,7 +29,8 @@ pub enum PhysicalStatus {
 pub struct PhysicalBodyFit {
     /// Its name.
     pub name: String,
-    /// Smallest eigenvalue of the pseudo-inertia whitened by the reference, `P0^{-1/2} P P0^{-1/2}`: at least the margin. Of a known body as it was given.
+    /// Smallest eigenvalue of the pseudo-inertia whitened by the reference, `P0^{-1/2} P P0^{-1/2}`: at least the
+    /// margin. Of a known body as it was given.
     pub least_whitened_eigenvalue: f64,
     /// Smallest eigenvalue of the pseudo-inertia in SI units.
     pub least_eigenvalue: f64,
@@ -47,16 +49,19 @@ pub struct PhysicalFit {
     pub status: PhysicalStatus,
     /// Iterations of the solver.
     pub iterations: usize,
-    /// Stationarity of the Lagrangian: largest entry over one plus the largest of its terms. Of the solution as the solver holds it, with twice the digits of `parameters`.
+    /// Stationarity of the Lagrangian: largest entry over one plus the largest of its terms. Of the solution as the
+    /// solver holds it, with twice the digits of `parameters`.
     pub stationarity: f64,
     /// Duality gap over one plus the objective: how much the objective could still fall.
     pub duality_gap: f64,
     /// `½‖R₁ B π − ρ₁‖²`: half the squared distance from the data's own optimum, in standard deviations of the rows.
     pub data_objective: f64,
-    /// γ times the distance from the prior. A possible set fits the data better by at most γ times how much farther from the prior it lies.
+    /// γ times the distance from the prior. A possible set fits the data better by at most γ times how much farther
+    /// from the prior it lies.
     pub prior_objective: f64,
-    /// `√(2 data_objective)`: how many standard deviations (of white residuals) the fit moved from the data's own optimum because of constraints and prior. By
-    /// chance alone, the true parameters lie about the square root of their number away.
+    /// `√(2 data_objective)`: how many standard deviations (of white residuals) the fit moved from the data's own
+    /// optimum because of constraints and prior. By chance alone, the true parameters lie about the square root of
+    /// their number away.
     pub moved_sigma: f64,
     /// Body by body.
     pub bodies: Vec<PhysicalBodyFit>,
@@ -70,7 +75,8 @@ impl PhysicalFit {
         self.stationarity.max(self.duality_gap)
     }
 
-    /// For every base parameter how far it moved from the estimate `values` in units of the standard deviations `std`; none where that is zero.
+    /// For every base parameter how far it moved from the estimate `values` in units of the standard deviations `std`;
+    /// none where that is zero.
     ///
     /// # Errors
     /// [`PhysicalError::Mismatch`] unless both have one entry for each base parameter.
@@ -89,17 +95,19 @@ impl PhysicalFit {
 ///     subject to  P(π_i) ⪰ ε P0_i,  and the limits of masses, total mass, centres of mass and scalars
 /// ```
 ///
-/// A convex problem with one optimum (Sousa and Cortesão, IJRR 33 (2014) 931; Wensing, Kim and Slotine, RA-L 3 (2018) 60; Lee, Wensing and Park, T-RO 36 (2020)
-/// 348). Data see base parameters only; the prior decides what they leave open: another possible set fits better by at most γ times how much farther from the
-/// prior it lies. The result is judged by a duality gap that does not depend on the route.
+/// A convex problem with one optimum (Sousa and Cortesão, IJRR 33 (2014) 931; Wensing, Kim and Slotine, RA-L 3 (2018)
+/// 60; Lee, Wensing and Park, T-RO 36 (2020) 348). Data see base parameters only; the prior decides what they leave
+/// open: another possible set fits better by at most γ times how much farther from the prior it lies. The result is
+/// judged by a duality gap that does not depend on the route.
 ///
 /// ```
 /// use dynident_estimation::consistent::{BaseMap, PhysicalBody, PhysicalProblem, physical_fit, rough_body};
 /// use dynident_estimation::TriangularFactor;
 /// use nalgebra::DMatrix;
-/// // A pendulum's data say that Ixx = 0.02 and m ry = −0.3, each to 1 %. No single body has both with a mass of at most 1 kg.
+/// // A pendulum's data say that Ixx = 0.02 and m ry = −0.3, each to 1 %. No single body has both with at most 1 kg.
 /// let body = PhysicalBody {
-///     name: "bob".into(), reference: rough_body(1.0, 0.1), known: None, mass_kg: Some([0.1, 1.0]), com_box_m: None, inside: None,
+///     name: "bob".into(), reference: rough_body(1.0, 0.1), mass_kg: Some([0.1, 1.0]),
+///     known: None, com_box_m: None, inside: None,
 /// };
 /// let base = DMatrix::from_fn(2, 10, |row, column| f64::from((row == 0 && column == 4) || (row == 1 && column == 2)));
 /// // Rows 100/0.02 Ixx = 100 and 100/0.3 m ry = −100: columns one after another, then the right-hand side.
@@ -113,8 +121,9 @@ impl PhysicalFit {
 /// ```
 ///
 /// # Errors
-/// [`PhysicalError::Setting`], and [`PhysicalError::Contradictory`] with the names of the constraints that exclude each other. A solver that does not reach the
-/// tolerance is a [`PhysicalStatus`].
+/// [`PhysicalError::Setting`], and [`PhysicalError::Contradictory`] with the names of the constraints that exclude each
+/// other. A solver that does not reach the tolerance is a [`PhysicalStatus`].
+#[doc(alias("lmi", "sdp", "pseudo-inertia", "physical consistency", "log-cholesky"))]
 pub fn physical_fit(problem: &PhysicalProblem, settings: &PhysicalSettings) -> Result<PhysicalFit, PhysicalError> {
     settings.validate()?;
     let assembled = Assembled::new(problem, settings);
@@ -129,7 +138,8 @@ pub fn physical_fit(problem: &PhysicalProblem, settings: &PhysicalSettings) -> R
     Ok(finished(problem, settings, &assembled, &solved))
 }
 
-/// The interior point, and where it stalls short of the tolerance (2 of 1,000 problems with a prior against data of a million times its weight) the better of both routes by certificate.
+/// The interior point, and where it stalls short of the tolerance (2 of 1,000 problems with a prior against data of a
+/// million times its weight) the better of both routes by certificate.
 fn interior_point_else_log_cholesky(
     program: &Program,
     start: &DVector<f64>,

@@ -1,15 +1,17 @@
 //! Route 1: a primal-dual path-following method on the 4 × 4 blocks.
 //!
-//! Every iterate is strictly inside the constraints. Newton's direction is that of Nesterov and Todd with Mehrotra's predictor and corrector (Mehrotra, SIAM J.
-//! Optimization 2 (1992) 575; Todd, Toh and Tütüncü, SIAM J. Optimization 8 (1998) 769), reduced to least squares in x:
+//! Every iterate is strictly inside the constraints. Newton's direction is that of Nesterov and Todd with Mehrotra's
+//! predictor and corrector (Mehrotra, SIAM J. Optimization 2 (1992) 575; Todd, Toh and Tütüncü, SIAM J. Optimization 8
+//! (1998) 769), reduced to least squares in x:
 //!
 //! ```text
 //!     minimise ½‖A Δx − (b − A x)‖² + g·Δx + Σ ½‖R⁻¹ mat(M Δx) R⁻ᵀ − (D + Λ)‖² + Σ ½ (√(z/s) a·Δx − (t/s + z)/√(z/s))²
 //! ```
 //!
-//! A body is seen in the frame of its own factor (`ΔS = L mat(u) Lᵀ`), where its cone's rows are of the size of one, and the factors of S and Z are carried from step to step by
-//! triangular ones near one: eigenvalues of 1e-12 beside masses of 1e6 references keep their digits, which neither S nor Z could hold. An entropic prior is a pair that stays at its
-//! own weight γ from the beginning; it keeps no other barrier's place.
+//! A body is seen in the frame of its own factor (`ΔS = L mat(u) Lᵀ`), where its cone's rows are of the size of one,
+//! and the factors of S and Z are carried from step to step by triangular ones near one: eigenvalues of 1e-12 beside
+//! masses of 1e6 references keep their digits, which neither S nor Z could hold. An entropic prior is a pair that stays
+//! at its own weight γ from the beginning; it keeps no other barrier's place.
 
 use super::cone::Scaling;
 use super::conic::{Block, BlockMap, Certificate, Multipliers, Program, Slacks};
@@ -41,15 +43,16 @@ pub(super) struct Solved {
 /// How much of the way to the boundary a step may go.
 const FRACTION_TO_BOUNDARY: f64 = 0.99;
 
-/// No step may leave a product of slack and multiplier below this share of their mean (an entropic block's: of its weight), if the step before did not: near the boundary the next
-/// one would be short.
+/// No step may leave a product of slack and multiplier below this share of their mean (an entropic block's: of its
+/// weight), if the step before did not: near the boundary the next one would be short.
 const WORST_BALANCE: f64 = 0.02;
 
 /// Below this share the next step does nothing but balance.
 const CENTRE_BELOW: f64 = 0.1;
 
-/// The relative gap at which multipliers must be in balance with the gradient before μ falls further. Bodies that data drive far from their references grow by a factor with every
-/// step while μ is large, and crawl once it is small: what is left of the start's imbalance holds them back like a weight on their trace.
+/// The relative gap at which multipliers must be in balance with the gradient before μ falls further. Bodies that data
+/// drive far from their references grow by a factor with every step while μ is large, and crawl once it is small: what
+/// is left of the start's imbalance holds them back like a weight on their trace.
 const HOLD_BELOW: f64 = 0.3;
 
 /// μ stops where the gap is this share of the tolerance.
@@ -194,8 +197,9 @@ impl State {
         Some(Solved { x: self.x.high.clone(), multipliers, certificate, iterations, ending })
     }
 
-    /// One step; gives whether there was one that double precision allows. Products out of balance are balanced first; then the multipliers are brought into balance with the
-    /// gradient while μ is still large; then predictor and corrector lower μ.
+    /// One step; gives whether there was one that double precision allows. Products out of balance are balanced first;
+    /// then the multipliers are brought into balance with the gradient while μ is still large; then predictor and
+    /// corrector lower μ.
     fn step(&mut self, program: &Program, tolerance: f64) -> Option<()> {
         let newton = Newton::new(program, self)?;
         let (mu, balance) = (newton.excess(None), self.balance(program));
@@ -246,7 +250,8 @@ impl State {
         Some(())
     }
 
-    /// The longest part of a direction after which no product of a pair falls too far behind the others: to where the boundary is near, the next step would be short.
+    /// The longest part of a direction after which no product of a pair falls too far behind the others: to where the
+    /// boundary is near, the next step would be short.
     fn followed(
         &self,
         program: &Program,
@@ -453,7 +458,8 @@ impl<'a> Newton<'a> {
         (blocks.sum::<f64>() + rows.sum::<f64>()) / degree
     }
 
-    /// What a direction is to do: `share` of the dual residual away, and products changed as `wanted` (scaled, `½ (Λ D + D Λ)` the new product) and `rows` say.
+    /// What a direction is to do: `share` of the dual residual away, and products changed as `wanted` (scaled, `½ (Λ D
+    /// + D Λ)` the new product) and `rows` say.
     fn right_side(&self, wanted: &[Matrix4<f64>], rows: &[f64], share: f64) -> RightSide {
         let mut local: Vec<DVector<f64>> = self.local_rest.iter().map(|rest| rest * share).collect();
         let mut wide = vec![&self.data_rest * share];
@@ -474,7 +480,8 @@ impl<'a> Newton<'a> {
         RightSide { local, wide, direct: &self.linear * -share }
     }
 
-    /// The dual residual as the frames see it: over √μ, how far it alone would drive a point beside the room that the barrier leaves.
+    /// The dual residual as the frames see it: over √μ, how far it alone would drive a point beside the room that the
+    /// barrier leaves.
     fn residual(&self) -> f64 {
         let now: Vec<Matrix4<f64>> =
             self.state.cones.iter().map(|cone| Matrix4::from_diagonal(&cone.scaling.lambda)).collect();

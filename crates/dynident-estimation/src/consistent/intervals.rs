@@ -1,4 +1,5 @@
-//! Intervals of standard parameters that respect what is possible: how far can a mass, a moment of inertia, a friction go before the data object, no body or law ever being impossible?
+//! Intervals of standard parameters that respect what is possible: how far can a mass, a moment of inertia, a friction
+//! go before the data object, no body or law ever being impossible?
 
 use super::description::{BaseMap, PhysicalProblem, expect, finite};
 use super::fit::{PhysicalFit, physical_fit};
@@ -13,9 +14,11 @@ use serde::{Deserialize, Serialize};
 pub struct IntervalSettings {
     /// Confidence level of each interval. Default 0.95.
     pub level: f64,
-    /// The solver, its margin and its prior. The prior only chooses among bodies that the data and the pull leave alike; its weight is far below that of a fit: 1e-5 by default.
+    /// The solver, its margin and its prior. The prior only chooses among bodies that the data and the pull leave
+    /// alike; its weight is far below that of a fit: 1e-5 by default.
     pub physical: PhysicalSettings,
-    /// An end counts as open beyond this many times the size of the reference (the body's own moments, a scalar's `scale`). Default 100.
+    /// An end counts as open beyond this many times the size of the reference (the body's own moments, a scalar's
+    /// `scale`). Default 100.
     pub open_beyond: f64,
     /// Most physical fits for one end. Default 20; three or four are usual.
     pub max_fits: usize,
@@ -32,7 +35,8 @@ impl IntervalSettings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// [`PhysicalError::Setting`] for a level outside 0.5 to 0.9999, a size below 10, fewer than three fits, or as [`PhysicalSettings::validate`].
+    /// [`PhysicalError::Setting`] for a level outside 0.5 to 0.9999, a size below 10, fewer than three fits, or as
+    /// [`PhysicalSettings::validate`].
     pub fn validate(&self) -> Result<(), PhysicalError> {
         self.physical.validate()?;
         let error = |setting, value, mend| Err(PhysicalError::Setting { setting, value, mend });
@@ -55,7 +59,8 @@ impl IntervalSettings {
 pub enum IntervalEnd {
     /// Beyond it the data are fitted too badly.
     Data,
-    /// Beyond it nothing is possible that the data allow: the body's cone or a limit stops it before the data's cost reaches its threshold.
+    /// Beyond it nothing is possible that the data allow: the body's cone or a limit stops it before the data's cost
+    /// reaches its threshold.
     Constraint,
     /// Neither holds it: the value can be as large as one likes.
     Open,
@@ -82,10 +87,12 @@ pub struct PossibleInterval {
 ///     { p : min over possible π with π_i = p of ½‖R₁ B π − ρ₁‖²  ≤  C_min + ½ t² κ_i }
 /// ```
 ///
-/// C_min belongs to the best possible set, t is Student's quantile, and κ_i is how much larger than for white residuals the variance of what the data say in the
-/// direction of π_i is, `κ_i = gᵀΣg / gᵀ(R₁ᵀR₁)⁻¹g`, from the covariance Σ of the base parameters that is thought honest. Without active constraints this is
-/// the usual interval `π̂_i ± t σ_i`; an end that only physics holds is said to be so, and one that nothing holds is open. Profile likelihood: Venzon and Moolgavkar,
-/// Applied Statistics 37 (1988) 87; here every profile is a convex problem, solved by pulling the parameter with a spring and moving the spring's other end.
+/// C_min belongs to the best possible set, t is Student's quantile, and κ_i is how much larger than for white residuals
+/// the variance of what the data say in the direction of π_i is, `κ_i = gᵀΣg / gᵀ(R₁ᵀR₁)⁻¹g`, from the covariance Σ of
+/// the base parameters that is thought honest. Without active constraints this is the usual interval `π̂_i ± t σ_i`; an
+/// end that only physics holds is said to be so, and one that nothing holds is open. Profile likelihood: Venzon and
+/// Moolgavkar, Applied Statistics 37 (1988) 87; here every profile is a convex problem, solved by pulling the parameter
+/// with a spring and moving the spring's other end.
 #[derive(Clone, Debug)]
 pub struct PossibleIntervals {
     problem: PhysicalProblem,
@@ -101,10 +108,12 @@ pub struct PossibleIntervals {
 }
 
 impl PossibleIntervals {
-    /// The best possible set, from which intervals are then measured. `covariance` of the base parameters, shape (base, base), replaces that of white residuals; `degrees_of_freedom` are those of Student's distribution.
+    /// The best possible set, from which intervals are then measured. `covariance` of the base parameters, shape (base,
+    /// base), replaces that of white residuals; `degrees_of_freedom` are those of Student's distribution.
     ///
     /// # Errors
-    /// [`PhysicalError::Setting`], [`PhysicalError::Mismatch`], [`PhysicalError::NotFinite`], and those of [`physical_fit`].
+    /// [`PhysicalError::Setting`], [`PhysicalError::Mismatch`], [`PhysicalError::NotFinite`], and those of
+    /// [`physical_fit`].
     pub fn new(
         problem: &PhysicalProblem,
         covariance: Option<&DMatrix<f64>>,
@@ -152,7 +161,8 @@ impl PossibleIntervals {
         &self.best
     }
 
-    /// The interval of standard parameter `index` (ten for each body, then the scalars). A parameter of a known body has no width.
+    /// The interval of standard parameter `index` (ten for each body, then the scalars). A parameter of a known body
+    /// has no width.
     ///
     /// # Errors
     /// [`PhysicalError::Mismatch`] if there is no such parameter, and those of [`physical_fit`].
@@ -175,12 +185,13 @@ impl PossibleIntervals {
         Ok(PossibleInterval { value, lower, upper, held_by: [below, above] })
     }
 
-    /// One end. The parameter is pulled by a spring whose other end moves out until the data's cost has risen by the threshold: √cost rises with the spring's
-    /// end, in proportion as long as no constraint joins in.
+    /// One end. The parameter is pulled by a spring whose other end moves out until the data's cost has risen by the
+    /// threshold: √cost rises with the spring's end, in proportion as long as no constraint joins in.
     fn end(&self, index: usize, side: f64) -> Result<(Option<f64>, IntervalEnd), PhysicalError> {
         let (value, size) = (self.best.parameters[index], self.sizes[index]);
         let far = self.settings.open_beyond * size;
-        // Where data say little the spring is as soft as the reference is large, so that no fit starts far outside of what is possible.
+        // Where data say little the spring is as soft as the reference is large, so that no fit starts far outside of
+        // what is possible.
         let softness = self.deviations[index].clamp(1.0e-9 * size, size);
         let guess = self.quantile * self.mean_inflation.sqrt();
         // Unconstrained, a parameter with this deviation gives way by half of it.
@@ -233,7 +244,8 @@ impl PossibleIntervals {
         Ok((Some(parameter), IntervalEnd::Unsettled))
     }
 
-    /// The parameter and the shift of the base parameters from the best set, when a spring pulls; none when the solver did not reach an optimum.
+    /// The parameter and the shift of the base parameters from the best set, when a spring pulls; none when the solver
+    /// did not reach an optimum.
     fn pulled(&self, index: usize, stiffness: f64, target: f64) -> Result<Option<(f64, DVector<f64>)>, PhysicalError> {
         let Self { problem, best, .. } = self;
         let (base, rows) = (problem.base.matrix(), problem.triangle.nrows());
@@ -296,7 +308,8 @@ fn between(below: Point, above: Point, wanted: f64, of: impl Fn(&Point) -> f64) 
     of(&below) + share * (of(&above) - of(&below))
 }
 
-/// What is ordinary for each standard parameter: the reference's mass, its mass times its radius of gyration, its moment; a scalar's scale.
+/// What is ordinary for each standard parameter: the reference's mass, its mass times its radius of gyration, its
+/// moment; a scalar's scale.
 fn sizes(problem: &PhysicalProblem) -> Vec<f64> {
     let mut sizes = Vec::new();
     for body in &problem.bodies {
@@ -307,7 +320,8 @@ fn sizes(problem: &PhysicalProblem) -> Vec<f64> {
     sizes
 }
 
-/// Mean of the base parameters' variances over those of white residuals; one where the data leave a base parameter without a white variance.
+/// Mean of the base parameters' variances over those of white residuals; one where the data leave a base parameter
+/// without a white variance.
 fn mean_inflation(covariance: &DMatrix<f64>, information: &DMatrix<f64>) -> f64 {
     let Some(white) = information.clone().cholesky().map(|factor| factor.inverse()) else { return 1.0 };
     let ratios: Vec<f64> = (0..white.nrows())
@@ -387,7 +401,8 @@ mod tests {
         assert!((mass.upper.unwrap() - (2.0 + T * 0.01)).abs() < 0.02 * T * 0.01, "{mass:?}");
     }
 
-    /// Data that say −0.1 ± 0.1 of a friction: the best possible one is zero, and the profile above it is ½((p + 0.1)/0.1)² − ½.
+    /// Data that say −0.1 ± 0.1 of a friction: the best possible one is zero, and the profile above it is ½((p +
+    /// 0.1)/0.1)² − ½.
     #[test]
     fn friction_that_the_data_want_negative() {
         let mut measured = all(0.01);
@@ -399,22 +414,25 @@ mod tests {
         assert!((interval.upper.unwrap() - upper).abs() < 0.02 * upper, "{interval:?}");
     }
 
-    /// Mass and first moment measured, inertia not at all: the parallel axis theorem holds it from below, nothing from above.
+    /// Mass and first moment measured, inertia not at all: the parallel axis theorem holds it from below, nothing from
+    /// above.
     #[test]
     fn an_unmeasured_moment_is_held_by_what_is_possible() {
         let measured = [(0, 2.0, 1e-4), (1, 0.0, 1e-4), (2, 0.6, 1e-4), (3, 0.0, 1e-4), (10, 0.5, 0.1)];
         let found = intervals(&measured, None);
         let interval = found.of(4).unwrap();
         assert_eq!(interval.held_by, [IntervalEnd::Constraint, IntervalEnd::Open], "{interval:?}");
-        // Ixx ≥ (m ry)²/m = 0.18; mass and moment give way by their own errors, of which Ixx has √((0.6 · 1e-4)² + (0.09 · 1e-4)²). The margin of 1e-4 reference
-        // bodies lies above it, and an end is as exact as a thousandth of the half width: 2e-4 in all.
+        // Ixx ≥ (m ry)²/m = 0.18; mass and moment give way by their own errors, of which Ixx has √((0.6 · 1e-4)² +
+        // (0.09 · 1e-4)²). The margin of 1e-4 reference bodies lies above it, and an end is as exact as a thousandth of
+        // the half width: 2e-4 in all.
         let expected = 0.18 - T * 6.07e-5;
         assert!((interval.lower.unwrap() - expected).abs() < 2e-4, "{interval:?}");
         // A product of inertia nobody measured is open on both sides.
         assert_eq!(found.of(5).unwrap().held_by, [IntervalEnd::Open; 2]);
     }
 
-    /// Only Ixx measured: of a body with Ixx = Σyy + Σzz, |Σyz| is at most half of it, and the sums are no less than the margin; what involves x is open.
+    /// Only Ixx measured: of a body with Ixx = Σyy + Σzz, |Σyz| is at most half of it, and the sums are no less than
+    /// the margin; what involves x is open.
     #[test]
     fn one_moment_holds_what_it_contains() {
         let found = intervals(&[(4, 0.02, 1e-6), (10, 0.5, 0.1)], None);

@@ -9,14 +9,17 @@
 //!             [   0    0    0    1 ]
 //! ```
 //!
-//! (Rucker and Wensing, RA-L 7 (2022) 2771, eq. 19), so that any ten numbers are a possible body. Where the best body lies on the cone's boundary the bare fit runs
-//! away (d → −∞) and never ends. Here `−μ ln det S` keeps the optimum of every stage finite, and μ falls until the duality gap `μ ν` is below the tolerance. The
-//! coordinates map all numbers one to one onto the cone's interior, so that a stage has one stationary point only: the optimum.
+//! (Rucker and Wensing, RA-L 7 (2022) 2771, eq. 19), so that any ten numbers are a possible body. Where the best body
+//! lies on the cone's boundary the bare fit runs away (d → −∞) and never ends. Here `−μ ln det S` keeps the optimum of
+//! every stage finite, and μ falls until the duality gap `μ ν` is below the tolerance. The coordinates map all numbers
+//! one to one onto the cone's interior, so that a stage has one stationary point only: the optimum.
 //!
-//! A step is the ten numbers of a second such matrix V that multiplies U from the right: upper triangular matrices are a group, and seen from U every body is the unit
-//! matrix, so that the barrier's Hessian is constant and small eigenvalues keep all their digits. The rest of the Hessian is `Jᵀ H J`: what is left out is multiplied by
-//! the gradient in x, which vanishes at the optimum, so steps become Newton's. Stiff data make curved valleys of straight ones; a long step may therefore also follow
-//! the straight line of S, `V Vᵀ = 1 + U⁻¹ ΔS U⁻ᵀ`, where the theory of self-concordant barriers promises progress (Boyd and Vandenberghe 9.6.4).
+//! A step is the ten numbers of a second such matrix V that multiplies U from the right: upper triangular matrices are
+//! a group, and seen from U every body is the unit matrix, so that the barrier's Hessian is constant and small
+//! eigenvalues keep all their digits. The rest of the Hessian is `Jᵀ H J`: what is left out is multiplied by the
+//! gradient in x, which vanishes at the optimum, so steps become Newton's. Stiff data make curved valleys of straight
+//! ones; a long step may therefore also follow the straight line of S, `V Vᵀ = 1 + U⁻¹ ΔS U⁻ᵀ`, where the theory of
+//! self-concordant barriers promises progress (Boyd and Vandenberghe 9.6.4).
 
 use super::cone::{congruence, inverse, log_determinant, upper_factor};
 use super::conic::{BlockMap, Certificate, Multipliers, Program, Slacks};
@@ -26,7 +29,8 @@ use super::precise::Precise;
 use super::stacked::{LocalRows, RightSide, Rows, StackedSystem};
 use nalgebra::{DMatrix, DVector, Matrix4};
 
-/// μ falls by a factor from stage to stage: by this one at first, then by less after a stage that took many steps and by more after a short one.
+/// μ falls by a factor from stage to stage: by this one at first, then by less after a stage that took many steps and
+/// by more after a short one.
 const REDUCTION: f64 = 0.1;
 const SLOWEST_REDUCTION: f64 = 0.7;
 const FASTEST_REDUCTION: f64 = 0.02;
@@ -40,7 +44,8 @@ const PATIENCE: usize = 25;
 /// One body: its first variable and the constant part of its block.
 type Body = (usize, Vector10);
 
-/// Solves a program all of whose plain blocks have variables of their own; none when `start` is not strictly inside or a block is shared.
+/// Solves a program all of whose plain blocks have variables of their own; none when `start` is not strictly inside or
+/// a block is shared.
 pub(super) fn log_cholesky(
     program: &Program,
     start: &DVector<f64>,
@@ -95,7 +100,8 @@ pub(super) fn log_cholesky(
                 _ => reduction.sqrt().min(SLOWEST_REDUCTION),
             };
             stage = 0;
-            // A pull that fell with μ would hold bodies back that must grow by powers of ten, and let them go when steps are short: it goes while μ is large.
+            // A pull that fell with μ would hold bodies back that must grow by powers of ten, and let them go when
+            // steps are short: it goes while μ is large.
             if pull > 0.0 && mu * degree <= RELEASE * scale {
                 let held = pull * point.factors.iter().map(Matrix4::norm_squared).sum::<f64>();
                 pull = if held <= 0.01 * mu { 0.0 } else { 0.1 * pull };
@@ -150,8 +156,8 @@ impl Point {
         Some((multipliers, certificate))
     }
 
-    /// `f − μ Σ ln det S − μ Σ ln s + pull Σ tr S`, or none outside. The pull keeps early stages, whose μ is large, near the reference in directions that
-    /// nothing else holds.
+    /// `f − μ Σ ln det S − μ Σ ln s + pull Σ tr S`, or none outside. The pull keeps early stages, whose μ is large,
+    /// near the reference in directions that nothing else holds.
     fn barrier(&self, program: &Program, mu: f64, pull: f64) -> Option<f64> {
         let mut sum = program.smooth_objective(&self.x);
         for block in program.blocks.iter().filter(|block| block.entropy > 0.0) {
@@ -201,7 +207,8 @@ impl Point {
             place.axpy(-pull, &vector_of(&Matrix4::identity()), 1.0);
         }
         let mut direct = rows.framed_gradient(&outside);
-        // The bodies' own barrier is exact in these coordinates. Of −ln det V Vᵀ only the logarithms on the diagonal count, and tr(G²) is 4 for them and 2 for the others.
+        // The bodies' own barrier is exact in these coordinates. Of −ln det V Vᵀ only the logarithms on the diagonal
+        // count, and tr(G²) is 4 for them and 2 for the others.
         for (first, _) in bodies {
             let own = |k: usize| f64::from(PAIRS[k].0 == PAIRS[k].1);
             let matrix = DMatrix::from_fn(10, 10, |i, j| if i == j { ((2.0 + 2.0 * own(i)) * mu).sqrt() } else { 0.0 });

@@ -1,5 +1,5 @@
-//! **Which bodies fit the data?** Inertial parameters that real bodies could have: every pseudo-inertia positive definite,
-//! friction and drive inertia not negative.
+//! **Which bodies fit the data?** Inertial parameters that real bodies could have: every pseudo-inertia positive
+//! definite, friction and drive inertia not negative.
 //!
 //! Data determine base parameters; a [`PhysicalProblem`] says which sums of the bodies' own parameters those are, and
 //! what is known of the bodies beside (mass, a box for the centre of mass, an ellipsoid around it). [`physical_fit`]

@@ -1,7 +1,8 @@
 //! Variables with twice the digits: an unevaluated sum of two vectors.
 //!
-//! Data rows of 1e4 times variables of 1e7 leave residuals of one: with the sixteen digits of a double the gradient could not be made smaller than rounding leaves it, and with it the
-//! certificate. Sums and products without loss: Ogita, Rump and Oishi, SIAM J. Sci. Comput. 26 (2005) 1955, algorithms 3.1, 3.3 and 5.3.
+//! Data rows of 1e4 times variables of 1e7 leave residuals of one: with the sixteen digits of a double the gradient
+//! could not be made smaller than rounding leaves it, and with it the certificate. Sums and products without loss:
+//! Ogita, Rump and Oishi, SIAM J. Sci. Comput. 26 (2005) 1955, algorithms 3.1, 3.3 and 5.3.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -8,8 +8,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PhysicalRoute {
-    /// Primal-dual interior point on the pseudo-inertias: fast, and as exact on the cone's boundary as inside. Where doubles let it come no nearer to the optimum than the tolerance, the other route is
-    /// tried as well and the better one counts.
+    /// Primal-dual interior point on the pseudo-inertias: fast, and as exact on the cone's boundary as inside. Where
+    /// doubles let it come no nearer to the optimum than the tolerance, the other route is tried as well and the better
+    /// one counts.
     #[default]
     InteriorPoint,
     /// Gauss-Newton in log-Cholesky coordinates with a falling barrier: an independent check.
@@ -24,10 +25,12 @@ pub struct PhysicalSettings {
     pub route: PhysicalRoute,
     /// Distance from the prior bodies. Default `entropic`.
     pub prior: PhysicalPrior,
-    /// γ: what one unit of that distance costs, against half the squared distance from the data's own optimum in standard deviations. Default 0.01: the data's
-    /// fit is given up by at most 0.01 times the distance, which no test could notice, while directions that no data reach get the prior's values.
+    /// γ: what one unit of that distance costs, against half the squared distance from the data's own optimum in
+    /// standard deviations. Default 0.01: the data's fit is given up by at most 0.01 times the distance, which no test
+    /// could notice, while directions that no data reach get the prior's values.
     pub prior_weight: f64,
-    /// ε of `P ⪰ ε P0` for every body. Default 1e-4: mass spread over a hundredth of the reference's size in every direction, which any real link has.
+    /// ε of `P ⪰ ε P0` for every body. Default 1e-4: mass spread over a hundredth of the reference's size in every
+    /// direction, which any real link has.
     pub margin: f64,
     /// Largest certificate (stationarity and duality gap, both relative) at which a fit counts as solved. Default 5e-8.
     pub tolerance: f64,
@@ -52,7 +55,8 @@ impl PhysicalSettings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// [`PhysicalError::Setting`] for a prior weight outside 1e-9 to 1e9, a margin outside 1e-9 to 0.5, a tolerance outside 1e-10 to 1e-2, or no iterations.
+    /// [`PhysicalError::Setting`] for a prior weight outside 1e-9 to 1e9, a margin outside 1e-9 to 0.5, a tolerance
+    /// outside 1e-10 to 1e-2, or no iterations.
     pub fn validate(&self) -> Result<(), PhysicalError> {
         let within = |setting, value: f64, least: f64, greatest: f64, mend| {
             if (least..=greatest).contains(&value) {

@@ -1,11 +1,14 @@
 //! Newton systems as least squares: stacked square-root rows under orthogonal reflections, never normal equations.
 //!
-//! A direction of a barrier method solves `GᵀG u = Gᵀh − g`, where G stacks the rows of the data, of the priors, and of every constraint in its own scaling. Formed as a matrix, GᵀG
-//! loses what stands a factor 1e-16 below its largest entry, and near the cone's boundary the unit rows of a constraint stand beside data rows of 1e10. G itself loses
-//! the square root of that only. Each body's ten variables are seen in a frame (`Δx = J u`) in which the barrier's rows are the unit matrix; they need no reflection, and the
-//! block triangle that they make with the other rows of the same body is where the reflections of the data rows begin.
+//! A direction of a barrier method solves `GᵀG u = Gᵀh − g`, where G stacks the rows of the data, of the priors, and of
+//! every constraint in its own scaling. Formed as a matrix, GᵀG loses what stands a factor 1e-16 below its largest
+//! entry, and near the cone's boundary the unit rows of a constraint stand beside data rows of 1e10. G itself loses the
+//! square root of that only. Each body's ten variables are seen in a frame (`Δx = J u`) in which the barrier's rows are
+//! the unit matrix; they need no reflection, and the block triangle that they make with the other rows of the same body
+//! is where the reflections of the data rows begin.
 //!
-//! Solved by the triangle and refined against the rows themselves (corrected seminormal equations: Björck, Linear Algebra Appl. 88 (1987) 31).
+//! Solved by the triangle and refined against the rows themselves (corrected seminormal equations: Björck, Linear
+//! Algebra Appl. 88 (1987) 31).
 
 use super::coordinates::Matrix10;
 use crate::factor::{CHUNK_ROWS, Chunk, TriangleOnPanel, row_start};
@@ -159,8 +162,8 @@ impl Rows {
 const LEAST_PIVOT: f64 = 1.0e-15;
 
 impl StackedSystem {
-    /// Reduces the rows over `size` variables. Where rounding leaves a variable without any row of its own, the least row that helps is added. None when that is not enough, or
-    /// an entry is not finite.
+    /// Reduces the rows over `size` variables. Where rounding leaves a variable without any row of its own, the least
+    /// row that helps is added. None when that is not enough, or an entry is not finite.
     pub(super) fn new(size: usize, rows: Rows) -> Option<Self> {
         let mut squares = vec![0.0; size];
         for part in &rows.local {
@@ -315,7 +318,8 @@ mod tests {
 
     #[test]
     fn solves_rows_that_normal_equations_would_lose() {
-        // Data rows 1e9 times the unit rows, and of half the rank: the weak directions are the unit rows' alone, and 1e-16 · 1e18 is more than they have.
+        // Data rows 1e9 times the unit rows, and of half the rank: the weak directions are the unit rows' alone, and
+        // 1e-16 · 1e18 is more than they have.
         let (size, scale) = (14, 1.0e9);
         let frame = Matrix10::identity();
         let wide = matrix(6, size, 0.4) * scale;

@@ -1,14 +1,18 @@
-//! Cross-validation between models that share most of their columns, from factors alone: which of many columns should one joint have?
+//! Cross-validation between models that share most of their columns, from factors alone: which of many columns should
+//! one joint have?
 //!
-//! The log's time segments are cut into K blocks. With block k left out, all other rows of all joints are reduced to one triangle whose last columns are the candidates':
+//! The log's time segments are cut into K blocks. With block k left out, all other rows of all joints are reduced to
+//! one triangle whose last columns are the candidates':
 //!
 //! ```text
 //!     [ R_cc  R_cv  r_c ]   c: columns that every candidate model has, v: candidate columns
 //!     [  0    R_vv  r_v ]
 //! ```
 //!
-//! A candidate model takes some of v: its coefficients follow from `R_vv` and `r_v` alone (a problem of a few unknowns), the others by substitution, and the error on block k from that
-//! block's own triangle. So the rows are reduced once per block, whatever the number of candidates (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413).
+//! A candidate model takes some of v: its coefficients follow from `R_vv` and `r_v` alone (a problem of a few
+//! unknowns), the others by substitution, and the error on block k from that block's own triangle. So the rows are
+//! reduced once per block, whatever the number of candidates (variable projection: Golub and Pereyra, SIAM J. Numer.
+//! Anal. 10 (1973) 413).
 
 use super::nonnegative::nonnegative_least_squares;
 use crate::error::EstimationError;
@@ -32,7 +36,8 @@ pub struct CrossValidation<'a> {
 pub struct JointFolds {
     common: Vec<usize>,
     variable: Vec<usize>,
-    /// Per block and, last, with no block left out: the triangle; and the joint's rows of the block (of all blocks), in the order common, variable.
+    /// Per block and, last, with no block left out: the triangle; and the joint's rows of the block (of all blocks), in
+    /// the order common, variable.
     folds: Vec<(TriangularFactor, TriangularFactor)>,
 }
 
@@ -53,7 +58,8 @@ impl FoldErrors {
         (self.squares.iter().sum::<f64>() / self.rows.iter().sum::<usize>().max(1) as f64).sqrt()
     }
 
-    /// Mean square error minus that of `other`, and the standard error of this difference as it varies from block to block: `s/√K`, with blocks weighted by their rows.
+    /// Mean square error minus that of `other`, and the standard error of this difference as it varies from block to
+    /// block: `s/√K`, with blocks weighted by their rows.
     pub fn excess_over(&self, other: &Self) -> [f64; 2] {
         let count = self.rows.len() as f64;
         let mean_rows = self.rows.iter().sum::<usize>() as f64 / count;
@@ -65,10 +71,12 @@ impl FoldErrors {
 }
 
 impl<'a> CrossValidation<'a> {
-    /// Cuts the problem's rows into `folds` blocks of consecutive segments, about equally many rows each, over all logs in their order.
+    /// Cuts the problem's rows into `folds` blocks of consecutive segments, about equally many rows each, over all logs
+    /// in their order.
     ///
     /// # Errors
-    /// [`EstimationError::Setting`] for fewer than two blocks; [`EstimationError::TooFewSegments`] when there are fewer segments than blocks; [`EstimationError::Empty`].
+    /// [`EstimationError::Setting`] for fewer than two blocks; [`EstimationError::TooFewSegments`] when there are fewer
+    /// segments than blocks; [`EstimationError::Empty`].
     pub fn new(problem: &'a LinearProblem, folds: usize) -> Result<Self, EstimationError> {
         if folds < 2 {
             let mend = "give at least 2 blocks";
@@ -102,12 +110,13 @@ impl<'a> CrossValidation<'a> {
         Ok(Self { problem, parts, folds })
     }
 
-    /// Prepares the choice of joint `joint` among the columns `variable`, which no other joint sees. All joints see those of the columns `common` that are theirs; rows of joint j
-    /// count with `weights[j]`.
+    /// Prepares the choice of joint `joint` among the columns `variable`, which no other joint sees. All joints see
+    /// those of the columns `common` that are theirs; rows of joint j count with `weights[j]`.
     ///
     /// # Errors
-    /// [`EstimationError::Mismatch`] for numbers out of range or another number of weights; [`EstimationError::Setting`] for an impossible weight;
-    /// [`EstimationError::TooFewRows`] when a block leaves fewer rows of the joint, or all blocks but one of all joints, than could tell the columns apart.
+    /// [`EstimationError::Mismatch`] for numbers out of range or another number of weights;
+    /// [`EstimationError::Setting`] for an impossible weight; [`EstimationError::TooFewRows`] when a block leaves fewer
+    /// rows of the joint, or all blocks but one of all joints, than could tell the columns apart.
     pub fn joint(
         &self,
         joint: usize,
@@ -200,8 +209,8 @@ impl JointFolds {
         &self.variable
     }
 
-    /// The error of the model that has the candidate columns `chosen` (places in [`variable`](Self::variable)) beside the common ones; those with `nonnegative` set are
-    /// constrained to coefficients of zero or more.
+    /// The error of the model that has the candidate columns `chosen` (places in [`variable`](Self::variable)) beside
+    /// the common ones; those with `nonnegative` set are constrained to coefficients of zero or more.
     ///
     /// # Panics
     /// If the slices' lengths differ or a place is out of range.
@@ -228,7 +237,8 @@ impl JointFolds {
         nonnegative_least_squares(&columns.tr_mul(&columns), &columns.tr_mul(&torque), nonnegative)
     }
 
-    /// All parameters: the candidate's as given, the others by substitution. A common column that the rows do not tell from earlier ones is zero.
+    /// All parameters: the candidate's as given, the others by substitution. A common column that the rows do not tell
+    /// from earlier ones is zero.
     fn theta(&self, triangle: &TriangularFactor, chosen: &[usize], coefficients: &DVector<f64>) -> Vec<f64> {
         let (start, end) = (self.common.len(), triangle.columns());
         let norms = triangle.column_norms();

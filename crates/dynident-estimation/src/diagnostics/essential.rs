@@ -9,9 +9,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct EssentialSettings {
-    /// Dropping ends when the largest relative standard deviation is below so many times the smallest. Default 30, as in published fits of the TX40; 10 is strict.
+    /// Dropping ends when the largest relative standard deviation is below so many times the smallest. Default 30, as
+    /// in published fits of the TX40; 10 is strict.
     pub ratio: f64,
-    /// Dropping ends before the residual grows by more than noise explains: the F-test's probability of such growth falls below this. Default 0.05.
+    /// Dropping ends before the residual grows by more than noise explains: the F-test's probability of such growth
+    /// falls below this. Default 0.05.
     pub significance: f64,
 }
 
@@ -80,19 +82,24 @@ pub struct EssentialReport {
     pub refused: Option<DroppedParameter>,
 }
 
-/// The estimate with all but the essential parameters held at zero (Pham and Gautier, "Essential parameters of robots", CDC 1991).
+/// The estimate with all but the essential parameters held at zero (Pham and Gautier, "Essential parameters of robots",
+/// CDC 1991).
 ///
-/// Again and again the parameter with the largest relative standard deviation is held at zero, until that is below `ratio` times the smallest, or until the F-test speaks against it:
+/// Again and again the parameter with the largest relative standard deviation is held at zero, until that is below
+/// `ratio` times the smallest, or until the F-test speaks against it:
 ///
 /// ```text
 ///     θ_e' = θ_e − V_ed V_dd⁻¹ θ_d,   F = θ_dᵀ V_dd⁻¹ θ_d / d  ~  F(d, N − p)
 /// ```
 ///
-/// with V the covariance under white noise, d the number dropped. Both are what a new fit with the same weights and fewer columns gives. With coloured residuals F is too large, and fewer
-/// parameters are dropped than could be. The covariance of the rest is the chosen one, carried through the same map; it does not know that the choice was made on the same data.
+/// with V the covariance under white noise, d the number dropped. Both are what a new fit with the same weights and
+/// fewer columns gives. With coloured residuals F is too large, and fewer parameters are dropped than could be. The
+/// covariance of the rest is the chosen one, carried through the same map; it does not know that the choice was made on
+/// the same data.
 ///
 /// # Errors
 /// [`EstimationError::Setting`].
+#[doc(alias("backward elimination", "f-test"))]
 pub fn essential(
     estimate: &Estimate,
     settings: &EssentialSettings,

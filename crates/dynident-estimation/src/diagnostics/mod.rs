@@ -2,8 +2,8 @@
 //!
 //! [`Validation`] sums up the errors of predicted torque; [`CrossValidation`] leaves out one part of the logs after the
 //! other to compare sets of columns. [`essential`] drops parameters that the data do not support, one by one.
-//! [`Whiteness`], [`Normality`] and [`Regimes`] are fed sample after sample and say whether residuals are white, normal,
-//! or larger at reversals; their memory does not grow.
+//! [`Whiteness`], [`Normality`] and [`Regimes`] are fed sample after sample and say whether residuals are white,
+//! normal, or larger at reversals; their memory does not grow.
 
 mod cross_validation;
 mod essential;

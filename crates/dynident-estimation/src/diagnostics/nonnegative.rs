@@ -4,8 +4,9 @@ use nalgebra::{DMatrix, DVector};
 
 /// `argmin ‖A x − b‖²` with `x_k ≥ 0` where `nonnegative[k]`, from `gram = AᵀA` and `right = Aᵀb`.
 ///
-/// The active-set method of Lawson and Hanson, *Solving Least Squares Problems* (1974), ch. 23, with the free unknowns never active. A column that others explain up to 1e-10 of
-/// its norm is left out (zero). Always ends: after `4 n + 10` changes of the set the last feasible point is returned.
+/// The active-set method of Lawson and Hanson, *Solving Least Squares Problems* (1974), ch. 23, with the free unknowns
+/// never active. A column that others explain up to 1e-10 of its norm is left out (zero). Always ends: after `4 n + 10`
+/// changes of the set the last feasible point is returned.
 pub(crate) fn nonnegative_least_squares(
     gram: &DMatrix<f64>,
     right: &DVector<f64>,
@@ -104,7 +105,8 @@ fn solved(gram: &DMatrix<f64>, right: &DVector<f64>, places: &[usize]) -> Option
 mod tests {
     use super::*;
 
-    /// The conditions of Karush, Kuhn and Tucker are necessary and sufficient here: an oracle that knows nothing of active sets.
+    /// The conditions of Karush, Kuhn and Tucker are necessary and sufficient here: an oracle that knows nothing of
+    /// active sets.
     #[test]
     fn random_problems_meet_the_optimality_conditions() {
         let mut state = 1_u64;

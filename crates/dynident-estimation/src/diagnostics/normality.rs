@@ -8,8 +8,10 @@ use serde::{Deserialize, Serialize};
 ///     JB = N/6 (S² + (K − 3)²/4) ~ χ²(2),   S = m₃ / m₂^(3/2),   K = m₄ / m₂²
 /// ```
 ///
-/// Heavy tails (K far above 3) are the usual finding on robots: friction at reversals, contacts, lost samples. The test assumes independent residuals; with coloured ones it rejects too often.
+/// Heavy tails (K far above 3) are the usual finding on robots: friction at reversals, contacts, lost samples. The test
+/// assumes independent residuals; with coloured ones it rejects too often.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[doc(alias("jarque-bera"))]
 pub struct Normality {
     count: f64,
     mean: f64,
@@ -34,7 +36,8 @@ pub struct NormalityReport {
 }
 
 impl Normality {
-    /// The next residual. Central moments are updated one by one, without cancellation: Pébay, Sandia report SAND2008-6212 (2008).
+    /// The next residual. Central moments are updated one by one, without cancellation: Pébay, Sandia report
+    /// SAND2008-6212 (2008).
     pub fn add(&mut self, residual: f64) {
         let before = self.count;
         self.count += 1.0;

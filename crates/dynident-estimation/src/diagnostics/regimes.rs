@@ -7,7 +7,8 @@ const STATIC: f64 = 0.005;
 /// Below this speed it counts as reversing, rad/s (m/s): friction's regime.
 const REVERSAL: f64 = 0.1;
 
-/// Sums of squared residuals by the joint's own speed: static (|q̇| < 0.005), reversal (up to 0.1), fast (from 0.1 rad/s on).
+/// Sums of squared residuals by the joint's own speed: static (|q̇| < 0.005), reversal (up to 0.1), fast (from 0.1
+/// rad/s on).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Regimes {
     sums: [(usize, f64); 3],

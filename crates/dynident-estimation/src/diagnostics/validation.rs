@@ -76,8 +76,8 @@ impl Validation {
     /// One sample: measured and predicted torque of every joint.
     ///
     /// # Errors
-    /// [`EstimationError::Mismatch`] unless both have one value per joint; [`EstimationError::Unusable`] for NaN or infinity (the column is
-    /// the joint). Nothing is counted then.
+    /// [`EstimationError::Mismatch`] unless both have one value per joint; [`EstimationError::Unusable`] for NaN or
+    /// infinity (the column is the joint). Nothing is counted then.
     pub fn add(&mut self, measured: &[f64], predicted: &[f64]) -> Result<(), EstimationError> {
         for (what, values) in [("measured torques", measured), ("predicted torques", predicted)] {
             if values.len() != self.sums.len() {

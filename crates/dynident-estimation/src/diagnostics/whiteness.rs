@@ -12,7 +12,8 @@ const LAGS: usize = 10;
 ///     Q = N (N + 2) Σ_{l=1}^{10} ρ_l² / (N − l),   ρ_l = Σ r_t r_{t−l} / Σ r_t²,   Q ~ χ²(10) for white residuals
 /// ```
 ///
-/// Residuals are taken as they are, not less their mean: an offset that the model does not have is an error as well. Parameters fitted to other data cost no degree of freedom.
+/// Residuals are taken as they are, not less their mean: an offset that the model does not have is an error as well.
+/// Parameters fitted to other data cost no degree of freedom.
 ///
 /// ```
 /// use dynident_estimation::Whiteness;
@@ -21,6 +22,7 @@ const LAGS: usize = 10;
 /// assert!(whiteness.report().unwrap().p_value < 1e-6);
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
+#[doc(alias("ljung-box"))]
 pub struct Whiteness {
     count: usize,
     recent: [f64; LAGS],
@@ -71,7 +73,8 @@ mod tests {
     use super::*;
     use dynident_model::sample::Random;
 
-    /// Of 400 white series the test at 5 % rejects 20 ± 4.4; four of these are 18. An AR(1) series of ρ = 0.5 is always found out.
+    /// Of 400 white series the test at 5 % rejects 20 ± 4.4; four of these are 18. An AR(1) series of ρ = 0.5 is always
+    /// found out.
     #[test]
     fn rejects_white_residuals_as_often_as_it_says() {
         let mut random = Random::new(7);

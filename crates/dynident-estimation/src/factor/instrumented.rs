@@ -1,14 +1,17 @@
-//! Rows that carry instruments: `[Z | W | τ]`, where Z are the same columns from a motion that is free of the noise in W.
+//! Rows that carry instruments: `[Z | W | τ]`, where Z are the same columns from a motion that is free of the noise in
+//! W.
 
 use super::problem::LinearProblem;
 use super::segmented::SegmentedFactor;
 use crate::error::EstimationError;
 use nalgebra::DMatrix;
 
-/// `τ_j = W_j θ + noise` with instruments `Z_j`, one column of Z for every column of W, held as factors of `[Z_j | W_j | τ_j]`.
+/// `τ_j = W_j θ + noise` with instruments `Z_j`, one column of Z for every column of W, held as factors of `[Z_j | W_j
+/// | τ_j]`.
 ///
-/// Z is the regressor of another account of the same motion: simulated with the current model, smoothed much more strongly, averaged over periods or
-/// taken from a repeated run. It must be correlated with W and not with the noise of W and τ.
+/// Z is the regressor of another account of the same motion: simulated with the current model, smoothed much more
+/// strongly, averaged over periods or taken from a repeated run. It must be correlated with W and not with the noise of
+/// W and τ.
 ///
 /// ```
 /// use dynident_estimation::{InstrumentedProblem, SegmentSettings, SegmentedFactor, instrumental_variables};
@@ -39,8 +42,8 @@ impl InstrumentedProblem {
         Self { fallback: vec![0.0; columns.len()], names: columns, rows: LinearProblem::new(both, joints) }
     }
 
-    /// Adds the rows of joint number `joint` in the log called `log`. The factor has the instruments first, one for each of `columns`, then the
-    /// regressor's columns in the same order, then the torque.
+    /// Adds the rows of joint number `joint` in the log called `log`. The factor has the instruments first, one for
+    /// each of `columns`, then the regressor's columns in the same order, then the torque.
     ///
     /// # Errors
     /// As [`LinearProblem::add`]; the factor must have twice as many columns as `columns` names.
@@ -112,8 +115,8 @@ impl InstrumentedProblem {
         both
     }
 
-    /// A problem over other columns, made of the same rows: `combination` gives for an equation's local columns `[Z | W | τ]` the new rows'
-    /// coefficients, shape (local columns + 1, names + 1).
+    /// A problem over other columns, made of the same rows: `combination` gives for an equation's local columns `[Z | W
+    /// | τ]` the new rows' coefficients, shape (local columns + 1, names + 1).
     pub(crate) fn combined(
         &self,
         names: Vec<String>,

@@ -4,7 +4,8 @@
 //! joint in one log go into a [`SegmentedFactor`], which keeps at most K factors of consecutive time segments, so that
 //! a covariance can later ask how the segments differ. The factors of all joints and logs over one list of named
 //! columns make a [`LinearProblem`] (an [`InstrumentedProblem`] where instruments stand beside the regressor), with a
-//! [`Prior`] where there is one. [`RankSettings`] say when a column counts as excited, a [`RankReport`] what was decided.
+//! [`Prior`] where there is one. [`RankSettings`] say when a column counts as excited, a [`RankReport`] what was
+//! decided.
 
 mod instrumented;
 mod problem;

@@ -55,8 +55,8 @@ impl LinearProblem {
         Self { columns, joints, logs: Vec::new(), equations: Vec::new(), fallback, prior: None }
     }
 
-    /// Adds the rows of joint number `joint` in the log called `log`; `columns` gives for every column of the factor its number in
-    /// the problem. Rows of several joints of one log are added under the same name.
+    /// Adds the rows of joint number `joint` in the log called `log`; `columns` gives for every column of the factor
+    /// its number in the problem. Rows of several joints of one log are added under the same name.
     ///
     /// # Errors
     /// [`EstimationError::Mismatch`] for a joint out of range or a list of another length than the factor's columns;
@@ -95,10 +95,12 @@ impl LinearProblem {
         Ok(())
     }
 
-    /// Values at which columns are fixed that the data do not excite (zero unless said otherwise): the prior model's, say.
+    /// Values at which columns are fixed that the data do not excite (zero unless said otherwise): the prior model's,
+    /// say.
     ///
     /// # Errors
-    /// [`EstimationError::Mismatch`] for another number of values than columns, [`EstimationError::Setting`] for one that is not finite.
+    /// [`EstimationError::Mismatch`] for another number of values than columns, [`EstimationError::Setting`] for one
+    /// that is not finite.
     pub fn with_fallback(mut self, values: Vec<f64>) -> Result<Self, EstimationError> {
         expect("fallback values", self.columns.len(), values.len())?;
         finite("fallback value", &values)?;
@@ -106,8 +108,8 @@ impl LinearProblem {
         Ok(self)
     }
 
-    /// Adds a Gaussian prior with mean `mean` (one value per column) and square-root information `sqrt_information`, shape
-    /// (any, columns): rows `[S | S m]` with unit noise. A diagonal S holds 1/std of each parameter.
+    /// Adds a Gaussian prior with mean `mean` (one value per column) and square-root information `sqrt_information`,
+    /// shape (any, columns): rows `[S | S m]` with unit noise. A diagonal S holds 1/std of each parameter.
     ///
     /// # Errors
     /// As [`with_fallback`](Self::with_fallback).
@@ -170,12 +172,12 @@ impl LinearProblem {
         squares.into_iter().map(f64::sqrt).collect()
     }
 
-    /// One factor of all rows over all columns, those of joint j multiplied by `weights[j]` (1/σ_j for weighted least squares),
-    /// and the rows of the prior if there is one (with weight 1).
+    /// One factor of all rows over all columns, those of joint j multiplied by `weights[j]` (1/σ_j for weighted least
+    /// squares), and the rows of the prior if there is one (with weight 1).
     ///
     /// # Errors
-    /// [`EstimationError::Mismatch`] unless there is one weight per joint; [`EstimationError::Setting`] for one that is negative,
-    /// NaN or infinite.
+    /// [`EstimationError::Mismatch`] unless there is one weight per joint; [`EstimationError::Setting`] for one that is
+    /// negative, NaN or infinite.
     pub fn combined(&self, weights: &[f64]) -> Result<TriangularFactor, EstimationError> {
         self.stacked().combined(weights)
     }

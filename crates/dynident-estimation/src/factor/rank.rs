@@ -10,11 +10,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RankSettings {
-    /// A column is dependent when the part of it that no earlier column explains is at most this share of its norm. Default 1e-8:
-    /// far above rounding (1e-13 or so after scaling) and far below what any real motion that excites a parameter leaves.
+    /// A column is dependent when the part of it that no earlier column explains is at most this share of its norm.
+    /// Default 1e-8: far above rounding (1e-13 or so after scaling) and far below what any real motion that excites a
+    /// parameter leaves.
     pub tolerance: f64,
-    /// A column whose norm is at most this share of the largest column norm is taken for zero. Default 1e-12: only rounding
-    /// noise is that small, units of different parameters never differ so much.
+    /// A column whose norm is at most this share of the largest column norm is taken for zero. Default 1e-12: only
+    /// rounding noise is that small, units of different parameters never differ so much.
     pub negligible_column: f64,
 }
 
@@ -60,7 +61,8 @@ pub struct RankReport {
     pub columns: usize,
     /// Columns that are not excited by these data, and the values at which they were fixed.
     pub fixed: Vec<FixedColumn>,
-    /// Singular values of all columns after each was divided by its norm (a negligible column by the largest norm), descending.
+    /// Singular values of all columns after each was divided by its norm (a negligible column by the largest norm),
+    /// descending.
     pub singular_values: Vec<f64>,
     /// How many of them exceed `tolerance` times the largest: a cross-check of `rank` by another criterion.
     pub numerical_rank: usize,

@@ -1,9 +1,9 @@
 //! Householder reflections of a triangle stacked on a panel of rows: the hot loop of every fit.
 //!
-//! `[R; A] = Q·[R'; 0]` with R upper triangular (d×d) and A dense (m×d). Reflector k has the form `v = (ν e_k, a)` with `a` the
-//! k-th column of the panel as it then stands, so it touches one row of R and the panel, nothing else: 2·m·d² operations.
-//! Four reflectors are built, then applied together (compact WY form: Schreiber and Van Loan, SIAM J. Sci. Stat. Comput.
-//! 10 (1989) 53), two target columns at a time, so that each loaded number feeds several multiplications.
+//! `[R; A] = Q·[R'; 0]` with R upper triangular (d×d) and A dense (m×d). Reflector k has the form `v = (ν e_k, a)` with
+//! `a` the k-th column of the panel as it then stands, so it touches one row of R and the panel, nothing else: 2·m·d²
+//! operations. Four reflectors are built, then applied together (compact WY form: Schreiber and Van Loan, SIAM J. Sci.
+//! Stat. Comput. 10 (1989) 53), two target columns at a time, so that each loaded number feeds several multiplications.
 
 use dynident_lanes::{Kernel, Lane};
 
@@ -26,7 +26,8 @@ const REFLECTORS: usize = 4;
 /// around 1e-145, far below any rounding error of a measured quantity.
 const NEGLIGIBLE_SQUARE: f64 = 1.0e-290;
 
-/// Where row `row` of a packed upper triangle of size `size` begins; entry (row, column) follows `column - row` places on.
+/// Where row `row` of a packed upper triangle of size `size` begins; entry (row, column) follows `column - row` places
+/// on.
 pub(crate) const fn row_start(size: usize, row: usize) -> usize {
     // Row r holds size - r entries: the sum over the rows before it.
     row * (2 * size + 1 - row) / 2
@@ -66,8 +67,8 @@ impl Kernel for TriangleOnPanel<'_> {
     }
 }
 
-/// `V` reflectors `I - β v vᵀ` in the making. Their parts `ν` lie in different rows of the triangle, so the inner product of two
-/// reflectors is that of their panel columns.
+/// `V` reflectors `I - β v vᵀ` in the making. Their parts `ν` lie in different rows of the triangle, so the inner
+/// product of two reflectors is that of their panel columns.
 struct Reflectors<const V: usize> {
     /// The part ν of each reflector in its row of the triangle.
     nu: [f64; V],
@@ -171,7 +172,8 @@ fn reflect_column<T: Lane, const V: usize, const P: usize>(
     let old = *diagonal;
     let norm = (old * old + square).sqrt();
     *diagonal = norm;
-    // old - norm without cancellation (old is not negative): Parlett, SIAM Review 13 (1971) 197. It keeps the diagonal positive.
+    // old - norm without cancellation (old is not negative): Parlett, SIAM Review 13 (1971) 197. It keeps the diagonal
+    // positive.
     reflectors.nu[P] = -square / (old + norm);
     // At most 2/square, which is finite; norm · square may underflow.
     let beta = (old + norm) / norm / square;
@@ -240,8 +242,8 @@ fn inner_products<T: Lane, const V: usize, const X: usize>(
             }
         }
     }
-    // Through memory: seeing the loop and the sums over lanes together, the compiler picks a layout that suits the few sums and
-    // shuffles in every turn of the loop (half the speed).
+    // Through memory: seeing the loop and the sums over lanes together, the compiler picks a layout that suits the few
+    // sums and shuffles in every turn of the loop (half the speed).
     let sums = core::hint::black_box(sums);
     let mut products = [[0.0; V]; X];
     for x in 0..X {

@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SegmentSettings {
-    /// Segments kept at most; memory is bounded by this many factors. Default 64: enough for a covariance from segments, and
-    /// segments of any log worth fitting then last longer than its residuals are correlated.
+    /// Segments kept at most; memory is bounded by this many factors. Default 64: enough for a covariance from
+    /// segments, and segments of any log worth fitting then last longer than its residuals are correlated.
     pub max_segments: usize,
     /// Rows of a segment at first; doubled whenever the log outgrows `max_segments`. Default 16. A multiple of
     /// [`BLOCK_ROWS`](crate::BLOCK_ROWS) is faster for logs known to be long.
@@ -25,7 +25,8 @@ impl Default for SegmentSettings {
 }
 
 impl SegmentSettings {
-    /// The default number of segments, with a first length that a log of `rows` rows never outgrows: no merging, the fastest.
+    /// The default number of segments, with a first length that a log of `rows` rows never outgrows: no merging, the
+    /// fastest.
     pub fn for_rows(rows: usize) -> Self {
         let settings = Self::default();
         let mut first_length_rows = settings.first_length_rows;
@@ -51,8 +52,8 @@ impl SegmentSettings {
     }
 }
 
-/// Rows that a segment keeps as they are: they wait for neighbours, since one large block is reduced faster than small ones
-/// and their triangles. Six times the memory of the factor.
+/// Rows that a segment keeps as they are: they wait for neighbours, since one large block is reduced faster than small
+/// ones and their triangles. Six times the memory of the factor.
 const fn most_rows(columns: usize) -> usize {
     3 * (columns + 1)
 }
@@ -67,10 +68,10 @@ enum Segment {
 
 /// A [`TriangularFactor`] kept as consecutive time segments of equal length (the last may be shorter).
 ///
-/// When the log outgrows the allowed number of segments, neighbours are merged and the length doubles: memory stays bounded for a
-/// log of any length, and all that resampling of a time series needs (segments as clusters, jackknife, block bootstrap, leaving
-/// segments out) comes from these factors, without a second pass over the data. The result depends only on the rows and the
-/// settings, by rounding on how they are cut into calls.
+/// When the log outgrows the allowed number of segments, neighbours are merged and the length doubles: memory stays
+/// bounded for a log of any length, and all that resampling of a time series needs (segments as clusters, jackknife,
+/// block bootstrap, leaving segments out) comes from these factors, without a second pass over the data. The result
+/// depends only on the rows and the settings, by rounding on how they are cut into calls.
 ///
 /// ```
 /// use dynident_estimation::{SegmentSettings, SegmentedFactor};
@@ -91,15 +92,6 @@ pub struct SegmentedFactor {
     rows: usize,
     segments: Vec<Segment>,
     workspace: FactorWorkspace,
-}
-
-/// What one segment says about a parameter vector.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SegmentScore {
-    /// Rows in the segment.
-    pub rows: usize,
-    /// `Wᵀ(τ − Wθ)` over the segment's rows.
-    pub score: DVector<f64>,
 }
 
 impl SegmentedFactor {
@@ -134,7 +126,8 @@ impl SegmentedFactor {
         self.segments.iter().map(|segment| segment.rows(self.columns)).collect()
     }
 
-    /// Absorbs the next `rows` rows of the log, column by column as in [`TriangularFactor::absorb`]; their order is time.
+    /// Absorbs the next `rows` rows of the log, column by column as in [`TriangularFactor::absorb`]; their order is
+    /// time.
     ///
     /// # Errors
     /// As [`TriangularFactor::absorb`]; nothing is absorbed then.
@@ -175,7 +168,8 @@ impl SegmentedFactor {
         self.length_rows *= 2;
     }
 
-    /// The same rows and segments with only the given columns, in the order given: a smaller model from the factors of a larger one, without a second pass over the log.
+    /// The same rows and segments with only the given columns, in the order given: a smaller model from the factors of
+    /// a larger one, without a second pass over the log.
     ///
     /// # Errors
     /// [`EstimationError::Mismatch`] for a column out of range.
@@ -209,8 +203,9 @@ impl SegmentedFactor {
         total.factor(self.columns, &mut workspace)
     }
 
-    /// The rows `[W | τ] C` in the same segments: other columns, and another torque, made of these. C has shape (columns + 1, new columns + 1), its last column makes the torque. A load whose
-    /// columns are sums of others, a torque less a known part, or a unit of one joint need no second pass over the log.
+    /// The rows `[W | τ] C` in the same segments: other columns, and another torque, made of these. C has shape
+    /// (columns + 1, new columns + 1), its last column makes the torque. A load whose columns are sums of others, a
+    /// torque less a known part, or a unit of one joint need no second pass over the log.
     ///
     /// ```
     /// use dynident_estimation::{SegmentSettings, SegmentedFactor};
@@ -224,7 +219,8 @@ impl SegmentedFactor {
     /// ```
     ///
     /// # Errors
-    /// [`EstimationError::Mismatch`] unless C has one row for each column and one for the torque, and at least one column; [`EstimationError::Setting`] for an entry that is not finite.
+    /// [`EstimationError::Mismatch`] unless C has one row for each column and one for the torque, and at least one
+    /// column; [`EstimationError::Setting`] for an entry that is not finite.
     pub fn mapped(&self, map: &DMatrix<f64>) -> Result<Self, EstimationError> {
         expect("rows of a map of columns", self.columns + 1, map.nrows())?;
         if map.ncols() == 0 {
@@ -252,8 +248,9 @@ impl SegmentedFactor {
         Self { rows: 0, segments: Vec::new(), workspace: FactorWorkspace::default(), ..*self }
     }
 
-    /// The factor of other rows made of these: for every matrix C of `blocks`, shape (columns + 1, new columns + 1), the rows `[W | τ] C`, all blocks
-    /// stacked. Segments stay what they were in time; their numbers of rows are multiplied by the number of blocks.
+    /// The factor of other rows made of these: for every matrix C of `blocks`, shape (columns + 1, new columns + 1),
+    /// the rows `[W | τ] C`, all blocks stacked. Segments stay what they were in time; their numbers of rows are
+    /// multiplied by the number of blocks.
     pub(crate) fn transformed(&self, blocks: &[DMatrix<f64>]) -> Self {
         let size = self.columns + 1;
         let columns = blocks.first().map_or(0, |block| block.ncols().saturating_sub(1));
@@ -284,7 +281,7 @@ impl SegmentedFactor {
     ///
     /// # Errors
     /// [`EstimationError::Mismatch`] when `theta` does not have one value per column.
-    pub fn scores(&self, theta: &[f64]) -> Result<Vec<SegmentScore>, EstimationError> {
+    pub fn scores(&self, theta: &[f64]) -> Result<Vec<DVector<f64>>, EstimationError> {
         if theta.len() != self.columns {
             let what = "parameters for a factor's columns".into();
             return Err(EstimationError::Mismatch { what, expected: self.columns, found: theta.len() });
@@ -303,7 +300,7 @@ impl SegmentedFactor {
                 score
             }
         };
-        Ok(self.segments.iter().map(|s| SegmentScore { rows: s.rows(self.columns), score: score(s) }).collect())
+        Ok(self.segments.iter().map(score).collect())
     }
 }
 

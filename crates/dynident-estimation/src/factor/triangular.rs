@@ -5,8 +5,9 @@ use crate::error::EstimationError;
 use dynident_lanes::{Level, dispatch};
 use nalgebra::{DMatrix, DVector};
 
-/// Rows absorbed at once. A block of 256 rows and 44 columns (a seven-joint arm) is 90 kB, which a second-level cache holds while the
-/// few columns at work are in the first; measured 15 % faster than 128 rows, because reflectors are made half as often.
+/// Rows absorbed at once. A block of 256 rows and 44 columns (a seven-joint arm) is 90 kB, which a second-level cache
+/// holds while the few columns at work are in the first; measured 15 % faster than 128 rows, because reflectors are
+/// made half as often.
 pub const BLOCK_ROWS: usize = 256;
 
 /// The largest magnitude that can be squared and summed without overflow.
@@ -19,13 +20,13 @@ const LARGEST: f64 = 1.0e140;
 ///         [  0   ρ ]    ‖τ − Wθ‖² = ‖r − R_W θ‖² + ρ²  for every θ
 /// ```
 ///
-/// Rows come in blocks and are forgotten; factors of blocks, logs and machines [`merge`](Self::merge). The diagonal is never
-/// negative, so the factor of given rows is unique (up to rounding) where their columns are independent. With fewer rows than
-/// columns, or dependent columns, the identities above still hold and nothing becomes NaN; rank decisions are made later, with
-/// scaled columns and a stated tolerance (`rank.rs`), never from this diagonal.
+/// Rows come in blocks and are forgotten; factors of blocks, logs and machines [`merge`](Self::merge). The diagonal is
+/// never negative, so the factor of given rows is unique (up to rounding) where their columns are independent. With
+/// fewer rows than columns, or dependent columns, the identities above still hold and nothing becomes NaN; rank
+/// decisions are made later, with scaled columns and a stated tolerance (`rank.rs`), never from this diagonal.
 ///
-/// Golub and Van Loan, Matrix Computations, 4th ed., 5.2 and 6.5; Bierman, Factorization Methods for Discrete Sequential
-/// Estimation (1977), ch. IV and V.
+/// Golub and Van Loan, Matrix Computations, 4th ed., 5.2 and 6.5; Bierman, Factorization Methods for Discrete
+/// Sequential Estimation (1977), ch. IV and V.
 ///
 /// ```
 /// use dynident_estimation::TriangularFactor;
@@ -38,6 +39,7 @@ const LARGEST: f64 = 1.0e140;
 /// # Ok::<(), dynident_estimation::EstimationError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[doc(alias("qr", "square-root information", "srif"))]
 pub struct TriangularFactor {
     columns: usize,
     rows: usize,
@@ -110,14 +112,15 @@ impl TriangularFactor {
         if column < row { 0.0 } else { self.triangle[row_start(size, row) + column - row] }
     }
 
-    /// Absorbs `rows` rows of `[W | τ]` given column by column: `panel[c * rows + i]` is column c of row i, torque last.
+    /// Absorbs `rows` rows of `[W | τ]` given column by column: `panel[c * rows + i]` is column c of row i, torque
+    /// last.
     ///
-    /// Takes about 2·rows·(columns + 1)² operations, in blocks of [`BLOCK_ROWS`]. How rows are cut into calls, and their
-    /// order, changes the result by rounding only.
+    /// Takes about 2·rows·(columns + 1)² operations, in blocks of [`BLOCK_ROWS`]. How rows are cut into calls, and
+    /// their order, changes the result by rounding only.
     ///
     /// # Errors
-    /// [`EstimationError::Shape`] when the panel has another length; [`EstimationError::Unusable`] for a NaN, an infinity or a
-    /// magnitude above 1e140. The factor is then unchanged.
+    /// [`EstimationError::Shape`] when the panel has another length; [`EstimationError::Unusable`] for a NaN, an
+    /// infinity or a magnitude above 1e140. The factor is then unchanged.
     pub fn absorb(&mut self, panel: &[f64], rows: usize) -> Result<(), EstimationError> {
         self.absorb_with(&mut FactorWorkspace::default(), panel, rows)
     }

@@ -6,18 +6,22 @@ use crate::factor::{LinearProblem, SegmentedFactor, solve, split};
 use crate::uncertainty::{Estimate, Fitted};
 use nalgebra::{DMatrix, DVector};
 
-/// Rows of all joints side by side: one row of `[W_1 τ_1 | W_2 τ_2 | … | W_n τ_n]` for every instant of a log, held as factors.
+/// Rows of all joints side by side: one row of `[W_1 τ_1 | W_2 τ_2 | … | W_n τ_n]` for every instant of a log, held as
+/// factors.
 ///
-/// The triangle of such rows knows all products `W_iᵀW_j`, so that any covariance across joints can be tried without passing the rows again. It is as wide as all
-/// joints together: for a seven-joint arm absorbing costs about seven times what the joints' own factors cost.
+/// The triangle of such rows knows all products `W_iᵀW_j`, so that any covariance across joints can be tried without
+/// passing the rows again. It is as wide as all joints together: for a seven-joint arm absorbing costs about seven
+/// times what the joints' own factors cost.
 ///
 /// ```
-/// use dynident_estimation::{CrossProblem, SegmentSettings, SegmentedFactor, WeightedSettings, generalized_least_squares};
+/// use dynident_estimation::*;
 /// // Two joints that see the same gain; the second one's error is minus the first one's.
 /// let x: Vec<f64> = (0..64).map(|k| f64::from(k % 7) - 3.0).collect();
 /// let e: Vec<f64> = (0..64).map(|k| if k % 3 == 0 { 0.2 } else { -0.1 }).collect();
-/// let tau = |sign: f64| -> Vec<f64> { (0..64).map(|k| 2.0 * x[k] + sign * e[k] + 0.01 * (k as f64 * sign).cos()).collect() };
-/// let mut problem = CrossProblem::new(vec!["gain".into()], vec!["joint1".into(), "joint2".into()], vec![vec![0], vec![0]])?;
+/// let torque = |k: usize, sign: f64| 2.0 * x[k] + sign * e[k] + 0.01 * (k as f64 * sign).cos();
+/// let tau = |sign: f64| -> Vec<f64> { (0..64).map(|k| torque(k, sign)).collect() };
+/// let joints = vec!["joint1".into(), "joint2".into()];
+/// let mut problem = CrossProblem::new(vec!["gain".into()], joints, vec![vec![0], vec![0]])?;
 /// let mut rows = SegmentedFactor::new(problem.width(), SegmentSettings { max_segments: 8, first_length_rows: 8 })?;
 /// rows.absorb(&[x.clone(), tau(1.0), x.clone(), tau(-1.0)].concat(), 64)?;
 /// problem.add("run", rows)?;
@@ -38,7 +42,8 @@ pub struct CrossProblem {
 /// What [`generalized_least_squares`] found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GeneralizedEstimate {
-    /// Values with covariance. Its clusters are segments of all joints; score inflation, effective and segment correlation are of all joints together.
+    /// Values with covariance. Its clusters are segments of all joints; score inflation, effective and segment
+    /// correlation are of all joints together.
     pub estimate: Estimate,
     /// Ω, the covariance of the joints' errors at one instant, (joints, joints), squared torque.
     pub noise_covariance: DMatrix<f64>,
@@ -50,8 +55,8 @@ impl CrossProblem {
     /// A problem without data: names of columns and joints, and the columns that each joint sees.
     ///
     /// # Errors
-    /// [`EstimationError::Empty`] without joints; [`EstimationError::Mismatch`] unless there is one list for each joint; [`EstimationError::Column`] for a column out of range or
-    /// given twice.
+    /// [`EstimationError::Empty`] without joints; [`EstimationError::Mismatch`] unless there is one list for each
+    /// joint; [`EstimationError::Column`] for a column out of range or given twice.
     pub fn new(
         columns: Vec<String>,
         joints: Vec<String>,
@@ -73,12 +78,14 @@ impl CrossProblem {
         Ok(Self { fallback: vec![0.0; columns.len()], columns, joints, joint_columns, logs: Vec::new() })
     }
 
-    /// Columns of a log's factor beside its last one (the last joint's torque): those of all joints, and the torques of all but the last.
+    /// Columns of a log's factor beside its last one (the last joint's torque): those of all joints, and the torques of
+    /// all but the last.
     pub fn width(&self) -> usize {
         self.joint_columns.iter().map(|list| list.len() + 1).sum::<usize>().saturating_sub(1)
     }
 
-    /// Adds a log: rows `[W_1 τ_1 | … | W_n τ_n]`, columns of each joint in the order of its list, absorbed in the order of time.
+    /// Adds a log: rows `[W_1 τ_1 | … | W_n τ_n]`, columns of each joint in the order of its list, absorbed in the
+    /// order of time.
     ///
     /// # Errors
     /// [`EstimationError::Mismatch`] when the factor has another [`width`](Self::width).
@@ -161,18 +168,22 @@ impl CrossProblem {
     }
 }
 
-/// Two joints' errors never count as more correlated than this: the whitener would divide by the rounding of their difference.
+/// Two joints' errors never count as more correlated than this: the whitener would divide by the rounding of their
+/// difference.
 const HIGHEST_CORRELATION: f64 = 1.0 - 1.0e-9;
 
-/// `θ = argmin Σ_t e_tᵀ Ω⁻¹ e_t`, `e_t = τ_t − W_t θ` over all joints at instant t, `Ω = Σ_t e_t e_tᵀ / (N − p/n)` iterated from the unit matrix until it settles; p estimated
-/// columns, n joints, N instants.
+/// `θ = argmin Σ_t e_tᵀ Ω⁻¹ e_t`, `e_t = τ_t − W_t θ` over all joints at instant t, `Ω = Σ_t e_t e_tᵀ / (N − p/n)`
+/// iterated from the unit matrix until it settles; p estimated columns, n joints, N instants.
 ///
-/// With `Ω = L Lᵀ` the rows are multiplied by L⁻¹, which the side-by-side triangle allows without another pass. The white covariance is `(Σ W_tᵀΩ⁻¹W_t)⁻¹`; that from segments
-/// takes a segment of all joints as a cluster. Zellner, J. Am. Stat. Assoc. 57 (1962) 348 (seemingly unrelated regressions, iterated).
+/// With `Ω = L Lᵀ` the rows are multiplied by L⁻¹, which the side-by-side triangle allows without another pass. The
+/// white covariance is `(Σ W_tᵀΩ⁻¹W_t)⁻¹`; that from segments takes a segment of all joints as a cluster. Zellner, J.
+/// Am. Stat. Assoc. 57 (1962) 348 (seemingly unrelated regressions, iterated).
 ///
 /// # Errors
-/// [`EstimationError::Empty`], [`EstimationError::TooFewRows`] (instants must outnumber the columns' share and the joints), [`EstimationError::Setting`], and those of the covariance.
-/// Joints whose errors are the same but for a factor are whitened as if correlated by 1 − 1e-9.
+/// [`EstimationError::Empty`], [`EstimationError::TooFewRows`] (instants must outnumber the columns' share and the
+/// joints), [`EstimationError::Setting`], and those of the covariance. Joints whose errors are the same but for a
+/// factor are whitened as if correlated by 1 − 1e-9.
+#[doc(alias("gls", "sur", "zellner"))]
 pub fn generalized_least_squares(
     problem: &CrossProblem,
     settings: &WeightedSettings,
@@ -248,7 +259,8 @@ pub fn generalized_least_squares(
     Ok(GeneralizedEstimate { estimate, noise_covariance: omega, noise_correlation })
 }
 
-/// L⁻¹ with L Lᵀ = Ω. A covariance that clamped correlations have made indefinite is drawn towards its diagonal until it is not.
+/// L⁻¹ with L Lᵀ = Ω. A covariance that clamped correlations have made indefinite is drawn towards its diagonal until
+/// it is not.
 fn inverse_root(omega: &DMatrix<f64>, sigma: &[f64]) -> DMatrix<f64> {
     let joints = sigma.len();
     let diagonal = DMatrix::from_diagonal(&DVector::from_iterator(joints, sigma.iter().map(|s| s * s)));

@@ -15,9 +15,11 @@ use serde::{Deserialize, Serialize};
 pub struct HausmanSettings {
     /// When a column counts as excited.
     pub rank: RankSettings,
-    /// The covariance behind the test; from time segments by default. `white` is the textbook's test, which coloured residuals make reject far too often.
+    /// The covariance behind the test; from time segments by default. `white` is the textbook's test, which coloured
+    /// residuals make reject far too often.
     pub covariance: CovarianceMethod,
-    /// Probability of rejecting least squares where it is right. Default 0.01: with that many samples small doubts are easily raised.
+    /// Probability of rejecting least squares where it is right. Default 0.01: with that many samples small doubts are
+    /// easily raised.
     pub level: f64,
 }
 
@@ -82,19 +84,23 @@ pub struct HausmanColumn {
     pub t: f64,
 }
 
-/// Regresses `τ` on `[W | V]`, where `V = W − Z(ZᵀZ)⁻¹ZᵀW` is what the instruments do not explain of the regressor, and tests whether V's coefficients γ are zero:
+/// Regresses `τ` on `[W | V]`, where `V = W − Z(ZᵀZ)⁻¹ZᵀW` is what the instruments do not explain of the regressor, and
+/// tests whether V's coefficients γ are zero:
 ///
 /// ```text
 ///     τ = W θ + V γ + noise,    T² = γᵀ Cov(γ)⁻¹ γ,    F = T² (G − q)/(q (G − 1))  against F(q, G − q)
 /// ```
 ///
-/// If W is free of noise that matters, V carries no other torque than W does and γ = 0; under noise in W (or noise fed back into the motion) the coefficients differ.
-/// Cov is that of G time segments, so that residuals correlated in time do not reject by themselves; F is Hotelling's form for a covariance that was estimated from G
-/// pieces. Rows are weighted by the joints' noise in `estimate`. Janot, Vandanjon and Gautier, Control Engineering Practice 48 (2016) 52; Hausman,
-/// Econometrica 46 (1978) 1251.
+/// If W is free of noise that matters, V carries no other torque than W does and γ = 0; under noise in W (or noise fed
+/// back into the motion) the coefficients differ. Cov is that of G time segments, so that residuals correlated in time
+/// do not reject by themselves; F is Hotelling's form for a covariance that was estimated from G pieces. Rows are
+/// weighted by the joints' noise in `estimate`. Janot, Vandanjon and Gautier, Control Engineering Practice 48 (2016)
+/// 52; Hausman, Econometrica 46 (1978) 1251.
 ///
 /// # Errors
-/// [`EstimationError::Setting`] and the errors of the covariance. A test that cannot be made is a verdict, not an error.
+/// [`EstimationError::Setting`] and the errors of the covariance. A test that cannot be made is a verdict, not an
+/// error.
+#[doc(alias("durbin-wu-hausman", "dwh"))]
 pub fn hausman_test(
     problem: &InstrumentedProblem,
     estimate: &InstrumentalEstimate,

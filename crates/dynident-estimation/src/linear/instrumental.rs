@@ -20,7 +20,8 @@ pub struct InstrumentalSettings {
     pub tolerance: f64,
     /// Most solutions made. Default 50.
     pub max_iterations: usize,
-    /// First-stage F below which the instruments are called weak. Default 10, the rule of thumb of Staiger and Stock, Econometrica 65 (1997) 557.
+    /// First-stage F below which the instruments are called weak. Default 10, the rule of thumb of Staiger and Stock,
+    /// Econometrica 65 (1997) 557.
     pub weak_below: f64,
 }
 
@@ -40,7 +41,8 @@ impl InstrumentalSettings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// [`EstimationError::Setting`] for a tolerance outside 1e-12 to 1, no iterations, a limit of F that is not positive, or rank settings out of range.
+    /// [`EstimationError::Setting`] for a tolerance outside 1e-12 to 1, no iterations, a limit of F that is not
+    /// positive, or rank settings out of range.
     pub fn validate(&self) -> Result<(), EstimationError> {
         let (rank, covariance) = (self.rank, self.covariance);
         let (tolerance, max_iterations) = (self.tolerance, self.max_iterations);
@@ -58,14 +60,16 @@ impl InstrumentalSettings {
 pub struct InstrumentReport {
     /// Independent instruments.
     pub instruments: usize,
-    /// Columns that hold noise which the instruments do not share. The others are explained wholly and are their own instruments.
+    /// Columns that hold noise which the instruments do not share. The others are explained wholly and are their own
+    /// instruments.
     pub noisy_columns: Vec<String>,
-    /// Smallest F of the first stage over all directions in the noisy columns (Cragg-Donald): `λ_min(Σ_V⁻¹ W̃ᵀW̃) / k` with
-    /// `Σ_V = VᵀV/(N − k)`, other columns taken out. None when no column is noisy.
+    /// Smallest F of the first stage over all directions in the noisy columns (Cragg-Donald): `λ_min(Σ_V⁻¹ W̃ᵀW̃) / k`
+    /// with `Σ_V = VᵀV/(N − k)`, other columns taken out. None when no column is noisy.
     pub weakest_f: Option<f64>,
     /// The noisy column with the largest part in that direction, each column measured by its own noise.
     pub weakest_column: Option<String>,
-    /// Whether the smallest F is below the settings' limit: the estimate is then biased towards least squares, and its error bars are too small.
+    /// Whether the smallest F is below the settings' limit: the estimate is then biased towards least squares, and its
+    /// error bars are too small.
     pub weak: bool,
 }
 
@@ -78,22 +82,27 @@ pub struct InstrumentalEstimate {
     pub instruments: InstrumentReport,
 }
 
-/// A part of a column that the instruments leave over counts as noise above this share of the column: rounding stays far below.
+/// A part of a column that the instruments leave over counts as noise above this share of the column: rounding stays
+/// far below.
 pub(crate) const NOISY: f64 = 1.0e-7;
 
-/// `θ = (Σ_j Z_jᵀW_j/σ_j²)⁻¹ Σ_j Z_jᵀτ_j/σ_j²`, with `σ_j² = ‖τ_j − W_j θ‖²/(N_j − p/n)` iterated from one as in weighted least squares.
+/// `θ = (Σ_j Z_jᵀW_j/σ_j²)⁻¹ Σ_j Z_jᵀτ_j/σ_j²`, with `σ_j² = ‖τ_j − W_j θ‖²/(N_j − p/n)` iterated from one as in
+/// weighted least squares.
 ///
-/// Solved in two stages from the triangle of `[Z | W | τ]`: `θ = argmin ‖Q_Zᵀτ − Q_ZᵀW θ‖`, which is the same as long as there are as many
-/// independent instruments as estimated columns, and two-stage least squares where there are more. Consistent when Z is uncorrelated with the noise of W and τ,
-/// where least squares is biased towards zero. The covariance is the sandwich `A⁻¹ (Σ_g s_g s_gᵀ) A⁻¹` with `A = W̃ᵀW̃`, `s_g = W̃_gᵀ(τ_g − W_g θ)`, `W̃ = Z(ZᵀZ)⁻¹ZᵀW`, or
-/// its leave-one-segment-out form.
+/// Solved in two stages from the triangle of `[Z | W | τ]`: `θ = argmin ‖Q_Zᵀτ − Q_ZᵀW θ‖`, which is the same as long
+/// as there are as many independent instruments as estimated columns, and two-stage least squares where there are more.
+/// Consistent when Z is uncorrelated with the noise of W and τ, where least squares is biased towards zero. The
+/// covariance is the sandwich `A⁻¹ (Σ_g s_g s_gᵀ) A⁻¹` with `A = W̃ᵀW̃`, `s_g = W̃_gᵀ(τ_g − W_g θ)`, `W̃ =
+/// Z(ZᵀZ)⁻¹ZᵀW`, or its leave-one-segment-out form.
 ///
-/// For instruments that are simulated with the current model (IDIM-IV) call this again with new Z until θ settles. Janot, Vandanjon and Gautier, IEEE
-/// Trans. Control Syst. Technol. 22 (2014) 132; weak instruments: Cragg and Donald, Econometric Theory 9 (1993) 222.
+/// For instruments that are simulated with the current model (IDIM-IV) call this again with new Z until θ settles.
+/// Janot, Vandanjon and Gautier, IEEE Trans. Control Syst. Technol. 22 (2014) 132; weak instruments: Cragg and Donald,
+/// Econometric Theory 9 (1993) 222.
 ///
 /// # Errors
-/// As [`weighted_least_squares`](crate::weighted_least_squares). Columns that the instruments do not tell apart are fixed and named in the estimate's rank report; weak
-/// instruments are reported: neither is an error.
+/// As [`weighted_least_squares`](crate::weighted_least_squares). Columns that the instruments do not tell apart are
+/// fixed and named in the estimate's rank report; weak instruments are reported: neither is an error.
+#[doc(alias("iv", "idim-iv", "2sls", "tsls"))]
 pub fn instrumental_variables(
     problem: &InstrumentedProblem,
     settings: &InstrumentalSettings,
@@ -124,7 +133,8 @@ pub fn instrumental_variables(
         iterations += 1;
     }
     let instruments = report(problem, &projection, &choice, settings);
-    // Least squares of τ − V θ on W̃ has the same solution, the residual τ − W θ, and so the sandwich of the instruments.
+    // Least squares of τ − V θ on W̃ has the same solution, the residual τ − W θ, and so the sandwich of the
+    // instruments.
     let theta = DVector::from_column_slice(&solution.values);
     let second = problem.combined(problem.columns().to_vec(), problem.fallback().to_vec(), |local| {
         let (fitted, left) = projection.parts(local);
@@ -183,7 +193,8 @@ fn report(
     if noisy.is_empty() || rows <= k {
         return report;
     }
-    // The explained part of the noisy columns with all others taken out: the last rows of a triangle with the others first.
+    // The explained part of the noisy columns with all others taken out: the last rows of a triangle with the others
+    // first.
     let others: Vec<usize> = choice.free.iter().copied().filter(|column| !noisy.contains(column)).collect();
     let order: Vec<usize> = others.iter().chain(&noisy).copied().collect();
     let reordered = |source: &TriangularFactor, order: &[usize]| {
@@ -200,7 +211,8 @@ fn report(
     let scaled =
         |matrix: DMatrix<f64>| DMatrix::from_fn(count, count, |row, column| matrix[(row, column)] / scales[column]);
     let (explained, left) = (scaled(explained), scaled(left));
-    // Smallest σ of E V⁻¹ is the reciprocal of the largest of V E⁻¹; E is regular, for its columns were found independent.
+    // Smallest σ of E V⁻¹ is the reciprocal of the largest of V E⁻¹; E is regular, for its columns were found
+    // independent.
     let Some(inverse) = explained.clone().try_inverse() else { return report };
     let decomposition = (left * &inverse).svd(false, true);
     let (Some(largest), Some(right)) =

@@ -18,12 +18,14 @@ const MOST_HALVINGS: usize = 12;
 /// Share of a gain's column, by its own norm, that must be in a dependence for the gain to be part of it.
 const IN_DEPENDENCE: f64 = 1.0e-6;
 
-/// `u_j = (1/g_j) W_j (θ + c) + noise`: what joint j reports in its own unit, for parameters θ and a known load c that some logs carry.
+/// `u_j = (1/g_j) W_j (θ + c) + noise`: what joint j reports in its own unit, for parameters θ and a known load c that
+/// some logs carry.
 #[derive(Clone, Debug)]
 pub struct GainProblem<'a> {
     /// Rows `[W | u]`; the columns are θ.
     pub rows: &'a LinearProblem,
-    /// For every log of the rows the known part of the parameters, one value per column: a load's in loaded logs, zero in others.
+    /// For every log of the rows the known part of the parameters, one value per column: a load's in loaded logs, zero
+    /// in others.
     pub known: Vec<Vec<f64>>,
 }
 
@@ -51,18 +53,23 @@ pub struct GainEstimate {
     pub gains: Vec<JointGain>,
 }
 
-/// Parameters and gains together, `min Σ_j ‖u_j − k_j W_j (θ + c)‖² / σ_j²` over θ and `k_j = 1/g_j`, by Gauss-Newton steps on the factors.
+/// Parameters and gains together, `min Σ_j ‖u_j − k_j W_j (θ + c)‖² / σ_j²` over θ and `k_j = 1/g_j`, by Gauss-Newton
+/// steps on the factors.
 ///
-/// The noise is in what is logged, so it stands alone on its side: with gains in front of u (`g_j u_j = W_j (θ + c)`) plain least squares draws the gains to zero, and total least squares is the cure
-/// that is usual (Gautier and Briot, ICRA 2012 and ASME J. Dyn. Sys. Meas. Control 136 (2014) 051025). Start: the same linear equations with u replaced by its fit on its own log's columns, which
-/// noise does not bias. Every step is a weighted fit of the columns `k_j W_j` and `W_j (θ + c)`; the last one's covariance is that of the solution.
+/// The noise is in what is logged, so it stands alone on its side: with gains in front of u (`g_j u_j = W_j (θ + c)`)
+/// plain least squares draws the gains to zero, and total least squares is the cure that is usual (Gautier and Briot,
+/// ICRA 2012 and ASME J. Dyn. Sys. Meas. Control 136 (2014) 051025). Start: the same linear equations with u replaced
+/// by its fit on its own log's columns, which noise does not bias. Every step is a weighted fit of the columns `k_j
+/// W_j` and `W_j (θ + c)`; the last one's covariance is that of the solution.
 ///
-/// A load must be known and felt: without it all of one joint's (or of all joints that share parameters) gains and parameters can be multiplied by the same number. Gains in such a dependence are not
-/// `identified`; they are held where they began.
+/// A load must be known and felt: without it all of one joint's (or of all joints that share parameters) gains and
+/// parameters can be multiplied by the same number. Gains in such a dependence are not `identified`; they are held
+/// where they began.
 ///
 /// # Errors
-/// [`EstimationError::Mismatch`] for shapes that do not fit or a problem with a prior, [`EstimationError::Setting`] for a load that is not finite or zero in all logs, and those of
-/// [`weighted_least_squares`].
+/// [`EstimationError::Mismatch`] for shapes that do not fit or a problem with a prior, [`EstimationError::Setting`] for
+/// a load that is not finite or zero in all logs, and those of [`weighted_least_squares`].
+#[doc(alias("torque constant", "drive gain"))]
 pub fn joint_gains(problem: &GainProblem<'_>, settings: &WeightedSettings) -> Result<GainEstimate, EstimationError> {
     check(problem)?;
     let rows = problem.rows;
@@ -163,7 +170,8 @@ fn misfit(problem: &GainProblem<'_>, x: &[f64]) -> Result<f64, EstimationError> 
     Ok(terms.map(|((square, &torque), n)| n as f64 * square.max(floor(torque)).ln()).sum())
 }
 
-/// The columns `k W` for θ and `W (θ + c)` for k about x; the target in absolute terms, so that the solution is the next x.
+/// The columns `k W` for θ and `W (θ + c)` for k about x; the target in absolute terms, so that the solution is the
+/// next x.
 fn linearised(
     problem: &GainProblem<'_>,
     merged: Option<&[SegmentedFactor]>,

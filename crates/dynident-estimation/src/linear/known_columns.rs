@@ -22,12 +22,14 @@ pub struct KnownColumns {
 /// The known values are not changed by these data; their errors go into the others' error bars:
 ///
 /// ```text
-///     V_u = V_own + G V_k Gᵀ,   cov(θ_u, θ_k) = G V_k,   G = ∂θ_u/∂θ_k = −(W_uᵀ Ω W_u)⁻¹ W_uᵀ Ω W_k,   Ω = diag(1/σ_j²)
+///     V_u = V_own + G V_k Gᵀ,   cov(θ_u, θ_k) = G V_k,
+///     G = ∂θ_u/∂θ_k = −(W_uᵀ Ω W_u)⁻¹ W_uᵀ Ω W_k,   Ω = diag(1/σ_j²)
 /// ```
 ///
-/// with `V_own` of these data by the chosen method. Right where the known values come from other data. The residual holds `W_k` times their error as well, so that `V_own` counts some of it again:
-/// the bars are cautious. The estimate has all columns of the problem; `rank` speaks of those that were not known. Murphy and Topel, J. Business and Economic Statistics 3 (1985) 370 (two-step
-/// estimation, independent steps).
+/// with `V_own` of these data by the chosen method. Right where the known values come from other data. The residual
+/// holds `W_k` times their error as well, so that `V_own` counts some of it again: the bars are cautious. The estimate
+/// has all columns of the problem; `rank` speaks of those that were not known. Murphy and Topel, J. Business and
+/// Economic Statistics 3 (1985) 370 (two-step estimation, independent steps).
 ///
 /// ```
 /// use dynident_estimation::*;
@@ -44,8 +46,10 @@ pub struct KnownColumns {
 /// ```
 ///
 /// # Errors
-/// [`EstimationError::Mismatch`] for numbers that do not fit, columns named twice, nothing left to estimate, or a problem with a prior; [`EstimationError::Setting`] for values that are not finite;
-/// and as [`weighted_least_squares`].
+/// [`EstimationError::Mismatch`] for numbers that do not fit, columns named twice, nothing left to estimate, or a
+/// problem with a prior; [`EstimationError::Setting`] for values that are not finite; and as
+/// [`weighted_least_squares`].
+#[doc(alias("payload"))]
 pub fn weighted_least_squares_with_known(
     problem: &LinearProblem,
     known: &KnownColumns,

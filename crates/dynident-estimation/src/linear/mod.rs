@@ -4,14 +4,16 @@
 //! | what the noise is like | function |
 //! | --- | --- |
 //! | equal in all joints | [`ordinary_least_squares`] |
-//! | a level for each joint | [`weighted_least_squares`]; with some columns known [`weighted_least_squares_with_known`] |
+//! | a level for each joint | [`weighted_least_squares`] |
+//! | the same, some columns known | [`weighted_least_squares_with_known`] |
 //! | correlated between joints | [`generalized_least_squares`] |
 //! | a level that depends on the speed | [`noise_weighted_least_squares`] |
 //! | gross errors | [`robust_least_squares`] |
 //! | in the columns too, of known size | [`total_least_squares`] |
 //! | in the columns too, of unknown size | [`instrumental_variables`]; [`hausman_test`] says whether it matters |
 //!
-//! [`joint_gains`] estimates the torque constants of the drives from the same rows.
+//! A function takes a problem, its settings and, where rows are needed again, a source of rows at last: a pass over the
+//! log as often as it is called. [`joint_gains`] estimates the torque constants of the drives from the same rows.
 
 mod generalized;
 mod hausman;

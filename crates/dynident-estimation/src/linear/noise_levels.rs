@@ -11,10 +11,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct NoiseLevelSettings {
-    /// Rows of one joint and log, centred on a row, whose residuals say how large the noise is there. Default 51: the level is then known to about 10 %, and follows what lasts longer
-    /// than some fifty rows (slow and fast motion, reversals of a slow motion, a brake that is let go).
+    /// Rows of one joint and log, centred on a row, whose residuals say how large the noise is there. Default 51: the
+    /// level is then known to about 10 %, and follows what lasts longer than some fifty rows (slow and fast motion,
+    /// reversals of a slow motion, a brake that is let go).
     pub window_rows: usize,
-    /// Share of the joint's mean square residual in every level's square, 0 to 1. Default 1e-3: no row is taken for more than thirty times as quiet as the mean. One gives weighted least squares.
+    /// Share of the joint's mean square residual in every level's square, 0 to 1. Default 1e-3: no row is taken for
+    /// more than thirty times as quiet as the mean. One gives weighted least squares.
     pub pooled_share: f64,
     /// When a column counts as excited.
     pub rank: RankSettings,
@@ -43,7 +45,8 @@ impl NoiseLevelSettings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// [`EstimationError::Setting`] for a window of fewer than five rows, a share outside 1e-6 to 1, a tolerance outside 1e-9 to 1, fewer than two passes, or rank settings out of range.
+    /// [`EstimationError::Setting`] for a window of fewer than five rows, a share outside 1e-6 to 1, a tolerance
+    /// outside 1e-9 to 1, fewer than two passes, or rank settings out of range.
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
         let error = |setting, value, mend| Err(EstimationError::Setting { setting, value, mend });
@@ -72,24 +75,29 @@ impl NoiseLevelSettings {
 pub struct NoiseWeightedEstimate {
     /// Values with covariance. `joint_sigma` is the noise of rows at their joint's mean level.
     pub estimate: Estimate,
-    /// For every joint the smallest and the largest noise level of its rows, over the root mean square of all its residuals. Both near one: weighted least squares would have done.
+    /// For every joint the smallest and the largest noise level of its rows, over the root mean square of all its
+    /// residuals. Both near one: weighted least squares would have done.
     pub level_range: Vec<[f64; 2]>,
 }
 
-/// `θ = argmin Σ_j Σ_k (τ_jk − w_jk θ)² / σ_jk²`, `σ_jk² = s σ_j² + (1 − s) · mean of r² over the window around row k`, iterated: rows of joint j at instant k count by the reciprocal of
-/// the noise level there, which the residuals of the solution before tell.
+/// `θ = argmin Σ_j Σ_k (τ_jk − w_jk θ)² / σ_jk²`, `σ_jk² = s σ_j² + (1 − s) · mean of r² over the window around row k`,
+/// iterated: rows of joint j at instant k count by the reciprocal of the noise level there, which the residuals of the
+/// solution before tell.
 ///
-/// Feng's reading of iteratively reweighted least squares, where weights are the reciprocal noise: torque noise of a drive is larger at speed, friction is modelled worse at reversals, and
-/// one σ for the whole joint lets the worst part decide. Unlike Huber's and Tukey's weights a row is not judged by its own residual but by its neighbourhood's, so that normal
-/// noise loses nothing but what the level's own uncertainty costs. After Han et al., "An iterative approach for accurate dynamic model identification", IEEE Trans. Ind. Electron. (2020); for estimated
-/// weights in general Carroll and Ruppert, Transformation and Weighting in Regression (1988), 2.3 and 3.
+/// Feng's reading of iteratively reweighted least squares, where weights are the reciprocal noise: torque noise of a
+/// drive is larger at speed, friction is modelled worse at reversals, and one σ for the whole joint lets the worst part
+/// decide. Unlike Huber's and Tukey's weights a row is not judged by its own residual but by its neighbourhood's, so
+/// that normal noise loses nothing but what the level's own uncertainty costs. After Han et al., "An iterative approach
+/// for accurate dynamic model identification", IEEE Trans. Ind. Electron. (2020); for estimated weights in general
+/// Carroll and Ruppert, Transformation and Weighting in Regression (1988), 2.3 and 3.
 ///
-/// `pass` hands every row that `problem` was made of to its visitor, as often as it is called; residuals are kept, one number for each row, regressors are not. The covariance is that of
-/// [`weighted_least_squares`] on the reweighted rows, weights taken for given.
+/// `pass` hands every row that `problem` was made of to its visitor, as often as it is called; residuals are kept, one
+/// number for each row, regressors are not. The covariance is that of [`weighted_least_squares`] on the reweighted
+/// rows, weights taken for given.
 ///
 /// # Errors
-/// As [`weighted_least_squares`]; [`EstimationError::Mismatch`] when a pass gives other rows than the problem holds; and whatever `pass` itself returns. Reaching `max_passes` is
-/// a status, not an error.
+/// As [`weighted_least_squares`]; [`EstimationError::Mismatch`] when a pass gives other rows than the problem holds;
+/// and whatever `pass` itself returns. Reaching `max_passes` is a status, not an error.
 ///
 /// ```
 /// use dynident_estimation::*;
@@ -107,6 +115,7 @@ pub struct NoiseWeightedEstimate {
 /// assert!((found.estimate.values[0] - 2.0).abs() < 1e-3 && found.level_range[0][0] < 0.2);
 /// # Ok::<(), EstimationError>(())
 /// ```
+#[doc(alias("heteroscedastic", "irls"))]
 pub fn noise_weighted_least_squares<E: From<EstimationError>>(
     problem: &LinearProblem,
     settings: &NoiseLevelSettings,
@@ -183,7 +192,8 @@ impl Levels {
     }
 }
 
-/// Mean square over a centred window of `width` numbers, cut at the ends. Sums are made afresh, not by subtraction, so that a large residual leaves no rounding behind.
+/// Mean square over a centred window of `width` numbers, cut at the ends. Sums are made afresh, not by subtraction, so
+/// that a large residual leaves no rounding behind.
 fn window_means(residuals: &[f64], width: usize) -> Vec<f64> {
     let half = width / 2;
     let mean = |row: usize| {

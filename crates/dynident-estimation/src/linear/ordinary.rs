@@ -15,19 +15,30 @@ pub struct OrdinarySettings {
     pub covariance: CovarianceMethod,
 }
 
+impl OrdinarySettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`EstimationError::Setting`] for rank settings out of range.
+    pub fn validate(&self) -> Result<(), EstimationError> {
+        self.rank.validate()
+    }
+}
+
 /// `θ = argmin Σ_j ‖τ_j − W_j θ‖²` by orthogonal reduction, never by normal equations.
 ///
 /// The white-noise covariance is `s² (WᵀW)⁻¹` with `s² = RSS/(N − p)`. Golub and Van Loan, Matrix Computations, 5.3.
 ///
 /// # Errors
 /// [`EstimationError::Empty`] and [`EstimationError::TooFewRows`] when there is nothing to estimate from,
-/// [`EstimationError::PriorWithoutNoiseLevel`] when the problem has a prior, [`EstimationError::Setting`], and the errors of the
-/// chosen covariance.
+/// [`EstimationError::PriorWithoutNoiseLevel`] when the problem has a prior, [`EstimationError::Setting`], and the
+/// errors of the chosen covariance.
+#[doc(alias("ols", "least squares", "lstsq"))]
 pub fn ordinary_least_squares(
     problem: &LinearProblem,
     settings: &OrdinarySettings,
 ) -> Result<Estimate, EstimationError> {
-    settings.rank.validate()?;
+    settings.validate()?;
     if problem.prior().is_some() {
         return Err(EstimationError::PriorWithoutNoiseLevel);
     }

@@ -12,7 +12,8 @@ use nalgebra::DMatrix;
 ///                     [  0   0    ρ ]
 /// ```
 ///
-/// No product ZᵀW is formed, so the condition of the instruments is not squared. Instruments that depend on earlier ones are left out.
+/// No product ZᵀW is formed, so the condition of the instruments is not squared. Instruments that depend on earlier
+/// ones are left out.
 pub(crate) struct Projection {
     /// `[M | m]` as a factor: that of the rows `[W̃ | P_Z τ]`.
     pub(crate) explained: TriangularFactor,
@@ -72,7 +73,8 @@ impl Projection {
         Ok(Self { explained, left, coefficients, instruments: k })
     }
 
-    /// For an equation that sees the columns `local`: coefficients of its `[Z | W | τ]` in `[Z Π | W − Z Π]` over all columns.
+    /// For an equation that sees the columns `local`: coefficients of its `[Z | W | τ]` in `[Z Π | W − Z Π]` over all
+    /// columns.
     pub(crate) fn parts(&self, local: &[usize]) -> (DMatrix<f64>, DMatrix<f64>) {
         let count = self.coefficients.ncols();
         let mut fitted = DMatrix::zeros(2 * local.len() + 1, count);

@@ -17,8 +17,8 @@ pub enum RowWeight {
         #[serde(default = "huber_k")]
         k: f64,
     },
-    /// `w = (1 − (u/c)²)²` for `|u| < c`, else nothing: gross errors are left out. Starts from Huber's solution, for it has several minima. Beaton and Tukey,
-    /// Technometrics 16 (1974) 147.
+    /// `w = (1 − (u/c)²)²` for `|u| < c`, else nothing: gross errors are left out. Starts from Huber's solution, for it
+    /// has several minima. Beaton and Tukey, Technometrics 16 (1974) 147.
     Tukey {
         /// c; 4.685 by default, which costs 5 % efficiency where noise is normal.
         #[serde(default = "tukey_c")]
@@ -109,7 +109,8 @@ impl RobustSettings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// [`EstimationError::Setting`] for a constant outside 0.1 to 100, a tolerance outside 1e-13 to 1, fewer than two passes, or rank settings out of range.
+    /// [`EstimationError::Setting`] for a constant outside 0.1 to 100, a tolerance outside 1e-13 to 1, fewer than two
+    /// passes, or rank settings out of range.
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
         let (setting, value) = match self.weight {
@@ -183,21 +184,26 @@ struct Tally {
 /// Normal noise has its median magnitude at this share of its standard deviation: Φ⁻¹(3/4).
 const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
 
-/// The scale never falls below this share of the torque's root mean square (most rows fitted exactly, as in a simulation).
+/// The scale never falls below this share of the torque's root mean square (most rows fitted exactly, as in a
+/// simulation).
 const SMALLEST_SCALE: f64 = 1.0e-9;
 
-/// `θ` with `Σ_i W_iᵀ w(u_i) (τ_i − W_i θ)/s_j² = 0`, `u_i = (τ_i − W_i θ)/s_j`, `s_j = median |τ_i − W_i θ| / 0.6745` over joint j's rows.
+/// `θ` with `Σ_i W_iᵀ w(u_i) (τ_i − W_i θ)/s_j² = 0`, `u_i = (τ_i − W_i θ)/s_j`, `s_j = median |τ_i − W_i θ| / 0.6745`
+/// over joint j's rows.
 ///
-/// Starts from [`weighted_least_squares`] on `problem`'s factors; then every pass over the rows gives residuals, scales and the factors of the reweighted rows, from which the
-/// next θ follows. The scale of a pass is that of the θ before, which has the same limit and needs one pass each, not two. Regressors are never stored; residuals
-/// are, one number per row, for their median. `pass` hands every row that `problem` was made of to its visitor, as often as it is called.
+/// Starts from [`weighted_least_squares`] on `problem`'s factors; then every pass over the rows gives residuals, scales
+/// and the factors of the reweighted rows, from which the next θ follows. The scale of a pass is that of the θ before,
+/// which has the same limit and needs one pass each, not two. Regressors are never stored; residuals are, one number
+/// per row, for their median. `pass` hands every row that `problem` was made of to its visitor, as often as it is
+/// called.
 ///
-/// The covariance is that of the reweighted rows times `(Σw/Σψ')²`, for an outlier's weight falls when the fit bends towards it (Huber, Robust Statistics (1981), 7.6). Rows
-/// are judged one by one: behind a filter that smears an outlier over its length, filter less.
+/// The covariance is that of the reweighted rows times `(Σw/Σψ')²`, for an outlier's weight falls when the fit bends
+/// towards it (Huber, Robust Statistics (1981), 7.6). Rows are judged one by one: behind a filter that smears an
+/// outlier over its length, filter less.
 ///
 /// # Errors
-/// As [`weighted_least_squares`]; [`EstimationError::Mismatch`] when a pass gives other rows than the problem holds; and whatever `pass` itself returns. Reaching `max_passes` is
-/// a status, not an error.
+/// As [`weighted_least_squares`]; [`EstimationError::Mismatch`] when a pass gives other rows than the problem holds;
+/// and whatever `pass` itself returns. Reaching `max_passes` is a status, not an error.
 ///
 /// ```
 /// use dynident_estimation::*;
@@ -217,6 +223,7 @@ const SMALLEST_SCALE: f64 = 1.0e-9;
 /// assert!((found.outlier_share[0] - 0.1).abs() < 0.02);
 /// # Ok::<(), EstimationError>(())
 /// ```
+#[doc(alias("irls", "huber", "tukey", "m-estimator"))]
 pub fn robust_least_squares<E: From<EstimationError>>(
     problem: &LinearProblem,
     settings: &RobustSettings,
@@ -395,7 +402,8 @@ pub(crate) fn scale_floors(problem: &LinearProblem) -> Vec<f64> {
     rms
 }
 
-/// Variance of the reweighted rows under white noise that makes `A⁻¹` the covariance before the correction of [`finished`]: `E ψ² / E w`.
+/// Variance of the reweighted rows under white noise that makes `A⁻¹` the covariance before the correction of
+/// [`finished`]: `E ψ² / E w`.
 fn variance_factor(tally: &[Tally]) -> f64 {
     let (square, weight) = tally.iter().fold((0.0, 0.0), |(s, w), t| (s + t.square, w + t.weight));
     if weight > 0.0 { square / weight } else { 1.0 }
@@ -403,7 +411,8 @@ fn variance_factor(tally: &[Tally]) -> f64 {
 
 fn finished(mut estimate: Estimate, tally: &[Tally], method: CovarianceMethod) -> RobustEstimate {
     let (weight, slope) = tally.iter().fold((0.0, 0.0), |(w, s), t| (w + t.weight, s + t.slope));
-    // The slopes' sum falls below a tenth of the weights' only where most rows are outliers; no covariance means much then.
+    // The slopes' sum falls below a tenth of the weights' only where most rows are outliers; no covariance means much
+    // then.
     let correction = (weight / slope.max(0.1 * weight)).powi(2);
     if correction.is_finite() {
         let scale = |matrix: &mut DMatrix<f64>| *matrix *= correction;

@@ -12,17 +12,38 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TotalSettings {
-    /// Standard deviation of the error in each column, in its own unit; zero for a column that is known exactly (an offset). Where joints differ in `torque_std` this is the error
-    /// in the rows of the joint with the largest; that of the others is smaller in proportion.
+    /// Standard deviation of the error in each column, in its own unit; zero for a column that is known exactly (an
+    /// offset). Where joints differ in `torque_std` this is the error in the rows of the joint with the largest; that
+    /// of the others is smaller in proportion.
     pub column_std: Vec<f64>,
     /// Standard deviation of the error in each joint's torque, N m (N); positive. Only ratios to `column_std` matter.
     pub torque_std: Vec<f64>,
     /// When a column counts as excited.
     #[serde(default)]
     pub rank: RankSettings,
-    /// `White`, or by time segments for any other choice: the estimate cannot be made without a segment from that segment's triangle alone.
+    /// `White`, or by time segments for any other choice: the estimate cannot be made without a segment from that
+    /// segment's triangle alone.
     #[serde(default)]
     pub covariance: CovarianceMethod,
+}
+
+impl TotalSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`EstimationError::Setting`] for a standard deviation or rank settings out of range.
+    pub fn validate(&self) -> Result<(), EstimationError> {
+        self.rank.validate()?;
+        if let Some(&value) = self.column_std.iter().find(|std| !(std.is_finite() && **std >= 0.0)) {
+            let mend = "give a finite standard deviation, 0 for an exact column";
+            return Err(EstimationError::Setting { setting: "column_std", value, mend });
+        }
+        if let Some(&value) = self.torque_std.iter().find(|std| !(std.is_finite() && **std > 0.0)) {
+            let mend = "give a finite standard deviation above 0";
+            return Err(EstimationError::Setting { setting: "torque_std", value, mend });
+        }
+        Ok(())
+    }
 }
 
 /// What [`total_least_squares`] found.
@@ -38,16 +59,20 @@ pub struct TotalEstimate {
 ///     min ‖[ΔW D⁻¹ | Δτ]‖²  with  (W + ΔW) θ = τ + Δτ
 /// ```
 ///
-/// with D of `column_std` over `torque_std`. Exact columns are taken out by the triangle; the smallest singular value √λ of what is left of `[W D⁻¹ | τ]` and its right vector give the
-/// others, which is mixed least squares and total least squares. Equivalently `(WᵀW − λD²) θ = Wᵀτ`. Consistent where D is right: Golub and Van Loan, SIAM J. Numer. Anal. 17 (1980) 883; Van
-/// Huffel and Vandewalle, The Total Least Squares Problem (1991), 3.5. Covariance: `H⁻¹ (Σ_g s_g s_gᵀ) H⁻¹` with `H = WᵀW − λD²`,
-/// `s_g = W_gᵀe_g + D²θ ‖e_g‖²/(1 + θᵀD²θ)`, `e = τ − W θ` (Fuller, Measurement Error Models (1987), 2.3); white: `σ_e² H⁻¹ WᵀW H⁻¹`.
+/// with D of `column_std` over `torque_std`. Exact columns are taken out by the triangle; the smallest singular value
+/// √λ of what is left of `[W D⁻¹ | τ]` and its right vector give the others, which is mixed least squares and total
+/// least squares. Equivalently `(WᵀW − λD²) θ = Wᵀτ`. Consistent where D is right: Golub and Van Loan, SIAM J. Numer.
+/// Anal. 17 (1980) 883; Van Huffel and Vandewalle, The Total Least Squares Problem (1991), 3.5. Covariance: `H⁻¹ (Σ_g
+/// s_g s_gᵀ) H⁻¹` with `H = WᵀW − λD²`, `s_g = W_gᵀe_g + D²θ ‖e_g‖²/(1 + θᵀD²θ)`, `e = τ − W θ` (Fuller, Measurement
+/// Error Models (1987), 2.3); white: `σ_e² H⁻¹ WᵀW H⁻¹`.
 ///
-/// Errors are taken to be independent between columns; those of q̇ and q̈ made from one position are not, and instruments are the better cure for them.
+/// Errors are taken to be independent between columns; those of q̇ and q̈ made from one position are not, and
+/// instruments are the better cure for them.
 ///
 /// # Errors
-/// As [`ordinary_least_squares`](crate::ordinary_least_squares); [`EstimationError::Setting`] for a standard deviation out of range; [`EstimationError::NoTotalSolution`] when the errors given are
-/// as large as a column itself, so that nothing is left to estimate from.
+/// As [`ordinary_least_squares`](crate::ordinary_least_squares); [`EstimationError::Setting`] for a standard deviation
+/// out of range; [`EstimationError::NoTotalSolution`] when the errors given are as large as a column itself, so that
+/// nothing is left to estimate from.
 ///
 /// ```
 /// use dynident_estimation::*;
@@ -71,6 +96,7 @@ pub struct TotalEstimate {
 /// assert!((found.error_scale - 1.0).abs() < 0.01);
 /// # Ok::<(), EstimationError>(())
 /// ```
+#[doc(alias("tls", "errors in variables", "eiv"))]
 pub fn total_least_squares(
     problem: &LinearProblem,
     settings: &TotalSettings,
@@ -134,17 +160,9 @@ pub fn total_least_squares(
 }
 
 fn check(problem: &LinearProblem, settings: &TotalSettings) -> Result<(), EstimationError> {
-    settings.rank.validate()?;
+    settings.validate()?;
     expect("standard deviations of columns", problem.columns().len(), settings.column_std.len())?;
     expect("standard deviations of torque", problem.joints().len(), settings.torque_std.len())?;
-    if let Some(&value) = settings.column_std.iter().find(|std| !(std.is_finite() && **std >= 0.0)) {
-        let mend = "give a finite standard deviation, 0 for an exact column";
-        return Err(EstimationError::Setting { setting: "column_std", value, mend });
-    }
-    if let Some(&value) = settings.torque_std.iter().find(|std| !(std.is_finite() && **std > 0.0)) {
-        let mend = "give a finite standard deviation above 0";
-        return Err(EstimationError::Setting { setting: "torque_std", value, mend });
-    }
     if problem.prior().is_some() {
         return Err(EstimationError::PriorWithoutNoiseLevel);
     }

@@ -13,7 +13,8 @@ pub struct WeightedSettings {
     pub rank: RankSettings,
     /// The covariance to report; from time segments by default.
     pub covariance: CovarianceMethod,
-    /// Largest relative change of any joint's σ at which the iteration ends. Default 1e-6: far below the accuracy of any σ.
+    /// Largest relative change of any joint's σ at which the iteration ends. Default 1e-6: far below the accuracy of
+    /// any σ.
     pub tolerance: f64,
     /// Most solutions made. Default 50; two to five are usual.
     pub max_iterations: usize,
@@ -48,20 +49,23 @@ impl WeightedSettings {
     }
 }
 
-/// A joint's σ never falls below this share of its torque's root mean square: with noise-free (simulated) torque the residual is
-/// rounding error, and weights made of it would wander for ever.
+/// A joint's σ never falls below this share of its torque's root mean square: with noise-free (simulated) torque the
+/// residual is rounding error, and weights made of it would wander for ever.
 const SMALLEST_SIGMA: f64 = 1.0e-9;
 
-/// `θ = argmin Σ_j ‖τ_j − W_j θ‖² / σ_j²` with `σ_j² = ‖τ_j − W_j θ‖² / (N_j − p/n)`, iterated from σ_j = 1 until the σ_j settle;
-/// N_j are the joint's rows, p the estimated columns, n the joints. A [prior](LinearProblem::with_prior) adds `‖S(θ − m)‖²`.
+/// `θ = argmin Σ_j ‖τ_j − W_j θ‖² / σ_j²` with `σ_j² = ‖τ_j − W_j θ‖² / (N_j − p/n)`, iterated from σ_j = 1 until the
+/// σ_j settle; N_j are the joint's rows, p the estimated columns, n the joints. A [prior](LinearProblem::with_prior)
+/// adds `‖S(θ − m)‖²`.
 ///
-/// The white-noise covariance is `(Σ_j W_jᵀW_j / σ_j² + SᵀS)⁻¹`. Which columns are excited is decided once, on the first solution.
-/// Gautier, "Dynamic identification of robots with power model", ICRA 1997; Swevers, Verdonck and De Schutter, IEEE Control
-/// Systems Magazine 27 (2007) 58.
+/// The white-noise covariance is `(Σ_j W_jᵀW_j / σ_j² + SᵀS)⁻¹`. Which columns are excited is decided once, on the
+/// first solution. Gautier, "Dynamic identification of robots with power model", ICRA 1997; Swevers, Verdonck and De
+/// Schutter, IEEE Control Systems Magazine 27 (2007) 58.
 ///
 /// # Errors
 /// [`EstimationError::Empty`] and [`EstimationError::TooFewRows`] when there is nothing to estimate from,
-/// [`EstimationError::Setting`], and the errors of the chosen covariance. Reaching `max_iterations` is a status, not an error.
+/// [`EstimationError::Setting`], and the errors of the chosen covariance. Reaching `max_iterations` is a status, not an
+/// error.
+#[doc(alias("wls", "idim-ls", "idim", "iteratively reweighted"))]
 pub fn weighted_least_squares(
     problem: &LinearProblem,
     settings: &WeightedSettings,
@@ -92,7 +96,8 @@ pub fn weighted_least_squares(
         solution = solve(&triangle, &split, &settings.rank, problem.fallback());
         iterations += 1;
     }
-    // The rows were scaled by the last weights; what noise is left in them is one up to the tolerance, unless the limit came first.
+    // The rows were scaled by the last weights; what noise is left in them is one up to the tolerance, unless the limit
+    // came first.
     Fitted { triangle, split, solution, weights, joint_sigma, weighted_variance: 1.0, iterations, converged }
         .into_estimate(&stacked, &settings.rank, settings.covariance)
 }

@@ -4,8 +4,9 @@ use nalgebra::{DMatrix, DVector};
 
 /// `a` of `e_t = a_1 e_{t−1} + … + a_k e_{t−k} + white noise`, k at most `most`; empty for white noise.
 ///
-/// Levinson and Durbin's recursion on the sample autocovariances `Σ e_t e_{t−l} / N`, which always gives a stable autoregression; k by Schwarz's criterion `N ln v_k + k ln N`, v_k being the variance that
-/// order k leaves. Brockwell and Davis, Time Series: Theory and Methods, 2nd ed., 5.2 and 9.3.
+/// Levinson and Durbin's recursion on the sample autocovariances `Σ e_t e_{t−l} / N`, which always gives a stable
+/// autoregression; k by Schwarz's criterion `N ln v_k + k ln N`, v_k being the variance that order k leaves. Brockwell
+/// and Davis, Time Series: Theory and Methods, 2nd ed., 5.2 and 9.3.
 pub(crate) fn autoregression(e: &[f64], most: usize) -> Vec<f64> {
     let count = e.len();
     let covariance = |lag: usize| -> f64 { e[lag..].iter().zip(e).map(|(late, early)| late * early).sum() };
@@ -63,7 +64,8 @@ mod tests {
     use super::*;
     use dynident_model::sample::Random;
 
-    /// e_t = 1.2 e_{t−1} − 0.5 e_{t−2} + w_t: coefficients of 4000 samples have errors of about √((1 − a_2²)/N) = 0.014; four of these. What the filter leaves is w.
+    /// e_t = 1.2 e_{t−1} − 0.5 e_{t−2} + w_t: coefficients of 4000 samples have errors of about √((1 − a_2²)/N) =
+    /// 0.014; four of these. What the filter leaves is w.
     #[test]
     fn an_autoregression_is_found_and_taken_away() {
         let mut random = Random::new(5);

@@ -1,4 +1,5 @@
-//! Maximum likelihood with errors in the motion as well as in the torque, both of known covariance: what averaged periods of a repeated motion allow.
+//! Maximum likelihood with errors in the motion as well as in the torque, both of known covariance: what averaged
+//! periods of a repeated motion allow.
 
 use crate::error::{EstimationError, expect};
 use crate::factor::{FactorWorkspace, RankReport, RankSettings, TriangularFactor, report, solve, split};
@@ -13,7 +14,8 @@ pub struct InstantRows<'a> {
     pub regressor: &'a DMatrix<f64>,
     /// τ, one entry per joint.
     pub torque: &'a DVector<f64>,
-    /// `∂W/∂x_i` for every measured variable x_i of the motion at this instant (positions; or positions, speeds and accelerations), each of W's shape.
+    /// `∂W/∂x_i` for every measured variable x_i of the motion at this instant (positions; or positions, speeds and
+    /// accelerations), each of W's shape.
     pub regressor_by_motion: &'a [DMatrix<f64>],
 }
 
@@ -23,7 +25,8 @@ pub type InstantVisitor<'a> = dyn FnMut(&InstantRows<'_>) -> Result<(), Estimati
 /// Settings of [`maximum_likelihood`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaximumLikelihoodSettings {
-    /// Σ_q: covariance of the errors of the motion's variables at one instant, as they enter (of P averaged periods, a P-th of a single one's). Symmetric, not indefinite.
+    /// Σ_q: covariance of the errors of the motion's variables at one instant, as they enter (of P averaged periods, a
+    /// P-th of a single one's). Symmetric, not indefinite.
     pub motion_covariance: DMatrix<f64>,
     /// Σ_τ: covariance of the torque's errors, (joints, joints), positive definite.
     pub torque_covariance: DMatrix<f64>,
@@ -42,14 +45,16 @@ pub struct MaximumLikelihoodEstimate {
     pub names: Vec<String>,
     /// One value per column; zero for a column that the data do not excite.
     pub values: Vec<f64>,
-    /// `(Σ_k W̃_kᵀ S_k⁻¹ W̃_k)⁻¹`: the Cramér-Rao bound for the covariances given; zero rows and columns for fixed columns.
+    /// `(Σ_k W̃_kᵀ S_k⁻¹ W̃_k)⁻¹`: the Cramér-Rao bound for the covariances given; zero rows and columns for fixed
+    /// columns.
     #[serde(skip)]
     pub covariance: DMatrix<f64>,
     /// Square roots of its diagonal.
     pub std: Vec<f64>,
     /// The cost at the values.
     pub cost: f64,
-    /// Residuals less estimated columns. The cost is about as large when model and covariances are right (χ²), and larger when the model leaves something out.
+    /// Residuals less estimated columns. The cost is about as large when model and covariances are right (χ²), and
+    /// larger when the model leaves something out.
     pub degrees_of_freedom: usize,
     /// Steps made.
     pub iterations: usize,
@@ -68,20 +73,26 @@ struct Gathered {
 /// Minimises
 ///
 /// ```text
-///     J(θ) = Σ_k r_kᵀ S_k(θ)⁻¹ r_k,   r_k = τ_k − W_k θ,   S_k = D_k Σ_q D_kᵀ + Σ_τ,   D_k = ∂r_k/∂q = −Σ_j θ_j ∂W_kj/∂q
+///     J(θ) = Σ_k r_kᵀ S_k(θ)⁻¹ r_k,   r_k = τ_k − W_k θ,
+///     S_k = D_k Σ_q D_kᵀ + Σ_τ,   D_k = ∂r_k/∂q = −Σ_j θ_j ∂W_kj/∂q
 /// ```
 ///
-/// which is the likelihood's exponent once the best motion near the measured one has been taken for every instant. Olsen, Swevers and Verdonck, Int. J. Robotics Research 21 (2002) 895: for periodic
-/// excitation Σ_q and Σ_τ are known from how the periods differ. Where W holds noise, least squares draws parameters towards zero; this does not, to first order in the motion's errors.
+/// which is the likelihood's exponent once the best motion near the measured one has been taken for every instant.
+/// Olsen, Swevers and Verdonck, Int. J. Robotics Research 21 (2002) 895: for periodic excitation Σ_q and Σ_τ are known
+/// from how the periods differ. Where W holds noise, least squares draws parameters towards zero; this does not, to
+/// first order in the motion's errors.
 ///
-/// Gauss and Newton's steps with the regressor at the corrected motion, `W̃ = W + Σ_i (Σ_q Dᵀ S⁻¹ r)_i (−∂W/∂q_i)`, whose gradient is exact: `∂J/∂θ = −2 Σ W̃ᵀ S⁻¹ r` (Britt and Luecke,
-/// Technometrics 15 (1973) 233). A step that does not lower J is halved. The first one, from θ = 0, is generalised least squares.
+/// Gauss and Newton's steps with the regressor at the corrected motion, `W̃ = W + Σ_i (Σ_q Dᵀ S⁻¹ r)_i (−∂W/∂q_i)`,
+/// whose gradient is exact: `∂J/∂θ = −2 Σ W̃ᵀ S⁻¹ r` (Britt and Luecke, Technometrics 15 (1973) 233). A step that does
+/// not lower J is halved. The first one, from θ = 0, is generalised least squares.
 ///
 /// `pass` hands every instant to its visitor, the same ones as often as it is called.
 ///
 /// # Errors
-/// [`EstimationError::Setting`] for covariances that are none or numbers out of range, [`EstimationError::Mismatch`] for other shapes, [`EstimationError::Empty`],
-/// [`EstimationError::TooFewRows`], [`EstimationError::Unusable`], and whatever `pass` returns.
+/// [`EstimationError::Setting`] for covariances that are none or numbers out of range, [`EstimationError::Mismatch`]
+/// for other shapes, [`EstimationError::Empty`], [`EstimationError::TooFewRows`], [`EstimationError::Unusable`], and
+/// whatever `pass` returns.
+#[doc(alias("ml", "mle"))]
 pub fn maximum_likelihood<E: From<EstimationError>>(
     names: &[String],
     settings: &MaximumLikelihoodSettings,

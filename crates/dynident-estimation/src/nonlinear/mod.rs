@@ -19,7 +19,7 @@ pub use simulated::{
     simulated_least_squares,
 };
 pub use simultaneous::{
-    ChannelNoise, SimultaneousEstimate, SimultaneousModel, SimultaneousSettings, simultaneous_bound,
-    simultaneous_least_squares,
+    ChannelNoise, SimultaneousEstimate, SimultaneousModel, SimultaneousProblem, SimultaneousSettings,
+    simultaneous_bound, simultaneous_least_squares,
 };
 pub use simultaneous_rows::ChannelRows;

@@ -6,21 +6,25 @@ use crate::uncertainty::EstimateStatus;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// What a simulation of the experiment gives, at the record's own instants: rows of all channels and instants in one order, which is the record's as well.
+/// What a simulation of the experiment gives, at the record's own instants: rows of all channels and instants in one
+/// order, which is the record's as well.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulatedRows {
     /// What is compared with the record: torque for DIDIM and CLIE, position for CLOE.
     pub output: DVector<f64>,
-    /// W of the simulated motion, shape (rows, columns); DIDIM's rows only, and empty (no rows) for a simulation that does not give them.
+    /// W of the simulated motion, shape (rows, columns); DIDIM's rows only, and empty (no rows) for a simulation that
+    /// does not give them.
     pub regressor: DMatrix<f64>,
 }
 
-/// The experiment over again with other parameters: the same machine model, controller, reference and filters. `estimation` does not know how.
+/// The experiment over again with other parameters: the same machine model, controller, reference and filters.
+/// `estimation` does not know how.
 pub trait SimulatedMotion {
     /// What can go wrong in a simulation.
     type Error: From<EstimationError>;
 
-    /// Simulates with parameters θ. None when the simulation does not get through (an unstable loop, a mass matrix that is none): the step is then halved.
+    /// Simulates with parameters θ. None when the simulation does not get through (an unstable loop, a mass matrix that
+    /// is none): the step is then halved.
     ///
     /// # Errors
     /// Whatever no other parameters would mend.
@@ -31,11 +35,12 @@ pub trait SimulatedMotion {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SimulatedCriterion {
-    /// `‖τ − W(q_s, q̇_s, q̈_s) θ‖`, the simulated motion taken for given in every step: direct and inverse dynamic identification. The measured position is not needed. A few simulations in all.
+    /// `‖τ − W(q_s, q̇_s, q̈_s) θ‖`, the simulated motion taken for given in every step: direct and inverse dynamic
+    /// identification. The measured position is not needed. A few simulations in all.
     #[default]
     Didim,
-    /// `‖y − y_s(θ)‖` with the Jacobian of the simulation by differences: closed-loop input error (y the torque) or output error (y the position), by what the simulation puts out. One
-    /// simulation for every parameter and step.
+    /// `‖y − y_s(θ)‖` with the Jacobian of the simulation by differences: closed-loop input error (y the torque) or
+    /// output error (y the position), by what the simulation puts out. One simulation for every parameter and step.
     Output,
 }
 
@@ -110,7 +115,8 @@ pub struct SimulatedEstimate {
     pub names: Vec<String>,
     /// One value per parameter; that of a parameter which the data do not excite is its start.
     pub values: Vec<f64>,
-    /// `s² (JᵀJ)⁻¹` of the rows over their noise, s² the mean square of what is left: for noise that is white over the rows.
+    /// `s² (JᵀJ)⁻¹` of the rows over their noise, s² the mean square of what is left: for noise that is white over the
+    /// rows.
     #[serde(skip)]
     pub covariance: DMatrix<f64>,
     /// Square roots of its diagonal.
@@ -121,15 +127,17 @@ pub struct SimulatedEstimate {
     pub iterations: usize,
     /// Simulations made.
     pub simulations: usize,
-    /// How it ended. [`EstimateStatus::IterationLimit`] also when no shorter step lowers the cost any more although the step is not small.
+    /// How it ended. [`EstimateStatus::IterationLimit`] also when no shorter step lowers the cost any more although the
+    /// step is not small.
     pub status: EstimateStatus,
     /// Rank decisions at the last point.
     pub rank: RankReport,
-    /// What the outputs do with the parameters at the last point, shape (rows, parameters): W of the simulated motion for DIDIM, J for CLIE and CLOE.
+    /// What the outputs do with the parameters at the last point, shape (rows, parameters): W of the simulated motion
+    /// for DIDIM, J for CLIE and CLOE.
     #[serde(skip)]
     pub jacobian: DMatrix<f64>,
-    /// What was measured there less `W θ` (DIDIM) or less the simulation's output, so that `jacobian · (θ' - values) ≈ residual` is the problem of the next step: what error bars for coloured residuals
-    /// can be made from.
+    /// What was measured there less `W θ` (DIDIM) or less the simulation's output, so that `jacobian · (θ' - values) ≈
+    /// residual` is the problem of the next step: what error bars for coloured residuals can be made from.
     #[serde(skip)]
     pub residual: DVector<f64>,
 }
@@ -137,20 +145,24 @@ pub struct SimulatedEstimate {
 /// Parameters with which the simulated experiment looks like the recorded one, by the method of Gauss and Newton:
 ///
 /// ```text
-///     DIDIM:       θ_{k+1} = argmin ‖Σ^{-1/2} (τ − W(q_s(θ_k)) θ)‖        (the motion follows the reference whatever θ is: ∂y_s/∂θ ≈ W)
+///     DIDIM:       θ_{k+1} = argmin ‖Σ^{-1/2} (τ − W(q_s(θ_k)) θ)‖        (the motion hardly depends on θ: ∂y_s/∂θ ≈ W)
 ///     CLIE, CLOE:  θ_{k+1} = θ_k + argmin ‖Σ^{-1/2} (y − y_s(θ_k) − J Δ)‖,  J = ∂y_s/∂θ by central differences
 /// ```
 ///
-/// A step that does not lower `‖Σ^{-1/2} (y − y_s(θ))‖` is halved (for DIDIM, one that raises its square by more than 5 %). No noise of a measured position enters the regressor; instead the controller and its reference must be known. Gautier, Janot and
-/// Vandanjon, IEEE Trans. Control Syst. Technol. 21 (2013) 428 (DIDIM); Walter and Pronzato, Identification of Parametric Models from Experimental Data (1997), for output errors.
+/// A step that does not lower `‖Σ^{-1/2} (y − y_s(θ))‖` is halved (for DIDIM, one that raises its square by more than 5
+/// %). No noise of a measured position enters the regressor; instead the controller and its reference must be known.
+/// Gautier, Janot and Vandanjon, IEEE Trans. Control Syst. Technol. 21 (2013) 428 (DIDIM); Walter and Pronzato,
+/// Identification of Parametric Models from Experimental Data (1997), for output errors.
 ///
 /// # Errors
-/// [`EstimationError::Mismatch`] for lists and rows of other lengths, [`EstimationError::Setting`], [`EstimationError::TooFewRows`], [`EstimationError::Unusable`], and whatever the simulation returns;
+/// [`EstimationError::Mismatch`] for lists and rows of other lengths, [`EstimationError::Setting`],
+/// [`EstimationError::TooFewRows`], [`EstimationError::Unusable`], and whatever the simulation returns;
 /// [`EstimationError::NoSimulation`] when the start itself cannot be simulated.
+#[doc(alias("didim", "clie", "cloe", "cle", "output error"))]
 pub fn simulated_least_squares<S: SimulatedMotion>(
     problem: &SimulatedProblem,
-    simulation: &mut S,
     settings: &SimulatedSettings,
+    simulation: &mut S,
 ) -> Result<SimulatedEstimate, S::Error> {
     settings.validate()?;
     problem.validate()?;
@@ -200,7 +212,8 @@ pub fn simulated_least_squares<S: SimulatedMotion>(
         let mut share = 1.0;
         while better.is_none() && share > 1.0e-4 {
             let candidate = &theta + &step * share;
-            // Within the tolerance costs differ by what the simulation's own accuracy leaves; and DIDIM's fixed point is not quite where the cost is least.
+            // Within the tolerance costs differ by what the simulation's own accuracy leaves; and DIDIM's fixed point
+            // is not quite where the cost is least.
             let most = match settings.criterion {
                 SimulatedCriterion::Didim => now.cost * DIDIM_RISE,
                 SimulatedCriterion::Output if converged => now.cost * (1.0 + settings.tolerance),
@@ -265,7 +278,8 @@ impl SimulatedProblem {
     }
 }
 
-/// How much a step of DIDIM may raise the cost: with noise in the torque its fixed point lies beside the least cost by a part of an error bar.
+/// How much a step of DIDIM may raise the cost: with noise in the torque its fixed point lies beside the least cost by
+/// a part of an error bar.
 const DIDIM_RISE: f64 = 1.05;
 
 struct Run<'a, S> {

@@ -1,4 +1,5 @@
-//! Motion and parameters from one likelihood: noise of the positions and noise of the torque are weighed against each other.
+//! Motion and parameters from one likelihood: noise of the positions and noise of the torque are weighed against each
+//! other.
 
 use super::autoregression::autoregression;
 use super::simultaneous_rows::{ChannelRows, WhiteRows, cost};
@@ -19,7 +20,8 @@ pub trait SimultaneousModel {
     /// As the model says.
     fn residuals(&mut self, motion: &[f64], parameters: &[f64]) -> Result<Vec<Vec<f64>>, Self::Error>;
 
-    /// The same with derivatives. These need not be exact: they decide how fast the iteration goes and how rows are weighed; where it ends has no bias from them.
+    /// The same with derivatives. These need not be exact: they decide how fast the iteration goes and how rows are
+    /// weighed; where it ends has no bias from them.
     ///
     /// # Errors
     /// As the model says.
@@ -35,15 +37,30 @@ pub struct ChannelNoise {
     pub autoregression: Vec<f64>,
 }
 
+/// What is sought, what was measured, and where to begin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SimultaneousProblem {
+    /// Names of the parameters.
+    pub names: Vec<String>,
+    /// Names of the measured channels, in the model's order.
+    pub channels: Vec<String>,
+    /// The motion's unknowns at the start, such as Fourier coefficients fitted to the positions.
+    pub motion: Vec<f64>,
+    /// The parameters at the start, such as a least-squares estimate.
+    pub parameters: Vec<f64>,
+}
+
 /// Settings of [`simultaneous_least_squares`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SimultaneousSettings {
     /// When a column counts as excited, once the motion's unknowns are taken out.
     pub rank: RankSettings,
-    /// The covariance to report, of whitened rows; from time segments by default. The white one is right where noise is autoregressive and the model leaves nothing out.
+    /// The covariance to report, of whitened rows; from time segments by default. The white one is right where noise is
+    /// autoregressive and the model leaves nothing out.
     pub covariance: CovarianceMethod,
-    /// Highest order of the autoregression that a channel's residuals may have; the order is Schwarz's. Default 4; 0 takes all noise for white.
+    /// Highest order of the autoregression that a channel's residuals may have; the order is Schwarz's. Default 4; 0
+    /// takes all noise for white.
     pub most_autoregression: usize,
     /// Length of a step, in error bars over all directions, at which the iteration ends. Default 1e-3.
     pub tolerance: f64,
@@ -67,7 +84,8 @@ impl SimultaneousSettings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// [`EstimationError::Setting`] for an order above 64, a tolerance outside 1e-9 to 1, fewer than two iterations, or rank settings out of range.
+    /// [`EstimationError::Setting`] for an order above 64, a tolerance outside 1e-9 to 1, fewer than two iterations, or
+    /// rank settings out of range.
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
         let error = |setting, value, mend| Err(EstimationError::Setting { setting, value, mend });
@@ -100,36 +118,46 @@ const SLOW: f64 = 0.25;
 /// and at the end if it lies so many error bars from where they were.
 const FAR: f64 = 1.0;
 
-/// `argmin Σ_c Σ_t [A_c (y_c − f_c(motion, parameters))]_t² / σ_c²` over motion **and** parameters: maximum likelihood for normal errors in all channels, with `A_c` the whitening filter of
-/// the channel's autoregressive noise and σ_c its standard deviation, both found from the residuals.
+/// `argmin Σ_c Σ_t [A_c (y_c − f_c(motion, parameters))]_t² / σ_c²` over motion **and** parameters: maximum likelihood
+/// for normal errors in all channels, with `A_c` the whitening filter of the channel's autoregressive noise and σ_c its
+/// standard deviation, both found from the residuals.
 ///
-/// Least squares on a measured motion takes that motion for exact. What noise in the positions does to the torque of heavy links is then part of the residual: coloured, correlated across joints, and
-/// as strong as the torque's own noise where it matters most. Here the motion (the coefficients of a Fourier series, say) is unknown too; positions and torques both tell of it, each by its precision.
-/// Its unknowns must be few against the rows: then the σ_c are consistent, which they are not when every instant has unknowns of its own (see
+/// Least squares on a measured motion takes that motion for exact. What noise in the positions does to the torque of
+/// heavy links is then part of the residual: coloured, correlated across joints, and as strong as the torque's own
+/// noise where it matters most. Here the motion (the coefficients of a Fourier series, say) is unknown too; positions
+/// and torques both tell of it, each by its precision. Its unknowns must be few against the rows: then the σ_c are
+/// consistent, which they are not when every instant has unknowns of its own (see
 /// [`maximum_likelihood`](crate::maximum_likelihood()) for that case, with known covariances).
 ///
-/// Gauss and Newton's steps; a step that raises the sum is halved. After the first one rows are linearised again, and after that only where steps do not shrink to a quarter or lead further than an error bar.
-/// The noise's colour is that of the residuals where rows were linearised last, σ_c follows every step, `σ_c² = RSS_c / (N_c − leverage of the channel)`. At the end the motion is eliminated from the rows,
-/// `X̃ = X_parameters − X_motion (X_motionᵀ X_motion)⁻¹ X_motionᵀ X_parameters`, and the parameters' covariance is that of a linear problem of those rows: `(Σ X̃ᵀX̃/σ²)⁻¹` if white, which is the
-/// Cramér-Rao bound of this model with its motion unknown, or a sandwich. All rows of the linearisation are held in memory.
+/// Gauss and Newton's steps; a step that raises the sum is halved. After the first one rows are linearised again, and
+/// after that only where steps do not shrink to a quarter or lead further than an error bar. The noise's colour is that
+/// of the residuals where rows were linearised last, σ_c follows every step, `σ_c² = RSS_c / (N_c − leverage of the
+/// channel)`. At the end the motion is eliminated from the rows, `X̃ = X_parameters − X_motion (X_motionᵀ X_motion)⁻¹
+/// X_motionᵀ X_parameters`, and the parameters' covariance is that of a linear problem of those rows: `(Σ X̃ᵀX̃/σ²)⁻¹`
+/// if white, which is the Cramér-Rao bound of this model with its motion unknown, or a sandwich. All rows of the
+/// linearisation are held in memory.
 ///
-/// Fuller, Measurement Error Models (1987), 3.1 to 3.3; Seber and Wild, Nonlinear Regression (1989), 6.2 (autoregressive errors), 14.3 (elimination).
+/// Fuller, Measurement Error Models (1987), 3.1 to 3.3; Seber and Wild, Nonlinear Regression (1989), 6.2
+/// (autoregressive errors), 14.3 (elimination).
 ///
 /// # Errors
-/// [`EstimationError::Setting`], [`EstimationError::Mismatch`] for other shapes, [`EstimationError::Empty`], [`EstimationError::TooFewRows`], [`EstimationError::Undetermined`] when the rows do not
-/// tell an unknown from those before it, the errors of the covariance, and whatever the model returns. Reaching `max_iterations` is a status, not an error.
+/// [`EstimationError::Setting`], [`EstimationError::Mismatch`] for other shapes, [`EstimationError::Empty`],
+/// [`EstimationError::TooFewRows`], [`EstimationError::Undetermined`] when the rows do not tell an unknown from those
+/// before it, the errors of the covariance, and whatever the model returns. Reaching `max_iterations` is a status, not
+/// an error.
+#[doc(alias("joint estimation", "bundle adjustment"))]
 pub fn simultaneous_least_squares<M: SimultaneousModel>(
-    names: &[String],
-    channels: &[String],
-    start: (&[f64], &[f64]),
+    problem: &SimultaneousProblem,
     settings: &SimultaneousSettings,
     model: &mut M,
 ) -> Result<SimultaneousEstimate, M::Error> {
     settings.validate()?;
-    expect("parameters of the start", names.len(), start.1.len())?;
-    let motion = start.0.len();
-    let mut unknowns = DVector::from_iterator(motion + names.len(), start.0.iter().chain(start.1).copied());
-    let mut raw = model.linearised(start.0, start.1)?;
+    let (names, channels) = (&problem.names, &problem.channels);
+    expect("parameters of the start", names.len(), problem.parameters.len())?;
+    let motion = problem.motion.len();
+    let start = problem.motion.iter().chain(&problem.parameters).copied();
+    let mut unknowns = DVector::from_iterator(motion + names.len(), start);
+    let mut raw = model.linearised(&problem.motion, &problem.parameters)?;
     expect("channels", channels.len(), raw.len())?;
     let mut colours = vec![Vec::new(); raw.len()];
     let mut rows = WhiteRows::new(&raw, &colours, motion, names.len())?;
@@ -207,11 +235,13 @@ pub fn simultaneous_least_squares<M: SimultaneousModel>(
     Ok(SimultaneousEstimate { estimate, motion: unknowns.as_slice()[..motion].to_vec(), noise })
 }
 
-/// The Cramér-Rao bound on the parameters' covariance when the motion is unknown as well: the parameters' block of `(Σ_c X_cᵀ A_cᵀ A_c X_c / σ_c²)⁻¹`, for rows linearised at the truth and the
-/// true noise. `motion` is the number of the motion's unknowns, `names` are the parameters'; residuals are not read.
+/// The Cramér-Rao bound on the parameters' covariance when the motion is unknown as well: the parameters' block of
+/// `(Σ_c X_cᵀ A_cᵀ A_c X_c / σ_c²)⁻¹`, for rows linearised at the truth and the true noise. `motion` is the number of
+/// the motion's unknowns, `names` are the parameters'; residuals are not read.
 ///
 /// # Errors
-/// [`EstimationError::Mismatch`] for other shapes, [`EstimationError::Setting`] for noise without a positive deviation, [`EstimationError::Undetermined`].
+/// [`EstimationError::Mismatch`] for other shapes, [`EstimationError::Setting`] for noise without a positive deviation,
+/// [`EstimationError::Undetermined`].
 pub fn simultaneous_bound(
     names: &[String],
     motion: usize,
@@ -236,8 +266,14 @@ mod tests {
     use super::*;
     use dynident_model::sample::Random;
 
-    fn names(names: &[&str]) -> Vec<String> {
-        names.iter().map(|name| (*name).to_owned()).collect()
+    fn begun(names: &[&str], motion: &[f64], parameters: &[f64]) -> SimultaneousProblem {
+        let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+        SimultaneousProblem {
+            names: owned(names),
+            channels: owned(&["position", "torque"]),
+            motion: motion.to_vec(),
+            parameters: parameters.to_vec(),
+        }
     }
 
     /// Positions q = c s and torques τ = θ c s of a known shape s: one unknown of the motion, one parameter.
@@ -276,7 +312,8 @@ mod tests {
         Line { s, q, tau }
     }
 
-    /// As many moments as unknowns: θ = Στs/Σqs, c = Σqs/Σs², whatever the noise; and Var θ = (σ_τ² + θ² σ_q²)/(c² Σs²) by the delta method, which is exact for linearised rows.
+    /// As many moments as unknowns: θ = Στs/Σqs, c = Σqs/Σs², whatever the noise; and Var θ = (σ_τ² + θ² σ_q²)/(c² Σs²)
+    /// by the delta method, which is exact for linearised rows.
     #[test]
     fn the_scalar_case_is_the_closed_form() {
         let mut model = line(&mut Random::new(3));
@@ -288,24 +325,26 @@ mod tests {
             tolerance: 1e-9,
             ..SimultaneousSettings::default()
         };
-        let (gain, channels) = (names(&["gain"]), names(&["position", "torque"]));
-        let found = simultaneous_least_squares(&gain, &channels, (&[1.0], &[3.0]), &settings, &mut model).unwrap();
+        let problem = begun(&["gain"], &[1.0], &[3.0]);
+        let found = simultaneous_least_squares(&problem, &settings, &mut model).unwrap();
         assert_eq!(found.estimate.status, crate::EstimateStatus::Complete);
         let (theta, c) = (found.estimate.values[0], found.motion[0]);
         // The tolerance of the steps, 1e-9 of error bars of 0.1.
         assert!((theta - ts / qs).abs() < 1e-9 && (c - qs / ss).abs() < 1e-9, "{theta} {c}");
         let [sigma_q, sigma_tau] = [found.noise[0].std, found.noise[1].std];
-        // Each of the two unknowns takes one degree of freedom, half from each channel or all from one: σ is known to a per cent of its own error.
+        // Each of the two unknowns takes one degree of freedom, half from each channel or all from one: σ is known to a
+        // per cent of its own error.
         assert!((sigma_q / 0.3 - 1.0).abs() < 0.2 && (sigma_tau / 0.5 - 1.0).abs() < 0.2);
         let std = ((sigma_tau.powi(2) + (theta * sigma_q).powi(2)) / (c * c * ss)).sqrt();
         assert!((found.estimate.std[0] / std - 1.0).abs() < 1e-6, "{} {std}", found.estimate.std[0]);
         let rows = model.linearised(&[2.0], &[5.0]).unwrap();
         let noise = [0.3, 0.5].map(|std| ChannelNoise { std, autoregression: Vec::new() });
-        let bound = simultaneous_bound(&gain, 1, &rows, &noise).unwrap()[(0, 0)];
+        let bound = simultaneous_bound(&problem.names, 1, &rows, &noise).unwrap()[(0, 0)];
         assert!((bound / ((0.25 + 25.0 * 0.09) / (4.0 * ss)) - 1.0).abs() < 1e-10);
     }
 
-    /// A pendulum `τ = J q̈ + m sin q + f q̇ + o` whose motion is a short Fourier series; torque noise is an autoregression.
+    /// A pendulum `τ = J q̈ + m sin q + f q̇ + o` whose motion is a short Fourier series; torque noise is an
+    /// autoregression.
     struct Pendulum {
         q: Vec<f64>,
         tau: Vec<f64>,
@@ -384,33 +423,25 @@ mod tests {
         }
     }
 
-    /// Against its own bound, which ordinary least squares on the fitted motion misses. 60 runs of four parameters: the root mean square has a sampling error of 1/√(2·240) = 5 %, twice that if parameters
-    /// err together; coverage of 240 intervals one of 1.4 %, twice that likewise. Three of these.
+    /// Against its own bound, which ordinary least squares on the fitted motion misses. 60 runs of four parameters: the
+    /// root mean square has a sampling error of 1/√(2·240) = 5 %, twice that if parameters err together; coverage of
+    /// 240 intervals one of 1.4 %, twice that likewise. Three of these.
     #[test]
     fn a_pendulum_reaches_the_bound_with_honest_intervals() {
-        let parameters = names(&["J", "m", "f", "o"]);
-        let channels = names(&["position", "torque"]);
+        let problem = begun(&["J", "m", "f", "o"], &[0.4, 0.8, -0.2, 0.2, 0.5], &[1.0, 4.0, 0.0, 0.0]);
         let mut random = Random::new(7);
         let rows = Pendulum::recorded(&mut random).linearised(&TRUE_MOTION, &TRUE_PARAMETERS).unwrap();
         let noise = [
             ChannelNoise { std: 0.02, autoregression: Vec::new() },
             ChannelNoise { std: 0.12, autoregression: vec![0.8] },
         ];
-        let bound = simultaneous_bound(&parameters, 5, &rows, &noise).unwrap();
+        let bound = simultaneous_bound(&problem.names, 5, &rows, &noise).unwrap();
         for (covariance, runs) in [(CovarianceMethod::White, 60), (CovarianceMethod::Jackknife, 30)] {
             let settings = SimultaneousSettings { covariance, ..SimultaneousSettings::default() };
             let (mut squares, mut inside) = (0.0, 0);
             for _ in 0..runs {
                 let mut model = Pendulum::recorded(&mut random);
-                let start = (&[0.4, 0.8, -0.2, 0.2, 0.5], &[1.0, 4.0, 0.0, 0.0]);
-                let found = simultaneous_least_squares(
-                    &parameters,
-                    &channels,
-                    (&start.0[..], &start.1[..]),
-                    &settings,
-                    &mut model,
-                )
-                .unwrap();
+                let found = simultaneous_least_squares(&problem, &settings, &mut model).unwrap();
                 assert_eq!(found.estimate.status, crate::EstimateStatus::Complete);
                 for p in 0..4 {
                     let error = found.estimate.values[p] - TRUE_PARAMETERS[p];
@@ -424,7 +455,8 @@ mod tests {
         }
     }
 
-    /// Without noise the truth comes out, to the smallest σ that a channel may have: 1e-9 of its size, over √500 rows and times the condition of the parameters.
+    /// Without noise the truth comes out, to the smallest σ that a channel may have: 1e-9 of its size, over √500 rows
+    /// and times the condition of the parameters.
     #[test]
     fn without_noise_the_truth_comes_out() {
         let (mut q, mut tau) = (Vec::new(), Vec::new());
@@ -434,12 +466,10 @@ mod tests {
             q.push(x);
             tau.push(j * ddx + m * x.sin() + f * dx + o);
         }
-        let parameters = names(&["J", "m", "f", "o"]);
-        let channels = names(&["position", "torque"]);
-        let start = (&[0.4, 0.8, -0.2, 0.2, 0.5][..], &[1.0, 4.0, 0.0, 0.0][..]);
+        let problem = begun(&["J", "m", "f", "o"], &[0.4, 0.8, -0.2, 0.2, 0.5], &[1.0, 4.0, 0.0, 0.0]);
         let settings = SimultaneousSettings::default();
         let mut model = Pendulum { q, tau };
-        let found = simultaneous_least_squares(&parameters, &channels, start, &settings, &mut model).unwrap();
+        let found = simultaneous_least_squares(&problem, &settings, &mut model).unwrap();
         assert_eq!(found.estimate.status, crate::EstimateStatus::Complete);
         for (found, truth) in found.estimate.values.iter().zip(TRUE_PARAMETERS) {
             assert!((found - truth).abs() < 1e-8, "{found} {truth}");
@@ -461,12 +491,12 @@ mod tests {
             }
         }
         let mut model = Still(line(&mut Random::new(3)));
-        let (gain, channels) = (names(&["gain"]), names(&["position", "torque"]));
+        let problem = begun(&["gain"], &[1.0], &[3.0]);
         let settings = SimultaneousSettings::default();
-        let found = simultaneous_least_squares(&gain, &channels, (&[1.0], &[3.0]), &settings, &mut model);
+        let found = simultaneous_least_squares(&problem, &settings, &mut model);
         assert_eq!(found.unwrap_err(), EstimationError::Undetermined { name: "gain".into() });
         model.0.tau[4] = f64::NAN;
-        let found = simultaneous_least_squares(&gain, &channels, (&[1.0], &[3.0]), &settings, &mut model);
+        let found = simultaneous_least_squares(&problem, &settings, &mut model);
         assert!(matches!(found, Err(EstimationError::Unusable { row: 4, .. })));
         let none = SimultaneousSettings { max_iterations: 0, ..settings };
         assert!(none.validate().is_err());

@@ -1,18 +1,22 @@
-//! The linear algebra behind [`simultaneous_least_squares`](crate::simultaneous_least_squares()): whitened rows, their normal matrices, and the motion's elimination.
+//! The linear algebra behind [`simultaneous_least_squares`](crate::simultaneous_least_squares()): whitened rows, their
+//! normal matrices, and the motion's elimination.
 
 use super::autoregression::{whitened, whitened_columns};
 use crate::error::{EstimationError, expect};
 use crate::factor::{LinearProblem, SegmentSettings, SegmentedFactor};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// A pivot of the information, scaled to a unit diagonal, that counts as zero: the square of a share of a column that is far below what any real motion leaves, and above rounding.
+/// A pivot of the information, scaled to a unit diagonal, that counts as zero: the square of a share of a column that
+/// is far below what any real motion leaves, and above rounding.
 const SINGULAR: f64 = 1.0e-13;
-/// A channel's σ never falls below this share of what its unknowns make of it: noise-free data leave rounding errors only.
+/// A channel's σ never falls below this share of what its unknowns make of it: noise-free data leave rounding errors
+/// only.
 const SMALLEST_SIGMA: f64 = 1.0e-9;
 /// Columns that are multiplied at a time: the normal matrices are symmetric, and half of them need not be made.
 const STRIP: usize = 64;
 
-/// One channel's rows about given unknowns: a joint's positions, or a joint's torques, of one uninterrupted piece of one log, in the order of time.
+/// One channel's rows about given unknowns: a joint's positions, or a joint's torques, of one uninterrupted piece of
+/// one log, in the order of time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChannelRows {
     /// `y − f(motion, parameters)`, one number for each row.
@@ -213,7 +217,8 @@ impl WhiteRows {
         Ok(sigma)
     }
 
-    /// The linear problem of the parameters alone: rows `[X_p − X_m B | r + (X_p − X_m B) θ]`, `B = H_mm⁻¹ H_mp`, whose normal matrix is the Schur complement of the motion's block.
+    /// The linear problem of the parameters alone: rows `[X_p − X_m B | r + (X_p − X_m B) θ]`, `B = H_mm⁻¹ H_mp`, whose
+    /// normal matrix is the Schur complement of the motion's block.
     pub(crate) fn eliminated(
         &self,
         names: &[String],

@@ -1,8 +1,9 @@
 //! Block bootstrap: what the estimate would have been from other draws of the same time segments.
 //!
-//! Each replicate draws as many segments of a joint in a log as there are, with replacement, and solves again with the weights of the fit. In coordinates where the fit's information is the unit
-//! matrix a replicate's change is `(Σ_g n_g H_g)⁻¹ Σ_g n_g s_g`, with H_g the segment's information, s_g its score and n_g how often it was drawn. Künsch, Annals of Statistics 17 (1989) 1217;
-//! Davison and Hinkley, Bootstrap Methods and their Application (1997), 8.2.
+//! Each replicate draws as many segments of a joint in a log as there are, with replacement, and solves again with the
+//! weights of the fit. In coordinates where the fit's information is the unit matrix a replicate's change is `(Σ_g n_g
+//! H_g)⁻¹ Σ_g n_g s_g`, with H_g the segment's information, s_g its score and n_g how often it was drawn. Künsch,
+//! Annals of Statistics 17 (1989) 1217; Davison and Hinkley, Bootstrap Methods and their Application (1997), 8.2.
 
 use crate::error::EstimationError;
 use dynident_model::sample::Random;
@@ -14,10 +15,11 @@ const REPLICATES: usize = 300;
 const SEED: u64 = 1;
 
 /// The segments of one joint in one log, whitened: information and score of each.
-pub(crate) type Blocks = Vec<(DMatrix<f64>, DVector<f64>)>;
+pub(super) type Blocks = Vec<(DMatrix<f64>, DVector<f64>)>;
 
-/// The second moment of the replicates' changes about zero, about which they are drawn. `fixed` is the information that is not drawn (a prior's).
-pub(crate) fn spread(blocks: &[Blocks], fixed: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimationError> {
+/// The second moment of the replicates' changes about zero, about which they are drawn. `fixed` is the
+/// information that is not drawn (a prior's).
+pub(super) fn replicated(blocks: &[Blocks], fixed: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimationError> {
     let size = fixed.nrows();
     let mut random = Random::new(SEED);
     let mut sum = DMatrix::zeros(size, size);
@@ -48,7 +50,8 @@ pub(crate) fn spread(blocks: &[Blocks], fixed: &DMatrix<f64>) -> Result<DMatrix<
 mod tests {
     use super::*;
 
-    /// The mean of independent numbers: the bootstrap's variance is Σ (x − mean)² / n². Two hundred draws of 300 know it to 8 % (one σ); 25 % is three.
+    /// The mean of independent numbers: the bootstrap's variance is Σ (x − mean)² / n². Two hundred draws of 300 know
+    /// it to 8 % (one σ); 25 % is three.
     #[test]
     fn the_mean_has_its_textbook_variance() {
         let n = 50;
@@ -58,13 +61,13 @@ mod tests {
             .map(|x| (DMatrix::from_element(1, 1, 1.0 / f64::from(n)), DVector::from_element(1, x / f64::from(n))))
             .collect();
         let expected = values.iter().map(|x| x * x).sum::<f64>() / f64::from(n * n);
-        let found = spread(&[blocks], &DMatrix::zeros(1, 1)).unwrap()[(0, 0)];
+        let found = replicated(&[blocks], &DMatrix::zeros(1, 1)).unwrap()[(0, 0)];
         assert!((found / expected - 1.0).abs() < 0.25, "{found} {expected}");
     }
 
     #[test]
     fn a_direction_that_no_draw_holds_is_an_error() {
         let blocks = vec![(DMatrix::zeros(1, 1), DVector::zeros(1)); 3];
-        assert!(spread(&[blocks], &DMatrix::zeros(1, 1)).is_err());
+        assert!(replicated(&[blocks], &DMatrix::zeros(1, 1)).is_err());
     }
 }

@@ -1,7 +1,7 @@
 //! The distributions that intervals and tests are read from: Student's t, Fisher's F, chi-squared.
 //!
-//! The incomplete beta and gamma functions are those of `statrs`; its inverse for Student's t loses digits from a thousand
-//! degrees of freedom on (decision 0005), where an expansion about the normal distribution has them all.
+//! The incomplete beta and gamma functions are those of `statrs`; its inverse for Student's t loses digits from a
+//! thousand degrees of freedom on (decision 0005), where an expansion about the normal distribution has them all.
 
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use statrs::function::{beta::checked_beta_reg, gamma::checked_gamma_ur};
@@ -29,14 +29,14 @@ pub(crate) fn f_tail(value: f64, numerator: f64, denominator: f64) -> f64 {
 }
 
 /// The t for which a Student variable with `freedom` degrees of freedom (they need not be whole) lies between -t and t
-/// with probability `level`. Below one degree it is that of one, from a million on that of a million, 1e-6 from the normal
-/// distribution's. NaN unless `level` lies between 0 and 1.
+/// with probability `level`. Below one degree it is that of one, from a million on that of a million, 1e-6 from the
+/// normal distribution's. NaN unless `level` lies between 0 and 1.
 ///
 /// ```
 /// let t = dynident_estimation::student_half_width(0.95, 10.0);
 /// assert!((t - 2.228_139).abs() < 1e-6);
 /// ```
-#[doc(alias = "quantile")]
+#[doc(alias("student t", "quantile"))]
 pub fn student_half_width(level: f64, freedom: f64) -> f64 {
     if !(level > 0.0 && level < 1.0) || freedom.is_nan() {
         return f64::NAN;
@@ -62,7 +62,8 @@ pub fn student_half_width(level: f64, freedom: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Closed forms: chi-squared with 2 degrees is exponential; t with 1 is Cauchy's, with 2 has an algebraic tail; F(2, n) has a power tail. Rounding of the series only.
+    /// Closed forms: chi-squared with 2 degrees is exponential; t with 1 is Cauchy's, with 2 has an algebraic tail;
+    /// F(2, n) has a power tail. Rounding of the series only.
     #[test]
     fn closed_forms() {
         for x in [0.01, 0.7, 3.0, 12.0, 80.0_f64] {

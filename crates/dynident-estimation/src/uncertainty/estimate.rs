@@ -1,7 +1,8 @@
 //! An estimate is never a bare vector: values with covariance, the noise found, and what was decided about the rank.
 
-use super::covariance::{CovarianceMethod, Fit, covariances};
+use super::covariance::{CovarianceMethod, covariances};
 use super::distributions::student_half_width;
+use super::scores::Fit;
 use crate::error::EstimationError;
 use crate::factor::{RankReport, RankSettings, Solution, Split, StackedProblem, TriangularFactor, report};
 use nalgebra::DMatrix;
@@ -26,7 +27,8 @@ pub struct Estimate {
     pub names: Vec<String>,
     /// One value per column; a fixed column has its fallback value.
     pub values: Vec<f64>,
-    /// Covariance of the values by the chosen method; zero rows and columns for fixed columns, which were not estimated.
+    /// Covariance of the values by the chosen method; zero rows and columns for fixed columns, which were not
+    /// estimated.
     #[serde(serialize_with = "rows_of")]
     pub covariance: DMatrix<f64>,
     /// Covariance if errors were independent from sample to sample.
@@ -38,7 +40,8 @@ pub struct Estimate {
     pub clusters: usize,
     /// Square roots of the diagonal of `covariance`.
     pub std: Vec<f64>,
-    /// How many independent squares the variance of each value was found from (Satterthwaite's degrees of freedom; N − p for white errors). With few, an interval is wider than 1.96 std.
+    /// How many independent squares the variance of each value was found from (Satterthwaite's degrees of freedom; N −
+    /// p for white errors). With few, an interval is wider than 1.96 std.
     pub std_freedom: Vec<f64>,
     /// Half the width of the 95 % interval: `t₀.₉₇₅(std_freedom) · std`; zero for fixed columns.
     pub half_width_95: Vec<f64>,
@@ -48,16 +51,18 @@ pub struct Estimate {
     pub status: EstimateStatus,
     /// Solutions made: 1 for ordinary least squares.
     pub iterations: usize,
-    /// For every joint the standard deviation of its residual, `√(RSS_j / (N_j − p/n))`, in N m (N for a prismatic joint).
+    /// For every joint the standard deviation of its residual, `√(RSS_j / (N_j − p/n))`, in N m (N for a prismatic
+    /// joint).
     pub joint_sigma: Vec<f64>,
-    /// For every joint how much larger the squared segment scores are than under white noise: about (1+ρ)/(1−ρ) for residuals with lag-1
-    /// correlation ρ, against slowly changing columns and in long segments.
+    /// For every joint how much larger the squared segment scores are than under white noise: about (1+ρ)/(1−ρ) for
+    /// residuals with lag-1 correlation ρ, against slowly changing columns and in long segments.
     pub score_inflation: Vec<f64>,
-    /// The ρ for which `score_inflation` is (1+ρ)/(1−ρ): an effective lag-1 correlation, between −1 and 1. It is what matters for the
-    /// error bars, and lower than the residual's own where the columns alternate fast.
+    /// The ρ for which `score_inflation` is (1+ρ)/(1−ρ): an effective lag-1 correlation, between −1 and 1. It is what
+    /// matters for the error bars, and lower than the residual's own where the columns alternate fast.
     pub effective_lag1: Vec<f64>,
-    /// For every joint the correlation between the scores of neighbouring segments, Σ s_gᵀA⁻¹s_{g+1} / Σ s_gᵀA⁻¹s_g. Above 0.2 or so the
-    /// segments are too short for the correlation of the residuals, and error bars still too small: use fewer, longer segments.
+    /// For every joint the correlation between the scores of neighbouring segments, Σ s_gᵀA⁻¹s_{g+1} / Σ s_gᵀA⁻¹s_g.
+    /// Above 0.2 or so the segments are too short for the correlation of the residuals, and error bars still too small:
+    /// use fewer, longer segments.
     pub segment_correlation: Vec<f64>,
     /// Rank decisions.
     pub rank: RankReport,
@@ -150,7 +155,8 @@ impl Fitted {
     }
 }
 
-/// Checks that all rows together and each joint's share leave freedom for the noise, and gives `N_j − p/n` for every joint.
+/// Checks that all rows together and each joint's share leave freedom for the noise, and gives `N_j − p/n` for every
+/// joint.
 pub(crate) fn joint_freedom(stacked: &StackedProblem<'_>, free: usize) -> Result<Vec<f64>, EstimationError> {
     let problem = stacked.problem;
     let rows = problem.joint_rows();

@@ -9,6 +9,7 @@ mod covariance;
 mod distributions;
 mod estimate;
 mod newey_west;
+mod scores;
 
 pub use covariance::{CovarianceMethod, correlation};
 pub use distributions::student_half_width;

@@ -4,15 +4,17 @@
 //!     S = Σ_g s_g s_gᵀ + Σ_{l=1}^{L} (1 − l/(L+1)) Σ_g (s_g s_{g−l}ᵀ + s_{g−l} s_gᵀ)
 //! ```
 //!
-//! The series is that of the segments of one joint in one log; with segments of one row it is the textbook's. Newey and West, Econometrica 55 (1987) 703; the bandwidth of Review of Economic
-//! Studies 61 (1994) 631, with the trace of the whitened scores' autocovariances, which does not depend on units, in place of their arbitrary weights.
+//! The series is that of the segments of one joint in one log; with segments of one row it is the textbook's. Newey and
+//! West, Econometrica 55 (1987) 703; the bandwidth of Review of Economic Studies 61 (1994) 631, with the trace of the
+//! whitened scores' autocovariances, which does not depend on units, in place of their arbitrary weights.
 
 use nalgebra::{DMatrix, DVector};
 
 /// Bartlett's kernel up to this lag.
 ///
-/// `L = ⌊1.1447 (s₁/s₀)^(2/3) T^(1/3)⌋`, `s₀ = γ_0 + 2 Σ γ_l`, `s₁ = 2 Σ l γ_l` over l = 1..⌊4 (T/100)^(2/9)⌋, at most T − 1.
-pub(crate) fn bandwidth(series: &[DVector<f64>]) -> usize {
+/// `L = ⌊1.1447 (s₁/s₀)^(2/3) T^(1/3)⌋`, `s₀ = γ_0 + 2 Σ γ_l`, `s₁ = 2 Σ l γ_l` over l = 1..⌊4 (T/100)^(2/9)⌋, at most
+/// T − 1.
+pub(super) fn bandwidth(series: &[DVector<f64>]) -> usize {
     let count = series.len();
     if count < 3 {
         return 0;
@@ -37,7 +39,7 @@ fn autocovariance(series: &[DVector<f64>], lag: usize) -> f64 {
 }
 
 /// S of one series with the given bandwidth; positive semi-definite.
-pub(crate) fn long_run(series: &[DVector<f64>], size: usize, bandwidth: usize) -> DMatrix<f64> {
+pub(super) fn long_run(series: &[DVector<f64>], size: usize, bandwidth: usize) -> DMatrix<f64> {
     let mut sum = DMatrix::zeros(size, size);
     for score in series {
         sum.ger(1.0, score, score, 1.0);
@@ -65,7 +67,8 @@ mod tests {
         assert_eq!(long_run(&series, 2, 1), expected);
     }
 
-    /// Scores that keep their sign for many steps ask for a longer kernel than independent ones. (Alternating ones also ask for a long one: the rule squares s₁/s₀, for they are correlated as far.)
+    /// Scores that keep their sign for many steps ask for a longer kernel than independent ones. (Alternating ones also
+    /// ask for a long one: the rule squares s₁/s₀, for they are correlated as far.)
     #[test]
     fn the_bandwidth_follows_the_correlation() {
         let one = |value: f64| DVector::from_vec(vec![value]);

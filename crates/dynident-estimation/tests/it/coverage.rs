@@ -11,8 +11,8 @@ const SAMPLES: usize = 6_400;
 const RHO: f64 = 0.9;
 const THETA: [f64; 4] = [2.0, -1.0, 0.5, 0.3];
 
-/// Two joints, noise AR(1) of different size; columns as slow as a robot's motion (periods of some 100 to 400 samples), the last one the
-/// sign of a velocity, as Coulomb friction is.
+/// Two joints, noise AR(1) of different size; columns as slow as a robot's motion (periods of some 100 to 400 samples),
+/// the last one the sign of a velocity, as Coulomb friction is.
 fn simulated(random: &mut Random, settings: SegmentSettings) -> LinearProblem {
     let names = (0..THETA.len()).map(|c| format!("theta{c}")).collect();
     let mut problem = LinearProblem::new(names, vec!["joint1".into(), "joint2".into()]);
@@ -37,8 +37,8 @@ fn simulated(random: &mut Random, settings: SegmentSettings) -> LinearProblem {
     problem
 }
 
-/// Share of 95 % intervals, over all parameters and runs, that hold the truth: by segments and under white noise; and the mean
-/// effective lag-1 correlation.
+/// Share of 95 % intervals, over all parameters and runs, that hold the truth: by segments and under white noise; and
+/// the mean effective lag-1 correlation.
 fn coverage(weighted: bool) -> (f64, f64, f64) {
     let mut random = Random::new(20_261_121);
     let (mut segments, mut white, mut lag1) = (0, 0, 0.0);
@@ -92,9 +92,9 @@ fn segments_too_short_for_the_correlation_show_it() {
         let estimate = ordinary_least_squares(&problem, &OrdinarySettings::default()).unwrap();
         estimate.segment_correlation.iter().sum::<f64>() / 2.0
     };
-    // Sums of AR(1) noise over neighbouring segments of L samples correlate by ρ(1−ρ^L)² / (L(1−ρ²) − 2ρ(1−ρ^L)), columns being constant
-    // over the segments: 0.05 for L = 100, 0.59 for L = 8. A single log of 64 segments and four columns scatters by 1/√(64·4) = 0.06:
-    // three of these allowed.
+    // Sums of AR(1) noise over neighbouring segments of L samples correlate by ρ(1−ρ^L)² / (L(1−ρ²) − 2ρ(1−ρ^L)),
+    // columns being constant over the segments: 0.05 for L = 100, 0.59 for L = 8. A single log of 64 segments and four
+    // columns scatters by 1/√(64·4) = 0.06: three of these allowed.
     let long = segment_correlation(SegmentSettings::default());
     let short = segment_correlation(SegmentSettings { max_segments: 1024, first_length_rows: 8 });
     assert!(long.abs() < 0.25, "{long}");

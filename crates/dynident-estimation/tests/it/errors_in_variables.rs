@@ -19,7 +19,8 @@ fn problem_of(panel: &[f64], rows: usize) -> InstrumentedProblem {
     problem
 }
 
-/// Two columns of normal numbers, measured with noise of standard deviation `noise`; instruments with independent noise of the same size; coloured torque noise.
+/// Two columns of normal numbers, measured with noise of standard deviation `noise`; instruments with independent noise
+/// of the same size; coloured torque noise.
 fn experiment(random: &mut Random, rows: usize, noise: f64) -> Vec<f64> {
     let mut columns = vec![Vec::new(); 5];
     let mut coloured = 0.0;
@@ -58,7 +59,8 @@ fn more_data_cure_instruments_and_not_least_squares() {
         let (plain, instruments) = bias(rows, 0.5, 40);
         for c in 0..2 {
             let limit = -0.2 * THETA[c];
-            // Standard deviation of a run's estimate is about √(1.2/rows) ≈ 0.08 at 200 rows; of the mean of 40 a sixth of it. Four of those.
+            // Standard deviation of a run's estimate is about √(1.2/rows) ≈ 0.08 at 200 rows; of the mean of 40 a sixth
+            // of it. Four of those.
             let chance = 4.0 * (2.0 / rows as f64 / 40.0).sqrt();
             // Finite-sample bias of IV falls as 1/rows and is a few times that.
             let small = 6.0 / rows as f64;
@@ -85,7 +87,8 @@ fn the_test_has_its_level_and_its_power() {
             *count += i32::from(test.verdict == HausmanVerdict::RejectLeastSquares);
         }
     }
-    // 5 % of 200 is 10 with a standard deviation of 3.1; the jackknife is cautious. Four deviations above, and any number below.
+    // 5 % of 200 is 10 with a standard deviation of 3.1; the jackknife is cautious. Four deviations above, and any
+    // number below.
     assert!(false_alarms <= 22, "{false_alarms} of 200");
     // A bias of 8 % of θ is fifteen standard deviations here.
     assert_eq!(found, 200);
@@ -266,7 +269,8 @@ fn total_least_squares_is_consistent_where_the_errors_are_known() {
         assert!(absurd.is_err() || absurd.unwrap().estimate.std.iter().all(|std| std.is_finite()));
     }
     for c in 0..3 {
-        // One run's error is about √(1.2/1500) = 0.028; of the mean of 60 runs 0.0037. Four of those; least squares is off by 0.28 in the first column.
+        // One run's error is about √(1.2/1500) = 0.028; of the mean of 60 runs 0.0037. Four of those; least squares is
+        // off by 0.28 in the first column.
         assert!((mean[c] - truth[c]).abs() < 0.015, "column {c}: {}", mean[c]);
     }
     // 180 intervals: 95 % is 171, with a standard deviation of 2.9.

@@ -7,8 +7,8 @@ use dynident_estimation::{
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
 
-/// Both sides work in double precision on rows with a condition number of 2.7e3 raw (2 scaled). The oracle's products of XᵀX lose at
-/// most its square times 1.1e-16, that is 8e-10.
+/// Both sides work in double precision on rows with a condition number of 2.7e3 raw (2 scaled). The oracle's products
+/// of XᵀX lose at most its square times 1.1e-16, that is 8e-10.
 const RELATIVE: f64 = 1.0e-9;
 
 fn golden() -> Value {

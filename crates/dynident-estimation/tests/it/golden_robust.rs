@@ -8,7 +8,8 @@ use dynident_estimation::{
 };
 use serde_json::Value;
 
-/// Double precision on well-conditioned rows (below 1e3 raw): the oracle's XᵀX loses at most 1e-10; its last iteration changes by 1e-13.
+/// Double precision on well-conditioned rows (below 1e3 raw): the oracle's XᵀX loses at most 1e-10; its last iteration
+/// changes by 1e-13.
 const RELATIVE: f64 = 1.0e-9;
 
 fn golden() -> Value {
@@ -59,7 +60,8 @@ fn robust_estimates_agree_with_statsmodels() {
             visit(&RowBlock { log: 0, joint: 0, rows: tau.len(), panel: &panel })
         })
         .unwrap();
-        // The oracle stops when its coefficients change by 1e-13; its convergence is linear with a factor well below 0.9, so it is within 1e-12.
+        // The oracle stops when its coefficients change by 1e-13; its convergence is linear with a factor well below
+        // 0.9, so it is within 1e-12.
         close_all(name, &found.estimate.values, &numbers(&data[name]["values"]), RELATIVE);
         close_all("scale", &found.estimate.joint_sigma, &[data[name]["scale"].as_f64().unwrap()], RELATIVE);
         let widths = found.estimate.std.iter().zip(&found.estimate.std_freedom);

@@ -18,7 +18,8 @@ fn fit(columns: &[Vec<f64>], tau: &[f64], segments: SegmentSettings, covariance:
     ordinary_least_squares(&problem, &OrdinarySettings { covariance, ..OrdinarySettings::default() }).unwrap()
 }
 
-/// Segments of one row make it the textbook's. Double precision on both sides, a condition number below 100: its square times rounding is 1e-12.
+/// Segments of one row make it the textbook's. Double precision on both sides, a condition number below 100: its square
+/// times rounding is 1e-12.
 #[test]
 fn newey_west_is_that_of_statsmodels() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../golden/statsmodels_newey_west.json");
@@ -41,7 +42,8 @@ fn columns(random: &mut Random, rows: usize, count: usize) -> Vec<Vec<f64>> {
     (0..count).map(|_| (0..rows).map(|_| random.normal()).collect()).collect()
 }
 
-/// Two of four parameters are zero: they go, the others stay, and what remains is ordinary least squares on the two columns left.
+/// Two of four parameters are zero: they go, the others stay, and what remains is ordinary least squares on the two
+/// columns left.
 #[test]
 fn what_the_data_do_not_tell_is_dropped() {
     let mut random = Random::new(3);

@@ -11,7 +11,8 @@ const SAMPLES: usize = 1200;
 const THETA: [f64; 4] = [3.0, -2.0, 1.0, 0.7];
 const GAINS: [f64; 2] = [12.0, -0.4];
 
-/// Two joints, each with two parameters: joint 1 sees 0, 1 and joint 2 sees 2, 3, or 1 and 3 if they share one. The load adds to parameters 0 and, if `felt`, 3.
+/// Two joints, each with two parameters: joint 1 sees 0, 1 and joint 2 sees 2, 3, or 1 and 3 if they share one. The
+/// load adds to parameters 0 and, if `felt`, 3.
 fn problem(random: &mut Random, noise: f64, shared: bool, felt: bool) -> (LinearProblem, Vec<Vec<f64>>) {
     let names = (0..4).map(|c| format!("theta{c}")).collect();
     let mut problem = LinearProblem::new(names, vec!["joint1".into(), "joint2".into()]);

@@ -50,7 +50,8 @@ fn intervals_of_the_second_step_hold_the_truth() {
         without += usize::from(error <= of(DMatrix::zeros(2, 2)).half_width_95[2]);
         runs += 1;
     }
-    // 400 runs tell 95 % to 1.1 %: three of these below; above, the bars are cautious by what the residual counts again. Without the first step's errors they are too short.
+    // 400 runs tell 95 % to 1.1 %: three of these below; above, the bars are cautious by what the residual counts
+    // again. Without the first step's errors they are too short.
     let share = |count: usize| count as f64 / f64::from(runs);
     assert!((0.917..=0.995).contains(&share(inside)), "{}", share(inside));
     assert!(share(without) < share(inside) - 0.02, "{} {}", share(without), share(inside));

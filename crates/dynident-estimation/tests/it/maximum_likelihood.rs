@@ -1,4 +1,5 @@
-//! Maximum likelihood with noise in the motion: against total least squares where the model is a straight line, and without bias where least squares has one.
+//! Maximum likelihood with noise in the motion: against total least squares where the model is a straight line, and
+//! without bias where least squares has one.
 
 use crate::common::Random;
 use dynident_estimation::{
@@ -24,7 +25,8 @@ fn names(count: usize) -> Vec<String> {
 
 #[test]
 fn a_straight_line_gives_total_least_squares() {
-    // τ = 2 x with errors of 0.5 in x and 1 in τ: the smallest singular vector of [w/0.5 | τ] is the maximum likelihood solution (Golub and Van Loan).
+    // τ = 2 x with errors of 0.5 in x and 1 in τ: the smallest singular vector of [w/0.5 | τ] is the maximum likelihood
+    // solution (Golub and Van Loan).
     let mut random = Random::new(3);
     let data: Vec<[f64; 2]> = (0..300)
         .map(|k| {
@@ -103,14 +105,16 @@ fn noise_in_the_motion_does_not_bias_and_the_error_bars_are_right() {
     }
     let runs = runs as f64;
     for k in 0..3 {
-        // The mean of 200 has a deviation of 0.07, four of them; curvature of the sines within 0.02 rad adds less than that.
+        // The mean of 200 has a deviation of 0.07, four of them; curvature of the sines within 0.02 rad adds less than
+        // that.
         assert!((sums[k] / runs).abs() < 0.3, "bias of p{k}: {} error bars", sums[k] / runs);
         // A variance from 200 squares has a deviation of 10 %; four of them.
         assert!((squares[k] / runs - 1.0).abs() < 0.4, "p{k}: {}", squares[k] / runs);
     }
     // χ² over 397 degrees of freedom, mean of 200: a deviation of 0.5 %; and the curvature.
     assert!((cost / runs - 1.0).abs() < 0.03, "{}", cost / runs);
-    // Without the motion's noise it is least squares, drawn towards zero: 0.36 of noise beside 1.9 of signal in q̈ takes about 15 %.
+    // Without the motion's noise it is least squares, drawn towards zero: 0.36 of noise beside 1.9 of signal in q̈
+    // takes about 15 %.
     assert!(plain / runs < 0.92, "{}", plain / runs);
 }
 

@@ -52,7 +52,8 @@ fn error(values: &[f64]) -> f64 {
 
 #[test]
 fn uneven_noise_costs_no_more_than_known_levels_would() {
-    // Mean square errors over 30 draws. Joint 0 alone carries quiet rows of 0.2 among loud ones of 2 (within the contrast that the default share allows): one σ per joint wastes them.
+    // Mean square errors over 30 draws. Joint 0 alone carries quiet rows of 0.2 among loud ones of 2 (within the
+    // contrast that the default share allows): one σ per joint wastes them.
     let settings = NoiseLevelSettings { covariance: CovarianceMethod::White, ..NoiseLevelSettings::default() };
     let white = WeightedSettings { covariance: CovarianceMethod::White, ..WeightedSettings::default() };
     let (mut by_levels, mut known, mut weighted) = (0.0, 0.0, 0.0);
@@ -73,12 +74,14 @@ fn uneven_noise_costs_no_more_than_known_levels_would() {
             .collect();
         known += error(&weighted_least_squares(&problem(&scaled), &white).unwrap().values);
     }
-    // Levels known to 10 % cost a per cent or two; stretches' ends, 50 rows of 250 with a mixed level, at most the share of rows that they are, a fifth of joint 0's quiet half; the chance of
-    // 30 draws of three parameters in a ratio of paired errors is below 0.1.
+    // Levels known to 10 % cost a per cent or two; stretches' ends, 50 rows of 250 with a mixed level, at most the
+    // share of rows that they are, a fifth of joint 0's quiet half; the chance of 30 draws of three parameters in a
+    // ratio of paired errors is below 0.1.
     assert!(by_levels <= 1.3 * known, "{} of the known levels' error", by_levels / known);
     // Joint 0's quiet thousand rows and joint 1's two thousand: a third of the information is lost without levels.
     assert!(by_levels <= 0.9 * weighted, "{} of the weighted error", by_levels / weighted);
-    // 90 intervals of 95 %: 85.5 expected with a deviation of 2.1; three deviations down, and the levels' own uncertainty.
+    // 90 intervals of 95 %: 85.5 expected with a deviation of 2.1; three deviations down, and the levels' own
+    // uncertainty.
     assert!(inside >= 78, "{inside} of 90 inside");
 }
 
@@ -94,7 +97,8 @@ fn even_noise_gives_weighted_least_squares_within_a_fraction_of_an_error_bar() {
         // Weights with a scatter of 10 % move an estimate by about a tenth of its error bar; three of those.
         assert!((found.estimate.values[k] - value).abs() < 0.3 * std, "column {k}");
     }
-    // With everything pooled it is weighted least squares itself: weights one to rounding, and the stopping tolerance of the joints' noise.
+    // With everything pooled it is weighted least squares itself: weights one to rounding, and the stopping tolerance
+    // of the joints' noise.
     let pooled = NoiseLevelSettings { pooled_share: 1.0, ..NoiseLevelSettings::default() };
     let same = noise_weighted_least_squares(&problem(&panels), &pooled, |visit| visited(&panels, visit)).unwrap();
     for (a, b) in same.estimate.values.iter().zip(&plain.values) {

@@ -8,8 +8,8 @@ use dynident_estimation::consistent::{
 use nalgebra::DMatrix;
 use serde_json::Value;
 
-/// What the issue asks. Points follow the objective by its square root: Clarabel stops at 1e-10 of its own measure, and so does the primal-dual route here. The
-/// other route is held to the objective, at its default tolerance.
+/// What the issue asks. Points follow the objective by its square root: Clarabel stops at 1e-10 of its own measure, and
+/// so does the primal-dual route here. The other route is held to the objective, at its default tolerance.
 const AGREEMENT: f64 = 1.0e-5;
 const TOLERANCE: f64 = 1.0e-10;
 

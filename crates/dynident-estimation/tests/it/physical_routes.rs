@@ -1,4 +1,5 @@
-//! A thousand random problems: all end, all are feasible, all carry a certificate, and two solvers that share only the certificate agree.
+//! A thousand random problems: all end, all are feasible, all carry a certificate, and two solvers that share only the
+//! certificate agree.
 
 #![allow(clippy::print_stdout, reason = "the figures are the point of the long run")]
 
@@ -87,8 +88,9 @@ fn check(worst: &Worst) {
     assert!(worst.boundary > 0, "no optimum on the boundary: the problems are too easy");
 }
 
-/// Problems of the long run that neither route solved, or only one, before both let their multipliers' imbalance go while the barrier was still strong: an entropic prior against data
-/// that want bodies a million times as heavy as their references.
+/// Problems of the long run that neither route solved, or only one, before both let their multipliers' imbalance go
+/// while the barrier was still strong: an entropic prior against data that want bodies a million times as heavy as
+/// their references.
 #[test]
 fn both_routes_find_the_same_optimum_of_problems_that_were_hard() {
     // At 1757 and 1766 the interior point stalls at 5e-7 and 2e-7 and the other route has to finish.

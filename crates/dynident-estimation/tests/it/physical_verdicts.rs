@@ -106,7 +106,8 @@ fn contradictions_are_named() {
     assert!(!error.to_string().contains("along y"), "{error}");
 }
 
-/// A start inside is looked for without the data, so nothing but the constraints holds a variable there: an offset has none.
+/// A start inside is looked for without the data, so nothing but the constraints holds a variable there: an offset has
+/// none.
 #[test]
 fn limits_away_from_the_prior_are_met_beside_a_scalar_without_any() {
     let mut heavy = body("link");

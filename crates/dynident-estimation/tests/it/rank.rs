@@ -59,7 +59,8 @@ fn unexcited_columns_are_named_and_fixed() {
         assert_eq!((estimate.values[column], estimate.std[column]), (0.0, 0.0));
         assert_eq!(estimate.relative_std_percent[column], None);
     }
-    // What p3 did now stands in p0 and p1: 3 + 2 and −1. Noise 0.1 over 200 rows: standard error 0.007, five of them 0.035.
+    // What p3 did now stands in p0 and p1: 3 + 2 and −1. Noise 0.1 over 200 rows: standard error 0.007, five of them
+    // 0.035.
     for (column, expected) in [(0, 5.0), (1, -1.0), (4, 0.5)] {
         assert!((estimate.values[column] - expected).abs() < 0.035);
     }

@@ -10,7 +10,8 @@ use nalgebra::{Complex, DMatrix, DVector};
 const ROWS: usize = 400;
 const TRUTH: [f64; 3] = [2.0, 3.0, 12.0];
 
-/// `m q̈ + c q̇ + k q = τ = Kp (r − q) + Kd (ṙ − q̇)`, settled under a reference of four sines: every signal is a sum of sines with the loop's frequency response.
+/// `m q̈ + c q̇ + k q = τ = Kp (r − q) + Kd (ṙ − q̇)`, settled under a reference of four sines: every signal is a sum
+/// of sines with the loop's frequency response.
 struct Plant {
     position: bool,
 }
@@ -76,9 +77,10 @@ fn without_noise_all_three_find_the_parameters() {
     for (criterion, position) in WAYS {
         let settings = SimulatedSettings { criterion, tolerance: 1e-9, ..SimulatedSettings::default() };
         let problem = problem(position, 0.0, 0, [1.4, 4.0, 9.0]);
-        let found = simulated_least_squares(&problem, &mut Plant { position }, &settings).unwrap();
+        let found = simulated_least_squares(&problem, &settings, &mut Plant { position }).unwrap();
         for (value, truth) in found.values.iter().zip(TRUTH) {
-            // Gauss-Newton ends in rounding; DIDIM's steps shrink by a constant factor each, so that it ends within the limit of steps times that.
+            // Gauss-Newton ends in rounding; DIDIM's steps shrink by a constant factor each, so that it ends within the
+            // limit of steps times that.
             assert!((value - truth).abs() < 1e-5 * truth, "{criterion:?}: {value} for {truth}");
         }
     }
@@ -92,7 +94,7 @@ fn with_noise_they_agree_with_the_truth_within_their_error_bars() {
         for seed in 0..20 {
             let settings = SimulatedSettings { criterion, ..SimulatedSettings::default() };
             let problem = problem(position, noise, seed, [1.4, 4.0, 9.0]);
-            let found = simulated_least_squares(&problem, &mut Plant { position }, &settings).unwrap();
+            let found = simulated_least_squares(&problem, &settings, &mut Plant { position }).unwrap();
             assert_eq!(found.status, EstimateStatus::Complete, "{criterion:?} {position}");
             // 397 degrees of freedom: a deviation of 28.
             assert!((found.cost - 397.0).abs() < 4.0 * 28.2, "{}", found.cost);
@@ -103,7 +105,8 @@ fn with_noise_they_agree_with_the_truth_within_their_error_bars() {
                 square += ((found.values[k] - TRUTH[k]) / found.std[k]).powi(2) / 60.0;
             }
         }
-        // DIDIM's error bars leave out that the motion changes with θ, and its scatter may be larger or smaller for it; those of the others are the bound: a mean of 60 squares, 18 %, four of them.
+        // DIDIM's error bars leave out that the motion changes with θ, and its scatter may be larger or smaller for it;
+        // those of the others are the bound: a mean of 60 squares, 18 %, four of them.
         let allowed = if criterion == SimulatedCriterion::Didim { 4.0 } else { 1.75 };
         assert!(square < allowed, "{criterion:?} {position}: {square}");
     }
@@ -113,16 +116,16 @@ fn with_noise_they_agree_with_the_truth_within_their_error_bars() {
 fn a_start_that_cannot_be_simulated_and_other_shapes_are_named() {
     let settings = SimulatedSettings::default();
     let mut plant = Plant { position: false };
-    let none = simulated_least_squares(&problem(false, 0.1, 1, [-1.0, 1.0, 1.0]), &mut plant, &settings);
+    let none = simulated_least_squares(&problem(false, 0.1, 1, [-1.0, 1.0, 1.0]), &settings, &mut plant);
     assert!(matches!(none, Err(EstimationError::NoSimulation)));
     let mut short = problem(false, 0.1, 1, TRUTH);
     short.measured = DVector::zeros(7);
     short.noise_std = DVector::from_element(7, 1.0);
-    let error = simulated_least_squares(&short, &mut plant, &settings);
+    let error = simulated_least_squares(&short, &settings, &mut plant);
     assert!(matches!(error, Err(EstimationError::Mismatch { expected: 7, found: ROWS, .. })));
     let mut flat = problem(false, 0.1, 1, TRUTH);
     flat.scale[1] = 0.0;
-    let error = simulated_least_squares(&flat, &mut plant, &settings).unwrap_err();
+    let error = simulated_least_squares(&flat, &settings, &mut plant).unwrap_err();
     assert!(matches!(error, EstimationError::Setting { setting: "scale", .. }));
     let bad = SimulatedSettings { difference: 0.0, ..settings };
     assert!(bad.validate().is_err());

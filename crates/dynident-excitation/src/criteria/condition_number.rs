@@ -3,8 +3,8 @@
 use super::{Criterion, Valued};
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// `cond(W)` by p-norms of the eigenvalues: `½ (log ‖λ‖_p + log ‖1/λ‖_p)`, smooth where eigenvalues meet (and at an optimum the lowest three or four do meet). The larger `p`, the nearer to
-/// the condition number itself.
+/// `cond(W)` by p-norms of the eigenvalues: `½ (log ‖λ‖_p + log ‖1/λ‖_p)`, smooth where eigenvalues meet (and at an
+/// optimum the lowest three or four do meet). The larger `p`, the nearer to the condition number itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConditionNumber {
     /// Order of the norm, positive. 40 to 80 serve well from the start.

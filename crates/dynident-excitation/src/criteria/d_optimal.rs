@@ -1,4 +1,5 @@
-//! D-optimality: the volume of the parameters' confidence ellipsoid, `-log det D`. Does not depend on units or on the choice of base columns, but for a constant.
+//! D-optimality: the volume of the parameters' confidence ellipsoid, `-log det D`. Does not depend on units or on the
+//! choice of base columns, but for a constant.
 
 use super::{Criterion, Valued};
 use crate::definite_inverse::log_det_and_inverse;

@@ -1,4 +1,5 @@
-//! What makes a motion good: functions of the information `D` with their derivatives. Smaller is better for all of them.
+//! What makes a motion good: functions of the information `D` with their derivatives. Smaller is better for all of
+//! them.
 
 mod a_optimal;
 mod condition_number;
@@ -14,7 +15,8 @@ pub use prediction::Prediction;
 
 use nalgebra::DMatrix;
 
-/// A value and its symmetric derivative by `D`; `None` where `D` is not positive definite (some parameter is not excited at all).
+/// A value and its symmetric derivative by `D`; `None` where `D` is not positive definite (some parameter is not
+/// excited at all).
 pub type Valued = Option<(f64, DMatrix<f64>)>;
 
 /// A criterion on the information matrix.
@@ -25,7 +27,8 @@ pub trait Criterion: core::fmt::Debug + Send + Sync {
     /// Value and derivative of the smooth form that optimisers use.
     fn value_and_derivative(&self, information: &DMatrix<f64>) -> Valued;
 
-    /// About how much the value changes when a motion of so many columns is made larger by half: what searches measure penalties and steps with.
+    /// About how much the value changes when a motion of so many columns is made larger by half: what searches measure
+    /// penalties and steps with.
     fn scale(&self, _columns: usize) -> f64 {
         1.0
     }

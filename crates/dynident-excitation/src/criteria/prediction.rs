@@ -6,17 +6,19 @@ use nalgebra::DMatrix;
 
 /// `log tr(D⁻¹ M)` with `M = Σ W_taskᵀ Σ⁻¹ W_task / samples`, with derivative `-D⁻¹ M D⁻¹ / tr(D⁻¹ M)`.
 ///
-/// The covariance of a prediction `W_task θ̂` is `W_task D⁻¹ W_taskᵀ`. Its trace, each joint measured in its own torque noise and averaged over the task's samples, is `tr(D⁻¹ M)`: the
-/// mean square of the prediction error that the parameters' uncertainty causes, all joints summed, in units of the torque noise's variance. Fedorov, Theory of Optimal
-/// Experiments (1972), section 2.7; called V- or I-optimality.
+/// The covariance of a prediction `W_task θ̂` is `W_task D⁻¹ W_taskᵀ`. Its trace, each joint measured in its own torque
+/// noise and averaged over the task's samples, is `tr(D⁻¹ M)`: the mean square of the prediction error that the
+/// parameters' uncertainty causes, all joints summed, in units of the torque noise's variance. Fedorov, Theory of
+/// Optimal Experiments (1972), section 2.7; called V- or I-optimality.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prediction {
     task: DMatrix<f64>,
 }
 
 impl Prediction {
-    /// For a task with `M` = `task`: symmetric, positive semi-definite, in the columns of the information that is to be judged. [`Information::of`](crate::Information::of) gives it for
-    /// the task's motion with the weight `1 / samples`.
+    /// For a task with `M` = `task`: symmetric, positive semi-definite, in the columns of the information that is to be
+    /// judged. [`Information::of`](crate::Information::of) gives it for the task's motion with the weight `1 /
+    /// samples`.
     pub fn new(task: DMatrix<f64>) -> Self {
         Self { task }
     }
@@ -68,7 +70,8 @@ mod tests {
         assert!(Prediction::new(DMatrix::zeros(9, 9)).value_and_derivative(&information).is_none());
     }
 
-    /// The derivative against central differences of fourth order: step 1e-3 leaves 1e-12 of truncation, rounding 1e-13.
+    /// The derivative against central differences of fourth order: step 1e-3 leaves 1e-12 of truncation, rounding
+    /// 1e-13.
     #[test]
     fn derivative_is_the_slope() {
         let mut random = Random::new(8);

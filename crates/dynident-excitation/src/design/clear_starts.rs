@@ -1,7 +1,8 @@
 //! Random starts that stay clear of floor, column and other links.
 //!
-//! A descent shrinks what a motion uses too much of, but it does not lead an arm around an obstacle that it passes through: in the middle of a column there is no way out that begins downhill. So
-//! starts are drawn on the right side: a posture that keeps the places, and a motion in ranges narrowed about it until the whole motion does.
+//! A descent shrinks what a motion uses too much of, but it does not lead an arm around an obstacle that it passes
+//! through: in the middle of a column there is no way out that begins downhill. So starts are drawn on the right side:
+//! a posture that keeps the places, and a motion in ranges narrowed about it until the whole motion does.
 
 use super::{DesignTask, ranges};
 use crate::limits::LimitWorkspace;
@@ -35,7 +36,8 @@ impl<'a> Starts<'a> {
         Self { task, times, positions, speeds, workspace, motion: Motion::default(), values: Vec::new() }
     }
 
-    /// The next start: the family's own where no places are limited, else the clearest of those tried, the first that is clear enough.
+    /// The next start: the family's own where no places are limited, else the clearest of those tried, the first that
+    /// is clear enough.
     pub(super) fn next(&mut self, random: &mut Random) -> Vec<f64> {
         let mut best = self.task.family.random(&self.positions, &self.speeds, random);
         if !self.task.limits.has_places() {

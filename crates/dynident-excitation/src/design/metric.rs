@@ -1,14 +1,16 @@
 //! How strongly the augmented Lagrangian is curved, joint by joint.
 //!
-//! Limits of a single joint depend on that joint's parameters alone: the curvature of those that push is known (exactly for linear families, to first order for others) and need not be learnt
-//! step by step. What is left, the criterion, is curved about as the motion's size is, measured in its limits.
+//! Limits of a single joint depend on that joint's parameters alone: the curvature of those that push is known (exactly
+//! for linear families, to first order for others) and need not be learnt step by step. What is left, the criterion, is
+//! curved about as the motion's size is, measured in its limits.
 
 use super::DesignTask;
 use crate::motion::Motion;
 use crate::optimisers::{Known, Step};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// `σ G + C`, one block a joint: `G` the mean square of the motion in units of its limits, `C` the curvature of the limits that push, and `σ` the criterion's share, from the last step.
+/// `σ G + C`, one block a joint: `G` the mean square of the motion in units of its limits, `C` the curvature of the
+/// limits that push, and `σ` the criterion's share, from the last step.
 pub(super) struct Metric {
     size: Vec<DMatrix<f64>>,
     limits: Vec<DMatrix<f64>>,
@@ -67,11 +69,13 @@ impl Metric {
         true
     }
 
-    /// Takes up the limits that push at the parameters `at`, and the criterion's share from the last step and its change of the gradient, or, at the start, such that the first step is a fifth
-    /// of the motion. False if no positive matrix comes of it.
+    /// Takes up the limits that push at the parameters `at`, and the criterion's share from the last step and its
+    /// change of the gradient, or, at the start, such that the first step is a fifth of the motion. False if no
+    /// positive matrix comes of it.
     pub(super) fn prepare(&mut self, task: &DesignTask<'_>, times: &[f64], at: &[f64], known: &Known<'_>) -> bool {
         let Known { pushing, gradient, free, last } = *known;
-        // A linear family's size is the same everywhere; another's is taken anew wherever the memory of steps begins anew.
+        // A linear family's size is the same everywhere; another's is taken anew wherever the memory of steps begins
+        // anew.
         if (!self.sized || (last.is_none() && !task.family.is_linear())) && !self.take_size(task, times, at) {
             return false;
         }

@@ -8,11 +8,13 @@ use crate::optimisers::OptimiserError;
 use dynident_model::sample::Random;
 use nalgebra::DMatrix;
 
-/// Random starts beside the best so far, and evaluations of each descent at least: a small search must still find its way inside.
+/// Random starts beside the best so far, and evaluations of each descent at least: a small search must still find its
+/// way inside.
 const STARTS: usize = 4;
 const EVALUATIONS: usize = 400;
 
-/// Descents from one start, with wider margins while something is broken between samples, and the most that one of them widens.
+/// Descents from one start, with wider margins while something is broken between samples, and the most that one of them
+/// widens.
 const ROUNDS: usize = 4;
 const WIDEST: f64 = 0.02;
 
@@ -36,16 +38,19 @@ impl Criterion for Anything {
         Some(0.0)
     }
 
-    /// Nothing is to be found outside the limits here: with the evaluations of a restoration the first penalty is about ten.
+    /// Nothing is to be found outside the limits here: with the evaluations of a restoration the first penalty is about
+    /// ten.
     fn scale(&self, _: usize) -> f64 {
         50.0
     }
 }
 
-/// The best motion, if need be after a search for the limits alone: from the best so far and from random starts, until one keeps every limit between samples; from there one more descent by the criterion.
-/// Starts follow one another, so that the first that succeeds is the same on any number of threads. Also the number of evaluations.
+/// The best motion, if need be after a search for the limits alone: from the best so far and from random starts, until
+/// one keeps every limit between samples; from there one more descent by the criterion. Starts follow one another, so
+/// that the first that succeeds is the same on any number of threads. Also the number of evaluations.
 ///
-/// A criterion can hold a search outside: its slope grows without end as an ill-conditioned motion is pressed into narrow limits, while the penalty only grows in steps.
+/// A criterion can hold a search outside: its slope grows without end as an ill-conditioned motion is pressed into
+/// narrow limits, while the penalty only grows in steps.
 pub(crate) fn restored(
     task: &DesignTask<'_>,
     settings: &DesignSettings,

@@ -8,10 +8,12 @@ use crate::optimisers::{
 };
 use core::ops::ControlFlow;
 
-/// First penalty of a limit, as a share of the criterion's scale: so low that a start first finds a good motion somewhat outside the limits and is then led inside. Measured on three arms, five
-/// harmonics, ten starts each: 0.02 with slow growth ends 2 to 4 nats better than 2 with fast growth.
+/// First penalty of a limit, as a share of the criterion's scale: so low that a start first finds a good motion
+/// somewhat outside the limits and is then led inside. Measured on three arms, five harmonics, ten starts each: 0.02
+/// with slow growth ends 2 to 4 nats better than 2 with fast growth.
 const FIRST_PENALTY: f64 = 0.02;
-/// The same where places are limited too: with 0.02 a start strays further into obstacles before it is led back, and more of them are lost there (UR10 over a table beside a column).
+/// The same where places are limited too: with 0.02 a start strays further into obstacles before it is led back, and
+/// more of them are lost there (UR10 over a table beside a column).
 const FIRST_PENALTY_OF_PLACES: f64 = 0.05;
 const PENALTY_GROWTH: f64 = 3.0;
 /// Evaluations that this slow way needs.
@@ -40,7 +42,8 @@ pub(super) struct Candidate {
     pub(super) feasible: Vec<f64>,
     /// Largest violation on the samples there.
     pub(super) violation: f64,
-    /// What candidates are compared by: the criterion as it would be with all limits kept, and a penalty for what is not.
+    /// What candidates are compared by: the criterion as it would be with all limits kept, and a penalty for what is
+    /// not.
     pub(super) score: f64,
 }
 

@@ -3,10 +3,12 @@
 use super::{ExportError, Sampled};
 use core::fmt::Write;
 
-/// A `JointTrajectory` message with positions, velocities and accelerations, as `ros2 topic pub` and parameter files read it. Move the arm to the first point before.
+/// A `JointTrajectory` message with positions, velocities and accelerations, as `ros2 topic pub` and parameter files
+/// read it. Move the arm to the first point before.
 ///
 /// # Source
-/// ROS 2 interfaces `trajectory_msgs/msg/JointTrajectory`, `trajectory_msgs/msg/JointTrajectoryPoint`, `builtin_interfaces/msg/Duration`.
+/// ROS 2 interfaces `trajectory_msgs/msg/JointTrajectory`, `trajectory_msgs/msg/JointTrajectoryPoint`,
+/// `builtin_interfaces/msg/Duration`.
 ///
 /// # Errors
 /// Names, times and motion that do not belong together, and numbers that are not finite.

@@ -42,7 +42,8 @@ impl UrScriptSettings {
     }
 }
 
-/// A URScript program: a slow `movej` to the first point, one `servoj` per sample, then a stop. Only positions are told; the controller makes the rates.
+/// A URScript program: a slow `movej` to the first point, one `servoj` per sample, then a stop. Only positions are
+/// told; the controller makes the rates.
 ///
 /// # Source
 /// Universal Robots, The URScript Programming Language, `movej` and `servoj`.

@@ -41,12 +41,15 @@ impl BSplineSettings {
 
 /// q(t) = Σ_i P_i N_i(t) with B-splines of degree 5 on equally spaced knots, the end knots six-fold.
 ///
-/// The first three control points are equal, and so are the last three, which makes q̇ = q̈ = 0 at both ends exact. With q(T) = q(0) all six are one number and
-/// n - 5 numbers a joint are free: the end posture, then P_3 .. P_(n-4), all in rad (m). Otherwise n - 4: start, end, then the inner ones. Every control point acts on six
-/// spans only, so richer splines cost no more per sample. Position, being an average of control points, stays between the smallest and the largest.
+/// The first three control points are equal, and so are the last three, which makes q̇ = q̈ = 0 at both ends exact.
+/// With q(T) = q(0) all six are one number and n - 5 numbers a joint are free: the end posture, then P_3 .. P_(n-4),
+/// all in rad (m). Otherwise n - 4: start, end, then the inner ones. Every control point acts on six spans only, so
+/// richer splines cost no more per sample. Position, being an average of control points, stays between the smallest and
+/// the largest.
 ///
 /// # Source
-/// de Boor, A Practical Guide to Splines (2001), chapters IX and X; The NURBS Book (Piegl and Tiller 1997), Eqs. 2.5 and 2.7.
+/// de Boor, A Practical Guide to Splines (2001), chapters IX and X; The NURBS Book (Piegl and Tiller 1997), Eqs. 2.5
+/// and 2.7.
 pub type BSpline = LinearFamily<BSplineBasis>;
 
 /// The functions of a [`BSpline`] family.
@@ -129,7 +132,8 @@ impl Basis for BSplineBasis {
         let per_span = (points - DEGREE) as f64 / self.duration_s;
         let (first, functions) = self.functions(time_s * per_span);
         let scales = [1.0, per_span, per_span.powi(2), per_span.powi(3)];
-        // All functions add up to 1: with one number for both ends its function is what the others leave, exactly at rest where they are.
+        // All functions add up to 1: with one number for both ends its function is what the others leave, exactly at
+        // rest where they are.
         if ends == 1 {
             out[0][0] = 1.0;
         }
@@ -170,7 +174,8 @@ mod tests {
         }
     }
 
-    /// In the middle of a long spline the functions are cardinal B-splines: N(k) = 1, 26, 66, 26, 1 over 120 at the knots, (Schoenberg), slopes 5, 50, 0, -50, -5 over 120.
+    /// In the middle of a long spline the functions are cardinal B-splines: N(k) = 1, 26, 66, 26, 1 over 120 at the
+    /// knots, (Schoenberg), slopes 5, 50, 0, -50, -5 over 120.
     #[test]
     fn cardinal_values() {
         let settings = BSplineSettings { control_points: 25, returns: true };

@@ -33,10 +33,12 @@ fn times(family: &dyn Family, random: &mut Random) -> Vec<f64> {
     (0..29).map(|_| random.uniform(0.02 * duration, 0.98 * duration)).collect()
 }
 
-/// Each of q̇, q̈ and jerk integrated over short spans by Gauss-Legendre quadrature with five points against the change of q, q̇ and q̈.
+/// Each of q̇, q̈ and jerk integrated over short spans by Gauss-Legendre quadrature with five points against the change
+/// of q, q̇ and q̈.
 ///
-/// The spans are 1e-4 of the duration, so short that five points integrate every smooth piece to rounding; allowed are 1e-6 of the integral's largest possible value and the rounding of
-/// the difference. Where a span holds a break of the next derivative (a knot) the quadrature is worth less: two spans of 29 may.
+/// The spans are 1e-4 of the duration, so short that five points integrate every smooth piece to rounding; allowed are
+/// 1e-6 of the integral's largest possible value and the rounding of the difference. Where a span holds a break of the
+/// next derivative (a knot) the quadrature is worth less: two spans of 29 may.
 pub(crate) fn derivatives(family: &dyn Family, seed: u64) {
     const NODES: [[f64; 2]; 5] = [
         [-0.906_179_845_938_664, 0.236_926_885_056_189_08],
@@ -79,7 +81,8 @@ pub(crate) fn derivatives(family: &dyn Family, seed: u64) {
     }
 }
 
-/// The gradient of a random linear function of the motion against central differences, and that it is added, not stored.
+/// The gradient of a random linear function of the motion against central differences, and that it is added, not
+/// stored.
 pub(crate) fn gradient(family: &dyn Family, seed: u64) {
     gradient_at(family, &start(family, seed), seed);
 }
@@ -119,7 +122,8 @@ pub(crate) fn gradient_on(family: &dyn Family, parameters: &[f64], times: &[f64]
             cost(&moved)
         };
         let difference = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * step);
-        // Fourth-order differences: rounding 1e-16 × cost / step and truncation step^4 are both below 1e-8 of the largest derivative.
+        // Fourth-order differences: rounding 1e-16 × cost / step and truncation step^4 are both below 1e-8 of the
+        // largest derivative.
         assert!(
             (gradient[index] - 1.0 - difference).abs() < 1e-7 * scale,
             "{}: parameter {index}: {} but {difference}",
@@ -129,7 +133,8 @@ pub(crate) fn gradient_on(family: &dyn Family, parameters: &[f64], times: &[f64]
     }
 }
 
-/// The curvature of random weights against the gradients of every weighted number of the motion, one by one: Σ w (Jᵀe)(Jᵀe)ᵀ.
+/// The curvature of random weights against the gradients of every weighted number of the motion, one by one: Σ w
+/// (Jᵀe)(Jᵀe)ᵀ.
 pub(crate) fn curvature(family: &dyn Family, seed: u64) {
     let parameters = start(family, seed);
     let mut random = Random::new(seed ^ 0x55);

@@ -31,7 +31,8 @@ pub enum FamilyError {
     },
 }
 
-/// The largest number of joints, strokes, harmonics, points and postures accepted: more is a slip of the keyboard, not a robot.
+/// The largest number of joints, strokes, harmonics, points and postures accepted: more is a slip of the keyboard, not
+/// a robot.
 pub(crate) const MOST: usize = 1000;
 
 /// Passes if `ok`, else says what is wrong with the setting.

@@ -14,7 +14,8 @@ pub struct FourierSettings {
     pub harmonics: usize,
     /// q̇ = q̈ = 0 at both ends, exactly. Default true; false gives the plain periodic series.
     pub rest: bool,
-    /// Periods within the duration. Default 1; bandwidth counts for information, so a long experiment does better with repeated periods.
+    /// Periods within the duration. Default 1; bandwidth counts for information, so a long experiment does better with
+    /// repeated periods.
     pub periods: usize,
 }
 
@@ -46,10 +47,12 @@ impl FourierSettings {
 ///
 /// q(t) = q0 + Σ_k a_k/(kω) sin kωt + b_k/(kω) cos kωt, k = 1..H, ω = 2π · periods / duration,
 ///
-/// so that a_k, b_k are amplitudes of speed in rad/s (m/s). Eq. 24 of the paper is the same series with its coefficients in rad: a_k/(kω), b_k/(kω) here.
+/// so that a_k, b_k are amplitudes of speed in rad/s (m/s). Eq. 24 of the paper is the same series with its
+/// coefficients in rad: a_k/(kω), b_k/(kω) here.
 ///
-/// At rest at both ends means q̇(0) = Σ a_k = 0 and q̈(0) = -ω Σ k b_k = 0; both are solved beforehand by an orthonormal basis of their null spaces, so no constraint is
-/// left and 2 H - 1 numbers a joint are free: q0, then H - 1 for a, then H - 1 for b. Periodic: q0, a_1..a_H, b_1..b_H.
+/// At rest at both ends means q̇(0) = Σ a_k = 0 and q̈(0) = -ω Σ k b_k = 0; both are solved beforehand by an
+/// orthonormal basis of their null spaces, so no constraint is left and 2 H - 1 numbers a joint are free: q0, then H -
+/// 1 for a, then H - 1 for b. Periodic: q0, a_1..a_H, b_1..b_H.
 ///
 /// ```
 /// use dynident_excitation::{Family, families::{Fourier, FourierSettings}};
@@ -142,7 +145,8 @@ impl Basis for FourierBasis {
     }
 }
 
-/// An orthonormal basis of the vectors at right angles to `normal`: all but the first column of the Householder reflection that turns `normal` onto the first axis.
+/// An orthonormal basis of the vectors at right angles to `normal`: all but the first column of the Householder
+/// reflection that turns `normal` onto the first axis.
 fn null_space(normal: &[f64]) -> Vec<Vec<f64>> {
     let length = normal.iter().map(|x| x * x).sum::<f64>().sqrt();
     let mut mirror: Vec<f64> = normal.iter().map(|x| x / length).collect();
@@ -176,7 +180,8 @@ mod tests {
         }
     }
 
-    /// Eq. 24 written out, with coefficients taken from the family, against its motion; rounding of sums of ten terms below 10.
+    /// Eq. 24 written out, with coefficients taken from the family, against its motion; rounding of sums of ten terms
+    /// below 10.
     #[test]
     fn is_the_series() {
         let (duration, harmonics) = (8.0, 5);

@@ -73,9 +73,10 @@ impl FrictionLadderSettings {
 
 /// Sweeps there and back at constant speed, one pair for each rung of a ladder of speeds, joined by smooth ramps.
 ///
-/// q(t) = q_mid + V g(t): the shape g is fixed by the settings, so a joint has two free numbers: the middle of its longest sweep in rad (m) and the
-/// fastest speed V in rad/s (m/s; negative begins the other way). During each sweep q̈ = 0 exactly, so torque is gravity and friction; the speed ramps up by a polynomial with
-/// continuous q̈ and jerk. Both ends are at rest and equal.
+/// q(t) = q_mid + V g(t): the shape g is fixed by the settings, so a joint has two free numbers: the middle of its
+/// longest sweep in rad (m) and the fastest speed V in rad/s (m/s; negative begins the other way). During each sweep
+/// q̈ = 0 exactly, so torque is gravity and friction; the speed ramps up by a polynomial with continuous q̈ and jerk.
+/// Both ends are at rest and equal.
 ///
 /// # Source
 /// Constant-velocity friction identification as in Armstrong-Hélouvry, Control of Machines with Friction (1991).
@@ -201,7 +202,8 @@ mod tests {
     use crate::family::Family;
     use proptest::prelude::*;
 
-    /// In every sweep the speed is the rung's and the acceleration is nothing; geometric ladder; the middle is the middle.
+    /// In every sweep the speed is the rung's and the acceleration is nothing; geometric ladder; the middle is the
+    /// middle.
     #[test]
     fn sweeps_are_at_constant_speed() {
         for (pace, one_by_one) in

@@ -8,8 +8,9 @@ use dynident_model::sample::Random;
 
 const NAME: &str = "given";
 
-/// A motion given at samples, as a family without free numbers. Between two samples it is the quintic polynomial that takes over q, q̇ and q̈ of both, so that these are
-/// exact at the samples and continuous everywhere; jerk is the polynomial's own.
+/// A motion given at samples, as a family without free numbers. Between two samples it is the quintic polynomial that
+/// takes over q, q̇ and q̈ of both, so that these are exact at the samples and continuous everywhere; jerk is the
+/// polynomial's own.
 ///
 /// ```
 /// use dynident_excitation::{Family, Motion, families::Given};
@@ -33,7 +34,8 @@ impl Given {
     /// The motion with q, q̇ and q̈ of `samples` at `times_s`, which are counted from the first; jerk is not looked at.
     ///
     /// # Errors
-    /// Fewer than two samples, times that do not increase, arrays of other lengths than joints × samples, a number that is not finite.
+    /// Fewer than two samples, times that do not increase, arrays of other lengths than joints × samples, a number that
+    /// is not finite.
     pub fn new(mut times_s: Vec<f64>, samples: Motion) -> Result<Self, FamilyError> {
         let length = |what, expected, found| {
             if expected == found { Ok(()) } else { Err(FamilyError::Length { family: NAME, what, expected, found }) }
@@ -125,7 +127,8 @@ mod tests {
     use super::*;
     use crate::families::{Fourier, FourierSettings, check};
 
-    /// Samples of a series, read back: exact at samples, and between them as near as the remainder h⁶ max|q⁽⁶⁾| / (720 · 64) of quintic Hermite interpolation says.
+    /// Samples of a series, read back: exact at samples, and between them as near as the remainder h⁶ max|q⁽⁶⁾| / (720
+    /// · 64) of quintic Hermite interpolation says.
     #[test]
     fn a_sampled_series_comes_back() {
         let duration = 8.0;
@@ -145,7 +148,8 @@ mod tests {
         let (mut found, mut expected) = (Motion::default(), Motion::default());
         given.motion(&[], &between, &mut found);
         series.motion(&parameters, &between, &mut expected);
-        // Fastest harmonic 5 · 2π/8 = 3.93 rad/s, speeds below 4 rad/s in all: q⁽⁶⁾ below 4 · 3.93⁵ = 3.8e3; h at most 0.07.
+        // Fastest harmonic 5 · 2π/8 = 3.93 rad/s, speeds below 4 rad/s in all: q⁽⁶⁾ below 4 · 3.93⁵ = 3.8e3; h at most
+        // 0.07.
         let worst = found.q.iter().zip(&expected.q).fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
         assert!(worst < 0.07_f64.powi(6) * 3.8e3 / (720.0 * 64.0), "{worst}");
     }

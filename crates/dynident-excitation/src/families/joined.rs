@@ -30,8 +30,9 @@ impl Default for JoinedSettings {
 
 /// Members one after another, with a move between each two, and from and to given postures.
 ///
-/// A move is the quintic polynomial that takes over position, speed and acceleration of both ends (so a plain periodic series can be joined too); between members at rest
-/// it is the minimum-jerk move. Speed and acceleration are continuous everywhere if they are within the members.
+/// A move is the quintic polynomial that takes over position, speed and acceleration of both ends (so a plain periodic
+/// series can be joined too); between members at rest it is the minimum-jerk move. Speed and acceleration are
+/// continuous everywhere if they are within the members.
 ///
 /// Free numbers: those of the first member (all its joints), of the second, and so on.
 #[derive(Debug)]
@@ -48,7 +49,8 @@ enum Piece {
     MoveTo(usize),
 }
 
-/// Position, speed and acceleration of all joints at both ends of one member: `[joint][order][end]` as a [`Motion`] of two samples.
+/// Position, speed and acceleration of all joints at both ends of one member: `[joint][order][end]` as a [`Motion`] of
+/// two samples.
 fn ends_of(member: &dyn Family, parameters: &[f64]) -> Motion {
     let mut ends = Motion::default();
     member.motion(parameters, &[0.0, member.duration_s()], &mut ends);
@@ -59,7 +61,8 @@ impl Joined {
     /// The members in this order.
     ///
     /// # Errors
-    /// No members, members or postures of unequal numbers of joints, a posture that is not finite, or a move without time.
+    /// No members, members or postures of unequal numbers of joints, a posture that is not finite, or a move without
+    /// time.
     pub fn new(members: Vec<Box<dyn Family>>, settings: &JoinedSettings) -> Result<Self, FamilyError> {
         let move_s = settings.move_s;
         require((1e-3..=1e7).contains(&move_s), NAME, "move_s", move_s, "give between a millisecond and 1e7 seconds")?;
@@ -299,7 +302,8 @@ mod tests {
         family.random(&[[-1.0, 1.0], [-2.0, 0.5]], &[1.0, 2.0], &mut Random::new(seed))
     }
 
-    /// Start and end postures at rest, members where they should be, and no step of q, q̇ or q̈ at any join: a step over 2e-9 s is at most rate × 2e-9 (rates here are below 1e3).
+    /// Start and end postures at rest, members where they should be, and no step of q, q̇ or q̈ at any join: a step
+    /// over 2e-9 s is at most rate × 2e-9 (rates here are below 1e3).
     #[test]
     fn joins_are_smooth() {
         let settings = JoinedSettings { move_s: 1.5, start: Some(vec![0.1, 0.2]), end: Some(vec![-0.3, 0.4]) };

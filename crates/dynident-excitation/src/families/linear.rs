@@ -34,8 +34,8 @@ pub trait Basis: core::fmt::Debug + Send + Sync {
 
 /// A family linear in its parameters: joint after joint, the weights of its [`Basis`].
 ///
-/// The functions are sampled once per grid of times and kept, so that motion and gradient are two small matrix products. A grid is recognised by its times, so optimisers
-/// should ask again for the same ones.
+/// The functions are sampled once per grid of times and kept, so that motion and gradient are two small matrix
+/// products. A grid is recognised by its times, so optimisers should ask again for the same ones.
 #[derive(Clone, Debug)]
 pub struct LinearFamily<B> {
     basis: B,

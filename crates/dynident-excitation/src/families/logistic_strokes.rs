@@ -1,7 +1,6 @@
 //! Any number of logistic strokes a joint, all joints at once, exactly at rest at both ends.
 
 use super::error::{FamilyError, MOST, require, require_frame};
-use super::logistic_map::PathRates;
 use super::logistic_stroke::{LAST, LogisticStroke, StrokeDerivatives, logistic_and_bell, unit_stroke, warp};
 use super::random_start::{grid, scale_and_shift};
 use super::sampled_basis::{load_some, store_some};
@@ -54,7 +53,8 @@ impl LogisticStrokesSettings {
     /// Checks the settings for a duration.
     ///
     /// # Errors
-    /// Too few strokes (1, or 2 if the motion returns) or more than 1000, κ outside its range, or a largest ω too small for one stroke to fit into the duration.
+    /// Too few strokes (1, or 2 if the motion returns) or more than 1000, κ outside its range, or a largest ω too small
+    /// for one stroke to fit into the duration.
     pub fn validate(&self, duration_s: f64) -> Result<(), FamilyError> {
         let least = if self.returns { 2 } else { 1 };
         require(
@@ -81,14 +81,17 @@ impl LogisticStrokesSettings {
     }
 }
 
-/// q(t) = h + Σ_k A_k s_k(t) with [`LogisticStroke`]s: the generalisation of the paper's Eq. 14 to strokes of unequal amplitude, steepness and time, all joints moving at once.
+/// q(t) = h + Σ_k A_k s_k(t) with [`LogisticStroke`]s: the generalisation of the paper's Eq. 14 to strokes of unequal
+/// amplitude, steepness and time, all joints moving at once.
 ///
 /// Free numbers a joint, in this order:
-/// * overlapping: h, A_1..A_K (without A_K, which closes the sum, if the motion returns), ω_1..ω_K in 1/s, places τ_1..τ_K from 0 (stroke begins with the motion) to 1
-///   (ends with it). 3 K numbers if it returns.
-/// * spliced: h, A_1..A_K (ditto), κ_1..κ_K, logarithms of the lengths of slots 1..K-1 against the last slot's. 3 K - 1 numbers if it returns.
+/// * overlapping: h, A_1..A_K (without A_K, which closes the sum, if the motion returns), ω_1..ω_K in 1/s, places
+///   τ_1..τ_K from 0 (stroke begins with the motion) to 1 (ends with it). 3 K numbers if it returns.
+/// * spliced: h, A_1..A_K (ditto), κ_1..κ_K, logarithms of the lengths of slots 1..K-1 against the last slot's. 3 K - 1
+///   numbers if it returns.
 ///
-/// Every value within [`bounds`](Family::bounds) keeps all strokes within the duration, so both ends are exactly at rest, with all derivatives zero.
+/// Every value within [`bounds`](Family::bounds) keeps all strokes within the duration, so both ends are exactly at
+/// rest, with all derivatives zero.
 #[derive(Clone, Debug)]
 pub struct LogisticStrokes {
     settings: LogisticStrokesSettings,
@@ -137,27 +140,6 @@ impl LogisticStrokes {
             })
             .collect();
         (own[0], strokes)
-    }
-
-    /// Speed and acceleration of a joint that is at `q` at `time_s`, by the stroke whose slot it is: Eqs. 15 and 16 for these strokes.
-    ///
-    /// `None` if q is outside the stroke, or strokes may overlap, so that position does not tell speed. A robot that lags is still on the stroke of an earlier time: subtract the lag from
-    /// `time_s`.
-    ///
-    /// # Panics
-    /// If the joint or the parameters do not exist.
-    pub fn rates(&self, parameters: &[f64], joint: usize, time_s: f64, q: f64) -> Option<PathRates> {
-        if self.settings.order == StrokeOrder::Overlapping {
-            return None;
-        }
-        let (mut from, strokes) = self.strokes(parameters, joint);
-        for stroke in strokes {
-            if (time_s - stroke.centre_s).abs() <= stroke.half_duration_s {
-                return stroke.rates(q - from);
-            }
-            from += stroke.amplitude;
-        }
-        None
     }
 
     fn free_amplitudes(&self) -> usize {
@@ -323,7 +305,8 @@ impl Kernel for Backward<'_> {
                         let unit = lanes_stroke(u, stroke.sharpness);
                         let inverse = T::splat(1.0 / stroke.half_duration_s);
                         let mut scale = T::ONE;
-                        // Moving the middle by dc is -du·w; stretching by dw scales u: order n gains -(u S_{n+1} + n S_n)/w.
+                        // Moving the middle by dc is -du·w; stretching by dw scales u: order n gains -(u S_{n+1} + n
+                        // S_n)/w.
                         let mut local = [T::ZERO; 4];
                         for order in 0..4 {
                             let pull = pulls[order] * scale;
@@ -365,7 +348,8 @@ impl Family for LogisticStrokes {
         self.joints * self.each()
     }
 
-    /// Overlapping: ω from the one stroke that fills the duration to the largest, places from 0 to 1. Spliced: κ from 2√3 to 40, slots up to e³ times as long as the last or as short.
+    /// Overlapping: ω from the one stroke that fills the duration to the largest, places from 0 to 1. Spliced: κ from
+    /// 2√3 to 40, slots up to e³ times as long as the last or as short.
     fn bounds(&self) -> Vec<[f64; 2]> {
         let count = self.settings.strokes;
         let (third, fourth) = match self.settings.order {
@@ -529,35 +513,6 @@ mod tests {
                 }
                 prop_assert!((motion.q[start] - motion.q[end]).abs() < 1e-13);
             }
-        }
-
-        /// The map on spliced strokes gives the family's own rates back wherever a stroke is neither just begun nor nearly done; 1e-12 of the stroke's Aω and Aω² plus
-        /// what rounding of q, up to 3 rad, is amplified to.
-        #[test]
-        fn map_is_exact_on_every_stroke(seed in any::<u64>(), strokes in 2_usize..6) {
-            let family = family(strokes, StrokeOrder::Spliced, true);
-            let parameters = check::start(&family, seed);
-            let times: Vec<f64> = (1..500).map(|s| 0.02 * f64::from(s)).collect();
-            let mut motion = Motion::default();
-            family.motion(&parameters, &times, &mut motion);
-            let mut mapped = 0;
-            for joint in 0..2 {
-                let (_, list) = family.strokes(&parameters, joint);
-                let omega = list.iter().fold(1.0_f64, |most, stroke| most.max(stroke.omega()));
-                for (at, &time) in motion.of(joint).zip(&times) {
-                    let inside = list.iter().any(|s| ((time - s.centre_s) / s.half_duration_s).abs() < 0.5);
-                    if !inside { continue; }
-                    let rates = family.rates(&parameters, joint, time, motion.q[at]);
-                    let Some(rates) = rates else { continue };
-                    mapped += 1;
-                    prop_assert!((rates.dq - motion.dq[at]).abs() < 1e-12 * omega * 3.0);
-                    prop_assert!((rates.ddq - motion.ddq[at]).abs() < 1e-12 * omega * omega * 3.0);
-                }
-            }
-            prop_assert!(mapped > 200, "{mapped}");
-            let overlapping = LogisticStrokes { settings: LogisticStrokesSettings::default(), ..family };
-            let parameters = check::start(&overlapping, seed);
-            prop_assert_eq!(overlapping.rates(&parameters, 0, 5.0, 0.0), None);
         }
     }
 }

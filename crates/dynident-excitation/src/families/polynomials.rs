@@ -1,6 +1,7 @@
 //! The polynomial pieces that several families share.
 
-/// The step 35x⁴ - 84x⁵ + 70x⁶ - 20x⁷ from 0 to 1 with three vanishing derivatives at both ends, with its first three derivatives by x; constant outside 0..1.
+/// The step 35x⁴ - 84x⁵ + 70x⁶ - 20x⁷ from 0 to 1 with three vanishing derivatives at both ends, with its first three
+/// derivatives by x; constant outside 0..1.
 pub(crate) fn smooth_step(x: f64) -> [f64; 4] {
     if x <= 0.0 {
         return [0.0; 4];
@@ -30,7 +31,8 @@ pub(crate) fn smooth_ramp(x: f64) -> [f64; 4] {
     [ramp, step, first, second]
 }
 
-/// The six quintic Hermite functions on 0..`span_s` at `time_s` with their first three derivatives by time: weights of q, q̇, q̈ at the start, then of q, q̇, q̈ at the end.
+/// The six quintic Hermite functions on 0..`span_s` at `time_s` with their first three derivatives by time: weights of
+/// q, q̇, q̈ at the start, then of q, q̇, q̈ at the end.
 ///
 /// # Source
 /// The quintic that takes position, speed and acceleration at both ends; Craig, Introduction to Robotics, section 7.3.
@@ -63,7 +65,8 @@ mod tests {
     use super::*;
     use dynident_lanes::{Dual, Scalar};
 
-    /// Horner's rule on dual numbers of the same polynomial, written out in powers: an independent way to each derivative (1e-12: sums of terms below 1e3).
+    /// Horner's rule on dual numbers of the same polynomial, written out in powers: an independent way to each
+    /// derivative (1e-12: sums of terms below 1e3).
     #[test]
     fn step_and_ramp_derive_each_other() {
         for sample in 1..40 {

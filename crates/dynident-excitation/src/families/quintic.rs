@@ -14,7 +14,8 @@ const NAME: &str = "quintic";
 pub struct QuinticSettings {
     /// Number of way-points, ends included, equally spaced in time. Default 6.
     pub way_points: usize,
-    /// Speed and acceleration at the inner way-points are free numbers too. Default false: the motion comes to rest at every way-point.
+    /// Speed and acceleration at the inner way-points are free numbers too. Default false: the motion comes to rest at
+    /// every way-point.
     pub free_rates: bool,
     /// The last way-point is the first one. Default true.
     pub returns: bool,
@@ -45,12 +46,13 @@ impl QuinticSettings {
 
 /// Quintic polynomials between way-points at equal times, with continuous speed and acceleration, at rest at both ends.
 ///
-/// Free numbers a joint: positions of the way-points (the last one left out if the motion returns), then, with free rates, q̇ of the inner way-points in rad/s and
-/// q̈ in rad/s². The jerk may jump at way-points.
+/// Free numbers a joint: positions of the way-points (the last one left out if the motion returns), then, with free
+/// rates, q̇ of the inner way-points in rad/s and q̈ in rad/s². The jerk may jump at way-points.
 ///
 /// # Source
-/// Atkeson, An and Hollerbach, Estimation of inertial parameters of manipulator loads and links, IJRR 5(3), 1986 (the paper's reference 7): fifth-order polynomials between
-/// way-points; Armstrong, IJRR 8(6), 1989, frees the accelerations.
+/// Atkeson, An and Hollerbach, Estimation of inertial parameters of manipulator loads and links, IJRR 5(3), 1986 (the
+/// paper's reference 7): fifth-order polynomials between way-points; Armstrong, IJRR 8(6), 1989, frees the
+/// accelerations.
 pub type Quintic = LinearFamily<QuinticBasis>;
 
 /// The functions of a [`Quintic`] family.

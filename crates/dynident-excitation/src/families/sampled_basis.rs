@@ -41,7 +41,8 @@ pub(crate) struct SampledBasis {
 }
 
 impl SampledBasis {
-    /// Samples `columns` functions; `row(set, time, out)` gives value, first, second and third derivative of each into zeroed `out`.
+    /// Samples `columns` functions; `row(set, time, out)` gives value, first, second and third derivative of each into
+    /// zeroed `out`.
     pub(crate) fn new(columns: usize, sets: usize, times_s: &[f64], row: impl Fn(usize, f64, &mut [[f64; 4]])) -> Self {
         let blocks = times_s.len().div_ceil(BLOCK);
         let mut buffer = vec![[0.0; 4]; columns];
@@ -73,7 +74,8 @@ impl SampledBasis {
         Self { times_s: times_s.to_vec(), columns, sets }
     }
 
-    /// Writes Σ parameter · column and its derivatives for samples `[from, from + len)` of `out`, which is already sized.
+    /// Writes Σ parameter · column and its derivatives for samples `[from, from + len)` of `out`, which is already
+    /// sized.
     pub(crate) fn motion(&self, parameters: &[f64], from: usize, out: &mut Motion) {
         dispatch(Level::detect(), Forward { basis: self, parameters, from, out });
     }
@@ -282,7 +284,8 @@ impl Clone for GridCache {
 }
 
 impl GridCache {
-    /// Calls `with(basis, from)` for the whole grid if its table of so many functions is small (sampled once, then kept), else piece by piece.
+    /// Calls `with(basis, from)` for the whole grid if its table of so many functions is small (sampled once, then
+    /// kept), else piece by piece.
     pub(crate) fn each(
         &self,
         functions: usize,
@@ -327,7 +330,8 @@ mod tests {
         out[3] = [x.sin(), x.cos(), -x.sin(), -x.cos()];
     }
 
-    /// Against the plain sums, for joints in pairs and alone, shared and own functions, and every remainder of a block; 1e-13 for sums of four terms below 5.
+    /// Against the plain sums, for joints in pairs and alone, shared and own functions, and every remainder of a block;
+    /// 1e-13 for sums of four terms below 5.
     #[test]
     fn both_products_are_the_plain_sums() {
         let mut random = Random::new(4);

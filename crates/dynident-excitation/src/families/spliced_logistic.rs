@@ -1,7 +1,6 @@
 //! The paper's excitation trajectory: logistic functions spliced there and back.
 
 use super::error::{FamilyError, MOST, require, require_frame};
-use super::logistic_map::LogisticMap;
 use super::random_start::{grid, scale_and_shift};
 use crate::family::Family;
 use crate::motion::{Motion, MotionCotangent};
@@ -14,7 +13,8 @@ const NAME: &str = "spliced_logistic";
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SplicedLogisticSettings {
-    /// ω T. Default 40 (the paper gives no T; |q̇(0)| < 1e-4 rad/s asks for about this). Where T is given, its least allowed value.
+    /// ω T. Default 40 (the paper gives no T; |q̇(0)| < 1e-4 rad/s asks for about this). Where T is given, its least
+    /// allowed value.
     pub period_times_omega: f64,
     /// The period T of each joint in seconds. Default none: T = `period_times_omega` / ω, changing with ω.
     pub periods_s: Option<Vec<f64>>,
@@ -34,7 +34,8 @@ impl SplicedLogisticSettings {
     /// Checks the settings for so many joints and seconds.
     ///
     /// # Errors
-    /// ω T not positive or above 1e4, no repetitions, lists that do not name each joint once, numbers that are not finite, or periods that do not fit into the duration.
+    /// ω T not positive or above 1e4, no repetitions, lists that do not name each joint once, numbers that are not
+    /// finite, or periods that do not fit into the duration.
     pub fn validate(&self, joints: usize, duration_s: f64) -> Result<(), FamilyError> {
         let product = self.period_times_omega;
         require(product > 0.0 && product <= 1e4, NAME, "period_times_omega", product, "give more than 0, at most 1e4")?;
@@ -64,12 +65,15 @@ impl SplicedLogisticSettings {
 
 /// The spliced logistic function, Eqs. 12 to 14 of the paper:
 ///
-/// q(t) = h + A/(1 + e^-(ω rem(t, T) - ωT/4)) in the first half of each period, h + A/(1 + e^(ω rem(t, T) - 3ωT/4)) in the second.
+/// q(t) = h + A/(1 + e^-(ω rem(t, T) - ωT/4)) in the first half of each period, h + A/(1 + e^(ω rem(t, T) - 3ωT/4)) in
+/// the second.
 ///
-/// Free numbers a joint: A in rad (m), ω in 1/s, and h in rad (m) unless given. Peak speed Aω/4, peak acceleration Aω²/(6√3).
+/// Free numbers a joint: A in rad (m), ω in 1/s, and h in rad (m) unless given. Peak speed Aω/4, peak acceleration
+/// Aω²/(6√3).
 ///
-/// At the splices the joint is at rest only nearly: it is A/(1 + e^(ωT/4)) away from its asymptote (4.5e-5 A for ωT = 40) with a speed of about that times ω, which changes sign there.
-/// [`LogisticStrokes`](super::LogisticStrokes) are exactly at rest.
+/// At the splices the joint is at rest only nearly: it is A/(1 + e^(ωT/4)) away from its asymptote (4.5e-5 A for
+/// ωT = 40) with a speed of about that times ω, which changes sign there. [`LogisticStrokes`](super::LogisticStrokes)
+/// are exactly at rest.
 ///
 /// Position tells speed and acceleration: [`SplicedLogistic::map`].
 #[derive(Clone, Debug)]
@@ -104,15 +108,6 @@ impl SplicedLogistic {
     /// If the joint or the parameters do not exist.
     pub fn period_s(&self, parameters: &[f64], joint: usize) -> f64 {
         self.period(joint, parameters[joint * self.each() + 1])
-    }
-
-    /// The map from position to speed and acceleration of a joint, Eqs. 15 and 16; the branch is [`Branch::at`](super::Branch::at) with [`period_s`](Self::period_s).
-    ///
-    /// # Panics
-    /// If the joint or the parameters do not exist.
-    pub fn map(&self, parameters: &[f64], joint: usize) -> LogisticMap {
-        let own = &parameters[joint * self.each()..(joint + 1) * self.each()];
-        LogisticMap { amplitude: own[0], omega: own[1], offset: self.offset(joint, own) }
     }
 
     /// Free numbers a joint.
@@ -274,15 +269,15 @@ impl Family for SplicedLogistic {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::families::{Branch, check};
+    use crate::families::check;
     use proptest::prelude::*;
 
     fn family(joints: usize, duration_s: f64, settings: &SplicedLogisticSettings) -> SplicedLogistic {
         SplicedLogistic::new(joints, duration_s, settings).unwrap()
     }
 
-    /// Figs. 4 and 5: for T = 80 all ω pass A/2 at T/4 and 3T/4 with slope ±Aω/4 and reach A at T/2; for ω = 0.6 the same stroke moves with T. Peak acceleration Aω²/(6√3) where
-    /// e^x = 2 + √3. Rounding only.
+    /// Figs. 4 and 5: for T = 80 all ω pass A/2 at T/4 and 3T/4 with slope ±Aω/4 and reach A at T/2; for ω = 0.6 the
+    /// same stroke moves with T. Peak acceleration Aω²/(6√3) where e^x = 2 + √3. Rounding only.
     #[test]
     fn features_of_figures_4_and_5() {
         for (omega, period) in [(0.5, 80.0), (1.0, 80.0), (2.0, 80.0), (0.6, 70.0), (0.6, 80.0), (0.6, 100.0)] {
@@ -338,7 +333,8 @@ mod tests {
             check::derivatives(&family(2, 60.0, &settings), seed);
         }
 
-        /// On the strokes: at a splice, which moves with ω where T does, the speed jumps by e^-10 and has no derivative.
+        /// On the strokes: at a splice, which moves with ω where T does, the speed jumps by e^-10 and has no
+        /// derivative.
         #[test]
         fn gradient_is_exact(seed in any::<u64>(), repetitions in 1_usize..4, fixed in any::<bool>(), given in any::<bool>()) {
             let settings = SplicedLogisticSettings {
@@ -356,29 +352,6 @@ mod tests {
                 times.extend((0..8).map(|_| period * (0.5 * half as f64 + 0.25 + random.uniform(-0.2, 0.2))));
             }
             check::gradient_on(&family, &parameters, &times, seed);
-        }
-
-        /// The map gives the family's own speed and acceleration back. Its error is the rounding of q, at most ω and ω² times 1e-16 |q|, so 1e-12 of the peaks is ample.
-        #[test]
-        fn map_is_exact_on_the_stroke(seed in any::<u64>()) {
-            let family = family(2, 60.0, &SplicedLogisticSettings::default());
-            let parameters = check::start(&family, seed);
-            let times: Vec<f64> = (0..600).map(|s| 0.1 * f64::from(s)).collect();
-            let mut motion = Motion::default();
-            family.motion(&parameters, &times, &mut motion);
-            for joint in 0..2 {
-                let (map, period) = (family.map(&parameters, joint), family.period_s(&parameters, joint));
-                let [speed, acceleration] =
-                    [map.amplitude * map.omega, map.amplitude * map.omega * map.omega].map(|x| x.abs().max(1.0));
-                for (at, &time) in motion.of(joint).zip(&times).filter(|(_, time)| **time < period) {
-                    let rates = map.rates(motion.q[at], Branch::at(time, period)).unwrap();
-                    prop_assert!((rates.dq - motion.dq[at]).abs() < 1e-12 * speed);
-                    prop_assert!((rates.ddq - motion.ddq[at]).abs() < 1e-12 * acceleration);
-                }
-                for outside in [-1e-6, 1.0 + 1e-6, f64::NAN] {
-                    prop_assert_eq!(map.rates(map.offset + outside * map.amplitude, Branch::There), None);
-                }
-            }
         }
     }
 }

@@ -10,8 +10,10 @@ const LEAST_PART: f64 = 0.3;
 
 /// Every motion of another family, moved joint by joint so that it starts at given positions: `q_j(t) + s_j - q_j(0)`.
 ///
-/// The start is exact by construction, and so is the end of a family that returns. Rates stay as they are. Parameters are those of the family; a parameter that only moves a joint as a whole
-/// has no effect where that joint's start is given. Of a family that is not moved by its own parameters (a joined one with a start posture of its own) it moves every posture alike.
+/// The start is exact by construction, and so is the end of a family that returns. Rates stay as they are. Parameters
+/// are those of the family; a parameter that only moves a joint as a whole has no effect where that joint's start is
+/// given. Of a family that is not moved by its own parameters (a joined one with a start posture of its own) it moves
+/// every posture alike.
 #[derive(Debug)]
 pub struct StartingAt {
     inner: Box<dyn Family>,
@@ -61,7 +63,8 @@ impl Family for StartingAt {
         self.inner.bounds()
     }
 
-    /// As the family's, in ranges about the start posture: what leaves the joint's own range there is for the search to mend.
+    /// As the family's, in ranges about the start posture: what leaves the joint's own range there is for the search to
+    /// mend.
     fn random(&self, ranges: &[[f64; 2]], speeds: &[f64], random: &mut Random) -> Vec<f64> {
         let mut ranges = ranges.to_vec();
         for (joint, start) in self.given() {

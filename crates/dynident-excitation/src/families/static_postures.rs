@@ -40,7 +40,8 @@ impl StaticPosturesSettings {
     }
 }
 
-/// K postures, each held for the same time, with moves between them that begin and end with q̇ = q̈ = jerk = 0 (polynomials of degree 7).
+/// K postures, each held for the same time, with moves between them that begin and end with q̇ = q̈ = jerk = 0
+/// (polynomials of degree 7).
 ///
 /// Free numbers a joint: its positions in the K postures, rad (m). The motion begins and ends in a held posture.
 pub type StaticPostures = LinearFamily<StaticPosturesBasis>;

@@ -18,10 +18,12 @@ pub struct Step {
     pub period_s: f64,
 }
 
-/// [`SplicedLogistic`] of single joints, one after another. Parameters: A in rad (m) and ω in 1/s of each step, in the order of the steps.
+/// [`SplicedLogistic`] of single joints, one after another. Parameters: A in rad (m) and ω in 1/s of each step, in the
+/// order of the steps.
 ///
-/// Before and after its turn a joint stands where its function starts, A/(1 + e^(ωT/4)) from its offset; a joint without a turn stands at its offset. Speed and acceleration jump by what the splice leaves
-/// (Eq. 17 of the paper asks for less than 1e-4).
+/// Before and after its turn a joint stands where its function starts, A/(1 + e^(ωT/4)) from its offset; a joint
+/// without a turn stands at its offset. Speed and acceleration jump by what the splice leaves (Eq. 17 of the paper asks
+/// for less than 1e-4).
 #[derive(Clone, Debug)]
 pub struct StepWiseLogistic {
     offsets: Vec<f64>,

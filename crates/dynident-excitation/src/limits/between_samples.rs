@@ -4,11 +4,13 @@ use super::kind::LimitKind;
 use super::set::LimitSet;
 
 impl LimitSet {
-    /// For each row the most by which its value between samples can exceed the larger of the two beside it, on a grid of step `step_s` that holds both ends, **given that the
-    /// limit on the next derivatives holds everywhere**; `None` where no such limit is set.
+    /// For each row the most by which its value between samples can exceed the larger of the two beside it, on a grid
+    /// of step `step_s` that holds both ends, **given that the limit on the next derivatives holds everywhere**; `None`
+    /// where no such limit is set.
     ///
-    /// A twice differentiable x leaves its chord by at most `h²/8 max |ẍ|`, so position is bounded by the acceleration limit and speed by the jerk limit; acceleration passes
-    /// its samples by at most `h/2 max |jerk|`. Torque, power and places have no such closed bound here: see [`peaks`](super::peaks).
+    /// A twice differentiable x leaves its chord by at most `h²/8 max |ẍ|`, so position is bounded by the acceleration
+    /// limit and speed by the jerk limit; acceleration passes its samples by at most `h/2 max |jerk|`. Torque, power
+    /// and places have no such closed bound here: see [`peaks`](super::peaks).
     pub fn sampling_margins(&self, step_s: f64) -> Vec<Option<f64>> {
         let size = |kind: LimitKind, subject: &str| {
             let row = self.constraints().iter().find(|row| row.kind == kind && row.subject == subject);

@@ -45,7 +45,7 @@ pub struct LinkCapsule {
 
 /// A capsule on a body (`None`: the base), ends in the body's frame.
 #[derive(Clone, Debug, PartialEq)]
-pub struct BodyCapsule {
+pub(crate) struct BodyCapsule {
     /// Index of the body.
     pub body: Option<usize>,
     /// Name of the link.
@@ -58,13 +58,13 @@ pub struct BodyCapsule {
 
 /// The capsules of a robot and which of them must stay apart.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct CapsulePairs {
+pub(crate) struct CapsulePairs {
     /// All capsules.
     pub capsules: Vec<BodyCapsule>,
     /// Pairs that are kept apart, by capsule number.
     pub pairs: Vec<[usize; 2]>,
-    /// Pairs of links whose **fitted** capsules overlap in every posture tried, so that keeping them apart would forbid all motion. They are not checked: give capsules of
-    /// their own to links that can really touch.
+    /// Pairs of links whose **fitted** capsules overlap in every posture tried, so that keeping them apart would forbid
+    /// all motion. They are not checked: give capsules of their own to links that can really touch.
     pub left_out: Vec<[String; 2]>,
 }
 
@@ -75,7 +75,8 @@ impl SelfCollision {
     /// Checks numbers and names.
     ///
     /// # Errors
-    /// If a link is unknown, a number is not finite, a radius or the clearance negative, or a pair has no size at all to keep apart.
+    /// If a link is unknown, a number is not finite, a radius or the clearance negative, or a pair has no size at all
+    /// to keep apart.
     pub fn validate(&self, model: &Model) -> Result<(), LimitError> {
         not_negative("clearance of the self-collision limit", self.clearance_m)?;
         if self.capsules.is_empty() {
@@ -95,12 +96,13 @@ impl SelfCollision {
         Ok(())
     }
 
-    /// The capsules on their bodies and the pairs to keep apart: all but those on one body, on neighbours (parent and child) and those ignored. Of **fitted** capsules also
-    /// those are left out that overlap in each of 256 seeded postures within the position limits of the description.
+    /// The capsules on their bodies and the pairs to keep apart: all but those on one body, on neighbours (parent and
+    /// child) and those ignored. Of **fitted** capsules also those are left out that overlap in each of 256 seeded
+    /// postures within the position limits of the description.
     ///
     /// # Errors
     /// As [`validate`](SelfCollision::validate).
-    pub fn resolve(&self, model: &Model) -> Result<CapsulePairs, LimitError> {
+    pub(crate) fn resolve(&self, model: &Model) -> Result<CapsulePairs, LimitError> {
         self.validate(model)?;
         let given = |capsule: &LinkCapsule| {
             let (body, placement) = link_place(model, &capsule.link, "a capsule")?;
@@ -190,4 +192,30 @@ fn always_overlapping(model: &Model, capsules: &[BodyCapsule], pairs: &[[usize; 
         }
     }
     always
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fitted_capsules_keep_the_forearm_from_the_shoulder_and_leave_out_the_wrist() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
+        let model = dynident_model::load_robot(path).unwrap().model;
+        let fitted = SelfCollision::default().resolve(&model).unwrap();
+        let names: Vec<[&str; 2]> =
+            fitted.pairs.iter().map(|pair| pair.map(|index| fitted.capsules[index].link.as_str())).collect();
+        assert!(names.contains(&["shoulder_link", "forearm_link"]), "{names:?}");
+        assert!(names.contains(&["upper_arm_link", "wrist_3_link"]), "{names:?}");
+        // The wrist's axes are 0.115 m apart, less than two radii, in every posture.
+        assert!(
+            fitted.left_out.iter().any(|[a, b]| a == "forearm_link" && b == "wrist_2_link"),
+            "{:?}",
+            fitted.left_out
+        );
+        for [first, second] in &fitted.pairs {
+            let parent = |index: usize| fitted.capsules[index].body.map(|body| model.joints()[body].parent);
+            assert_ne!(parent(*second), Some(fitted.capsules[*first].body), "neighbours are no pair");
+        }
+    }
 }

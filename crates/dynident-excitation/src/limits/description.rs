@@ -122,7 +122,8 @@ pub struct ColumnLimit {
 }
 
 impl Limits {
-    /// The description's own limits: position where both ends are given, speed, torque from `effort`. Acceleration, jerk, power and space stay free.
+    /// The description's own limits: position where both ends are given, speed, torque from `effort`. Acceleration,
+    /// jerk, power and space stay free.
     pub fn from_model(model: &Model) -> Self {
         let joints = model.joints().iter().map(|joint| JointLimit {
             joint: joint.name.clone(),
@@ -134,7 +135,8 @@ impl Limits {
         Self { joints: joints.collect(), ..Self::default() }
     }
 
-    /// These limits with `other` laid over them: what `other` says wins, joint by joint and value by value; its boxes are added.
+    /// These limits with `other` laid over them: what `other` says wins, joint by joint and value by value; its boxes
+    /// are added.
     pub fn overlaid(mut self, other: &Self) -> Self {
         for over in &other.joints {
             let Some(under) = self.joints.iter_mut().find(|under| under.joint == over.joint) else {

@@ -11,10 +11,12 @@ use dynident_model::Model;
 const ON_THE_LIMIT: f64 = 1e-9;
 
 impl Limits {
-    /// Checks that the robot may stand at `q` (rad or m): position, places, distances, and gravity within the torque limits.
+    /// Checks that the robot may stand at `q` (rad or m): position, places, distances, and gravity within the torque
+    /// limits.
     ///
     /// # Errors
-    /// As [`validate`](Limits::validate); the first limit that the posture breaks; a wrong length or a number that is not finite.
+    /// As [`validate`](Limits::validate); the first limit that the posture breaks; a wrong length or a number that is
+    /// not finite.
     pub fn check_start(&self, model: &Model, q: &[f64]) -> Result<(), LimitError> {
         let set = LimitSet::new(self, model)?;
         if q.len() != model.dof() {
@@ -38,10 +40,12 @@ impl Limits {
         })
     }
 
-    /// Checks that every joint can go `displacement` (rad or m, less if its range is smaller) from rest to rest within `duration_s`, by its speed, acceleration and jerk limits.
+    /// Checks that every joint can go `displacement` (rad or m, less if its range is smaller) from rest to rest within
+    /// `duration_s`, by its speed, acceleration and jerk limits.
     ///
     /// # Errors
-    /// As [`validate`](Limits::validate); the slowest joint, if it needs longer; a duration or displacement that is not finite and positive.
+    /// As [`validate`](Limits::validate); the slowest joint, if it needs longer; a duration or displacement that is not
+    /// finite and positive.
     pub fn check_duration(&self, model: &Model, duration_s: f64, displacement: f64) -> Result<(), LimitError> {
         self.validate(model)?;
         positive("duration", duration_s)?;
@@ -63,11 +67,12 @@ impl Limits {
     }
 }
 
-/// The least time, s, from rest to rest over `displacement` (rad or m, not negative) with the given largest speed, acceleration and jerk; `None` is no limit.
+/// The least time, s, from rest to rest over `displacement` (rad or m, not negative) with the given largest speed,
+/// acceleration and jerk; `None` is no limit.
 ///
-/// Double-S profile (Biagiotti and Melchiorri, *Trajectory Planning for Automatic Machines and Robots* (2008), section 3.4, rest at both ends); without a jerk limit the
-/// trapezoid. Zero when nothing limits.
-pub fn shortest_duration_s(displacement: f64, speed: Option<f64>, acceleration: Option<f64>, jerk: Option<f64>) -> f64 {
+/// Double-S profile (Biagiotti and Melchiorri, *Trajectory Planning for Automatic Machines and Robots* (2008), section
+/// 3.4, rest at both ends); without a jerk limit the trapezoid. Zero when nothing limits.
+fn shortest_duration_s(displacement: f64, speed: Option<f64>, acceleration: Option<f64>, jerk: Option<f64>) -> f64 {
     let d = displacement;
     if d <= 0.0 {
         return 0.0;

@@ -31,17 +31,17 @@ pub enum LimitKind {
 
 impl LimitKind {
     /// True for limits that change when the same path is run slower.
-    pub fn depends_on_time(self) -> bool {
+    pub(crate) fn depends_on_time(self) -> bool {
         matches!(self, Self::Speed | Self::Acceleration | Self::Jerk | Self::Torque | Self::Power)
     }
 
     /// True for limits on where points of the arm are, which no single joint decides.
-    pub fn is_place(self) -> bool {
+    pub(crate) fn is_place(self) -> bool {
         matches!(self, Self::Box | Self::Floor | Self::Column | Self::SelfCollision)
     }
 
     /// True where the limit is a least distance and not a largest magnitude.
-    pub fn is_clearance(self) -> bool {
+    pub(crate) fn is_clearance(self) -> bool {
         matches!(self, Self::Floor | Self::Column | Self::SelfCollision)
     }
 }
@@ -65,8 +65,8 @@ impl fmt::Display for LimitKind {
 
 /// One limit: a row of constraint values over the samples.
 ///
-/// Its value `c` is at most 0 when the limit holds: `|x - middle| / size - 1` for magnitudes and ranges, `1 - distance / size` for clearances, and for the
-/// floor `(height + radius - z) / 1 m`.
+/// Its value `c` is at most 0 when the limit holds: `|x - middle| / size - 1` for magnitudes and ranges, `1 - distance
+/// / size` for clearances, and for the floor `(height + radius - z) / 1 m`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Constraint {
     /// What is limited.
@@ -82,7 +82,8 @@ pub struct Constraint {
 }
 
 impl Constraint {
-    /// The quantity at a constraint value `c`: magnitude, offset from the middle of the range, distance, or height above the floor.
+    /// The quantity at a constraint value `c`: magnitude, offset from the middle of the range, distance, or height
+    /// above the floor.
     pub fn quantity(&self, c: f64) -> f64 {
         match self.kind {
             LimitKind::Floor => self.middle - c * self.size,

@@ -1,8 +1,10 @@
-//! **Where may it move?** Limits as a user states them, as values and derivatives for optimisers, and in words when they cannot be kept.
+//! **Where may it move?** Limits as a user states them, as values and derivatives for optimisers, and in words when
+//! they cannot be kept.
 //!
-//! [`Limits`] is the description. [`LimitSet`] prepares it for a robot: normalised values `c <= 0` over a block of samples and the way back from multipliers to
-//! the motion. [`peaks()`] finds the true extremes between samples, [`diagnose()`] says what binds and what would help. The final word has
-//! [`check`](crate::check), which shares none of this.
+//! [`Limits`] is the description. [`LimitSet`] prepares it for a robot: normalised values `c <= 0` over a block of
+//! samples and the way back from multipliers to the motion. [`peaks()`] finds the true extremes between samples,
+//! [`diagnose()`] says what binds and what would help. The final word has [`check`](crate::check), which shares none of
+//! this.
 
 mod between_samples;
 mod capsules;
@@ -25,13 +27,10 @@ mod torque;
 mod validate;
 mod wrench;
 
-pub use capsules::{BodyCapsule, CapsulePairs, LinkCapsule, SelfCollision};
+pub use capsules::{LinkCapsule, SelfCollision};
 pub use description::{BoxLimit, ColumnLimit, FloorLimit, JointLimit, Limits, LinkPoint};
 pub use diagnose::{BrokenLimit, Diagnosis, LimitChange, Relaxation, diagnose};
 pub use error::LimitError;
-pub use feasibility::shortest_duration_s;
 pub use kind::{Constraint, LimitKind};
 pub use peaks::{Peak, PeakSettings, peaks};
-pub use segments::{SegmentDistance, segment_distance};
 pub use set::{LimitSet, LimitWorkspace};
-pub use torque::torque_pull_back;

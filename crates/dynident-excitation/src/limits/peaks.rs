@@ -44,11 +44,12 @@ struct Bracket {
 
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// The largest value of every row over all time from the first to the last of `times_s` (ascending), refined from the samples by golden section around every sampled maximum that comes
-/// near the row's largest. `motion` gives the exact motion at any list of times, as [`Family::motion`](crate::Family::motion) does.
+/// The largest value of every row over all time from the first to the last of `times_s` (ascending), refined from the
+/// samples by golden section around every sampled maximum that comes near the row's largest. `motion` gives the exact
+/// motion at any list of times, as [`Family::motion`](crate::Family::motion) does.
 ///
-/// Finds every extreme that the samples see as a local maximum; of a jump (in jerk) it finds the side on which samples stand higher. All brackets advance together, so the cost is `steps` blocks
-/// of as many samples as there are maxima.
+/// Finds every extreme that the samples see as a local maximum; of a jump (in jerk) it finds the side on which samples
+/// stand higher. All brackets advance together, so the cost is `steps` blocks of as many samples as there are maxima.
 pub fn peaks(
     set: &LimitSet,
     workspace: &mut LimitWorkspace,

@@ -20,7 +20,8 @@ enum Room {
 }
 
 impl Room {
-    /// The place on the straight way from `here` to `next` that counts, and its share of the way: nearest to the axis of a column, and `here` itself for everything that is not thin.
+    /// The place on the straight way from `here` to `next` that counts, and its share of the way: nearest to the axis
+    /// of a column, and `here` itself for everything that is not thin.
     fn nearest(&self, here: Vec3, next: Option<Vec3>) -> (Vec3, f64) {
         let (Self::Outside { axis, .. }, Some(next)) = (self, next) else { return (here, 0.0) };
         let (x, y) = (here[0] - axis[0], here[1] - axis[1]);
@@ -128,7 +129,8 @@ impl Term for PlaceLimits {
                     let (place, share) = room.nearest(here, next);
                     let gradient = room.value(place).1.scale(weight);
                     let joints = inputs.motion.joints;
-                    // The nearest place moves with both ends; its own sliding along the way changes nothing to first order.
+                    // The nearest place moves with both ends; its own sliding along the way changes nothing to first
+                    // order.
                     pull.point(point.body, joints, sample, here, gradient.scale(1.0 - share));
                     if let Some(next) = next {
                         pull.point(point.body, joints, sample + 1, next, gradient.scale(share));

@@ -2,9 +2,10 @@
 
 use dynident_model::Vec3;
 
-/// Where two segments come nearest: as fractions along each, the distance, and the direction from the second to the first.
+/// Where two segments come nearest: as fractions along each, the distance, and the direction from the second to the
+/// first.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SegmentDistance {
+pub(crate) struct SegmentDistance {
     /// Fraction along the first segment, 0 to 1.
     pub along_first: f64,
     /// Fraction along the second segment, 0 to 1.
@@ -17,11 +18,13 @@ pub struct SegmentDistance {
 
 /// The distance of the segments `first[0]`-`first[1]` and `second[0]`-`second[1]`, which may be parallel or points.
 ///
-/// Squared distance is convex in the two fractions, so its minimum over the unit square is the stationary point, where that lies inside, or on one of the four edges, each
-/// of which is the distance of an end point from the other segment (compare Ericson, *Real-Time Collision Detection* (2005), section 5.1.9). All five are
-/// looked at, so that no case depends on a parallelism threshold; of equal candidates the middle is taken, for parallel segments the middle of their overlap.
-/// By the envelope theorem the distance changes with the motion of the two nearest points along [`direction`](SegmentDistance::direction) only.
-pub fn segment_distance(first: [Vec3; 2], second: [Vec3; 2]) -> SegmentDistance {
+/// Squared distance is convex in the two fractions, so its minimum over the unit square is the stationary point, where
+/// that lies inside, or on one of the four edges, each of which is the distance of an end point from the other segment
+/// (compare Ericson, *Real-Time Collision Detection* (2005), section 5.1.9). All five are looked at, so that no case
+/// depends on a parallelism threshold; of equal candidates the middle is taken, for parallel segments the middle of
+/// their overlap. By the envelope theorem the distance changes with the motion of the two nearest points along
+/// [`direction`](SegmentDistance::direction) only.
+pub(crate) fn segment_distance(first: [Vec3; 2], second: [Vec3; 2]) -> SegmentDistance {
     let (u, v, w) = (first[1] - first[0], second[1] - second[0], first[0] - second[0]);
     let (uu, uv, vv, uw, vw) = (u.dot(u), u.dot(v), v.dot(v), u.dot(w), v.dot(w));
     // Nearest fraction on one segment to a fraction on the other; a segment without length has only its start.
@@ -83,7 +86,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The least value of a convex function on 0 to 1, by thirds: no derivative, no projection, and in no valley can it end too early.
+    /// The least value of a convex function on 0 to 1, by thirds: no derivative, no projection, and in no valley can it
+    /// end too early.
     fn least(of: &dyn Fn(f64) -> f64) -> f64 {
         let (mut low, mut high) = (0.0, 1.0);
         // (2/3)^90 = 1e-16
@@ -94,7 +98,8 @@ mod tests {
         of(0.5 * (low + high)).min(of(0.0)).min(of(1.0))
     }
 
-    /// The squared distance is convex in both fractions, and so is its least value over one of them as a function of the other.
+    /// The squared distance is convex in both fractions, and so is its least value over one of them as a function of
+    /// the other.
     fn nested_search(first: [Vec3; 2], second: [Vec3; 2]) -> f64 {
         let point = |ends: [Vec3; 2], s: f64| ends[0].scale(1.0 - s) + ends[1].scale(s);
         let square = |s: f64, t: f64| {

@@ -14,7 +14,8 @@ use crate::motion::{Motion, MotionCotangent};
 use dynident_dynamics::{BatchWorkspace, Workspace, body_placements, inverse_dynamics_batch};
 use dynident_model::{Model, Transform};
 
-/// Limits prepared for an optimiser. Row `r` at sample `s` stands at `r * samples + s`; a value `c <= 0` keeps the limit (see [`Constraint`]).
+/// Limits prepared for an optimiser. Row `r` at sample `s` stands at `r * samples + s`; a value `c <= 0` keeps the
+/// limit (see [`Constraint`]).
 #[derive(Debug)]
 pub struct LimitSet {
     model: Model,
@@ -27,8 +28,8 @@ pub struct LimitSet {
     placements: bool,
 }
 
-/// Scratch of one thread for one [`LimitSet`]; torques and placements of the last motion stay in it, so that [`pull_back`](LimitSet::pull_back) after
-/// [`values`](LimitSet::values) does not repeat them.
+/// Scratch of one thread for one [`LimitSet`]; torques and placements of the last motion stay in it, so that
+/// [`pull_back`](LimitSet::pull_back) after [`values`](LimitSet::values) does not repeat them.
 #[derive(Debug)]
 pub struct LimitWorkspace {
     batch: BatchWorkspace,
@@ -45,7 +46,8 @@ pub struct LimitWorkspace {
 }
 
 impl LimitWorkspace {
-    /// From now on samples are consecutive times of one motion, and columns are also looked for on the straight way from one sample to the next: an arm would else pass through a thin one unseen.
+    /// From now on samples are consecutive times of one motion, and columns are also looked for on the straight way
+    /// from one sample to the next: an arm would else pass through a thin one unseen.
     pub fn sweep(&mut self) {
         self.swept = true;
     }
@@ -99,12 +101,12 @@ impl LimitSet {
     }
 
     /// The rows that bound a single joint's motion.
-    pub fn bands(&self) -> &[JointBand] {
+    pub(crate) fn bands(&self) -> &[JointBand] {
         &self.bands
     }
 
     /// Whether the places of points are limited: boxes, floor, column, self-collision.
-    pub fn has_places(&self) -> bool {
+    pub(crate) fn has_places(&self) -> bool {
         self.placements
     }
 
@@ -129,7 +131,8 @@ impl LimitSet {
         }
     }
 
-    /// Adds a constant to every value of each row from now on, so that a motion kept at 0 on samples keeps the true limit between them. Zero to begin with.
+    /// Adds a constant to every value of each row from now on, so that a motion kept at 0 on samples keeps the true
+    /// limit between them. Zero to begin with.
     ///
     /// # Panics
     /// If there is not one number a row.
@@ -171,8 +174,9 @@ impl LimitSet {
         }
     }
 
-    /// Adds to `cotangent` what a cost with derivatives `weights` by the [`values`](LimitSet::values) pulls on the motion. Exact, but for the corners of `|x|` at zero and of
-    /// distances between parallel segments, where it is one of the one-sided derivatives.
+    /// Adds to `cotangent` what a cost with derivatives `weights` by the [`values`](LimitSet::values) pulls on the
+    /// motion. Exact, but for the corners of `|x|` at zero and of distances between parallel segments, where it is one
+    /// of the one-sided derivatives.
     ///
     /// # Panics
     /// If sizes differ.

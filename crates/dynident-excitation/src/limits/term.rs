@@ -6,7 +6,8 @@ use crate::motion::{Motion, MotionCotangent};
 use core::fmt::Debug;
 use dynident_model::{Transform, Vec3};
 
-/// What a limit may look at. Torques are joint-major as the motion; placements (`base_from_body`) stand sample by sample, and are empty where no limit asked for them.
+/// What a limit may look at. Torques are joint-major as the motion; placements (`base_from_body`) stand sample by
+/// sample, and are empty where no limit asked for them.
 #[derive(Clone, Copy)]
 pub(crate) struct Inputs<'a> {
     pub(crate) motion: &'a Motion,
@@ -23,7 +24,8 @@ impl Inputs<'_> {
     }
 }
 
-/// Where derivatives of the cost go: by the motion, by the torques, and by the places of points as forces on the bodies.
+/// Where derivatives of the cost go: by the motion, by the torques, and by the places of points as forces on the
+/// bodies.
 pub(crate) struct Pull<'a> {
     pub(crate) motion: &'a mut MotionCotangent,
     pub(crate) tau: &'a mut [f64],

@@ -58,12 +58,12 @@ impl Term for TorqueLimits {
     }
 }
 
-/// Adds to `cotangent` what a cost with derivatives `by_torque` (joint-major) by the rigid-body torques pulls: `(∂τ/∂q)ᵀ w`, `(∂τ/∂q̇)ᵀ w`, `Mᵀ w` at every
-/// sample where a weight is not zero.
+/// Adds to `cotangent` what a cost with derivatives `by_torque` (joint-major) by the rigid-body torques pulls:
+/// `(∂τ/∂q)ᵀ w`, `(∂τ/∂q̇)ᵀ w`, `Mᵀ w` at every sample where a weight is not zero.
 ///
 /// # Panics
 /// If sizes differ.
-pub fn torque_pull_back(
+pub(crate) fn torque_pull_back(
     model: &Model,
     workspace: &mut Workspace,
     motion: &Motion,

@@ -10,8 +10,9 @@ impl Limits {
     /// Checks every number and name against the robot.
     ///
     /// # Errors
-    /// The first contradiction: an unknown or doubled joint, an unknown link, a number that is not finite or not positive, a range upside down or empty, a torque or
-    /// power limit over bodies without inertial parameters, a box without room.
+    /// The first contradiction: an unknown or doubled joint, an unknown link, a number that is not finite or not
+    /// positive, a range upside down or empty, a torque or power limit over bodies without inertial parameters, a box
+    /// without room.
     pub fn validate(&self, model: &Model) -> Result<(), LimitError> {
         for (index, limit) in self.joints.iter().enumerate() {
             let joint = model.joint_index(&limit.joint).ok_or_else(|| LimitError::UnknownJoint {

@@ -2,7 +2,8 @@
 
 use dynident_model::{Model, Transform, Vec3};
 
-/// Force and moment about the base origin, base frame: the derivative of a cost by the places of a body's points is a force at each.
+/// Force and moment about the base origin, base frame: the derivative of a cost by the places of a body's points is a
+/// force at each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Wrench {
     force: Vec3,
@@ -19,8 +20,8 @@ impl Wrench {
     }
 }
 
-/// Adds `Jᵀ f` of one sample to `by_position[joint]`: a joint about axis `a` through `o` sees `a · (n - o × f)` of the wrench on everything it carries, a sliding one
-/// `a · f`. One inward sweep; the wrenches are used up.
+/// Adds `Jᵀ f` of one sample to `by_position[joint]`: a joint about axis `a` through `o` sees `a · (n - o × f)` of the
+/// wrench on everything it carries, a sliding one `a · f`. One inward sweep; the wrenches are used up.
 pub(crate) fn pull_wrenches(model: &Model, placements: &[Transform], wrenches: &mut [Wrench], by_position: &mut [f64]) {
     for (joint, map) in model.maps().iter().enumerate().rev() {
         let Wrench { force, moment } = wrenches[joint];

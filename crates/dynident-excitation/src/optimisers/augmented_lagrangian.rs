@@ -2,14 +2,14 @@
 
 use super::projected_lbfgs::{Effort, End, Smooth, projected_lbfgs};
 use super::{OptimiserError, Progress, Step, Watch, check_bounds, check_length, setting};
-use serde::{Deserialize, Serialize};
 
-/// minimise f(x) subject to c_i(x) = 0 for the first [`equalities`](ConstrainedProblem::equalities) constraints, c_i(x) <= 0 for the others, and
-/// lower <= x <= upper.
+/// minimise f(x) subject to c_i(x) = 0 for the first [`equalities`](ConstrainedProblem::equalities) constraints,
+/// c_i(x) <= 0 for the others, and lower <= x <= upper.
 ///
-/// Evaluation is split in two so that one adjoint sweep gives the gradient of f and of any number of constraints together, reusing what the values needed.
-/// Constraints work best when scaled to order one (limit reached = 0, limit exceeded by its own size = 1).
-pub trait ConstrainedProblem {
+/// Evaluation is split in two so that one adjoint sweep gives the gradient of f and of any number of constraints
+/// together, reusing what the values needed. Constraints work best when scaled to order one (limit reached = 0, limit
+/// exceeded by its own size = 1).
+pub(crate) trait ConstrainedProblem {
     /// Number of variables.
     fn variables(&self) -> usize;
     /// Lower and upper bound of each variable; infinite where there is none.
@@ -20,12 +20,15 @@ pub trait ConstrainedProblem {
     fn equalities(&self) -> usize {
         0
     }
-    /// Writes c(x) and returns f(x), at an `x` inside the bounds. Not finite where they are not defined; the search then takes a shorter step.
+    /// Writes c(x) and returns f(x), at an `x` inside the bounds. Not finite where they are not defined; the search
+    /// then takes a shorter step.
     fn values(&mut self, x: &[f64], constraints: &mut [f64]) -> f64;
-    /// Writes the gradient of `f + Σ weights_i c_i` at the `x` of the last [`values`](ConstrainedProblem::values). Most weights are zero.
+    /// Writes the gradient of `f + Σ weights_i c_i` at the `x` of the last [`values`](ConstrainedProblem::values). Most
+    /// weights are zero.
     fn gradient(&mut self, weights: &[f64], gradient: &mut [f64]);
-    /// Optional: takes up a positive definite model of the augmented Lagrangian's curvature at the `x` of the last [`gradient`](ConstrainedProblem::gradient), from which the quasi-Newton
-    /// matrix starts at every step. Returns whether there is a model.
+    /// Optional: takes up a positive definite model of the augmented Lagrangian's curvature at the `x` of the last
+    /// [`gradient`](ConstrainedProblem::gradient), from which the quasi-Newton matrix starts at every step. Returns
+    /// whether there is a model.
     fn prepare_metric(&mut self, _known: &Known<'_>) -> bool {
         false
     }
@@ -35,7 +38,7 @@ pub trait ConstrainedProblem {
 
 /// What is known of the augmented Lagrangian at a point, for a model of its curvature.
 #[derive(Clone, Copy, Debug)]
-pub struct Known<'a> {
+pub(crate) struct Known<'a> {
     /// For every constraint the penalty where it pushes, 0 where it does not.
     pub pushing: &'a [f64],
     /// Gradient.
@@ -47,9 +50,8 @@ pub struct Known<'a> {
 }
 
 /// Settings of [`augmented_lagrangian()`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct AugmentedLagrangianSettings {
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct AugmentedLagrangianSettings {
     /// A point is feasible if no constraint is violated by more. Default 1e-8.
     pub feasibility_tolerance: f64,
     /// Converged if the projected gradient of the Lagrangian has no entry above this times max(1, |f|). Default 1e-6.
@@ -91,7 +93,7 @@ impl AugmentedLagrangianSettings {
     ///
     /// # Errors
     /// [`OptimiserError::Setting`] names the first that is not.
-    pub fn validate(&self) -> Result<(), OptimiserError> {
+    pub(crate) fn validate(&self) -> Result<(), OptimiserError> {
         let positive = |name, value: f64| setting(name, value, value > 0.0 && value.is_finite(), "positive and finite");
         positive("feasibility_tolerance", self.feasibility_tolerance)?;
         positive("optimality_tolerance", self.optimality_tolerance)?;
@@ -107,8 +109,8 @@ impl AugmentedLagrangianSettings {
 }
 
 /// Where a search stands, so that another can go on from there.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct AugmentedLagrangianState {
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct AugmentedLagrangianState {
     /// The point.
     pub x: Vec<f64>,
     /// Multipliers of the constraints: what the objective would gain per unit of relaxation. Empty for zeros.
@@ -125,9 +127,8 @@ impl From<Vec<f64>> for AugmentedLagrangianState {
 }
 
 /// How a search ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum AugmentedLagrangianStatus {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum AugmentedLagrangianStatus {
     /// Feasible and stationary within the tolerances.
     Converged,
     /// Feasible, and no lower value can be found in double precision, though the gradient is above its tolerance.
@@ -141,11 +142,12 @@ pub enum AugmentedLagrangianStatus {
 }
 
 /// What [`augmented_lagrangian()`] found.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct AugmentedLagrangianResult {
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct AugmentedLagrangianResult {
     /// How it ended.
     pub status: AugmentedLagrangianStatus,
-    /// The feasible point of the lowest objective among all that were evaluated; if none was feasible, the one with the smallest violation.
+    /// The feasible point of the lowest objective among all that were evaluated; if none was feasible, the one with the
+    /// smallest violation.
     pub best: Vec<f64>,
     /// Objective there.
     pub value: f64,
@@ -153,9 +155,11 @@ pub struct AugmentedLagrangianResult {
     pub violation: f64,
     /// Whether that is within the tolerance.
     pub feasible: bool,
-    /// The last iterate with its multipliers and penalty. While constraints are still violated it tells more than [`best`](Self::best), which may be an early point that kept them by standing still.
+    /// The last iterate with its multipliers and penalty. While constraints are still violated it tells more than
+    /// [`best`](Self::best), which may be an early point that kept them by standing still.
     pub end: AugmentedLagrangianState,
-    /// `f + Σ λ_i c_i` there over the violated constraints: to first order the objective that is left once they are kept.
+    /// `f + Σ λ_i c_i` there over the violated constraints: to first order the objective that is left once they are
+    /// kept.
     pub lagrangian: f64,
     /// Largest violation there.
     pub end_violation: f64,
@@ -165,31 +169,20 @@ pub struct AugmentedLagrangianResult {
     pub evaluations: usize,
 }
 
-/// Minimises a [`ConstrainedProblem`] from `start`, which is first moved into the bounds.
+/// Minimises a [`ConstrainedProblem`] from `state`, a point that is first moved into the bounds, or the end of an
+/// earlier search.
 ///
-/// Powell, Hestenes and Rockafellar's function L = f + Σ_eq (λ c + ρ c²/2) + Σ_ineq [max(0, λ + ρ c)² - λ²] / 2ρ is minimised inside the bounds by
-/// L-BFGS with projected steps; then λ ← λ + ρ c (not below 0 for
-/// inequalities), and ρ grows when the violation was not halved (Birgin and Martínez, *Practical Augmented Lagrangian Methods*, 2014, algorithm 4.1).
-/// Finds a local solution.
+/// Powell, Hestenes and Rockafellar's function L = f + Σ_eq (λ c + ρ c²/2) + Σ_ineq [max(0, λ + ρ c)² - λ²] / 2ρ is
+/// minimised inside the bounds by L-BFGS with projected steps; then λ ← λ + ρ c (not below 0 for inequalities), and ρ
+/// grows when the violation was not halved (Birgin and Martínez, *Practical Augmented Lagrangian Methods*, 2014,
+/// algorithm 4.1). Finds a local solution.
 ///
 /// Deterministic. `watch` hears the best point so far after every evaluation.
 ///
 /// # Errors
-/// A setting out of range, a start of the wrong length or where the problem is not defined, empty bounds.
-pub fn augmented_lagrangian(
-    problem: &mut impl ConstrainedProblem,
-    start: &[f64],
-    settings: &AugmentedLagrangianSettings,
-    watch: &mut Watch<'_>,
-) -> Result<AugmentedLagrangianResult, OptimiserError> {
-    augmented_lagrangian_from(problem, &start.to_vec().into(), settings, watch)
-}
-
-/// The same, going on from where an earlier search ended.
-///
-/// # Errors
-/// As [`augmented_lagrangian()`]; multipliers of another number.
-pub fn augmented_lagrangian_from(
+/// A setting out of range, a start of the wrong length or where the problem is not defined, multipliers of another
+/// number, empty bounds.
+pub(crate) fn augmented_lagrangian(
     problem: &mut impl ConstrainedProblem,
     state: &AugmentedLagrangianState,
     settings: &AugmentedLagrangianSettings,
@@ -233,7 +226,8 @@ pub fn augmented_lagrangian_from(
         if search.halted() {
             break;
         }
-        // Values and constraints at the point where the descent ended; the last evaluation may have been a rejected trial.
+        // Values and constraints at the point where the descent ended; the last evaluation may have been a rejected
+        // trial.
         search.value(&x);
         search.outer += 1;
         let measure = search.update_multipliers();

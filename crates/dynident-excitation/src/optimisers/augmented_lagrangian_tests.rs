@@ -1,6 +1,10 @@
 use super::*;
 use core::ops::ControlFlow;
 
+fn at(x: &[f64]) -> AugmentedLagrangianState {
+    x.to_vec().into()
+}
+
 fn never(_: &Progress<'_>) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
@@ -68,7 +72,7 @@ fn hs71() -> Textbook {
 #[test]
 fn hock_and_schittkowski_71() {
     let settings = AugmentedLagrangianSettings::default();
-    let result = augmented_lagrangian(&mut hs71(), &[1.0, 5.0, 5.0, 1.0], &settings, &mut never).unwrap();
+    let result = augmented_lagrangian(&mut hs71(), &at(&[1.0, 5.0, 5.0, 1.0]), &settings, &mut never).unwrap();
     assert_eq!(result.status, AugmentedLagrangianStatus::Converged, "{result:?}");
     // The published solution to its printed digits.
     assert!((result.value - 17.014_017_3).abs() < 1e-6, "{}", result.value);
@@ -107,7 +111,7 @@ fn hock_and_schittkowski_43() {
         x: Vec::new(),
     };
     let settings = AugmentedLagrangianSettings::default();
-    let result = augmented_lagrangian(&mut problem, &[0.0; 4], &settings, &mut never).unwrap();
+    let result = augmented_lagrangian(&mut problem, &at(&[0.0; 4]), &settings, &mut never).unwrap();
     assert_eq!(result.status, AugmentedLagrangianStatus::Converged, "{result:?}");
     assert!((result.value + 44.0).abs() < 1e-6);
     for (x, exact) in result.best.iter().zip([0.0, 1.0, 2.0, -1.0]) {
@@ -119,7 +123,8 @@ fn hock_and_schittkowski_43() {
     }
 }
 
-/// As many constraints as a sampled trajectory has: the smallest disc's centre problem, a bowl cut by 7000 half-planes that leave a disc of radius 1.
+/// As many constraints as a sampled trajectory has: the smallest disc's centre problem, a bowl cut by 7000 half-planes
+/// that leave a disc of radius 1.
 struct ManyHalfPlanes(Vec<f64>);
 
 impl ConstrainedProblem for ManyHalfPlanes {
@@ -155,9 +160,10 @@ impl ConstrainedProblem for ManyHalfPlanes {
 #[test]
 fn thousands_of_constraints() {
     let settings = AugmentedLagrangianSettings::default();
-    let result = augmented_lagrangian(&mut ManyHalfPlanes(Vec::new()), &[0.0; 50], &settings, &mut never).unwrap();
+    let result = augmented_lagrangian(&mut ManyHalfPlanes(Vec::new()), &at(&[0.0; 50]), &settings, &mut never).unwrap();
     assert!(result.feasible, "{:?} {}", result.status, result.violation);
-    // The polygon lies between the discs of radius 1 and 1/cos(π/7000) = 1 + 1e-7: distance from (3, 4) is 4 within that, the value 16 within 1e-6.
+    // The polygon lies between the discs of radius 1 and 1/cos(π/7000) = 1 + 1e-7: distance from (3, 4) is 4 within
+    // that, the value 16 within 1e-6.
     assert!((result.value - 16.0).abs() < 2e-6, "{} {:?}", result.value, result.status);
     assert!((result.best[0] - 0.6).abs() < 1e-3 && (result.best[1] - 0.8).abs() < 1e-3);
 }
@@ -181,7 +187,7 @@ fn contradiction() -> Textbook {
 #[test]
 fn contradictions_are_named() {
     let settings = AugmentedLagrangianSettings::default();
-    let result = augmented_lagrangian(&mut contradiction(), &[5.0, 5.0], &settings, &mut never).unwrap();
+    let result = augmented_lagrangian(&mut contradiction(), &at(&[5.0, 5.0]), &settings, &mut never).unwrap();
     assert_eq!(result.status, AugmentedLagrangianStatus::Infeasible, "{result:?}");
     assert!(!result.feasible);
     assert!((result.violation - 1.0).abs() < 1e-6, "{result:?}");
@@ -190,13 +196,13 @@ fn contradictions_are_named() {
 #[test]
 fn limits_and_callback_end_it_with_the_best_so_far() {
     let settings = AugmentedLagrangianSettings { max_evaluations: 12, ..Default::default() };
-    let result = augmented_lagrangian(&mut hs71(), &[1.0, 5.0, 5.0, 1.0], &settings, &mut never).unwrap();
+    let result = augmented_lagrangian(&mut hs71(), &at(&[1.0, 5.0, 5.0, 1.0]), &settings, &mut never).unwrap();
     assert_eq!(result.status, AugmentedLagrangianStatus::IterationLimit);
     assert_eq!(result.evaluations, 12);
     let mut tenth =
         |p: &Progress<'_>| if p.evaluations == 10 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
     let settings = AugmentedLagrangianSettings::default();
-    let result = augmented_lagrangian(&mut hs71(), &[1.0, 5.0, 5.0, 1.0], &settings, &mut tenth).unwrap();
+    let result = augmented_lagrangian(&mut hs71(), &at(&[1.0, 5.0, 5.0, 1.0]), &settings, &mut tenth).unwrap();
     assert_eq!((result.status, result.evaluations), (AugmentedLagrangianStatus::Stopped, 10));
     let mut c = [0.0; 2];
     assert_eq!(hs71().values(&result.best, &mut c), result.value);
@@ -205,31 +211,31 @@ fn limits_and_callback_end_it_with_the_best_so_far() {
 #[test]
 fn bad_starts_and_settings_are_named() {
     let settings = AugmentedLagrangianSettings::default();
-    let error = augmented_lagrangian(&mut hs71(), &[1.0; 3], &settings, &mut never).unwrap_err();
+    let error = augmented_lagrangian(&mut hs71(), &at(&[1.0; 3]), &settings, &mut never).unwrap_err();
     assert_eq!(error.to_string(), "start has 3 entries, expected 4");
-    let error = augmented_lagrangian(&mut hs71(), &[1.0, f64::NAN, 1.0, 1.0], &settings, &mut never).unwrap_err();
+    let error = augmented_lagrangian(&mut hs71(), &at(&[1.0, f64::NAN, 1.0, 1.0]), &settings, &mut never).unwrap_err();
     assert_eq!(error, OptimiserError::Start);
     let flat = AugmentedLagrangianSettings { penalty_growth: 1.0, ..Default::default() };
-    let error = augmented_lagrangian(&mut hs71(), &[1.0; 4], &flat, &mut never).unwrap_err();
+    let error = augmented_lagrangian(&mut hs71(), &at(&[1.0; 4]), &flat, &mut never).unwrap_err();
     assert_eq!(error.to_string(), "setting `penalty_growth` is 1; it must be finite and above 1");
 }
 
 #[test]
 fn a_search_goes_on_where_another_ended() {
     let settings = AugmentedLagrangianSettings::default();
-    let whole = augmented_lagrangian(&mut hs71(), &[1.0, 5.0, 5.0, 1.0], &settings, &mut never).unwrap();
+    let whole = augmented_lagrangian(&mut hs71(), &at(&[1.0, 5.0, 5.0, 1.0]), &settings, &mut never).unwrap();
     let short = AugmentedLagrangianSettings { max_evaluations: 25, ..settings.clone() };
-    let first = augmented_lagrangian(&mut hs71(), &[1.0, 5.0, 5.0, 1.0], &short, &mut never).unwrap();
-    let rest = augmented_lagrangian_from(&mut hs71(), &first.end, &settings, &mut never).unwrap();
+    let first = augmented_lagrangian(&mut hs71(), &at(&[1.0, 5.0, 5.0, 1.0]), &short, &mut never).unwrap();
+    let rest = augmented_lagrangian(&mut hs71(), &first.end, &settings, &mut never).unwrap();
     assert_eq!(rest.status, AugmentedLagrangianStatus::Converged);
     assert!((rest.value - whole.value).abs() < 1e-6, "{} and {}", rest.value, whole.value);
     // At a solution the multipliers of what pushes weigh violations of the size of the tolerance: the two values agree.
     assert!((rest.lagrangian - rest.value).abs() < 1e-6, "{rest:?}");
     // From the solution itself little is left to do.
-    let again = augmented_lagrangian_from(&mut hs71(), &whole.end, &settings, &mut never).unwrap();
+    let again = augmented_lagrangian(&mut hs71(), &whole.end, &settings, &mut never).unwrap();
     assert!(again.evaluations < whole.evaluations / 2, "{} of {}", again.evaluations, whole.evaluations);
     let other = AugmentedLagrangianState { multipliers: vec![0.0; 5], ..whole.end };
-    let error = augmented_lagrangian_from(&mut hs71(), &other, &settings, &mut never).unwrap_err();
+    let error = augmented_lagrangian(&mut hs71(), &other, &settings, &mut never).unwrap_err();
     assert_eq!(error.to_string(), "multipliers has 5 entries, expected 2");
 }
 

@@ -4,8 +4,8 @@ use super::{OptimiserError, Progress, Watch, check_bounds, evaluate_all, setting
 use dynident_model::sample::Random;
 use serde::{Deserialize, Serialize};
 
-/// Settings of [`binary_genetic()`]; the defaults are the paper's (*Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*,
-/// section 2.2).
+/// Settings of [`binary_genetic()`]; the defaults are the paper's (*Iterative Identification of Robot Dynamic
+/// Parameters Based on Logistic Function*, section 2.2).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BinaryGeneticSettings {
@@ -17,10 +17,11 @@ pub struct BinaryGeneticSettings {
     pub generations: usize,
     /// Probability that a pair of parents is crossed. Default 0.5.
     pub crossover: f64,
-    /// Probability of a flip, of every single bit in every generation. The paper does not say whether its 0.01 is per bit or per individual; here it
-    /// is per bit. Default 0.01.
+    /// Probability of a flip, of every single bit in every generation. The paper does not say whether its 0.01 is per
+    /// bit or per individual; here it is per bit. Default 0.01.
     pub mutation: f64,
-    /// Whether the best individual of a generation passes unchanged to the next. The paper mentions no elite. Default false.
+    /// Whether the best individual of a generation passes unchanged to the next. The paper mentions no elite. Default
+    /// false.
     pub elite: bool,
     /// Seed of all chance. Default 0.
     pub seed: u64,
@@ -76,13 +77,14 @@ pub struct BinaryGeneticResult {
 
 /// Minimises a positive `objective` over the box `bounds` by the paper's genetic algorithm.
 ///
-/// A variable is a binary number of `bits` digits, most significant first, `x = lower + (upper - lower) k / (2^bits - 1)`; an individual is its
-/// variables' digits one after another.
-/// Every generation: parents are drawn by roulette, with probability proportional to 1/H; neighbours in the drawing are crossed at one random place
-/// with probability `crossover`; every bit of
-/// the children flips with probability `mutation`; the children replace all parents (but for the elite, if asked).
+/// A variable is a binary number of `bits` digits, most significant first, `x = lower + (upper - lower) k / (2^bits -
+/// 1)`; an individual is its variables' digits one after another. Every generation: parents are drawn by roulette, with
+/// probability proportional to 1/H; neighbours in the drawing are crossed at one random place with probability
+/// `crossover`; every bit of the children flips with probability `mutation`; the children replace all parents (but for
+/// the elite, if asked).
 ///
-/// Candidates are evaluated in parallel; the result depends on the seed alone. An infinite or undefined objective is never drawn unless all are.
+/// Candidates are evaluated in parallel; the result depends on the seed alone. An infinite or undefined objective is
+/// never drawn unless all are.
 ///
 /// # Errors
 /// A setting out of range, or a range that is empty or infinite.
@@ -221,7 +223,8 @@ mod tests {
             let settings = BinaryGeneticSettings { elite, generations: 200, seed: 5, ..Default::default() };
             let result = binary_genetic(bowl, &BOX, &settings, &mut |_| ControlFlow::Continue(())).unwrap();
             assert_eq!((result.history.len(), result.evaluations), (200, 8000));
-            // 8000 points in 80 square units leave a nearest one within about 0.06; the search must do no worse than blind.
+            // 8000 points in 80 square units leave a nearest one within about 0.06; the search must do no worse than
+            // blind.
             assert!(result.value < 1.01, "{}", result.value);
             assert_eq!(bowl(&result.best), result.value);
             let mut lowest = f64::INFINITY;

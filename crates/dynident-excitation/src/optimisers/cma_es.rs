@@ -7,19 +7,22 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-/// Settings of [`cma_es()`]. Strategy constants are the defaults of Hansen, *The CMA Evolution Strategy: A Tutorial* (2016), table 1.
+/// Settings of [`cma_es()`]. Strategy constants are the defaults of Hansen, *The CMA Evolution Strategy: A Tutorial*
+/// (2016), table 1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CmaEsSettings {
     /// Candidates of a generation, at least 4; none: 4 + ⌊3 ln n⌋. Default none.
     pub population: Option<usize>,
-    /// Restarts after a run has ended by itself, each from a random place with twice the candidates (IPOP, Auger and Hansen 2005). Default 0.
+    /// Restarts after a run has ended by itself, each from a random place with twice the candidates (IPOP, Auger and
+    /// Hansen 2005). Default 0.
     pub restarts: usize,
     /// No generation is begun after this many evaluations, all runs together. Default 100,000.
     pub max_evaluations: usize,
     /// The search ends at an objective this low. Default none.
     pub target: Option<f64>,
-    /// A run ends when the best values of the last 10 + ⌈30 n/λ⌉ generations and all of the present one differ by less. Default 1e-12.
+    /// A run ends when the best values of the last 10 + ⌈30 n/λ⌉ generations and all of the present one differ by less.
+    /// Default 1e-12.
     pub function_tolerance: f64,
     /// A run ends when its steps are this small, as a share of the first ones. Default 1e-12.
     pub step_tolerance: f64,
@@ -112,11 +115,12 @@ pub struct CmaEsResult {
     pub runs: Vec<CmaEsRun>,
 }
 
-/// Minimises `objective` from `start` with first steps of standard deviation `steps` (one per variable), inside `bounds`.
+/// Minimises `objective` from `start` with first steps of standard deviation `steps` (one per variable), inside
+/// `bounds`.
 ///
-/// (μ/μ_w, λ)-CMA-ES with cumulative step-size adaptation, rank-one and rank-μ update (Hansen 2016, fig. 6). A candidate outside the bounds is
-/// evaluated at the nearest point inside, and ranked with the
-/// square of its distance (in the search's own scale) times the spread of the generation's values added (Hansen 2016, appendix B.5).
+/// (μ/μ_w, λ)-CMA-ES with cumulative step-size adaptation, rank-one and rank-μ update (Hansen 2016, fig. 6). A
+/// candidate outside the bounds is evaluated at the nearest point inside, and ranked with the square of its distance
+/// (in the search's own scale) times the spread of the generation's values added (Hansen 2016, appendix B.5).
 ///
 /// Candidates are evaluated in parallel; the result depends on the seed alone.
 ///

@@ -1,7 +1,9 @@
-//! Optimisers, one file each: without derivatives ([`binary_genetic()`], [`cma_es()`]) and with exact gradients ([`augmented_lagrangian()`],
-//! [`multi_start()`]).
+//! **What looks for the best?** Optimisers, one file each: without derivatives ([`binary_genetic()`], [`cma_es()`]),
+//! and with exact gradients from many starts (augmented Lagrangian, projected L-BFGS), which
+//! [`design()`](crate::design()) runs.
 //!
-//! All are deterministic by their seed or start, on any number of threads, and anytime: a callback hears the best point so far and can stop them.
+//! All are deterministic by their seed or start, on any number of threads, and anytime: a callback hears the best point
+//! so far and can stop them.
 
 mod augmented_lagrangian;
 mod binary_genetic;
@@ -9,14 +11,16 @@ mod cma_es;
 mod multi_start;
 mod projected_lbfgs;
 
-pub use augmented_lagrangian::{
-    AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianState, AugmentedLagrangianStatus,
-    ConstrainedProblem, Known, augmented_lagrangian, augmented_lagrangian_from,
+#[cfg(test)]
+pub(crate) use augmented_lagrangian::AugmentedLagrangianStatus;
+pub(crate) use augmented_lagrangian::{
+    AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianState, ConstrainedProblem, Known,
+    augmented_lagrangian,
 };
 pub use binary_genetic::{BinaryGeneticResult, BinaryGeneticSettings, Generation, binary_genetic};
 pub use cma_es::{CmaEsResult, CmaEsRun, CmaEsSettings, CmaEsStatus, cma_es};
-pub use multi_start::{MultiStartResult, multi_start};
-pub use projected_lbfgs::Step;
+pub(crate) use multi_start::multi_start;
+pub(crate) use projected_lbfgs::Step;
 
 use core::ops::ControlFlow;
 use rayon::prelude::*;
@@ -24,7 +28,8 @@ use rayon::prelude::*;
 /// The state of a search, as its callback hears it.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress<'a> {
-    /// The best point so far: the feasible one of the lowest objective, or the least infeasible one while none is feasible.
+    /// The best point so far: the feasible one of the lowest objective, or the least infeasible one while none is
+    /// feasible.
     pub best: &'a [f64],
     /// Its objective.
     pub value: f64,
@@ -101,7 +106,8 @@ fn check_length(what: &'static str, expected: usize, found: usize) -> Result<(),
     if expected == found { Ok(()) } else { Err(OptimiserError::Length { what, expected, found }) }
 }
 
-/// The objective of every candidate, in parallel, in the candidates' order; what is not a number counts as infinitely bad.
+/// The objective of every candidate, in parallel, in the candidates' order; what is not a number counts as infinitely
+/// bad.
 fn evaluate_all(objective: &(impl Fn(&[f64]) -> f64 + Sync), candidates: &[Vec<f64>]) -> Vec<f64> {
     candidates
         .par_iter()

@@ -2,44 +2,42 @@
 
 use super::{
     AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianState, ConstrainedProblem,
-    OptimiserError, Progress, augmented_lagrangian_from,
+    OptimiserError, Progress, augmented_lagrangian,
 };
 use core::ops::ControlFlow;
 use rayon::prelude::*;
-use serde::Serialize;
 use std::sync::{Mutex, PoisonError};
 
 /// What [`multi_start()`] found.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct MultiStartResult {
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct MultiStartResult {
     /// The number of the best start: of the lowest objective among the feasible ones, else of the smallest violation.
     pub best_start: usize,
     /// The results of all starts, in order; an error where the problem is not defined at the start.
-    #[serde(skip)]
     pub runs: Vec<Result<AugmentedLagrangianResult, OptimiserError>>,
 }
 
 impl MultiStartResult {
     /// The result of the best start; none if the problem was defined at no start.
-    pub fn best(&self) -> Option<&AugmentedLagrangianResult> {
+    pub(crate) fn best(&self) -> Option<&AugmentedLagrangianResult> {
         self.runs.get(self.best_start)?.as_ref().ok()
     }
 
     /// Evaluations of all starts together.
-    pub fn evaluations(&self) -> usize {
+    pub(crate) fn evaluations(&self) -> usize {
         self.runs.iter().flatten().map(|run| run.evaluations).sum()
     }
 }
 
-/// Runs [`augmented_lagrangian_from()`] from every start, in parallel, each on its own problem from `problem`.
+/// Runs [`augmented_lagrangian()`] from every start, in parallel, each on its own problem from `problem`.
 ///
-/// `watch` hears the best over all starts whenever it improves, and is asked after every evaluation whether to go on; `iteration` and `evaluations`
-/// are those of the start that speaks.
-/// Unless it stops the search, the result does not depend on the number of threads: among equals the first start is best.
+/// `watch` hears the best over all starts whenever it improves, and is asked after every evaluation whether to go on;
+/// `iteration` and `evaluations` are those of the start that speaks. Unless it stops the search, the result does not
+/// depend on the number of threads: among equals the first start is best.
 ///
 /// # Errors
 /// No start; settings or bounds out of range.
-pub fn multi_start<P: ConstrainedProblem>(
+pub(crate) fn multi_start<P: ConstrainedProblem>(
     problem: impl Fn() -> P + Sync,
     starts: &[AugmentedLagrangianState],
     settings: &AugmentedLagrangianSettings,
@@ -62,7 +60,7 @@ pub fn multi_start<P: ConstrainedProblem>(
                 }
                 watch(&Progress { best: &best.0, value: best.1, violation: best.2, ..*progress })
             };
-            augmented_lagrangian_from(&mut problem(), start, settings, &mut hear)
+            augmented_lagrangian(&mut problem(), start, settings, &mut hear)
         })
         .collect();
     let rank = |run: &Result<AugmentedLagrangianResult, OptimiserError>| {
@@ -77,7 +75,8 @@ pub fn multi_start<P: ConstrainedProblem>(
     Ok(MultiStartResult { best_start, runs })
 }
 
-/// Whether a point of this value and violation is better than another: feasible before infeasible, then by value or violation.
+/// Whether a point of this value and violation is better than another: feasible before infeasible, then by value or
+/// violation.
 fn before(one: (f64, f64), other: (f64, f64), tolerance: f64) -> bool {
     match (one.1 <= tolerance, other.1 <= tolerance) {
         (true, true) => one.0 < other.0,

@@ -1,14 +1,17 @@
-//! Minimisation of a smooth function inside a box: limited-memory BFGS on the free variables, steps projected onto the box.
+//! Minimisation of a smooth function inside a box: limited-memory BFGS on the free variables, steps projected onto the
+//! box.
 
 use std::collections::VecDeque;
 
-/// A smooth function that is asked for its gradient only where it was just evaluated, so that it can keep its intermediate values.
+/// A smooth function that is asked for its gradient only where it was just evaluated, so that it can keep its
+/// intermediate values.
 pub(crate) trait Smooth {
     /// The value at `x`; not a finite number where the function is not defined.
     fn value(&mut self, x: &[f64]) -> f64;
     /// The gradient at the point of the last [`value`](Smooth::value).
     fn gradient(&mut self, gradient: &mut [f64]);
-    /// Takes up a model of the curvature at the point of the last [`gradient`](Smooth::gradient), from the gradient and the last step with its change of the gradient; false if there is none.
+    /// Takes up a model of the curvature at the point of the last [`gradient`](Smooth::gradient), from the gradient and
+    /// the last step with its change of the gradient; false if there is none.
     fn prepare_metric(&mut self, _gradient: &[f64], _free: &[bool], _last: Option<Step<'_>>) -> bool {
         false
     }
@@ -41,7 +44,7 @@ pub(crate) struct Effort {
 
 /// A step of a search, and how it changed the gradient.
 #[derive(Clone, Copy, Debug)]
-pub struct Step<'a> {
+pub(crate) struct Step<'a> {
     /// Difference of the points.
     pub by: &'a [f64],
     /// Difference of the gradients.
@@ -54,16 +57,18 @@ struct Pair {
     y: Vec<f64>,
 }
 
-/// Armijo's share of the predicted decrease and Wolfe's share of the slope (Nocedal and Wright, *Numerical Optimization*, 2006, section 3.1).
+/// Armijo's share of the predicted decrease and Wolfe's share of the slope (Nocedal and Wright, *Numerical
+/// Optimization*, 2006, section 3.1).
 const DECREASE: f64 = 1e-4;
 const SLOPE: f64 = 0.9;
 const TRIALS: usize = 40;
 
-/// Minimises from `x`, which must lie in the box and ends at the lowest point found. Returns why it ended and the largest entry of the projected gradient
-/// `P(x - g) - x`.
+/// Minimises from `x`, which must lie in the box and ends at the lowest point found. Returns why it ended and the
+/// largest entry of the projected gradient `P(x - g) - x`.
 ///
-/// Two-loop recursion (Nocedal and Wright 2006, algorithm 7.4) over the variables that are not held at a bound by the gradient (two-metric projection,
-/// Bertsekas 1982); line search for the weak Wolfe conditions by bisection and doubling (Lewis and Overton 2013) along the projected path.
+/// Two-loop recursion (Nocedal and Wright 2006, algorithm 7.4) over the variables that are not held at a bound by the
+/// gradient (two-metric projection, Bertsekas 1982); line search for the weak Wolfe conditions by bisection and
+/// doubling (Lewis and Overton 2013) along the projected path.
 pub(crate) fn projected_lbfgs(
     function: &mut impl Smooth,
     bounds: &[[f64; 2]],
@@ -135,7 +140,8 @@ struct Point {
     gradient: Vec<f64>,
 }
 
-/// Looks along `P(from + step·direction)` for a point that is lower enough and has a flatter slope. The last point that was lower enough, if any.
+/// Looks along `P(from + step·direction)` for a point that is lower enough and has a flatter slope. The last point that
+/// was lower enough, if any.
 fn line_search(
     function: &mut impl Smooth,
     bounds: &[[f64; 2]],
@@ -187,7 +193,8 @@ fn line_search(
 /// Multiplies a vector with the matrix that the recursion starts from.
 type Shape<'a> = dyn Fn(&mut [f64]) + 'a;
 
-/// `-H g` on the free variables by the two-loop recursion, zero on the others; from `shape`, or from a multiple of the identity.
+/// `-H g` on the free variables by the two-loop recursion, zero on the others; from `shape`, or from a multiple of the
+/// identity.
 fn quasi_newton(pairs: &VecDeque<Pair>, gradient: &[f64], free: &[bool], shape: Option<&Shape<'_>>) -> Vec<f64> {
     let masked = |v: &[f64], w: &[f64]| -> f64 { (0..v.len()).filter(|&i| free[i]).map(|i| v[i] * w[i]).sum() };
     let mut direction: Vec<f64> = gradient.iter().zip(free).map(|(&g, &free)| if free { -g } else { 0.0 }).collect();

@@ -1,4 +1,5 @@
-//! Whole designs: feasible everywhere by code that shares nothing with the search, the same for any number of threads, and a forecast that comes true.
+//! Whole designs: feasible everywhere by code that shares nothing with the search, the same for any number of threads,
+//! and a forecast that comes true.
 
 use core::ops::ControlFlow;
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, BatchWorkspace, PanelLayout, Panels, regressor_panels};
@@ -7,7 +8,7 @@ use dynident_excitation::check::check_limits;
 use dynident_excitation::criteria::{Criterion, DOptimal};
 use dynident_excitation::families::{Fourier, FourierSettings};
 use dynident_excitation::limits::{LimitSet, Limits};
-use dynident_excitation::{DesignSettings, DesignTask, Designed, Family, Motion, design, forecast, grid};
+use dynident_excitation::{Design, DesignSettings, DesignTask, Family, Motion, design, forecast, grid};
 use dynident_model::sample::Random;
 use dynident_model::{Model, load_robot};
 
@@ -32,7 +33,7 @@ fn small() -> DesignSettings {
     }
 }
 
-fn designed(threads: usize) -> (Model, Limits, Fourier, PanelLayout, Designed) {
+fn designed(threads: usize) -> (Model, Limits, Fourier, PanelLayout, Design) {
     let (model, limits) = ur10();
     let set = LimitSet::new(&limits, &model).expect("limits fit the robot");
     let family = Fourier::new(model.dof(), 10.0, &FourierSettings::default()).expect("settings are valid");
@@ -84,7 +85,8 @@ fn the_forecast_comes_true() {
         forecast(&design.information, 3).std.into_iter().map(|std| std.expect("every parameter is excited")).collect();
     let mut random = Random::new(77);
     let truth: Vec<f64> = (0..columns).map(|_| random.uniform(-1.0, 1.0)).collect();
-    // The 200 runs; the standard deviation of a standard deviation from 200 runs is 5 %, so single parameters scatter by more than the 10 % that hold for their mean square.
+    // The 200 runs; the standard deviation of a standard deviation from 200 runs is 5 %, so single parameters
+    // scatter by more than the 10 % that hold for their mean square.
     let runs = 200;
     let mut squares = vec![0.0; columns];
     for _ in 0..runs {

@@ -1,6 +1,8 @@
-//! A hundred random problems: each ends with a motion that keeps every limit by the independent check at 10 kHz, or with the limits that bind, or is refused by name before any search.
+//! A hundred random problems: each ends with a motion that keeps every limit by the independent check at 10 kHz, or
+//! with the limits that bind, or is refused by name before any search.
 //!
-//! Sixty are built around a motion of the family: its peaks, 5 % wider, are the limits, so that something feasible is known to exist and must be found. Forty have random limits.
+//! Sixty are built around a motion of the family: its peaks, 5 % wider, are the limits, so that something feasible is
+//! known to exist and must be found. Forty have random limits.
 
 use core::ops::ControlFlow;
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, PanelLayout};
@@ -62,7 +64,8 @@ fn family(index: usize, joints: usize, duration_s: f64) -> Box<dyn Family> {
     }
 }
 
-/// Limits of every kind that could be asked for, each at the known motion's own peak: found by the check with limits of 1 (position: -1 to 1), where a ratio is the peak.
+/// Limits of every kind that could be asked for, each at the known motion's own peak: found by the check with limits of
+/// 1 (position: -1 to 1), where a ratio is the peak.
 fn around(model: &Model, family: &dyn Family, parameters: &[f64], floor: bool) -> Limits {
     let unit = |joint: &String| JointLimit {
         joint: joint.clone(),
@@ -222,7 +225,8 @@ fn a_hundred_random_problems() {
         if case.known && outcome != Outcome::Feasible {
             missed.push((index, case.family.name(), case.model.dof(), outcome));
         } else if case.limits.floor.as_ref().is_some_and(|floor| floor.height_m >= OUT_OF_REACH_M) {
-            // Nothing keeps this; whatever else is broken beside it, it is named (unless the problem was refused already).
+            // Nothing keeps this; whatever else is broken beside it, it is named (unless the problem was refused
+            // already).
             assert!(
                 match &outcome {
                     Outcome::Feasible => false,

@@ -49,8 +49,9 @@ fn derivatives_by_the_motion_equal_differences() {
                         [&mut moved.q, &mut moved.dq, &mut moved.ddq][which][entry] += step;
                         value(&moved)
                     };
-                    // Fourth-order differences. The least eigenvalue of D is known to 1e-16 times D's condition (1e6 here), so its logarithm to 1e-10 and
-                    // its difference quotient to 1e-10 / h; the fifth derivatives (some hundreds) leave h^4 times as much.
+                    // Fourth-order differences. The least eigenvalue of D is known to 1e-16 times D's condition (1e6
+                    // here), so its logarithm to 1e-10 and its difference quotient to 1e-10 / h; the fifth derivatives
+                    // (some hundreds) leave h^4 times as much.
                     let h = 5e-3;
                     let expected = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
                     let found = [&gradient.q, &gradient.dq, &gradient.ddq][which][entry];

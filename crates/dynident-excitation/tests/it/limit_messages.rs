@@ -1,4 +1,5 @@
-//! Every way in which limits can contradict themselves or a motion has its own message; no numbers make a panic or a NaN.
+//! Every way in which limits can contradict themselves or a motion has its own message; no numbers make a panic or a
+//! NaN.
 
 use crate::common::{Harmonics, all_limits, grid, ur10};
 use dynident_excitation::Motion;
@@ -193,7 +194,8 @@ fn a_stretch_leaves_gravity() {
         panic!("neither a slower run nor one kind of limit alone mends both: {diagnosis:?}")
     };
     assert!(diagnosis.sentences().last().unwrap().starts_with("No single change"), "{:?}", diagnosis.sentences());
-    // The position needs half a range of 0.2 rad at any speed. Whatever the factor, the relaxed limits must hold by the independent check ...
+    // The position needs half a range of 0.2 rad at any speed. Whatever the factor, the relaxed limits must hold by the
+    // independent check ...
     let relaxed = |scale: f64| {
         let needed = |wanted| changes.iter().find(|(kind, _)| *kind == wanted).unwrap().1.2 * scale;
         let (half, torque) = (needed(LimitKind::Position), needed(LimitKind::Torque));
@@ -206,7 +208,8 @@ fn a_stretch_leaves_gravity() {
         reports.unwrap().iter().filter(|report| report.violated).count()
     };
     assert_eq!((relaxed(1.0 + 1e-5), relaxed(0.999)), (0, 2));
-    // ... and no factor on a fine grid has a smaller sum of relative changes. At a slower run the torque nears gravity's 19.6 Nm at the level.
+    // ... and no factor on a fine grid has a smaller sum of relative changes. At a slower run the torque nears
+    // gravity's 19.6 Nm at the level.
     let cost = |factor: f64| {
         let family =
             Harmonics { joints: vec![(0.0, [[0.2, 8.0 / factor, 0.0], [0.0; 3], [0.0; 3]]), (0.0, [[0.0; 3]; 3])] };

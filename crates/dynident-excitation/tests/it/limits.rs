@@ -4,7 +4,7 @@ use crate::common::{Harmonics, all_limits, grid, ur10};
 use dynident_excitation::Motion;
 use dynident_excitation::check::check_limits;
 use dynident_excitation::limits::{
-    ColumnLimit, LimitKind, LimitSet, LimitWorkspace, Limits, LinkPoint, PeakSettings, SelfCollision, peaks,
+    ColumnLimit, LimitKind, LimitSet, LimitWorkspace, Limits, LinkPoint, PeakSettings, peaks,
 };
 use dynident_model::Model;
 use dynident_model::sample::{Random, random_tree};
@@ -144,7 +144,8 @@ fn check_agrees_with_the_values_and_peaks_bound_both() {
         for (key, peak) in worst(&set, &peak_values, 1) {
             let (dense, scale) = (sampled[&key], 1.0 + sampled[&key].abs());
             assert!(peak >= dense - 1e-9 * scale, "{key:?}: refined {peak}, sampled {dense}");
-            // At 10 kHz a peak of harmonics below 12 rad/s is at most (1e-4 · 12)² / 8 = 2e-7 above the samples; a distance has corners.
+            // At 10 kHz a peak of harmonics below 12 rad/s is at most (1e-4 · 12)² / 8 = 2e-7 above the samples; a
+            // distance has corners.
             assert!(peak <= dense + 1e-3 * scale, "{key:?}: refined {peak}, sampled {dense}");
         }
         for (peak, constraint) in found.iter().zip(set.constraints()) {
@@ -218,21 +219,5 @@ fn tightening_shifts_values_by_its_amount() {
     set.values(&mut set.workspace(), &motion, &mut tight);
     for (at, (plain, tight)) in plain.iter().zip(&tight).enumerate() {
         assert_eq!(plain + margins[at / 2], *tight);
-    }
-}
-
-#[test]
-fn fitted_capsules_keep_the_forearm_from_the_shoulder_and_leave_out_the_wrist() {
-    let model = ur10();
-    let fitted = SelfCollision::default().resolve(&model).unwrap();
-    let names: Vec<[&str; 2]> =
-        fitted.pairs.iter().map(|pair| pair.map(|index| fitted.capsules[index].link.as_str())).collect();
-    assert!(names.contains(&["shoulder_link", "forearm_link"]), "{names:?}");
-    assert!(names.contains(&["upper_arm_link", "wrist_3_link"]), "{names:?}");
-    // The wrist's axes are 0.115 m apart, less than two radii, in every posture.
-    assert!(fitted.left_out.iter().any(|[a, b]| a == "forearm_link" && b == "wrist_2_link"), "{:?}", fitted.left_out);
-    for [first, second] in &fitted.pairs {
-        let parent = |index: usize| fitted.capsules[index].body.map(|body| model.joints()[body].parent);
-        assert_ne!(parent(*second), Some(fitted.capsules[*first].body), "neighbours are no pair");
     }
 }

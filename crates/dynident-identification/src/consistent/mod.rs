@@ -5,10 +5,16 @@
 //! [`ConsistencySettings`] says what is known of the bodies beforehand.
 
 mod error;
+mod intervals;
+mod nearest_to_nominal;
+mod of_estimate;
 mod problem;
 mod settings;
 
 pub use error::ConsistencyError;
+pub use intervals::{ParameterInterval, consistent_intervals};
+pub use nearest_to_nominal::{inertials, nearest_to_nominal};
+pub use of_estimate::consistent_with_estimate;
 pub use problem::{
     consistency_problem, consistent_parameters, inconsistent_nominal_bodies, nearest_consistent_parameters,
     typical_length_m,

@@ -13,6 +13,11 @@ pub struct Power {
     pub rounding: f64,
 }
 
+impl Power {
+    /// The rounding that is usual: below any velocity that a differentiated encoder tells from rest, rad/s or m/s.
+    pub const ROUNDING: f64 = 1.0e-3;
+}
+
 /// The powers in use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PowerExponent {

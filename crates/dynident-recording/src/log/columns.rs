@@ -1,8 +1,9 @@
 //! The columns of one table that a log's description asks for, found by name or index.
 
 use super::format::ColumnRef;
-use super::source::{LogPlace, LogTable};
+use super::source::LogTable;
 use crate::error::RecordingError;
+use crate::place::LogPlace;
 
 /// A table under way, and the columns of it that are wanted.
 #[derive(Debug)]

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 
 /// Whether the first row names the columns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Header {
     /// Yes, unless every field of the first row is a number.
     #[default]
@@ -106,11 +107,11 @@ impl<T: Clone> OneOrMany<T> {
 ///
 /// `joint = M · (scale · sign · unit · column) + offset`
 ///
-/// where `M` is `matrix`, or the inverse of `inverse_matrix`, or the identity. `scale`, `sign` and `unit` are per column;
-/// `offset` is per joint and in SI (rad, m, N m, N).
+/// where `M` is `matrix`, or the inverse of `inverse_matrix`, or the identity. `scale`, `sign` and `unit` are per
+/// column; `offset` is per joint and in SI (rad, m, N m, N).
 ///
 /// ```
-/// let coupled_wrist: dynident_recording::ChannelGroup = toml::from_str(
+/// let coupled_wrist: dynident_recording::log::ChannelGroup = toml::from_str(
 ///     r#"
 ///     file = "motor_angles.csv"
 ///     columns = "Joint_{1..2}"
@@ -152,6 +153,7 @@ pub struct ChannelGroup {
 
 /// Unit of time stamps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub enum TimeUnit {
     /// Seconds.
     #[default]
@@ -207,6 +209,7 @@ impl TimeColumn {
 /// What to do with a row that has an empty, NaN or infinite field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Missing {
     /// Stop with an error that names the place.
     #[default]
@@ -218,8 +221,9 @@ pub enum Missing {
 /// How time stamps are understood.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum ClockRule {
-    /// Decided from the data, see [`clock`](crate::clock).
+    /// Decided from the data, see [`Clock`](crate::clock::Clock).
     #[default]
     Auto,
     /// Samples were taken at equal steps; the stamps only tell the mean rate.
@@ -268,7 +272,8 @@ pub struct LogFormat {
     pub acceleration: Option<ChannelGroup>,
     /// Joint torques or motor currents.
     pub torque: ChannelGroup,
-    /// Temperatures of the joints, °C, for friction that depends on them. Any other unit by `scale` and `offset`; several joints may name the same column.
+    /// Temperatures of the joints, °C, for friction that depends on them. Any other unit by `scale` and `offset`;
+    /// several joints may name the same column.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<ChannelGroup>,
     /// Data rows `[first, end)`, 0-based, header and comments not counted.
@@ -404,20 +409,22 @@ impl LogFormat {
                 "give 1.5 to 1000 median steps",
             ));
         }
-        for (key, group, quantity) in self.groups() {
-            group.validate(key, quantity, joints)?;
+        for (quantity, group) in self.groups() {
+            group.validate(quantity, joints)?;
         }
         Ok(())
     }
 
-    /// The channel groups that are present, with their key and quantity.
-    pub(crate) fn groups(&self) -> Vec<(&'static str, &ChannelGroup, Quantity)> {
-        let mut groups = vec![("position", &self.position, Quantity::Position)];
-        groups.extend(self.velocity.as_ref().map(|group| ("velocity", group, Quantity::Velocity)));
-        groups.extend(self.acceleration.as_ref().map(|group| ("acceleration", group, Quantity::Acceleration)));
-        groups.push(("torque", &self.torque, Quantity::Torque));
-        groups.extend(self.temperature.as_ref().map(|group| ("temperature", group, Quantity::Temperature)));
-        groups
+    /// The channel groups that are present, in the order of [`Quantity::ALL`].
+    pub(crate) fn groups(&self) -> Vec<(Quantity, &ChannelGroup)> {
+        let group = |quantity| match quantity {
+            Quantity::Position => Some(&self.position),
+            Quantity::Velocity => self.velocity.as_ref(),
+            Quantity::Acceleration => self.acceleration.as_ref(),
+            Quantity::Torque => Some(&self.torque),
+            Quantity::Temperature => self.temperature.as_ref(),
+        };
+        Quantity::ALL.into_iter().filter_map(|quantity| Some((quantity, group(quantity)?))).collect()
     }
 }
 
@@ -457,7 +464,8 @@ impl ChannelGroup {
         Ok(list)
     }
 
-    fn validate(&self, key: &str, quantity: Quantity, joints: &[String]) -> Result<(), FormatError> {
+    fn validate(&self, quantity: Quantity, joints: &[String]) -> Result<(), FormatError> {
+        let key = quantity.key();
         let columns = self.column_list(key)?.len();
         let at = |name: &str| format!("{key}.{name}");
         let wrong = |name: &str, found: usize, expected: usize, what: &str| {
@@ -519,7 +527,7 @@ impl ChannelGroup {
         if let Some(matrix) = &self.inverse_matrix {
             check_matrix(&at("inverse_matrix"), matrix, joints.len(), columns)?;
         }
-        super::mapping::Mapping::new(key, self, quantity, joints.len()).map(|_| ())
+        super::mapping::Mapping::new(self, quantity, joints.len()).map(|_| ())
     }
 }
 

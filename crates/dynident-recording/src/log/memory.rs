@@ -2,8 +2,9 @@
 
 use super::Log;
 use super::format::{ChannelGroup, ColumnRef, Columns, LogFormat, TimeColumn};
-use super::source::{LogPlace, LogSource, LogTable};
+use super::source::{LogSource, LogTable};
 use crate::error::RecordingError;
+use crate::place::LogPlace;
 use std::sync::Arc;
 
 /// Samples of all joints in SI and in joint order; `q[j]` holds joint j.
@@ -41,10 +42,11 @@ pub struct JointSamples {
 
 /// When samples in memory were taken.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum SampleClock {
     /// At so many samples per second.
     RateHz(f64),
-    /// At these times, s; what their jitter means is decided as for a file ([`ClockRule`](crate::ClockRule)).
+    /// At these times, s; what their jitter means is decided as for a file ([`ClockRule`](super::ClockRule)).
     TimesS(Vec<f64>),
 }
 
@@ -65,8 +67,8 @@ impl JointSamples {
         Self { clock: SampleClock::RateHz(rate_hz), q, tau, ..Self::default() }
     }
 
-    /// A log of these samples for `joints`, named `label` in messages. The samples are moved, not copied; ranges, missing
-    /// values and the clock's rule can be set in the [`format`](Log::format) of what is returned.
+    /// A log of these samples for `joints`, named `label` in messages. The samples are moved, not copied; ranges,
+    /// missing values and the clock's rule can be set in the [`format`](Log::format) of what is returned.
     ///
     /// # Errors
     /// [`RecordingError::Samples`] if the arrays do not have one entry for each joint and one value for each sample.

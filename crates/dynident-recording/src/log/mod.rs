@@ -23,7 +23,7 @@ pub use format::{
 };
 pub use memory::{JointSamples, MemoryLog, SampleClock};
 pub use reader::{LinesDropped, LogReader, RawBlock};
-pub use source::{LogPlace, LogSource, LogTable};
+pub use source::{LogSource, LogTable};
 pub use text::TextLog;
 pub use units::{Quantity, si_factor, unit_names};
 

@@ -4,6 +4,7 @@ use super::columns::Selected;
 use super::format::Missing;
 use super::mapping::Mapping;
 use super::source::LogSource;
+use super::units::Quantity;
 use super::{Log, file_source};
 use crate::error::RecordingError;
 use std::path::Path;
@@ -41,7 +42,7 @@ impl RawBlock {
 }
 
 /// What the reader left out.
-#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct LinesDropped {
     /// Rows with an empty, NaN or infinite field, under `missing = "drop"`.
     pub missing: u64,
@@ -51,7 +52,7 @@ pub struct LinesDropped {
 
 #[derive(Debug)]
 struct Group {
-    key: &'static str,
+    quantity: Quantity,
     table: usize,
     slots: Vec<usize>,
     mapping: Mapping,
@@ -97,7 +98,8 @@ impl LogReader {
         // Channel groups in files of their own: each file is opened once.
         let mut paths = vec![main.path().map(Path::to_owned)];
         let mut groups = Vec::new();
-        for (key, group, quantity) in format.groups() {
+        for (quantity, group) in format.groups() {
+            let key = quantity.key();
             let path = match &group.file {
                 None => main.path().map(Path::to_owned),
                 Some(name) => {
@@ -114,8 +116,8 @@ impl LogReader {
             let list = group.column_list(key)?;
             let slots = list.iter().map(|column| tables[table].want(&format!("{key}.columns"), column));
             let slots = slots.collect::<Result<Vec<_>, _>>()?;
-            let mapping = Mapping::new(key, group, quantity, log.joints.len())?;
-            groups.push(Group { key, table, columns: vec![Vec::new(); slots.len()], slots, mapping });
+            let mapping = Mapping::new(group, quantity, log.joints.len())?;
+            groups.push(Group { quantity, table, columns: vec![Vec::new(); slots.len()], slots, mapping });
         }
         tables.iter_mut().for_each(Selected::ready);
 
@@ -188,15 +190,15 @@ impl LogReader {
         while !self.finished && block.row.len() < BLOCK_ROWS {
             self.next_row_into(block)?;
         }
-        for group in ["position", "velocity", "acceleration", "torque", "temperature"] {
-            let (out, finite) = match group {
-                "position" => (&mut block.q, "position"),
-                "velocity" => (&mut block.dq, "velocity"),
-                "acceleration" => (&mut block.ddq, "acceleration"),
-                "torque" => (&mut block.tau, "torque"),
-                _ => (&mut block.temperature_c, "temperature"),
+        for quantity in Quantity::ALL {
+            let out = match quantity {
+                Quantity::Position => &mut block.q,
+                Quantity::Velocity => &mut block.dq,
+                Quantity::Acceleration => &mut block.ddq,
+                Quantity::Torque => &mut block.tau,
+                Quantity::Temperature => &mut block.temperature_c,
             };
-            let Some(group) = self.groups.iter().find(|candidate| candidate.key == group) else {
+            let Some(group) = self.groups.iter().find(|group| group.quantity == quantity) else {
                 out.clear();
                 continue;
             };
@@ -207,7 +209,7 @@ impl LogReader {
                     return Err(RecordingError::Overflow {
                         log: self.label.clone(),
                         row: block.row[at],
-                        group: finite,
+                        group: quantity.key(),
                         joint: self.joints[joint].clone(),
                     });
                 }

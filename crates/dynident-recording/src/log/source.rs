@@ -1,14 +1,15 @@
 //! Where rows of numbers come from: the seam behind which every log format stands.
 
 use crate::error::RecordingError;
+use crate::place::LogPlace;
 use core::fmt;
 use std::path::Path;
 
 /// Where raw rows come from: a file of some format, or samples in memory.
 ///
 /// A format is one type with this trait and one with [`LogTable`]. They deal in columns of numbers as they were
-/// recorded; what the columns mean (unit, sign, gear, range, missing values) is a
-/// [`LogFormat`](crate::LogFormat) and the business of [`LogReader`](crate::LogReader), which stands behind all of them.
+/// recorded; what the columns mean (unit, sign, gear, range, missing values) is a [`LogFormat`](crate::LogFormat) and
+/// the business of [`LogReader`](crate::LogReader), which stands behind all of them.
 ///
 /// ```
 /// use dynident_recording::{Log, LogFormat, LogPlace, LogSource, LogTable, MotionBlock, MotionSettings, MotionStream};
@@ -102,7 +103,8 @@ pub trait LogTable: fmt::Debug + Send {
         None
     }
 
-    /// The columns, each once, that [`next_row`](Self::next_row) is to give, in this order. Called before the first row.
+    /// The columns, each once, that [`next_row`](Self::next_row) is to give, in this order. Called before the first
+    /// row.
     fn select(&mut self, fields: &[usize]);
 
     /// Reads one row: one number for each selected column, NaN or infinite where it is missing; false at the end.
@@ -129,39 +131,5 @@ pub trait LogTable: fmt::Debug + Send {
     /// Where a last row was cut off and therefore left out.
     fn truncated(&self) -> Option<LogPlace> {
         None
-    }
-}
-
-/// A place in a log, for messages: `log.csv:17`, or `my samples, row 16`.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum LogPlace {
-    /// No place in particular.
-    Whole {
-        /// Label of the log.
-        log: String,
-    },
-    /// A line of a text.
-    Line {
-        /// Label of the log.
-        log: String,
-        /// 1-based.
-        line: u64,
-    },
-    /// A row of numbers that has no line.
-    Row {
-        /// Label of the log.
-        log: String,
-        /// 0-based.
-        row: u64,
-    },
-}
-
-impl fmt::Display for LogPlace {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Whole { log } => f.write_str(log),
-            Self::Line { log, line } => write!(f, "{log}:{line}"),
-            Self::Row { log, row } => write!(f, "{log}, row {row}"),
-        }
     }
 }

@@ -3,8 +3,9 @@
 use super::columns::column_label;
 use super::format::{Header, LogFormat};
 use super::lines::Lines;
-use super::source::{LogPlace, LogSource, LogTable};
+use super::source::{LogSource, LogTable};
 use crate::error::RecordingError;
+use crate::place::LogPlace;
 use std::path::{Path, PathBuf};
 
 /// A text file with one row of numbers a line.
@@ -257,8 +258,8 @@ fn number(field: &[u8]) -> Option<f64> {
     short_decimal(field).or_else(|| core::str::from_utf8(field).ok()?.parse().ok())
 }
 
-/// The fast path for fields such as `-12.345678`: both the digits as an integer below 2⁵³ and the power of ten are exact, so
-/// that one division rounds correctly. `None` sends the field to the standard library.
+/// The fast path for fields such as `-12.345678`: both the digits as an integer below 2⁵³ and the power of ten are
+/// exact, so that one division rounds correctly. `None` sends the field to the standard library.
 fn short_decimal(field: &[u8]) -> Option<f64> {
     const POWERS: [f64; 16] = [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
     let (negative, digits) = match field {

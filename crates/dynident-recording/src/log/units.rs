@@ -1,7 +1,11 @@
 //! Units at the edge: from what a log says to SI.
 
+use serde::{Deserialize, Serialize};
+
 /// What a channel measures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Quantity {
     /// Joint or motor position (rad, m).
     Position,
@@ -13,6 +17,23 @@ pub enum Quantity {
     Torque,
     /// Temperature, °C.
     Temperature,
+}
+
+impl Quantity {
+    /// All, in the order of a log's channel groups.
+    pub(crate) const ALL: [Self; 5] =
+        [Self::Position, Self::Velocity, Self::Acceleration, Self::Torque, Self::Temperature];
+
+    /// The key of its channel group in a [`LogFormat`](crate::LogFormat), which is also what reports call it.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Position => "position",
+            Self::Velocity => "velocity",
+            Self::Acceleration => "acceleration",
+            Self::Torque => "torque",
+            Self::Temperature => "temperature",
+        }
+    }
 }
 
 /// Name, quantity, factor to SI.

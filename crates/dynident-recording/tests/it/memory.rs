@@ -73,10 +73,11 @@ fn arrays_give_the_bits_of_the_file_with_the_same_numbers() {
         from_arrays.format.rows = format.rows;
         from_arrays.format.fraction = format.fraction;
         from_arrays.format.time_range_s = format.time_range_s;
-        let (expected, told) = motion(&Log::file(file.path(), format.clone(), &joints()), &settings).unwrap();
+        let (expected, expected_report) =
+            motion(&Log::file(file.path(), format.clone(), &joints()), &settings).unwrap();
         let (found, report) = motion(&from_arrays, &settings).unwrap();
         assert!(!expected.is_empty() && expected == found, "{selection}");
-        assert_eq!(ImportReport { file: told.file.clone(), ..report }, told, "{selection}");
+        assert_eq!(ImportReport { file: expected_report.file.clone(), ..report }, expected_report, "{selection}");
 
         let flat = rows.iter().flatten().copied().collect();
         let names = "t,q1,q2,v1,v2,tau1,tau2,temp".split(',').map(str::to_owned).collect();
@@ -99,7 +100,7 @@ fn errors_name_the_label_and_the_place() {
     let mut holed = log(vec![ramp(), holed], vec![ramp(); 2]).unwrap();
     let message = motion(&holed, &settings).unwrap_err().to_string();
     assert!(message.starts_with("bench run, row 17, column 1: `NaN`"), "{message}");
-    holed.format.missing = dynident_recording::Missing::Drop;
+    holed.format.missing = dynident_recording::log::Missing::Drop;
     assert_eq!(motion(&holed, &settings).unwrap().1.dropped.missing, 1);
     let message = motion(&log(vec![vec![]; 2], vec![vec![]; 2]).unwrap(), &settings).unwrap_err().to_string();
     assert!(message.starts_with("bench run: no data rows; "), "{message}");
@@ -152,4 +153,14 @@ proptest! {
             (found, expected) => prop_assert!(false, "{:?}\n{:?}", found.is_ok(), expected.is_ok()),
         }
     }
+}
+
+/// What was found is stored beside a result as JSON, and read back.
+#[test]
+fn a_report_survives_json() {
+    let rows = rows(3000);
+    let format: LogFormat = toml::from_str(CHANNELS).unwrap();
+    let (_, report) = motion(&Log::file(file(&rows).path(), format, &joints()), &MotionSettings::default()).unwrap();
+    let text = serde_json::to_string(&report).unwrap();
+    assert_eq!(serde_json::from_str::<ImportReport>(&text).unwrap(), report);
 }

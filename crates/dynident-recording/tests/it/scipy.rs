@@ -1,8 +1,9 @@
 //! Filters against SciPy and NumPy (`golden/scipy_filters.py`).
-use dynident_recording::{
-    ButterworthZeroPhase, CentralDifferences, DecimationSettings, Derivatives, Differentiator, Ends, FivePointCubic,
-    FourierFit, FrequencyDomain, LowPass, SavitzkyGolay, SmoothedDifferences,
+use dynident_recording::derivative::{
+    ButterworthZeroPhase, CentralDifferences, Ends, FivePointCubic, FourierFit, FrequencyDomain, LowPass,
+    SavitzkyGolay, SmoothedDifferences,
 };
+use dynident_recording::{DecimationSettings, Derivatives, Differentiator};
 use serde_json::Value;
 
 fn golden() -> Value {

@@ -7,10 +7,10 @@ use super::rows::Rows;
 use super::scenario::{DURATION_S, HARMONICS, Record};
 use dynident_estimation::{
     CovarianceMethod, Estimate, EstimateStatus, EstimationError, InstrumentalSettings, LinearProblem,
-    NoiseLevelSettings, OrdinarySettings, RankSettings, RobustSettings, RowWeight, SimultaneousSettings, TotalSettings,
-    WeightedSettings, generalized_least_squares, instrumental_variables, noise_weighted_least_squares,
-    ordinary_least_squares, robust_least_squares, simultaneous_least_squares, total_least_squares,
-    weighted_least_squares,
+    NoiseLevelSettings, OrdinarySettings, RankSettings, RobustSettings, RowWeight, SimultaneousProblem,
+    SimultaneousSettings, TotalSettings, WeightedSettings, generalized_least_squares, instrumental_variables,
+    noise_weighted_least_squares, ordinary_least_squares, robust_least_squares, simultaneous_least_squares,
+    total_least_squares, weighted_least_squares,
 };
 use dynident_excitation::Motion;
 use dynident_identification::consistent::{ConsistencySettings, consistent_parameters};
@@ -132,9 +132,9 @@ pub(super) fn simultaneous(trial: &Trial<'_>) -> Result<Answer, EstimationError>
         .collect();
     // Whitened rows of a model that leaves nothing out: their own information is right.
     let settings = SimultaneousSettings { covariance: CovarianceMethod::White, ..SimultaneousSettings::default() };
-    let names = trial.problem.columns();
-    simultaneous_least_squares(names, &channels, (&motion, &start.values), &settings, &mut model)
-        .map(|found| answer(found.estimate))
+    let names = trial.problem.columns().to_vec();
+    let problem = SimultaneousProblem { names, channels, motion, parameters: start.values };
+    simultaneous_least_squares(&problem, &settings, &mut model).map(|found| answer(found.estimate))
 }
 
 fn answer(estimate: Estimate) -> Answer {

@@ -25,14 +25,15 @@ use bound_with_motion::BoundWithMotion;
 use shared::Shared;
 
 use crate::cpu_time::thread_seconds;
-use crate::error::Error;
-use crate::progress::Progress;
 use dynident_estimation::EstimationError;
+use dynident_identification::{IdentificationError, Progress};
 use dynident_model::UrdfError;
 use dynident_model::sample::Random;
 use dynident_recording::FilterError;
+use fnv::FnvHasher;
 use rayon::prelude::*;
 use serde::Serialize;
+use std::hash::Hasher;
 use thiserror::Error as ThisError;
 
 /// Name and version of the schema of [`BenchmarkFile`].
@@ -101,7 +102,7 @@ pub enum BenchmarkError {
     },
     /// An error of the pipeline.
     #[error(transparent)]
-    Pipeline(Box<Error>),
+    Pipeline(Box<IdentificationError>),
 }
 
 /// What is compared.
@@ -292,5 +293,7 @@ fn one_run(
 
 /// FNV-1a: a seed from a place, the same on every machine.
 fn hash(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
+    let mut hasher = FnvHasher::default();
+    hasher.write(bytes);
+    hasher.finish()
 }

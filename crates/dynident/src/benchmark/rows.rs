@@ -2,14 +2,13 @@
 
 use super::BenchmarkError;
 use super::scenario::Scenario;
-use crate::error::Error;
-use crate::measured::rows::{Computer, JointRows, RawSamples, RowSink, decimation};
-use crate::progress::Silent;
-use crate::study::{EstimatorSection, ParallelFilterSection};
+use crate::study::EstimatorSection;
 use dynident_dynamics::Column;
 use dynident_estimation::{
     CrossProblem, EstimationError, InstrumentedProblem, LinearProblem, RowBlock, RowVisitor, SegmentedFactor,
 };
+use dynident_identification::rows::{JointRows, ParallelFilterSettings, RowBuilder, RowConsumer};
+use dynident_identification::{IdentificationError, RegressorModel};
 use dynident_recording::MotionBlock;
 
 /// Name of the one log.
@@ -29,13 +28,9 @@ struct Block {
     panel: Vec<f64>,
 }
 
-impl RowSink for Rows<'_> {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), Error> {
+impl RowConsumer for Rows<'_> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
         self.blocks.push(Block { joint: rows.joint, rows: rows.rows, panel: rows.panel.to_vec() });
-        Ok(())
-    }
-
-    fn raw(&mut self, _samples: &RawSamples<'_>) -> Result<(), Error> {
         Ok(())
     }
 }
@@ -47,12 +42,12 @@ impl<'a> Rows<'a> {
         motion: &MotionBlock,
         cutoff_hz: Option<f64>,
     ) -> Result<Self, BenchmarkError> {
-        let (model, layout) = (scenario.parametric.model(), scenario.parametric.layout());
-        let filter =
-            cutoff_hz.and_then(|cutoff| decimation(&ParallelFilterSection::default(), motion.rate_hz, Some(cutoff)));
+        let defaults = ParallelFilterSettings::default();
+        let filter = cutoff_hz.and_then(|cutoff| defaults.decimation(motion.rate_hz, Some(cutoff)));
+        let model = RegressorModel::from(scenario.parametric.clone());
         let places: Vec<usize> = (0..model.dof()).collect();
         let mut rows = Self { scenario, blocks: Vec::new() };
-        Computer::new(model, layout, &places, motion.rate_hz, filter.as_ref(), None, &Silent)
+        RowBuilder::new(&model, &places, motion.rate_hz, filter.as_ref())
             .map_err(|source| BenchmarkError::Filter { robot: scenario.robot.to_owned(), source })?
             .take(motion, &mut rows)
             .map_err(|source| BenchmarkError::Pipeline(Box::new(source)))?;

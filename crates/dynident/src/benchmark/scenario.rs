@@ -192,7 +192,13 @@ fn torque(model: &Model, layout: &PanelLayout, motion: &Motion, theta: &[f64]) -
     let mut buffer = Vec::new();
     for joint in 0..model.dof() {
         let columns = layout.joint_columns(joint);
-        crate::measured::evidence::predicted(panels.joint(joint), motion.samples, columns, theta, &mut buffer);
+        dynident_identification::rows::predicted_torque(
+            panels.joint(joint),
+            motion.samples,
+            columns,
+            theta,
+            &mut buffer,
+        );
         tau.extend_from_slice(&buffer);
     }
     tau

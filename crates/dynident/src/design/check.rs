@@ -1,24 +1,25 @@
-//! The look at a motion that is there already: a trajectory that the user brings, or a log after the run. Nothing is searched.
+//! The look at a motion that is there already: a trajectory that the user brings, or a log after the run. Nothing is
+//! searched.
 
-use super::prepared::{Judged, Prepared};
-use super::{DesignOutcome, sentences, table};
-use crate::cpu_time::cpu_seconds;
+use super::limit_check::LimitCheck;
+use super::outcome::{MotionOrigin, MotionReview};
+use super::setup::{DesignSetup, MotionInformation};
+use super::{DesignOutcome, table};
 use crate::error::Error;
-use crate::job::{RunOptions, joint_names};
-use crate::machine::Machine;
-use crate::measured::motion_log::motion_stream;
-use crate::measured::rows::motion_in_force;
+use crate::jobs::options::RunOptions;
+use crate::study::StudyRobot;
 use crate::study::{Folders, Study};
-use dynident_excitation::check::{CHECK_RATE_HZ, LimitReport, check_limits};
+use dynident_excitation::check::CHECK_RATE_HZ;
 use dynident_excitation::families::Given;
 use dynident_excitation::{Family, Motion, grid};
+use dynident_identification::{Execution, IdentificationSettings, Logs};
 use dynident_recording::MotionBlock;
 use nalgebra::DMatrix;
-use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::path::Path;
 
-/// The family of such motions in `design.json`.
-const GIVEN: &str = "given";
+/// What is checked of a table, and of a log.
+const SPLINE: &str = "the quintic spline through the samples of the table";
+const SAMPLES: &str = "the log's own samples, its positions through the study's differentiator";
 
 /// Longest trajectory, s: the check at 10 kHz looks at every sample.
 const MAX_DURATION_S: f64 = 3600.0;
@@ -29,8 +30,9 @@ const MAX_SAMPLES: usize = 2_000_000;
 /// A speed at an end below this share of its peak is rest.
 const REST: f64 = 1e-3;
 
-/// Judges the trajectory in the table `trajectory` (`t_s`, `q1..` or the joints' names, and `dq1..`, `ddq1..` or neither) as a design would be: every limit at 10 kHz on the quintic spline through the table's
-/// samples, the criteria's figures and the forecast at `search.rate_hz`.
+/// Judges the trajectory in the table `trajectory` (`t_s`, `q1..` or the joints' names, and `dq1..`, `ddq1..` or
+/// neither) as a design would be: every limit at 10 kHz on the quintic spline through the table's samples, the
+/// criteria's figures and the forecast at `search.rate_hz`.
 ///
 /// # Errors
 /// If the study makes no sense, or the table is missing, holds other joints or something that is no motion.
@@ -40,9 +42,8 @@ pub fn check_trajectory(
     trajectory: &Path,
     options: &RunOptions<'_>,
 ) -> Result<DesignOutcome, Error> {
-    let (started, cpu_at_start) = (Instant::now(), cpu_seconds());
-    let mut prepared = Prepared::for_check(study, study_path, options)?;
-    let joints = joint_names(&prepared.machine);
+    let mut setup = DesignSetup::for_check(study, study_path, options)?;
+    let joints = setup.machine.parametric.joint_names();
     let table = table::trajectory(trajectory, &joints, &study.motion)?;
     let given = table.given;
     let duration_s = given.duration_s();
@@ -50,29 +51,20 @@ pub fn check_trajectory(
         let message = format!("{duration_s} s: at most {MAX_DURATION_S} s can be checked; give a part of it");
         return Err(Error::States { path: trajectory.to_owned(), line: 1, message });
     }
-    prepared.notes.extend(table.note);
-    prepared.notes.extend(not_at_rest(&given, &joints));
+    setup.notes.extend(table.note);
+    setup.notes.extend(not_at_rest(&given, &joints));
     let motion_at = |times: &[f64], out: &mut Motion| given.motion(&[], times, out);
-    let reports = checked(&prepared, study_path, duration_s, CHECK_RATE_HZ, &motion_at)?;
-    let broken = reports.iter().any(|report| report.violated);
-    let diagnosis = if broken { sentences(&prepared.set, duration_s, &reports, &motion_at) } else { Vec::new() };
-    let rate_hz = prepared.section.search.rate_hz;
+    let check = LimitCheck::of(&setup, study_path, duration_s, CHECK_RATE_HZ, SPLINE, &motion_at)?;
+    let rate_hz = setup.section.search.rate_hz;
     let times = grid(duration_s, (duration_s * rate_hz).round() as usize + 1);
-    let [plain, weighted] = prepared.informations(&times, &motion_at);
-    let judged = Judged {
-        duration_s,
-        rate_hz,
-        reports,
-        check_rate_hz: CHECK_RATE_HZ,
-        check_of: "the quintic spline through the samples of the table",
-        diagnosis,
-        ..looked_at(&prepared, trajectory.display().to_string(), [plain, weighted], (started, cpu_at_start))
-    };
-    Ok(prepared.outcome(judged, Box::new(given)))
+    let information = setup.information(&times, &motion_at);
+    let origin = MotionOrigin::given(&setup, trajectory.display().to_string(), given, &information);
+    Ok(DesignOutcome::new(setup, origin, MotionReview { duration_s, rate_hz, information, check }))
 }
 
-/// Judges a log of the study, by its name or its file: what the run that is over tells about each parameter. Positions go the same way to speeds and accelerations as they would to a fit; limits are looked at
-/// on the log's own samples, every one of which counts for the forecast.
+/// Judges a log of the study, by its name or its file: what the run that is over tells about each parameter. Positions
+/// go the same way to speeds and accelerations as they would to a fit; limits are looked at on the log's own samples,
+/// every one of which counts for the forecast.
 ///
 /// # Errors
 /// If the study makes no sense, no log or more than one is called `name`, or the log cannot be read.
@@ -82,92 +74,35 @@ pub fn check_log(
     name: &str,
     options: &RunOptions<'_>,
 ) -> Result<DesignOutcome, Error> {
-    let (started, cpu_at_start) = (Instant::now(), cpu_seconds());
     study.require_log(study_path)?;
     let index = log_called(study, name).map_err(|message| Error::study(study_path, message))?;
-    let mut prepared = Prepared::for_check(study, study_path, options)?;
+    let mut setup = DesignSetup::for_check(study, study_path, options)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let file = folders.find(&study.log[index].file, study.source.as_deref())?;
-    let (mut pieces, rate_hz) = pieces(study, &prepared.machine, index, &file)?;
+    let (mut pieces, rate_hz) = pieces(study, study_path, (&setup.machine, &folders), index, &file)?;
     let gaps = pieces.len().saturating_sub(1);
     if gaps > 0 {
-        prepared.notes.push(format!(
+        setup.notes.push(format!(
             "the log has {gaps} gap(s): its pieces are judged one by one and count together; pictures show the longest"
         ));
     }
-    let count = prepared.machine.layout().columns().len();
+    let count = setup.machine.layout().columns().len();
     let [mut plain, mut weighted] = [(); 2].map(|()| DMatrix::zeros(count, count));
-    let (mut reports, mut diagnosis, mut duration_s): (Vec<LimitReport>, Vec<String>, f64) =
-        (Vec::new(), Vec::new(), 0.0);
+    let mut check = LimitCheck { reports: Vec::new(), rate_hz, of: SAMPLES, diagnosis: Vec::new() };
+    let mut duration_s = 0.0;
     for piece in &pieces {
         let motion_at = |times: &[f64], out: &mut Motion| piece.motion(&[], times, out);
-        let found = checked(&prepared, study_path, piece.duration_s(), rate_hz, &motion_at)?;
-        if found.iter().any(|report| report.violated) {
-            diagnosis.extend(sentences(&prepared.set, piece.duration_s(), &found, &motion_at));
-        }
-        reports = worse_of(reports, found, duration_s);
-        for (sum, part) in
-            [&mut plain, &mut weighted].into_iter().zip(prepared.informations(piece.times_s(), &motion_at))
-        {
-            *sum += part;
-        }
+        check.append(LimitCheck::of(&setup, study_path, piece.duration_s(), rate_hz, SAMPLES, &motion_at)?, duration_s);
+        let part = setup.information(piece.times_s(), &motion_at);
+        plain += part.plain;
+        weighted += part.weighted;
         duration_s += piece.duration_s();
     }
     let longest = (0..pieces.len())
         .fold(0, |best, piece| if pieces[piece].duration_s() > pieces[best].duration_s() { piece } else { best });
-    let judged = Judged {
-        duration_s,
-        rate_hz,
-        reports,
-        check_rate_hz: rate_hz,
-        check_of: "the log's own samples, its positions through the study's differentiator",
-        diagnosis,
-        ..looked_at(&prepared, study.log_name(index), [plain, weighted], (started, cpu_at_start))
-    };
-    Ok(prepared.outcome(judged, Box::new(pieces.swap_remove(longest))))
-}
-
-/// What is the same of every motion that was given: no search, no family. Limits, times and rates are filled in by who knows them.
-fn looked_at(
-    prepared: &Prepared,
-    given: String,
-    [plain, weighted]: [DMatrix<f64>; 2],
-    (started, cpu_at_start): (Instant, Option<f64>),
-) -> Judged {
-    Judged {
-        family: GIVEN,
-        family_settings: None,
-        given: Some(given),
-        parameters: Vec::new(),
-        start_posture: Vec::new(),
-        optimiser: "none",
-        criterion: prepared.criterion(),
-        figure: prepared.figure(&plain, &weighted),
-        windowed: None,
-        history: Vec::new(),
-        plain,
-        weighted,
-        duration_s: 0.0,
-        rate_hz: 0.0,
-        reports: Vec::new(),
-        check_rate_hz: 0.0,
-        check_of: "",
-        diagnosis: Vec::new(),
-        evaluations: 0,
-        seconds: started.elapsed().as_secs_f64(),
-        cpu_at_start,
-    }
-}
-
-fn checked(
-    prepared: &Prepared,
-    study_path: &Path,
-    duration_s: f64,
-    rate_hz: f64,
-    motion_at: &dyn Fn(&[f64], &mut Motion),
-) -> Result<Vec<LimitReport>, Error> {
-    check_limits(&prepared.limits, &prepared.machine.model(), duration_s, rate_hz, motion_at)
-        .map_err(|why| Error::study(study_path, format!("[design.limits]: {why}")))
+    let information = MotionInformation { plain, weighted };
+    let origin = MotionOrigin::given(&setup, study.log_name(index), pieces.swap_remove(longest), &information);
+    Ok(DesignOutcome::new(setup, origin, MotionReview { duration_s, rate_hz, information, check }))
 }
 
 /// Which log is meant: by its name in reports, or by its file.
@@ -188,13 +123,26 @@ fn log_called(study: &Study, name: &str) -> Result<usize, String> {
 }
 
 /// The uninterrupted pieces of a log as motions in the model's order of joints, and the log's rate.
-fn pieces(study: &Study, machine: &Machine, index: usize, file: &Path) -> Result<(Vec<Given>, f64), Error> {
+fn pieces(
+    study: &Study,
+    study_path: &Path,
+    (machine, folders): (&StudyRobot, &Folders),
+    index: usize,
+    file: &Path,
+) -> Result<(Vec<Given>, f64), Error> {
     let log = study.log_name(index);
     let failed = |source| Error::recording(&log, source);
-    let mut files = vec![PathBuf::new(); study.log.len()];
-    file.clone_into(&mut files[index]);
-    let motion = motion_in_force(study, machine, &files, &[index], None)?;
-    let mut stream = motion_stream(study, machine, &motion, index, file)?;
+    let in_study = |error| Error::identification(study_path, error);
+    let recording = study.recording(machine, folders, index, file)?;
+    let mut settings = IdentificationSettings::default();
+    settings.motion = study.motion.clone();
+    let execution = Execution::default();
+    let (model, alone) = (machine.model(), core::slice::from_ref(&recording));
+    let motion = Logs::new(model, alone, &settings, &[0], None, execution).map_err(in_study)?.motion;
+    let places = recording.places(model).map_err(in_study)?;
+    let Some(mut stream) = recording.open(model, &motion).map_err(in_study)? else {
+        return Err(Error::study(study_path, format!("log `{log}` has no samples")));
+    };
     let rate_hz = stream.rate_hz();
     // By piece: for q, dq, ddq and each joint of the model its samples.
     let mut found: Vec<Vec<Vec<f64>>> = Vec::new();
@@ -212,7 +160,7 @@ fn pieces(study: &Study, machine: &Machine, index: usize, file: &Path) -> Result
         }
         if let Some(piece) = found.last_mut() {
             for (order, source) in [&block.q, &block.dq, &block.ddq].into_iter().enumerate() {
-                for (joint, &place) in machine.log_place.iter().enumerate() {
+                for (joint, &place) in places.iter().enumerate() {
                     piece[order * dof + joint].extend_from_slice(block.joint(source, place));
                 }
             }
@@ -231,18 +179,6 @@ fn pieces(study: &Study, machine: &Machine, index: usize, file: &Path) -> Result
         return Err(none(format!("log `{log}`: no uninterrupted piece of two samples or more")));
     }
     Ok((pieces, rate_hz))
-}
-
-/// The worse report of each limit; those of `later` happened `after_s` into the log's pieces.
-fn worse_of(earlier: Vec<LimitReport>, later: Vec<LimitReport>, after_s: f64) -> Vec<LimitReport> {
-    let later = later.into_iter().map(|mut report| {
-        report.at_s += after_s;
-        report
-    });
-    if earlier.is_empty() {
-        return later.collect();
-    }
-    earlier.into_iter().zip(later).map(|(a, b)| if b.worst_ratio > a.worst_ratio { b } else { a }).collect()
 }
 
 /// A word on ends in motion: a robot cannot begin there.

@@ -100,7 +100,8 @@ pub struct ParameterForecast {
 /// A direction in the space of column-scaled parameters.
 #[derive(Clone, Debug, Serialize)]
 pub struct DirectionForecast {
-    /// How many times less is known in it than of a column that stood alone: `1 / √λ` of the correlation-scaled information.
+    /// How many times less is known in it than of a column that stood alone: `1 / √λ` of the correlation-scaled
+    /// information.
     pub inflation: f64,
     /// Symbols of the columns that make it, the largest share first, and their shares.
     pub terms: Vec<(String, f64)>,

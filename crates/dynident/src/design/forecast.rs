@@ -1,21 +1,22 @@
 //! The forecast under the parameters' names.
 
 use super::file::{DirectionForecast, ParameterForecast};
-use crate::machine::Machine;
+use crate::study::StudyRobot;
 use dynident_excitation::forecast;
 use nalgebra::DMatrix;
 
-/// Worst directions that are told, and the terms of each.
+/// Worst directions shown, and the terms of each.
 const DIRECTIONS: usize = 3;
 const TERMS: usize = 6;
 
 /// A prior value below this share of the largest is zero.
 const NEGLIGIBLE: f64 = 1e-9;
 
-/// The forecast from the motion's information, with the parameters' names and with their sizes by the description; `with_prior` is the information that includes what was known before. Worst
-/// directions are those of all that is known.
+/// The forecast from the motion's information, with the parameters' names and with their sizes by the description;
+/// `with_prior` is the information that includes what was known before. Worst directions are those of all that is
+/// known.
 pub(super) fn named_forecast(
-    machine: &Machine,
+    machine: &StudyRobot,
     information: &DMatrix<f64>,
     with_prior: Option<&DMatrix<f64>>,
 ) -> (Vec<ParameterForecast>, Vec<DirectionForecast>) {

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 const NAME: &str = "joined";
 
-/// Parts one after another with a move between each two: for instance a series, then a friction ladder, then static postures.
+/// Parts one after another with a move between each two: for instance a series, then a friction ladder, then static
+/// postures.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct JoinedChoice {

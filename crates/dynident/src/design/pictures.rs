@@ -47,8 +47,8 @@ impl DesignOutcome {
         Ok(picture.svg()?)
     }
 
-    /// `path.svg`: the tool's path and some poses of the arm in the base frame, from above and from the side, with floor,
-    /// column and boxes. The tool is the frame farthest out on every last body.
+    /// `path.svg`: the tool's path and some poses of the arm in the base frame, from above and from the side, with
+    /// floor, column and boxes. The tool is the frame farthest out on every last body.
     ///
     /// # Errors
     /// A motion that cannot be drawn.

@@ -1,9 +1,9 @@
 //! `[design.prior]`: what is known before the motion, so that the next one looks for what is not.
 
 use crate::error::Error;
-use crate::identify::result::{BaseParameterResult, RESULT_SCHEMA};
-use crate::machine::Machine;
+use crate::result::identification::{BaseParameterResult, RESULT_SCHEMA};
 use crate::study::Folders;
+use crate::study::StudyRobot;
 use dynident_dynamics::Column;
 use dynident_model::laws::Law;
 use nalgebra::DMatrix;
@@ -13,18 +13,21 @@ use std::path::{Path, PathBuf};
 /// A value below this share of the largest of its kind in its body is known no better than one of this size.
 const FLOOR: f64 = 0.1;
 
-/// Standard deviation (SI) of a law's parameter that the description says nothing about: as good as unknown beside any measurement.
+/// Standard deviation (SI) of a law's parameter that the description says nothing about: as good as unknown beside any
+/// measurement.
 const UNKNOWN: f64 = 1e3;
 
 /// `[design.prior]`. What several sources say adds up.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PriorSection {
-    /// `result.json` of an earlier identification of the same machine: its covariance says how well each base parameter is known. Found as the study's logs are.
+    /// `result.json` of an earlier identification of the same machine: its covariance says how well each base parameter
+    /// is known. Found as the study's logs are.
     pub result: Option<PathBuf>,
-    /// The description's own inertial parameters, good to so many percent each (one standard deviation, independent of each other). A parameter that is smaller than a tenth of the largest of its
-    /// kind (first moments, moments of inertia) in its body counts as if it were of that tenth; of a kind that the body has nothing of, the largest of the robot counts. Friction is taken from the description where it
-    /// says something, else it is unknown.
+    /// The description's own inertial parameters, good to so many percent each (one standard deviation, independent of
+    /// each other). A parameter that is smaller than a tenth of the largest of its kind (first moments, moments of
+    /// inertia) in its body counts as if it were of that tenth; of a kind that the body has nothing of, the largest of
+    /// the robot counts. Friction is taken from the description where it says something, else it is unknown.
     pub cad_std_percent: Option<f64>,
 }
 
@@ -43,10 +46,11 @@ impl PriorSection {
         }
     }
 
-    /// The information about the machine's base parameters, inverse covariance, and a sentence on each source. None if nothing is said.
+    /// The information about the machine's base parameters, inverse covariance, and a sentence on each source. None if
+    /// nothing is said.
     pub(crate) fn information(
         &self,
-        machine: &Machine,
+        machine: &StudyRobot,
         study_path: &Path,
         folders: &Folders,
         notes: &mut Vec<String>,
@@ -78,8 +82,9 @@ impl PriorSection {
     }
 }
 
-/// `K diag(σ²) Kᵀ` of the base parameters: the independent ones with their own variance, and what is regrouped into them.
-fn cad_covariance(machine: &Machine, share: f64) -> DMatrix<f64> {
+/// `K diag(σ²) Kᵀ` of the base parameters: the independent ones with their own variance, and what is regrouped into
+/// them.
+fn cad_covariance(machine: &StudyRobot, share: f64) -> DMatrix<f64> {
     let std = standard_deviations(machine, share);
     let base = machine.base();
     let mut spread = base.regrouping().clone();
@@ -94,7 +99,7 @@ fn cad_covariance(machine: &Machine, share: f64) -> DMatrix<f64> {
 }
 
 /// Standard deviation of every standard parameter: bodies, then laws.
-fn standard_deviations(machine: &Machine, share: f64) -> Vec<f64> {
+fn standard_deviations(machine: &StudyRobot, share: f64) -> Vec<f64> {
     const KINDS: [core::ops::Range<usize>; 3] = [0..1, 1..4, 4..10];
     let values = machine.nominal().to_vec();
     let largest = |values: &[f64]| values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
@@ -116,7 +121,8 @@ fn standard_deviations(machine: &Machine, share: f64) -> Vec<f64> {
     std
 }
 
-/// Inverse of a covariance by way of its correlations, whose entries are of one size; `None` if it is not positive definite.
+/// Inverse of a covariance by way of its correlations, whose entries are of one size; `None` if it is not positive
+/// definite.
 fn inverse(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale: Vec<f64> = covariance.diagonal().iter().map(|variance| variance.sqrt().recip()).collect();
     let between = |matrix: &DMatrix<f64>| {
@@ -137,7 +143,7 @@ struct StoredUncertainty {
 }
 
 /// Inverse covariance of an earlier result in the machine's columns; zero for those that it did not excite.
-fn of_result(path: &Path, machine: &Machine) -> Result<DMatrix<f64>, Error> {
+fn of_result(path: &Path, machine: &StudyRobot) -> Result<DMatrix<f64>, Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
     let stored: StoredUncertainty = serde_json::from_slice(&bytes).map_err(|error| {
@@ -177,14 +183,14 @@ fn of_result(path: &Path, machine: &Machine) -> Result<DMatrix<f64>, Error> {
     Ok(information)
 }
 
-/// Names that are told of a list at most.
+/// Names shown of a list at most.
 const TOLD: usize = 6;
 
 /// For every stored parameter its column in the machine.
-fn places(stored: &[BaseParameterResult], machine: &Machine) -> Result<Vec<usize>, String> {
+fn places(stored: &[BaseParameterResult], machine: &StudyRobot) -> Result<Vec<usize>, String> {
     let symbols: Vec<String> = machine.layout().columns().iter().map(Column::symbol).collect();
     let expressions = machine.base().expressions();
-    let told = |names: &[&str]| {
+    let listed = |names: &[&str]| {
         let more = if names.len() > TOLD { format!(" and {} more", names.len() - TOLD) } else { String::new() };
         format!("{}{more}", names[..names.len().min(TOLD)].join(", "))
     };
@@ -197,10 +203,10 @@ fn places(stored: &[BaseParameterResult], machine: &Machine) -> Result<Vec<usize
         .collect();
     let mend = "use a result of the same robot with the same [drive] and [robot]";
     if !strange.is_empty() {
-        return Err(format!("its base parameters {} are none of the study's machine: {mend}", told(&strange)));
+        return Err(format!("its base parameters {} are none of the study's machine: {mend}", listed(&strange)));
     }
     if !absent.is_empty() {
-        return Err(format!("it does not hold the machine's base parameters {} once each: {mend}", told(&absent)));
+        return Err(format!("it does not hold the machine's base parameters {} once each: {mend}", listed(&absent)));
     }
     stored
         .iter()

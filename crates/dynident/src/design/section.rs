@@ -55,13 +55,15 @@ pub struct DesignSection {
     /// What looks for it; `"gradient"` by default. A name, or a table with a `kind` and its settings.
     #[serde(deserialize_with = "name_or_table")]
     pub optimiser: OptimiserChoice,
-    /// Strokes of a windowed design that are to be judged as they are, one a joint; nothing is searched then. Empty by default.
+    /// Strokes of a windowed design that are to be judged as they are, one a joint; nothing is searched then. Empty by
+    /// default.
     pub parameters: Vec<GivenStroke>,
     /// Where the motion starts, and where a family that returns ends; free by default.
     pub start_posture: Option<StartPosture>,
     /// What is known before the motion; nothing by default.
     pub prior: PriorSection,
-    /// Standard deviation of each joint's torque, Nm (N): one number, or one per joint in the model's order. By default 1 % of the joint's effort limit, and 1 where there is none.
+    /// Standard deviation of each joint's torque, Nm (N): one number, or one per joint in the model's order. By default
+    /// 1 % of the joint's effort limit, and 1 where there is none.
     pub torque_std_nm: Option<TorqueNoise>,
     /// How much is searched, and how finely; also the rate of the log and the seed.
     pub search: DesignSettings,
@@ -162,7 +164,8 @@ pub enum CriterionChoice {
     ConditionNumberScaled,
     /// V-optimality: the mean square error of the torque that the fitted model will predict on a task.
     Prediction {
-        /// The task: a table with `t_s`, `q1..` and, if at hand, `dq1..` and `ddq1..` (rad, m, s), or positions under the joints' names. Found as the study's logs are.
+        /// The task: a table with `t_s`, `q1..` and, if at hand, `dq1..` and `ddq1..` (rad, m, s), or positions under
+        /// the joints' names. Found as the study's logs are.
         trajectory: PathBuf,
     },
     /// The paper's sum of condition numbers over windows around the mid-points of logistic strokes.
@@ -170,7 +173,8 @@ pub enum CriterionChoice {
 }
 
 impl CriterionChoice {
-    /// The criterion in the forms that a search uses one after another: smooth first, sharp last. None for a task, which has to be read first.
+    /// The criterion in the forms that a search uses one after another: smooth first, sharp last. None for a task,
+    /// which has to be read first.
     pub(crate) fn criteria(&self) -> Option<Vec<Box<dyn Criterion>>> {
         let condition = |scaled| -> Vec<Box<dyn Criterion>> {
             [40.0, 80.0].map(|order| -> Box<dyn Criterion> { Box::new(ConditionNumber { order, scaled }) }).into()

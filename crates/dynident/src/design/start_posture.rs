@@ -5,7 +5,8 @@ use dynident_model::Model;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Position of joints at the start, rad (m): by name (what is not named stays free), or all joints in the model's order.
+/// Position of joints at the start, rad (m): by name (what is not named stays free), or all joints in the model's
+/// order.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(untagged, expecting = "positions by joint, { elbow = 1.5 }, or a list with one per joint (rad, m)")]
 pub enum StartPosture {
@@ -19,8 +20,9 @@ impl StartPosture {
     /// The position of every joint that is named.
     ///
     /// # Errors
-    /// A joint that the model does not have, another number of positions than joints, a position that is not finite or that the limits do not allow: at rest in a whole posture every limit is
-    /// asked, in a part of one those of position.
+    /// A joint that the model does not have, another number of positions than joints, a position that is not finite or
+    /// that the limits do not allow: at rest in a whole posture every limit is asked, in a part of one those of
+    /// position.
     pub(crate) fn of_joints(&self, model: &Model, limits: &Limits) -> Result<Vec<Option<f64>>, String> {
         let names: Vec<&str> = model.joints().iter().map(|joint| &*joint.name).collect();
         let posture: Vec<Option<f64>> = match self {

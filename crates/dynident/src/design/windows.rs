@@ -1,16 +1,18 @@
 //! The paper's criterion over windows as a study asks for it, solved by any optimiser, with the optimum beside it.
 
 use super::optimiser::OptimiserChoice;
+use super::search::SearchResult;
 use super::section::{DesignSection, FamilyChoice};
-use crate::machine::Machine;
+use crate::study::StudyRobot;
 use core::ops::ControlFlow;
 use dynident_excitation::families::{SplicedLogisticSettings, Step, StepWiseLogistic};
 use dynident_excitation::limits::Limits;
 use dynident_excitation::optimisers::{
     BinaryGeneticSettings, CmaEsSettings, Generation, Progress, binary_genetic, cma_es,
 };
-use dynident_excitation::paper_problem::{PaperProblem, PaperQuantity, Stroke};
-use dynident_excitation::step_wise::{StepWiseJoint, StepWiseProblem, gravity_across};
+use dynident_excitation::step_wise::{
+    StepWiseJoint, StepWiseProblem, Stroke, StrokeConstants, StrokeQuantity, gravity_across,
+};
 use dynident_excitation::{DesignProgress, Family};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -25,7 +27,8 @@ const FREE_RAD: f64 = 1e6;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum WindowedProblem {
-    /// One joint after another makes its stroke, from the tip to the base, while all others rest at their offsets: the paper's Q for the tip joint, then M for the base joint.
+    /// One joint after another makes its stroke, from the tip to the base, while all others rest at their offsets: the
+    /// paper's Q for the tip joint, then M for the base joint.
     #[default]
     StepWise,
 }
@@ -52,15 +55,14 @@ pub struct WindowedCondition {
 
 impl Default for WindowedCondition {
     fn default() -> Self {
-        let paper = PaperProblem::default();
         Self {
             problem: WindowedProblem::StepWise,
             joints: None,
-            penalty: paper.penalty,
-            rest_limit: paper.rest_limit,
-            amplitude_range: paper.amplitude_range,
-            steepness_range: paper.steepness_range,
-            window_range: paper.window_range,
+            penalty: 1000.0,
+            rest_limit: 1e-4,
+            amplitude_range: [0.1, core::f64::consts::PI],
+            steepness_range: [0.1, 3.0],
+            window_range: [0.1, 10.0],
         }
     }
 }
@@ -125,7 +127,7 @@ pub struct StrokeFile {
 #[derive(Clone, Debug, Serialize)]
 pub struct StrokeLimitFile {
     /// What is bounded.
-    pub quantity: PaperQuantity,
+    pub quantity: StrokeQuantity,
     /// Its peak; positions count from the offset. rad and s.
     pub value: f64,
     /// What it must stay below.
@@ -148,12 +150,11 @@ impl WindowedFile {
         for stroke in &self.strokes {
             for limit in stroke.limits.iter().filter(|limit| !limit.kept) {
                 let what = match limit.quantity {
-                    PaperQuantity::Position => "reach (rad)",
-                    PaperQuantity::Speed => "peak speed (rad/s)",
-                    PaperQuantity::Acceleration => "peak acceleration (rad/s\u{b2})",
-                    PaperQuantity::RestSpeed => "speed at rest (rad/s)",
-                    PaperQuantity::RestAcceleration => "acceleration at rest (rad/s\u{b2})",
-                    PaperQuantity::Ground => "dip below the ground",
+                    StrokeQuantity::Position => "reach (rad)",
+                    StrokeQuantity::Speed => "peak speed (rad/s)",
+                    StrokeQuantity::Acceleration => "peak acceleration (rad/s\u{b2})",
+                    StrokeQuantity::RestSpeed => "speed at rest (rad/s)",
+                    StrokeQuantity::RestAcceleration => "acceleration at rest (rad/s\u{b2})",
                 };
                 sentences.push(format!(
                     "The stroke of `{}`, {what}: {} where less than {} is allowed, {:.0} % too much.",
@@ -173,24 +174,14 @@ fn digits(value: f64) -> String {
     if value < 1e-2 { format!("{value:.3e}") } else { format!("{value:.4}") }
 }
 
-/// A solved windowed design.
-pub(crate) struct Windowed {
-    pub(crate) file: WindowedFile,
-    pub(crate) family: StepWiseLogistic,
-    pub(crate) parameters: Vec<f64>,
-    pub(crate) history: Vec<Generation>,
-    pub(crate) evaluations: usize,
-    pub(crate) seconds: f64,
-}
-
 /// Solves the step-wise problem of a study.
 pub(crate) fn step_wise(
     section: &DesignSection,
     windowed: &WindowedCondition,
-    machine: &Machine,
+    machine: &StudyRobot,
     limits: &Limits,
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
-) -> Result<Windowed, String> {
+) -> Result<SearchResult, String> {
     let begun = Instant::now();
     let FamilyChoice::SplicedLogistic(settings) = &section.family else {
         return Err(format!(
@@ -217,13 +208,13 @@ pub(crate) fn step_wise(
     let seed = section.search.seed;
     let late = || section.search.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > limit);
     let stop = |round: &'static str, progress: &Progress<'_>| {
-        let told = DesignProgress {
+        let progress = DesignProgress {
             round,
             value: progress.value,
             violation: progress.violation,
             evaluations: progress.evaluations as u64,
         };
-        if watch(&told).is_break() || late() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if watch(&progress).is_break() || late() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     // The optimum stands beside every design: it takes a tenth of a second.
     let optimum = problem.gradient_solution(seed, STARTS, |_| ControlFlow::Continue(()));
@@ -260,9 +251,9 @@ pub(crate) fn step_wise(
     };
 
     let strokes = problem.strokes(&x);
-    let told = |x: &[f64]| told(&problem, &problem.strokes(x), settings, &offsets, machine);
+    let files_of = |x: &[f64]| stroke_files(&problem, &problem.strokes(x), settings, &offsets, machine);
     let condition_sum = problem.condition_numbers(&strokes).iter().sum();
-    let optimum_strokes = told(&optimum);
+    let optimum_strokes = files_of(&optimum);
     let inside = optimum_strokes.iter().flat_map(|stroke| &stroke.limits).all(|limit| limit.kept);
     let best = inside.then(|| problem.fitness(&optimum));
     let steps: Vec<Step> = problem
@@ -283,18 +274,27 @@ pub(crate) fn step_wise(
         condition_sum,
         optimum: best,
         above_optimum_percent: best.map(|best| 100.0 * (condition_sum / best - 1.0)),
-        strokes: told(&x),
+        strokes: files_of(&x),
         optimum_strokes: if inside { optimum_strokes } else { Vec::new() },
     };
     debug_assert_eq!(family.joints(), dof);
-    Ok(Windowed { file, family, parameters, history, evaluations, seconds: begun.elapsed().as_secs_f64() })
+    Ok(SearchResult {
+        family: Box::new(family),
+        parameters,
+        start_posture: Vec::new(),
+        figure: Some(condition_sum),
+        windowed: Some(file),
+        history,
+        evaluations,
+        seconds: begun.elapsed().as_secs_f64(),
+    })
 }
 
 /// The constants of every joint.
 fn problem(
     section: &DesignSection,
     windowed: &WindowedCondition,
-    machine: &Machine,
+    machine: &StudyRobot,
     limits: &Limits,
     settings: &SplicedLogisticSettings,
     offsets: &[f64],
@@ -322,7 +322,7 @@ fn problem(
             }
             None => FREE_RAD,
         };
-        let constants = PaperProblem {
+        let constants = StrokeConstants {
             gravity,
             rate_hz: section.search.rate_hz,
             period_times_steepness: settings.period_times_omega,
@@ -369,12 +369,12 @@ fn given(strokes: &[GivenStroke], names: &[String]) -> Result<Vec<f64>, String> 
 }
 
 /// Strokes as the file tells them.
-fn told(
+fn stroke_files(
     problem: &StepWiseProblem,
     strokes: &[Stroke],
     settings: &SplicedLogisticSettings,
     offsets: &[f64],
-    machine: &Machine,
+    machine: &StudyRobot,
 ) -> Vec<StrokeFile> {
     let conditions = problem.condition_numbers(strokes);
     let one = |place: usize| {
@@ -384,7 +384,7 @@ fn told(
             quantity: limit.quantity,
             value: limit.value,
             limit: limit.limit,
-            excess_percent: 100.0 * limit.excess().unwrap_or(0.0),
+            excess_percent: 100.0 * limit.excess(),
             kept: limit.kept(),
         });
         StrokeFile {

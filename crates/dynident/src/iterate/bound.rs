@@ -1,6 +1,6 @@
 //! The least that the errors of one run can be.
 
-use crate::machine::Machine;
+use crate::study::StudyRobot;
 use dynident_excitation::Information;
 use dynident_excitation::Motion;
 use dynident_iteration::Leg;
@@ -12,7 +12,7 @@ const SAMPLES_AT_ONCE: usize = 4096;
 
 /// The Cramér-Rao bound of every base parameter: `√ diag (Σ Wᵀ Σ_τ⁻¹ W)⁻¹` over the recorded samples along the trajectories that count, for white torque noise and exact positions; none without torque noise,
 /// with correlated noise, or where a parameter is not excited.
-pub(super) fn cramer_rao(machine: &Machine, legs: &[Leg], sensors: &SensorSettings) -> Option<Vec<f64>> {
+pub(super) fn cramer_rao(machine: &StudyRobot, legs: &[Leg], sensors: &SensorSettings) -> Option<Vec<f64>> {
     let dof = machine.model().dof();
     let std: Vec<f64> = (0..dof).map(|joint| sensors.torque_std.of(joint)).collect();
     if sensors.torque_correlation != 0.0 || std.iter().any(|std| *std <= 0.0) {
@@ -49,7 +49,7 @@ pub(super) fn cramer_rao(machine: &Machine, legs: &[Leg], sensors: &SensorSettin
 }
 
 /// `Σ Wᵀ Σ_τ⁻¹ W` over some samples of a motion.
-fn information(machine: &Machine, whole: &Motion, std: &[f64], samples: &[usize]) -> DMatrix<f64> {
+fn information(machine: &StudyRobot, whole: &Motion, std: &[f64], samples: &[usize]) -> DMatrix<f64> {
     let dof = machine.model().dof();
     let mut gatherer = Information::new(machine.model(), machine.layout(), std, None);
     let count = machine.layout().columns().len();

@@ -4,10 +4,10 @@ use super::section::{IterationSection, RobotChoice};
 use super::trajectory::Trajectory;
 use crate::design::DesignSection;
 use crate::error::Error;
-use crate::job::{RunOptions, joint_names};
-use crate::machine::Machine;
+use crate::jobs::options::RunOptions;
 use crate::simulate::section::SimulationSection;
 use crate::study::Study;
+use crate::study::StudyRobot;
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
 use dynident_iteration::Leg;
@@ -68,7 +68,7 @@ impl Default for LegSection {
 pub(super) fn trajectories(
     study: &Study,
     study_path: &Path,
-    machine: &Machine,
+    machine: &StudyRobot,
     rate_hz: f64,
     options: &RunOptions<'_>,
     watch: &(dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
@@ -108,8 +108,8 @@ impl IterationSection {
     }
 
     /// Checks names and numbers of the legs.
-    pub(super) fn check_legs(&self, machine: &Machine) -> Result<(), String> {
-        let names = joint_names(machine);
+    pub(super) fn check_legs(&self, machine: &StudyRobot) -> Result<(), String> {
+        let names = machine.parametric.joint_names();
         for (number, leg) in (1..).zip(&self.leg) {
             let at = |what: &str| format!("leg {number}: {what}");
             if leg.trajectory.is_some() && leg.design.is_some() {
@@ -132,8 +132,8 @@ impl IterationSection {
     }
 
     /// What is run, with held joints at rest and the times that count.
-    pub(super) fn legs(&self, trajectories: &[Trajectory], machine: &Machine) -> Result<Vec<Leg>, String> {
-        let names = joint_names(machine);
+    pub(super) fn legs(&self, trajectories: &[Trajectory], machine: &StudyRobot) -> Result<Vec<Leg>, String> {
+        let names = machine.parametric.joint_names();
         let free = [LegSection::default()];
         let sections = if self.leg.is_empty() { &free[..] } else { &self.leg[..] };
         if sections.len() != trajectories.len() {
@@ -173,11 +173,11 @@ impl IterationSection {
     pub(super) fn robots(
         &self,
         simulation: &SimulationSection,
-        machine: &Machine,
+        machine: &StudyRobot,
         stage: usize,
         members: &[usize],
     ) -> Result<Vec<Box<dyn Robot>>, String> {
-        let joints = joint_names(machine);
+        let joints = machine.parametric.joint_names();
         let said = |error: dynident_simulation::SimulationError| error.to_string();
         Ok(match &self.robot {
             RobotChoice::Process(settings) => {

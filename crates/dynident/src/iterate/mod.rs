@@ -14,9 +14,9 @@ pub use section::{IterationSection, PriorChoice, RobotChoice};
 pub(crate) use trajectory::Trajectory;
 
 use crate::error::Error;
-use crate::job::{RunOptions, joint_names};
-use crate::machine::Machine;
+use crate::jobs::options::RunOptions;
 use crate::output::write_whole;
+use crate::study::StudyRobot;
 use crate::study::{Folders, Study};
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
@@ -24,7 +24,9 @@ use dynident_iteration::{
     Iteration, IterationError, IterationStatus, IterationStore, IterationTask, RunRecord, iterate,
 };
 use dynident_iteration::{Robot, RobotRun};
+use fnv::FnvHasher;
 use report::{RunName, RunTrace, TimeSpent};
+use std::hash::Hasher;
 use std::path::Path;
 use std::time::Instant;
 use told::{Stage, Told, joined};
@@ -62,7 +64,7 @@ pub fn iterate_study(
     let simulation = study.simulation.clone().unwrap_or_default();
     let settings = section.settings(study).map_err(|why| Error::study(study_path, why))?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
-    let machine = Machine::new(study, study_path, &folders)?;
+    let machine = StudyRobot::new(study, study_path, &folders)?;
     let truth = match section.robot {
         RobotChoice::Simulation => Some(simulation.truth(&machine).map_err(|why| wrong("simulation", &why))?),
         _ => None,
@@ -139,7 +141,7 @@ pub fn iterate_study(
         for record in records {
             for (place, own) in iteration.task().legs.iter().enumerate() {
                 let name = RunName { run: record.run, leg: leg.or((members.len() > 1).then_some(place + 1)), place };
-                traces.push(RunTrace::new(name, &stores[number], own.reference(), &joint_names(&machine)));
+                traces.push(RunTrace::new(name, &stores[number], own.reference(), &machine.parametric.joint_names()));
             }
         }
         let last = records.iter().rev().find(|record| record.accepted).and_then(|record| record.estimate.as_ref());
@@ -169,12 +171,11 @@ fn write_file(path: &Path, file: &IterationsFile) -> Result<(), Error> {
 }
 
 /// Everything that runs depend on, in one number: study, robot, and the version of the program (FNV-1a, 64 bits).
-fn fingerprint(study: &Study, machine: &Machine, options: &RunOptions<'_>) -> String {
+fn fingerprint(study: &Study, machine: &StudyRobot, options: &RunOptions<'_>) -> String {
     let text = format!("{study:?} {:?} {:?} {}", machine.model(), options.data, env!("CARGO_PKG_VERSION"));
-    let hash = text
-        .bytes()
-        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
-    format!("{hash:016x}")
+    let mut hasher = FnvHasher::default();
+    hasher.write(text.as_bytes());
+    format!("{:016x}", hasher.finish())
 }
 
 /// The trajectories of an earlier call, or new ones, which are kept before anything is run.

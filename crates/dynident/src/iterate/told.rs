@@ -1,9 +1,9 @@
 //! From records to what `iterations.json` holds.
 
 use super::file::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile};
-use crate::job::{joint_names, study_name};
-use crate::machine::Machine;
+use crate::jobs::options::study_name;
 use crate::study::Study;
+use crate::study::StudyRobot;
 use dynident_iteration::{IterationStatus, RunEstimate, RunRecord};
 use std::path::Path;
 
@@ -21,7 +21,7 @@ fn model_of_run(record: &RunRecord, records: &[RunRecord]) -> Option<usize> {
 pub(super) struct Told<'a> {
     pub(super) study: &'a Study,
     pub(super) study_path: &'a Path,
-    pub(super) machine: &'a Machine,
+    pub(super) machine: &'a StudyRobot,
     /// Length of a run with all its legs, s.
     pub(super) duration_s: f64,
     /// True base parameters, where they are known.
@@ -99,7 +99,7 @@ impl Told<'_> {
                 IterationStatus::Waiting { .. } => "waiting",
             },
             reason: status.to_string(),
-            joints: joint_names(self.machine),
+            joints: self.machine.parametric.joint_names(),
             duration_s: self.duration_s,
             runs,
             tracking_improvement,

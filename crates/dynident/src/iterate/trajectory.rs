@@ -2,8 +2,8 @@
 
 use crate::design::{design_study, trajectory_table};
 use crate::error::Error;
-use crate::job::{RunOptions, joint_names};
-use crate::machine::Machine;
+use crate::jobs::options::RunOptions;
+use crate::study::StudyRobot;
 use crate::study::{Folders, Study};
 use core::ops::ControlFlow;
 use dynident_excitation::{DesignProgress, Motion};
@@ -49,7 +49,7 @@ impl Trajectory {
     pub(crate) fn of_study(
         study: &Study,
         study_path: &Path,
-        machine: &Machine,
+        machine: &StudyRobot,
         rate_hz: f64,
         options: &RunOptions<'_>,
         watch: &(dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
@@ -59,7 +59,7 @@ impl Trajectory {
         if let Some(file) = file {
             let folders = Folders::new(study, study_path, options.data.as_deref());
             let path = folders.find(file, None)?;
-            let table = trajectory_table(&path, &joint_names(machine), &study.motion)?;
+            let table = trajectory_table(&path, &machine.parametric.joint_names(), &study.motion)?;
             let reference = Reference::of_family(&table.given, &[], rate_hz, None).map_err(|error| wrong(&error))?;
             return Ok(Self::new(&reference, None));
         }

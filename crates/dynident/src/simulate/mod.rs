@@ -4,8 +4,8 @@ pub(crate) mod section;
 
 use crate::error::Error;
 use crate::iterate::Trajectory;
-use crate::job::{RunOptions, joint_names, study_name};
-use crate::machine::Machine;
+use crate::jobs::options::{RunOptions, study_name};
+use crate::study::StudyRobot;
 use crate::study::{Folders, Study};
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
@@ -91,7 +91,7 @@ pub fn simulate_study(
     let wrong = |part: &str, why: &dyn core::fmt::Display| Error::study(study_path, format!("[{part}]: {why}"));
     let simulation = study.simulation.clone().unwrap_or_default();
     let folders = Folders::new(study, study_path, options.data.as_deref());
-    let machine = Machine::new(study, study_path, &folders)?;
+    let machine = StudyRobot::new(study, study_path, &folders)?;
     let mut truth = simulation.truth(&machine).map_err(|why| wrong("simulation", &why))?;
     let controller = study
         .controller
@@ -120,7 +120,7 @@ pub fn simulate_study(
         controller: controller.name(),
         done: run.status.is_done(),
         status: run.status,
-        joints: joint_names(&machine),
+        joints: machine.parametric.joint_names(),
         samples: run.record.samples,
         rate_hz: run.record.rate_hz,
         max_tracking_error_rad: max_error,

@@ -1,6 +1,6 @@
 //! `[simulation]`: the robot that is simulated, where it differs from its description, its sensors and limits.
 
-use crate::machine::Machine;
+use crate::study::StudyRobot;
 use dynident_iteration::SimulatedRobot;
 use dynident_model::laws::Law;
 use dynident_model::sample::Random;
@@ -137,7 +137,7 @@ impl SimulationSection {
     ///
     /// # Errors
     /// In words: numbers that do not fit, bodies without inertials, laws without a parameter, a robot that cannot be simulated.
-    pub fn truth(&self, machine: &Machine) -> Result<SimulatedTruth, String> {
+    pub fn truth(&self, machine: &StudyRobot) -> Result<SimulatedTruth, String> {
         let described = machine.model();
         self.validate(described.dof())?;
         let unknown = described.bodies_without_prior();

@@ -3,6 +3,7 @@
 use super::arrays::two;
 use super::friction::{FrictionChoice, FrictionLaw};
 use super::numbers::{not_negative, positive};
+use dynident_identification::{GainChoice, OffsetChoice};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -16,28 +17,6 @@ pub enum CoulombChoice {
     Sign,
     /// `tanh(speed / width)`.
     Smooth,
-}
-
-/// Which logs share the joints' offsets.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum OffsetChoice {
-    /// All.
-    #[default]
-    Shared,
-    /// None: each training log has its own, and the base parameters hold their mean.
-    PerLog,
-}
-
-/// Who says what a unit of logged torque is worth in newton metres.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum GainChoice {
-    /// Unit and scale of the log's format.
-    #[default]
-    Stated,
-    /// Training logs without and with a payload that is known: one gain for each joint is estimated with the parameters.
-    Unknown,
 }
 
 /// `[drive]`: the laws of every joint, and exceptions by joint.

@@ -1,12 +1,11 @@
 //! `[estimator]`: how the parameters are estimated, and how far they are trusted.
 
-use super::noise_levels::NoiseLevelSection;
 use super::numbers::positive;
-use super::periods::PeriodSection;
 use super::physical::PhysicalChoice;
 use super::simulated::SimulatedSection;
-use crate::identify::instruments::InstrumentSection;
 use dynident_estimation::{CovarianceMethod, EssentialSettings, RankSettings, SegmentSettings};
+use dynident_identification::EstimationSettings;
+use dynident_identification::estimators::{InstrumentSettings, NoiseLevels, PeriodSettings};
 use serde::{Deserialize, Serialize};
 
 /// How base parameters are estimated.
@@ -55,11 +54,6 @@ impl EstimatorMethod {
             Self::Cloe => "cloe",
         }
     }
-
-    /// Whether its values are those of least squares on the rows as they are, with one weight for each joint.
-    pub(crate) fn is_plain(self) -> bool {
-        matches!(self, Self::Ordinary | Self::Weighted)
-    }
 }
 
 /// `[estimator]`.
@@ -82,23 +76,34 @@ pub struct EstimatorSection {
     /// Hold parameters that the data hardly tell at zero; not by default.
     pub essential: Option<EssentialSettings>,
     /// Instruments for `method = "instrumental"`. With another method they only test whether noise in the regressor biases it.
-    pub instruments: Option<InstrumentSection>,
+    pub instruments: Option<InstrumentSettings>,
     /// How `method = "noise-weighted"` finds the noise around a row.
-    pub noise_levels: NoiseLevelSection,
+    pub noise_levels: NoiseLevels,
     /// The repeated motion of `method = "maximum-likelihood"`.
-    pub periods: PeriodSection,
+    pub periods: PeriodSettings,
     /// How the loop is simulated for `method = "didim"`, `"clie"` and `"cloe"`.
     pub simulated: SimulatedSection,
 }
 
 impl EstimatorSection {
+    /// What all estimators share, with weighted least squares.
+    pub(crate) fn common(&self) -> EstimationSettings {
+        let mut settings = EstimationSettings::default();
+        (settings.rank, settings.covariance, settings.segments) = (self.rank, self.covariance, self.segments);
+        settings.essential.clone_from(&self.essential);
+        settings
+    }
+
     pub(crate) fn validate(&self) -> Result<(), String> {
         self.rank.validate().map_err(|error| format!("[estimator.rank]: {error}"))?;
         let instruments = self.instruments.clone().unwrap_or_default();
-        crate::identify::fit::instrumental_settings(self, &instruments)
+        let estimation = self.common();
+        instruments
+            .instrumental(&estimation)
             .validate()
             .map_err(|error| format!("[estimator.instruments]: {error}"))?;
-        crate::identify::fit::hausman_settings(self, &instruments)
+        instruments
+            .hausman(&estimation)
             .validate()
             .map_err(|error| format!("[estimator.instruments], test_level: {error}"))?;
         if let Some(cutoff) = instruments.cutoff_hz {
@@ -108,9 +113,12 @@ impl EstimatorSection {
                 )
             })?;
         }
-        self.noise_levels.settings(self).validate().map_err(|error| format!("[estimator.noise_levels]: {error}"))?;
+        self.noise_levels
+            .settings(&estimation)
+            .validate()
+            .map_err(|error| format!("[estimator.noise_levels]: {error}"))?;
         self.periods.validate().map_err(|error| format!("[estimator.periods]: {error}"))?;
-        self.simulated.validate(self).map_err(|error| format!("[estimator.simulated]: {error}"))?;
+        self.simulated.validate().map_err(|error| format!("[estimator.simulated]: {error}"))?;
         self.physical.validate().map_err(|error| format!("[estimator.physical]: {error}"))?;
         if self.intervals && self.physical.settings().is_none() {
             return Err("estimator.intervals = true needs the possible machine: take out physical = false".to_owned());

@@ -1,20 +1,10 @@
 //! `[[log]]`: one recording, or a part of one.
 
 use super::arrays::exactly;
+use dynident_identification::Role;
 use dynident_recording::{LogFormat, ReferenceSettings};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
-
-/// What a log is for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Role {
-    /// The model is fitted to it.
-    #[default]
-    Identify,
-    /// The model is tested on it.
-    Validate,
-}
 
 /// `[[log]]`: one recording, or a part of one.
 #[derive(Clone, Debug, Deserialize, Serialize)]

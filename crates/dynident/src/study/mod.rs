@@ -5,32 +5,32 @@ mod drive;
 mod estimator;
 mod folders;
 pub(crate) mod friction;
+mod friction_keys;
 mod log;
-mod noise_levels;
 mod numbers;
-mod parallel_filter;
 mod payload;
-mod periods;
 mod physical;
 mod robot;
+mod robot_model;
 mod simulated;
+mod task;
 
-pub use drive::{CoulombChoice, CouplingSection, DriveSection, GainChoice, JointDrive, OffsetChoice};
+pub use drive::{CoulombChoice, CouplingSection, DriveSection, JointDrive};
 pub use estimator::{EstimatorMethod, EstimatorSection};
 pub use folders::Folders;
-pub use log::{LogSection, Role};
-pub use noise_levels::NoiseLevelSection;
-pub use parallel_filter::ParallelFilterSection;
-pub use payload::{ArmSection, PayloadSection, Refit};
-pub use periods::PeriodSection;
+pub use log::LogSection;
+pub use payload::{ArmSection, PayloadSection};
 pub use physical::PhysicalChoice;
 pub use robot::RobotSection;
-pub use simulated::{SimulatedSection, SimulationStart};
+pub use robot_model::StudyRobot;
+pub use simulated::SimulatedSection;
 
 use crate::design::DesignSection;
 use crate::error::Error;
 use crate::iterate::IterationSection;
 use crate::simulate::section::SimulationSection;
+use dynident_identification::Role;
+use dynident_identification::rows::ParallelFilterSettings;
 use dynident_model::line_and_column;
 use dynident_recording::{LogFormat, MotionSettings};
 use dynident_simulation::ControllerSettings;
@@ -96,7 +96,7 @@ pub struct Study {
     pub motion: MotionSettings,
     /// The low-pass and decimation that torque and regressor go through alike.
     #[serde(default)]
-    pub parallel_filter: ParallelFilterSection,
+    pub parallel_filter: ParallelFilterSettings,
     /// The estimator.
     #[serde(default)]
     pub estimator: EstimatorSection,
@@ -183,6 +183,11 @@ impl Study {
             return Err(Error::study(path, message));
         }
         Ok(())
+    }
+
+    /// Places of the logs with this role.
+    pub(crate) fn logs_of_role(&self, role: Role) -> Vec<usize> {
+        (0..self.log.len()).filter(|&index| self.log[index].role == role).collect()
     }
 
     fn check(&self) -> Result<(), String> {

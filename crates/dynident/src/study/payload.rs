@@ -1,6 +1,7 @@
 //! `[[payload]]` and `[arm]`: what the arm carries in which log, and an arm that is known already.
 
 use super::arrays::exactly;
+use dynident_identification::payload::Refit;
 use dynident_model::{InertialParameters, Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -22,19 +23,6 @@ pub struct PayloadSection {
     /// Its inertia about its centre of mass, axes of the link's frame: xx, xy, xz, yy, yz, zz. Zero by default, which is a point mass.
     #[serde(default, deserialize_with = "exactly")]
     pub inertia_at_com_kgm2: Option<[f64; 6]>,
-}
-
-/// What of the arm is fitted again, beside the payload.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Refit {
-    /// Nothing.
-    #[default]
-    Nothing,
-    /// The joints' offsets.
-    Offset,
-    /// Offsets and friction: both change with the temperature from run to run.
-    Friction,
 }
 
 /// `[arm]`: the arm by an earlier identification. Only payloads are estimated then, and the arm's error bars go into theirs.

@@ -1,21 +1,8 @@
 //! `[estimator.simulated]`: how the loop is simulated for `method = "didim"`, `"clie"` and `"cloe"`.
 
-use super::{EstimatorMethod, EstimatorSection};
-use dynident_estimation::{SimulatedCriterion, SimulatedSettings};
+use dynident_estimation::SimulatedSettings;
+use dynident_identification::estimators::SimulationStart;
 use serde::{Deserialize, Serialize};
-
-/// Where the iteration begins.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum SimulationStart {
-    /// At the one of the two below whose simulation is nearer to the record; at the other if that leads nowhere.
-    #[default]
-    Nearer,
-    /// The possible machine that fits the measured rows best: a simulation with negative masses would get nowhere.
-    Estimate,
-    /// The robot's description.
-    Description,
-}
 
 /// `[estimator.simulated]`. Rate, integrator, speeds and delays of the feedback, start and torque limits of the loop are those of `[simulation]`; noise is not simulated.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -39,21 +26,9 @@ impl Default for SimulatedSection {
 }
 
 impl SimulatedSection {
-    /// The estimator's settings.
-    pub(crate) fn settings(&self, section: &EstimatorSection) -> SimulatedSettings {
-        SimulatedSettings {
-            criterion: match section.method {
-                EstimatorMethod::Clie | EstimatorMethod::Cloe => SimulatedCriterion::Output,
-                _ => SimulatedCriterion::Didim,
-            },
-            rank: section.rank,
-            tolerance: self.tolerance,
-            max_iterations: self.max_iterations,
-            difference: self.difference,
-        }
-    }
-
-    pub(crate) fn validate(&self, section: &EstimatorSection) -> Result<(), String> {
-        self.settings(section).validate().map_err(|error| error.to_string())
+    pub(crate) fn validate(&self) -> Result<(), String> {
+        let SimulatedSection { tolerance, max_iterations, difference, .. } = *self;
+        let settings = SimulatedSettings { tolerance, max_iterations, difference, ..SimulatedSettings::default() };
+        settings.validate().map_err(|error| error.to_string())
     }
 }

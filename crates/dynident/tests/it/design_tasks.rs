@@ -2,7 +2,7 @@
 use crate::common::{Job, Motion, Truth, header, plain, repository, write_log};
 use core::ops::ControlFlow;
 use dynident::excitation::export::{Sampled, trajectory_csv, waypoints_csv};
-use dynident::{DesignOutcome, Machine, check_log, check_trajectory, design_study};
+use dynident::{DesignOutcome, StudyRobot, check_log, check_trajectory, design_study};
 use std::path::Path;
 
 /// A search of some hundred evaluations: what is asked here does not need the best motion.
@@ -167,7 +167,7 @@ fn the_description_is_a_prior() {
         "torque_std_nm = 1e7\nprior = { cad_std_percent = 20.0 }",
         "[drive]\nviscous = false\ncoulomb = \"none\"\noffset = false\n",
     );
-    let machine: Machine = job.machine();
+    let machine: StudyRobot = job.machine();
     let [_, known] = stds(&designed(&job));
     let bodies = machine.model().parameter_vector();
     let std: Vec<f64> = (0..bodies.len())

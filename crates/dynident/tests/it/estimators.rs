@@ -1,6 +1,6 @@
 //! Estimators that come back to the logs: by the noise around each row, by the periods of a repeated motion; and what each of them says of logs that cannot carry a model.
 use crate::common::{Job, Motion, Random, Truth, header, repository, write_log};
-use dynident::{Error, Identification, identify};
+use dynident::{Error, IdentificationOutcome, identify};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -38,13 +38,13 @@ fn study(method: &str, further: &str) -> String {
     )
 }
 
-fn run(folder: &Path, text: &str) -> Result<Identification, Error> {
+fn run(folder: &Path, text: &str) -> Result<IdentificationOutcome, Error> {
     let job = Job::new(folder, text);
     identify(&job.study, &job.path, &Job::options(1))
 }
 
 /// Root mean square of the errors in units of `bars`.
-fn score(found: &Identification, truth: &[f64], bars: &[f64]) -> f64 {
+fn score(found: &IdentificationOutcome, truth: &[f64], bars: &[f64]) -> f64 {
     let squares = (0..truth.len()).map(|i| ((found.estimate.values[i] - truth[i]) / bars[i]).powi(2));
     (squares.sum::<f64>() / truth.len() as f64).sqrt()
 }
@@ -143,7 +143,7 @@ fn the_period_may_come_from_the_commanded_motion() {
 fn with_each_new_method(
     folder: &Path,
     reference: &dyn Fn(f64) -> [[f64; 2]; 3],
-    mut check: impl FnMut(&str, Result<Identification, Error>),
+    mut check: impl FnMut(&str, Result<IdentificationOutcome, Error>),
 ) {
     let mut table = "t_s,q1,q2,dq1,dq2,ddq1,ddq2".to_owned();
     for k in 0..=1000 {
@@ -189,7 +189,7 @@ fn both(t: f64) -> [[f64; 2]; 3] {
     core::array::from_fn(|order| [a[order], b[order]])
 }
 
-fn finite(found: &Identification) {
+fn finite(found: &IdentificationOutcome) {
     let estimate = &found.estimate;
     for (name, values) in [("values", &estimate.values), ("std", &estimate.std), ("sigma", &estimate.joint_sigma)] {
         assert!(values.iter().all(|value| value.is_finite()), "{name}: {values:?}");

@@ -2,7 +2,7 @@
 use crate::common::{Job, Random};
 use dynident::dynamics::{Workspace, inverse_dynamics};
 use dynident::model::load_robot;
-use dynident::{FrictionLaw, Identification, validate};
+use dynident::{FrictionLaw, IdentificationOutcome, validate};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -56,7 +56,7 @@ fn arm(folder: &Path) -> std::path::PathBuf {
     path
 }
 
-fn all_finite(found: &Identification) -> bool {
+fn all_finite(found: &IdentificationOutcome) -> bool {
     found.result.base_parameters.iter().all(|p| p.value.is_finite() && p.std.is_finite())
         && found.result.validation.iter().all(|log| log.model.rmse_nm.is_finite())
 }

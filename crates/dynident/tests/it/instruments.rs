@@ -1,8 +1,10 @@
 //! Instruments from another source than the log: the seam for simulated motions.
 use crate::common::{Job, Motion, Random, Truth, format, header, repository, write_log};
 use dynident::estimation::HausmanVerdict;
+use dynident::identification::IdentificationError;
+use dynident::identification::estimators::InstrumentSource;
+use dynident::identify_with_instruments;
 use dynident::recording::MotionBlock;
-use dynident::{Error, InstrumentSource, identify_with_instruments};
 
 /// The motion that the log was made from, as a perfect simulation would give it.
 struct TrueMotion {
@@ -11,12 +13,12 @@ struct TrueMotion {
 }
 
 impl InstrumentSource for TrueMotion {
-    fn begin(&mut self, _log: usize) -> Result<(), Error> {
+    fn begin(&mut self, _log: usize) -> Result<(), IdentificationError> {
         self.begun += 1;
         Ok(())
     }
 
-    fn motion(&mut self, measured: &MotionBlock, instruments: &mut MotionBlock) -> Result<(), Error> {
+    fn motion(&mut self, measured: &MotionBlock, instruments: &mut MotionBlock) -> Result<(), IdentificationError> {
         let size = measured.rows * measured.joints;
         for values in [&mut instruments.q, &mut instruments.dq, &mut instruments.ddq] {
             values.resize(size, 0.0);
@@ -58,7 +60,7 @@ fn a_simulated_motion_undoes_the_bias_of_noisy_positions() {
     assert_eq!(noise.instrument_cutoff_hz, None);
     // Errors in units of the instruments' own error bars, over all base parameters: about one where these are honest. Noise of 1e-3 rad at 30 Hz is some 7 rad/s² of acceleration,
     // several times the motion's own: least squares loses most of the inertias.
-    let error = |found: &dynident::Identification, bars: &[f64]| {
+    let error = |found: &dynident::IdentificationOutcome, bars: &[f64]| {
         let sum: f64 = (0..values.len()).map(|i| ((found.estimate.values[i] - values[i]) / bars[i]).powi(2)).sum();
         (sum / values.len() as f64).sqrt()
     };

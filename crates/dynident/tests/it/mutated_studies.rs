@@ -1,6 +1,6 @@
 //! A good study with bytes changed at random: every one is read or refused with its place, and none brings anything down.
 use crate::common::repository;
-use dynident::{Folders, Machine, Study};
+use dynident::{Folders, Study, StudyRobot};
 use proptest::prelude::*;
 use std::path::Path;
 
@@ -61,7 +61,7 @@ fn try_whole(text: &str) {
                 let _ = study.format_of(index).validate(&["a".to_owned()]);
             }
             let folders = Folders::new(&study, &path, None);
-            if let Ok(machine) = Machine::new(&study, &path, &folders) {
+            if let Ok(machine) = StudyRobot::new(&study, &path, &folders) {
                 assert!(machine.base().count() <= 10 * machine.model().dof() + machine.laws().len());
                 assert!(machine.nominal_base().is_none_or(|prior| prior.iter().all(|value| value.is_finite())));
             }
@@ -73,7 +73,8 @@ fn try_whole(text: &str) {
 #[test]
 fn the_study_itself_is_good() {
     let study = Study::parse(STUDY, Path::new("study.toml")).unwrap();
-    let machine = Machine::new(&study, Path::new("study.toml"), &Folders::new(&study, &repository("study.toml"), None));
+    let machine =
+        StudyRobot::new(&study, Path::new("study.toml"), &Folders::new(&study, &repository("study.toml"), None));
     assert_eq!(machine.unwrap().model().dof(), 5);
 }
 

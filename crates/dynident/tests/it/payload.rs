@@ -1,7 +1,8 @@
 //! Payloads: beside a free arm, with a held arm, and what is said of what cannot be told.
 use crate::common::{Job, Motion, Random, Truth, assert_recovered, format, header, plain, repository, write_log};
+use dynident::identification::payload::Measured;
 use dynident::model::{InertialParameters, Mat3, Vec3};
-use dynident::{Measured, validate};
+use dynident::validate;
 use std::fmt::Write;
 use std::path::Path;
 

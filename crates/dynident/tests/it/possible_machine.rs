@@ -2,7 +2,7 @@
 use crate::common::{Job, Motion, Random, Truth, format, header, plain, recordings, repository, write_log};
 use dynident::model::load_robot;
 use dynident::recording::Level;
-use dynident::{Identification, RunOptions, Silent, Study, identify};
+use dynident::{IdentificationOutcome, RunOptions, Silent, Study, identify};
 use std::path::Path;
 
 fn study(robot: &Path, further: &str) -> String {
@@ -30,7 +30,7 @@ fn what_is_known_of_bodies_holds() {
     let found = |further: &str| Job::new(folder.path(), &study(&arm(), further)).identify();
     // Base parameters say nothing of the second mass alone (1.5 kg by the description), so all of these fit.
     let free = found("");
-    let mass = |found: &Identification, body: usize| found.result.bodies[body].mass_kg;
+    let mass = |found: &IdentificationOutcome, body: usize| found.result.bodies[body].mass_kg;
     for prior in ["entropic", "constant-pullback", "euclidean"] {
         let known = found(&format!(
             "[estimator.physical]\nprior = {prior:?}\nprior_weight = 0.1\nmargin = 1e-3\ntotal_mass_kg = [4.5, 5.0]\n\
@@ -143,9 +143,9 @@ fn bare(path: &Path) -> String {
 }
 
 /// Whether the logs of a result are called reversed by what machines are possible.
-fn called_reversed(found: &Identification) -> bool {
+fn called_reversed(found: &IdentificationOutcome) -> bool {
     let sign = found.result.physical.sign.unwrap();
-    let said = found.result.logs.iter().filter(|log| log.role == "identify").all(|log| {
+    let said = found.result.logs.iter().filter(|log| log.role.name() == "identify").all(|log| {
         log.model_findings.iter().any(|finding| {
             finding.level == Level::Problem && finding.message.contains("opposite sign of any possible machine")
         })

@@ -1,15 +1,15 @@
 //! The studies in `examples/` on the public recordings, where these are at hand.
 use crate::common::{recordings, repository};
 use dynident::recording::Level;
-use dynident::{FrictionChoice, Identification, RunOptions, Silent, Study, identify};
+use dynident::{FrictionChoice, IdentificationOutcome, RunOptions, Silent, Study, identify};
 use std::path::Path;
 
-fn run(study: &Study, path: &Path, data: &Path) -> Identification {
+fn run(study: &Study, path: &Path, data: &Path) -> IdentificationOutcome {
     let options = RunOptions { data: Some(data.to_owned()), threads: 2, progress: &Silent };
     identify(study, path, &options).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn example(name: &str) -> Option<Identification> {
+fn example(name: &str) -> Option<IdentificationOutcome> {
     let data = recordings()?;
     let path = repository("examples").join(name);
     let found = run(&Study::load(&path).unwrap(), &path, &data);
@@ -20,7 +20,7 @@ fn example(name: &str) -> Option<Identification> {
 }
 
 /// The same with the friction that the study states in place of the one that the logs choose.
-fn with_stated_friction(name: &str) -> Option<Identification> {
+fn with_stated_friction(name: &str) -> Option<IdentificationOutcome> {
     let data = recordings()?;
     let path = repository("examples").join(name);
     let mut study = Study::load(&path).unwrap();
@@ -29,7 +29,7 @@ fn with_stated_friction(name: &str) -> Option<Identification> {
 }
 
 /// The held-out error is no worse than the limit: that of plain least squares on the same split, or what friction chosen from the training logs must reach.
-fn held_out(name: &str, limit_percent: f64) -> Option<Identification> {
+fn held_out(name: &str, limit_percent: f64) -> Option<IdentificationOutcome> {
     let found = example(name)?;
     let error = found.result.validation[0].model.relative_error_percent.unwrap();
     assert!(error <= limit_percent, "{name}: {error:.3} % instead of at most {limit_percent} %");
@@ -132,7 +132,7 @@ fn pendulum_with_instruments() -> (String, std::path::PathBuf) {
     (std::fs::read_to_string(&path).unwrap(), path)
 }
 
-fn base_value(found: &Identification, start: &str) -> f64 {
+fn base_value(found: &IdentificationOutcome, start: &str) -> f64 {
     found.result.base_parameters.iter().find(|p| p.expression.starts_with(start)).unwrap().value
 }
 

@@ -35,7 +35,7 @@ fn every_joint_is_drawn_and_no_name_becomes_markup() {
         role = "validate"
     "#;
     let found = Job::new(folder.path(), text).identify();
-    assert_eq!(found.traces.iter().map(|trace| trace.role).collect::<Vec<_>>(), ["identify", "validate"]);
+    assert_eq!(found.traces.iter().map(|trace| trace.role.name()).collect::<Vec<_>>(), ["identify", "validate"]);
     for (trace, gaps) in found.traces.iter().zip([0, 1]) {
         assert_eq!((trace.joints.len(), trace.cut), (2, false));
         for joint in &trace.joints {

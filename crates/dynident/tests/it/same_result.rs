@@ -2,7 +2,7 @@
 use crate::common::{Job, Motion, Random, Truth, format, header, repository, write_log};
 use dynident::dynamics::{Workspace, inverse_dynamics, torque_regressor};
 use dynident::model::load_robot;
-use dynident::{Identification, Silent, validate};
+use dynident::{IdentificationOutcome, Silent, validate};
 use std::path::Path;
 
 /// A noisy study of a UR10 with two logs to fit to and two held out.
@@ -25,7 +25,7 @@ fn study(folder: &Path) -> (Job, Truth) {
     (Job::new(folder, &text), truth)
 }
 
-fn json(found: &Identification) -> serde_json::Value {
+fn json(found: &IdentificationOutcome) -> serde_json::Value {
     serde_json::to_value(&found.result).unwrap()
 }
 

@@ -1,7 +1,7 @@
 //! DIDIM, CLIE and CLOE through a study: logs of a simulated closed loop with noise, and what is said when there is nothing to simulate.
 use crate::common::{Job, Motion, repository};
 use core::ops::ControlFlow;
-use dynident::{Error, Identification, identify, simulate_study};
+use dynident::{Error, IdentificationOutcome, identify, simulate_study};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -64,7 +64,7 @@ fn recorded(folder: &Path) -> Vec<f64> {
 }
 
 /// Root mean square of the errors in units of `bars`.
-fn score(found: &Identification, truth: &[f64], bars: &[f64]) -> f64 {
+fn score(found: &IdentificationOutcome, truth: &[f64], bars: &[f64]) -> f64 {
     let squares = (0..truth.len()).map(|i| ((found.estimate.values[i] - truth[i]) / bars[i]).powi(2));
     (squares.sum::<f64>() / truth.len() as f64).sqrt()
 }
@@ -78,7 +78,7 @@ fn all_three_find_the_truth_where_least_squares_is_biased() {
         let job = Job::new(folder.path(), &study(method, CONTROLLER));
         let found = job.identify();
         let fit = found.result.simulated.as_ref().unwrap();
-        assert_eq!((fit.controller, fit.rate_hz), ("joint-pd", RATE_HZ));
+        assert_eq!((&*fit.controller, fit.rate_hz), ("joint-pd", RATE_HZ));
         let bars = &found.estimate.std;
         let (simulated, least_squares) = (score(&found, &truth, bars), score(&plain, &truth, bars));
         assert_eq!((&found.result.method.estimator[..], &found.result.method.status[..]), (method, "complete"));

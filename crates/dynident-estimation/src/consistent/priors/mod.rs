@@ -1,7 +1,7 @@
 //! What is believed of a body before the data: three distances from a prior body, each in its own file.
 //!
-//! Lee, Wensing and Park, "Geometric robot dynamic identification: a convex programming approach", IEEE T-RO 36 (2020) 348, compare them. All are convex in the
-//! parameters, and all measure a body by its prior's own mass and size.
+//! Lee, Wensing and Park, "Geometric robot dynamic identification: a convex programming approach", IEEE T-RO 36 (2020)
+//! 348, compare them. All are convex in the parameters, and all measure a body by its prior's own mass and size.
 
 mod entropic;
 mod euclidean;
@@ -15,19 +15,22 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PhysicalPrior {
-    /// `tr(P0⁻¹P) − ln det(P0⁻¹P) − 4`: the log-det Bregman divergence, four times the Kullback-Leibler divergence between the bodies' Gaussians. Infinite on the
-    /// cone's boundary, so that bodies that the data say nothing of stay plump.
+    /// `tr(P0⁻¹P) − ln det(P0⁻¹P) − 4`: the log-det Bregman divergence, four times the Kullback-Leibler divergence
+    /// between the bodies' Gaussians. Infinite on the cone's boundary, so that bodies that the data say nothing of stay
+    /// plump.
     #[default]
     Entropic,
     /// `½ tr[(P0⁻¹(P − P0))²]`: the affine-invariant metric held constant at the prior.
     #[serde(alias = "constant-pullback")]
     Pullback,
-    /// `½ Σ_k ((π_k − π0_k)/u_k)²`, parameter by parameter in units of the prior's mass m, m ℓ and m ℓ², `ℓ = √(tr Σ/m)`.
+    /// `½ Σ_k ((π_k − π0_k)/u_k)²`, parameter by parameter in units of the prior's mass m, m ℓ and m ℓ², `ℓ = √(tr
+    /// Σ/m)`.
     Euclidean,
 }
 
 impl PhysicalPrior {
-    /// Adds the prior of one body, whose ten whitened coordinates start at `first`, with a weight; gives the constant that the program leaves out.
+    /// Adds the prior of one body, whose ten whitened coordinates start at `first`, with a weight; gives the constant
+    /// that the program leaves out.
     pub(super) fn add_to(self, program: &mut Program, first: usize, body: &PriorBody<'_>, weight: f64) -> f64 {
         match self {
             Self::Entropic => entropic::add_to(program, first, body, weight),

@@ -1,7 +1,7 @@
 //! A robot whose parameters are known, and logs of it: inverse dynamics of the bodies plus friction written out by hand.
 use dynident::dynamics::{Workspace, inverse_dynamics};
 use dynident::model::{InertialParameters, Model, load_robot};
-use dynident::{Identification, Machine, RunOptions, Silent, Study, identify};
+use dynident::{IdentificationOutcome, RunOptions, Silent, Study, StudyRobot, identify};
 pub(crate) use dynident_testing::{recordings, repository};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -63,7 +63,7 @@ impl Truth {
     }
 
     /// What a perfect fit finds: the truth in the machine's base parameters.
-    pub(crate) fn base_values(&self, machine: &Machine) -> Vec<f64> {
+    pub(crate) fn base_values(&self, machine: &StudyRobot) -> Vec<f64> {
         use dynident::model::laws::Law;
         let mut all = self.model.parameter_vector();
         all.extend(machine.laws().iter().map(|law| match law {
@@ -185,18 +185,18 @@ impl Job {
         RunOptions { data: None, threads, progress: &Silent }
     }
 
-    pub(crate) fn identify(&self) -> Identification {
+    pub(crate) fn identify(&self) -> IdentificationOutcome {
         identify(&self.study, &self.path, &Self::options(1)).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    pub(crate) fn machine(&self) -> Machine {
+    pub(crate) fn machine(&self) -> StudyRobot {
         let folders = dynident::Folders::new(&self.study, &self.path, None);
-        Machine::new(&self.study, &self.path, &folders).unwrap()
+        StudyRobot::new(&self.study, &self.path, &folders).unwrap()
     }
 }
 
 /// Every base parameter within `tolerance` of the truth, relative to itself or to a hundredth of its unit.
-pub(crate) fn assert_recovered(found: &Identification, expected: &[f64], tolerance: f64) {
+pub(crate) fn assert_recovered(found: &IdentificationOutcome, expected: &[f64], tolerance: f64) {
     assert_eq!(found.result.base_parameters.len(), expected.len());
     for (parameter, truth) in found.result.base_parameters.iter().zip(expected) {
         let error = (parameter.value - truth).abs() / truth.abs().max(0.01);

@@ -1,0 +1,157 @@
+//! The scores of a fit in coordinates where its information is the unit matrix.
+//!
+//! With `A = RᵀR` the information of the free columns, `R⁻ᵀ` whitens: what every covariance method looks at is `R⁻ᵀ
+//! s_g` of each time segment g of each joint in each log, and its result `M` spreads to the columns as `R⁻¹ M R⁻ᵀ`.
+
+use crate::error::EstimationError;
+use crate::factor::{JointRows, Solution, Split, StackedProblem, TriangularFactor};
+use nalgebra::{DMatrix, DVector};
+
+/// What a covariance needs to know about the fit.
+pub(crate) struct Fit<'a> {
+    pub(crate) split: &'a Split,
+    pub(crate) solution: &'a Solution,
+    /// w_j: what the rows of joint j were multiplied by.
+    pub(crate) weights: &'a [f64],
+    /// Noise of joint j, same unit as its torque.
+    pub(crate) joint_sigma: &'a [f64],
+    /// Variance of the weighted rows under white noise.
+    pub(crate) weighted_variance: f64,
+    pub(crate) rows: usize,
+}
+
+/// The scores of all joints in all logs.
+pub(super) struct Scores<'a> {
+    /// One for each equation of the problem, in its order.
+    pub(super) joints: Vec<JointScores<'a>>,
+    /// Estimated columns.
+    pub(super) free: usize,
+    /// R⁻¹ of the free columns.
+    inverse: &'a DMatrix<f64>,
+    /// Place of every column among the free ones.
+    place: Vec<Option<usize>>,
+}
+
+/// The scores of one joint in one log.
+pub(super) struct JointScores<'a> {
+    pub(super) rows: &'a JointRows,
+    weight: f64,
+    /// The parameters that these rows see, and their rows of R⁻¹.
+    theta: Vec<f64>,
+    local_inverse: DMatrix<f64>,
+    /// `R⁻ᵀ w² W_gᵀ(τ_g − W_g θ)` for every segment g.
+    pub(super) scores: Vec<DVector<f64>>,
+    /// `‖w W R⁻¹‖²`: what the squared scores sum up to under unit white noise.
+    information: f64,
+}
+
+impl<'a> Scores<'a> {
+    pub(super) fn new(stacked: &StackedProblem<'a>, fit: &Fit<'a>) -> Result<Self, EstimationError> {
+        let problem = stacked.problem;
+        let inverse = &fit.solution.inverse;
+        let free = inverse.ncols();
+        let mut place = vec![None; problem.columns().len()];
+        for (k, &column) in fit.split.free.iter().enumerate() {
+            place[column] = Some(k);
+        }
+        let joints = problem.equations().iter().zip(&stacked.totals).map(|(rows, total)| {
+            let weight = fit.weights[rows.joint];
+            let mut local_inverse = DMatrix::zeros(total.columns(), free);
+            for (local, &column) in rows.columns.iter().enumerate() {
+                if let Some(k) = place[column] {
+                    local_inverse.set_row(local, &inverse.row(k));
+                }
+            }
+            let information = (total.regressor_triangle() * &local_inverse * weight).norm_squared();
+            let theta = rows.local(&fit.solution.values);
+            let whitened = |score: &DVector<f64>| local_inverse.tr_mul(score) * (weight * weight);
+            let scores = rows.factor.scores(&theta)?.iter().map(whitened).collect();
+            Ok(JointScores { rows, weight, theta, local_inverse, scores, information })
+        });
+        Ok(Self { joints: joints.collect::<Result<_, EstimationError>>()?, free, inverse, place })
+    }
+
+    /// Segments of all joints and logs.
+    pub(super) fn clusters(&self) -> usize {
+        self.joints.iter().map(|joint| joint.scores.len()).sum()
+    }
+
+    /// For every joint the squared scores over those of white noise, and the correlation of neighbouring segments'
+    /// scores.
+    pub(super) fn inflation_and_neighbours(&self, fit: &Fit<'_>) -> (Vec<f64>, Vec<f64>) {
+        let count = fit.joint_sigma.len();
+        let (mut found, mut expected, mut products) = (vec![0.0; count], vec![0.0; count], vec![0.0; count]);
+        for own in &self.joints {
+            let joint = own.rows.joint;
+            expected[joint] += own.information * (own.weight * fit.joint_sigma[joint]).powi(2);
+            for (g, score) in own.scores.iter().enumerate() {
+                found[joint] += score.norm_squared();
+                if g > 0 {
+                    products[joint] += own.scores[g - 1].dot(score);
+                }
+            }
+        }
+        let inflation = found.iter().zip(&expected).map(|(f, e)| if *e > 0.0 { f / e } else { 1.0 }).collect();
+        let neighbours = products.iter().zip(&found).map(|(s, f)| if *f > 0.0 { s / f } else { 0.0 }).collect();
+        (inflation, neighbours)
+    }
+
+    /// `R⁻¹ M R⁻ᵀ` over all columns, zero for fixed ones.
+    pub(super) fn spread(&self, moment: &DMatrix<f64>) -> DMatrix<f64> {
+        let small = self.inverse * moment * self.inverse.transpose();
+        let columns = self.place.len();
+        DMatrix::from_fn(columns, columns, |row, column| match (self.place[row], self.place[column]) {
+            (Some(i), Some(j)) => 0.5 * (small[(i, j)] + small[(j, i)]),
+            _ => 0.0,
+        })
+    }
+
+    /// Degrees of freedom of every column's variance, `independent` times those of its clusters under white noise;
+    /// infinite for fixed columns.
+    pub(super) fn freedom(&self, independent: f64) -> Vec<f64> {
+        // What share of each estimate's variance comes from each cluster.
+        let shares: Vec<Vec<f64>> = self.joints.iter().flat_map(|joint| joint.shares(self.inverse)).collect();
+        let freedom =
+            |place: &Option<usize>| place.map_or(f64::INFINITY, |k| (independent * satterthwaite(&shares, k)).max(1.0));
+        self.place.iter().map(freedom).collect()
+    }
+}
+
+impl JointScores<'_> {
+    /// `w R_g R⁻¹`: the rows of a segment in whitened coordinates.
+    pub(super) fn whitened(&self, segment: &TriangularFactor) -> DMatrix<f64> {
+        segment.regressor_triangle() * &self.local_inverse * self.weight
+    }
+
+    /// By how much leaving out one segment changes the estimate.
+    pub(super) fn change_without(&self, segment: &TriangularFactor) -> DVector<f64> {
+        // Where a segment alone fixes a direction its own residual there is zero, and so is the quotient; this keeps it
+        // from being 0/0.
+        const ALONE: f64 = 1.0e-6;
+        let triangle = segment.regressor_triangle();
+        let rest = (segment.rotated_torque() - &triangle * DVector::from_column_slice(&self.theta)) * self.weight;
+        let whitened = self.whitened(segment);
+        let left = DMatrix::identity(rest.len(), rest.len()) * (1.0 + ALONE) - &whitened * whitened.transpose();
+        // Positive definite but for rounding: the segment is a part of the total, which is one here.
+        let without = left.cholesky().map_or_else(|| rest.clone(), |factor| factor.solve(&rest));
+        whitened.tr_mul(&without)
+    }
+
+    /// For every segment its share in the variance of every free column under white noise.
+    fn shares<'b>(&'b self, inverse: &'b DMatrix<f64>) -> impl Iterator<Item = Vec<f64>> + 'b {
+        self.rows.factor.segment_factors().into_iter().map(move |segment| {
+            let part = self.whitened(&segment) * inverse.transpose();
+            part.column_iter().map(|column| column.norm_squared()).collect()
+        })
+    }
+}
+
+/// `(Σ_g h_g)² / Σ_g h_g²`: the degrees of freedom of a sum of independent squares with expectations h_g.
+///
+/// Satterthwaite, Biometrics Bulletin 2 (1946) 110; for clusters Bell and McCaffrey, Survey Methodology 28 (2002) 169,
+/// here without the correlation that the fit puts between clusters, and less the one degree that the jackknife's factor
+/// (G − 1)/G stands for.
+fn satterthwaite(shares: &[Vec<f64>], k: usize) -> f64 {
+    let (sum, square) = shares.iter().fold((0.0, 0.0), |(sum, square), h| (sum + h[k], square + h[k] * h[k]));
+    if square > 0.0 { (sum * sum / square - 1.0).max(1.0) } else { 1.0 }
+}

@@ -1,0 +1,47 @@
+//! From base parameters back to a full set: one of the many that give the same torque, as near to the prior as can be.
+
+use super::problem::typical_length_m;
+use dynident_dynamics::{Column, ParametricModel};
+use dynident_model::laws::Law;
+use dynident_model::{InertialParameters, Model};
+use nalgebra::{DMatrix, DVector};
+
+/// All parameters `π` with `B π = θ` (B takes parameters to base parameters) whose weighted distance to `prior` is least:
+/// `π = π₀ + S Bᵀ (B S Bᵀ)⁻¹ (θ - B π₀)`.
+///
+/// The weights S say how far each parameter may move: masses by kilograms, first moments and inertias by what such a mass does at the machine's size.
+/// Torques depend on θ alone, so every choice predicts the same; masses and inertias of single bodies are **not** measured values.
+pub fn nearest_to_nominal(robot: &ParametricModel, theta: &[f64]) -> Vec<f64> {
+    let (model, base, prior) = (robot.model(), robot.base(), robot.nominal());
+    let columns = base.all_columns();
+    let count = base.count();
+    let length = typical_length_m(model);
+    let weight = |column: usize| -> f64 {
+        let scale: f64 = match &columns[column] {
+            Column::Body { parameter: 0, .. } => 1.0,
+            Column::Body { parameter: 1..=3, .. } => length,
+            Column::Body { .. } | Column::Law(Law::DriveInertia(_)) => length * length,
+            Column::Law(_) => 1.0,
+        };
+        scale * scale
+    };
+    let mut matrix = DMatrix::zeros(count, columns.len());
+    for (b, &column) in base.independent().iter().enumerate() {
+        matrix[(b, column)] = 1.0;
+    }
+    for (d, &column) in base.dependent().iter().enumerate() {
+        matrix.column_mut(column).copy_from(&base.regrouping().column(d));
+    }
+    let weighted = DMatrix::from_fn(columns.len(), count, |c, b| weight(c) * matrix[(b, c)]);
+    let gram = &matrix * &weighted;
+    let gap = DVector::from_column_slice(theta) - DVector::from_vec(base.values(prior));
+    // B has full row rank (its independent columns are the identity), so the Gram matrix is positive definite.
+    let multipliers = gram.cholesky().map_or_else(|| gap.clone(), |factor| factor.solve(&gap));
+    let change = weighted * multipliers;
+    prior.iter().zip(change.iter()).map(|(prior, change)| prior + change).collect()
+}
+
+/// The bodies' share of a full parameter vector.
+pub fn inertials(model: &Model, parameters: &[f64]) -> Vec<InertialParameters> {
+    (0..model.dof()).map(|body| InertialParameters(core::array::from_fn(|k| parameters[10 * body + k]))).collect()
+}

@@ -1,0 +1,49 @@
+//! Generalised least squares: the joints' rows of the same instants side by side, in one factor.
+
+use super::{Findings, TrainingRows};
+use crate::error::IdentificationError;
+use crate::rows::{JointRows, RowConsumer};
+use dynident_estimation::{CrossProblem, Estimate, SegmentedFactor, generalized_least_squares};
+
+/// Puts the joints' rows of the same instants side by side.
+struct SideBySide {
+    factor: SegmentedFactor,
+    panel: Vec<f64>,
+    joints: usize,
+}
+
+impl RowConsumer for SideBySide {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
+        // Joints of a block come in their order, with as many rows each.
+        if rows.joint == 0 {
+            self.panel.clear();
+        }
+        self.panel.extend_from_slice(rows.panel);
+        if rows.joint + 1 == self.joints {
+            self.factor.absorb(&self.panel, rows.rows)?;
+        }
+        Ok(())
+    }
+}
+
+/// The estimate, from one more pass over the logs.
+pub(super) fn generalized(rows: &TrainingRows<'_>) -> Result<(Estimate, Findings), IdentificationError> {
+    let TrainingRows { logs, model, problem, .. } = *rows;
+    let settings = &logs.settings.estimation;
+    let joints = problem.joints().len();
+    let lists = (0..joints).map(|joint| model.layout().joint_columns(joint).to_vec()).collect();
+    let mut cross = CrossProblem::new(problem.columns().to_vec(), problem.joints().to_vec(), lists)
+        .and_then(|cross| cross.with_fallback(problem.fallback().to_vec()))?;
+    rows.begin("joints side by side");
+    for (place, &index) in rows.training.iter().enumerate() {
+        let factor = SegmentedFactor::new(cross.width(), settings.segments)?;
+        let mut consumer = SideBySide { factor, panel: Vec::new(), joints };
+        logs.pass(model, index).run(&mut consumer)?;
+        cross.add(&problem.logs()[place], consumer.factor)?;
+    }
+    logs.end();
+    let found = generalized_least_squares(&cross, &settings.weighted())?;
+    let rows = found.noise_correlation.row_iter();
+    let correlation = rows.map(|row| row.iter().copied().collect()).collect();
+    Ok((found.estimate, Findings::NoiseCorrelation(correlation)))
+}

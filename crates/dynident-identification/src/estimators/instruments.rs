@@ -1,0 +1,128 @@
+//! Instruments for a log: a second account of the same motion, sample by sample, that is free of the noise in the first.
+
+use super::instrumental::InstrumentSettings;
+use crate::error::IdentificationError;
+use crate::logs::Logs;
+use dynident_model::Model;
+use dynident_recording::{DifferentiatorSettings, MotionBlock, MotionSettings, MotionStream};
+
+/// Where the motion behind the instruments comes from: [`SmoothedMotion`] of the same log, or a simulation of the closed loop with the current model, which a
+/// crate above this one can plug in.
+pub trait InstrumentSource: Send {
+    /// A new pass over recording number `log` of the task begins.
+    ///
+    /// # Errors
+    /// If there is no motion for this log.
+    fn begin(&mut self, log: usize) -> Result<(), IdentificationError>;
+
+    /// Writes `q`, `dq` and `ddq` (joint-major, `joint * rows + row`, the log's order of joints, SI units) for the samples of `measured`, which come in the order of
+    /// time: same rows, same piece of the log. Nothing else of `instruments` is read.
+    ///
+    /// # Errors
+    /// If the motion does not cover these samples.
+    fn motion(&mut self, measured: &MotionBlock, instruments: &mut MotionBlock) -> Result<(), IdentificationError>;
+}
+
+/// The motion of the log itself through another filter.
+#[derive(Debug)]
+pub struct SmoothedMotion<'a> {
+    logs: &'a Logs<'a>,
+    model: &'a Model,
+    motion: MotionSettings,
+    log: usize,
+    stream: Option<MotionStream>,
+    block: MotionBlock,
+    used: usize,
+    /// The cut-off in force in each log begun so far.
+    pub cutoffs_hz: Vec<f64>,
+}
+
+impl<'a> SmoothedMotion<'a> {
+    /// The motion of the task's logs, smoothed as `settings` say; trimmed as the regressor's.
+    pub fn new(logs: &'a Logs<'a>, model: &'a Model, settings: &InstrumentSettings) -> Self {
+        let differentiator = DifferentiatorSettings::Butterworth { order: 4, cutoff_hz: settings.cutoff_hz };
+        let motion = MotionSettings { differentiator, smooth_torque: false, ..logs.motion.clone() };
+        let block = MotionBlock::default();
+        Self { logs, model, motion, log: 0, stream: None, block, used: 0, cutoffs_hz: Vec::new() }
+    }
+
+    fn log_name(&self) -> String {
+        self.logs.recordings[self.log].name.clone()
+    }
+
+    fn unaligned(&self) -> IdentificationError {
+        IdentificationError::Instruments {
+            log: self.log_name(),
+            message: "the smoothed motion does not cover the same samples as the regressor: a piece of the log is too short for one of the two filters; \
+                      leave short pieces out with `rows` or `time_range_s`"
+                .to_owned(),
+        }
+    }
+}
+
+impl InstrumentSource for SmoothedMotion<'_> {
+    fn begin(&mut self, log: usize) -> Result<(), IdentificationError> {
+        self.log = log;
+        let (recording, model) = (&self.logs.recordings[log], self.model);
+        let open = |motion: &MotionSettings| {
+            recording.open(model, motion)?.ok_or_else(|| IdentificationError::Instruments {
+                log: recording.name.clone(),
+                message: "a motion that is made already cannot be smoothed anew: give its raw samples".to_owned(),
+            })
+        };
+        let mut motion = self.motion.clone();
+        let DifferentiatorSettings::Butterworth { cutoff_hz, .. } = &mut motion.differentiator else {
+            return Err(self.unaligned());
+        };
+        if cutoff_hz.is_none() {
+            *cutoff_hz = Some(0.25 * open(&self.motion)?.cutoff().cutoff_hz);
+        }
+        self.cutoffs_hz.extend(*cutoff_hz);
+        self.stream = Some(open(&motion)?);
+        (self.block, self.used) = (MotionBlock::default(), 0);
+        Ok(())
+    }
+
+    fn motion(&mut self, measured: &MotionBlock, instruments: &mut MotionBlock) -> Result<(), IdentificationError> {
+        let (rows, joints) = (measured.rows, measured.joints);
+        (instruments.rows, instruments.joints) = (rows, joints);
+        for values in [&mut instruments.q, &mut instruments.dq, &mut instruments.ddq] {
+            values.clear();
+            values.resize(rows * joints, 0.0);
+        }
+        let mut done = 0;
+        while done < rows {
+            if self.used == self.block.rows {
+                let log = self.log_name();
+                let Some(stream) = &mut self.stream else { return Err(self.unaligned()) };
+                let more = stream
+                    .next_block(&mut self.block)
+                    .map_err(|source| IdentificationError::recording(&log, source))?;
+                if !more {
+                    return Err(self.unaligned());
+                }
+                self.used = 0;
+            }
+            let at = self.block.first_time_s + self.used as f64 / self.block.rate_hz;
+            let wanted = measured.first_time_s + done as f64 / measured.rate_hz;
+            if self.block.segment != measured.segment || (at - wanted).abs() * measured.rate_hz > 0.5 {
+                return Err(self.unaligned());
+            }
+            let count = (rows - done).min(self.block.rows - self.used);
+            let pairs = [
+                (&self.block.q, &mut instruments.q),
+                (&self.block.dq, &mut instruments.dq),
+                (&self.block.ddq, &mut instruments.ddq),
+            ];
+            for (source, to) in pairs {
+                for joint in 0..joints {
+                    let source = &self.block.joint(source, joint)[self.used..self.used + count];
+                    to[joint * rows + done..joint * rows + done + count].copy_from_slice(source);
+                }
+            }
+            self.used += count;
+            done += count;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,353 @@
+//! Maximum likelihood for a motion that repeats: from logs to mean periods, their noise, and an estimate.
+
+use super::TrainingRows;
+use super::row_pass::Stop;
+use super::simulated::torque_sigma;
+use crate::error::IdentificationError;
+use crate::regressor_model::RegressorModel;
+use crate::rows::motion_band_hz;
+use dynident_dynamics::{BatchWorkspace, LawHistory, Panels, regressor_panels_following};
+use dynident_estimation::{
+    CovarianceMethod, Estimate, InstantRows, InstantVisitor, LinearProblem, MaximumLikelihoodEstimate,
+    MaximumLikelihoodSettings, maximum_likelihood, student_half_width,
+};
+use dynident_model::laws::{JointMotion, Law};
+use dynident_recording::{AveragedPeriods, MotionBlock, MotionSettings, averaged_periods};
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+/// A motion whose periods differ by more than this share of its own size does not repeat.
+const MOST_DIFFERENCE: f64 = 0.1;
+/// A motion smaller than this counts as none, rad (m).
+const NO_MOTION: f64 = 1e-4;
+/// Noise of a torque counts as at least this share of its root mean square.
+const LEAST_RELATIVE_SIGMA: f64 = 1e-4;
+/// Steps of central differences of the regressor by position, speed and acceleration; it is linear in the last.
+const STEPS: [f64; 3] = [1e-5, 1e-5, 1.0];
+
+/// The repeated motion.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PeriodSettings {
+    /// After how many seconds the motion repeats; by default the length of the log's `reference`.
+    pub period_s: Option<f64>,
+    /// Seconds at the start of every log that are left out, until the motion repeats; 0 by default.
+    pub skip_s: f64,
+}
+
+impl PeriodSettings {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// In words, with the key and the fix.
+    pub fn validate(&self) -> Result<(), String> {
+        if let Some(period) = self.period_s
+            && !(period > 0.0 && period.is_finite())
+        {
+            return Err(format!("period_s = {period}: give the seconds after which the motion repeats"));
+        }
+        if !(self.skip_s >= 0.0 && self.skip_s.is_finite()) {
+            return Err(format!("skip_s = {}: give 0 or more seconds", self.skip_s));
+        }
+        Ok(())
+    }
+}
+
+/// What the periods of a repeated motion told.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct PeriodicFit {
+    /// Their length, s.
+    pub period_s: f64,
+    /// For each log how many whole periods were averaged.
+    pub periods: Vec<usize>,
+    /// Instants of all mean periods that were fitted to.
+    pub instants: usize,
+    /// For each joint the standard deviation of a single sample's smoothed position, speed and acceleration, rad, rad/s, rad/s² (m).
+    pub motion_std: Vec<[f64; 3]>,
+    /// For each joint the standard deviation of a single sample's smoothed torque, Nm (N).
+    pub torque_std: Vec<f64>,
+    /// The likelihood's cost.
+    pub cost: f64,
+    /// What it would be if model and noise were right. Where the cost is larger, the model leaves something out, and the error bars were widened by the root of the ratio.
+    pub degrees_of_freedom: usize,
+}
+
+/// The mean period of one log, joints in the model's order: for each joint position, speed, acceleration, then the torques of all.
+struct MeanPeriod {
+    averaged: AveragedPeriods,
+    samples: usize,
+    /// Every how many samples one is fitted to: between them the filters have left nothing new.
+    stride: usize,
+}
+
+/// The estimate, and what the periods told.
+///
+/// Torque passes the differentiator's smoothing as the positions do, so that both have the same noise band, and of the mean period as many instants count as that band tells apart.
+pub(super) fn periodic(
+    rows: &TrainingRows<'_>,
+    periods: &PeriodSettings,
+) -> Result<(Estimate, PeriodicFit), IdentificationError> {
+    let TrainingRows { logs, model, problem, .. } = *rows;
+    let method = "maximum-likelihood";
+    let wrong = |message: String| IdentificationError::Estimator { method, message };
+    if let Some(law) = model.laws().iter().find(|law| matches!(law, Law::MaxwellSlip(_) | Law::Load(_))) {
+        return Err(wrong(format!(
+            "{} depends on more than the motion of one instant: leave that law out, or take another method",
+            law.symbol()
+        )));
+    }
+    rows.begin("periods");
+    let mut period_s = periods.period_s;
+    let mut means = Vec::new();
+    for &index in rows.training {
+        if period_s.is_none() {
+            let commanded = logs.recordings[index].commanded.as_ref();
+            period_s = commanded.and_then(|reference| reference.period_s());
+        }
+        let name = &logs.recordings[index].name;
+        let Some(period_s) = period_s else {
+            return Err(wrong(format!(
+                "log `{name}`: say after how many seconds the motion repeats: [estimator.periods] period_s = ..., or name the commanded motion of one period as the log's reference"
+            )));
+        };
+        means.push(mean_period(rows, index, (period_s, periods.skip_s), &|message| {
+            wrong(format!("log `{name}`: {message}"))
+        })?);
+    }
+    logs.end();
+    let Some(first) = means.first() else { return Err(wrong("there is no log to fit to".to_owned())) };
+    let (dof, most) = (model.model().dof(), first.averaged.periods);
+    let sample_covariance = pooled(&means);
+    // Covariance of the mean of as many periods as the first log has; the other logs' rows are scaled to it.
+    let mean_covariance = &sample_covariance / most as f64;
+    let motion_covariance = mean_covariance.view((0, 0), (3 * dof, 3 * dof)).into_owned();
+    let mut torque_covariance = mean_covariance.view((3 * dof, 3 * dof), (dof, dof)).into_owned();
+    for joint in 0..dof {
+        let (mut square, mut count) = (0.0, 0);
+        for mean in &means {
+            square += mean.averaged.mean[3 * dof + joint].iter().map(|tau| tau * tau).sum::<f64>();
+            count += mean.samples;
+        }
+        let least = LEAST_RELATIVE_SIGMA * LEAST_RELATIVE_SIGMA * square / count.max(1) as f64;
+        torque_covariance[(joint, joint)] += least.max(f64::MIN_POSITIVE);
+    }
+    let settings = MaximumLikelihoodSettings {
+        motion_covariance,
+        torque_covariance,
+        rank: logs.settings.estimation.rank,
+        tolerance: 1e-6,
+        max_iterations: 50,
+    };
+    let mut instants = Instants::new(model);
+    let found = maximum_likelihood::<Stop>(problem.columns(), &settings, |visit| {
+        for mean in &means {
+            let weight = (mean.averaged.periods as f64 / most as f64).sqrt();
+            instants.of(mean, weight, visit)?;
+        }
+        Ok(())
+    })?;
+    let std = |place: usize| sample_covariance[(place, place)].max(0.0).sqrt();
+    let fit = PeriodicFit {
+        period_s: period_s.unwrap_or_default(),
+        periods: means.iter().map(|mean| mean.averaged.periods).collect(),
+        instants: means.iter().map(|mean| mean.samples.div_ceil(mean.stride)).sum(),
+        motion_std: (0..dof).map(|joint| core::array::from_fn(|order| std(order * dof + joint))).collect(),
+        torque_std: (0..dof).map(|joint| std(3 * dof + joint)).collect(),
+        cost: found.cost,
+        degrees_of_freedom: found.degrees_of_freedom,
+    };
+    let estimate = estimate_of(found, problem)?;
+    Ok((estimate, fit))
+}
+
+/// Noise of a single sample between all channels, over all logs.
+fn pooled(means: &[MeanPeriod]) -> DMatrix<f64> {
+    let channels = means.first().map_or(0, |mean| mean.averaged.sample_covariance.len());
+    let (mut sum, mut freedom) = (DMatrix::zeros(channels, channels), 0.0);
+    for mean in means {
+        let own = (mean.samples * (mean.averaged.periods - 1)) as f64;
+        let covariance = &mean.averaged.sample_covariance;
+        sum += DMatrix::from_fn(channels, channels, |a, b| covariance[a][b]) * own;
+        freedom += own;
+    }
+    sum / freedom.max(1.0)
+}
+
+/// The mean period of log number `index`.
+fn mean_period(
+    rows: &TrainingRows<'_>,
+    index: usize,
+    (period_s, skip_s): (f64, f64),
+    wrong: &dyn Fn(String) -> IdentificationError,
+) -> Result<MeanPeriod, IdentificationError> {
+    let TrainingRows { logs, model, .. } = *rows;
+    let (motion, recording) = (&logs.motion, &logs.recordings[index]);
+    let places = recording.places(model.model())?;
+    let alike = MotionSettings { smooth_torque: true, ..motion.clone() };
+    let failed = |source| IdentificationError::recording(&recording.name, source);
+    let Some(mut stream) = recording.open(model.model(), &alike)? else {
+        return Err(wrong("a motion that is made already has no periods: give its raw samples".to_owned()));
+    };
+    let (rate_hz, dof) = (stream.rate_hz(), model.model().dof());
+    let stride =
+        logs.settings.parallel_filter.decimation(rate_hz, motion_band_hz(motion)).map_or(1, |settings| settings.factor);
+    let mut channels = vec![Vec::new(); 4 * dof];
+    let (mut block, mut segment, mut begins_s) = (MotionBlock::default(), None, 0.0);
+    while stream.next_block(&mut block).map_err(failed)? {
+        if *segment.get_or_insert(block.segment) != block.segment {
+            return Err(wrong(
+                "the log has a gap, and periods are counted without one: cut the longest piece out with time_range_s"
+                    .to_owned(),
+            ));
+        }
+        if channels[0].is_empty() {
+            begins_s = block.first_time_s;
+        }
+        for (order, values) in [&block.q, &block.dq, &block.ddq, block.fitted_tau()].into_iter().enumerate() {
+            for (joint, &place) in places.iter().enumerate() {
+                channels[order * dof + joint].extend_from_slice(block.joint(values, place));
+            }
+        }
+        logs.execution.progress.advance(block.rows as u64);
+    }
+    let samples = (period_s * rate_hz).round() as usize;
+    if samples < 2 {
+        return Err(wrong(format!("a period of {period_s} s holds fewer than two samples at {rate_hz:.1} Hz")));
+    }
+    let skipped = (skip_s - begins_s).max(0.0) * rate_hz;
+    let channels = at_phases(&channels, skipped, period_s * rate_hz / samples as f64);
+    let views: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
+    let length = views.first().map_or(0, |channel| channel.len());
+    if length < 2 * samples {
+        return Err(wrong(format!(
+            "{:.2} s are left, fewer than two periods of {period_s} s: record at least two, better ten; or give the true period_s",
+            length as f64 / rate_hz
+        )));
+    }
+    let averaged = averaged_periods(&views, samples).map_err(|error| wrong(error.to_string()))?;
+    let joints = model.model().joints();
+    for joint in 0..dof {
+        let mean = &averaged.mean[joint];
+        let middle = mean.iter().sum::<f64>() / mean.len() as f64;
+        let size = (mean.iter().map(|q| (q - middle).powi(2)).sum::<f64>() / mean.len() as f64).sqrt();
+        let difference = averaged.sample_covariance[joint][joint].max(0.0).sqrt();
+        if difference > MOST_DIFFERENCE * size.max(NO_MOTION) {
+            return Err(wrong(format!(
+                "the motion does not repeat every {period_s} s: positions of {} differ by {difference:.2e} rad from period to period, and move by {size:.2e} rad (root mean squares); \
+                 mend period_s, or skip the start with skip_s",
+                joints[joint].name
+            )));
+        }
+    }
+    Ok(MeanPeriod { averaged, samples, stride })
+}
+
+/// Channels from `from` on at steps of `step` samples, so that a period is a whole number of them: cubic interpolation where these lie between samples.
+fn at_phases(channels: &[Vec<f64>], from: f64, step: f64) -> Vec<Vec<f64>> {
+    let length = channels.first().map_or(0, Vec::len);
+    let on_samples = (step - 1.0).abs() * (length as f64) < 1e-3;
+    let first = from.ceil();
+    if on_samples {
+        return channels.iter().map(|channel| channel[(first as usize).min(length)..].to_vec()).collect();
+    }
+    let last = length as f64 - 3.0;
+    let count = if last > first { ((last - first) / step) as usize } else { 0 };
+    let value = |channel: &[f64], place: f64| {
+        let at = (place.floor() as usize).clamp(1, channel.len() - 3);
+        let u = place - at as f64;
+        let [a, b, c, d] = [channel[at - 1], channel[at], channel[at + 1], channel[at + 2]];
+        // Lagrange's cubic through four neighbours.
+        -a * u * (u - 1.0) * (u - 2.0) / 6.0 + b * (u + 1.0) * (u - 1.0) * (u - 2.0) / 2.0
+            - c * (u + 1.0) * u * (u - 2.0) / 2.0
+            + d * (u + 1.0) * u * (u - 1.0) / 6.0
+    };
+    channels.iter().map(|channel| (0..count).map(|k| value(channel, first + k as f64 * step)).collect()).collect()
+}
+
+/// Regressors of single instants and their derivatives by the motion.
+struct Instants<'a> {
+    model: &'a RegressorModel,
+    workspace: BatchWorkspace,
+    panels: Panels,
+}
+
+impl<'a> Instants<'a> {
+    fn new(model: &'a RegressorModel) -> Self {
+        Self { model, workspace: BatchWorkspace::new(model.model()), panels: Panels::default() }
+    }
+
+    /// Hands the instants of a mean period to `visit`. Rows of a mean over more periods count more; `weight` is the root of how much.
+    fn of(&mut self, mean: &MeanPeriod, weight: f64, visit: &mut InstantVisitor<'_>) -> Result<(), Stop> {
+        let (model, layout) = (self.model.model(), self.model.layout());
+        let (dof, columns) = (model.dof(), layout.columns().len());
+        let variables = 3 * dof;
+        let samples = 1 + 2 * variables;
+        let mut states = [vec![0.0; dof * samples], vec![0.0; dof * samples], vec![0.0; dof * samples]];
+        for instant in (0..mean.samples).step_by(mean.stride) {
+            for (order, state) in states.iter_mut().enumerate() {
+                for joint in 0..dof {
+                    let own = &mut state[joint * samples..(joint + 1) * samples];
+                    own.fill(mean.averaged.mean[order * dof + joint][instant]);
+                    let variable = order * dof + joint;
+                    own[1 + 2 * variable] += STEPS[order];
+                    own[2 + 2 * variable] -= STEPS[order];
+                }
+            }
+            let [q, dq, ddq] = &states;
+            let motion = JointMotion { samples, q, dq, ddq };
+            let mut history = LawHistory::new(None);
+            regressor_panels_following(model, &mut self.workspace, layout, &motion, &mut history, &mut self.panels);
+            let mut regressor = DMatrix::zeros(dof, columns);
+            let mut by_motion = vec![DMatrix::zeros(dof, columns); variables];
+            for joint in 0..dof {
+                let panel = self.panels.joint(joint);
+                for (place, &column) in layout.joint_columns(joint).iter().enumerate() {
+                    let values = &panel[place * samples..(place + 1) * samples];
+                    regressor[(joint, column)] = weight * values[0];
+                    for (variable, by) in by_motion.iter_mut().enumerate() {
+                        by[(joint, column)] =
+                            (values[1 + 2 * variable] - values[2 + 2 * variable]) / (2.0 * STEPS[variable / dof]);
+                    }
+                }
+            }
+            let torque = DVector::from_fn(dof, |joint, _| weight * mean.averaged.mean[3 * dof + joint][instant]);
+            visit(&InstantRows { regressor: &regressor, torque: &torque, regressor_by_motion: &by_motion })?;
+        }
+        Ok(())
+    }
+}
+
+/// As the other estimators' result. Error bars grow with what the model leaves beyond the noise.
+fn estimate_of(
+    found: MaximumLikelihoodEstimate,
+    problem: &LinearProblem,
+) -> Result<Estimate, dynident_estimation::EstimationError> {
+    let joints = problem.joints().len();
+    let freedom = found.degrees_of_freedom as f64;
+    let widened = (found.cost / freedom).max(1.0);
+    let std: Vec<f64> = found.std.iter().map(|std| std * widened.sqrt()).collect();
+    let half = student_half_width(0.95, freedom);
+    let relative = |(std, value): (&f64, &f64)| (*std > 0.0 && *value != 0.0).then(|| 100.0 * std / value.abs());
+    Ok(Estimate {
+        joint_sigma: torque_sigma(problem, &found.values)?,
+        half_width_95: std.iter().map(|std| half * std).collect(),
+        relative_std_percent: std.iter().zip(&found.values).map(relative).collect(),
+        std_freedom: vec![freedom; std.len()],
+        covariance: &found.covariance * widened,
+        covariance_white: found.covariance,
+        covariance_method: CovarianceMethod::White,
+        clusters: 0,
+        std,
+        status: found.status,
+        iterations: found.iterations,
+        score_inflation: vec![widened; joints],
+        effective_lag1: vec![0.0; joints],
+        segment_correlation: vec![0.0; joints],
+        degrees_of_freedom: found.degrees_of_freedom,
+        condition_number_raw: found.rank.condition_number_raw,
+        condition_number_scaled: found.rank.condition_number_scaled,
+        rank: found.rank,
+        names: found.names,
+        values: found.values,
+    })
+}

@@ -1,0 +1,194 @@
+//! From the rows of the training logs to base parameters: every estimator that is offered, with its settings and its findings.
+//!
+//! **To add an estimator**: a file here with its settings, its findings and a function from [`TrainingRows`] to an [`Estimation`]; a variant of [`Estimator`], which the compiler
+//! then asks for here; and its name in the study file.
+
+mod generalized;
+mod instrument_rows;
+mod instrumental;
+mod instruments;
+mod maximum_likelihood;
+mod noise_weighted;
+mod robust;
+mod row_pass;
+mod simulated;
+mod simulated_loop;
+
+pub use instrumental::{InstrumentSettings, NoiseInRegressor};
+pub use instruments::{InstrumentSource, SmoothedMotion};
+pub use maximum_likelihood::{PeriodSettings, PeriodicFit};
+pub use noise_weighted::NoiseLevels;
+pub use robust::GrossErrors;
+pub use simulated::{SimulatedFit, SimulatedLoopSettings, SimulationStart};
+
+use crate::error::IdentificationError;
+use crate::logs::Logs;
+use crate::regressor_model::RegressorModel;
+use dynident_estimation::{
+    Estimate, EstimationError, LinearProblem, RowWeight, ordinary_least_squares, weighted_least_squares,
+};
+use simulated::Compared;
+
+/// How base parameters are estimated, with the settings that belong to the estimator alone.
+#[derive(Clone, Debug, Default)]
+#[non_exhaustive]
+pub enum Estimator {
+    /// Ordinary least squares: every joint's newton metre counts alike.
+    Ordinary,
+    /// Weighted least squares: every joint counts by its own noise.
+    #[default]
+    Weighted,
+    /// Generalised least squares: errors of the joints at one instant are correlated.
+    Generalized,
+    /// Iteratively reweighted with Huber's weights: rows far off count less.
+    Huber,
+    /// Iteratively reweighted with Tukey's weights: rows far off do not count.
+    Tukey,
+    /// Reweighted by the noise around every row: noisy stretches of a joint count less.
+    NoiseWeighted(NoiseLevels),
+    /// Instrumental variables: noise in the regressor does not bias the estimate.
+    Instrumental(InstrumentSettings),
+    /// Maximum likelihood for a motion that repeats: noise of motion and torque from how the periods differ.
+    MaximumLikelihood(PeriodSettings),
+    /// Regression on the motion of the simulated closed loop: no measured position enters the regressor.
+    Didim(Box<SimulatedLoopSettings>),
+    /// The simulated closed loop's torque fitted to the measured one (closed-loop input error).
+    Clie(Box<SimulatedLoopSettings>),
+    /// The simulated closed loop's positions fitted to the measured ones (closed-loop output error).
+    Cloe(Box<SimulatedLoopSettings>),
+}
+
+impl Estimator {
+    /// The name in files and messages.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Ordinary => "ordinary",
+            Self::Weighted => "weighted",
+            Self::Generalized => "generalized",
+            Self::Huber => "huber",
+            Self::Tukey => "tukey",
+            Self::NoiseWeighted(_) => "noise-weighted",
+            Self::Instrumental(_) => "instrumental",
+            Self::MaximumLikelihood(_) => "maximum-likelihood",
+            Self::Didim(_) => "didim",
+            Self::Clie(_) => "clie",
+            Self::Cloe(_) => "cloe",
+        }
+    }
+
+    /// Whether its values are those of least squares on the rows as they are, with one weight for each joint.
+    pub fn is_plain(&self) -> bool {
+        match self {
+            Self::Ordinary | Self::Weighted => true,
+            Self::Generalized
+            | Self::Huber
+            | Self::Tukey
+            | Self::NoiseWeighted(_)
+            | Self::Instrumental(_)
+            | Self::MaximumLikelihood(_)
+            | Self::Didim(_)
+            | Self::Clie(_)
+            | Self::Cloe(_) => false,
+        }
+    }
+}
+
+/// What an estimator alone can tell, beside its estimate.
+#[derive(Clone, Debug, Default)]
+#[non_exhaustive]
+pub enum Findings {
+    /// Nothing.
+    #[default]
+    None,
+    /// How a robust estimator weighed the rows.
+    GrossErrors(GrossErrors),
+    /// Correlation of the joints' errors at one instant, joint by joint.
+    NoiseCorrelation(Vec<Vec<f64>>),
+    /// Lowest and highest noise level found around a row, joint by joint, Nm (N).
+    NoiseLevels(Vec<[f64; 2]>),
+    /// What the periods of a repeated motion say.
+    Periodic(PeriodicFit),
+    /// How the fit to a simulated closed loop went.
+    Simulated(SimulatedFit),
+}
+
+/// Base parameters with their covariance, and what came out beside them.
+#[derive(Clone, Debug)]
+pub struct Estimation {
+    /// The estimate.
+    pub estimate: Estimate,
+    /// What the estimator alone can tell.
+    pub findings: Findings,
+    /// Least squares against instruments, where there are any.
+    pub noise_in_regressor: Option<NoiseInRegressor>,
+}
+
+impl Estimation {
+    /// An estimate without findings.
+    pub fn plain(estimate: Estimate) -> Self {
+        Self { estimate, findings: Findings::None, noise_in_regressor: None }
+    }
+}
+
+/// The rows that parameters are estimated from: as factors, and as logs for estimators that come back to the rows.
+#[derive(Clone, Copy, Debug)]
+pub struct TrainingRows<'a> {
+    /// All recordings of the task.
+    pub logs: &'a Logs<'a>,
+    /// What makes their rows.
+    pub model: &'a RegressorModel,
+    /// Recordings to fit to, in the order of the problem's logs.
+    pub training: &'a [usize],
+    /// The rows as triangular factors.
+    pub problem: &'a LinearProblem,
+}
+
+impl TrainingRows<'_> {
+    pub(crate) fn begin(&self, stage: &str) {
+        self.logs.begin(stage, self.training);
+    }
+}
+
+/// The estimate that the task's settings ask for, and the test of least squares if there are instruments: those of `source`, or the settings' own.
+///
+/// # Errors
+/// Rows that do not carry an estimate, and what the estimator chosen needs and does not find.
+pub fn estimate(
+    rows: &TrainingRows<'_>,
+    source: Option<&mut dyn InstrumentSource>,
+) -> Result<Estimation, IdentificationError> {
+    let settings = &rows.logs.settings.estimation;
+    let instruments = match &settings.estimator {
+        Estimator::Instrumental(own) => Some(own),
+        _ => settings.exogeneity_test.as_ref(),
+    };
+    let instrumented = match (source, instruments) {
+        (Some(source), own) => Some(instrumental::with_instruments(rows, &own.cloned().unwrap_or_default(), source)?),
+        (None, Some(own)) => Some(instrumental::with_smoothed_motion(rows, own)?),
+        (None, None) => None,
+    };
+    let (by_instruments, noise_in_regressor) = instrumented.unzip();
+    let simulated = |loop_settings, compared| {
+        let found = simulated::simulated(rows, loop_settings, compared);
+        found.map(|(estimate, found)| (estimate, Findings::Simulated(found)))
+    };
+    let (estimate, findings) = match &settings.estimator {
+        Estimator::Ordinary => (ordinary_least_squares(rows.problem, &settings.ordinary())?, Findings::None),
+        Estimator::Weighted => (weighted_least_squares(rows.problem, &settings.weighted())?, Findings::None),
+        Estimator::Instrumental(_) => {
+            (by_instruments.map(|found| found.estimate).ok_or(EstimationError::Empty)?, Findings::None)
+        }
+        Estimator::Huber => robust::robust(rows, RowWeight::huber())?,
+        Estimator::Tukey => robust::robust(rows, RowWeight::tukey())?,
+        Estimator::Generalized => generalized::generalized(rows)?,
+        Estimator::NoiseWeighted(levels) => noise_weighted::noise_weighted(rows, levels)?,
+        Estimator::MaximumLikelihood(periods) => {
+            let (estimate, found) = maximum_likelihood::periodic(rows, periods)?;
+            (estimate, Findings::Periodic(found))
+        }
+        Estimator::Didim(settings) => simulated(settings, Compared::TorqueRows)?,
+        Estimator::Clie(settings) => simulated(settings, Compared::Torque)?,
+        Estimator::Cloe(settings) => simulated(settings, Compared::Position)?,
+    };
+    Ok(Estimation { estimate, findings, noise_in_regressor })
+}

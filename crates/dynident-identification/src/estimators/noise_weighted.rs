@@ -1,0 +1,51 @@
+//! Rows weighted by the noise around them.
+
+use super::row_pass::{Stop, every_row};
+use super::{Findings, TrainingRows};
+use crate::error::IdentificationError;
+use crate::settings::EstimationSettings;
+use dynident_estimation::{Estimate, NoiseLevelSettings, noise_weighted_least_squares};
+use serde::{Deserialize, Serialize};
+
+/// How the noise around a row is found; see [`NoiseLevelSettings`].
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct NoiseLevels {
+    /// Rows of one joint and log, centred on a row, whose residuals say how large the noise is there; 51 by default.
+    pub window_rows: usize,
+    /// Share of the joint's mean square residual in every level's square, 0 to 1; 1e-3 by default.
+    pub pooled_share: f64,
+    /// Most passes over the logs; 30 by default.
+    pub max_passes: usize,
+}
+
+impl Default for NoiseLevels {
+    fn default() -> Self {
+        let NoiseLevelSettings { window_rows, pooled_share, max_passes, .. } = NoiseLevelSettings::default();
+        Self { window_rows, pooled_share, max_passes }
+    }
+}
+
+impl NoiseLevels {
+    /// The estimator's settings.
+    pub fn settings(&self, estimation: &EstimationSettings) -> NoiseLevelSettings {
+        NoiseLevelSettings {
+            window_rows: self.window_rows,
+            pooled_share: self.pooled_share,
+            max_passes: self.max_passes,
+            rank: estimation.rank,
+            covariance: estimation.covariance,
+            ..NoiseLevelSettings::default()
+        }
+    }
+}
+
+/// The estimate with one pass over the rows for every reweighting.
+pub(super) fn noise_weighted(
+    rows: &TrainingRows<'_>,
+    levels: &NoiseLevels,
+) -> Result<(Estimate, Findings), IdentificationError> {
+    let settings = levels.settings(&rows.logs.settings.estimation);
+    let found = noise_weighted_least_squares::<Stop>(rows.problem, &settings, |visit| every_row(rows, visit))?;
+    Ok((found.estimate, Findings::NoiseLevels(found.level_range)))
+}

@@ -1,0 +1,30 @@
+//! Iteratively reweighted least squares: rows far off count less, or not at all.
+
+use super::row_pass::{Stop, every_row};
+use super::{Findings, TrainingRows};
+use crate::error::IdentificationError;
+use dynident_estimation::{Estimate, RobustSettings, RowWeight, robust_least_squares};
+use serde::{Deserialize, Serialize};
+
+/// What a robust estimator thought of the rows, joint by joint.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct GrossErrors {
+    /// Share of rows whose weight is below one half.
+    pub share: Vec<f64>,
+    /// Mean weight of the rows.
+    pub mean_weight: Vec<f64>,
+}
+
+/// The estimate with one pass over the rows for every reweighting.
+pub(super) fn robust(rows: &TrainingRows<'_>, weight: RowWeight) -> Result<(Estimate, Findings), IdentificationError> {
+    let estimation = &rows.logs.settings.estimation;
+    let settings = RobustSettings {
+        weight,
+        rank: estimation.rank,
+        covariance: estimation.covariance,
+        ..RobustSettings::default()
+    };
+    let found = robust_least_squares::<Stop>(rows.problem, &settings, |visit| every_row(rows, visit))?;
+    let errors = GrossErrors { share: found.outlier_share, mean_weight: found.mean_weight };
+    Ok((found.estimate, Findings::GrossErrors(errors)))
+}

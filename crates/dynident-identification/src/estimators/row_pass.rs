@@ -1,0 +1,58 @@
+//! Every row of the training logs once more, for estimators that reweight them.
+
+use super::TrainingRows;
+use crate::error::IdentificationError;
+use crate::rows::{JointRows, RowConsumer};
+use dynident_estimation::{EstimationError, RowBlock, RowVisitor};
+
+/// What stops an estimator that comes back to the logs: itself, or what reads or simulates them.
+pub(crate) enum Stop {
+    Estimator(EstimationError),
+    Log(IdentificationError),
+}
+
+impl From<EstimationError> for Stop {
+    fn from(error: EstimationError) -> Self {
+        Self::Estimator(error)
+    }
+}
+
+/// Hands a log's rows to a visitor.
+struct Visiting<'a, 'b> {
+    log: usize,
+    visit: &'a mut RowVisitor<'b>,
+    refused: Option<EstimationError>,
+}
+
+impl RowConsumer for Visiting<'_, '_> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
+        if self.refused.is_none() {
+            let block = RowBlock { log: self.log, joint: rows.joint, rows: rows.rows, panel: rows.panel };
+            self.refused = (self.visit)(&block).err();
+        }
+        Ok(())
+    }
+}
+
+impl From<Stop> for IdentificationError {
+    fn from(stop: Stop) -> Self {
+        match stop {
+            Stop::Estimator(source) => Self::Estimation(source),
+            Stop::Log(error) => error,
+        }
+    }
+}
+
+/// One pass: every row of every training log.
+pub(super) fn every_row(rows: &TrainingRows<'_>, visit: &mut RowVisitor<'_>) -> Result<(), Stop> {
+    rows.begin("reweighting rows");
+    for (log, &index) in rows.training.iter().enumerate() {
+        let mut consumer = Visiting { log, visit: &mut *visit, refused: None };
+        rows.logs.pass(rows.model, index).run(&mut consumer).map_err(Stop::Log)?;
+        if let Some(refused) = consumer.refused {
+            return Err(refused.into());
+        }
+    }
+    rows.logs.end();
+    Ok(())
+}

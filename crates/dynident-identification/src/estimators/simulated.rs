@@ -1,0 +1,390 @@
+//! DIDIM, CLIE and CLOE: from a controller and the commanded motion to an estimate.
+
+use super::TrainingRows;
+use super::simulated_loop::{LoopLog, SimulatedLoop};
+use crate::consistent::{ConsistencySettings, consistent_parameters};
+use crate::error::IdentificationError;
+use dynident_dynamics::Column;
+use dynident_estimation::{
+    Estimate, EstimateStatus, EstimationError, LinearProblem, SegmentedFactor, SimulatedCriterion, SimulatedEstimate,
+    SimulatedMotion, SimulatedProblem, SimulatedSettings, simulated_least_squares, weighted_least_squares,
+};
+use dynident_simulation::{ControllerModel, ControllerSettings, LoopSettings, RunLimits, SensorSettings};
+use nalgebra::DVector;
+use serde::{Deserialize, Serialize};
+
+/// Noise of the compared signal counts as at least this share of the signal's root mean square, so that noise-free data have weights.
+const LEAST_RELATIVE_SIGMA: f64 = 1e-4;
+/// Rows times columns that are held in memory, of 8 bytes each.
+const MOST_ENTRIES: usize = 100_000_000;
+/// The noise of the joints is judged anew so often at most, until no joint's changes by more than a tenth.
+const ROUNDS: usize = 3;
+const SETTLED: f64 = 0.1;
+
+/// Where the iteration begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SimulationStart {
+    /// At the one of the two below whose simulation is nearer to the record; at the other if that leads nowhere.
+    #[default]
+    Nearer,
+    /// The consistent set that fits the measured rows best: a simulation with negative masses would get nowhere.
+    Estimate,
+    /// The robot's description.
+    Description,
+}
+
+/// The experiment to simulate, and how the fit to it goes.
+#[derive(Clone, Debug)]
+pub struct SimulatedLoopSettings {
+    /// The controller that drove the robot.
+    pub controller: ControllerSettings,
+    /// Samples a second of the controller.
+    pub rate_hz: f64,
+    /// Integrator, velocities and delays of the feedback, start and torque limits of the loop. Noise is not simulated.
+    pub loop_settings: LoopSettings,
+    /// Where the iteration begins.
+    pub start: SimulationStart,
+    /// Length of a step, in error bars over all directions, at which the iteration ends; 1e-3 is usual.
+    pub tolerance: f64,
+    /// Most steps; 30 are usual.
+    pub max_iterations: usize,
+    /// Step of the differences of CLIE and CLOE, relative to each parameter's size; 1e-4 is usual.
+    pub difference: f64,
+}
+
+/// What is compared with the record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Compared {
+    /// Torque, with the regressor of the simulated motion beside it: DIDIM.
+    TorqueRows,
+    /// Torque: CLIE.
+    Torque,
+    /// Positions: CLOE.
+    Position,
+}
+
+impl Compared {
+    fn method(self) -> &'static str {
+        match self {
+            Self::TorqueRows => "didim",
+            Self::Torque => "clie",
+            Self::Position => "cloe",
+        }
+    }
+
+    fn criterion(self) -> SimulatedCriterion {
+        match self {
+            Self::TorqueRows => SimulatedCriterion::Didim,
+            Self::Torque | Self::Position => SimulatedCriterion::Output,
+        }
+    }
+}
+
+/// How a fit to the simulated closed loop went.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct SimulatedFit {
+    /// The controller.
+    pub controller: String,
+    /// Its samples a second.
+    pub rate_hz: f64,
+    /// What was compared: `torque` or `position`.
+    pub compared: String,
+    /// Where the iteration began: at the `estimate` (the possible machine that fits the measured rows best) or the `description`.
+    pub start: String,
+    /// Steps.
+    pub iterations: usize,
+    /// Simulations of all logs.
+    pub simulations: usize,
+    /// For each joint the standard deviation of what the simulation leaves, Nm (N), or rad (m) where positions are compared.
+    pub residual_std: Vec<f64>,
+}
+
+/// The estimate, and how it came about.
+///
+/// The simulation has the study's controller (its model, if it needs one, is the description) and the log's commanded motion, and no noise; its motion is taken at the log's instants, and what it gives
+/// passes the same parallel filter as what was measured. Error bars are those of weighted least squares on the last linearised rows, so that coloured residuals count as everywhere.
+pub(super) fn simulated(
+    rows: &TrainingRows<'_>,
+    experiment: &SimulatedLoopSettings,
+    compared: Compared,
+) -> Result<(Estimate, SimulatedFit), IdentificationError> {
+    let TrainingRows { logs, model, problem, training } = *rows;
+    let estimation = &logs.settings.estimation;
+    let method = compared.method();
+    let wrong = |message: String| IdentificationError::Estimator { method, message };
+    let SimulatedLoopSettings { controller, rate_hz, .. } = experiment;
+    let mut settings = experiment.loop_settings.clone();
+    settings.limits = RunLimits { torque: settings.limits.torque, ..RunLimits::default() };
+    let SensorSettings { speed, feedback_delay_samples, .. } = settings.sensors;
+    settings.sensors = SensorSettings { speed, feedback_delay_samples, ..SensorSettings::default() };
+    settings.accelerations = compared != Compared::Torque;
+    let controller_model = if controller.needs_model() {
+        let unknown = model.model().bodies_without_prior();
+        if !unknown.is_empty() {
+            return Err(wrong(format!(
+                "the controller \"{}\" needs the model that it had, and the description has no inertial of {}",
+                controller.name(),
+                unknown.join(", ")
+            )));
+        }
+        let nominal = model.parametric.nominal();
+        let described = ControllerModel::from_parameters(model.model(), model.laws(), nominal);
+        Some(described.map_err(|error| wrong(format!("[controller]: {error}")))?)
+    } else {
+        None
+    };
+    rows.begin("instants and commanded motion");
+    let read = |&index: &usize| LoopLog::read(rows, index, compared, *rate_hz, &wrong);
+    let loop_logs = training.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+    logs.end();
+    let mut simulated = SimulatedLoop {
+        model,
+        controller,
+        controller_model,
+        settings,
+        compared,
+        logs: loop_logs,
+        wrong: &wrong,
+        failure: None,
+    };
+    let entries = simulated.rows() * problem.columns().len();
+    if entries > MOST_ENTRIES {
+        return Err(wrong(format!(
+            "{} rows of {} columns are too many to hold at once: give parallel_filter.factor, or a shorter part of the log",
+            simulated.rows(),
+            problem.columns().len()
+        )));
+    }
+
+    let weighted = estimation.weighted();
+    let plain = weighted_least_squares(problem, &weighted)?;
+    let measured = simulated.measured();
+    let (mut begun, mut refused) = (Vec::new(), Vec::new());
+    for (values, name) in start_values(rows, experiment.start, &plain).map_err(&wrong)? {
+        match simulated.simulate(&values)? {
+            Some(rows) => {
+                let sigma = deviations(&simulated, &(&measured - &rows.output), &measured, 0);
+                begun.push(Begun { values, name, sigma });
+            }
+            None => refused.push(format!("of the {name} ({})", failure(&simulated))),
+        }
+    }
+    if begun.is_empty() {
+        return Err(wrong(no_simulation(&refused.join(", nor "))));
+    }
+    begun.sort_by(|a, b| log_sum(&a.sigma).total_cmp(&log_sum(&b.sigma)));
+    logs.execution.progress.begin("simulating the closed loop", None);
+    let mut best: Option<Settled> = None;
+    let (mut iterations, mut simulations) = (0, 0);
+    for start in begun {
+        let settled = settled(rows, &mut simulated, (start, experiment), (&measured, &plain.std))?;
+        iterations += settled.iterations;
+        simulations += settled.simulations;
+        let done = settled.found.status != EstimateStatus::IterationLimit;
+        if best.as_ref().is_none_or(|best| log_sum(&settled.sigma) < log_sum(&best.sigma)) {
+            best = Some(settled);
+        }
+        if done {
+            break;
+        }
+    }
+    logs.end();
+    let Some(Settled { found, start: start_name, .. }) = best else {
+        return Err(EstimationError::NoSimulation.into());
+    };
+    let rows = linearised(rows, &simulated, &found)?;
+    let mut estimate = weighted_least_squares(&rows, &weighted)?;
+    estimate.iterations = iterations;
+    if found.status == EstimateStatus::IterationLimit {
+        // The step that these rows ask for made the simulation worse: the last values that were simulated stand.
+        estimate.status = EstimateStatus::IterationLimit;
+        estimate.values.clone_from(&found.values);
+        let relative = |(std, value): (&f64, &f64)| (*std > 0.0 && *value != 0.0).then(|| 100.0 * std / value.abs());
+        estimate.relative_std_percent = estimate.std.iter().zip(&estimate.values).map(relative).collect();
+    }
+    let residual_std = std::mem::take(&mut estimate.joint_sigma);
+    // What the model leaves of the measured torque, whatever was compared: that is what the torque's band is made of.
+    estimate.joint_sigma = torque_sigma(problem, &estimate.values)?;
+    let fit = SimulatedFit {
+        controller: controller.name().to_owned(),
+        rate_hz: *rate_hz,
+        compared: if compared == Compared::Position { "position" } else { "torque" }.to_owned(),
+        start: start_name.to_owned(),
+        iterations,
+        simulations,
+        residual_std,
+    };
+    Ok((estimate, fit))
+}
+
+/// For each joint the standard deviation of its measured filtered torque from the model's, `√(RSS_j / (N_j − p/n))`.
+pub(crate) fn torque_sigma(problem: &LinearProblem, values: &[f64]) -> Result<Vec<f64>, EstimationError> {
+    let mut squares = vec![0.0; problem.joints().len()];
+    for equation in problem.equations() {
+        let theta: Vec<f64> = equation.columns.iter().map(|&column| values[column]).collect();
+        squares[equation.joint] += equation.factor.total().residual_sum_of_squares(&theta)?;
+    }
+    let share = values.len() as f64 / squares.len().max(1) as f64;
+    let rows = problem.joint_rows();
+    Ok(squares.iter().zip(rows).map(|(sum, rows)| (sum / (rows as f64 - share).max(1.0)).sqrt()).collect())
+}
+
+/// A start that can be simulated.
+struct Begun {
+    values: Vec<f64>,
+    name: &'static str,
+    sigma: Vec<f64>,
+}
+
+/// What came of one start.
+struct Settled {
+    found: SimulatedEstimate,
+    start: &'static str,
+    sigma: Vec<f64>,
+    iterations: usize,
+    simulations: usize,
+}
+
+fn log_sum(sigma: &[f64]) -> f64 {
+    sigma.iter().map(|sigma| sigma.ln()).sum()
+}
+
+/// Iterates from one start; the joints' noise, which weighs their rows, is judged anew by what is left.
+fn settled(
+    rows: &TrainingRows<'_>,
+    simulated: &mut SimulatedLoop<'_>,
+    (start, experiment): (Begun, &SimulatedLoopSettings),
+    (measured, std): (&DVector<f64>, &[f64]),
+) -> Result<Settled, IdentificationError> {
+    let settings = SimulatedSettings {
+        criterion: simulated.compared.criterion(),
+        rank: rows.logs.settings.estimation.rank,
+        tolerance: experiment.tolerance,
+        max_iterations: experiment.max_iterations,
+        difference: experiment.difference,
+    };
+    let Begun { values, name, mut sigma } = start;
+    let largest = values.iter().fold(0.0_f64, |most, value| most.max(value.abs())).max(1e-9);
+    let scale = values.iter().zip(std).map(|(value, std)| value.abs().max(*std).max(1e-3 * largest)).collect();
+    let mut fit = SimulatedProblem {
+        names: rows.model.layout().columns().iter().map(Column::symbol).collect(),
+        start: values,
+        scale,
+        noise_std: by_row(simulated, &sigma),
+        measured: measured.clone(),
+    };
+    let (mut iterations, mut simulations) = (0, 0);
+    for round in 1..=ROUNDS {
+        let found = simulated_least_squares(&fit, &settings, simulated)?;
+        iterations += found.iterations;
+        simulations += found.simulations;
+        let next = deviations(simulated, &found.residual, measured, found.rank.rank);
+        let changed = next.iter().zip(&sigma).any(|(new, old)| (new / old - 1.0).abs() > SETTLED);
+        sigma = next;
+        if !changed || round == ROUNDS || found.status == EstimateStatus::IterationLimit {
+            return Ok(Settled { found, start: name, sigma, iterations, simulations });
+        }
+        fit.noise_std = by_row(simulated, &sigma);
+        fit.start.clone_from(&found.values);
+    }
+    // The last round returns.
+    Err(EstimationError::NoSimulation.into())
+}
+
+/// Where the iteration may begin, and what each is called.
+fn start_values(
+    rows: &TrainingRows<'_>,
+    choice: SimulationStart,
+    plain: &Estimate,
+) -> Result<Vec<(Vec<f64>, &'static str)>, String> {
+    let (model, problem) = (rows.model, rows.problem);
+    let mut starts = Vec::new();
+    let mut why = Vec::new();
+    if choice != SimulationStart::Description {
+        let default = ConsistencySettings::default();
+        let settings = rows.logs.settings.consistency.as_ref().unwrap_or(&default);
+        match consistent_parameters(&model.parametric, problem, &plain.joint_sigma, settings) {
+            Ok(fit) => starts.push((fit.base_values, "estimate")),
+            Err(reason) => why.push(format!("there is no possible machine to start from: {reason}")),
+        }
+    }
+    if choice != SimulationStart::Estimate {
+        if let Some(nominal) = model.parametric.nominal_base() {
+            starts.push((nominal.to_vec(), "description"));
+        } else {
+            let unknown = model.model().bodies_without_prior().join(", ");
+            why.push(format!("the description, which could be started from, has no inertial of {unknown}"));
+        }
+    }
+    if starts.is_empty() { Err(why.join("; ")) } else { Ok(starts) }
+}
+
+fn failure(simulated: &SimulatedLoop<'_>) -> String {
+    simulated.failure.clone().unwrap_or_else(|| "its motion has grown beyond all numbers".to_owned())
+}
+
+fn no_simulation(why: &str) -> String {
+    format!(
+        "the closed loop does not get through with the starting values {why}; check kind, gains and rate of the controller, the log's reference, and simulated.start"
+    )
+}
+
+/// Standard deviation of each joint's share of `residual`.
+fn deviations(
+    simulated: &SimulatedLoop<'_>,
+    residual: &DVector<f64>,
+    measured: &DVector<f64>,
+    free: usize,
+) -> Vec<f64> {
+    let joints = simulated.model.model().dof();
+    let (mut squares, mut signal, mut count) = (vec![0.0; joints], vec![0.0; joints], vec![0_usize; joints]);
+    let mut at = 0;
+    for log in &simulated.logs {
+        for (joint, &rows) in log.rows.iter().enumerate() {
+            squares[joint] += residual.rows(at, rows).norm_squared();
+            signal[joint] += measured.rows(at, rows).norm_squared();
+            count[joint] += rows;
+            at += rows;
+        }
+    }
+    let share = free as f64 / joints as f64;
+    (0..joints)
+        .map(|joint| {
+            let rows = count[joint] as f64;
+            let least = LEAST_RELATIVE_SIGMA * (signal[joint] / rows.max(1.0)).sqrt();
+            (squares[joint] / (rows - share).max(1.0)).sqrt().max(least).max(1e-12)
+        })
+        .collect()
+}
+
+/// One number per joint as one per row.
+fn by_row(simulated: &SimulatedLoop<'_>, values: &[f64]) -> DVector<f64> {
+    let all = simulated.logs.iter().flat_map(|log| log.rows.iter().zip(values));
+    let repeated = all.flat_map(|(&rows, &value)| std::iter::repeat_n(value, rows));
+    DVector::from_iterator(simulated.rows(), repeated)
+}
+
+/// The last linearised rows `J θ' ≈ residual + J θ`, by log, joint and time segment.
+fn linearised(
+    training: &TrainingRows<'_>,
+    simulated: &SimulatedLoop<'_>,
+    found: &SimulatedEstimate,
+) -> Result<LinearProblem, EstimationError> {
+    let columns: Vec<usize> = (0..found.values.len()).collect();
+    let target = &found.residual + &found.jacobian * DVector::from_column_slice(&found.values);
+    let problem = training.problem;
+    let mut rows = LinearProblem::new(problem.columns().to_vec(), training.model.joint_names());
+    let mut at = 0;
+    for (place, log) in simulated.logs.iter().enumerate() {
+        for (joint, &count) in log.rows.iter().enumerate() {
+            let mut factor = SegmentedFactor::new(columns.len(), training.logs.settings.estimation.segments)?;
+            let own = found.jacobian.rows(at, count);
+            let panel: Vec<f64> = own.iter().copied().chain(target.rows(at, count).iter().copied()).collect();
+            factor.absorb(&panel, count)?;
+            rows.add(&problem.logs()[place], joint, columns.clone(), factor)?;
+            at += count;
+        }
+    }
+    rows.with_fallback(found.values.clone())
+}

@@ -1,0 +1,308 @@
+//! The closed loop of an experiment behind the estimators' seam: the same controller, reference, instants and filters as the logs, other parameters.
+
+use super::TrainingRows;
+use super::row_pass::Stop;
+use super::simulated::Compared;
+use crate::error::IdentificationError;
+use crate::regressor_model::RegressorModel;
+use crate::rows::{JointRows, RowBuilder, RowConsumer, motion_band_hz};
+use dynident_estimation::{SimulatedMotion, SimulatedRows};
+use dynident_excitation::Motion;
+use dynident_model::laws::Law;
+use dynident_recording::{DecimationSettings, Decimator, FilterError, MotionBlock};
+use dynident_simulation::{ControllerModel, ControllerSettings, LoopSettings, Plant, Reference, Run, closed_loop};
+use nalgebra::{DMatrix, DVector};
+
+/// Samples of a log without a gap.
+#[derive(Clone, Copy, Debug)]
+struct Piece {
+    segment: usize,
+    first_time_s: f64,
+    rows: usize,
+}
+
+/// What a log says of how it was made, and when its samples were taken.
+pub(super) struct LoopLog {
+    pub(super) name: String,
+    rate_hz: f64,
+    pieces: Vec<Piece>,
+    filter: Option<DecimationSettings>,
+    reference: Reference,
+    /// When the simulation begins, in seconds after the log's first row: with the commanded motion, or with the log if that began later.
+    begins_s: f64,
+    /// For each joint its filtered rows.
+    pub(super) rows: Vec<usize>,
+    /// The measured outputs, filtered, joint by joint.
+    measured: Vec<Vec<f64>>,
+}
+
+/// The experiment over again.
+pub(super) struct SimulatedLoop<'a> {
+    pub(super) model: &'a RegressorModel,
+    pub(super) controller: &'a ControllerSettings,
+    pub(super) controller_model: Option<ControllerModel>,
+    pub(super) settings: LoopSettings,
+    pub(super) compared: Compared,
+    pub(super) logs: Vec<LoopLog>,
+    /// Makes an error from what is wrong.
+    pub(super) wrong: &'a dyn Fn(String) -> IdentificationError,
+    /// Why the last simulation that did not get through did not.
+    pub(super) failure: Option<String>,
+}
+
+impl LoopLog {
+    /// Log number `index`: its instants, its filtered outputs, and the commanded motion at the controller's rate.
+    pub(super) fn read(
+        training: &TrainingRows<'_>,
+        index: usize,
+        compared: Compared,
+        rate_hz: f64,
+        wrong: &dyn Fn(String) -> IdentificationError,
+    ) -> Result<Self, IdentificationError> {
+        let TrainingRows { logs, model, .. } = *training;
+        let (recording, motion) = (&logs.recordings[index], &logs.motion);
+        let name = recording.name.clone();
+        let Some(commanded) = recording.commanded.as_deref() else {
+            return Err(wrong(format!(
+                "log `{name}`: say what the controller was told to follow: reference = \"trajectory.csv\" under [[log]]"
+            )));
+        };
+        let Some(mut stream) = recording.open(model.model(), motion)? else {
+            return Err(wrong(format!(
+                "log `{name}`: a motion that is made already has no instants: give its raw samples"
+            )));
+        };
+        let places = recording.places(model.model())?;
+        let filter = logs.settings.parallel_filter.decimation(stream.rate_hz(), motion_band_hz(motion));
+        let in_filter = |source| IdentificationError::Filter { log: name.clone(), source };
+        let dof = model.dof();
+        let mut outputs = Outputs::new(dof, filter.as_ref(), stream.rate_hz()).map_err(in_filter)?;
+        let (mut block, mut pieces, mut samples) = (MotionBlock::default(), Vec::new(), 0);
+        while stream.next_block(&mut block).map_err(|source| IdentificationError::recording(&name, source))? {
+            let values = if compared == Compared::Position { &block.q } else { &block.tau };
+            for (joint, &place) in places.iter().enumerate() {
+                outputs.take(joint, block.segment, block.joint(values, place));
+            }
+            pieces.push(Piece { segment: block.segment, first_time_s: block.first_time_s, rows: block.rows });
+            samples += block.rows;
+            logs.execution.progress.advance(block.rows as u64);
+        }
+        let log_rate_hz = stream.rate_hz();
+        if outputs.rows.iter().any(Vec::is_empty) {
+            return Err(IdentificationError::NothingLeft { log: name, rows: samples as u64, needed: outputs.needed() });
+        }
+        let begins_s = commanded.start_s().min(0.0);
+        let ends_s =
+            pieces.iter().map(|piece| piece.first_time_s + piece.rows as f64 / log_rate_hz).fold(0.0, f64::max);
+        let over = |piece: &Piece| {
+            let last_s = piece.first_time_s + (piece.rows - 1) as f64 / log_rate_hz;
+            let ends = [piece.first_time_s, last_s];
+            ends.into_iter().find(|&time_s| (0..dof).any(|joint| !commanded.covers(joint, time_s)))
+        };
+        if let Some(time_s) = pieces.iter().filter(|piece| piece.rows > 0).find_map(over) {
+            return Err(wrong(format!(
+                "log `{name}`: at {time_s:.3} s of the log its reference has not begun or is over while it still moves; cut the log with time_range_s, or mend the reference's start_s"
+            )));
+        }
+        let count = ((ends_s - begins_s) * rate_hz).ceil() as usize + 2;
+        let mut told = Motion::default();
+        told.reset(dof, count);
+        for joint in 0..dof {
+            for sample in 0..count {
+                let at = joint * count + sample;
+                [told.q[at], told.dq[at], told.ddq[at]] = commanded.at(joint, begins_s + sample as f64 / rate_hz);
+            }
+        }
+        let reference = Reference::new(rate_hz, told).map_err(|error| wrong(format!("log `{name}`: {error}")))?;
+        let rows = outputs.rows.iter().map(Vec::len).collect();
+        Ok(Self { name, rate_hz: log_rate_hz, pieces, filter, reference, begins_s, rows, measured: outputs.rows })
+    }
+}
+
+impl SimulatedLoop<'_> {
+    /// What was measured, logs one after another and in each joint by joint: the order of all rows.
+    pub(super) fn measured(&self) -> DVector<f64> {
+        let all = self.logs.iter().flat_map(|log| log.measured.iter().flatten().copied());
+        DVector::from_iterator(self.rows(), all)
+    }
+
+    /// Rows of all logs and joints.
+    pub(super) fn rows(&self) -> usize {
+        self.logs.iter().flat_map(|log| &log.rows).sum()
+    }
+
+    /// The robot with base parameters θ: its torques, and so its mass matrix, are those of every full set that has these base parameters.
+    fn plant(&self, theta: &[f64]) -> Result<Plant, String> {
+        let model = ControllerModel::from_columns(self.model.model(), self.model.layout().columns(), theta)
+            .map_err(|error| error.to_string())?;
+        let (laws, values): (Vec<Law>, Vec<f64>) = model.laws().iter().cloned().unzip();
+        Plant::new(model.model(), &laws, &values).map_err(|error| error.to_string())
+    }
+
+    /// One log's rows of a run.
+    fn rows_of(&self, log: &LoopLog, run: &Run, out: &mut Gathered) -> Result<(), IdentificationError> {
+        let dof = self.model.model().dof();
+        let motion = (self.compared != Compared::Torque)
+            .then(|| sampled(run, log.begins_s))
+            .transpose()
+            .map_err(|source| IdentificationError::Filter { log: log.name.clone(), source })?;
+        let in_filter = |source| IdentificationError::Filter { log: log.name.clone(), source };
+        let mut outputs = Outputs::new(dof, log.filter.as_ref(), log.rate_hz).map_err(in_filter)?;
+        let layout = self.model.layout();
+        let places: Vec<usize> = (0..dof).collect();
+        let builder = || RowBuilder::new(self.model, &places, log.rate_hz, log.filter.as_ref());
+        let mut builder = (self.compared == Compared::TorqueRows).then(builder).transpose().map_err(in_filter)?;
+        let mut panels = PanelRows { joints: vec![Vec::new(); dof] };
+        let mut values = Vec::new();
+        for piece in &log.pieces {
+            let time = |row: usize| piece.first_time_s + row as f64 / log.rate_hz;
+            let mut block = MotionBlock {
+                rate_hz: log.rate_hz,
+                segment: piece.segment,
+                first_time_s: piece.first_time_s,
+                rows: piece.rows,
+                joints: dof,
+                ..MotionBlock::default()
+            };
+            if builder.is_some() {
+                for field in [&mut block.q, &mut block.dq, &mut block.ddq, &mut block.tau] {
+                    field.resize(dof * piece.rows, 0.0);
+                }
+            }
+            for joint in 0..dof {
+                values.clear();
+                for row in 0..piece.rows {
+                    values.push(match &motion {
+                        Some(motion) if self.compared == Compared::Position => motion.at(joint, time(row))[0],
+                        _ => held_torque(run, joint, time(row) - log.begins_s),
+                    });
+                    if let (Some(motion), true) = (&motion, builder.is_some()) {
+                        let at = joint * piece.rows + row;
+                        [block.q[at], block.dq[at], block.ddq[at]] = motion.at(joint, time(row));
+                    }
+                }
+                outputs.take(joint, piece.segment, &values);
+            }
+            if let Some(builder) = &mut builder {
+                builder.take(&block, &mut panels)?;
+            }
+        }
+        for joint in 0..dof {
+            out.output.append(&mut outputs.rows[joint]);
+            if builder.is_some() {
+                let (rows, columns) = (log.rows[joint], layout.joint_columns(joint));
+                for (place, &column) in columns.iter().enumerate() {
+                    let mut row = out.filled;
+                    for (count, panel) in &panels.joints[joint] {
+                        let from = &panel[place * count..(place + 1) * count];
+                        out.regressor.view_mut((row, column), (*count, 1)).copy_from_slice(from);
+                        row += count;
+                    }
+                }
+                out.filled += rows;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl SimulatedMotion for SimulatedLoop<'_> {
+    type Error = Stop;
+
+    fn simulate(&mut self, parameters: &[f64]) -> Result<Option<SimulatedRows>, Stop> {
+        let mut plant = match self.plant(parameters) {
+            Ok(plant) => plant,
+            Err(reason) => {
+                self.failure = Some(reason);
+                return Ok(None);
+            }
+        };
+        let rows = self.rows();
+        let with_regressor = self.compared == Compared::TorqueRows;
+        let mut out = Gathered {
+            output: Vec::with_capacity(rows),
+            regressor: DMatrix::zeros(if with_regressor { rows } else { 0 }, parameters.len()),
+            filled: 0,
+        };
+        for log in &self.logs {
+            let in_loop = |error: dynident_simulation::SimulationError| {
+                Stop::Log((self.wrong)(format!("log `{}`: the closed loop cannot be simulated: {error}", log.name)))
+            };
+            let mut controller = self.controller.build(plant.dof(), self.controller_model.as_ref()).map_err(in_loop)?;
+            let run = closed_loop(&mut plant, controller.as_mut(), &log.reference, &self.settings).map_err(in_loop)?;
+            if !run.status.is_done() {
+                self.failure = Some(format!("log `{}`: {}", log.name, run.status));
+                return Ok(None);
+            }
+            self.rows_of(log, &run, &mut out).map_err(Stop::Log)?;
+        }
+        Ok(Some(SimulatedRows { output: DVector::from_vec(out.output), regressor: out.regressor }))
+    }
+}
+
+/// Rows of all logs as they come.
+struct Gathered {
+    output: Vec<f64>,
+    regressor: DMatrix<f64>,
+    filled: usize,
+}
+
+/// One number per joint and sample through the parallel filter.
+struct Outputs {
+    decimators: Option<Vec<Decimator>>,
+    segments: Vec<usize>,
+    out: Vec<f64>,
+    rows: Vec<Vec<f64>>,
+}
+
+impl Outputs {
+    fn new(dof: usize, filter: Option<&DecimationSettings>, rate_hz: f64) -> Result<Self, FilterError> {
+        let decimators = filter
+            .map(|settings| (0..dof).map(|_| Decimator::new(settings, rate_hz, 1)).collect::<Result<Vec<_>, _>>())
+            .transpose()?;
+        Ok(Self { decimators, segments: vec![0; dof], out: Vec::new(), rows: vec![Vec::new(); dof] })
+    }
+
+    fn needed(&self) -> usize {
+        self.decimators.as_ref().and_then(|all| all.first()).map_or(1, Decimator::length)
+    }
+
+    fn take(&mut self, joint: usize, segment: usize, values: &[f64]) {
+        let Some(decimators) = &mut self.decimators else {
+            self.rows[joint].extend_from_slice(values);
+            return;
+        };
+        if std::mem::replace(&mut self.segments[joint], segment) != segment {
+            decimators[joint].finish();
+        }
+        let rows = decimators[joint].push(values, values.len(), &mut self.out);
+        self.rows[joint].extend_from_slice(&self.out[..rows]);
+    }
+}
+
+/// Keeps every joint's filtered panels.
+struct PanelRows {
+    joints: Vec<Vec<(usize, Vec<f64>)>>,
+}
+
+impl RowConsumer for PanelRows {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
+        self.joints[rows.joint].push((rows.rows, rows.panel.to_vec()));
+        Ok(())
+    }
+}
+
+/// The motion of a run at any time of the log's clock: between the controller's samples the quintic that has both ends' position, speed and acceleration.
+fn sampled(run: &Run, begins_s: f64) -> Result<dynident_recording::Reference, FilterError> {
+    let times: Vec<f64> = (0..run.samples).map(|sample| begins_s + run.time_s(sample)).collect();
+    let joints: Vec<[Vec<f64>; 3]> = (0..run.joints.len())
+        .map(|joint| [&run.q, &run.dq, &run.ddq].map(|values| values[run.of(joint)].to_vec()))
+        .collect();
+    dynident_recording::Reference::sampled(&times, &joints)
+}
+
+/// The torque in force: that of the controller's last sample; rounding must not fetch the one before.
+fn held_torque(run: &Run, joint: usize, time_s: f64) -> f64 {
+    let sample = ((time_s * run.rate_hz).max(0.0) + 1e-6).floor() as usize;
+    run.tau[run.of(joint)][sample.min(run.samples - 1)]
+}

@@ -1,0 +1,157 @@
+//! Rows for estimating a lag: regressor, slope of the predicted torque, and the torque at six neighbouring samples, from which it is known at any time between.
+
+use dynident_estimation::{EstimationError, SegmentSettings, SegmentedFactor};
+use dynident_recording::{DecimationSettings, Decimator};
+
+/// Samples that torque between samples is made from.
+pub(crate) const NODES: usize = 6;
+/// The first of them, from the centre.
+const FIRST_NODE: isize = -2;
+/// Samples that the slope needs on either side.
+const SLOPE_REACH: isize = 2;
+
+/// One uninterrupted piece of a log.
+pub(crate) struct Piece {
+    pub(crate) segment: usize,
+    /// Predicted torque sample by sample, by joint.
+    pub(crate) model: Vec<Vec<f64>>,
+    /// Measured torque sample by sample, by joint.
+    pub(crate) measured: Vec<Vec<f64>>,
+    /// Filtered regressor rows by joint: blocks of rows, column by column.
+    pub(crate) rows: Vec<Vec<(usize, Vec<f64>)>>,
+}
+
+impl Piece {
+    pub(crate) fn new(segment: usize, joints: usize) -> Self {
+        let none = || vec![Vec::new(); joints];
+        Self { segment, model: none(), measured: none(), rows: vec![Vec::new(); joints] }
+    }
+}
+
+/// One joint's rows `[Y | −∂(Yθ)/∂t | τ at the six nodes]`, filtered alike; the last node stands where a factor has its torque.
+pub(crate) struct DelayRows {
+    pub(crate) factor: SegmentedFactor,
+    /// The sample after which the lag lies, give or take one.
+    pub(crate) centre: isize,
+    /// Root mean square of the filtered slope, Nm (N) per sample.
+    pub(crate) slope_rms: f64,
+}
+
+impl DelayRows {
+    /// Rows about a lag of `shift` samples; `columns` is the width of the regressor.
+    pub(crate) fn new(
+        pieces: &[Piece],
+        joint: usize,
+        columns: usize,
+        (rate_hz, filter): (f64, Option<&DecimationSettings>),
+        shift: f64,
+        segments: SegmentSettings,
+    ) -> Result<Self, EstimationError> {
+        let centre = shift.floor() as isize;
+        let mut factor = SegmentedFactor::new(columns + NODES, segments)?;
+        let mut panel = Vec::new();
+        for piece in pieces {
+            let further = Further::new(&piece.model[joint], &piece.measured[joint], centre, rate_hz, filter);
+            let mut first = 0;
+            for (rows, regressor) in &piece.rows[joint] {
+                let from = further.valid.start.max(first).min(first + rows);
+                let to = further.valid.end.clamp(from, first + rows);
+                panel.clear();
+                for column in regressor.chunks_exact(*rows) {
+                    panel.extend_from_slice(&column[from - first..to - first]);
+                }
+                for column in further.values.chunks_exact(further.rows.max(1)) {
+                    panel.extend_from_slice(&column[from..to]);
+                }
+                if to > from {
+                    factor.absorb(&panel, to - from)?;
+                }
+                first += rows;
+            }
+        }
+        let slope_rms = factor.total().column_norms()[columns] / (factor.rows().max(1) as f64).sqrt();
+        Ok(Self { factor, centre, slope_rms })
+    }
+
+    /// Whether the nodes still surround a lag of `shift` samples.
+    pub(crate) fn reaches(&self, shift: f64) -> bool {
+        (-0.5..=1.5).contains(&(shift - self.centre as f64))
+    }
+}
+
+/// Slope and shifted torques behind the filter, and which of their rows stand on samples that are there.
+struct Further {
+    rows: usize,
+    values: Vec<f64>,
+    valid: core::ops::Range<usize>,
+}
+
+impl Further {
+    fn new(model: &[f64], measured: &[f64], centre: isize, rate_hz: f64, filter: Option<&DecimationSettings>) -> Self {
+        let n = model.len() as isize;
+        let at = |signal: &[f64], k: isize| usize::try_from(k).ok().and_then(|k| signal.get(k).copied()).unwrap_or(0.0);
+        // Differences of order four: less than 1 % short at a tenth of the sampling rate.
+        let slope =
+            |k: isize| (8.0 * (at(model, k + 1) - at(model, k - 1)) - (at(model, k + 2) - at(model, k - 2))) / 12.0;
+        let mut signals: Vec<f64> = (0..n).map(|k| -slope(k)).collect();
+        for node in 0..NODES as isize {
+            signals.extend((0..n).map(|k| at(measured, k + centre + FIRST_NODE + node)));
+        }
+        let last_node = FIRST_NODE + NODES as isize - 1;
+        let low = SLOPE_REACH.max(-(centre + FIRST_NODE)).max(0);
+        let high = n - SLOPE_REACH.max(centre + last_node).max(0);
+        let decimator = filter.and_then(|settings| Decimator::new(settings, rate_hz, NODES + 1).ok());
+        let Some(mut decimator) = decimator else {
+            let valid = low.min(n) as usize..high.max(low.min(n)) as usize;
+            return Self { rows: n as usize, values: signals, valid };
+        };
+        let mut values = Vec::new();
+        let rows = decimator.push(&signals, n as usize, &mut values);
+        let reach = decimator.half_length() as isize;
+        let whole = |row: &usize| {
+            let middle = decimator.input_row(*row as u64) as isize;
+            middle - reach >= low && middle + reach < high
+        };
+        let start = (0..rows).find(whole).unwrap_or(rows);
+        let end = (start..rows).rev().find(whole).map_or(start, |row| row + 1);
+        Self { rows, values, valid: start..end }
+    }
+}
+
+/// Weights of the six nodes for the value `x` samples after the centre: Lagrange's polynomial of degree five.
+pub(crate) fn lagrange(x: f64) -> [f64; NODES] {
+    let node = |k: usize| (k as isize + FIRST_NODE) as f64;
+    core::array::from_fn(|i| {
+        (0..NODES).filter(|&k| k != i).map(|k| (x - node(k)) / (node(i) - node(k))).product::<f64>()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn torque_between_samples_is_exact_for_polynomials() {
+        let value = |t: f64| 0.3 - t + 0.2 * t.powi(3) - 0.01 * t.powi(5);
+        for x in [-0.4, 0.0, 0.37, 0.5, 1.0, 1.3] {
+            let found: f64 = lagrange(x).iter().enumerate().map(|(k, w)| w * value(k as f64 - 2.0)).sum();
+            // Rounding of six products of order ten.
+            assert!((found - value(x)).abs() < 1e-12, "{x}");
+        }
+    }
+
+    #[test]
+    fn rows_at_the_ends_are_left_out() {
+        let signal: Vec<f64> = (0..50).map(f64::from).collect();
+        for (centre, valid) in [(0, 2..47), (4, 2..43), (-5, 7..48)] {
+            let found = Further::new(&signal, &signal, centre, 100.0, None);
+            assert_eq!(found.valid, valid, "{centre}");
+            for k in valid {
+                // The slope of a ramp, and the ramp itself further on.
+                assert!((found.values[k] + 1.0).abs() < 1e-12);
+                assert_eq!(found.values[50 + k], (k as isize + centre - 2) as f64);
+            }
+        }
+        assert!(Further::new(&signal[..3], &signal[..3], 20, 100.0, None).valid.is_empty());
+    }
+}

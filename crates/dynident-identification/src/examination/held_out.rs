@@ -1,0 +1,173 @@
+//! A model against a recording that was not used for its fit.
+
+use super::nominal_agreement::{Evidence, PriorAgreement};
+use super::residuals::{JointResiduals, JointWatch, Uncertainty};
+use super::torque_delay::{DelayCheck, TorqueLag};
+use super::torque_trace::{LogTrace, TraceConsumer};
+use crate::error::IdentificationError;
+use crate::logs::Logs;
+use crate::recording::Role;
+use crate::regressor_model::RegressorModel;
+use crate::rows::{JointRows, LogPass, LogStatistics, RawSamples, RowConsumer, predicted_torque};
+use dynident_estimation::{Validation, ValidationReport};
+use serde::{Deserialize, Serialize};
+
+/// Errors of the predicted torque on one held-out recording.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct LogValidation {
+    /// The log.
+    pub log: String,
+    /// On the torque as filtered for the estimation.
+    #[serde(flatten)]
+    pub model: ValidationReport,
+    /// On the torque as logged.
+    pub raw: ValidationReport,
+    /// The physically consistent set on the filtered torque.
+    pub physical: Option<ValidationReport>,
+    /// The description's own model on the filtered torque.
+    pub prior: Option<ValidationReport>,
+    /// What the residuals look like, joint by joint.
+    pub residuals: Vec<JointResiduals>,
+}
+
+/// A recording that a model was tested on.
+#[derive(Clone, Debug)]
+pub struct HeldOutExamination {
+    /// Number of the recording.
+    pub index: usize,
+    /// Errors of the predicted torque.
+    pub validation: LogValidation,
+    /// How the recording was read.
+    pub statistics: LogStatistics,
+    /// How well the nominal values explain it, where they are known.
+    pub nominal_agreement: Option<PriorAgreement>,
+    /// Delays of the torque, joint by joint; none where the log does not tell.
+    pub delays: Vec<Option<TorqueLag>>,
+    /// Measured and predicted torque over time, if asked for.
+    pub trace: Option<LogTrace>,
+}
+
+struct Test<'a> {
+    rows_of: &'a RegressorModel,
+    log: String,
+    theta: &'a [f64],
+    watches: Vec<JointWatch>,
+    model: Validation,
+    physical: Option<(&'a [f64], Validation)>,
+    raw: Validation,
+    prior: Option<(&'a [f64], Validation)>,
+    evidence: Option<Evidence<'a>>,
+    delay: DelayCheck<'a>,
+    trace: Option<TraceConsumer<'a>>,
+    buffer: Vec<f64>,
+}
+
+impl Test<'_> {
+    fn failed(&self, source: dynident_estimation::EstimationError) -> IdentificationError {
+        IdentificationError::Rows { log: self.log.clone(), source }
+    }
+}
+
+impl RowConsumer for Test<'_> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
+        let columns = self.rows_of.layout().joint_columns(rows.joint);
+        let measured = &rows.panel[columns.len() * rows.rows..];
+        predicted_torque(rows.panel, rows.rows, columns, self.theta, &mut self.buffer);
+        self.model.add_joint(rows.joint, measured, &self.buffer).map_err(|source| self.failed(source))?;
+        self.watches[rows.joint].add(rows.panel, rows.rows, &self.buffer);
+        for (prior, validation) in [&mut self.prior, &mut self.physical].into_iter().flatten() {
+            predicted_torque(rows.panel, rows.rows, columns, prior, &mut self.buffer);
+            let added = validation.add_joint(rows.joint, measured, &self.buffer);
+            added.map_err(|source| IdentificationError::Rows { log: self.log.clone(), source })?;
+        }
+        if let Some(evidence) = &mut self.evidence {
+            evidence.filtered(rows, &mut self.buffer);
+        }
+        if let Some(trace) = &mut self.trace {
+            trace.filtered(rows);
+        }
+        self.delay.filtered(rows);
+        Ok(())
+    }
+
+    fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), IdentificationError> {
+        let rows = samples.panels.samples();
+        for joint in 0..self.rows_of.model().dof() {
+            let columns = self.rows_of.layout().joint_columns(joint);
+            let panel = samples.panels.joint(joint);
+            predicted_torque(panel, rows, columns, self.theta, &mut self.buffer);
+            let added = self.raw.add_joint(joint, &panel[columns.len() * rows..], &self.buffer);
+            added.map_err(|source| self.failed(source))?;
+        }
+        if let Some(trace) = &mut self.trace {
+            trace.raw(samples);
+        }
+        self.delay.raw(samples);
+        Ok(())
+    }
+}
+
+/// What is tested on a recording.
+#[derive(Clone, Copy, Debug)]
+pub struct TestedModel<'a> {
+    /// Base parameters.
+    pub theta: &'a [f64],
+    /// Those of the physically consistent set.
+    pub physical: Option<&'a [f64]>,
+    /// What the band of the predicted torque is made from.
+    pub uncertainty: Option<&'a Uncertainty>,
+    /// Whether the torque over time is kept.
+    pub traced: bool,
+}
+
+/// Tests base parameters on recording number `index`, those of the consistent set beside them; with their uncertainty also the band of the predicted torque, and the torque over time if asked for.
+///
+/// # Errors
+/// What reading it can give.
+pub fn examine_held_out(
+    logs: &Logs<'_>,
+    model: &RegressorModel,
+    index: usize,
+    tested: &TestedModel<'_>,
+) -> Result<HeldOutExamination, IdentificationError> {
+    let TestedModel { theta, physical, uncertainty, traced } = *tested;
+    let (recording, joints) = (&logs.recordings[index], model.joint_names());
+    let columns = (0..model.dof()).map(|joint| model.layout().joint_columns(joint)).collect();
+    let nominal = model.parametric.nominal_base();
+    let mut test = Test {
+        rows_of: model,
+        log: recording.label(),
+        theta,
+        watches: (0..joints.len()).map(|joint| JointWatch::new(model.layout(), joint, uncertainty)).collect(),
+        model: Validation::new(joints.clone()),
+        physical: physical.map(|physical| (physical, Validation::new(joints.clone()))),
+        raw: Validation::new(joints.clone()),
+        prior: nominal.map(|nominal| (nominal, Validation::new(joints.clone()))),
+        evidence: nominal.map(|nominal| Evidence::new(columns, nominal)),
+        delay: DelayCheck::new(model, theta),
+        trace: traced.then(|| TraceConsumer::new(model, theta)),
+        buffer: Vec::new(),
+    };
+    logs.begin(&format!("testing on {}", recording.name), &[index]);
+    let pass = LogPass { reader_thread: logs.execution.parallel(), kept: None, ..logs.pass(model, index) };
+    let statistics = pass.run(&mut test);
+    logs.end();
+    let statistics = statistics?;
+    let name = &recording.name;
+    let residuals = test.watches.iter().zip(&joints).map(|(watch, joint)| watch.report(name, joint)).collect();
+    Ok(HeldOutExamination {
+        index,
+        validation: LogValidation {
+            log: name.clone(),
+            model: test.model.report(),
+            raw: test.raw.report(),
+            physical: test.physical.map(|(_, validation)| validation.report()),
+            prior: test.prior.map(|(_, validation)| validation.report()),
+            residuals,
+        },
+        nominal_agreement: test.evidence.as_ref().map(|evidence| evidence.agreement(&joints)),
+        delays: test.delay.delays(logs.settings, &logs.motion),
+        trace: test.trace.map(|trace| trace.finished(name.clone(), Role::Validate, statistics.filtered_rate_hz)),
+        statistics,
+    })
+}

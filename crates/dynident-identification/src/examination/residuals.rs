@@ -1,0 +1,145 @@
+//! Residual diagnostics and the 95 % band of a held-out log, joint by joint, in the pass that validates.
+
+use dynident_dynamics::{Column, PanelLayout};
+use dynident_estimation::{
+    Estimate, Normality, NormalityReport, Regimes, RegimesReport, Whiteness, WhitenessReport, student_half_width,
+};
+use dynident_model::laws::Law;
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// What the filtered residual of one joint looks like on a log.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct JointResiduals {
+    /// The joint.
+    pub name: String,
+    /// Ljung and Box's test; none for a short log.
+    pub whiteness: Option<WhitenessReport>,
+    /// Jarque and Bera's test; none for a short log.
+    pub normality: Option<NormalityReport>,
+    /// Residual by speed; none where the speed is not among the model's columns (no viscous friction, nor both directions of it).
+    pub regimes: Option<RegimesReport>,
+    /// The predicted torque's 95 % band; none where the covariance is not at hand. Written as `torque_band` of a result, for a finished model's test has none.
+    #[serde(skip)]
+    pub band: Option<TorqueBand>,
+}
+
+/// How well the predicted 95 % band `τ̂ ± t √(w V wᵀ + σ²)` holds the torque of one joint on a held-out log.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct TorqueBand {
+    /// The log.
+    pub log: String,
+    /// The joint.
+    pub joint: String,
+    /// Share of the filtered torque inside, percent.
+    pub coverage_percent: f64,
+    /// Its mean half width, Nm (N).
+    pub half_width_nm: f64,
+}
+
+/// What the band needs of an estimate.
+#[derive(Clone, Debug)]
+pub struct Uncertainty {
+    covariance: DMatrix<f64>,
+    joint_sigma: Vec<f64>,
+    width: f64,
+}
+
+impl Uncertainty {
+    /// Of base parameters with the given covariance.
+    pub fn of(estimate: &Estimate, covariance: DMatrix<f64>) -> Self {
+        let freedom = estimate.degrees_of_freedom as f64;
+        Self { covariance, joint_sigma: estimate.joint_sigma.clone(), width: student_half_width(0.95, freedom) }
+    }
+}
+
+/// Accumulates one joint's residuals.
+pub(crate) struct JointWatch {
+    /// The joint's columns among all.
+    own: DMatrix<f64>,
+    sigma: Option<(f64, f64)>,
+    /// Places among the panel's columns whose sum is the speed: viscous friction, or its two directions. None where there are no such columns.
+    speed: Vec<usize>,
+    whiteness: Whiteness,
+    normality: Normality,
+    regimes: Regimes,
+    inside: usize,
+    samples: usize,
+    widths: f64,
+}
+
+impl JointWatch {
+    pub(crate) fn new(layout: &PanelLayout, joint: usize, uncertainty: Option<&Uncertainty>) -> Self {
+        let columns = layout.joint_columns(joint);
+        let all = layout.columns();
+        let places = |is: &dyn Fn(&Law) -> bool| -> Vec<usize> {
+            let own = columns.iter().enumerate();
+            own.filter(|(_, column)| matches!(&all[**column], Column::Law(law) if is(law)))
+                .map(|(place, _)| place)
+                .collect()
+        };
+        let viscous = places(&|law| matches!(law, Law::Viscous(law) if law.joint == joint));
+        let directions = places(&|law| matches!(law, Law::DirectionalViscous(law) if law.joint == joint));
+        let speed = if viscous.is_empty() && directions.len() == 2 { directions } else { viscous };
+        // V = L Lᵀ of the joint's columns: the variance of a prediction w is ‖Lᵀ w‖². Covariances from few segments are singular, so by eigenvalues.
+        let own = uncertainty.map_or_else(
+            || DMatrix::zeros(0, columns.len()),
+            |uncertainty| {
+                let own = uncertainty.covariance.select_rows(columns).select_columns(columns);
+                let eigen = own.symmetric_eigen();
+                let root = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
+                DMatrix::from_diagonal(&root) * eigen.eigenvectors.transpose()
+            },
+        );
+        Self {
+            own,
+            sigma: uncertainty.map(|uncertainty| (uncertainty.joint_sigma[joint], uncertainty.width)),
+            speed,
+            whiteness: Whiteness::default(),
+            normality: Normality::default(),
+            regimes: Regimes::default(),
+            inside: 0,
+            samples: 0,
+            widths: 0.0,
+        }
+    }
+
+    /// Rows of the joint: its panel (columns, then torque) and the predicted torque.
+    pub(crate) fn add(&mut self, panel: &[f64], rows: usize, predicted: &[f64]) {
+        let columns = self.own.ncols();
+        for row in 0..rows {
+            let residual = panel[columns * rows + row] - predicted[row];
+            self.samples += 1;
+            self.whiteness.add(residual);
+            self.normality.add(residual);
+            if !self.speed.is_empty() {
+                self.regimes.add(self.speed.iter().map(|column| panel[column * rows + row]).sum(), residual);
+            }
+            if let Some((sigma, width)) = self.sigma {
+                let variance: f64 = (0..self.own.nrows())
+                    .map(|k| (0..columns).map(|c| self.own[(k, c)] * panel[c * rows + row]).sum::<f64>().powi(2))
+                    .sum();
+                let half = width * (variance + sigma * sigma).sqrt();
+                self.widths += half;
+                self.inside += usize::from(residual.abs() <= half);
+            }
+        }
+    }
+
+    pub(crate) fn report(&self, log: &str, name: &str) -> JointResiduals {
+        let counted = self.sigma.is_some() && self.samples > 0;
+        let samples = self.samples as f64;
+        JointResiduals {
+            name: name.to_owned(),
+            whiteness: self.whiteness.report(),
+            normality: self.normality.report(),
+            regimes: (!self.speed.is_empty()).then(|| self.regimes.report()),
+            band: counted.then(|| TorqueBand {
+                log: log.to_owned(),
+                joint: name.to_owned(),
+                coverage_percent: 100.0 * self.inside as f64 / samples,
+                half_width_nm: self.widths / samples,
+            }),
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! Measured and predicted torque over time, for the report.
+
+use crate::recording::Role;
+use crate::regressor_model::RegressorModel;
+use crate::rows::{JointRows, RawSamples, predicted_torque};
+
+/// Rows of one joint that are kept at most: pictures need no more, and memory stays bounded.
+const MOST_ROWS: usize = 100_000;
+
+/// Torque of one joint.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct JointTrace {
+    /// As measured, filtered as for the fit, Nm (N); NaN where the log has a gap.
+    pub measured_nm: Vec<f64>,
+    /// By the estimated base parameters; NaN in gaps.
+    pub predicted_nm: Vec<f64>,
+}
+
+/// Measured and predicted torque of one log's first samples.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LogTrace {
+    /// The log.
+    pub log: String,
+    /// What the log is for.
+    pub role: Role,
+    /// Rows a second.
+    pub rate_hz: f64,
+    /// Whether the log goes on after what is kept.
+    pub cut: bool,
+    /// One for each joint, in the model's order.
+    pub joints: Vec<JointTrace>,
+}
+
+/// Gathers a [`LogTrace`] while rows pass.
+#[derive(Debug)]
+pub(crate) struct TraceConsumer<'a> {
+    model: &'a RegressorModel,
+    theta: &'a [f64],
+    trace: LogTrace,
+    segment: Option<usize>,
+    buffer: Vec<f64>,
+}
+
+impl<'a> TraceConsumer<'a> {
+    pub(crate) fn new(model: &'a RegressorModel, theta: &'a [f64]) -> Self {
+        let joints = vec![JointTrace::default(); model.model().dof()];
+        Self { model, theta, trace: LogTrace { joints, ..LogTrace::default() }, segment: None, buffer: Vec::new() }
+    }
+
+    pub(crate) fn raw(&mut self, samples: &RawSamples<'_>) {
+        if *self.segment.get_or_insert(samples.segment) != samples.segment {
+            self.segment = Some(samples.segment);
+            for JointTrace { measured_nm, predicted_nm } in &mut self.trace.joints {
+                // One gap, however many pieces gave no row.
+                if measured_nm.last().is_some_and(|value| !value.is_nan()) {
+                    measured_nm.push(f64::NAN);
+                    predicted_nm.push(f64::NAN);
+                }
+            }
+        }
+    }
+
+    pub(crate) fn filtered(&mut self, rows: &JointRows<'_>) {
+        let columns = self.model.layout().joint_columns(rows.joint);
+        let JointTrace { measured_nm, predicted_nm } = &mut self.trace.joints[rows.joint];
+        let kept = rows.rows.min(MOST_ROWS.saturating_sub(measured_nm.len()));
+        self.trace.cut |= kept < rows.rows;
+        if kept > 0 {
+            predicted_torque(rows.panel, rows.rows, columns, self.theta, &mut self.buffer);
+            predicted_nm.extend_from_slice(&self.buffer[..kept]);
+            measured_nm.extend_from_slice(&rows.panel[columns.len() * rows.rows..][..kept]);
+        }
+    }
+
+    pub(crate) fn finished(self, log: String, role: Role, rate_hz: f64) -> LogTrace {
+        LogTrace { log, role, rate_hz, ..self.trace }
+    }
+}

@@ -1,0 +1,49 @@
+//! A second pass over the first samples of a training log, now that there is a model to predict them with.
+
+use super::torque_delay::{DELAY_SAMPLES, DelayCheck, TorqueLag};
+use super::torque_trace::{LogTrace, TraceConsumer};
+use crate::error::IdentificationError;
+use crate::logs::Logs;
+use crate::progress::Silent;
+use crate::recording::Role;
+use crate::regressor_model::RegressorModel;
+use crate::rows::{JointRows, LogPass, RawSamples, RowConsumer};
+
+/// What the second pass gathers.
+struct SecondPass<'a> {
+    delay: DelayCheck<'a>,
+    trace: TraceConsumer<'a>,
+}
+
+impl RowConsumer for SecondPass<'_> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
+        self.trace.filtered(rows);
+        self.delay.filtered(rows);
+        Ok(())
+    }
+
+    fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), IdentificationError> {
+        self.trace.raw(samples);
+        self.delay.raw(samples);
+        Ok(())
+    }
+}
+
+/// The delays of the torque of recording number `index`, and its torque over time, with the base parameters `theta`.
+///
+/// # Errors
+/// What reading it can give.
+pub fn examine_training(
+    logs: &Logs<'_>,
+    model: &RegressorModel,
+    index: usize,
+    theta: &[f64],
+) -> Result<(Vec<Option<TorqueLag>>, LogTrace), IdentificationError> {
+    let mut second = SecondPass { delay: DelayCheck::new(model, theta), trace: TraceConsumer::new(model, theta) };
+    let most_samples = Some(DELAY_SAMPLES as u64);
+    let pass = LogPass { most_samples, progress: &Silent, ..logs.pass(model, index) };
+    let statistics = pass.run(&mut second)?;
+    let delays = second.delay.delays(logs.settings, &logs.motion);
+    let name = logs.recordings[index].name.clone();
+    Ok((delays, second.trace.finished(name, Role::Identify, statistics.filtered_rate_hz)))
+}

@@ -1,0 +1,135 @@
+//! The friction that a joint may have when the data choose: terms, and for each term a grid of its constants, every one a column.
+
+use dynident_model::laws::{
+    Coulomb, CoulombShape, Direction, DirectionalViscous, Law, LoadFriction, MaxwellSlip, Power, PowerExponent,
+    Sigmoid, Stribeck, Viscous,
+};
+
+/// Widths of the smooth Coulomb step, rad/s or m/s; beside them the sign and what the study states.
+const WIDTHS: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
+/// Stribeck speeds, rad/s or m/s.
+const STRIBECK_SPEEDS: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.4];
+const STRIBECK_EXPONENTS: [f64; 2] = [1.0, 2.0];
+/// Width of the step under the Stribeck term as a share of its speed: beyond half its speed the step is done.
+const STRIBECK_WIDTH: f64 = 0.25;
+const SIGMOID_WIDTHS: [f64; 3] = [0.02, 0.05, 0.1];
+/// Yield displacements of the Maxwell-slip elements, rad or m.
+const YIELDS: [f64; 6] = [3.0e-4, 1.0e-3, 3.0e-3, 1.0e-2, 3.0e-2, 1.0e-1];
+
+/// What a candidate model is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Term {
+    Viscous,
+    AsymmetricViscous,
+    Coulomb,
+    Sigmoid,
+    Stribeck,
+    CubeRoot,
+    Quadratic,
+    Load,
+    MaxwellSlip,
+}
+
+impl Term {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Viscous => "viscous",
+            Self::AsymmetricViscous => "asymmetric viscous",
+            Self::Coulomb => "coulomb",
+            Self::Sigmoid => "sigmoid",
+            Self::Stribeck => "stribeck",
+            Self::CubeRoot => "cube-root",
+            Self::Quadratic => "quadratic",
+            Self::Load => "load",
+            Self::MaxwellSlip => "maxwell-slip",
+        }
+    }
+
+    /// Constants that are tuned for it: they count as parameters.
+    pub(crate) fn constants(self) -> usize {
+        match self {
+            Self::Coulomb => 1,
+            Self::Sigmoid | Self::Stribeck => 2,
+            _ => 0,
+        }
+    }
+
+    /// True when one column of its grid is taken; else all are.
+    pub(crate) fn takes_one(self) -> bool {
+        self.constants() > 0
+    }
+}
+
+/// One column that a joint may have.
+#[derive(Clone, Debug)]
+pub(crate) struct CandidateColumn {
+    pub(crate) term: Term,
+    pub(crate) law: Law,
+    /// What is stated when this column is chosen: itself, or both directions of a term that has two.
+    pub(crate) stated: Vec<Law>,
+}
+
+/// A joint whose friction the training logs choose, and where the search begins.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrictionSearch {
+    /// The joint.
+    pub joint: String,
+    /// Its stated Coulomb step: one of the candidates. None by default.
+    pub coulomb: Option<CoulombShape>,
+    /// Velocity below which the sign step counts as zero, rad/s or m/s. 0 by default.
+    pub dead_band: f64,
+    /// Width of the step of load-dependent friction where no smooth step is stated, rad/s or m/s. 0.02 by default.
+    pub width: f64,
+}
+
+impl FrictionSearch {
+    /// The search for a joint's friction with the defaults.
+    pub fn of(joint: impl Into<String>) -> Self {
+        Self { joint: joint.into(), coulomb: None, dead_band: 0.0, width: 0.02 }
+    }
+}
+
+/// The columns to choose from at `joint`; a term's columns stand together, in the order of its grid.
+pub(crate) fn candidate_columns(search: &FrictionSearch, joint: usize) -> Vec<CandidateColumn> {
+    let sign = CoulombShape::Sign { dead_band: search.dead_band };
+    let mut shapes = vec![sign];
+    shapes.extend(WIDTHS.map(|width| CoulombShape::Smooth { width }));
+    if let Some(stated) = search.coulomb.filter(|stated| !shapes.contains(stated)) {
+        shapes.push(stated);
+    }
+    let load_width = match search.coulomb {
+        Some(CoulombShape::Smooth { width }) => width,
+        _ => search.width,
+    };
+    let mut columns = Vec::new();
+    let mut add = |term, laws: Vec<Law>| {
+        let column = |law: &Law| CandidateColumn { term, law: law.clone(), stated: laws.clone() };
+        columns.extend(laws.iter().map(column));
+    };
+    add(Term::Viscous, vec![Law::Viscous(Viscous { joint })]);
+    for shape in shapes {
+        add(Term::Coulomb, vec![Law::Coulomb(Coulomb { joint, shape })]);
+    }
+    let both = [Direction::Forward, Direction::Backward];
+    let directions = both.map(|direction| Law::DirectionalViscous(DirectionalViscous { joint, direction }));
+    add(Term::AsymmetricViscous, directions.to_vec());
+    for width in SIGMOID_WIDTHS {
+        for offset_speed in [-0.5 * width, 0.5 * width] {
+            add(Term::Sigmoid, vec![Law::Sigmoid(Sigmoid { joint, steepness: 2.0 / width, offset_speed })]);
+        }
+    }
+    for speed in STRIBECK_SPEEDS {
+        for exponent in STRIBECK_EXPONENTS {
+            let shape = CoulombShape::Smooth { width: STRIBECK_WIDTH * speed };
+            add(Term::Stribeck, vec![Law::Stribeck(Stribeck { joint, speed, exponent, shape })]);
+        }
+    }
+    for (term, exponent) in [(Term::CubeRoot, PowerExponent::CubeRoot), (Term::Quadratic, PowerExponent::Quadratic)] {
+        add(term, vec![Law::Power(Power { joint, exponent, rounding: Power::ROUNDING })]);
+    }
+    add(Term::Load, vec![Law::Load(LoadFriction { joint, shape: CoulombShape::Smooth { width: load_width } })]);
+    for yield_displacement in YIELDS {
+        add(Term::MaxwellSlip, vec![Law::MaxwellSlip(MaxwellSlip { joint, yield_displacement })]);
+    }
+    columns
+}

@@ -1,0 +1,336 @@
+//! The whole way from recordings to an identified model, stage by stage.
+
+use crate::consistent::{
+    ConsistencyError, ParameterInterval, consistent_intervals, consistent_with_estimate, inconsistent_nominal_bodies,
+    inertials, nearest_to_nominal,
+};
+use crate::error::IdentificationError;
+use crate::estimators::{Estimation, InstrumentSource, TrainingRows, estimate};
+use crate::examination::{
+    HeldOutExamination, LogTrace, SignEvidence, TestedModel, TorqueLag, Uncertainty, examine_held_out,
+    examine_training, pooled_delay, sign_evidence,
+};
+use crate::execution::Execution;
+use crate::logs::{Logs, of_role};
+use crate::payload::{KnownArm, PayloadResult, payload_results};
+use crate::recording::Role;
+use crate::regressor_model::RegressorModel;
+use crate::task::IdentificationTask;
+use crate::training::{Training, training_rows};
+use dynident_estimation::consistent::PhysicalFit;
+use dynident_estimation::{EssentialReport, Estimate, LinearProblem, essential};
+use dynident_model::InertialParameters;
+use dynident_recording::MotionSettings;
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// Where the time went, seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StageTimes {
+    /// From logs to factors.
+    pub logs_s: f64,
+    /// From factors to parameters.
+    pub estimation_s: f64,
+    /// Delays, traces and held-out recordings.
+    pub examination_s: f64,
+}
+
+/// Physically consistent parameters beside an estimate, or why there are none.
+#[derive(Clone, Debug)]
+pub struct ConsistentParameters {
+    /// The consistent set that explains the data best; none if it was not asked for or does not exist.
+    pub fit: Option<PhysicalFit>,
+    /// Why there is none although it was asked for.
+    pub failure: Option<String>,
+    /// All parameters, ten for each body and one for each term: the consistent set's, or else the set nearest to the nominal one that has the estimated base parameters.
+    pub parameters: Vec<f64>,
+    /// Intervals of all parameters over all consistent sets that the data do not reject, if asked for.
+    pub intervals: Option<Vec<ParameterInterval>>,
+    /// Bodies whose nominal parameters are no body's, with the least eigenvalue of their pseudo-inertia.
+    pub inconsistent_nominal: Vec<(String, f64)>,
+    /// How well consistent sets explain the torque with either sign.
+    pub sign: Option<SignEvidence>,
+}
+
+/// What the training recordings say of the estimate.
+#[derive(Clone, Debug)]
+pub struct TrainingExamination {
+    /// For each training recording the delays of its torque, joint by joint; none where it does not tell.
+    pub delays: Vec<Vec<Option<TorqueLag>>>,
+    /// Measured and predicted torque over time.
+    pub traces: Vec<LogTrace>,
+    /// The delays of all recordings together, joint by joint.
+    pub pooled_delays: Vec<Option<TorqueLag>>,
+}
+
+/// An identified model with everything that was found on the way.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Identification {
+    /// The motion settings in force, with one cut-off for all recordings.
+    pub motion: MotionSettings,
+    /// The training recordings as factors, the model with the friction that was chosen, payload columns, gains.
+    pub training: Training,
+    /// The estimate and what its estimator can tell.
+    pub estimation: Estimation,
+    /// What was held at zero because the data hardly tell it, if that was asked for.
+    pub essential: Option<EssentialReport>,
+    /// Bodies, friction and drives.
+    pub consistent: ConsistentParameters,
+    /// Payloads that were estimated.
+    pub payloads: Vec<PayloadResult>,
+    /// Delays and torque over time of the training recordings.
+    pub examination: TrainingExamination,
+    /// Tests on recordings that were not fitted to.
+    pub held_out: Vec<HeldOutExamination>,
+    /// Where the time went.
+    pub times: StageTimes,
+}
+
+impl Identification {
+    /// The model: terms, base parameters, layout.
+    pub fn model(&self) -> &RegressorModel {
+        &self.training.model
+    }
+
+    /// The estimate over base parameters, payloads and offsets of single logs.
+    pub fn estimate(&self) -> &Estimate {
+        &self.estimation.estimate
+    }
+
+    /// Base parameters as estimated.
+    pub fn base_values(&self) -> &[f64] {
+        &self.estimation.estimate.values[..self.training.columns.base()]
+    }
+
+    /// Inertial parameters of all bodies: of the consistent set, where there is one.
+    pub fn inertials(&self) -> Vec<InertialParameters> {
+        inertials(self.model().model(), &self.consistent.parameters)
+    }
+
+    /// Base parameters of the consistent set, where there is one.
+    pub fn consistent_base_values(&self) -> Option<&[f64]> {
+        self.consistent.fit.as_ref().map(|fit| &fit.base_values[..])
+    }
+}
+
+/// Fits a robot's model to its recordings with the role [`Identify`](Role::Identify) and tests it on the others: rows and factors, estimate, consistent parameters, examination, held-out
+/// examination. Each of these stages can be called alone: [`Logs::new`], [`training_rows`], [`estimate`](crate::estimators::estimate()), [`consistent_stage`], [`examine_training`], [`examine_held_out`].
+///
+/// # Errors
+/// [`IdentificationError`]: recordings, settings that do not go together. A poor fit is not an error.
+pub fn identify(task: &IdentificationTask, execution: Execution<'_>) -> Result<Identification, IdentificationError> {
+    execution.install(|| identified(task, execution, &mut Job::Model(None)))
+}
+
+/// As [`identify()`] with instruments from `source`: the closed loop simulated with the model so far (IDIM-IV: call again with a new simulation until the parameters settle), or a repeated run.
+/// With [`Estimator::Instrumental`](crate::estimators::Estimator::Instrumental) they make the estimate, with another estimator they test it.
+///
+/// # Errors
+/// As [`identify()`], and what `source` returns.
+pub fn identify_with_instruments(
+    task: &IdentificationTask,
+    source: &mut dyn InstrumentSource,
+    execution: Execution<'_>,
+) -> Result<Identification, IdentificationError> {
+    execution.install(|| identified(task, execution, &mut Job::Model(Some(source))))
+}
+
+/// Payloads on an arm that is known already, with the arm's error bars in theirs. The task's robot has the arm's terms; bodies of the arm are not looked for.
+///
+/// # Errors
+/// As [`identify()`].
+pub fn identify_payload(
+    task: &IdentificationTask,
+    arm: &KnownArm,
+    execution: Execution<'_>,
+) -> Result<Identification, IdentificationError> {
+    execution.install(|| identified(task, execution, &mut Job::Payload(arm)))
+}
+
+/// What is looked for.
+enum Job<'a, 's> {
+    Model(Option<&'s mut dyn InstrumentSource>),
+    Payload(&'a KnownArm),
+}
+
+impl Job<'_, '_> {
+    fn arm(&self) -> Option<&KnownArm> {
+        match self {
+            Self::Model(_) => None,
+            Self::Payload(arm) => Some(arm),
+        }
+    }
+}
+
+fn identified(
+    task: &IdentificationTask,
+    execution: Execution<'_>,
+    job: &mut Job<'_, '_>,
+) -> Result<Identification, IdentificationError> {
+    let IdentificationTask { robot, recordings, payloads, settings } = task;
+    let chosen = of_role(recordings, Role::Identify);
+    if chosen.is_empty() {
+        return Err(IdentificationError::NoTrainingLog);
+    }
+    if let Some(knowledge) = &settings.consistency {
+        let mut named = knowledge.clone();
+        if !settings.friction.is_empty() {
+            // Terms that the logs are to choose are not there yet.
+            named.laws.clear();
+        }
+        named.check_names(robot.model(), robot.laws()).map_err(IdentificationError::Consistency)?;
+    }
+
+    // Rows and factors, with the filters in force and the friction that the logs choose.
+    let cutoff_hz = job.arm().and_then(KnownArm::cutoff_hz);
+    let logs = Logs::new(robot.model(), recordings, settings, &chosen, cutoff_hz, execution)?;
+    let refit = job.arm().map(KnownArm::refit);
+    let training = training_rows(&logs, robot.clone().into(), &chosen, payloads, refit)?;
+    let model = &training.model;
+    let mut times =
+        StageTimes { logs_s: training.timings_s[0], estimation_s: training.timings_s[1], examination_s: 0.0 };
+
+    // The estimate.
+    let started = Instant::now();
+    let rows = TrainingRows { logs: &logs, model, training: &chosen, problem: &training.problem };
+    let mut estimation = match job {
+        Job::Payload(arm) => {
+            Estimation::plain(arm.estimate(model, &training.columns, &training.problem, &settings.estimation)?)
+        }
+        Job::Model(source) => match &training.gains {
+            Some((found, _)) => Estimation::plain(found.clone()),
+            None => estimate(&rows, source.take())?,
+        },
+    };
+    let mut dropped = None;
+    if let Some(essential_settings) = &settings.estimation.essential {
+        let (rest, report) = essential(&estimation.estimate, essential_settings)?;
+        (estimation.estimate, dropped) = (rest, Some(report));
+    }
+
+    // Bodies, friction and drives that a robot can have.
+    let consistent = match job {
+        Job::Payload(_) => held_arm(task, &training, &estimation.estimate),
+        Job::Model(_) => consistent_stage(&logs, &training, &estimation.estimate)?,
+    };
+    times.estimation_s += started.elapsed().as_secs_f64();
+
+    // What training and held-out recordings say of it.
+    let started = Instant::now();
+    let examination = examine_all_training(&logs, &training, &estimation.estimate)?;
+    let physical = consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
+    let held_out = examine_all_held_out(&logs, &training, &estimation.estimate, physical)?;
+    times.examination_s = started.elapsed().as_secs_f64();
+    Ok(Identification {
+        payloads: payload_results((recordings, payloads), &chosen, &training.columns, &estimation.estimate),
+        motion: logs.motion.clone(),
+        training,
+        estimation,
+        essential: dropped,
+        consistent,
+        examination,
+        held_out,
+        times,
+    })
+}
+
+/// The arm's bodies are those of the earlier result; what the estimate of payloads says of them is the set nearest to the nominal one.
+fn held_arm(task: &IdentificationTask, training: &Training, estimate: &Estimate) -> ConsistentParameters {
+    let robot = &training.model.parametric;
+    let settings = task.settings.consistency.as_ref();
+    ConsistentParameters {
+        fit: None,
+        failure: Some("the arm is known from an earlier result, which has its bodies and its URDF".to_owned()),
+        parameters: nearest_to_nominal(robot, &estimate.values[..training.columns.base()]),
+        intervals: None,
+        inconsistent_nominal: settings.map_or_else(Vec::new, |settings| inconsistent_nominal_bodies(robot, settings)),
+        sign: None,
+    }
+}
+
+/// Consistent parameters for an estimate over the columns of `training`: the best set, its intervals if asked for, and which sign of the torque a robot can have at all.
+///
+/// # Errors
+/// Factors that do not belong to the estimate, intervals that cannot be had. That there is no consistent set is part of the result.
+pub fn consistent_stage(
+    logs: &Logs<'_>,
+    training: &Training,
+    estimate: &Estimate,
+) -> Result<ConsistentParameters, IdentificationError> {
+    let (settings, robot, columns) = (logs.settings, &training.model.parametric, &training.columns);
+    // Without the columns of payloads and offsets of single logs.
+    let alone: Option<LinearProblem> =
+        (!columns.is_plain()).then(|| columns.arm_problem(&training.problem, &estimate.values)).transpose()?;
+    let (problem, arm) = (alone.as_ref().unwrap_or(&training.problem), columns.arm_estimate(estimate));
+    let plain = settings.estimation.estimator.is_plain();
+    let fit = settings
+        .consistency
+        .as_ref()
+        .map(|knowledge| consistent_with_estimate(robot, problem, (&arm, plain), knowledge));
+    let (fit, failure) = match fit.transpose() {
+        Ok(fit) => (fit, None),
+        Err(reason) => (None, Some(reason.to_string())),
+    };
+    let intervals = match &settings.consistency {
+        // Where there is no consistent set, `failure` says why.
+        Some(knowledge) if settings.intervals && fit.is_some() => {
+            let estimated = (problem, &arm, plain);
+            let found = consistent_intervals(robot, estimated, knowledge, logs.execution.progress);
+            Some(found.map_err(|reason: ConsistencyError| IdentificationError::Intervals(reason))?)
+        }
+        _ => None,
+    };
+    let parameters = fit.as_ref().map(|fit| fit.parameters.clone());
+    let knowledge = settings.consistency.as_ref();
+    Ok(ConsistentParameters {
+        parameters: parameters.unwrap_or_else(|| nearest_to_nominal(robot, &arm.values)),
+        sign: sign_evidence(robot, problem, &arm),
+        inconsistent_nominal: knowledge
+            .map_or_else(Vec::new, |knowledge| inconsistent_nominal_bodies(robot, knowledge)),
+        fit,
+        failure,
+        intervals,
+    })
+}
+
+/// [`examine_training`] of every training recording, side by side.
+fn examine_all_training(
+    logs: &Logs<'_>,
+    training: &Training,
+    estimate: &Estimate,
+) -> Result<TrainingExamination, IdentificationError> {
+    let one = |log: &crate::training::LogFactors| {
+        let theta = training.columns.base_values(log.index, &estimate.values);
+        examine_training(logs, &training.model, log.index, &theta)
+    };
+    let found: Vec<_> = if logs.execution.parallel() {
+        training.logs.par_iter().map(one).collect::<Result<_, _>>()?
+    } else {
+        training.logs.iter().map(one).collect::<Result<_, _>>()?
+    };
+    let (delays, traces): (Vec<Vec<Option<TorqueLag>>>, Vec<LogTrace>) = found.into_iter().unzip();
+    let of_joint = |joint: usize| -> Vec<TorqueLag> { delays.iter().filter_map(|log| log[joint]).collect() };
+    let pooled_delays = (0..training.model.dof()).map(|joint| pooled_delay(&of_joint(joint))).collect();
+    Ok(TrainingExamination { delays, traces, pooled_delays })
+}
+
+/// [`examine_held_out`] of every recording to test on.
+fn examine_all_held_out(
+    logs: &Logs<'_>,
+    training: &Training,
+    estimate: &Estimate,
+    physical: Option<&[f64]>,
+) -> Result<Vec<HeldOutExamination>, IdentificationError> {
+    let columns = &training.columns;
+    let one = |index: usize| {
+        let theta = columns.base_values(index, &estimate.values);
+        let uncertainty = Uncertainty::of(estimate, columns.base_covariance(index, &estimate.covariance));
+        let physical =
+            physical.map(|values| columns.base_values(index, &[values, &estimate.values[columns.base()..]].concat()));
+        let tested =
+            TestedModel { theta: &theta, physical: physical.as_deref(), uncertainty: Some(&uncertainty), traced: true };
+        examine_held_out(logs, &training.model, index, &tested)
+    };
+    logs.of_role(Role::Validate).into_iter().map(one).collect()
+}

@@ -1,0 +1,122 @@
+//! From what the logs tell of a payload to a body with mass, centre of mass and inertia, and to a possible one.
+
+use super::columns::PayloadColumns;
+use dynident_estimation::consistent::{
+    BaseMap, PhysicalBody, PhysicalFit, PhysicalProblem, PhysicalSettings, physical_fit, rough_body,
+};
+use dynident_estimation::{Estimate, TriangularFactor};
+use nalgebra::{DMatrix, DVector};
+
+/// What data leave open is taken from a body of the payload's mass with this radius of gyration about the link's origin, metres.
+const LENGTH_M: f64 = 0.1;
+/// Least mass of that body, kg.
+const LEAST_MASS_KG: f64 = 0.01;
+/// Error bars count as at least this share of what a body of that size has: noise-free logs would leave nothing for the prior in double precision.
+const LEAST_RELATIVE_STD: f64 = 1.0e-5;
+
+/// Mass, centre of mass (3) and inertia about it (6: xx, xy, xz, yy, yz, zz), from ten parameters in a frame.
+pub(crate) fn at_centre_of_mass(p: &[f64; 10]) -> [f64; 10] {
+    let (m, h) = (p[0], [p[1], p[2], p[3]]);
+    let square: f64 = h.iter().map(|h| h * h).sum();
+    let mut out = [m, h[0] / m, h[1] / m, h[2] / m, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    for (k, (a, b)) in PAIRS.into_iter().enumerate() {
+        out[4 + k] = p[4 + k] - (if a == b { square } else { 0.0 } - h[a] * h[b]) / m;
+    }
+    out
+}
+
+/// The Jacobian of [`at_centre_of_mass`].
+pub(crate) fn jacobian(p: &[f64; 10]) -> DMatrix<f64> {
+    let (m, h) = (p[0], [p[1], p[2], p[3]]);
+    let square: f64 = h.iter().map(|h| h * h).sum();
+    let mut jacobian = DMatrix::identity(10, 10);
+    for k in 0..3 {
+        jacobian[(1 + k, 0)] = -h[k] / (m * m);
+        jacobian[(1 + k, 1 + k)] = 1.0 / m;
+    }
+    for (row, (a, b)) in PAIRS.into_iter().enumerate() {
+        let same = f64::from(u8::from(a == b));
+        jacobian[(4 + row, 0)] = (same * square - h[a] * h[b]) / (m * m);
+        for k in 0..3 {
+            let change = 2.0 * same * h[k] - f64::from(u8::from(k == a)) * h[b] - f64::from(u8::from(k == b)) * h[a];
+            jacobian[(4 + row, 1 + k)] = -change / m;
+        }
+    }
+    jacobian
+}
+
+const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+
+/// The possible body nearest to the estimate in the metric of its covariance; otherwise the reason why there is none.
+pub(crate) fn possible_body(name: &str, columns: &PayloadColumns, estimate: &Estimate) -> Result<PhysicalFit, String> {
+    let said = |error: &dyn core::fmt::Display| error.to_string();
+    let n = columns.kept.len();
+    let fixed = |place: &usize| estimate.rank.fixed.iter().any(|fixed| fixed.column == columns.first + place);
+    let told: Vec<usize> = (0..n).filter(|place| !fixed(place)).collect();
+    let value = |place: usize| estimate.values[columns.first + place];
+    let mass = if columns.kept.first() == Some(&0) { value(0).abs() } else { 1.0 }.max(LEAST_MASS_KG);
+    let reference = rough_body(mass, LENGTH_M);
+    // Both accounts of the error together: one from few segments has directions without any.
+    let entry = |i: usize, j: usize| estimate.covariance[(i, j)] + estimate.covariance_white[(i, j)];
+    let mut covariance =
+        DMatrix::from_fn(told.len(), told.len(), |i, j| entry(columns.first + told[i], columns.first + told[j]));
+    for (i, &place) in told.iter().enumerate() {
+        let length = match columns.kept[place] {
+            0 => 1.0,
+            1..=3 => LENGTH_M,
+            _ => LENGTH_M * LENGTH_M,
+        };
+        covariance[(i, i)] += (LEAST_RELATIVE_STD * mass * length).powi(2);
+    }
+    // V = L Lᵀ: rows L⁻¹ φ = L⁻¹ φ̂ have unit noise.
+    let lower = covariance.cholesky().ok_or_else(|| "its covariance is not positive definite".to_owned())?.l();
+    let values = DVector::from_iterator(told.len(), told.iter().map(|&place| value(place)));
+    let (Some(rows), Some(target)) = (lower.clone().try_inverse(), lower.solve_lower_triangular(&values)) else {
+        return Err("its covariance is not positive definite".to_owned());
+    };
+    let mut panel = vec![0.0; (n + 1) * told.len()];
+    for (i, &place) in told.iter().enumerate() {
+        panel[place * told.len()..(place + 1) * told.len()].copy_from_slice(rows.column(i).as_slice());
+    }
+    panel[n * told.len()..].copy_from_slice(target.as_slice());
+    let factor = TriangularFactor::from_rows(n, &panel, told.len()).map_err(|error| said(&error))?;
+    let map = BaseMap::from_regrouping(&columns.kept, &columns.dropped, &columns.regrouping).map_err(|e| said(&e))?;
+    let body =
+        PhysicalBody { name: name.to_owned(), reference, known: None, mass_kg: None, com_box_m: None, inside: None };
+    let problem = PhysicalProblem::new(map, vec![body], Vec::new(), &factor).map_err(|error| said(&error))?;
+    physical_fit(&problem, &PhysicalSettings::default()).map_err(|error| said(&error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynident_model::InertialParameters;
+
+    const BODY: [f64; 10] = [2.5, 0.3, -0.2, 0.5, 0.21, 0.01, -0.06, 0.19, 0.03, 0.09];
+
+    #[test]
+    fn values_are_those_of_the_body() {
+        let (found, body) = (at_centre_of_mass(&BODY), InertialParameters(BODY));
+        let inertia = body.inertia_at_com().map(|inertia| inertia.0).unwrap_or_default();
+        let com = body.com_m().map(|com| com.0).unwrap_or_default();
+        for (k, (a, b)) in PAIRS.into_iter().enumerate() {
+            assert!((found[4 + k] - inertia[a][b]).abs() < 1e-14);
+        }
+        assert!((0..3).all(|k| (found[1 + k] - com[k]).abs() < 1e-15));
+    }
+
+    #[test]
+    fn the_jacobian_is_the_slope_of_the_values() {
+        let jacobian = jacobian(&BODY);
+        for k in 0..10 {
+            let h = 1e-6;
+            let mut sides = [BODY; 2];
+            (sides[0][k], sides[1][k]) = (BODY[k] - h, BODY[k] + h);
+            let [low, high] = sides.map(|side| at_centre_of_mass(&side));
+            for row in 0..10 {
+                // Central differences: h² of curvature, rounding over h.
+                assert!(((high[row] - low[row]) / (2.0 * h) - jacobian[(row, k)]).abs() < 1e-8, "{row} {k}");
+            }
+        }
+    }
+}

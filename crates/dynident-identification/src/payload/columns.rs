@@ -1,0 +1,395 @@
+//! The parameters of a task beside the arm's: payloads and offsets of single logs, and what each log sees of them.
+//!
+//! A payload with parameters π in the frame of its link adds `A π` to the ten parameters of the body that it is fixed to, and so `M π` with `M = B_body A` to the base parameters
+//! (`θ = B π_all`). No log needs other columns than the arm's: log ℓ is explained by the base vector `θ_ℓ = T_ℓ x + c_ℓ`, with x all that is to be estimated and c a known payload.
+
+use super::error::PayloadError;
+use super::known_arm::Refit;
+use crate::logs::of_role;
+use crate::recording::{Recording, Role};
+use crate::regressor_model::RegressorModel;
+use crate::settings::{GainChoice, IdentificationSettings, OffsetChoice};
+use dynident_dynamics::{Column, independent_columns};
+use dynident_estimation::{Estimate, EstimationError, LinearProblem, SegmentedFactor};
+use dynident_model::laws::{Law, Offset};
+use dynident_model::{INERTIAL_NAMES, InertialParameters};
+use nalgebra::{DMatrix, DVector};
+
+/// A payload's parameter is a sum of earlier ones when the part of its change that they do not make is below this share: the structure is known to 1e-9 or so.
+const DEPENDENT: f64 = 1.0e-6;
+/// Share of a dropped parameter below which it does not stand in a sum.
+const IN_SUM: f64 = 1.0e-9;
+
+/// Something that recordings were made with, at a link of the robot. A [`Recording`] carries it by its name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Payload {
+    /// What recordings call it.
+    pub name: String,
+    /// The link that it is fixed to, in whose frame its parameters are.
+    pub link: String,
+    /// Its ten inertial parameters, where they are known; otherwise they are estimated.
+    pub known: Option<InertialParameters>,
+}
+
+/// Columns of one payload to estimate.
+#[derive(Clone, Debug)]
+pub(crate) struct PayloadColumns {
+    /// Its number among the study's payloads.
+    pub(crate) payload: usize,
+    /// Its first column.
+    pub(crate) first: usize,
+    /// Which of the ten parameters have columns.
+    pub(crate) kept: Vec<usize>,
+    /// The others.
+    pub(crate) dropped: Vec<usize>,
+    /// How often a kept one holds a dropped one, shape (kept, dropped).
+    pub(crate) regrouping: DMatrix<f64>,
+    /// What the kept ones add to the base parameters, shape (base, kept).
+    pub(crate) change: DMatrix<f64>,
+}
+
+/// Columns of a problem: the arm's base parameters, then payloads, then offsets of single logs.
+#[derive(Clone, Debug)]
+pub struct LoadColumns {
+    base: usize,
+    /// Symbols of all further columns.
+    symbols: Vec<String>,
+    pub(crate) payloads: Vec<PayloadColumns>,
+    /// (log, joint, column) of the offsets that are columns of their own.
+    pub offsets: Vec<(usize, usize, usize)>,
+    /// For every log of the study `T_ℓ`, (base, columns), and `c_ℓ`; none where the log sees the arm alone.
+    logs: Vec<Option<(DMatrix<f64>, Vec<f64>)>>,
+}
+
+impl LoadColumns {
+    /// The columns of a task, in terms of the columns of the model's layout; `known_arm` where the arm is held, with what of it is fitted again.
+    ///
+    /// # Errors
+    /// If a payload or its link is not there, or something is asked for that does not go together with payloads.
+    pub fn new(
+        settings: &IdentificationSettings,
+        recordings: &[Recording],
+        described: &[Payload],
+        model: &RegressorModel,
+        known_arm: Option<Refit>,
+    ) -> Result<Self, PayloadError> {
+        let base = model.layout().columns().len();
+        check(settings, recordings, described, model, known_arm)?;
+        let mut symbols = Vec::new();
+        let (mut payloads, mut known) = (Vec::new(), vec![None; described.len()]);
+        let training = of_role(recordings, Role::Identify);
+        for (number, section) in described.iter().enumerate() {
+            let matrix = change_of_base(model, &section.link)?;
+            if let Some(parameters) = section.known {
+                known[number] = Some((&matrix * DVector::from_column_slice(&parameters.0)).as_slice().to_vec());
+                continue;
+            }
+            let carries = |log: usize| recordings[log].payload.as_ref() == Some(&section.name);
+            if !training.iter().any(|&log| carries(log)) {
+                if (0..recordings.len()).any(carries) {
+                    return Err(PayloadError::NotTrained { name: section.name.clone() });
+                }
+                continue;
+            }
+            let norms: Vec<f64> = matrix.column_iter().map(|column| column.norm()).collect();
+            let unit = |k: usize| if norms[k] > 0.0 { norms[k] } else { 1.0 };
+            let scaled = DMatrix::from_fn(matrix.nrows(), 10, |row, k| matrix[(row, k)] / unit(k));
+            let split = independent_columns(&scaled, DEPENDENT);
+            let (kept, dropped) = (split.independent, split.dependent);
+            let regrouping = DMatrix::from_fn(kept.len(), dropped.len(), |row, column| {
+                split.regrouping[(row, column)] * unit(dropped[column]) / unit(kept[row])
+            });
+            let columns = PayloadColumns {
+                payload: number,
+                first: base + symbols.len(),
+                change: matrix.select_columns(&kept),
+                kept,
+                dropped,
+                regrouping,
+            };
+            symbols.extend(columns.expressions().iter().map(|expression| format!("{}: {expression}", section.name)));
+            payloads.push(columns);
+        }
+        let mut offsets = Vec::new();
+        if per_log(settings) {
+            let joints = model.joint_names();
+            let with_offset = |joint: &usize| model.laws().contains(&Law::Offset(Offset { joint: *joint }));
+            // The last log's are the others' with the opposite sign: the base parameters hold the mean.
+            for &log in training.split_last().map_or(&[][..], |(_, rest)| rest) {
+                for joint in (0..model.model().dof()).filter(with_offset) {
+                    offsets.push((log, joint, base + symbols.len()));
+                    symbols.push(format!("offset of {} in {}", joints[joint], recordings[log].name));
+                }
+            }
+        }
+        let mut columns = Self { base, symbols, payloads, offsets, logs: Vec::new() };
+        let of_log = |log| columns.of_log(recordings, described, model, (&training, &known), log);
+        columns.logs = (0..recordings.len()).map(of_log).collect();
+        Ok(columns)
+    }
+
+    /// The arm's part of an estimate: its base parameters alone.
+    pub fn arm_estimate(&self, estimate: &Estimate) -> Estimate {
+        let mut arm = estimate.clone();
+        let base = self.base;
+        for values in [&mut arm.values, &mut arm.std, &mut arm.std_freedom, &mut arm.half_width_95] {
+            values.truncate(base);
+        }
+        arm.names.truncate(base);
+        arm.relative_std_percent.truncate(base);
+        arm.covariance = estimate.covariance.view((0, 0), (base, base)).into_owned();
+        arm.covariance_white = estimate.covariance_white.view((0, 0), (base, base)).into_owned();
+        arm
+    }
+
+    fn of_log(
+        &self,
+        recordings: &[Recording],
+        described: &[Payload],
+        model: &RegressorModel,
+        (training, known): (&[usize], &[Option<Vec<f64>>]),
+        log: usize,
+    ) -> Option<(DMatrix<f64>, Vec<f64>)> {
+        let carried = recordings[log].payload.as_ref();
+        let number = carried.and_then(|name| described.iter().position(|payload| payload.name == *name));
+        let last = training.last() == Some(&log);
+        let own: Vec<(usize, usize, f64)> = self
+            .offsets
+            .iter()
+            .filter(|(of, _, _)| training.contains(&log) && (last || *of == log))
+            .map(|&(_, joint, column)| (joint, column, if last { -1.0 } else { 1.0 }))
+            .collect();
+        if number.is_none() && own.is_empty() {
+            return None;
+        }
+        let mut map = DMatrix::zeros(self.base, self.count());
+        map.view_mut((0, 0), (self.base, self.base)).fill_with_identity();
+        if let Some(payload) = self.payloads.iter().find(|payload| Some(payload.payload) == number) {
+            map.view_mut((0, payload.first), (self.base, payload.kept.len())).copy_from(&payload.change);
+        }
+        let all = model.base().all_columns();
+        for (joint, column, sign) in own {
+            let offset = Column::Law(Law::Offset(Offset { joint }));
+            if let Some(place) = all.iter().position(|column| *column == offset) {
+                map.set_column(column, &(base_column(model, place, self.base) * sign));
+            }
+        }
+        let known = number.and_then(|number| known[number].clone()).unwrap_or_else(|| vec![0.0; self.base]);
+        Some((map, known))
+    }
+
+    /// True when all logs see the arm alone.
+    pub fn is_plain(&self) -> bool {
+        self.logs.iter().all(Option::is_none)
+    }
+
+    /// The arm's base parameters.
+    pub fn base(&self) -> usize {
+        self.base
+    }
+
+    /// All columns.
+    pub fn count(&self) -> usize {
+        self.base + self.symbols.len()
+    }
+
+    /// Symbols of all columns.
+    pub(crate) fn symbols(&self, model: &RegressorModel) -> Vec<String> {
+        model.layout().columns().iter().map(Column::symbol).chain(self.symbols.iter().cloned()).collect()
+    }
+
+    /// `θ_ℓ = T_ℓ x + c_ℓ`: the base parameters that explain a log.
+    pub fn base_values(&self, log: usize, x: &[f64]) -> Vec<f64> {
+        match &self.logs[log] {
+            None => x[..self.base].to_vec(),
+            Some((map, known)) => (map * DVector::from_column_slice(&x[..self.count()])
+                + DVector::from_column_slice(known))
+            .as_slice()
+            .to_vec(),
+        }
+    }
+
+    /// Covariance of those.
+    pub fn base_covariance(&self, log: usize, covariance: &DMatrix<f64>) -> DMatrix<f64> {
+        let all = covariance.view((0, 0), (self.count(), self.count()));
+        match &self.logs[log] {
+            None => all.view((0, 0), (self.base, self.base)).into_owned(),
+            Some((map, _)) => map * all * map.transpose(),
+        }
+    }
+
+    /// `c_ℓ` over all columns: a known payload.
+    pub(crate) fn known(&self, log: usize) -> Vec<f64> {
+        let mut known = self.logs[log].as_ref().map_or_else(|| vec![0.0; self.base], |(_, known)| known.clone());
+        known.resize(self.count(), 0.0);
+        known
+    }
+
+    /// Adds one joint's rows of a log to a problem over all columns; the known payload's torque is taken off unless the gain of the joint is not known yet.
+    pub(crate) fn add(
+        &self,
+        problem: &mut LinearProblem,
+        (index, log): (usize, &str),
+        joint: usize,
+        (own, factor): (&[usize], &SegmentedFactor),
+        keep_known: bool,
+    ) -> Result<(), EstimationError> {
+        let Some((map, known)) = &self.logs[index] else {
+            return problem.add(log, joint, own.to_vec(), factor.clone());
+        };
+        // Further columns that the joint does not feel would only be zeros.
+        let further = (self.base..self.count()).filter(|&column| own.iter().any(|&row| map[(row, column)] != 0.0));
+        let columns: Vec<usize> = own.iter().copied().chain(further).collect();
+        let mut local = DMatrix::zeros(own.len() + 1, columns.len() + 1);
+        for (row, &global) in own.iter().enumerate() {
+            for (to, &column) in columns.iter().enumerate() {
+                local[(row, to)] = map[(global, column)];
+            }
+            local[(row, columns.len())] = if keep_known { 0.0 } else { -known[global] };
+        }
+        local[(own.len(), columns.len())] = 1.0;
+        problem.add(log, joint, columns, factor.mapped(&local)?)
+    }
+
+    /// The rows as they are for the arm alone once all that differs from log to log stands at its estimate.
+    pub fn arm_problem(&self, problem: &LinearProblem, x: &[f64]) -> Result<LinearProblem, EstimationError> {
+        let mut arm = LinearProblem::new(problem.columns()[..self.base].to_vec(), problem.joints().to_vec())
+            .with_fallback(problem.fallback()[..self.base].to_vec())?;
+        for equation in problem.equations() {
+            let columns: Vec<usize> = equation.columns.iter().copied().filter(|&column| column < self.base).collect();
+            let mut map = DMatrix::zeros(equation.columns.len() + 1, columns.len() + 1);
+            let mut next = 0;
+            for (row, &column) in equation.columns.iter().enumerate() {
+                if column < self.base {
+                    map[(row, next)] = 1.0;
+                    next += 1;
+                } else {
+                    map[(row, columns.len())] = -x[column];
+                }
+            }
+            map[(equation.columns.len(), columns.len())] = 1.0;
+            arm.add(&problem.logs()[equation.log], equation.joint, columns, equation.factor.mapped(&map)?)?;
+        }
+        Ok(arm)
+    }
+}
+
+impl PayloadColumns {
+    /// What each column sums: `Ixx + Iyy`, in the frame of the payload's link.
+    pub(crate) fn expressions(&self) -> Vec<String> {
+        let of_row = |(row, &kept): (usize, &usize)| {
+            let further = self.dropped.iter().enumerate().filter_map(|(column, &dropped)| {
+                let share = self.regrouping[(row, column)];
+                let sign = if share < 0.0 { "-" } else { "+" };
+                (share.abs() > IN_SUM).then(|| format!(" {sign} {:.4} {}", share.abs(), INERTIAL_NAMES[dropped]))
+            });
+            format!("{}{}", INERTIAL_NAMES[kept], further.collect::<String>())
+        };
+        self.kept.iter().enumerate().map(of_row).collect()
+    }
+
+    /// Whether kept parameter number `row` stands for itself alone.
+    pub(crate) fn alone(&self, row: usize) -> bool {
+        self.regrouping.row(row).iter().all(|share| share.abs() <= IN_SUM)
+    }
+}
+
+fn per_log(settings: &IdentificationSettings) -> bool {
+    settings.offsets == OffsetChoice::PerLog
+}
+
+/// What is asked for and payloads cannot be with.
+fn check(
+    settings: &IdentificationSettings,
+    recordings: &[Recording],
+    payloads: &[Payload],
+    model: &RegressorModel,
+    known_arm: Option<Refit>,
+) -> Result<(), PayloadError> {
+    let known = |name: &String| payloads.iter().find(|payload| payload.name == *name);
+    for name in recordings.iter().filter_map(|recording| recording.payload.as_ref()) {
+        if known(name).is_none() {
+            let known = payloads.iter().map(|payload| payload.name.clone()).collect();
+            return Err(PayloadError::UnknownPayload { name: name.clone(), known });
+        }
+    }
+    let loaded = recordings.iter().any(|recording| recording.payload.is_some());
+    let unknown_gains = settings.gains == GainChoice::Unknown;
+    if !(loaded || per_log(settings) || known_arm.is_some() || unknown_gains) {
+        return Ok(());
+    }
+    if let Some(refit) = known_arm {
+        let to_estimate = |name: &String| known(name).is_some_and(|payload| payload.known.is_none());
+        let mut training = recordings.iter().filter(|recording| recording.role == Role::Identify);
+        let carried = training.any(|recording| recording.payload.as_ref().is_some_and(to_estimate));
+        if !carried && refit == Refit::Nothing && !per_log(settings) {
+            return Err(PayloadError::NothingToEstimate);
+        }
+        if unknown_gains {
+            return Err(PayloadError::GainsOfKnownArm);
+        }
+    }
+    let estimation = &settings.estimation;
+    if !estimation.estimator.is_plain() || estimation.exogeneity_test.is_some() || estimation.essential.is_some() {
+        return Err(PayloadError::Estimator);
+    }
+    if !settings.friction.is_empty() {
+        return Err(PayloadError::FrictionChoice);
+    }
+    if loaded && model.laws().iter().any(|law| matches!(law, Law::Load(_))) {
+        return Err(PayloadError::LoadFriction);
+    }
+    Ok(())
+}
+
+/// Column `place` of B, with zeros for columns of the layout that are no base parameters.
+fn base_column(model: &RegressorModel, place: usize, rows: usize) -> DVector<f64> {
+    let base = model.base();
+    let mut column = DVector::zeros(rows);
+    if let Some(b) = base.independent().iter().position(|&index| index == place) {
+        column[b] = 1.0;
+    } else if let Some(d) = base.dependent().iter().position(|&index| index == place) {
+        column.rows_mut(0, base.count()).copy_from(&base.regrouping().column(d));
+    }
+    column
+}
+
+/// M: what ten parameters in the frame of `link` add to the base parameters.
+fn change_of_base(model: &RegressorModel, link: &str) -> Result<DMatrix<f64>, PayloadError> {
+    let bodies = model.model().bodies().iter().enumerate();
+    let found = bodies.flat_map(|(body, b)| b.links.iter().map(move |link| (body, link))).find(|(_, l)| l.name == link);
+    let Some((body, link)) = found else {
+        let links = model.model().bodies().iter().flat_map(|body| &body.links);
+        let known = links.map(|link| link.name.clone()).collect();
+        return Err(PayloadError::UnknownLink { link: link.to_owned(), known });
+    };
+    let rows = model.layout().columns().len();
+    let mut matrix = DMatrix::zeros(rows, 10);
+    for k in 0..10 {
+        let unit = InertialParameters(core::array::from_fn(|i| f64::from(u8::from(i == k))));
+        let in_body = unit.expressed_in(&link.placement);
+        for (parameter, &share) in in_body.0.iter().enumerate() {
+            if share != 0.0 {
+                let column = base_column(model, 10 * body + parameter, rows) * share;
+                matrix.set_column(k, &(matrix.column(k) + column));
+            }
+        }
+    }
+    Ok(matrix)
+}
+
+/// What every payload that is known adds to the base parameters, by name.
+///
+/// # Errors
+/// If its link is not there.
+pub fn known_payloads(payloads: &[Payload], model: &RegressorModel) -> Result<Vec<(String, Vec<f64>)>, PayloadError> {
+    let mut known = Vec::new();
+    for payload in payloads {
+        let matrix = change_of_base(model, &payload.link)?;
+        if let Some(parameters) = &payload.known {
+            let added = matrix * DVector::from_column_slice(&parameters.0);
+            known.push((payload.name.clone(), added.as_slice().to_vec()));
+        }
+    }
+    Ok(known)
+}

@@ -1,0 +1,105 @@
+//! Drive gains: newton metres per unit of what is logged, from logs without and with a known payload.
+
+use super::columns::LoadColumns;
+use super::error::PayloadError;
+use crate::error::IdentificationError;
+use crate::settings::EstimationSettings;
+use dynident_estimation::{Estimate, EstimationError, GainProblem, JointGain, LinearProblem, joint_gains};
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// Beyond this share of its value the half width of a gain's interval means that the logs do not tell it.
+const WIDEST: f64 = 0.5;
+
+/// The drive gain of one joint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DriveGain {
+    /// The joint.
+    pub joint: String,
+    /// Torque per unit of what is logged, Nm (N): a factor for `torque.scale` of the format. Where it is not identified, what it was held at.
+    pub gain: f64,
+    /// Its standard deviation.
+    pub std: f64,
+    /// Half the width of its 95 % interval.
+    pub half_width_95: f64,
+    /// Whether the logs tell it.
+    pub identified: bool,
+    /// Why not; none where they do.
+    pub reason: Option<String>,
+}
+
+/// What a fit with unknown gains found.
+pub(crate) struct Gains {
+    pub(crate) of_joints: Vec<DriveGain>,
+    /// Over the columns of the problem, in SI units.
+    pub(crate) estimate: Estimate,
+    /// The problem with its torque in newton metres and without the known payloads' torque.
+    pub(crate) problem: LinearProblem,
+}
+
+/// Gains and parameters together; `rows` has the torque as logged and the known payloads still in it, log by log in the order of `training`.
+pub(crate) fn drive_gains(
+    settings: &EstimationSettings,
+    columns: &LoadColumns,
+    rows: &LinearProblem,
+    training: &[usize],
+) -> Result<Gains, IdentificationError> {
+    let known: Vec<Vec<f64>> = training.iter().map(|&log| columns.known(log)).collect();
+    let (with, without): (Vec<bool>, Vec<bool>) =
+        known.iter().map(|known| known.iter().any(|&value| value != 0.0)).map(|loaded| (loaded, !loaded)).unzip();
+    if !with.contains(&true) || !without.contains(&true) {
+        return Err(PayloadError::GainsNeedPayload.into());
+    }
+    let found = joint_gains(&GainProblem { rows, known: known.clone() }, &settings.weighted())?;
+    let scale: Vec<f64> = found.gains.iter().map(|gain| gain.gain).collect();
+    let problem = in_newton_metres(rows, &known, &scale)?;
+    let estimate = without_gains(found.estimate, rows.columns().len(), &scale);
+    Ok(Gains { of_joints: found.gains.into_iter().map(drive_gain).collect(), estimate, problem })
+}
+
+fn drive_gain(gain: JointGain) -> DriveGain {
+    let wide = gain.half_width_95 > WIDEST * gain.gain.abs();
+    let reason = if !gain.identified {
+        Some("joint does not feel the payload: any gain fits as well, with other parameters; move it so that the payload's weight or inertia loads it".to_owned())
+    } else if wide {
+        Some("joint hardly feels the payload: its interval is wider than half its value; a heavier payload, farther out, or a motion that loads the joint more would tell".to_owned())
+    } else {
+        None
+    };
+    let JointGain { joint, gain, std, half_width_95, .. } = gain;
+    DriveGain { joint, gain, std, half_width_95, identified: reason.is_none(), reason }
+}
+
+fn in_newton_metres(rows: &LinearProblem, known: &[Vec<f64>], scale: &[f64]) -> Result<LinearProblem, EstimationError> {
+    let mut problem =
+        LinearProblem::new(rows.columns().to_vec(), rows.joints().to_vec()).with_fallback(rows.fallback().to_vec())?;
+    for equation in rows.equations() {
+        let own = equation.columns.len();
+        let mut map = DMatrix::identity(own + 1, own + 1);
+        for (row, &column) in equation.columns.iter().enumerate() {
+            map[(row, own)] = -known[equation.log][column];
+        }
+        map[(own, own)] = scale[equation.joint];
+        let factor = equation.factor.mapped(&map)?;
+        problem.add(&rows.logs()[equation.log], equation.joint, equation.columns.clone(), factor)?;
+    }
+    Ok(problem)
+}
+
+/// The estimate without its last columns, residuals in newton metres.
+fn without_gains(full: Estimate, count: usize, scale: &[f64]) -> Estimate {
+    let mut estimate = full;
+    estimate.names.truncate(count);
+    estimate.values.truncate(count);
+    estimate.std.truncate(count);
+    estimate.std_freedom.truncate(count);
+    estimate.half_width_95.truncate(count);
+    estimate.relative_std_percent.truncate(count);
+    estimate.covariance = estimate.covariance.view((0, 0), (count, count)).into_owned();
+    estimate.covariance_white = estimate.covariance_white.view((0, 0), (count, count)).into_owned();
+    estimate.rank.fixed.retain(|fixed| fixed.column < count);
+    for (sigma, scale) in estimate.joint_sigma.iter_mut().zip(scale) {
+        *sigma *= scale.abs();
+    }
+    estimate
+}

@@ -1,0 +1,84 @@
+//! An arm that is known from an earlier identification, with its covariance.
+
+use super::columns::LoadColumns;
+use super::error::PayloadError;
+use crate::regressor_model::RegressorModel;
+use crate::settings::EstimationSettings;
+use dynident_dynamics::Column;
+use dynident_estimation::{Estimate, EstimationError, KnownColumns, LinearProblem, weighted_least_squares_with_known};
+use dynident_model::laws::Law;
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// What of a known arm is fitted again, beside the payload.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Refit {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// The joints' offsets.
+    Offset,
+    /// Offsets and friction: both change with the temperature from run to run.
+    Friction,
+}
+
+/// Base parameters of an arm, and how well they are known.
+#[derive(Clone, Debug)]
+pub struct KnownArm {
+    values: Vec<f64>,
+    covariance: DMatrix<f64>,
+    refit: Refit,
+    cutoff_hz: Option<f64>,
+}
+
+impl KnownArm {
+    /// An arm with these base parameters and their covariance, found at the cut-off `cutoff_hz` of the motion.
+    ///
+    /// # Errors
+    /// A covariance of another size.
+    pub fn new(
+        values: Vec<f64>,
+        covariance: DMatrix<f64>,
+        refit: Refit,
+        cutoff_hz: Option<f64>,
+    ) -> Result<Self, PayloadError> {
+        if covariance.shape() != (values.len(), values.len()) {
+            return Err(PayloadError::ArmCovariance { expected: values.len(), found: covariance.nrows() });
+        }
+        Ok(Self { values, covariance, refit, cutoff_hz })
+    }
+
+    /// What of the arm is fitted again.
+    pub fn refit(&self) -> Refit {
+        self.refit
+    }
+
+    /// The motion's cut-off that it was found with.
+    pub fn cutoff_hz(&self) -> Option<f64> {
+        self.cutoff_hz
+    }
+
+    /// Payloads, offsets per log and what is fitted again, with the arm held.
+    pub(crate) fn estimate(
+        &self,
+        model: &RegressorModel,
+        columns: &LoadColumns,
+        problem: &LinearProblem,
+        settings: &EstimationSettings,
+    ) -> Result<Estimate, EstimationError> {
+        let held: Vec<usize> = (0..columns.base())
+            .filter(|&column| match &model.layout().columns()[column] {
+                Column::Law(Law::Offset(_)) => self.refit == Refit::Nothing,
+                Column::Law(law) if law.is_joint_friction() => self.refit != Refit::Friction,
+                _ => true,
+            })
+            .collect();
+        let known = KnownColumns {
+            values: held.iter().map(|&column| self.values[column]).collect(),
+            covariance: self.covariance.select_rows(&held).select_columns(&held),
+            columns: held,
+        };
+        weighted_least_squares_with_known(problem, &known, &settings.weighted())
+    }
+}

@@ -1,0 +1,16 @@
+//! What differs from log to log: payloads, offsets, gains; and payloads on an arm that is known already.
+
+mod body;
+mod columns;
+mod error;
+mod gains;
+mod known_arm;
+mod result;
+
+pub use columns::{LoadColumns, Payload, known_payloads};
+pub use error::PayloadError;
+pub use gains::DriveGain;
+pub use known_arm::{KnownArm, Refit};
+pub use result::{Measured, PayloadParameter, PayloadResult, PossiblePayload, payload_results};
+
+pub(crate) use gains::{Gains, drive_gains};

@@ -1,0 +1,205 @@
+//! What logs tell of payloads: values with error bars, and a body that it may be.
+
+use super::body::{at_centre_of_mass, jacobian, possible_body};
+use super::columns::{LoadColumns, Payload, PayloadColumns};
+use crate::recording::Recording;
+use dynident_estimation::Estimate;
+use dynident_model::INERTIAL_NAMES;
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// A value with its error bar.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// The value.
+    pub value: f64,
+    /// Its standard deviation.
+    pub std: f64,
+    /// Half the width of its 95 % interval.
+    pub half_width_95: f64,
+}
+
+/// A parameter of a payload, or a sum of parameters, that the logs tell.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PayloadParameter {
+    /// What it sums, in the frame of the payload's link: `Ixx + Iyy`.
+    pub expression: String,
+    /// Its unit.
+    pub unit: String,
+    /// The estimate; zero where it is not excited.
+    pub value: f64,
+    /// Its standard deviation.
+    pub std: f64,
+    /// Half the width of its 95 % interval.
+    pub half_width_95: f64,
+    /// False when the logs do not excite it.
+    pub excited: bool,
+}
+
+/// The physically possible payload nearest to the estimate in the metric of its covariance. What the logs leave open is no measured value.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PossiblePayload {
+    /// Mass.
+    pub mass_kg: f64,
+    /// Centre of mass in the link's frame.
+    pub com_m: [f64; 3],
+    /// Inertia about the centre of mass, axes of the link's frame: xx, xy, xz, yy, yz, zz.
+    pub inertia_at_com_kgm2: [f64; 6],
+    /// How far it lies from the estimate, in standard deviations.
+    pub moved_sigma: f64,
+    /// Whether the logs want it outside of what is possible.
+    pub on_the_boundary: bool,
+}
+
+/// What was found of one payload.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PayloadResult {
+    /// Its name.
+    pub name: String,
+    /// The link in whose frame it is described.
+    pub link: String,
+    /// Training logs that carry it.
+    pub logs: Vec<String>,
+    /// What the logs tell of its ten parameters about the link's origin, one by one or as sums.
+    pub parameters: Vec<PayloadParameter>,
+    /// Mass, kg; none where it is not told alone.
+    pub mass_kg: Option<Measured>,
+    /// Centre of mass in the link's frame, m; none for coordinates that are not told alone.
+    pub com_m: [Option<Measured>; 3],
+    /// Inertia about the centre of mass, axes of the link's frame, kg m²: xx, xy, xz, yy, yz, zz; none where it is not told alone.
+    pub inertia_at_com_kgm2: [Option<Measured>; 6],
+    /// What the logs cannot tell, in words.
+    pub not_identified: Vec<String>,
+    /// A body that it may be; none where there is none.
+    pub possible: Option<PossiblePayload>,
+    /// Why there is none.
+    pub failure: Option<String>,
+    /// What it adds to the base parameters, in their order: what `validate` predicts the torque of logs with it by.
+    pub base_parameters_added: Vec<f64>,
+}
+
+/// All payloads that were estimated.
+pub fn payload_results(
+    (recordings, payloads): (&[Recording], &[Payload]),
+    training: &[usize],
+    columns: &LoadColumns,
+    estimate: &Estimate,
+) -> Vec<PayloadResult> {
+    columns.payloads.iter().map(|payload| result((recordings, payloads), training, payload, estimate)).collect()
+}
+
+fn result(
+    (recordings, payloads): (&[Recording], &[Payload]),
+    training: &[usize],
+    columns: &PayloadColumns,
+    estimate: &Estimate,
+) -> PayloadResult {
+    let section = &payloads[columns.payload];
+    let excited = |place: usize| !estimate.rank.fixed.iter().any(|fixed| fixed.column == columns.first + place);
+    let parameters: Vec<PayloadParameter> = columns
+        .expressions()
+        .into_iter()
+        .enumerate()
+        .map(|(place, expression)| PayloadParameter {
+            expression,
+            unit: unit(columns.kept[place]).to_owned(),
+            value: estimate.values[columns.first + place],
+            std: estimate.std[columns.first + place],
+            half_width_95: estimate.half_width_95[columns.first + place],
+            excited: excited(place),
+        })
+        .collect();
+    let mut not_identified: Vec<String> = parameters
+        .iter()
+        .filter(|p| !p.excited)
+        .map(|p| format!("{}: these logs do not tell it from the arm", p.expression))
+        .collect();
+    not_identified.extend(columns.dropped.iter().enumerate().map(|(place, &dropped)| {
+        let column = columns.regrouping.column(place);
+        let homes: Vec<&str> = (0..parameters.len())
+            .filter(|&row| column[row].abs() > 1.0e-9)
+            .map(|row| &parameters[row].expression[..])
+            .collect();
+        if homes.is_empty() {
+            format!("{}: no motion of this robot tells it", INERTIAL_NAMES[dropped])
+        } else {
+            format!("{}: told only as a part of {}", INERTIAL_NAMES[dropped], homes.join(", "))
+        }
+    }));
+    let figures = figures(columns, estimate, &excited);
+    let (possible, failure) = match possible_body(&section.name, columns, estimate) {
+        Ok(fit) => {
+            let p: [f64; 10] = core::array::from_fn(|k| fit.parameters[k]);
+            let [mass_kg, x, y, z, xx, xy, xz, yy, yz, zz] = at_centre_of_mass(&p);
+            let possible = PossiblePayload {
+                mass_kg,
+                com_m: [x, y, z],
+                inertia_at_com_kgm2: [xx, xy, xz, yy, yz, zz],
+                moved_sigma: fit.moved_sigma,
+                on_the_boundary: fit.bodies.iter().any(|body| body.on_the_boundary),
+            };
+            (Some(possible), None)
+        }
+        Err(reason) => (None, Some(reason)),
+    };
+    let added = (0..columns.change.nrows())
+        .map(|row| (0..parameters.len()).map(|place| columns.change[(row, place)] * parameters[place].value).sum());
+    PayloadResult {
+        name: section.name.clone(),
+        link: section.link.clone(),
+        logs: training
+            .iter()
+            .filter(|&&log| recordings[log].payload.as_ref() == Some(&section.name))
+            .map(|&log| recordings[log].name.clone())
+            .collect(),
+        mass_kg: figures[0],
+        com_m: core::array::from_fn(|k| figures[1 + k]),
+        inertia_at_com_kgm2: core::array::from_fn(|k| figures[4 + k]),
+        not_identified,
+        possible,
+        failure,
+        base_parameters_added: added.collect(),
+        parameters,
+    }
+}
+
+/// Mass, centre of mass and inertia about it, each where all that it is made of is told alone.
+fn figures(columns: &PayloadColumns, estimate: &Estimate, excited: &dyn Fn(usize) -> bool) -> [Option<Measured>; 10] {
+    let place = |k: usize| {
+        let place = columns.kept.iter().position(|&kept| kept == k)?;
+        (columns.alone(place) && excited(place)).then_some(columns.first + place)
+    };
+    let places: [Option<usize>; 10] = core::array::from_fn(place);
+    let p: [f64; 10] = core::array::from_fn(|k| places[k].map_or(0.0, |column| estimate.values[column]));
+    let mass_told = places[0].is_some() && p[0] != 0.0;
+    let covariance = DMatrix::from_fn(10, 10, |i, j| match (places[i], places[j]) {
+        (Some(i), Some(j)) => estimate.covariance[(i, j)],
+        _ => 0.0,
+    });
+    // The interval of a function of several parameters is as wide, beside its deviation, as the widest of theirs.
+    let width = places
+        .iter()
+        .flatten()
+        .map(|&column| estimate.half_width_95[column] / estimate.std[column].max(f64::MIN_POSITIVE));
+    let width = width.fold(0.0, f64::max);
+    let (values, jacobian) =
+        if mass_told { (at_centre_of_mass(&p), jacobian(&p)) } else { (p, DMatrix::identity(10, 10)) };
+    let variances = (&jacobian * covariance * jacobian.transpose()).diagonal();
+    core::array::from_fn(|k| {
+        let told = match k {
+            0 => places[0].is_some(),
+            1..=3 => mass_told && places[k].is_some(),
+            _ => mass_told && places[1..4].iter().all(Option::is_some) && places[k].is_some(),
+        };
+        let std = variances[k].max(0.0).sqrt();
+        told.then_some(Measured { value: values[k], std, half_width_95: width * std })
+    })
+}
+
+fn unit(parameter: usize) -> &'static str {
+    match parameter {
+        0 => "kg",
+        1..=3 => "kg m",
+        _ => "kg m^2",
+    }
+}

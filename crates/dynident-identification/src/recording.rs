@@ -1,0 +1,140 @@
+//! One recording of a task: its samples, what it is for, and what is known about how it was made.
+
+use crate::error::IdentificationError;
+use crate::rows::MotionRecord;
+use dynident_model::Model;
+use dynident_recording::{Log, MotionSettings, MotionStream, Reference};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// What a recording is for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// The model is fitted to it.
+    #[default]
+    Identify,
+    /// The model is tested on it.
+    Validate,
+}
+
+impl Role {
+    /// The name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Identify => "identify",
+            Self::Validate => "validate",
+        }
+    }
+}
+
+/// Where the motion of a recording comes from.
+#[derive(Clone, Debug)]
+pub enum Samples {
+    /// Raw samples of a file, a stream or of arrays: clock, filters and derivatives are made here. Joints are found by name.
+    Log(Log),
+    /// A motion that is made already, joints in the model's order.
+    Motion(MotionRecord),
+}
+
+/// One recording.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// What it is called in results and messages.
+    pub name: String,
+    /// What it is for.
+    pub role: Role,
+    /// Its samples.
+    pub samples: Samples,
+    /// The motion that was commanded, joints in the model's order: for differentiators and estimators that need it.
+    pub commanded: Option<Arc<Reference>>,
+    /// The payload that it was recorded with, by name.
+    pub payload: Option<String>,
+}
+
+impl Recording {
+    /// A log to fit to.
+    pub fn training(name: impl Into<String>, log: Log) -> Self {
+        Self::new(name.into(), Role::Identify, Samples::Log(log))
+    }
+
+    /// A log to test on.
+    pub fn held_out(name: impl Into<String>, log: Log) -> Self {
+        Self::new(name.into(), Role::Validate, Samples::Log(log))
+    }
+
+    /// A motion that is made already, to fit to.
+    pub fn of_motion(name: impl Into<String>, motion: MotionRecord) -> Self {
+        Self::new(name.into(), Role::Identify, Samples::Motion(motion))
+    }
+
+    fn new(name: String, role: Role, samples: Samples) -> Self {
+        Self { name, role, samples, commanded: None, payload: None }
+    }
+
+    /// What messages about its rows call it: a file's path, or the label of its samples.
+    pub fn label(&self) -> String {
+        match &self.samples {
+            Samples::Log(log) => log.source().label(),
+            Samples::Motion(record) => record.label.clone(),
+        }
+    }
+
+    /// Rows, about; for progress bars only.
+    pub(crate) fn estimated_rows(&self) -> Option<u64> {
+        match &self.samples {
+            Samples::Log(log) => log.source().estimated_rows(),
+            Samples::Motion(record) => Some(record.motion.rows as u64),
+        }
+    }
+
+    /// Whether it has the temperatures of the joints.
+    pub(crate) fn has_temperature(&self) -> bool {
+        match &self.samples {
+            Samples::Log(log) => log.format.temperature.is_some(),
+            Samples::Motion(record) => !record.motion.temperature_c.is_empty(),
+        }
+    }
+
+    /// For each joint of the model its place among the recording's joints.
+    ///
+    /// # Errors
+    /// A joint that the recording does not have.
+    pub fn places(&self, model: &Model) -> Result<Vec<usize>, IdentificationError> {
+        match &self.samples {
+            Samples::Log(log) => {
+                let place = |name: &String| log.joints.iter().position(|joint| joint == name);
+                let of = |joint: &dynident_model::Joint| {
+                    place(&joint.name).ok_or_else(|| IdentificationError::NoSuchJoint {
+                        log: self.name.clone(),
+                        joint: joint.name.clone(),
+                        known: log.joints.clone(),
+                    })
+                };
+                model.joints().iter().map(of).collect()
+            }
+            Samples::Motion(_) => Ok((0..model.dof()).collect()),
+        }
+    }
+
+    /// Its log on the way to a motion, with these settings; the commanded motion goes along where the differentiator needs it. `None` for a motion that is made already.
+    ///
+    /// # Errors
+    /// What opening it can give.
+    pub fn open(&self, model: &Model, motion: &MotionSettings) -> Result<Option<MotionStream>, IdentificationError> {
+        let Samples::Log(log) = &self.samples else { return Ok(None) };
+        let reference = match &self.commanded {
+            Some(commanded) if motion.differentiator.reference().is_some() => {
+                let mut order = vec![0; model.dof()];
+                for (joint, &place) in self.places(model)?.iter().enumerate() {
+                    order[place] = joint;
+                }
+                commanded.reordered(&order).map(Arc::new)
+            }
+            // The differentiator says that it needs one.
+            _ => None,
+        };
+        let stream = MotionStream::following(log, motion, reference.as_ref());
+        stream.map(Some).map_err(|source| IdentificationError::recording(&self.name, source))
+    }
+}

@@ -1,0 +1,175 @@
+//! Blocks of a motion into rows of regressor and torque.
+
+use super::mask::RowMask;
+use super::{JointRows, PANEL_SAMPLES, RawSamples, RowConsumer};
+use crate::error::IdentificationError;
+use crate::regressor_model::RegressorModel;
+use dynident_dynamics::{BatchWorkspace, LawHistory, Panels, regressor_panels_following};
+use dynident_model::laws::JointMotion;
+use dynident_recording::{DecimationSettings, Decimator, FilterError, MotionBlock};
+
+/// Some samples of a block's positions, velocities and accelerations, joints in the model's order.
+pub(crate) fn in_model_order(
+    block: &MotionBlock,
+    places: &[usize],
+    from: usize,
+    samples: usize,
+    motion: &mut [Vec<f64>; 3],
+) {
+    for (to, source) in motion.iter_mut().zip([&block.q, &block.dq, &block.ddq]) {
+        to.clear();
+        for &place in places {
+            to.extend_from_slice(&block.joint(source, place)[from..from + samples]);
+        }
+    }
+}
+
+/// Turns blocks of a motion into rows of regressor and torque, filtered alike.
+#[derive(Debug)]
+pub struct RowBuilder<'a> {
+    model: &'a RegressorModel,
+    places: Vec<usize>,
+    workspace: BatchWorkspace,
+    panels: Panels,
+    history: LawHistory,
+    decimators: Option<Vec<Decimator>>,
+    mask: Option<RowMask<'a>>,
+    temperature_c: Vec<f64>,
+    segment: usize,
+    motion: [Vec<f64>; 3],
+    out: Vec<f64>,
+    filtered_rows: u64,
+    samples: u64,
+}
+
+impl<'a> RowBuilder<'a> {
+    /// For samples at `rate_hz`, joint `j` of the model standing at place `places[j]` of the motion.
+    ///
+    /// # Errors
+    /// A filter that does not exist at this rate.
+    pub fn new(
+        model: &'a RegressorModel,
+        places: &[usize],
+        rate_hz: f64,
+        filter: Option<&DecimationSettings>,
+    ) -> Result<Self, FilterError> {
+        let layout = model.layout();
+        let decimators = filter
+            .map(|settings| {
+                (0..model.dof())
+                    .map(|joint| Decimator::new(settings, rate_hz, layout.joint_columns(joint).len() + 1))
+                    .collect::<Result<Vec<_>, _>>()
+            })
+            .transpose()?;
+        Ok(Self {
+            model,
+            places: places.to_vec(),
+            workspace: BatchWorkspace::new(model.model()),
+            panels: Panels::default(),
+            history: LawHistory::new(model.load_parameters.clone()),
+            decimators,
+            mask: None,
+            temperature_c: Vec::new(),
+            segment: 0,
+            motion: [Vec::new(), Vec::new(), Vec::new()],
+            out: Vec::new(),
+            filtered_rows: 0,
+            samples: 0,
+        })
+    }
+
+    /// The same that leaves out rows that do not count.
+    pub(crate) fn with_mask(mut self, mask: Option<RowMask<'a>>) -> Self {
+        self.mask = mask;
+        self
+    }
+
+    /// Samples to either side of a filtered row that it is made from.
+    pub(crate) fn reach(&self) -> usize {
+        self.decimators.as_ref().and_then(|all| all.first()).map_or(0, Decimator::half_length)
+    }
+
+    /// Samples that the first filtered row needs.
+    pub(crate) fn needed(&self) -> usize {
+        self.decimators.as_ref().and_then(|all| all.first()).map_or(1, Decimator::length)
+    }
+
+    /// Filtered rows of each joint so far, whether they counted or not.
+    pub(crate) fn filtered_rows(&self) -> u64 {
+        self.filtered_rows
+    }
+
+    /// Samples so far.
+    pub(crate) fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// Makes the rows of the next samples.
+    ///
+    /// # Errors
+    /// What the consumer returns.
+    pub fn take(&mut self, block: &MotionBlock, consumer: &mut dyn RowConsumer) -> Result<(), IdentificationError> {
+        if block.segment != self.segment {
+            self.segment = block.segment;
+            self.history.restart();
+            self.decimators.iter_mut().flatten().for_each(|decimator| {
+                decimator.finish();
+            });
+        }
+        let (model, layout) = (self.model.model(), self.model.layout());
+        for from in (0..block.rows).step_by(PANEL_SAMPLES) {
+            let samples = PANEL_SAMPLES.min(block.rows - from);
+            in_model_order(block, &self.places, from, samples, &mut self.motion);
+            let [q, dq, ddq] = &self.motion;
+            let motion = JointMotion { samples, q, dq, ddq };
+            if !block.temperature_c.is_empty() {
+                self.temperature_c.clear();
+                for &place in &self.places {
+                    let temperature = block.joint(&block.temperature_c, place);
+                    self.temperature_c.extend_from_slice(&temperature[from..from + samples]);
+                }
+                self.history.set_temperature(&self.temperature_c);
+            }
+            regressor_panels_following(
+                model,
+                &mut self.workspace,
+                layout,
+                &motion,
+                &mut self.history,
+                &mut self.panels,
+            );
+            for (joint, &place) in self.places.iter().enumerate() {
+                let tau = &block.joint(block.fitted_tau(), place)[from..from + samples];
+                let torque = self.panels.torque_mut(joint);
+                torque.copy_from_slice(tau);
+                if let Some(gain) = self.model.torque_gains.get(joint) {
+                    for torque in torque {
+                        *torque *= gain;
+                    }
+                }
+            }
+            consumer.raw(&RawSamples { segment: block.segment, rate_hz: block.rate_hz, panels: &self.panels })?;
+            let mut rows = samples;
+            for joint in 0..model.dof() {
+                let panel = self.panels.joint(joint);
+                let panel = match &mut self.decimators {
+                    Some(decimators) => {
+                        rows = decimators[joint].push(panel, samples, &mut self.out);
+                        &self.out[..]
+                    }
+                    None => panel,
+                };
+                let (counted, panel) = match &mut self.mask {
+                    Some(mask) if rows > 0 => mask.apply(joint, rows, panel),
+                    _ => (rows, panel),
+                };
+                if counted > 0 {
+                    consumer.filtered(&JointRows { joint, rows: counted, panel })?;
+                }
+            }
+            self.filtered_rows += rows as u64;
+            self.samples += samples as u64;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,61 @@
+//! The low-pass and decimation that torque and regressor go through alike.
+
+use dynident_recording::{DecimationSettings, MotionSettings};
+use serde::{Deserialize, Serialize};
+
+/// The parallel filter: torque and every regressor column pass the same zero-phase low-pass, then every n-th row is kept.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ParallelFilterSettings {
+    /// Off: every sample counts as it is. On by default.
+    pub enabled: bool,
+    /// Every how many samples one is kept. By default so many that the filter's cut-off lies at 0.7 of the motion's.
+    pub factor: Option<usize>,
+    /// Frequency at which the filter's gain is one half; by default 0.4 of the rate that remains.
+    pub cutoff_hz: Option<f64>,
+    /// Attenuation in the stop band, dB; 60 by default.
+    pub stop_band_db: f64,
+}
+
+impl Default for ParallelFilterSettings {
+    fn default() -> Self {
+        Self { enabled: true, factor: None, cutoff_hz: None, stop_band_db: 60.0 }
+    }
+}
+
+impl ParallelFilterSettings {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// In words, with the key and the fix.
+    pub fn validate(&self) -> Result<(), String> {
+        if self.factor == Some(0) {
+            return Err("parallel_filter.factor = 0: give 1 or more".to_owned());
+        }
+        Ok(())
+    }
+
+    /// The filter in force at this rate for a motion that lies below `motion_cutoff_hz`; `None` where every sample counts.
+    pub fn decimation(&self, rate_hz: f64, motion_cutoff_hz: Option<f64>) -> Option<DecimationSettings> {
+        if !self.enabled {
+            return None;
+        }
+        // The motion's cut-off is twice the motion's highest frequency; with seven eighths of it per Nyquist band the filter's gain of one half lies
+        // at 0.7 of the cut-off, above all motion. It takes the same from torque and regressor, so it costs no bias.
+        let automatic =
+            motion_cutoff_hz.map_or(1, |cutoff| (rate_hz / (1.75 * cutoff)).floor().clamp(1.0, 1000.0) as usize);
+        let factor = self.factor.unwrap_or(automatic);
+        (factor > 1 || self.cutoff_hz.is_some()).then(|| DecimationSettings {
+            factor,
+            cutoff_hz: self.cutoff_hz,
+            stop_band_db: self.stop_band_db,
+            ..DecimationSettings::default()
+        })
+    }
+}
+
+/// The frequency below which the whole motion lies; unknown for differentiators without a cut-off, and where only the deviation from a reference has one.
+pub fn motion_band_hz(motion: &MotionSettings) -> Option<f64> {
+    let differentiator = &motion.differentiator;
+    differentiator.cutoff_hz().filter(|_| differentiator.reference().is_none())
+}

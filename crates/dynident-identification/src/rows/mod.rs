@@ -1,0 +1,74 @@
+//! From samples to rows of regressor and torque, filtered alike: what every estimator and every examination reads.
+//!
+//! Samples flow in blocks: positions to motion, motion to regressor blocks, regressor and torque through the same low-pass and decimation, then to a
+//! [`RowConsumer`]. The whole regressor is never stored.
+
+mod builder;
+mod filter;
+mod mask;
+mod pass;
+mod reader;
+
+pub use builder::RowBuilder;
+pub(crate) use builder::in_model_order;
+pub use filter::{ParallelFilterSettings, motion_band_hz};
+pub use mask::MotionRecord;
+pub use pass::{KeptLog, LogPass, LogStatistics};
+
+use crate::error::IdentificationError;
+use dynident_dynamics::Panels;
+
+/// Samples that are made into regressor blocks at a time: small enough for the cache, large enough to spread the filter's overhead.
+pub(crate) const PANEL_SAMPLES: usize = 256;
+
+/// Filtered rows of one joint.
+#[derive(Clone, Copy, Debug)]
+pub struct JointRows<'a> {
+    /// The joint.
+    pub joint: usize,
+    /// Number of rows.
+    pub rows: usize,
+    /// The joint's columns of the layout one after another, each of `rows` numbers, then its torque (N m, N).
+    pub panel: &'a [f64],
+}
+
+/// Unfiltered samples of all joints.
+#[derive(Clone, Copy, Debug)]
+pub struct RawSamples<'a> {
+    /// Number of the uninterrupted piece of the log.
+    pub segment: usize,
+    /// Samples a second.
+    pub rate_hz: f64,
+    /// Regressor blocks with the torque as logged, or as smoothed with `smooth_torque`.
+    pub panels: &'a Panels,
+}
+
+/// What is done with a log's rows.
+pub trait RowConsumer {
+    /// Takes rows as they leave the parallel filter. Joints of the same instants come in their order, with as many rows each unless windows leave some out.
+    ///
+    /// # Errors
+    /// What stops the pass.
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError>;
+
+    /// Takes the same samples before the filter; they come before their rows. Ignored by default.
+    ///
+    /// # Errors
+    /// What stops the pass.
+    fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), IdentificationError> {
+        let _ = samples;
+        Ok(())
+    }
+}
+
+/// `panel · θ` of one joint: the torque that base parameters `theta` predict for its rows; `columns` are the joint's columns of the layout.
+pub fn predicted_torque(panel: &[f64], rows: usize, columns: &[usize], theta: &[f64], out: &mut Vec<f64>) {
+    out.clear();
+    out.resize(rows, 0.0);
+    for (place, &column) in columns.iter().enumerate() {
+        let value = theta[column];
+        for (to, x) in out.iter_mut().zip(&panel[place * rows..(place + 1) * rows]) {
+            *to += value * x;
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! One pass over a recording: its rows to a consumer.
+
+use super::builder::RowBuilder;
+use super::filter::{ParallelFilterSettings, motion_band_hz};
+use super::reader::read_beside;
+use super::{MotionRecord, RowConsumer};
+use crate::error::IdentificationError;
+use crate::progress::Progress;
+use crate::recording::{Recording, Samples};
+use crate::regressor_model::RegressorModel;
+use dynident_recording::{ImportReport, MotionBlock, MotionSettings, MotionStream};
+use std::sync::OnceLock;
+
+/// Numbers of all logs' motions together would be too many; of one log at most so many are kept, 256 MiB.
+const MOST_KEPT_NUMBERS: usize = 1 << 25;
+
+/// The motion of a log that was read once.
+#[derive(Debug)]
+pub struct KeptLog {
+    blocks: Vec<MotionBlock>,
+    rate_hz: f64,
+    report: ImportReport,
+}
+
+/// What is known of a recording once its rows have passed.
+#[derive(Clone, Debug)]
+pub struct LogStatistics {
+    /// What the importer found; `None` for a motion that was made already.
+    pub report: Option<ImportReport>,
+    /// Cut-off of the differentiator in force.
+    pub motion_cutoff_hz: Option<f64>,
+    /// Rate after decimation.
+    pub filtered_rate_hz: f64,
+    /// Gain one half of the parallel filter, if there is one.
+    pub filter_cutoff_hz: Option<f64>,
+    /// Filtered rows of each joint.
+    pub filtered_rows: u64,
+}
+
+/// One recording to be passed: everything but the consumer.
+#[derive(Clone, Copy)]
+pub struct LogPass<'a> {
+    /// The recording.
+    pub recording: &'a Recording,
+    /// What makes its rows.
+    pub model: &'a RegressorModel,
+    /// The motion settings with the cut-off that is in force for all logs.
+    pub motion: &'a MotionSettings,
+    /// The parallel filter.
+    pub filter: &'a ParallelFilterSettings,
+    /// Whether a second thread reads.
+    pub reader_thread: bool,
+    /// Stop after about so many samples.
+    pub most_samples: Option<u64>,
+    /// Hears of the samples that have passed.
+    pub progress: &'a dyn Progress,
+    /// Where the log's motion is kept for later passes, if it fits.
+    pub kept: Option<&'a OnceLock<KeptLog>>,
+}
+
+impl core::fmt::Debug for LogPass<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("LogPass").field("recording", &self.recording.name).finish_non_exhaustive()
+    }
+}
+
+/// The motion behind a pass.
+enum Motion<'a> {
+    Kept(&'a KeptLog),
+    Stream(Box<MotionStream>),
+    Record(&'a MotionRecord),
+}
+
+impl LogPass<'_> {
+    /// Sends the recording's rows to `consumer`.
+    ///
+    /// # Errors
+    /// A recording that cannot be read, lacks a temperature that friction needs, or leaves no rows behind the filter; and what the consumer returns.
+    pub fn run(&self, consumer: &mut dyn RowConsumer) -> Result<LogStatistics, IdentificationError> {
+        let Recording { name, samples, .. } = self.recording;
+        if let Some(joint) = self.model.joint_that_needs_temperature().filter(|_| !self.recording.has_temperature()) {
+            let joint = self.model.model().joints()[joint].name.clone();
+            return Err(IdentificationError::NoTemperature { log: name.clone(), joint });
+        }
+        let places = self.recording.places(self.model.model())?;
+        let mut motion = match (samples, self.kept.and_then(OnceLock::get)) {
+            (Samples::Motion(record), _) => Motion::Record(record),
+            (_, Some(kept)) => Motion::Kept(kept),
+            _ => match self.recording.open(self.model.model(), self.motion)? {
+                Some(stream) => Motion::Stream(Box::new(stream)),
+                None => return Err(IdentificationError::NoTrainingLog),
+            },
+        };
+        let rate_hz = match &motion {
+            Motion::Kept(kept) => kept.rate_hz,
+            Motion::Stream(stream) => stream.rate_hz(),
+            Motion::Record(record) => record.motion.rate_hz,
+        };
+        let filter = self.filter.decimation(rate_hz, motion_band_hz(self.motion));
+        let in_filter = |source| IdentificationError::Filter { log: name.clone(), source };
+        let mut builder = RowBuilder::new(self.model, &places, rate_hz, filter.as_ref()).map_err(in_filter)?;
+        let factor = filter.as_ref().map_or(1, |settings| settings.factor);
+        if let Motion::Record(record) = &motion {
+            let reach = builder.reach();
+            builder = builder.with_mask(record.mask(reach, factor));
+        }
+        let mut report = None;
+        match &mut motion {
+            Motion::Record(record) => self.take(&record.motion, &mut builder, consumer)?,
+            Motion::Kept(kept) => {
+                for block in &kept.blocks {
+                    if self.is_enough(&builder) {
+                        break;
+                    }
+                    self.take(block, &mut builder, consumer)?;
+                }
+                report = Some(kept.report.clone());
+            }
+            Motion::Stream(stream) => {
+                let blocks = self.stream(stream, &mut builder, consumer)?;
+                report = Some(stream.report());
+                if let (Some(kept), Some(blocks)) = (self.kept, blocks) {
+                    // Another thread may have kept the same meanwhile.
+                    let _ = kept.set(KeptLog { blocks, rate_hz, report: stream.report() });
+                }
+            }
+        }
+        let filtered_rows = builder.filtered_rows();
+        if filtered_rows == 0 {
+            let (rows, needed) = (builder.samples(), builder.needed());
+            return Err(IdentificationError::NothingLeft { log: name.clone(), rows, needed });
+        }
+        let filtered_rate_hz = rate_hz / factor as f64;
+        Ok(LogStatistics {
+            report,
+            motion_cutoff_hz: self.motion.differentiator.cutoff_hz(),
+            filtered_rate_hz,
+            filter_cutoff_hz: filter.map(|settings| settings.cutoff_hz.unwrap_or(0.4 * filtered_rate_hz)),
+            filtered_rows,
+        })
+    }
+
+    fn take(
+        &self,
+        block: &MotionBlock,
+        builder: &mut RowBuilder<'_>,
+        consumer: &mut dyn RowConsumer,
+    ) -> Result<(), IdentificationError> {
+        builder.take(block, consumer)?;
+        self.progress.advance(block.rows as u64);
+        Ok(())
+    }
+
+    fn is_enough(&self, builder: &RowBuilder<'_>) -> bool {
+        self.most_samples.is_some_and(|most| builder.samples() >= most)
+    }
+
+    /// Reads a log to its end, or to as many samples as are asked for; returns its blocks if it was read whole and they fit.
+    fn stream(
+        &self,
+        stream: &mut MotionStream,
+        builder: &mut RowBuilder<'_>,
+        consumer: &mut dyn RowConsumer,
+    ) -> Result<Option<Vec<MotionBlock>>, IdentificationError> {
+        let name = &self.recording.name;
+        let mut keeper =
+            Keeper { blocks: (self.kept.is_some() && self.most_samples.is_none()).then(Vec::new), numbers: 0 };
+        if self.reader_thread && self.most_samples.is_none() {
+            let take = |block: MotionBlock| {
+                self.take(&block, builder, consumer)?;
+                Ok(keeper.keep(block))
+            };
+            read_beside(stream, take).map_err(|error| error.named(name))?;
+        } else {
+            let mut block = MotionBlock::default();
+            while !self.is_enough(builder)
+                && stream.next_block(&mut block).map_err(|source| IdentificationError::recording(name, source))?
+            {
+                self.take(&block, builder, consumer)?;
+                block = keeper.keep(block).unwrap_or_default();
+            }
+        }
+        Ok(keeper.blocks)
+    }
+}
+
+/// Keeps blocks until they are too many.
+struct Keeper {
+    blocks: Option<Vec<MotionBlock>>,
+    numbers: usize,
+}
+
+impl Keeper {
+    /// Returns the block if it is not kept.
+    fn keep(&mut self, block: MotionBlock) -> Option<MotionBlock> {
+        let MotionBlock { q, dq, ddq, tau, tau_smooth, temperature_c, .. } = &block;
+        self.numbers += [q, dq, ddq, tau, tau_smooth, temperature_c].into_iter().map(Vec::len).sum::<usize>();
+        if self.numbers > MOST_KEPT_NUMBERS {
+            self.blocks = None;
+        }
+        match &mut self.blocks {
+            Some(blocks) => {
+                blocks.push(block);
+                None
+            }
+            None => Some(block),
+        }
+    }
+}

@@ -1,0 +1,250 @@
+//! From training recordings to triangular factors, and the model whose terms they were made with.
+
+use crate::error::IdentificationError;
+use crate::estimators::Estimator;
+use crate::examination::{Evidence, PriorAgreement};
+use crate::friction::{JointFriction, candidate_columns, choose_friction, chosen_model};
+use crate::logs::Logs;
+use crate::payload::{DriveGain, Gains, LoadColumns, Payload, Refit, drive_gains};
+use crate::regressor_model::RegressorModel;
+use crate::rows::{JointRows, LogPass, LogStatistics, RowConsumer};
+use crate::settings::{EstimationSettings, GainChoice};
+use dynident_dynamics::Column;
+use dynident_estimation::{
+    Estimate, EstimationError, LinearProblem, SegmentedFactor, ordinary_least_squares, weighted_least_squares,
+};
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// What is left of one recording for fitting.
+#[derive(Clone, Debug)]
+pub struct LogFactors {
+    /// Number of the recording.
+    pub index: usize,
+    /// One factor of `[W | τ]` for each joint, cut into time segments.
+    pub factors: Vec<SegmentedFactor>,
+    /// How the recording was read.
+    pub statistics: LogStatistics,
+    /// How well the nominal values explain it, where they are known and torque is in newton metres.
+    pub nominal_agreement: Option<PriorAgreement>,
+}
+
+/// The training recordings as factors, and the model that they were made with.
+#[derive(Clone, Debug)]
+pub struct Training {
+    /// The model, with the friction that was chosen.
+    pub model: RegressorModel,
+    /// The recordings, in the order of the problem's logs.
+    pub logs: Vec<LogFactors>,
+    /// All of them over one set of columns.
+    pub problem: LinearProblem,
+    /// Columns beside the base parameters: payloads and offsets of single logs.
+    pub columns: LoadColumns,
+    /// How friction was chosen, joint by joint; empty where it was stated.
+    pub friction_choice: Vec<JointFriction>,
+    /// Where gains were asked for: what was found, and the estimate with them.
+    pub gains: Option<(Estimate, Vec<DriveGain>)>,
+    /// Seconds spent on reading logs, and on estimates that choose.
+    pub timings_s: [f64; 2],
+}
+
+/// Makes the factors of the recordings `training`; where friction is to be chosen or depends on the load, once more with what the first fit says. `known_arm` where
+/// the arm is held, with what of it is fitted again.
+///
+/// # Errors
+/// Recordings that cannot be read, payloads and gains that do not go together, rows that do not carry an estimate.
+pub fn training_rows(
+    logs: &Logs<'_>,
+    model: RegressorModel,
+    training: &[usize],
+    payloads: &[Payload],
+    known_arm: Option<Refit>,
+) -> Result<Training, IdentificationError> {
+    let job = Job { logs, training, payloads, known_arm };
+    let mut fitted = job.fit(model)?;
+    if logs.settings.gains == GainChoice::Unknown {
+        let Gains { of_joints, estimate, problem } =
+            drive_gains(&logs.settings.estimation, &fitted.columns, &fitted.problem, training)?;
+        fitted.model.torque_gains = of_joints.iter().map(|gain| gain.gain).collect();
+        fitted.problem = problem;
+        fitted.gains = Some((estimate, of_joints));
+    }
+    Ok(fitted)
+}
+
+struct Job<'a> {
+    logs: &'a Logs<'a>,
+    training: &'a [usize],
+    payloads: &'a [Payload],
+    known_arm: Option<Refit>,
+}
+
+impl Job<'_> {
+    fn fit(&self, model: RegressorModel) -> Result<Training, IdentificationError> {
+        let settings = self.logs.settings;
+        let (first, plain) = self.fit_once(model)?;
+        let candidates: Vec<_> = settings
+            .friction
+            .iter()
+            .filter_map(|search| Some((first.model.model().joint_index(&search.joint)?, search)))
+            .map(|(joint, search)| (joint, candidate_columns(search, joint)))
+            .collect();
+        if candidates.is_empty() {
+            let model = first.model.clone().with_load_of(&first.model, &plain.values);
+            if model.load_parameters.is_none() {
+                return Ok(first);
+            }
+            let [read, estimated] = first.timings_s;
+            let (mut second, _) = self.fit_once(model)?;
+            second.timings_s = [second.timings_s[0] + read, second.timings_s[1] + estimated];
+            return Ok(second);
+        }
+        // All candidates as columns of one set of factors, from which each candidate model is a selection.
+        let known = first.model.layout().columns();
+        let further = candidates.iter().flat_map(|(_, columns)| columns).map(|column| column.law.clone());
+        let further = further.filter(|law| !known.contains(&Column::Law(law.clone())));
+        let wide = first.model.with_further_columns(further).with_load_of(&first.model, &plain.values);
+        let started = Instant::now();
+        let factors = self.read(&wide)?;
+        let read_s = first.timings_s[0] + started.elapsed().as_secs_f64();
+        let started = Instant::now();
+        let wide_problem = self.problem(&wide, &self.columns(&wide)?, &factors)?;
+        let equal_weights = matches!(settings.estimation.estimator, Estimator::Ordinary);
+        let friction_choice =
+            choose_friction(&first.model, &wide, &wide_problem, &candidates, (&plain, equal_weights))?;
+        let chosen = chosen_model(&first.model.parametric, &friction_choice)?;
+        let model = RegressorModel::from(chosen).with_load_of(&first.model, &plain.values);
+        let logs = factors.into_iter().map(|log| log.of(&wide, &model)).collect::<Result<Vec<_>, _>>()?;
+        let columns = self.columns(&model)?;
+        let problem = self.problem(&model, &columns, &logs)?;
+        let timings_s = [read_s, first.timings_s[1] + started.elapsed().as_secs_f64()];
+        Ok(Training { model, logs, problem, columns, friction_choice, gains: None, timings_s })
+    }
+
+    fn fit_once(&self, model: RegressorModel) -> Result<(Training, Estimate), IdentificationError> {
+        let columns = self.columns(&model)?;
+        let started = Instant::now();
+        let logs = self.read(&model)?;
+        let read_s = started.elapsed().as_secs_f64();
+        let started = Instant::now();
+        let problem = self.problem(&model, &columns, &logs)?;
+        let estimate = plain_estimate(&self.logs.settings.estimation, &problem)?;
+        let timings_s = [read_s, started.elapsed().as_secs_f64()];
+        let training = Training { model, logs, problem, columns, friction_choice: Vec::new(), gains: None, timings_s };
+        Ok((training, estimate))
+    }
+
+    fn columns(&self, model: &RegressorModel) -> Result<LoadColumns, IdentificationError> {
+        Ok(LoadColumns::new(self.logs.settings, self.logs.recordings, self.payloads, model, self.known_arm)?)
+    }
+
+    /// Recordings side by side, or one with its reader on a second thread; results stand in their order either way.
+    fn read(&self, model: &RegressorModel) -> Result<Vec<LogFactors>, IdentificationError> {
+        self.logs.begin("logs to factors", self.training);
+        let alone = self.training.len() == 1;
+        let one = |index: &usize| log_factors(self.logs, model, *index, alone);
+        let factors = if !alone && self.logs.execution.parallel() {
+            self.training.par_iter().map(one).collect()
+        } else {
+            self.training.iter().map(one).collect()
+        };
+        self.logs.end();
+        factors
+    }
+
+    fn problem(
+        &self,
+        model: &RegressorModel,
+        columns: &LoadColumns,
+        logs: &[LogFactors],
+    ) -> Result<LinearProblem, EstimationError> {
+        let mut problem = LinearProblem::new(columns.symbols(model), model.joint_names());
+        let keep_known = self.logs.settings.gains == GainChoice::Unknown;
+        for log in logs {
+            // Two recordings may share a name; their numbers keep them apart.
+            let name = format!("{} ({})", self.logs.recordings[log.index].name, log.index + 1);
+            for (joint, factor) in log.factors.iter().enumerate() {
+                let own = model.layout().joint_columns(joint);
+                columns.add(&mut problem, (log.index, &name), joint, (own, factor), keep_known)?;
+            }
+        }
+        match model.parametric.nominal_base() {
+            Some(nominal) => {
+                let mut nominal = nominal.to_vec();
+                nominal.resize(columns.count(), 0.0);
+                problem.with_fallback(nominal)
+            }
+            None => Ok(problem),
+        }
+    }
+}
+
+/// The estimate that friction is chosen and loads are taken by: least squares, whatever estimator comes in the end.
+fn plain_estimate(settings: &EstimationSettings, problem: &LinearProblem) -> Result<Estimate, EstimationError> {
+    match settings.estimator {
+        Estimator::Ordinary => ordinary_least_squares(problem, &settings.ordinary()),
+        _ => weighted_least_squares(problem, &settings.weighted()),
+    }
+}
+
+impl LogFactors {
+    /// The same rows as another model sees them, whose columns are among those of `wide`.
+    fn of(mut self, wide: &RegressorModel, model: &RegressorModel) -> Result<Self, EstimationError> {
+        for (joint, factor) in self.factors.iter_mut().enumerate() {
+            let seen = wide.layout().joint_columns(joint);
+            // A column that is not there gets a number out of range, which the selection refuses.
+            let place = |&column: &usize| {
+                let wanted = &model.layout().columns()[column];
+                seen.iter().position(|&global| wide.layout().columns()[global] == *wanted).unwrap_or(usize::MAX)
+            };
+            let places: Vec<usize> = model.layout().joint_columns(joint).iter().map(place).collect();
+            *factor = factor.selected(&places)?;
+        }
+        Ok(self)
+    }
+}
+
+struct FactorConsumer<'a> {
+    log: String,
+    factors: Vec<SegmentedFactor>,
+    evidence: Option<Evidence<'a>>,
+    buffer: Vec<f64>,
+}
+
+impl RowConsumer for FactorConsumer<'_> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
+        if let Some(evidence) = &mut self.evidence {
+            evidence.filtered(rows, &mut self.buffer);
+        }
+        self.factors[rows.joint]
+            .absorb(rows.panel, rows.rows)
+            .map_err(|source| IdentificationError::Rows { log: self.log.clone(), source })
+    }
+}
+
+/// The factors of recording number `index`; `alone` lets a second thread read.
+///
+/// # Errors
+/// What reading it can give.
+pub fn log_factors(
+    logs: &Logs<'_>,
+    model: &RegressorModel,
+    index: usize,
+    alone: bool,
+) -> Result<LogFactors, IdentificationError> {
+    let columns: Vec<&[usize]> = (0..model.dof()).map(|joint| model.layout().joint_columns(joint)).collect();
+    let log = logs.recordings[index].label();
+    let factors = columns
+        .iter()
+        .map(|columns| SegmentedFactor::new(columns.len(), logs.settings.estimation.segments))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(|source| IdentificationError::Rows { log: log.clone(), source })?;
+    // Torque in a unit that nobody knows says nothing about the description.
+    let nominal = model.parametric.nominal_base().filter(|_| logs.settings.gains == GainChoice::Stated);
+    let evidence = nominal.map(|nominal| Evidence::new(columns, nominal));
+    let mut consumer = FactorConsumer { log, factors, evidence, buffer: Vec::new() };
+    let pass = LogPass { reader_thread: alone && logs.execution.parallel(), ..logs.pass(model, index) };
+    let statistics = pass.run(&mut consumer)?;
+    let nominal_agreement = consumer.evidence.as_ref().map(|evidence| evidence.agreement(&model.joint_names()));
+    Ok(LogFactors { index, factors: consumer.factors, statistics, nominal_agreement })
+}

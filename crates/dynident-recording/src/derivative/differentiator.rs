@@ -1,0 +1,158 @@
+//! From q to dq and ddq: the interface of every way there is, and of those that a caller plugs in.
+
+use crate::error::FilterError;
+use core::ops::Range;
+
+/// Where a differentiator writes: three slices of the input's length.
+#[derive(Debug)]
+pub struct Derivatives<'a> {
+    /// Filtered position.
+    pub q: &'a mut [f64],
+    /// First derivative, per second.
+    pub dq: &'a mut [f64],
+    /// Second derivative, per second squared.
+    pub ddq: &'a mut [f64],
+}
+
+/// Which samples are looked at: ways that know the commanded motion need the joint and the time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Samples per second.
+    pub rate_hz: f64,
+    /// The joint, in the order of the reference.
+    pub joint: usize,
+    /// Time of the first sample, seconds after the log's first row.
+    pub first_time_s: f64,
+}
+
+impl Place {
+    /// The first joint from time zero on.
+    pub fn start(rate_hz: f64) -> Self {
+        Self { rate_hz, joint: 0, first_time_s: 0.0 }
+    }
+
+    /// Time of sample `i`.
+    pub fn time_s(&self, i: usize) -> f64 {
+        self.first_time_s + i as f64 / self.rate_hz
+    }
+}
+
+/// Samples, as ascending ranges.
+pub type SampleRanges = Vec<Range<usize>>;
+
+/// Appends sample `i` to ascending ranges.
+pub(crate) fn add_sample(ranges: &mut SampleRanges, i: usize) {
+    match ranges.last_mut() {
+        Some(last) if last.end >= i => last.end = last.end.max(i + 1),
+        _ => ranges.push(i..i + 1),
+    }
+}
+
+/// One way from uniformly sampled positions of one joint to filtered position, velocity and acceleration.
+///
+/// A way that states its [`context_samples`](Self::context_samples) works through a long log in pieces: a window with
+/// so many samples more on either side gives inside what the whole log would give. Ways that fit something to the whole
+/// piece, or estimate a lag over it, leave the default.
+///
+/// Name, shortest signal and [`differentiate_at`](Self::differentiate_at) make a new way. It need not be known to this
+/// crate: [`MotionStream::with_differentiator`](crate::MotionStream::with_differentiator) takes it as it is.
+///
+/// ```
+/// use dynident_recording::{Derivatives, Differentiator, FilterError, Place, SampleRanges};
+/// use dynident_recording::{JointSamples, MotionBlock, MotionSettings, MotionStream};
+///
+/// /// Backward differences: crude, and late by half a sample and by one.
+/// #[derive(Debug)]
+/// struct Backward;
+///
+/// impl Differentiator for Backward {
+///     fn name(&self) -> &'static str {
+///         "backward"
+///     }
+///     fn minimum_samples(&self) -> usize {
+///         3
+///     }
+///     fn context_samples(&self, _rate_hz: f64) -> Option<usize> {
+///         Some(2)
+///     }
+///     fn differentiate_at(&self, place: Place, q: &[f64], out: Derivatives) -> Result<SampleRanges, FilterError> {
+///         self.check_length(q.len())?;
+///         for i in 0..q.len() {
+///             let [q0, q1, q2] = [i, i.saturating_sub(1), i.saturating_sub(2)].map(|k| q[k]);
+///             out.q[i] = q0;
+///             out.dq[i] = place.rate_hz * (q0 - q1);
+///             out.ddq[i] = place.rate_hz * place.rate_hz * (q0 - 2.0 * q1 + q2);
+///         }
+///         // The first two samples have no past: they are to be left out.
+///         Ok(if place.first_time_s == 0.0 { vec![0..2; 1] } else { Vec::new() })
+///     }
+/// }
+///
+/// let q: Vec<f64> = (0..200).map(|i| 0.25 * f64::from(i * i)).collect();
+/// let log = JointSamples::at_rate(1.0, vec![q.clone()], vec![q]).into_log("parabola", &["x".to_owned()])?;
+/// let settings = MotionSettings::default();
+/// let mut stream = MotionStream::with_differentiator(&log, &settings, |_| Ok(Box::new(Backward)))?;
+/// let mut block = MotionBlock::default();
+/// assert!(stream.next_block(&mut block)?);
+/// assert!(block.rows == 198 && block.ddq.iter().all(|ddq| *ddq == 0.5));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub trait Differentiator: core::fmt::Debug + Send + Sync {
+    /// Name as in the study file.
+    fn name(&self) -> &'static str;
+
+    /// Shortest signal that it can be applied to.
+    fn minimum_samples(&self) -> usize;
+
+    /// Samples on either side of a piece within which the ends of the window are felt (to 1e-12 of the signal);
+    /// `None` if every sample depends on the whole piece, which is the default.
+    fn context_samples(&self, rate_hz: f64) -> Option<usize> {
+        let _ = rate_hz;
+        None
+    }
+
+    /// Fills `out` from the positions `q` at `place`; which joint it is, and when, matters only to ways that follow a
+    /// [`Reference`](crate::Reference).
+    ///
+    /// Returns the samples at which this way does not apply: velocity and acceleration there mean nothing.
+    ///
+    /// # Errors
+    /// [`FilterError`] if `q` is shorter than [`minimum_samples`](Self::minimum_samples) or the filter does not exist
+    /// at this rate.
+    ///
+    /// # Panics
+    /// If a slice of `out` is shorter than `q`.
+    fn differentiate_at(&self, place: Place, q: &[f64], out: Derivatives<'_>) -> Result<SampleRanges, FilterError>;
+
+    /// Applies only the smoothing to another signal of the same clock (a torque), as it is applied to q; by default
+    /// there is none.
+    ///
+    /// # Errors
+    /// As [`differentiate_at`](Self::differentiate_at).
+    fn smooth(&self, rate_hz: f64, signal: &[f64], out: &mut [f64]) -> Result<(), FilterError> {
+        let _ = rate_hz;
+        out[..signal.len()].copy_from_slice(signal);
+        Ok(())
+    }
+
+    /// As [`differentiate_at`](Self::differentiate_at), the samples taken for those of the first joint from time zero
+    /// on.
+    ///
+    /// # Errors
+    /// As [`differentiate_at`](Self::differentiate_at).
+    fn differentiate(&self, rate_hz: f64, q: &[f64], out: Derivatives<'_>) -> Result<(), FilterError> {
+        self.differentiate_at(Place::start(rate_hz), q, out).map(drop)
+    }
+
+    /// Refuses a signal that is shorter than [`minimum_samples`](Self::minimum_samples).
+    ///
+    /// # Errors
+    /// [`FilterError::TooShort`].
+    fn check_length(&self, found: usize) -> Result<(), FilterError> {
+        let needed = self.minimum_samples();
+        if found < needed {
+            return Err(FilterError::TooShort { method: self.name(), found, needed });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,364 @@
+//! What a study file may ask for under `differentiator`: the registry of every way that is offered.
+
+use super::butterworth::{ButterworthZeroPhase, LowPass};
+use super::central_differences::CentralDifferences;
+use super::deviation::Deviation;
+use super::differentiator::Differentiator;
+use super::five_point_cubic::FivePointCubic;
+use super::fourier_fit::FourierFit;
+use super::frequency_domain::{Ends, FrequencyDomain};
+use super::position_map::PositionMap;
+use super::reference_lag::check_max_lag;
+use super::savitzky_golay::SavitzkyGolay;
+use super::smoothed_differences::SmoothedDifferences;
+use super::speed_series::SpeedSeries;
+use super::time_warp::TimeWarp;
+use crate::error::FilterError;
+use crate::reference::{Reference, ReferenceSettings};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// One way from q to dq and ddq with its settings, as a study file names it under `differentiator`.
+///
+/// ```
+/// use dynident_recording::DifferentiatorSettings;
+/// let settings: DifferentiatorSettings = toml::from_str("method = \"butterworth\"\ncutoff_hz = 8.0").unwrap();
+/// assert_eq!(settings, DifferentiatorSettings::Butterworth { order: 4, cutoff_hz: Some(8.0) });
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "method", rename_all = "kebab-case", deny_unknown_fields)]
+#[non_exhaustive]
+pub enum DifferentiatorSettings {
+    /// [`ButterworthZeroPhase`]; without `cutoff_hz` the cut-off is chosen from the data ([`cutoff`](crate::cutoff())).
+    Butterworth {
+        /// Order of the one-way filter, 1 to 12; 4 by default.
+        #[serde(default = "four")]
+        order: usize,
+        /// Cut-off; chosen from the data by default.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        cutoff_hz: Option<f64>,
+    },
+    /// [`CentralDifferences`] of the positions as logged.
+    CentralDifferences {
+        /// Order of accuracy: 2, 4, 6 or 8; 4 by default.
+        #[serde(default = "four")]
+        order: usize,
+    },
+    /// [`SavitzkyGolay`]: local polynomials.
+    SavitzkyGolay {
+        /// Odd number of samples.
+        window: usize,
+        /// Degree of the polynomial, 2 or more, below `window`; 4 by default.
+        #[serde(default = "four")]
+        degree: usize,
+    },
+    /// [`LowPass`]: a causal Butterworth filter, which makes everything late.
+    LowPass {
+        /// Order, 1 to 12; 4 by default.
+        #[serde(default = "four")]
+        order: usize,
+        /// Cut-off; chosen from the data by default.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        cutoff_hz: Option<f64>,
+    },
+    /// [`FourierFit`]: a series fitted to the positions of the whole piece.
+    FourierFit {
+        /// Base frequency of the motion.
+        base_hz: f64,
+        /// Highest harmonic, 1 to 200.
+        harmonics: usize,
+        /// Whether a straight line is fitted beside them; true by default.
+        #[serde(default = "yes")]
+        trend: bool,
+    },
+    /// [`FrequencyDomain`]: jω up to a cut-off, nothing beyond.
+    FrequencyDomain {
+        /// Highest frequency that is kept; chosen from the data by default.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        cutoff_hz: Option<f64>,
+        /// What stands beyond the ends; a smooth bridge by default.
+        #[serde(default)]
+        ends: Ends,
+    },
+    /// [`SmoothedDifferences`]: central differences, acceleration and torque by a moving average.
+    SmoothedDifferences {
+        /// Order of accuracy of the differences; 2 by default.
+        #[serde(default = "two")]
+        order: usize,
+        /// Odd number of samples, 3 to 501.
+        window: usize,
+    },
+    /// [`FivePointCubic`]: torque by five-point cubic smoothing, low-pass filtered differences of position.
+    FivePointCubic {
+        /// Passes over the torque; 1 by default.
+        #[serde(default = "one")]
+        passes: usize,
+        /// Cut-off of the low-pass; chosen from the data by default.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        cutoff_hz: Option<f64>,
+    },
+    /// [`SpeedSeries`]: a Fourier series fitted to the filtered speed.
+    SpeedSeries {
+        /// Base frequency of the motion.
+        base_hz: f64,
+        /// Highest harmonic, 1 to 200.
+        harmonics: usize,
+        /// Cut-off of the filter; chosen from the data by default.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        cutoff_hz: Option<f64>,
+    },
+    /// [`PositionMap`]: the paper's map, position to speed and acceleration on a known stroke.
+    #[serde(alias = "logistic-map")]
+    PositionMap {
+        /// The commanded motion; a log may have its own.
+        #[serde(default)]
+        reference: ReferenceSettings,
+        /// Longest lag of a joint behind it that is looked for, s; 0.5 by default.
+        #[serde(default = "half")]
+        max_lag_s: f64,
+    },
+    /// [`TimeWarp`]: the reference at a shifted time, one lag a stroke.
+    TimeWarp {
+        /// The commanded motion; a log may have its own.
+        #[serde(default)]
+        reference: ReferenceSettings,
+        /// Longest lag of a joint behind it that is looked for, s; 0.5 by default.
+        #[serde(default = "half")]
+        max_lag_s: f64,
+    },
+    /// [`Deviation`]: the reference's own derivatives, and those of the smoothed deviation from it.
+    Deviation {
+        /// The commanded motion; a log may have its own.
+        #[serde(default)]
+        reference: ReferenceSettings,
+        /// Any of the ways that need no reference; zero-phase Butterworth by default.
+        #[serde(default)]
+        smoother: Box<DifferentiatorSettings>,
+        /// Shift the reference by the joint's lag behind it, at most so many seconds; not shifted by default.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        max_lag_s: Option<f64>,
+    },
+}
+
+fn one() -> usize {
+    1
+}
+
+fn two() -> usize {
+    2
+}
+
+fn half() -> f64 {
+    0.5
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn four() -> usize {
+    4
+}
+
+impl Default for DifferentiatorSettings {
+    fn default() -> Self {
+        Self::Butterworth { order: four(), cutoff_hz: None }
+    }
+}
+
+impl DifferentiatorSettings {
+    /// Checks what can be checked without a log and without the reference's table.
+    ///
+    /// # Errors
+    /// A [`FilterError`] that names the setting.
+    pub fn validate(&self) -> Result<(), FilterError> {
+        match self {
+            Self::PositionMap { reference, max_lag_s } | Self::TimeWarp { reference, max_lag_s } => {
+                reference.validate()?;
+                check_max_lag(*max_lag_s)
+            }
+            Self::Deviation { reference, smoother, max_lag_s } => {
+                reference.validate()?;
+                max_lag_s.map_or(Ok(()), check_max_lag)?;
+                if smoother.reference().is_some() {
+                    let problem = "the smoother of a deviation must not need a reference itself".to_owned();
+                    return Err(FilterError::Reference { problem });
+                }
+                smoother.validate()
+            }
+            Self::Butterworth { .. }
+            | Self::CentralDifferences { .. }
+            | Self::SavitzkyGolay { .. }
+            | Self::LowPass { .. }
+            | Self::FourierFit { .. }
+            | Self::FrequencyDomain { .. }
+            | Self::SmoothedDifferences { .. }
+            | Self::FivePointCubic { .. }
+            | Self::SpeedSeries { .. } => self.build(1.0).map(drop),
+        }
+    }
+
+    /// How the commanded motion is named; `None` for ways that need none.
+    pub fn reference(&self) -> Option<&ReferenceSettings> {
+        match self {
+            Self::PositionMap { reference, .. }
+            | Self::TimeWarp { reference, .. }
+            | Self::Deviation { reference, .. } => Some(reference),
+            Self::Butterworth { .. }
+            | Self::CentralDifferences { .. }
+            | Self::SavitzkyGolay { .. }
+            | Self::LowPass { .. }
+            | Self::FourierFit { .. }
+            | Self::FrequencyDomain { .. }
+            | Self::SmoothedDifferences { .. }
+            | Self::FivePointCubic { .. }
+            | Self::SpeedSeries { .. } => None,
+        }
+    }
+
+    fn cutoff_place(&mut self) -> Option<&mut Option<f64>> {
+        match self {
+            Self::Butterworth { cutoff_hz, .. }
+            | Self::LowPass { cutoff_hz, .. }
+            | Self::FrequencyDomain { cutoff_hz, .. }
+            | Self::FivePointCubic { cutoff_hz, .. }
+            | Self::SpeedSeries { cutoff_hz, .. } => Some(cutoff_hz),
+            Self::Deviation { smoother, .. } => smoother.cutoff_place(),
+            Self::CentralDifferences { .. }
+            | Self::SavitzkyGolay { .. }
+            | Self::FourierFit { .. }
+            | Self::SmoothedDifferences { .. }
+            | Self::PositionMap { .. }
+            | Self::TimeWarp { .. } => None,
+        }
+    }
+
+    /// The cut-off that the settings name (a deviation's smoother names its own); `None` where there is none, or it is
+    /// left to the data.
+    pub fn cutoff_hz(&self) -> Option<f64> {
+        self.clone().cutoff_place().copied().flatten()
+    }
+
+    /// Whether the cut-off is left to the data.
+    pub fn wants_cutoff(&self) -> bool {
+        matches!(self.clone().cutoff_place(), Some(None))
+    }
+
+    /// The same with this cut-off, where it was left to the data.
+    #[must_use]
+    pub fn with_cutoff(mut self, chosen_cutoff_hz: f64) -> Self {
+        if let Some(place) = self.cutoff_place() {
+            place.get_or_insert(chosen_cutoff_hz);
+        }
+        self
+    }
+
+    /// The differentiator; `chosen_cutoff_hz` stands in where the settings name none. A commanded motion has to be
+    /// given in closed form: see [`build_following`](Self::build_following).
+    ///
+    /// # Errors
+    /// A [`FilterError`] that names the setting.
+    pub fn build(&self, chosen_cutoff_hz: f64) -> Result<Box<dyn Differentiator>, FilterError> {
+        self.build_following(chosen_cutoff_hz, None)
+    }
+
+    /// As [`build`](Self::build), with the commanded motion, which stands before what the settings name.
+    ///
+    /// # Errors
+    /// A [`FilterError`] that names the setting; [`FilterError::NoReference`] if this way needs a motion and has none.
+    pub fn build_following(
+        &self,
+        chosen_cutoff_hz: f64,
+        given: Option<&Arc<Reference>>,
+    ) -> Result<Box<dyn Differentiator>, FilterError> {
+        let motion = |settings: &ReferenceSettings, method| match given {
+            Some(given) => Ok(Arc::clone(given)),
+            None => settings.closed_form()?.map(Arc::new).ok_or(FilterError::NoReference { method }),
+        };
+        Ok(match self {
+            Self::Butterworth { order, cutoff_hz } => {
+                Box::new(ButterworthZeroPhase::new(*order, cutoff_hz.unwrap_or(chosen_cutoff_hz))?)
+            }
+            Self::CentralDifferences { order } => Box::new(CentralDifferences::new(*order)?),
+            Self::SavitzkyGolay { window, degree } => Box::new(SavitzkyGolay::new(*window, *degree)?),
+            Self::LowPass { order, cutoff_hz } => {
+                Box::new(LowPass::new(*order, cutoff_hz.unwrap_or(chosen_cutoff_hz))?)
+            }
+            Self::FourierFit { base_hz, harmonics, trend } => Box::new(FourierFit::new(*base_hz, *harmonics, *trend)?),
+            Self::FrequencyDomain { cutoff_hz, ends } => {
+                Box::new(FrequencyDomain::new(cutoff_hz.unwrap_or(chosen_cutoff_hz), *ends)?)
+            }
+            Self::SmoothedDifferences { order, window } => Box::new(SmoothedDifferences::new(*order, *window)?),
+            Self::FivePointCubic { passes, cutoff_hz } => {
+                Box::new(FivePointCubic::new(*passes, cutoff_hz.unwrap_or(chosen_cutoff_hz))?)
+            }
+            Self::SpeedSeries { base_hz, harmonics, cutoff_hz } => {
+                Box::new(SpeedSeries::new(*base_hz, *harmonics, cutoff_hz.unwrap_or(chosen_cutoff_hz))?)
+            }
+            Self::PositionMap { reference, max_lag_s } => {
+                Box::new(PositionMap::new(motion(reference, "position-map")?, *max_lag_s)?)
+            }
+            Self::TimeWarp { reference, max_lag_s } => {
+                Box::new(TimeWarp::new(motion(reference, "time-warp")?, *max_lag_s)?)
+            }
+            Self::Deviation { reference, smoother, max_lag_s } => {
+                self.validate()?;
+                let reference = motion(reference, "deviation")?;
+                Box::new(Deviation::new(reference, smoother.build(chosen_cutoff_hz)?, *max_lag_s)?)
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A result stores its settings as JSON, and `validate` reads them back.
+    #[test]
+    fn settings_survive_json() {
+        for text in [
+            "method = \"time-warp\"\nreference = \"a.csv\"",
+            "method = \"logistic-map\"\nreference = { start_s = -1.5, joints = [{ amplitude = 1.0, omega = 1.0, offset = 0.0, period_s = 40.0 }] }",
+            "method = \"deviation\"\nmax_lag_s = 0.1\nreference = { file = \"a.csv\", start_s = 2.0, strokes_s = [0.0, 1.5] }\nsmoother = { method = \"savitzky-golay\", window = 21 }",
+            "method = \"frequency-domain\"\nends = \"periodic\"",
+        ] {
+            let settings: DifferentiatorSettings = toml::from_str(text).unwrap();
+            settings.validate().unwrap();
+            let json = serde_json::to_string(&settings).unwrap();
+            assert_eq!(serde_json::from_str::<DifferentiatorSettings>(&json).unwrap(), settings, "{json}");
+        }
+    }
+
+    #[test]
+    fn contradictions_and_misspelt_keys_are_refused() {
+        for text in [
+            "method = \"time-warp\"\nreference = { fle = \"a.csv\" }",
+            "method = \"time-warp\"\nrefrence = \"a.csv\"",
+            "method = \"time-warp\"\nreference = 3",
+        ] {
+            assert!(toml::from_str::<DifferentiatorSettings>(text).is_err(), "{text}");
+        }
+        for text in [
+            "method = \"time-warp\"\nmax_lag_s = 0.0",
+            "method = \"time-warp\"\nreference = { start_s = inf }",
+            "method = \"time-warp\"\nreference = { strokes_s = [1.0] }",
+            "method = \"time-warp\"\nreference = { strokes_s = [1.0, 0.5] }",
+            "method = \"time-warp\"\nreference = { file = \"a.csv\", joints = [{ amplitude = 1.0, omega = 1.0, offset = 0.0, period_s = 40.0 }] }",
+            "method = \"deviation\"\nsmoother = { method = \"time-warp\" }",
+        ] {
+            let settings: DifferentiatorSettings = toml::from_str(text).unwrap();
+            assert!(settings.validate().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_cutoff_left_to_the_data_is_filled_in_wherever_it_stands() {
+        let settings: DifferentiatorSettings = toml::from_str("method = \"deviation\"").unwrap();
+        assert!(settings.wants_cutoff());
+        let settings = settings.with_cutoff(3.0).with_cutoff(5.0);
+        assert_eq!((settings.wants_cutoff(), settings.cutoff_hz()), (false, Some(3.0)));
+        let none: DifferentiatorSettings = toml::from_str("method = \"savitzky-golay\"\nwindow = 5").unwrap();
+        assert_eq!((none.wants_cutoff(), none.with_cutoff(3.0).cutoff_hz()), (false, None));
+    }
+}

@@ -1,0 +1,206 @@
+//! A cut-off chosen from the data: where the motion's acceleration has faded into the noise of the position.
+
+use realfft::RealFftPlanner;
+use serde::{Deserialize, Serialize};
+
+/// Samples that are looked at, at most.
+pub(crate) const CUTOFF_SAMPLES: usize = 1 << 16;
+
+/// Part of the acceleration's power (noise subtracted) that the pass band has to hold.
+const POWER_SHARE: f64 = 0.9999;
+/// Two-way Butterworth filters of order 4 pass 99.6 % of the amplitude at half their cut-off and 86 % at 0.8 of it.
+/// What the filter takes from positions alone, and not from torque, biases the fit; this margin keeps it to 0.4 % at
+/// the motion's highest frequency.
+const MARGIN: f64 = 2.0;
+/// A spectrum this far above the noise floor counts as motion.
+const ABOVE_NOISE: f64 = 10.0;
+/// No cut-off comes closer to the sampling rate than this part of it.
+const HIGHEST: f64 = 0.4;
+
+/// A cut-off and why.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CutoffChoice {
+    /// The cut-off for all joints.
+    pub cutoff_hz: f64,
+    /// What each joint alone would ask for; `None` for a joint that does not move.
+    pub joints_hz: Vec<Option<f64>>,
+    /// The choice in a sentence.
+    pub evidence: String,
+}
+
+/// Chooses one cut-off for all joints from uniformly sampled positions `q` (one slice for each joint; at most the first
+/// 65 536 samples are used).
+///
+/// Per joint, from the Welch spectrum of the second difference of q (Hann window, half overlap, about eight seconds a
+/// piece):
+/// * Noise in the position makes the spectrum of the acceleration rise with frequency. Behind the peak of the
+///   velocity's spectrum, the first frequency at which the acceleration's (smoothed over a quarter octave) comes within
+///   twice its minimum is the valley where motion has faded into noise.
+/// * Data that were filtered before have their valley far above the motion: there the frequency counts below which
+///   99.99 % of the acceleration's power up to the valley lies.
+///
+/// The joint asks for twice the lower of the two; the log's cut-off is the highest of its joints', at most 0.4 of the
+/// rate. A joint whose spectrum nowhere stands above ten times its median over the upper half of the band does not
+/// count.
+pub fn cutoff<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> CutoffChoice {
+    let joints: Vec<Option<Content>> = q.iter().map(|q| content(q.as_ref(), rate_hz)).collect();
+    let highest = HIGHEST * rate_hz;
+    let asked = |content: &Content| (MARGIN * content.power_hz).min(highest);
+    let leading = joints.iter().enumerate().filter_map(|(joint, content)| content.as_ref().map(|c| (joint, c)));
+    let leading = leading.max_by(|a, b| a.1.power_hz.total_cmp(&b.1.power_hz));
+    let joints_hz = joints.iter().map(|content| content.as_ref().map(asked)).collect();
+    match leading {
+        None => CutoffChoice {
+            cutoff_hz: 0.1 * rate_hz,
+            joints_hz,
+            evidence: "no joint moves above its noise: a tenth of the sampling rate".to_owned(),
+        },
+        Some((joint, content)) => CutoffChoice {
+            cutoff_hz: asked(content),
+            joints_hz,
+            evidence: format!(
+                "joint {} (0-based) reaches highest: its acceleration fades into the noise ({:.1e} per sample of position) at {:.3} Hz, \
+                 and 99.99 % of its power below that lies below {:.3} Hz; times {MARGIN}, at most {HIGHEST} of the rate",
+                joint, content.noise, content.valley_hz, content.power_hz,
+            ),
+        },
+    }
+}
+
+struct Content {
+    power_hz: f64,
+    valley_hz: f64,
+    /// Standard deviation of the position noise of one sample.
+    noise: f64,
+}
+
+fn content(q: &[f64], rate_hz: f64) -> Option<Content> {
+    let q = &q[..q.len().min(CUTOFF_SAMPLES)];
+    let (first, rest) = q.split_first()?;
+    if q.len() < 64 || rest.iter().all(|x| x == first) || q.iter().any(|x| !x.is_finite()) {
+        return None;
+    }
+    let second: Vec<f64> = q.windows(3).map(|x| (x[2] - x[1]) - (x[1] - x[0])).collect();
+    let longest = (8.0 * rate_hz).clamp(64.0, 65536.0) as usize;
+    let length = longest.next_power_of_two().min(previous_power_of_two(second.len() / 2).max(32));
+    let spectrum = welch(&second, length)?;
+    let bins = spectrum.len();
+    let response = |k: usize| (2.0 * (core::f64::consts::PI * k as f64 / length as f64).sin()).powi(4);
+    let position: Vec<f64> = (1..bins).map(|k| spectrum[k] / response(k)).collect();
+    let mut upper = position[position.len() / 2..].to_vec();
+    upper.sort_by(f64::total_cmp);
+    let floor = upper[upper.len() / 2];
+    let acceleration: Vec<f64> = (1..bins).map(|k| spectrum[k]).collect();
+    let valley = valley(&acceleration);
+    let end = position.iter().rposition(|power| *power > ABOVE_NOISE * floor)?.min(valley);
+    let power: Vec<f64> = (0..=end).map(|k| ((position[k] - floor) * response(k + 1)).max(0.0)).collect();
+    let total: f64 = power.iter().sum();
+    if position[0] <= ABOVE_NOISE * floor || total <= 0.0 {
+        return None;
+    }
+    let mut sum = 0.0;
+    let last = power.iter().position(|power| {
+        sum += power;
+        sum >= POWER_SHARE * total
+    });
+    let hertz = |k: usize| (k + 1) as f64 * rate_hz / length as f64;
+    Some(Content { power_hz: hertz(last.unwrap_or(end)), valley_hz: hertz(valley), noise: floor.sqrt() })
+}
+
+/// Index (bin minus one) at which the acceleration's spectrum has come down to twice its minimum behind the main
+/// motion.
+fn valley(acceleration: &[f64]) -> usize {
+    let bins = acceleration.len();
+    let sums: Vec<f64> = core::iter::once(0.0)
+        .chain(acceleration.iter().scan(0.0, |sum, power| {
+            *sum += power;
+            Some(*sum)
+        }))
+        .collect();
+    let smooth: Vec<f64> = (0..bins)
+        .map(|k| {
+            let (from, to) =
+                (k.min(((k + 1) as f64 / 1.09) as usize), (((k + 1) as f64 * 1.09).ceil() as usize + 1).min(bins));
+            let from = from.saturating_sub(1);
+            (sums[to] - sums[from]) / (to - from) as f64
+        })
+        .collect();
+    let velocity = |k: usize| smooth[k] / ((k + 1) * (k + 1)) as f64;
+    let peak = (0..bins).max_by(|a, b| velocity(*a).total_cmp(&velocity(*b))).unwrap_or(0);
+    let least = smooth[peak..].iter().fold(f64::INFINITY, |least, power| least.min(*power));
+    peak + smooth[peak..].iter().position(|power| *power <= 2.0 * least).unwrap_or(0)
+}
+
+fn previous_power_of_two(n: usize) -> usize {
+    n.checked_ilog2().map_or(1, |log| 1 << log)
+}
+
+/// Welch's power spectrum: bin k is the variance per bin of white noise of unit variance being one.
+/// Source: Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70.
+fn welch(signal: &[f64], length: usize) -> Option<Vec<f64>> {
+    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(length);
+    let window: Vec<f64> =
+        (0..length).map(|i| 0.5 - 0.5 * (core::f64::consts::TAU * (i as f64 + 0.5) / length as f64).cos()).collect();
+    let energy: f64 = window.iter().map(|w| w * w).sum();
+    let (mut input, mut output) = (transform.make_input_vec(), transform.make_output_vec());
+    let mut power = vec![0.0; output.len()];
+    let (mut from, mut pieces) = (0, 0.0);
+    while from + length <= signal.len() {
+        for ((input, x), w) in input.iter_mut().zip(&signal[from..]).zip(&window) {
+            *input = x * w;
+        }
+        transform.process(&mut input, &mut output).ok()?;
+        for (power, bin) in power.iter_mut().zip(&output) {
+            *power += bin.norm_sqr() / energy;
+        }
+        pieces += 1.0;
+        from += length / 2;
+    }
+    for power in &mut power {
+        *power /= pieces;
+    }
+    (pieces > 0.0).then_some(power)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::f64::consts::TAU;
+
+    /// White noise of unit variance from a linear congruential generator, twelve uniforms a sample.
+    fn noise(n: usize) -> Vec<f64> {
+        let mut state = 12345_u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..n).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
+    }
+
+    #[test]
+    fn the_cutoff_lies_between_the_highest_harmonic_and_the_noise() {
+        let (rate, n) = (500.0, 20_000);
+        let noise = noise(n);
+        for sigma in [0.0, 1e-6, 1e-4] {
+            let q: Vec<f64> = (0..n)
+                .map(|i| {
+                    let t = i as f64 / rate;
+                    (1..=5).map(|k| (TAU * 0.4 * f64::from(k) * t + f64::from(k)).sin() / f64::from(k)).sum::<f64>()
+                        + sigma * noise[i]
+                })
+                .collect();
+            let choice = cutoff(&[q], rate);
+            // The highest harmonic is 2 Hz and carries a third of the acceleration's power.
+            assert!((2.0..6.0).contains(&choice.cutoff_hz), "sigma {sigma}: {choice:?}");
+        }
+    }
+
+    #[test]
+    fn joints_that_stand_still_do_not_decide() {
+        let q = [noise(5000), vec![1.0; 5000]];
+        let choice = cutoff(&q, 100.0);
+        assert_eq!(choice.joints_hz, [None, None], "{choice:?}");
+        assert_eq!(choice.cutoff_hz, 10.0);
+        assert_eq!(cutoff::<Vec<f64>>(&[], 100.0).cutoff_hz, 10.0);
+    }
+}

@@ -1,0 +1,70 @@
+//! A motion in blocks, and how a log is to become one.
+
+use crate::derivative::DifferentiatorSettings;
+use crate::error::FilterError;
+use serde::{Deserialize, Serialize};
+
+/// How a log becomes a motion.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MotionSettings {
+    /// From q to dq and ddq.
+    pub differentiator: DifferentiatorSettings,
+    /// Also pass the torque through the differentiator's smoothing, as [`MotionBlock::tau_smooth`].
+    pub smooth_torque: bool,
+    /// Seconds left out at both ends of every uninterrupted piece, where a zero-phase filter has to invent
+    /// samples; 0 to 60, 0 by default.
+    pub trim_s: f64,
+}
+
+impl MotionSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// A [`FilterError`] that names the setting.
+    pub fn validate(&self) -> Result<(), FilterError> {
+        if !(0.0..=60.0).contains(&self.trim_s) {
+            return Err(FilterError::Setting { name: "trim_s", value: self.trim_s, mend: "give seconds, 0 to 60" });
+        }
+        self.differentiator.validate()
+    }
+}
+
+/// Successive samples of a motion on a uniform clock, joint-major: entry `joint * rows + row`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MotionBlock {
+    /// Samples per second.
+    pub rate_hz: f64,
+    /// Number of the uninterrupted piece: blocks of different pieces must not be filtered together.
+    pub segment: usize,
+    /// Time of the first row, in seconds after the first data row of the file.
+    pub first_time_s: f64,
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of joints.
+    pub joints: usize,
+    /// Filtered positions (rad, m).
+    pub q: Vec<f64>,
+    /// Velocities (rad/s, m/s).
+    pub dq: Vec<f64>,
+    /// Accelerations (rad/s², m/s²).
+    pub ddq: Vec<f64>,
+    /// Torques as logged, on the uniform clock, unfiltered (N m, N).
+    pub tau: Vec<f64>,
+    /// Torques smoothed like the positions; empty unless asked for.
+    pub tau_smooth: Vec<f64>,
+    /// Temperatures of the joints on the uniform clock, unfiltered (°C); empty without a `temperature` group.
+    pub temperature_c: Vec<f64>,
+}
+
+impl MotionBlock {
+    /// The torques to fit to: smoothed like the positions if that was asked for, otherwise as logged.
+    pub fn fitted_tau(&self) -> &[f64] {
+        if self.tau_smooth.is_empty() { &self.tau } else { &self.tau_smooth }
+    }
+
+    /// One joint's part of `values` (one of this block's own fields).
+    pub fn joint<'a>(&self, values: &'a [f64], joint: usize) -> &'a [f64] {
+        &values[joint * self.rows..(joint + 1) * self.rows]
+    }
+}

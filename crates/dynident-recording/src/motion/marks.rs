@@ -1,0 +1,76 @@
+//! Samples that are left out of a block.
+
+use super::block::MotionBlock;
+use core::ops::Range;
+
+/// The runs of rows of a block that no mark touches. Marks (in any order, overlapping or not) count in a window whose
+/// sample `first` is the block's first row.
+pub(crate) fn kept_runs(marked: &[Range<usize>], first: usize, rows: usize) -> Vec<Range<usize>> {
+    let mut ranges: Vec<Range<usize>> = marked
+        .iter()
+        .map(|range| range.start.saturating_sub(first).min(rows)..range.end.saturating_sub(first).min(rows))
+        .filter(|range| !range.is_empty())
+        .collect();
+    ranges.sort_by_key(|range| range.start);
+    let (mut runs, mut from) = (Vec::new(), 0);
+    for range in ranges {
+        if range.start > from {
+            runs.push(from..range.start);
+        }
+        from = from.max(range.end);
+    }
+    if from < rows {
+        runs.push(from..rows);
+    }
+    runs
+}
+
+/// Some rows of a block.
+pub(crate) fn part(block: &MotionBlock, run: &Range<usize>) -> MotionBlock {
+    let some = |values: &[f64]| -> Vec<f64> {
+        if values.is_empty() {
+            return Vec::new();
+        }
+        (0..block.joints).flat_map(|joint| block.joint(values, joint)[run.clone()].iter().copied()).collect()
+    };
+    MotionBlock {
+        rate_hz: block.rate_hz,
+        segment: block.segment,
+        first_time_s: block.first_time_s + run.start as f64 / block.rate_hz,
+        rows: run.len(),
+        joints: block.joints,
+        q: some(&block.q),
+        dq: some(&block.dq),
+        ddq: some(&block.ddq),
+        tau: some(&block.tau),
+        tau_smooth: some(&block.tau_smooth),
+        temperature_c: some(&block.temperature_c),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_are_what_the_marks_leave() {
+        assert_eq!(kept_runs(&[], 5, 10), vec![0..10; 1]);
+        assert_eq!(kept_runs(&[12..20, 3..7, 6..8], 5, 10), vec![3..7; 1]);
+        assert!(kept_runs(&vec![0..100; 1], 5, 10).is_empty());
+        assert_eq!(kept_runs(&[7..8, 9..10], 5, 10), [0..2, 3..4, 5..10]);
+    }
+
+    #[test]
+    fn parts_keep_joints_apart() {
+        let block = MotionBlock {
+            rate_hz: 10.0,
+            rows: 3,
+            joints: 2,
+            q: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+            ..MotionBlock::default()
+        };
+        let part = part(&block, &(1..3));
+        assert_eq!((part.rows, &part.q[..], part.tau.len()), (2, &[2.0, 3.0, 5.0, 6.0][..], 0));
+        assert!((part.first_time_s - 0.1).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,11 @@
+//! From a log to q, dq, ddq and torque on a uniform clock, block by block.
+//!
+//! [`MotionStream`] pulls rows through everything below: reader, clock, differentiator, checks. [`MotionBlock`] is what
+//! it gives, [`MotionSettings`] is what it is told.
+
+mod block;
+mod marks;
+mod stream;
+
+pub use block::{MotionBlock, MotionSettings};
+pub use stream::MotionStream;

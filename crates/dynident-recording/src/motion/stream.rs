@@ -1,0 +1,475 @@
+//! The whole way from a log file to q, dq, ddq and torque on a uniform clock, block by block.
+
+use super::block::{MotionBlock, MotionSettings};
+use super::marks::{kept_runs, part};
+use crate::clock::segments::Segmenter;
+use crate::clock::{Clock, clock};
+use crate::derivative::{Derivatives, Differentiator, Place};
+use crate::error::{FilterError, RecordingError};
+use crate::filter::cutoff::{CUTOFF_SAMPLES, CutoffChoice, cutoff};
+use crate::log::{Log, LogFormat, LogReader, Quantity, RawBlock};
+use crate::reference::Reference;
+use crate::report::ImportReport;
+use crate::report::channels::{ChannelCheck, quantisation_step};
+use crate::report::comparison::Comparison;
+use crate::report::steps::TimeCheck;
+use std::collections::VecDeque;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Rows of a [`MotionBlock`] at least, but for the last of a segment.
+const CHUNK_ROWS: usize = 8192;
+
+/// A log on its way to a motion; memory does not grow with the log's length, unless the differentiator needs
+/// the whole log.
+///
+/// Opening reads a bounded first part of the log to decide on clock, rate and cut-off; then the log is read once more
+/// from the start, as [`next_block`](Self::next_block) is called.
+#[derive(Debug)]
+pub struct MotionStream {
+    reader: LogReader,
+    raw: RawBlock,
+    raw_at: usize,
+    joints: Vec<String>,
+    clock: Clock,
+    cutoff: CutoffChoice,
+    differentiator: Box<dyn Differentiator>,
+    smooth_torque: bool,
+    trim: usize,
+    /// Samples on either side of a chunk that enter it; `None`: the whole segment.
+    context: Option<usize>,
+    segmenter: Segmenter,
+    /// Channels on the uniform clock: positions, torques, logged velocities, logged accelerations, temperatures.
+    uniform: Vec<Vec<f64>>,
+    /// Samples of `uniform` that were given out and stay as context.
+    done: usize,
+    /// Samples of the segment before those in `uniform`.
+    passed: u64,
+    ended: bool,
+    segments: usize,
+    short_segments: [u64; 2],
+    longest_short: usize,
+    rows: u64,
+    time_check: TimeCheck,
+    checks: Vec<ChannelCheck>,
+    velocity: Vec<Comparison>,
+    acceleration: Vec<Comparison>,
+    window: [Vec<f64>; 4],
+    /// Blocks that wait because samples between them were left out.
+    waiting: VecDeque<MotionBlock>,
+    /// How often a piece was cut where the differentiator does not apply, and whether the last sample was left out.
+    cuts: usize,
+    in_cut: bool,
+    unmapped: u64,
+    given: u64,
+}
+
+/// The first part of a log, as read for the decisions.
+struct Prefix {
+    row: Vec<u64>,
+    time_s: Vec<f64>,
+    q: Vec<Vec<f64>>,
+    tau: Vec<Vec<f64>>,
+}
+
+impl MotionStream {
+    /// Begins a pass over the log whose main file is `file`: [`new`](Self::new) of [`Log::file`].
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn open(
+        format: &LogFormat,
+        file: &Path,
+        joints: &[String],
+        settings: &MotionSettings,
+    ) -> Result<Self, RecordingError> {
+        Self::new(&Log::file(file, format.clone(), joints), settings)
+    }
+
+    /// Begins a pass over `log` and decides on clock and cut-off.
+    ///
+    /// # Errors
+    /// If settings or description are wrong, the log cannot be read, or no rate follows from it.
+    pub fn new(log: &Log, settings: &MotionSettings) -> Result<Self, RecordingError> {
+        Self::following(log, settings, None)
+    }
+
+    /// As [`new`](Self::new), with the commanded motion for a way that needs it, its joints in the order of the log's.
+    ///
+    /// Where the way does not apply to a joint, the samples of all joints are left out, the piece is cut there, and the
+    /// report says how many.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn following(
+        log: &Log,
+        settings: &MotionSettings,
+        reference: Option<&Arc<Reference>>,
+    ) -> Result<Self, RecordingError> {
+        settings.validate()?;
+        Self::begin(log, settings, |cutoff| settings.differentiator.build_following(cutoff.cutoff_hz, reference))
+    }
+
+    /// As [`new`](Self::new), with a differentiator of the caller's own in place of the one that the settings name.
+    ///
+    /// `build` gets the cut-off that the data suggest.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), and what `build` refuses.
+    pub fn with_differentiator(
+        log: &Log,
+        settings: &MotionSettings,
+        build: impl FnOnce(&CutoffChoice) -> Result<Box<dyn Differentiator>, FilterError>,
+    ) -> Result<Self, RecordingError> {
+        settings.validate()?;
+        Self::begin(log, settings, build)
+    }
+
+    fn begin(
+        log: &Log,
+        settings: &MotionSettings,
+        build: impl FnOnce(&CutoffChoice) -> Result<Box<dyn Differentiator>, FilterError>,
+    ) -> Result<Self, RecordingError> {
+        let Log { format, joints, .. } = log;
+        let (prefix, time_label) = prefix(log)?;
+        let clock = match format.rate_hz {
+            Some(rate_hz) => Clock {
+                rate_hz,
+                uniform: true,
+                median_step_s: rate_hz.recip(),
+                misfit_uniform: None,
+                misfit_stamps: None,
+                evidence: "even spacing: the rate is given, there are no stamps".to_owned(),
+            },
+            None => clock(format.clock, &prefix.time_s, &prefix.row, &prefix.q, format.max_gap_steps)
+                .map_err(|reason| RecordingError::NoRate { log: log.source().label(), column: time_label, reason })?,
+        };
+        let segmenter = Segmenter::new(&clock, format.max_gap_steps, 2 * joints.len());
+        let cutoff = cutoff(&longest_segment(segmenter, &prefix), clock.rate_hz);
+        let differentiator = build(&cutoff)?;
+        let mut checks = Vec::new();
+        for (quantity, _) in format.groups() {
+            for (index, joint) in joints.iter().enumerate() {
+                let mut check = ChannelCheck::new(quantity, joint);
+                check.quantisation_step = match quantity {
+                    Quantity::Position => quantisation_step(&prefix.q[index]),
+                    Quantity::Torque => quantisation_step(&prefix.tau[index]),
+                    Quantity::Velocity | Quantity::Acceleration | Quantity::Temperature => None,
+                };
+                checks.push(check);
+            }
+        }
+        let comparisons = |group: bool| -> Vec<Comparison> {
+            joints.iter().filter(|_| group).map(|joint| Comparison::new(joint)).collect()
+        };
+        let (velocity, acceleration) =
+            (comparisons(format.velocity.is_some()), comparisons(format.acceleration.is_some()));
+        let temperature = if format.temperature.is_some() { joints.len() } else { 0 };
+        let channels = 2 * joints.len() + velocity.len() + acceleration.len() + temperature;
+        Ok(Self {
+            reader: LogReader::open(log)?,
+            raw: RawBlock::default(),
+            raw_at: 0,
+            joints: joints.clone(),
+            trim: (settings.trim_s * clock.rate_hz).round() as usize,
+            context: differentiator.context_samples(clock.rate_hz),
+            segmenter: Segmenter::new(&clock, format.max_gap_steps, channels),
+            time_check: TimeCheck::new(clock.median_step_s),
+            clock,
+            cutoff,
+            differentiator,
+            smooth_torque: settings.smooth_torque,
+            uniform: vec![Vec::new(); channels],
+            done: 0,
+            passed: 0,
+            ended: false,
+            segments: 0,
+            short_segments: [0; 2],
+            longest_short: 0,
+            rows: 0,
+            checks,
+            velocity,
+            acceleration,
+            window: Default::default(),
+            waiting: VecDeque::new(),
+            cuts: 0,
+            in_cut: false,
+            unmapped: 0,
+            given: 0,
+        })
+    }
+
+    /// Samples per second of the motion.
+    pub fn rate_hz(&self) -> f64 {
+        self.clock.rate_hz
+    }
+
+    /// The cut-off that the data suggest; in force unless the settings name one.
+    pub fn cutoff(&self) -> &CutoffChoice {
+        &self.cutoff
+    }
+
+    /// Fills `block` with the next samples; false (and an empty block) at the end.
+    ///
+    /// # Errors
+    /// If the log cannot be read further, or no piece of it is long enough for the filter.
+    pub fn next_block(&mut self, block: &mut MotionBlock) -> Result<bool, RecordingError> {
+        loop {
+            if let Some(next) = self.waiting.pop_front() {
+                *block = next;
+                return Ok(true);
+            }
+            let available = self.uniform[0].len();
+            if let Some(context) = self.context
+                && available >= self.done + self.chunk() + context.max(self.trim)
+            {
+                let end = self.done + self.chunk();
+                if self.give(block, end, false)? {
+                    return Ok(true);
+                }
+                continue;
+            }
+            if self.segmenter.closed() || self.ended {
+                let given = self.close_segment(block)?;
+                if given {
+                    return Ok(true);
+                }
+                if self.waiting.is_empty() && self.ended && self.raw_at >= self.raw.rows() {
+                    return self.finish(block);
+                }
+                continue;
+            }
+            self.feed()?;
+        }
+    }
+
+    fn finish(&self, block: &mut MotionBlock) -> Result<bool, RecordingError> {
+        *block = MotionBlock { rate_hz: self.clock.rate_hz, joints: self.joints.len(), ..MotionBlock::default() };
+        if self.segments == 0 {
+            return Err(RecordingError::TooShort {
+                log: self.reader.label().to_owned(),
+                found: self.longest_short,
+                needed: self.needed(),
+                method: self.differentiator.name(),
+            });
+        }
+        if self.given == 0 && self.unmapped > 0 {
+            return Err(RecordingError::NotFollowed {
+                log: self.reader.label().to_owned(),
+                method: self.differentiator.name(),
+                samples: self.unmapped,
+            });
+        }
+        Ok(false)
+    }
+
+    /// Shortest piece that gives at least one sample.
+    fn needed(&self) -> usize {
+        self.differentiator.minimum_samples().max(2 * self.trim + 1)
+    }
+
+    fn chunk(&self) -> usize {
+        CHUNK_ROWS.max(3 * self.context.unwrap_or(0))
+    }
+
+    /// Moves raw rows to the uniform clock until the raw block or the segment ends.
+    fn feed(&mut self) -> Result<(), RecordingError> {
+        if self.raw_at >= self.raw.rows() {
+            self.raw_at = 0;
+            if !self.reader.next_block(&mut self.raw)? {
+                self.ended = true;
+                self.segmenter.close(&mut self.uniform);
+                return Ok(());
+            }
+            self.rows += self.raw.rows() as u64;
+            for (row, time_s) in self.raw.row.iter().zip(&self.raw.time_s) {
+                self.time_check.see(*row, *time_s);
+            }
+            // In the order of LogFormat::groups.
+            let raw = &self.raw;
+            let logged = raw.q.iter().chain(&raw.dq).chain(&raw.ddq).chain(&raw.tau).chain(&raw.temperature_c);
+            for (check, values) in self.checks.iter_mut().zip(logged) {
+                check.see(values);
+            }
+        }
+        let raw = &self.raw;
+        self.raw_at = self.segmenter.feed(&raw.row, &raw.time_s, self.raw_at, &mut self.uniform, || {
+            raw.q.iter().chain(&raw.tau).chain(&raw.dq).chain(&raw.ddq).chain(&raw.temperature_c)
+        });
+        Ok(())
+    }
+
+    /// Gives out what remains of the segment and starts the next.
+    fn close_segment(&mut self, block: &mut MotionBlock) -> Result<bool, RecordingError> {
+        let available = self.uniform[0].len();
+        let total = self.passed + available as u64;
+        let mut given = false;
+        if available > 0 {
+            if total < self.needed() as u64 {
+                self.short_segments[0] += 1;
+                self.short_segments[1] += total;
+                self.longest_short = self.longest_short.max(total as usize);
+            } else {
+                let end = available.saturating_sub(self.trim);
+                given = self.give(block, end, true)?;
+                self.segments += 1;
+            }
+        }
+        self.uniform.iter_mut().for_each(Vec::clear);
+        self.done = 0;
+        self.passed = 0;
+        self.in_cut = false;
+        self.segmenter.reopen();
+        Ok(given)
+    }
+
+    /// Differentiates and gives out the samples from the first not yet given to `end`; false if trimming leaves none.
+    fn give(&mut self, block: &mut MotionBlock, end: usize, last: bool) -> Result<bool, RecordingError> {
+        let context = self.context.unwrap_or(usize::MAX);
+        let window_from = self.done.saturating_sub(context);
+        let window_to = if last { self.uniform[0].len() } else { end + context };
+        let from = self.done.max(self.trim.saturating_sub(self.passed as usize));
+        let (joints, rows) = (self.joints.len(), end.saturating_sub(from));
+        let rate = self.clock.rate_hz;
+        block.rate_hz = rate;
+        block.segment = self.segments + self.cuts;
+        block.first_time_s = self.segmenter.first_time_s() + (self.passed as f64 + from as f64) / rate;
+        block.rows = rows;
+        block.joints = joints;
+        let MotionBlock { q, dq, ddq, tau, tau_smooth, temperature_c, .. } = block;
+        for values in [q, dq, ddq, tau, tau_smooth, temperature_c] {
+            values.clear();
+        }
+        let mut marked = Vec::new();
+        if rows > 0 {
+            let inside = from - window_from..end - window_from;
+            let [q, dq, ddq, other] = &mut self.window;
+            for values in [&mut *q, &mut *dq, &mut *ddq, &mut *other] {
+                values.resize(window_to - window_from, 0.0);
+            }
+            for joint in 0..joints {
+                let signal = &self.uniform[joint][window_from..window_to];
+                let before = self.passed as f64 + window_from as f64;
+                let first_time_s = self.segmenter.first_time_s() + before / rate;
+                let place = Place { rate_hz: rate, joint, first_time_s };
+                marked.extend(self.differentiator.differentiate_at(place, signal, Derivatives { q, dq, ddq })?);
+                block.q.extend_from_slice(&q[inside.clone()]);
+                block.dq.extend_from_slice(&dq[inside.clone()]);
+                block.ddq.extend_from_slice(&ddq[inside.clone()]);
+                let tau = &self.uniform[joints + joint];
+                block.tau.extend_from_slice(&tau[from..end]);
+                if self.smooth_torque {
+                    self.differentiator.smooth(rate, &tau[window_from..window_to], other)?;
+                    block.tau_smooth.extend_from_slice(&other[inside.clone()]);
+                }
+                let first = 2 * joints + self.velocity.len() + self.acceleration.len();
+                if let Some(temperature) = self.uniform.get(first + joint) {
+                    block.temperature_c.extend_from_slice(&temperature[from..end]);
+                }
+                let channel = 2 * joints + joint;
+                if let Some(comparison) = self.velocity.get_mut(joint) {
+                    self.differentiator.smooth(rate, &self.uniform[channel][window_from..window_to], other)?;
+                    comparison.see(&dq[inside.clone()], &other[inside.clone()]);
+                }
+                if let Some(comparison) = self.acceleration.get_mut(joint) {
+                    let channel = channel + self.velocity.len();
+                    self.differentiator.smooth(rate, &self.uniform[channel][window_from..window_to], other)?;
+                    comparison.see(&ddq[inside.clone()], &other[inside.clone()]);
+                }
+            }
+        }
+        self.done = end.max(self.done);
+        let unneeded = self.done.saturating_sub(context);
+        if unneeded > 0 {
+            self.uniform.iter_mut().for_each(|channel| drop(channel.drain(..unneeded)));
+            self.done -= unneeded;
+            self.passed += unneeded as u64;
+        }
+        self.given += rows as u64;
+        if marked.is_empty() {
+            self.in_cut &= rows == 0;
+            return Ok(rows > 0);
+        }
+        self.keep_unmarked(block, &marked, from - window_from);
+        Ok(false)
+    }
+
+    /// Leaves the marked samples out; what remains waits as blocks of pieces of their own. `first` is the place of the
+    /// block's first row in the window that the marks count in.
+    fn keep_unmarked(&mut self, block: &MotionBlock, marked: &[core::ops::Range<usize>], first: usize) {
+        let runs = kept_runs(marked, first, block.rows);
+        let kept: usize = runs.iter().map(ExactSizeIterator::len).sum();
+        self.unmapped += (block.rows - kept) as u64;
+        self.given -= (block.rows - kept) as u64;
+        for run in &runs {
+            // A run at the block's start goes on with the piece before it.
+            self.cuts += usize::from(run.start > 0 || self.in_cut);
+            let mut kept = part(block, run);
+            kept.segment = self.segments + self.cuts;
+            self.waiting.push_back(kept);
+            self.in_cut = run.end < block.rows;
+        }
+        self.in_cut |= runs.is_empty() && block.rows > 0;
+    }
+
+    /// What was found so far; complete once [`next_block`](Self::next_block) has returned false.
+    pub fn report(&self) -> ImportReport {
+        let mut report = ImportReport {
+            file: self.reader.label().to_owned(),
+            rows: self.rows,
+            rate_hz: self.clock.rate_hz,
+            clock: self.clock.clone(),
+            steps: self.time_check.steps(),
+            gap_count: self.time_check.gap_count,
+            gaps: self.time_check.gaps.clone(),
+            duplicate_stamps: self.time_check.duplicates,
+            backward_stamps: self.time_check.backward,
+            crowded_samples: self.segmenter.crowded(),
+            dropped: self.reader.dropped().clone(),
+            segments: self.segments,
+            short_segments: self.short_segments,
+            unmapped_samples: self.unmapped,
+            channels: self.checks.iter().map(ChannelCheck::report).collect(),
+            velocity: self.velocity.iter().map(|c| c.report(self.clock.rate_hz)).collect(),
+            acceleration: self.acceleration.iter().map(|c| c.report(self.clock.rate_hz)).collect(),
+            cutoff: self.cutoff.clone(),
+            findings: Vec::new(),
+        };
+        report.find();
+        report
+    }
+}
+
+/// Reads the first [`CUTOFF_SAMPLES`] rows.
+fn prefix(log: &Log) -> Result<(Prefix, String), RecordingError> {
+    let mut reader = LogReader::open(log)?;
+    let columns = || vec![Vec::new(); log.joints.len()];
+    let mut prefix = Prefix { row: Vec::new(), time_s: Vec::new(), q: columns(), tau: columns() };
+    let mut raw = RawBlock::default();
+    while prefix.row.len() < CUTOFF_SAMPLES && reader.next_block(&mut raw)? {
+        prefix.row.extend_from_slice(&raw.row);
+        prefix.time_s.extend_from_slice(&raw.time_s);
+        for (all, block) in prefix.q.iter_mut().zip(&raw.q).chain(prefix.tau.iter_mut().zip(&raw.tau)) {
+            all.extend_from_slice(block);
+        }
+    }
+    Ok((prefix, reader.time_label()))
+}
+
+/// Positions of the longest uninterrupted piece of the prefix, on the uniform clock.
+fn longest_segment(mut segmenter: Segmenter, prefix: &Prefix) -> Vec<Vec<f64>> {
+    let joints = prefix.q.len();
+    let mut longest = vec![Vec::new(); joints];
+    let mut at = 0;
+    while at < prefix.row.len() {
+        let mut piece = vec![Vec::new(); 2 * joints];
+        at = segmenter.feed(&prefix.row, &prefix.time_s, at, &mut piece, || prefix.q.iter().chain(&prefix.tau));
+        segmenter.close(&mut piece);
+        segmenter.reopen();
+        piece.truncate(joints);
+        if piece.first().map_or(0, Vec::len) > longest.first().map_or(0, Vec::len) {
+            longest = piece;
+        }
+    }
+    longest
+}

@@ -1,0 +1,114 @@
+//! How a study file names the commanded motion.
+
+use super::logistic_path::LogisticPath;
+use super::{Reference, check_boundaries};
+use crate::error::FilterError;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// Where the commanded motion comes from: the table that `design` wrote, or the closed form of the paper's strokes. A
+/// text alone is the table's file.
+///
+/// ```
+/// use dynident_recording::DifferentiatorSettings;
+/// let table: DifferentiatorSettings =
+///     toml::from_str("method = \"time-warp\"\nreference = \"trajectory.csv\"").unwrap();
+/// let closed: DifferentiatorSettings = toml::from_str(
+///     r#"
+///     method = "position-map"
+///     reference = { start_s = 2.0, joints = [{ amplitude = 2.094, omega = 0.996, offset = 0.0, period_s = 40.16 }] }
+///     "#,
+/// )
+/// .unwrap();
+/// assert!(closed.build(1.0).is_ok());
+/// assert!(table.validate().is_ok() && table.build(1.0).is_err()); // the table has still to be read
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ReferenceSettings {
+    /// Table with columns `t_s, q1.., dq1.., ddq1..` (SI), the joints in the order of the robot's description.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+    /// In place of a table: one spliced logistic function for each joint, in the same order.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub joints: Vec<LogisticPath>,
+    /// Where strokes begin and end, seconds after the motion's start, for all joints; by default they are what lies
+    /// between rests.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub strokes_s: Vec<f64>,
+    /// When it begins, in seconds after the log's first row; 0 by default.
+    pub start_s: f64,
+}
+
+impl<'de> Deserialize<'de> for ReferenceSettings {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        #[derive(Deserialize)]
+        #[serde(
+            untagged,
+            expecting = "reference is a file in quotes, or a table with file or joints, and start_s: { file = \"trajectory.csv\", start_s = 0.0 }"
+        )]
+        enum Written {
+            File(PathBuf),
+            Table(Table),
+        }
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Table {
+            #[serde(default)]
+            file: Option<PathBuf>,
+            #[serde(default)]
+            joints: Vec<LogisticPath>,
+            #[serde(default)]
+            strokes_s: Vec<f64>,
+            #[serde(default)]
+            start_s: f64,
+        }
+        Ok(match Written::deserialize(deserializer)? {
+            Written::File(file) => Self { file: Some(file), ..Self::default() },
+            Written::Table(Table { file, joints, strokes_s, start_s }) => Self { file, joints, strokes_s, start_s },
+        })
+    }
+}
+
+impl ReferenceSettings {
+    /// Checks what can be checked without the table.
+    ///
+    /// # Errors
+    /// [`FilterError::Reference`] if file and joints are both given or a path has no meaning; [`FilterError::Setting`]
+    /// if the start is not finite.
+    pub fn validate(&self) -> Result<(), FilterError> {
+        if !(self.start_s.is_finite() && self.start_s.abs() <= 1e6) {
+            return Err(FilterError::Setting { name: "start_s", value: self.start_s, mend: "give seconds" });
+        }
+        if self.file.is_some() && !self.joints.is_empty() {
+            return Err(FilterError::Reference {
+                problem: "file and joints are both given: keep one of them".to_owned(),
+            });
+        }
+        if !self.strokes_s.is_empty() {
+            check_boundaries(&self.strokes_s)?;
+        }
+        self.joints.iter().try_for_each(LogisticPath::validate)
+    }
+
+    /// The closed form, if joints are given.
+    ///
+    /// # Errors
+    /// As [`validate`](Self::validate).
+    pub fn closed_form(&self) -> Result<Option<Reference>, FilterError> {
+        self.validate()?;
+        if self.joints.is_empty() {
+            return Ok(None);
+        }
+        self.placed(Reference::logistic(&self.joints)?).map(Some)
+    }
+
+    /// A motion with the strokes and the start that the settings name.
+    ///
+    /// # Errors
+    /// [`FilterError::Reference`] if the strokes' boundaries do not increase.
+    pub fn placed(&self, reference: Reference) -> Result<Reference, FilterError> {
+        let reference =
+            if self.strokes_s.is_empty() { reference } else { reference.with_boundaries(&self.strokes_s)? };
+        Ok(reference.starting_at(self.start_s))
+    }
+}

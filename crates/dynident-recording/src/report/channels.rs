@@ -1,0 +1,160 @@
+//! What a channel looks like: its range, whether it is alive, quantised, saturated. Accumulated block by block.
+
+use crate::log::Quantity;
+use serde::{Deserialize, Serialize};
+
+/// Samples in a row at an extreme value from which a torque counts as saturated.
+const SATURATED_RUN: u64 = 20;
+
+/// What was seen of one channel of one joint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChannelReport {
+    /// What it measures.
+    pub channel: Quantity,
+    /// The joint.
+    pub joint: String,
+    /// Smallest value (SI).
+    pub min: f64,
+    /// Largest value (SI).
+    pub max: f64,
+    /// Share of samples that are exactly zero, 0 to 1.
+    pub zero_share: f64,
+    /// Longest run of successive samples at the smallest or largest value.
+    pub longest_run_at_extreme: u64,
+    /// Quantisation step, if nine tenths of the steps of the first rows are its multiples.
+    pub quantisation_step: Option<f64>,
+}
+
+impl ChannelReport {
+    /// Whether the channel never changes.
+    pub fn constant(&self) -> bool {
+        self.min >= self.max
+    }
+
+    /// Whether the channel sits at a limit for long.
+    pub fn saturated(&self) -> bool {
+        self.channel == Quantity::Torque && !self.constant() && self.longest_run_at_extreme >= SATURATED_RUN
+    }
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct ChannelCheck {
+    quantity: Quantity,
+    joint: String,
+    low: Extreme,
+    high: Extreme,
+    zeros: u64,
+    samples: u64,
+    pub(crate) quantisation_step: Option<f64>,
+}
+
+/// A running maximum and the longest run at it.
+#[derive(Clone, Debug)]
+struct Extreme {
+    value: f64,
+    run: u64,
+    longest: u64,
+}
+
+impl Extreme {
+    fn new() -> Self {
+        Self { value: f64::NEG_INFINITY, run: 0, longest: 0 }
+    }
+
+    #[inline]
+    fn see(&mut self, value: f64) {
+        if value < self.value {
+            self.run = 0;
+        } else {
+            if value > self.value {
+                *self = Self { value, run: 0, longest: 0 };
+            }
+            self.run += 1;
+            self.longest = self.longest.max(self.run);
+        }
+    }
+}
+
+impl ChannelCheck {
+    pub(crate) fn new(quantity: Quantity, joint: &str) -> Self {
+        Self {
+            quantity,
+            joint: joint.to_owned(),
+            low: Extreme::new(),
+            high: Extreme::new(),
+            zeros: 0,
+            samples: 0,
+            quantisation_step: None,
+        }
+    }
+
+    pub(crate) fn see(&mut self, values: &[f64]) {
+        for value in values {
+            self.high.see(*value);
+            self.low.see(-value);
+            self.zeros += u64::from(*value == 0.0);
+        }
+        self.samples += values.len() as u64;
+    }
+
+    pub(crate) fn report(&self) -> ChannelReport {
+        ChannelReport {
+            channel: self.quantity,
+            joint: self.joint.clone(),
+            min: -self.low.value,
+            max: self.high.value,
+            zero_share: self.zeros as f64 / self.samples.max(1) as f64,
+            // A channel's extreme is a run at zero only if it is dead, which is reported as such.
+            longest_run_at_extreme: [&self.low, &self.high]
+                .map(|extreme| if extreme.value == 0.0 { 0 } else { extreme.longest })
+                .into_iter()
+                .max()
+                .unwrap_or(0),
+            quantisation_step: self.quantisation_step,
+        }
+    }
+}
+
+/// The step of which nine tenths of the differences between successive values are multiples (within 2 %).
+pub(crate) fn quantisation_step(values: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> =
+        values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0).collect();
+    if steps.len() < 20 {
+        return None;
+    }
+    steps.sort_by(f64::total_cmp);
+    // Not the smallest as such: the rounding of the printed text makes far smaller ones.
+    let least = 0.02 * steps[steps.len() / 20];
+    let candidate = *steps.iter().find(|step| **step >= least)?;
+    let multiples = steps.iter().filter(|step| {
+        let ratio = *step / candidate;
+        (ratio - ratio.round()).abs() <= 0.02
+    });
+    (multiples.count() as f64 >= 0.9 * steps.len() as f64).then_some(candidate)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantised_and_smooth_channels_are_told_apart() {
+        let smooth: Vec<f64> = (0..2000).map(|i| (f64::from(i) * 0.01).sin()).collect();
+        let quantised: Vec<f64> = smooth.iter().map(|x| (x / 0.003).round() * 0.003).collect();
+        assert!(quantisation_step(&smooth).is_none());
+        assert!((quantisation_step(&quantised).unwrap() - 0.003).abs() < 1e-9);
+    }
+
+    #[test]
+    fn clipping_and_death_are_seen_across_blocks() {
+        let mut check = ChannelCheck::new(Quantity::Torque, "elbow");
+        let clipped: Vec<f64> = (0..200).map(|i| (f64::from(i) * 0.05).sin().clamp(-0.5, 0.8)).collect();
+        clipped.chunks(7).for_each(|block| check.see(block));
+        let report = check.report();
+        assert!(report.saturated() && !report.constant(), "{report:?}");
+        assert_eq!((report.min, report.max), (-0.5, 0.8));
+        let mut dead = ChannelCheck::new(Quantity::Torque, "wrist");
+        dead.see(&[0.0; 50]);
+        assert!(dead.report().constant() && dead.report().zero_share == 1.0);
+    }
+}

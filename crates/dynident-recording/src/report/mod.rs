@@ -1,0 +1,214 @@
+//! What was found in a log, for people and for machines.
+//!
+//! `ChannelCheck` looks at every channel (dead, saturated, quantised), `TimeCheck` at the steps of the stamps,
+//! `Comparison` holds logged velocities and accelerations against the derivatives of the position, shifted by
+//! [`best_lag`]. [`ImportReport`] is all of it, with [`Finding`]s as sentences where something matters.
+
+pub(crate) mod channels;
+pub(crate) mod comparison;
+mod lag;
+pub(crate) mod steps;
+
+pub use channels::ChannelReport;
+pub use comparison::DerivativeComparison;
+pub use lag::{Lag, best_lag};
+
+use crate::clock::Clock;
+use crate::filter::CutoffChoice;
+use crate::log::{LinesDropped, Quantity};
+use serde::{Deserialize, Serialize};
+
+/// How much a finding matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Level {
+    /// Good to know.
+    Info,
+    /// May harm the result.
+    Warning,
+    /// Harms the result.
+    Problem,
+}
+
+/// One thing that was found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Finding {
+    /// How much it matters.
+    pub level: Level,
+    /// Where: `time`, `rows`, or a quantity and joint such as `torque arm_5`.
+    pub channel: String,
+    /// What, in a sentence.
+    pub message: String,
+}
+
+/// A step between successive samples that is longer than three median steps.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Gap {
+    /// 0-based data row before the gap.
+    pub row: u64,
+    /// Seconds after the first row of the file at which it begins.
+    pub time_s: f64,
+    /// Its length in seconds.
+    pub length_s: f64,
+}
+
+/// Time steps between successive rows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Steps {
+    /// Shortest, in seconds.
+    pub min_s: f64,
+    /// Median over the first rows, in seconds.
+    pub median_s: f64,
+    /// Longest, in seconds.
+    pub max_s: f64,
+    /// Standard deviation, in seconds.
+    pub std_s: f64,
+}
+
+/// Everything the importer found in a log.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ImportReport {
+    /// The main file.
+    pub file: String,
+    /// Rows used.
+    pub rows: u64,
+    /// Sampling rate of the motion that was made of them.
+    pub rate_hz: f64,
+    /// How stamps were understood, and why.
+    pub clock: Clock,
+    /// Time steps; all equal without a time column.
+    pub steps: Steps,
+    /// Number of [`Gap`]s.
+    pub gap_count: u64,
+    /// The first hundred of them.
+    pub gaps: Vec<Gap>,
+    /// Stamps that are not later than the one before: equal ones.
+    pub duplicate_stamps: u64,
+    /// Stamps that are earlier than the one before.
+    pub backward_stamps: u64,
+    /// Samples left out for standing too close to the one before.
+    pub crowded_samples: u64,
+    /// Lines left out.
+    pub dropped: LinesDropped,
+    /// Uninterrupted pieces that were used.
+    pub segments: usize,
+    /// Pieces too short for the filter, and the samples in them.
+    pub short_segments: [u64; 2],
+    /// Samples left out because the way from q to dq and ddq does not apply there.
+    pub unmapped_samples: u64,
+    /// Every channel of every joint.
+    pub channels: Vec<ChannelReport>,
+    /// Logged velocities against the derivative of the position.
+    pub velocity: Vec<DerivativeComparison>,
+    /// Logged accelerations against the second derivative of the position.
+    pub acceleration: Vec<DerivativeComparison>,
+    /// The cut-off that the data suggest (in force unless the settings name one).
+    pub cutoff: CutoffChoice,
+    /// All of this as sentences, where it matters.
+    pub findings: Vec<Finding>,
+}
+
+impl ImportReport {
+    /// Writes the findings that follow from the other fields.
+    pub(crate) fn find(&mut self) {
+        let mut findings = Vec::new();
+        let mut add = |level, channel: &str, message: String| {
+            findings.push(Finding { level, channel: channel.to_owned(), message });
+        };
+        add(Level::Info, "time", format!("{} rows at {:.4} Hz; {}", self.rows, self.rate_hz, self.clock.evidence));
+        if let Some(gap) = self.gaps.first() {
+            let message = format!(
+                "{} steps longer than three median steps, the first of {:.4} s after row {} at {:.4} s",
+                self.gap_count, gap.length_s, gap.row, gap.time_s
+            );
+            add(Level::Warning, "time", message);
+        }
+        if self.segments > 1 {
+            add(Level::Info, "time", format!("split at gaps into {} pieces", self.segments));
+        }
+        if self.short_segments[0] > 0 {
+            let [pieces, samples] = self.short_segments;
+            add(
+                Level::Warning,
+                "time",
+                format!("{pieces} pieces too short for the filter were left out ({samples} samples)"),
+            );
+        }
+        if self.unmapped_samples > 0 {
+            let message = format!(
+                "{} samples were left out: off the stroke, or the commanded motion is not followed or not known there",
+                self.unmapped_samples
+            );
+            add(Level::Warning, "position", message);
+        }
+        if self.duplicate_stamps > 0 {
+            add(Level::Warning, "time", format!("{} stamps equal the one before", self.duplicate_stamps));
+        }
+        if self.backward_stamps > 0 {
+            add(Level::Problem, "time", format!("{} stamps are earlier than the one before", self.backward_stamps));
+        }
+        if self.crowded_samples > 0 {
+            let message =
+                format!("{} samples stand too close to the one before and were left out", self.crowded_samples);
+            add(Level::Info, "time", message);
+        }
+        if self.dropped.missing > 0 {
+            add(Level::Warning, "rows", format!("{} rows with missing values were left out", self.dropped.missing));
+        }
+        if let Some(place) = &self.dropped.truncated {
+            add(Level::Info, "rows", format!("the cut-off last line was left out ({place})"));
+        }
+        for channel in &self.channels {
+            let name = format!("{} {}", channel.channel.key(), channel.joint);
+            let measured = matches!(channel.channel, Quantity::Position | Quantity::Torque);
+            if channel.constant() {
+                let level = if measured { Level::Problem } else { Level::Warning };
+                add(level, &name, format!("dead: constantly {}", channel.min));
+            } else if channel.zero_share > 0.5 {
+                let message =
+                    format!("mostly dead: {:.1} % of the samples are exactly zero", 100.0 * channel.zero_share);
+                add(if measured { Level::Problem } else { Level::Warning }, &name, message);
+            }
+            if channel.saturated() {
+                let message = format!(
+                    "saturated? {} samples in a row at an extreme of [{}, {}]",
+                    channel.longest_run_at_extreme, channel.min, channel.max
+                );
+                add(Level::Warning, &name, message);
+            }
+            if let Some(step) = channel.quantisation_step
+                && measured
+            {
+                add(Level::Info, &name, format!("quantised in steps of {step:.3e}"));
+            }
+        }
+        for (quantity, comparisons) in [("velocity", &self.velocity), ("acceleration", &self.acceleration)] {
+            for comparison in comparisons {
+                let name = format!("{quantity} {}", comparison.joint);
+                let difference = 100.0 * comparison.relative_rms_difference;
+                match &comparison.lag {
+                    Some(lag) if lag.correlation < -0.5 => {
+                        add(
+                            Level::Problem,
+                            &name,
+                            "the logged signal has the opposite sign of the position's derivative".to_owned(),
+                        );
+                    }
+                    Some(lag) if difference > 20.0 => {
+                        let message = format!(
+                            "differs from the position's derivative by {difference:.1} % RMS (correlation {:.3})",
+                            lag.correlation_unshifted
+                        );
+                        add(Level::Warning, &name, message);
+                    }
+                    Some(lag) if lag.matters() && lag.samples.abs() > 0.5 => {
+                        add(Level::Info, &name, format!("comes {:.4} s after the position's derivative", lag.seconds));
+                    }
+                    _ => {}
+                }
+            }
+        }
+        findings.sort_by_key(|finding| core::cmp::Reverse(finding.level));
+        self.findings = findings;
+    }
+}

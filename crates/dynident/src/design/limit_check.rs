@@ -1,0 +1,86 @@
+//! Whether a motion keeps its limits, and why not.
+
+use super::setup::DesignSetup;
+use crate::error::Error;
+use dynident_excitation::check::{LimitReport, VIOLATION, check_limits};
+use dynident_excitation::limits::{LimitSet, diagnose};
+use dynident_excitation::{Motion, grid};
+use std::path::Path;
+
+/// Rate of the diagnosis, Hz.
+const DIAGNOSIS_RATE_HZ: f64 = 1000.0;
+
+/// Every limit as a motion uses it.
+pub(super) struct LimitCheck {
+    /// Every limit at the motion's worst moment.
+    pub(super) reports: Vec<LimitReport>,
+    /// Samples a second that were looked at.
+    pub(super) rate_hz: f64,
+    /// What was looked at.
+    pub(super) of: &'static str,
+    /// Why limits are broken, in sentences; empty if none is.
+    pub(super) diagnosis: Vec<String>,
+}
+
+impl LimitCheck {
+    /// Looks at the motion `rate_hz` times a second.
+    ///
+    /// # Errors
+    /// Limits that make no sense for the robot.
+    pub(super) fn of(
+        setup: &DesignSetup,
+        study_path: &Path,
+        duration_s: f64,
+        rate_hz: f64,
+        of: &'static str,
+        motion_at: &dyn Fn(&[f64], &mut Motion),
+    ) -> Result<Self, Error> {
+        let reports = check_limits(&setup.limits, setup.machine.model(), duration_s, rate_hz, motion_at)
+            .map_err(|why| Error::study(study_path, format!("[design.limits]: {why}")))?;
+        let broken = reports.iter().any(|report| report.violated);
+        let diagnosis = if broken { sentences(&setup.set, duration_s, &reports, motion_at) } else { Vec::new() };
+        Ok(Self { reports, rate_hz, of, diagnosis })
+    }
+
+    /// Whether every limit is kept.
+    pub(super) fn kept(&self) -> bool {
+        self.diagnosis.is_empty() && self.reports.iter().all(|report| !report.violated)
+    }
+
+    /// Takes in the check of a later piece, which begins `after_s` into the whole: of each limit the worse report
+    /// stays.
+    pub(super) fn append(&mut self, later: Self, after_s: f64) {
+        let first = self.reports.is_empty();
+        for (place, mut report) in later.reports.into_iter().enumerate() {
+            report.at_s += after_s;
+            if first {
+                self.reports.push(report);
+            } else if report.worst_ratio > self.reports[place].worst_ratio {
+                self.reports[place] = report;
+            }
+        }
+        self.diagnosis.extend(later.diagnosis);
+    }
+}
+
+/// Why the motion is not feasible.
+fn sentences(
+    set: &LimitSet,
+    duration_s: f64,
+    reports: &[LimitReport],
+    motion_at: &dyn Fn(&[f64], &mut Motion),
+) -> Vec<String> {
+    let times = grid(duration_s, (duration_s * DIAGNOSIS_RATE_HZ).ceil() as usize + 1);
+    let mut motion = Motion::default();
+    motion_at(&times, &mut motion);
+    let sentences = diagnose(set, &times, &motion).sentences();
+    if !sentences.is_empty() {
+        return sentences;
+    }
+    // Broken between the diagnosis' samples only.
+    let broken = reports.iter().filter(|report| report.violated).map(|report| {
+        let excess = 100.0 * (report.worst_ratio - 1.0).max(VIOLATION);
+        format!("The {} limit of `{}` is exceeded by {excess:.4} % at {:.4} s.", report.kind, report.joint, report.at_s)
+    });
+    broken.collect()
+}

@@ -1,0 +1,205 @@
+//! All that is known of a motion in the end.
+
+use super::file::{DESIGN_SCHEMA, DesignFile};
+use super::forecast::named_forecast;
+use super::limit_check::LimitCheck;
+use super::search::SearchResult;
+use super::section::FamilyChoice;
+use super::setup::{DesignSetup, MotionInformation};
+use super::windows::WindowedFile;
+use crate::cpu_time::cpu_seconds;
+use crate::study::StudyRobot;
+use dynident_dynamics::{Workspace, inverse_dynamics};
+use dynident_excitation::criteria::{ConditionNumber, Criterion, DOptimal};
+use dynident_excitation::families::Given;
+use dynident_excitation::limits::Limits;
+use dynident_excitation::optimisers::Generation;
+use dynident_excitation::{Family, Motion};
+use nalgebra::DMatrix;
+use std::time::Instant;
+
+/// What a job has cost so far.
+pub(super) struct Stopwatch {
+    started: Instant,
+    cpu_s: Option<f64>,
+}
+
+impl Stopwatch {
+    pub(super) fn start() -> Self {
+        Self { started: Instant::now(), cpu_s: cpu_seconds() }
+    }
+
+    fn cpu_s(&self) -> Option<f64> {
+        self.cpu_s.zip(cpu_seconds()).map(|(start, end)| end - start)
+    }
+}
+
+/// A motion and where it comes from: a search, or somebody who brings it.
+pub(super) struct MotionOrigin {
+    motion: Box<dyn Family>,
+    parameters: Vec<f64>,
+    family: &'static str,
+    family_settings: Option<FamilyChoice>,
+    given: Option<String>,
+    start_posture: Vec<Option<f64>>,
+    optimiser: &'static str,
+    criterion: &'static str,
+    figure: Option<f64>,
+    windowed: Option<WindowedFile>,
+    history: Vec<Generation>,
+    evaluations: usize,
+    seconds: f64,
+}
+
+impl MotionOrigin {
+    /// The best motion of a search.
+    pub(super) fn search(setup: &DesignSetup, found: SearchResult) -> Self {
+        let section = &setup.section;
+        let windowed = found.windowed.as_ref();
+        Self {
+            family: windowed.map_or(section.family.name(), |_| found.family.name()),
+            family_settings: Some(section.family.clone()),
+            given: None,
+            optimiser: windowed.map_or(section.optimiser.name(), |file| file.optimiser),
+            criterion: windowed.map_or(setup.criterion(), |_| "windowed-condition"),
+            motion: found.family,
+            parameters: found.parameters,
+            start_posture: found.start_posture,
+            figure: found.figure,
+            windowed: found.windowed,
+            history: found.history,
+            evaluations: found.evaluations,
+            seconds: found.seconds,
+        }
+    }
+
+    /// The trajectory or log called `name`.
+    pub(super) fn given(setup: &DesignSetup, name: String, motion: Given, known: &MotionInformation) -> Self {
+        Self {
+            family: "given",
+            family_settings: None,
+            given: Some(name),
+            optimiser: "none",
+            criterion: setup.criterion(),
+            motion: Box::new(motion),
+            parameters: Vec::new(),
+            start_posture: Vec::new(),
+            figure: setup.figure(known),
+            windowed: None,
+            history: Vec::new(),
+            evaluations: 0,
+            seconds: setup.stopwatch.started.elapsed().as_secs_f64(),
+        }
+    }
+}
+
+/// What a look at a motion shows.
+pub(super) struct MotionReview {
+    /// Seconds from its start to its end; of a log with gaps, of all its pieces.
+    pub(super) duration_s: f64,
+    /// Rate of the samples that count for the information, Hz.
+    pub(super) rate_hz: f64,
+    /// What the motion tells.
+    pub(super) information: MotionInformation,
+    /// The limits.
+    pub(super) check: LimitCheck,
+}
+
+/// A finished design.
+#[derive(Debug)]
+pub struct DesignOutcome {
+    /// What `design.json` holds.
+    pub file: DesignFile,
+    /// The machine.
+    pub machine: StudyRobot,
+    /// The limits in force: the description's with the study's laid over them.
+    pub limits: Limits,
+    /// The search by generations, for optimisers that have them; empty for gradients.
+    pub history: Vec<Generation>,
+    family: Box<dyn Family>,
+}
+
+impl DesignOutcome {
+    /// All of it together.
+    pub(super) fn new(setup: DesignSetup, origin: MotionOrigin, review: MotionReview) -> Self {
+        let MotionInformation { plain, weighted } = &review.information;
+        let log_det = |information: &DMatrix<f64>| DOptimal.figure(information).map(|figure| -figure);
+        let condition = |scaled| ConditionNumber { scaled, ..ConditionNumber::default() }.figure(plain);
+        let all = setup.prior.as_ref().map(|prior| prior + weighted);
+        let (forecast, worst_directions) = named_forecast(&setup.machine, weighted, all.as_ref());
+        let file = DesignFile {
+            schema: DESIGN_SCHEMA,
+            name: setup.name,
+            joints: setup.machine.parametric.joint_names(),
+            family: origin.family,
+            family_settings: origin.family_settings,
+            given: origin.given,
+            parameters: origin.parameters,
+            start_posture: origin.start_posture,
+            optimiser: origin.optimiser,
+            criterion: origin.criterion,
+            criterion_figure: origin.figure,
+            condition_number: condition(false),
+            condition_number_scaled: condition(true),
+            log_det: log_det(plain),
+            log_det_weighted: log_det(weighted),
+            base_columns: setup.machine.base().count(),
+            duration_s: review.duration_s,
+            rate_hz: review.rate_hz,
+            torque_std_nm: setup.torque_std_nm,
+            feasible: review.check.kept(),
+            check_rate_hz: review.check.rate_hz,
+            check_of: review.check.of,
+            limits: review.check.reports,
+            forecast,
+            worst_directions,
+            windowed: origin.windowed,
+            evaluations: origin.evaluations,
+            cpu_s: setup.stopwatch.cpu_s(),
+            seconds: origin.seconds,
+            seed: setup.section.search.seed,
+            diagnosis: review.check.diagnosis,
+            notes: setup.notes,
+        };
+        let (machine, limits) = (setup.machine, setup.limits);
+        Self { file, machine, limits, history: origin.history, family: origin.motion }
+    }
+
+    /// The family of the motion; its parameters are the file's.
+    pub fn family(&self) -> &dyn Family {
+        &*self.family
+    }
+
+    /// The times `0, 1/rate, ..` up to the end, which stands last even if the rate does not divide the duration, and
+    /// the motion there; of a log with gaps that of its longest piece.
+    pub fn sampled(&self, rate_hz: f64) -> (Vec<f64>, Motion) {
+        let duration_s = self.family.duration_s();
+        let steps = (duration_s * rate_hz - 1e-9).ceil().max(1.0) as usize;
+        let times: Vec<f64> = (0..=steps).map(|k| (k as f64 / rate_hz).min(duration_s)).collect();
+        let mut motion = Motion::default();
+        self.family.motion(&self.file.parameters, &times, &mut motion);
+        (times, motion)
+    }
+
+    /// Torque along a motion by the prior inertial parameters, joint-major as the motion, Nm (N); `None` while a body's
+    /// inertial is unknown.
+    pub fn torque_nm(&self, motion: &Motion) -> Option<Vec<f64>> {
+        let model = self.machine.model();
+        if !model.bodies_without_prior().is_empty() {
+            return None;
+        }
+        let mut workspace = Workspace::new(model);
+        let mut torque = vec![0.0; motion.joints * motion.samples];
+        for sample in 0..motion.samples {
+            let state = |values: &[f64]| -> Vec<f64> {
+                (0..motion.joints).map(|joint| values[joint * motion.samples + sample]).collect()
+            };
+            let tau =
+                inverse_dynamics(model, &mut workspace, &state(&motion.q), &state(&motion.dq), &state(&motion.ddq));
+            for (joint, tau) in tau.iter().enumerate() {
+                torque[joint * motion.samples + sample] = *tau;
+            }
+        }
+        Some(torque)
+    }
+}

@@ -1,0 +1,81 @@
+//! The search for the motion that a study asks for.
+
+use super::setup::DesignSetup;
+use super::windows::WindowedFile;
+use crate::error::Error;
+use core::ops::ControlFlow;
+use dynident_excitation::criteria::Criterion;
+use dynident_excitation::families::StartingAt;
+use dynident_excitation::optimisers::{Generation, OptimiserError};
+use dynident_excitation::{DesignProgress, DesignTask, Family, design, design_without_gradients};
+
+/// The displacement, rad or m, that every joint must at least have the time for.
+const LEAST_DISPLACEMENT: f64 = 0.05;
+
+/// The best motion of a search.
+pub(super) struct SearchResult {
+    /// The family of the motion.
+    pub(super) family: Box<dyn Family>,
+    /// Its parameters.
+    pub(super) parameters: Vec<f64>,
+    /// Where the study lets each joint start, rad (m).
+    pub(super) start_posture: Vec<Option<f64>>,
+    /// The criterion's figure; none where a parameter is not excited.
+    pub(super) figure: Option<f64>,
+    /// The strokes of a windowed design.
+    pub(super) windowed: Option<WindowedFile>,
+    /// The search by generations, for optimisers that have them.
+    pub(super) history: Vec<Generation>,
+    /// Evaluations of criterion, limits and gradient.
+    pub(super) evaluations: usize,
+    /// Seconds by the clock.
+    pub(super) seconds: f64,
+}
+
+/// The search for the ordinary problem: all joints at once, by gradients or without.
+pub(super) fn search(
+    setup: &DesignSetup,
+    wrong: &dyn Fn(&str, &dyn core::fmt::Display) -> Error,
+    watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
+) -> Result<SearchResult, Error> {
+    let DesignSetup { section, machine, limits, set, .. } = setup;
+    let model = machine.model();
+    limits.check_duration(model, section.duration_s, LEAST_DISPLACEMENT).map_err(|why| wrong("design.limits", &why))?;
+    let mut family =
+        section.family.family(model.dof(), section.duration_s).map_err(|why| wrong("design.family", &why))?;
+    let mut start_posture = Vec::new();
+    if let Some(start) = &section.start_posture {
+        start_posture = start.of_joints(model, limits).map_err(|why| wrong("design", &why))?;
+        family = Box::new(StartingAt::new(family, start_posture.clone()).map_err(|why| wrong("design", &why))?);
+    }
+    let criteria: Vec<&dyn Criterion> = setup.criteria.iter().map(|criterion| &**criterion).collect();
+    let task = DesignTask {
+        family: &*family,
+        criteria: &criteria,
+        limits: set,
+        layout: machine.layout(),
+        torque_std_nm: setup.counted_std_nm(),
+        prior: setup.prior.as_ref(),
+    };
+    let (best, history) = match section.optimiser.derivative_free() {
+        Some(optimiser) => design_without_gradients(&task, &section.search, &optimiser, watch),
+        None => design(&task, &section.search, watch).map(|best| (best, Vec::new())),
+    }
+    .map_err(|why| match why {
+        OptimiserError::Start => wrong(
+            "design.family",
+            &"no motion of this family excites every parameter, or none can be computed: take a richer family, join it with another, or give [design.prior]",
+        ),
+        why => wrong("design", &why),
+    })?;
+    Ok(SearchResult {
+        parameters: best.parameters,
+        start_posture,
+        figure: best.figure,
+        windowed: None,
+        history,
+        evaluations: best.evaluations,
+        seconds: best.seconds,
+        family,
+    })
+}

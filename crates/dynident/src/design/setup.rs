@@ -1,0 +1,198 @@
+//! What a search and the check of a given motion start with: robot, limits, noise, prior and criterion of a study.
+
+use super::outcome::Stopwatch;
+use super::section::{CriterionChoice, DesignSection, TorqueNoise};
+use super::table;
+use crate::error::Error;
+use crate::jobs::options::{RunOptions, study_name};
+use crate::study::StudyRobot;
+use crate::study::{CoulombChoice, Folders, Study};
+use dynident_excitation::criteria::{Criterion, DOptimal, Prediction};
+use dynident_excitation::limits::{LimitSet, Limits};
+use dynident_excitation::{Family, Information, Motion};
+use nalgebra::DMatrix;
+use std::path::Path;
+
+/// Samples whose regressor is held at once.
+const SAMPLES_AT_ONCE: usize = 4096;
+
+/// What a motion tells of the base parameters.
+pub(super) struct MotionInformation {
+    /// `Σ WᵀW`: every torque noise 1 Nm (N).
+    pub(super) plain: DMatrix<f64>,
+    /// `Σ Wᵀ Σ⁻¹ W` with the torque noise of the study.
+    pub(super) weighted: DMatrix<f64>,
+}
+
+/// A study's `[design]`, read and checked.
+pub(super) struct DesignSetup {
+    pub(super) name: String,
+    pub(super) section: DesignSection,
+    pub(super) machine: StudyRobot,
+    pub(super) limits: Limits,
+    pub(super) set: LimitSet,
+    pub(super) criteria: Vec<Box<dyn Criterion>>,
+    pub(super) prior: Option<DMatrix<f64>>,
+    pub(super) torque_std_nm: Vec<f64>,
+    ones: Vec<f64>,
+    pub(super) notes: Vec<String>,
+    pub(super) stopwatch: Stopwatch,
+}
+
+impl DesignSetup {
+    /// For a search: laws are smooth, and something bounds how fast each joint moves.
+    pub(super) fn for_search(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Self, Error> {
+        let mut notes = Vec::new();
+        let setup = Self::new(&smooth(study, &mut notes), study_path, options, notes)?;
+        bounded(&setup.machine, &setup.limits)
+            .map_err(|why| Error::study(study_path, format!("[design.limits]: {why}")))?;
+        Ok(setup)
+    }
+
+    /// For a motion that is there already: laws as the study has them.
+    pub(super) fn for_check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Self, Error> {
+        Self::new(study, study_path, options, Vec::new())
+    }
+
+    fn new(study: &Study, study_path: &Path, options: &RunOptions<'_>, mut notes: Vec<String>) -> Result<Self, Error> {
+        let stopwatch = Stopwatch::start();
+        let section = study.design.clone().unwrap_or_default();
+        let wrong = |part: &str, why: &dyn core::fmt::Display| Error::study(study_path, format!("[{part}]: {why}"));
+        section.validate().map_err(|why| wrong("design", &why))?;
+        let folders = Folders::new(study, study_path, options.data.as_deref());
+        let machine = StudyRobot::new(study, study_path, &folders)?;
+        let limits = Limits::from_model(machine.model()).overlaid(&section.limits);
+        let set = LimitSet::new(&limits, machine.model()).map_err(|why| wrong("design.limits", &why))?;
+        let torque_std_nm = torque_std(&section, &machine, &mut notes).map_err(|why| wrong("design", &why))?;
+        let prior = section.prior.information(&machine, study_path, &folders, &mut notes)?;
+        let criteria = match &section.criterion {
+            CriterionChoice::Prediction { trajectory } => {
+                let path = folders.find(trajectory, None)?;
+                let task = table::trajectory(&path, &machine.parametric.joint_names(), &study.motion)?;
+                notes.extend(task.note.map(|note| format!("task: {note}")));
+                let samples = task.given.samples();
+                let motion_at = |times: &[f64], out: &mut Motion| task.given.motion(&[], times, out);
+                let sum = information(&machine, &torque_std_nm, task.given.times_s(), &motion_at);
+                let criterion: Box<dyn Criterion> = Box::new(Prediction::new(sum / samples.samples as f64));
+                // From a motion that tells all parameters well to one that tells the task's: a better start than any
+                // random one.
+                vec![Box::new(DOptimal), criterion]
+            }
+            named => named.criteria().unwrap_or_default(),
+        };
+        Ok(Self {
+            name: study_name(study, study_path),
+            ones: vec![1.0; machine.model().dof()],
+            section,
+            machine,
+            limits,
+            set,
+            criteria,
+            prior,
+            torque_std_nm,
+            notes,
+            stopwatch,
+        })
+    }
+
+    /// The torque noise that the criterion counts with.
+    pub(super) fn counted_std_nm(&self) -> &[f64] {
+        if self.section.criterion.of_regressor() { &self.ones } else { &self.torque_std_nm }
+    }
+
+    /// What a motion tells at `times`.
+    pub(super) fn information(&self, times: &[f64], motion_at: &dyn Fn(&[f64], &mut Motion)) -> MotionInformation {
+        let [plain, weighted] =
+            [&self.ones, &self.torque_std_nm].map(|std| information(&self.machine, std, times, motion_at));
+        MotionInformation { plain, weighted }
+    }
+
+    /// The criterion's name.
+    pub(super) fn criterion(&self) -> &'static str {
+        self.criteria.last().map_or("", |criterion| criterion.name())
+    }
+
+    /// The criterion's figure of a motion that was not searched for.
+    pub(super) fn figure(&self, MotionInformation { plain, weighted }: &MotionInformation) -> Option<f64> {
+        let criterion = self.criteria.last()?;
+        match &self.prior {
+            _ if self.section.criterion.of_regressor() => criterion.figure(plain),
+            Some(prior) => criterion.figure(&(prior + weighted)),
+            None => criterion.figure(weighted),
+        }
+    }
+}
+
+/// Information of a motion at `times`, a block at a time.
+fn information(
+    machine: &StudyRobot,
+    torque_std_nm: &[f64],
+    times: &[f64],
+    motion_at: &dyn Fn(&[f64], &mut Motion),
+) -> DMatrix<f64> {
+    let count = machine.layout().columns().len();
+    let mut gatherer = Information::new(machine.model(), machine.layout(), torque_std_nm, None);
+    let (mut sum, mut motion) = (DMatrix::zeros(count, count), Motion::default());
+    for times in times.chunks(SAMPLES_AT_ONCE) {
+        motion_at(times, &mut motion);
+        sum += gatherer.of(&motion, 1.0);
+    }
+    sum
+}
+
+/// The study with smooth steps in place of signs: a sign has no slope to follow.
+fn smooth(study: &Study, notes: &mut Vec<String>) -> Study {
+    let mut study = study.clone();
+    let mut changed = false;
+    let choices = core::iter::once(Some(&mut study.drive.coulomb))
+        .chain(study.drive.joints.values_mut().map(|joint| joint.coulomb.as_mut()))
+        .chain(study.coupling.iter_mut().map(|coupling| coupling.coulomb.as_mut()));
+    for choice in choices.flatten().filter(|choice| **choice == CoulombChoice::Sign) {
+        *choice = CoulombChoice::Smooth;
+        changed = true;
+    }
+    if changed {
+        notes.push(
+            "Coulomb friction is designed for with a smooth step (coulomb_width) in place of the sign".to_owned(),
+        );
+    }
+    study
+}
+
+/// That something bounds how fast each joint moves: without it the best motion is infinitely fast.
+fn bounded(machine: &StudyRobot, limits: &Limits) -> Result<(), String> {
+    for joint in machine.model().joints() {
+        let free = limits.of(&joint.name).is_none_or(|limit| {
+            let rates = [limit.speed, limit.acceleration, limit.jerk, limit.torque, limit.power_w];
+            rates.iter().all(Option::is_none)
+        });
+        if free {
+            return Err(format!(
+                "joint `{0}` has no limit of speed, acceleration, jerk, torque or power, so that the best motion would be infinitely fast; \
+                 give one: joints = [{{ joint = \"{0}\", acceleration = ... }}]",
+                joint.name
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Torque noise of every joint.
+fn torque_std(section: &DesignSection, machine: &StudyRobot, notes: &mut Vec<String>) -> Result<Vec<f64>, String> {
+    let joints = machine.model().joints();
+    match &section.torque_std_nm {
+        Some(TorqueNoise::Same(std)) => Ok(vec![*std; joints.len()]),
+        Some(TorqueNoise::Each(stds)) if stds.len() == joints.len() => Ok(stds.clone()),
+        Some(TorqueNoise::Each(stds)) => {
+            Err(format!("torque_std_nm has {} entries, the robot {} joints: give one each", stds.len(), joints.len()))
+        }
+        None => {
+            notes.push(
+                "torque noise is taken as 1 % of each effort limit (torque_std_nm), 1 Nm where there is none"
+                    .to_owned(),
+            );
+            let of = |effort: Option<f64>| effort.filter(|effort| *effort > 0.0).map_or(1.0, |effort| 0.01 * effort);
+            Ok(joints.iter().map(|joint| of(joint.limits.effort)).collect())
+        }
+    }
+}

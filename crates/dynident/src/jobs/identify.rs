@@ -1,0 +1,261 @@
+//! Logs to a model: the main job.
+
+use crate::error::Error;
+use crate::jobs::options::{RunOptions, study_name};
+use crate::result::identification::{LogSummary, PhysicalVerdict, RESULT_SCHEMA, ResultFile, Timings};
+use crate::result::log_summary::{held_out_summary, training_summary};
+use crate::result::sections::{
+    base_parameters, bodies, friction_results, joint_results, law_results, method_summary, offset_results,
+    physical_fit_result, robot_summary, training_result, verdict,
+};
+use crate::result::stored::StoredModel;
+use crate::result::urdf::written_urdf;
+use crate::study::{ArmSection, EstimatorMethod, Folders, Study, StudyRobot};
+use dynident_estimation::{Estimate, strongest_correlations};
+use dynident_identification::estimators::{Findings, InstrumentSource};
+use dynident_identification::examination::{LogTrace, sign_findings};
+use dynident_identification::{
+    Identification, IdentificationTask, identify as identify_task, identify_payload,
+    identify_with_instruments as identify_task_with_instruments,
+};
+use dynident_model::InertialParameters;
+use dynident_model::laws::Law;
+use std::path::Path;
+use std::time::Instant;
+
+/// Correlations that a result tells.
+const CORRELATIONS: usize = 10;
+
+/// A finished identification of a study.
+#[derive(Debug)]
+pub struct IdentificationOutcome {
+    /// What `result.json` holds.
+    pub result: ResultFile,
+    /// The estimate with its covariance.
+    pub estimate: Estimate,
+    /// Inertial parameters of the bodies, as in `result.bodies`.
+    pub inertials: Vec<InertialParameters>,
+    /// The user's own URDF with the new values; without it, [`ResultFile::no_urdf`] says why.
+    pub urdf: Option<String>,
+    /// Measured and predicted torque over time, training logs first: at most the first 20 000 samples of a log that was fitted to, the first 100 000 filtered rows of a held-out one.
+    pub traces: Vec<LogTrace>,
+}
+
+impl IdentificationOutcome {
+    /// The report as one self-contained HTML page: torque measured against predicted, residuals, parameters with error bars, friction, bodies, what was found in the logs, where the time went.
+    ///
+    /// # Errors
+    /// [`Error::Report`], which would be a defect of this program.
+    pub fn report(&self) -> Result<String, Error> {
+        crate::pages::identification::identification_report(self)
+    }
+}
+
+/// Fits a study's model to its logs and tests it on the held-out ones.
+///
+/// # Errors
+/// Everything that [`Error`] names: files, study, logs. A poor fit is not an error.
+pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<IdentificationOutcome, Error> {
+    identified(study, study_path, options, None)
+}
+
+/// As [`identify()`] with the method `"instrumental"`, whatever the study asks for, and instruments from `source`: the closed loop simulated with the model so far (IDIM-IV: call again with a new
+/// simulation until the parameters settle), or a repeated run.
+///
+/// # Errors
+/// As [`identify()`], and what `source` returns.
+pub fn identify_with_instruments(
+    study: &Study,
+    study_path: &Path,
+    options: &RunOptions<'_>,
+    source: &mut dyn InstrumentSource,
+) -> Result<IdentificationOutcome, Error> {
+    let mut study = study.clone();
+    study.estimator.method = EstimatorMethod::Instrumental;
+    identified(&study, study_path, options, Some(source))
+}
+
+fn identified(
+    study: &Study,
+    study_path: &Path,
+    options: &RunOptions<'_>,
+    source: Option<&mut dyn InstrumentSource>,
+) -> Result<IdentificationOutcome, Error> {
+    // The study's files: robot, known arm, logs.
+    let start = Instant::now();
+    study.require_training_log(study_path)?;
+    let folders = Folders::new(study, study_path, options.data.as_deref());
+    let arm = study.arm.as_ref().map(|section| known_arm(section, &folders)).transpose()?;
+    // With the friction that was chosen when the arm was identified.
+    let with_arm = arm.as_ref().map(|(_, stored)| stored.friction_of(study));
+    let study = with_arm.as_ref().unwrap_or(study);
+    let robot = StudyRobot::new(study, study_path, &folders)?;
+    let task = study.task(study_path, &robot, &folders)?;
+    let mut timings = Timings { machine: start.elapsed().as_secs_f64(), ..Timings::default() };
+
+    // The identification itself.
+    let in_study = |error| Error::identification(study_path, error);
+    let execution = options.execution();
+    let found = match (&arm, &study.arm, source) {
+        (Some((path, stored)), Some(section), _) => {
+            let arm = stored.known_arm(path, &robot.parametric, section.refit)?;
+            identify_payload(&task, &arm, execution)
+        }
+        (_, _, Some(source)) => identify_task_with_instruments(&task, source, execution),
+        _ => identify_task(&task, execution),
+    };
+    let found = found.map_err(in_study)?;
+    timings.logs = found.times.logs_s;
+    timings.estimation = found.times.estimation_s;
+    timings.validation = found.times.examination_s;
+    timings.total = start.elapsed().as_secs_f64();
+
+    // What is written.
+    let inertials = found.inertials();
+    let verdict = physical_verdict(study, &task, &found, &inertials);
+    let (urdf, no_urdf) = match exported_urdf(&robot, &task, &found, &verdict, arm.is_some()) {
+        Ok(urdf) => (Some(urdf), None),
+        Err(reason) => (None, Some(reason)),
+    };
+    let training = training_result(&found, &task.recordings)
+        .map_err(|source| Error::Estimation { path: study_path.to_owned(), source })?;
+    let parts =
+        Parts { name: study_name(study, study_path), timings, verdict, no_urdf, inertials: &inertials, training };
+    let result = result_file(study, &robot, &task, &found, parts);
+    let mut traces = found.examination.traces;
+    traces.extend(found.held_out.into_iter().filter_map(|log| log.trace));
+    Ok(IdentificationOutcome { result, estimate: found.estimation.estimate, inertials, urdf, traces })
+}
+
+/// The earlier result of an arm, and where it lies.
+fn known_arm(section: &ArmSection, folders: &Folders) -> Result<(std::path::PathBuf, StoredModel), Error> {
+    let path = folders.find(&section.result, None)?;
+    let stored = StoredModel::read(&path)?;
+    Ok((path, stored))
+}
+
+fn physical_verdict(
+    study: &Study,
+    task: &IdentificationTask,
+    found: &Identification,
+    inertials: &[InertialParameters],
+) -> PhysicalVerdict {
+    let consistent = &found.consistent;
+    let mut verdict = verdict(found.model(), inertials, &consistent.parameters);
+    if let Some(fit) = &consistent.fit {
+        let arm_estimate = found.training.columns.arm_estimate(found.estimate());
+        verdict.fit = Some(physical_fit_result(fit, &arm_estimate));
+        verdict.note = if task.settings.estimation.estimator.is_plain() && study.arm.is_none() {
+            "of the possible set that fits the logs best; the base parameters above it are the unconstrained estimate"
+        } else {
+            "of the possible set nearest to the estimate; the base parameters above it are that unconstrained estimate"
+        }
+        .to_owned();
+    }
+    verdict.failure.clone_from(&consistent.failure);
+    verdict.sign = consistent.sign;
+    verdict.impossible_priors = consistent
+        .inconsistent_nominal
+        .iter()
+        .map(|(body, least)| format!("{body}: least eigenvalue of the pseudo-inertia {least:.2e}"))
+        .collect();
+    verdict
+}
+
+/// Parameters that URDF cannot express leave a result without one; it is no reason to lose the result.
+fn exported_urdf(
+    robot: &StudyRobot,
+    task: &IdentificationTask,
+    found: &Identification,
+    verdict: &PhysicalVerdict,
+    is_payload: bool,
+) -> Result<String, String> {
+    if is_payload {
+        return Err(verdict.failure.clone().unwrap_or_default());
+    }
+    if task.settings.consistency.is_some() && (verdict.failure.is_some() || !verdict.consistent) {
+        let reason = verdict.failure.clone().unwrap_or_else(|| verdict.violations.join("; "));
+        return Err(format!(
+            "the bodies are not physically possible: {reason} (estimator.physical = false writes them as they are)"
+        ));
+    }
+    written_urdf(robot, &found.model().parametric, &found.inertials(), &found.consistent.parameters)
+}
+
+/// What the result has beside the identification itself.
+struct Parts<'a> {
+    name: String,
+    timings: Timings,
+    verdict: PhysicalVerdict,
+    no_urdf: Option<String>,
+    inertials: &'a [InertialParameters],
+    training: crate::result::identification::TrainingResult,
+}
+
+fn result_file(
+    study: &Study,
+    robot: &StudyRobot,
+    task: &IdentificationTask,
+    found: &Identification,
+    parts: Parts<'_>,
+) -> ResultFile {
+    let (model, estimate, base) = (found.model(), found.estimate(), found.training.columns.base());
+    let parameters = &found.consistent.parameters;
+    let covariance = estimate.covariance.view((0, 0), (base, base)).into_owned();
+    let (mut gross_errors, mut noise_correlation, mut noise_levels) = (None, None, None);
+    let (mut periodic, mut simulated) = (None, None);
+    match found.estimation.findings.clone() {
+        Findings::GrossErrors(found) => gross_errors = Some(found),
+        Findings::NoiseCorrelation(found) => noise_correlation = Some(found),
+        Findings::NoiseLevels(found) => noise_levels = Some(found),
+        Findings::Periodic(found) => periodic = Some(found),
+        Findings::Simulated(found) => simulated = Some(found),
+        _ => {}
+    }
+    let held_out = found.held_out.iter();
+    let bands = held_out.clone().flat_map(|log| &log.validation.residuals).filter_map(|joint| joint.band.clone());
+    ResultFile {
+        schema: RESULT_SCHEMA.to_owned(),
+        name: parts.name,
+        robot: robot_summary(robot),
+        method: method_summary(found, study.estimator.method.name()),
+        noise_in_regressor: found.estimation.noise_in_regressor.clone(),
+        gross_errors,
+        noise_correlation,
+        noise_levels,
+        periodic,
+        simulated,
+        base_parameters: base_parameters(model, estimate, found.consistent_base_values()),
+        base_parameter_covariance: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        bodies: bodies(model, parts.inertials),
+        possible_intervals: found.consistent.intervals.clone(),
+        essential: found.essential.clone(),
+        correlations: strongest_correlations(estimate, CORRELATIONS),
+        joints: joint_results(model, estimate, parameters, &found.examination.pooled_delays),
+        friction_choice: friction_results(&found.training.friction_choice),
+        payloads: found.payloads.clone(),
+        offsets: offset_results(found, &task.recordings),
+        drive_gains: found.training.gains.as_ref().map(|(_, gains)| gains.clone()),
+        couplings: law_results(model, estimate, parameters, |law| matches!(law, Law::Coupling(_))),
+        training: parts.training,
+        torque_band: bands.collect(),
+        validation: held_out.map(|log| log.validation.clone()).collect(),
+        physical: parts.verdict,
+        logs: log_summaries(task, found),
+        no_urdf: parts.no_urdf,
+        timings_s: parts.timings,
+    }
+}
+
+/// Training logs first.
+fn log_summaries(task: &IdentificationTask, found: &Identification) -> Vec<LogSummary> {
+    let joints = found.model().joint_names();
+    let pairs = found.training.logs.iter().zip(&found.examination.delays);
+    let training = pairs.map(|(factors, delays)| {
+        let mut summary = training_summary(&task.recordings[factors.index], factors, delays, &joints);
+        summary.model_findings.extend(found.consistent.sign.as_ref().and_then(sign_findings));
+        summary
+    });
+    let held_out = found.held_out.iter().map(|log| held_out_summary(&task.recordings[log.index], log, &joints));
+    training.chain(held_out).collect()
+}

@@ -1,0 +1,59 @@
+//! A finished model against logs that were not used for its fit.
+
+use crate::error::Error;
+use crate::jobs::options::{RunOptions, study_name};
+use crate::result::log_summary::held_out_summary;
+use crate::result::stored::StoredModel;
+use crate::result::validation::{VALIDATION_SCHEMA, ValidationFile};
+use crate::study::{Folders, Study, StudyRobot};
+use dynident_identification::examination::{TestedModel, examine_held_out};
+use dynident_identification::{Logs, Role};
+use std::path::Path;
+
+/// Tests the model of a `result.json` on the logs of a study that have the role `validate`, or on all its logs if none has.
+///
+/// # Errors
+/// If the result does not belong to the study's machine, and everything that reading logs can give.
+pub fn validate(
+    result_path: &Path,
+    study: &Study,
+    study_path: &Path,
+    options: &RunOptions<'_>,
+) -> Result<ValidationFile, Error> {
+    study.require_log(study_path)?;
+    let folders = Folders::new(study, study_path, options.data.as_deref());
+    let stored = StoredModel::read(result_path)?;
+    let study = &stored.friction_of(study);
+    let robot = StudyRobot::new(study, study_path, &folders)?;
+    let theta = stored.base_values(result_path, &robot.parametric)?;
+    let consistent = stored.consistent_values(result_path)?;
+    let model = stored.regressor_model(result_path, &robot.parametric)?;
+    let payloads = stored.payloads(result_path, study, study_path, &model)?;
+    let task = study.task(study_path, &robot, &folders)?;
+    let mut chosen = study.logs_of_role(Role::Validate);
+    if chosen.is_empty() {
+        chosen = (0..study.log.len()).collect();
+    }
+    let in_study = |error| Error::identification(study_path, error);
+    let execution = options.execution();
+    let (recordings, settings) = (&task.recordings, &task.settings);
+    let tested = execution.install(|| {
+        let logs = Logs::new(robot.model(), recordings, settings, &chosen, stored.cutoff_hz(), execution)?;
+        let one = |&index: &usize| {
+            let carried = recordings[index].payload.as_ref();
+            let theta = payloads.base_values(carried, &theta);
+            let physical = consistent.as_ref().map(|values| payloads.base_values(carried, values));
+            let tested = TestedModel { theta: &theta, physical: physical.as_deref(), uncertainty: None, traced: false };
+            examine_held_out(&logs, &model, index, &tested)
+        };
+        chosen.iter().map(one).collect::<Result<Vec<_>, _>>()
+    });
+    let tested = tested.map_err(in_study)?;
+    let joints = model.joint_names();
+    Ok(ValidationFile {
+        schema: VALIDATION_SCHEMA.to_owned(),
+        name: study_name(study, study_path),
+        logs: tested.iter().map(|log| held_out_summary(&recordings[log.index], log, &joints)).collect(),
+        validation: tested.into_iter().map(|log| log.validation).collect(),
+    })
+}

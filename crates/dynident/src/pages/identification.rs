@@ -1,0 +1,349 @@
+//! `report.html` of an identification.
+
+use crate::error::Error;
+use crate::jobs::identify::IdentificationOutcome;
+use crate::result::identification::{BaseParameterResult, LogSummary, ResultFile};
+use dynident_estimation::consistent::IntervalEnd;
+use dynident_identification::Role;
+use dynident_identification::consistent::ParameterInterval;
+use dynident_identification::examination::{LogTrace, LogValidation};
+use dynident_recording::Level;
+use dynident_report::{BarPlot, Cell, Heading, HeatMap, KeyFigures, LinePlot, Report, Table, Text, Tone, short};
+
+/// Base parameters up to which their correlations are drawn.
+const MOST_CORRELATIONS: usize = 80;
+
+/// The whole page.
+pub(crate) fn identification_report(found: &IdentificationOutcome) -> Result<String, Error> {
+    let r = &found.result;
+    let mut page = Report::new(&r.name).subtitle(format!(
+        "{}: {} joints, {} base parameters; estimator {}, error bars {}",
+        r.robot.name,
+        r.robot.dof,
+        r.base_parameters.len(),
+        r.method.estimator,
+        r.method.covariance
+    ));
+    page.add(figures(r));
+    page.add(Heading::new("Torque"));
+    page.add(errors(r));
+    for log in &r.validation {
+        page.add(held_out(log));
+    }
+    torques(&mut page, &r.robot.joints, &found.traces);
+    page.add(Heading::new("Parameters"));
+    parameters(&mut page, r);
+    page.add(Heading::new("Friction and drives"));
+    friction(&mut page, r);
+    super::payloads::loads(&mut page, r);
+    page.add(Heading::new("Bodies"));
+    bodies(&mut page, r);
+    page.add(Heading::new("Logs"));
+    for log in &r.logs {
+        page.add(log_text(log));
+    }
+    page.add(Heading::new("Time"));
+    let t = &r.timings_s;
+    let steps = [
+        ("robot and base parameters", t.machine),
+        ("logs to factors", t.logs),
+        ("estimation", t.estimation),
+        ("validation", t.validation),
+        ("all", t.total),
+    ];
+    page.add(
+        Table::new("", ["step", "s"])
+            .rows(steps.iter().map(|(step, seconds)| vec![(*step).into(), short(*seconds, 3).into()])),
+    );
+    Ok(page.html()?)
+}
+
+/// A unit that is not broken, with raised exponents.
+fn unit(unit: &str) -> String {
+    unit.replace(' ', "\u{a0}").replace("^2", "²")
+}
+
+fn percent(value: Option<f64>) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| format!("{} %", short(value, 3)))
+}
+
+fn figures(r: &ResultFile) -> KeyFigures {
+    let mut figures = KeyFigures::new();
+    for log in r.validation.iter().take(3) {
+        let prior = log.prior.as_ref().and_then(|prior| prior.relative_error_percent);
+        let note =
+            prior.map_or_else(|| log.log.clone(), |prior| format!("{}; description {}", log.log, percent(Some(prior))));
+        figures = figures.figure("held-out torque error", percent(log.model.relative_error_percent), note);
+    }
+    if r.validation.is_empty() {
+        figures = figures.judged("held-out torque error", "–", "no log was held out", Tone::Warning);
+    }
+    let excited = r.base_parameters.iter().filter(|parameter| parameter.excited).count();
+    let physical = if r.physical.consistent { ("yes", Tone::Good) } else { ("no", Tone::Bad) };
+    figures
+        .figure("error of the fit", percent(r.training.relative_error_percent), format!("{} rows", r.training.samples))
+        .judged(
+            "parameters identified",
+            format!("{excited} of {}", r.base_parameters.len()),
+            r.method.status.clone(),
+            if excited == r.base_parameters.len() { Tone::Good } else { Tone::Warning },
+        )
+        .figure("condition number", short(r.method.condition_number_scaled, 3), "columns of unit length")
+        .judged("physically possible", physical.0, "", physical.1)
+        .figure("time", format!("{} s", short(r.timings_s.total, 3)), "")
+}
+
+/// Errors of the torque by joint, training and held-out logs side by side.
+fn errors(r: &ResultFile) -> Table {
+    let mut columns = vec!["joint".to_owned(), "fit, Nm (N)".to_owned(), "fit, %".to_owned()];
+    for log in &r.validation {
+        columns.extend([format!("{}, Nm (N)", log.log), format!("{}, %", log.log)]);
+    }
+    let number = |value: Option<f64>| Cell::from(value.map_or_else(|| "–".to_owned(), |value| short(value, 3)));
+    let mut table = Table::new("Torque error by joint", columns)
+        .note("root mean square of measured less predicted filtered torque, and as part of the measured torque");
+    for (j, joint) in r.training.joints.iter().enumerate() {
+        let mut row = vec![Cell::from(&joint.name), number(Some(joint.rmse_nm)), number(joint.relative_error_percent)];
+        for log in &r.validation {
+            let joint = &log.model.joints[j];
+            row.extend([number(Some(joint.rmse_nm)), number(joint.relative_error_percent)]);
+        }
+        table = table.rows([row]);
+    }
+    table
+}
+
+/// One held-out log: the estimate, the possible set and the description.
+fn held_out(log: &LogValidation) -> Table {
+    let sets = [
+        ("base parameters", Some(&log.model)),
+        ("base parameters, unfiltered torque", Some(&log.raw)),
+        ("possible set", log.physical.as_ref()),
+        ("the description's own", log.prior.as_ref()),
+    ];
+    let rows = sets.into_iter().filter_map(|(set, report)| {
+        let report = report?;
+        let r_squared = report.r_squared.map_or_else(|| "–".to_owned(), |value| short(value, 4));
+        Some(vec![
+            set.into(),
+            short(report.rmse_nm, 3).into(),
+            percent(report.relative_error_percent).into(),
+            short(report.max_error_nm, 3).into(),
+            r_squared.into(),
+        ])
+    });
+    Table::new(format!("Held-out log {}", log.log), ["parameters", "RMS, Nm (N)", "error", "largest, Nm (N)", "R²"])
+        .rows(rows)
+}
+
+fn torques(page: &mut Report, joints: &[String], traces: &[LogTrace]) {
+    for trace in traces.iter().rev() {
+        let role = if trace.role == Role::Validate { "held out" } else { "fitted to" };
+        let part = if trace.cut || trace.role == Role::Identify { "; the first samples" } else { "" };
+        let rows = trace.joints.iter().map(|joint| joint.measured_nm.len()).min().unwrap_or(0);
+        let time: Vec<f64> = (0..rows).map(|row| row as f64 / trace.rate_hz).collect();
+        let mut residuals =
+            LinePlot::new(format!("Residual: {} ({role})", trace.log), "t, s", "torque, Nm (N)", time.clone())
+                .note("measured less predicted; gaps of the log are closed up");
+        for (name, joint) in joints.iter().zip(&trace.joints) {
+            let (measured, predicted) = (joint.measured_nm[..rows].to_vec(), joint.predicted_nm[..rows].to_vec());
+            let residual = measured.iter().zip(&predicted).map(|(measured, predicted)| measured - predicted).collect();
+            residuals = residuals.line(name, residual);
+            page.add(
+                LinePlot::new(format!("{name}: {} ({role})", trace.log), "t, s", "torque, Nm (N)", time.clone())
+                    .note(format!("filtered at {} Hz{part}", short(trace.rate_hz, 4)))
+                    .line("measured", measured)
+                    .line("predicted", predicted),
+            );
+        }
+        page.add(residuals);
+    }
+}
+
+fn parameters(page: &mut Report, r: &ResultFile) {
+    // One picture a unit: bars of one scale.
+    let mut units: Vec<&str> = Vec::new();
+    for parameter in &r.base_parameters {
+        if !units.contains(&parameter.unit.as_str()) {
+            units.push(&parameter.unit);
+        }
+    }
+    for of_unit in units {
+        let mut plot = BarPlot::new(format!("Base parameters in {}", unit(of_unit)), unit(of_unit))
+            .note("with 95 % error bars")
+            .reference_label("by the description");
+        for p in r.base_parameters.iter().filter(|parameter| parameter.unit == of_unit) {
+            let half_width = p.excited.then_some(p.half_width_95);
+            plot = plot.bar(&p.expression, if p.excited { p.value } else { f64::NAN }, half_width, p.prior);
+        }
+        page.add(plot);
+    }
+    let optional = |value: Option<f64>| Cell::from(value.map_or_else(String::new, |value| short(value, 5)));
+    let row = |p: &BaseParameterResult| {
+        let relative = p.relative_std_percent.unwrap_or(f64::INFINITY);
+        let tone = if relative > 30.0 { Tone::Warning } else { Tone::Plain };
+        let relative = p.relative_std_percent.map_or_else(String::new, |value| short(value, 3));
+        vec![
+            Cell::from(&p.expression),
+            short(p.value, 6).into(),
+            short(p.std, 3).into(),
+            Cell::judged(relative, if p.excited { tone } else { Tone::Bad }),
+            optional(p.physical),
+            optional(p.prior),
+            Cell::from(unit(&p.unit)),
+        ]
+    };
+    let columns = ["expression", "value", "std", "std, %", "possible set", "description", "unit"];
+    page.add(Table::new("Base parameters", columns).rows(r.base_parameters.iter().map(row)));
+    if !r.method.not_excited.is_empty() {
+        let text = format!("Not excited by the logs: {}", r.method.not_excited.join(", "));
+        page.add(Text { paragraphs: Vec::new(), points: vec![(Tone::Warning, text)] });
+    }
+    let n = r.base_parameters.len();
+    if (2..=MOST_CORRELATIONS).contains(&n) && r.base_parameter_covariance.len() == n {
+        let std = |i: usize| r.base_parameter_covariance[i][i].sqrt();
+        let value = |i: usize, j: usize| r.base_parameter_covariance[i][j] / (std(i) * std(j));
+        let values = (0..n).map(|i| (0..n).map(|j| value(i, j)).collect()).collect();
+        let names = || r.base_parameters.iter().map(|parameter| parameter.symbol.clone());
+        page.add(HeatMap::new("Correlation of the base parameters", names(), names(), values).limit(1.0));
+    }
+}
+
+fn friction(page: &mut Report, r: &ResultFile) {
+    let mut table = Table::new("", ["joint", "parameter", "value", "std", "unit"])
+        .note("of the possible set where there is one; a deviation where the parameter is identified on its own");
+    let owned = r.joints.iter().map(|joint| (joint.name.as_str(), &joint.laws[..]));
+    let coupled = [("coupling", &r.couplings[..])];
+    for (name, laws) in owned.chain(coupled) {
+        for law in laws {
+            let std = law.std.map_or_else(String::new, |std| short(std, 3));
+            table = table.row([name.to_owned(), law.symbol.clone(), short(law.value, 5), std, unit(&law.unit)]);
+        }
+    }
+    page.add(table);
+    lags(page, r);
+    if !r.friction_choice.is_empty() {
+        let rows = r.friction_choice.iter().map(|joint| vec![Cell::from(&joint.joint), Cell::from(&joint.chosen)]);
+        page.add(Table::new("Friction that the logs chose", ["joint", "friction"]).rows(rows));
+    }
+}
+
+fn lags(page: &mut Report, r: &ResultFile) {
+    if r.joints.iter().all(|joint| joint.torque_lag.is_none()) {
+        return;
+    }
+    let rows = r.joints.iter().filter_map(|joint| {
+        let lag = joint.torque_lag?;
+        let ms = |seconds: f64| Cell::from(short(1e3 * seconds, 3));
+        let tone = if lag.matters { Tone::Warning } else { Tone::Plain };
+        Some(vec![
+            Cell::from(&joint.name),
+            Cell::judged(short(1e3 * lag.lag_s, 3), tone),
+            ms(lag.std_s),
+            ms(lag.half_width_95_s),
+        ])
+    });
+    let table = Table::new("Lag of the torque behind the motion", ["joint", "lag, ms", "std, ms", "95 %, ± ms"])
+        .note("estimated together with the model, log by log; marked where it moves more torque than the model leaves unexplained")
+        .rows(rows);
+    page.add(table);
+}
+
+fn bodies(page: &mut Report, r: &ResultFile) {
+    let mut verdict = Text::new(format!("The verdict is {}.", r.physical.note));
+    if r.physical.consistent {
+        verdict = verdict.point(Tone::Good, "every body, friction and drive is physically possible");
+    }
+    let failure = r.physical.failure.iter().map(|reason| format!("no possible set: {reason}"));
+    for violation in r.physical.violations.iter().cloned().chain(failure) {
+        verdict = verdict.point(Tone::Bad, violation);
+    }
+    if let Some(reason) = &r.no_urdf {
+        verdict = verdict.point(Tone::Warning, format!("no identified.urdf: {reason}"));
+    }
+    page.add(verdict);
+    let columns = [
+        "body",
+        "mass, kg",
+        "description, kg",
+        "x, m",
+        "y, m",
+        "z, m",
+        "Ixx",
+        "Ixy",
+        "Ixz",
+        "Iyy",
+        "Iyz",
+        "Izz",
+        "least eigenvalue",
+    ];
+    let rows = r.bodies.iter().map(|body| {
+        let prior = body.prior.map_or_else(String::new, |prior| short(prior[0], 4));
+        let mut row = vec![Cell::from(&body.name), short(body.mass_kg, 4).into(), prior.into()];
+        row.extend((0..3).map(|k| Cell::from(body.com_m.map_or_else(String::new, |com| short(com[k], 4)))));
+        row.extend(body.inertia_at_origin_kgm2.iter().map(|value| Cell::from(short(*value, 4))));
+        let least = body.pseudo_inertia_min_eigenvalue;
+        row.push(Cell::judged(short(least, 3), if least > 0.0 { Tone::Plain } else { Tone::Bad }));
+        row
+    });
+    let note = "centre of mass and inertia (kg m²) in the body's own frame, inertia about its origin; least eigenvalue of the pseudo-inertia";
+    page.add(Table::new("Bodies", columns).note(note).rows(rows));
+    if let Some(found) = &r.possible_intervals {
+        page.add(intervals(found));
+    }
+}
+
+/// How far every parameter could go.
+fn intervals(found: &[ParameterInterval]) -> Table {
+    let end = |end: Option<f64>| Cell::from(end.map_or_else(|| "open".to_owned(), |end| short(end, 4)));
+    let holder = |end: IntervalEnd| match end {
+        IntervalEnd::Data => "data",
+        IntervalEnd::Constraint => "physics",
+        IntervalEnd::Open => "–",
+        IntervalEnd::Unsettled => "not settled",
+    };
+    let rows = found.iter().map(|interval| {
+        vec![
+            Cell::from(&interval.symbol),
+            interval.of.clone().unwrap_or_default().into(),
+            unit(&interval.unit).into(),
+            short(interval.value, 4).into(),
+            end(interval.lower),
+            end(interval.upper),
+            holder(interval.held_by[0]).into(),
+            holder(interval.held_by[1]).into(),
+        ]
+    });
+    let note = "every value in an interval belongs to a possible machine that the data do not reject at 95 %; the ends are held by the data, by what is possible, or not at all";
+    Table::new(
+        "How far each parameter could go",
+        ["parameter", "of", "unit", "best fit", "from", "to", "held below by", "held above by"],
+    )
+    .note(note)
+    .rows(rows)
+}
+
+fn log_text(log: &LogSummary) -> Text {
+    let filter =
+        log.filter_cutoff_hz.map_or_else(String::new, |hz| format!(", parallel filter at {} Hz", short(hz, 3)));
+    let cutoff =
+        log.motion_cutoff_hz.map_or_else(String::new, |hz| format!(", positions filtered at {} Hz", short(hz, 3)));
+    let mut text = Text::new(format!(
+        "{} ({}): {} rows at {} Hz{cutoff}{filter}, {} rows at {} Hz after it.",
+        log.log,
+        if log.role == Role::Validate { "held out" } else { "fitted to" },
+        log.import.rows,
+        short(log.import.rate_hz, 5),
+        log.filtered_rows,
+        short(log.filtered_rate_hz, 5),
+    ));
+    for finding in log.import.findings.iter().chain(&log.model_findings) {
+        let tone = match finding.level {
+            Level::Info => Tone::Plain,
+            Level::Warning => Tone::Warning,
+            Level::Problem => Tone::Bad,
+        };
+        text = text.point(tone, format!("{}: {}", finding.channel, finding.message));
+    }
+    text
+}

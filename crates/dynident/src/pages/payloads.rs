@@ -1,0 +1,75 @@
+//! Payloads, drive gains and offsets in `report.html`.
+
+use crate::result::identification::ResultFile;
+use dynident_identification::payload::{Measured, PayloadResult};
+use dynident_report::{Cell, Heading, Report, Table, Text, Tone, short};
+
+/// The sections, as far as there is something to say.
+pub(crate) fn loads(page: &mut Report, r: &ResultFile) {
+    if !r.payloads.is_empty() {
+        page.add(Heading::new("Payloads"));
+    }
+    for payload in &r.payloads {
+        payload_sections(page, payload);
+    }
+    if let Some(gains) = &r.drive_gains {
+        page.add(Heading::new("Drive gains"));
+        let rows = gains.iter().map(|gain| {
+            let tone = if gain.identified { Tone::Plain } else { Tone::Bad };
+            vec![
+                Cell::from(&gain.joint),
+                Cell::judged(short(gain.gain, 5), tone),
+                short(gain.std, 3).into(),
+                short(gain.half_width_95, 3).into(),
+                gain.reason.clone().unwrap_or_default().into(),
+            ]
+        });
+        let columns = ["joint", "Nm (N) per logged unit", "std", "95 %, ±", "not identified because"];
+        page.add(Table::new("Drive gains", columns).note("factors for torque.scale of the log's format").rows(rows));
+    }
+    if !r.offsets.is_empty() {
+        let rows = r.offsets.iter().map(|offset| {
+            vec![
+                Cell::from(&offset.joint),
+                Cell::from(&offset.log),
+                short(offset.deviation_nm, 4).into(),
+                short(offset.std_nm, 3).into(),
+            ]
+        });
+        let table = Table::new("Offsets by log", ["joint", "log", "less the mean, Nm (N)", "std"]);
+        page.add(table.note("the base parameters hold the mean over the training logs").rows(rows));
+    }
+}
+
+fn payload_sections(page: &mut Report, payload: &PayloadResult) {
+    let figures = [("mass, kg", payload.mass_kg)]
+        .into_iter()
+        .chain(["x, m", "y, m", "z, m"].into_iter().zip(payload.com_m))
+        .chain(["Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"].into_iter().zip(payload.inertia_at_com_kgm2));
+    let possible = payload.possible.as_ref().map(|body| {
+        let [x, y, z] = body.com_m;
+        let [xx, xy, xz, yy, yz, zz] = body.inertia_at_com_kgm2;
+        [body.mass_kg, x, y, z, xx, xy, xz, yy, yz, zz]
+    });
+    let rows = figures.enumerate().map(|(k, (figure, measured))| {
+        let of = |part: fn(&Measured) -> f64| {
+            Cell::from(measured.map_or_else(|| "–".to_owned(), |measured| short(part(&measured), 4)))
+        };
+        let possible = possible.map_or_else(String::new, |values| short(values[k], 4));
+        vec![Cell::from(figure), of(|m| m.value), of(|m| m.std), of(|m| m.half_width_95), possible.into()]
+    });
+    let note = format!(
+        "in the frame of {}; inertia (kg m²) about the centre of mass; what the logs do not tell alone is –",
+        payload.link
+    );
+    let columns = ["", "estimate", "std", "95 %, ±", "possible body"];
+    page.add(Table::new(format!("Payload {}", payload.name), columns).note(note).rows(rows));
+    let mut text = Text::new(format!("Carried in {}.", payload.logs.join(", ")));
+    for words in &payload.not_identified {
+        text = text.point(Tone::Warning, words.clone());
+    }
+    if let Some(reason) = &payload.failure {
+        text = text.point(Tone::Bad, format!("no possible body: {reason}"));
+    }
+    page.add(text);
+}

@@ -1,0 +1,351 @@
+//! What `identify` writes: the schema of `result.json`.
+
+use crate::study::JointDrive;
+use dynident_estimation::{CorrelatedPair, EssentialReport};
+use dynident_identification::Role;
+use dynident_identification::consistent::ParameterInterval;
+use dynident_identification::estimators::{GrossErrors, NoiseInRegressor, PeriodicFit, SimulatedFit};
+use dynident_identification::examination::{LogValidation, PriorAgreement, SignEvidence, TorqueBand, TorqueLag};
+use dynident_identification::friction::FrictionCandidate;
+use dynident_identification::payload::{DriveGain, PayloadResult};
+use dynident_recording::{Finding, ImportReport, MotionSettings};
+use serde::{Deserialize, Serialize};
+
+/// Name and version of the schema. Fields are added, never renamed, within a version.
+pub const RESULT_SCHEMA: &str = "dynident/result/1";
+
+/// A finished identification.
+#[derive(Clone, Debug, Serialize)]
+pub struct ResultFile {
+    /// [`RESULT_SCHEMA`].
+    pub schema: String,
+    /// Name of the study.
+    pub name: String,
+    /// The machine.
+    pub robot: RobotSummary,
+    /// How the fit was made.
+    pub method: MethodSummary,
+    /// Whether noise in the regressor biases least squares; none unless the study asks for instruments.
+    pub noise_in_regressor: Option<NoiseInRegressor>,
+    /// Rows that a robust estimator gave little weight; none for other estimators.
+    pub gross_errors: Option<GrossErrors>,
+    /// Correlations of the joints' errors at one instant, in the order of `robot.joints`; none unless the estimator is `generalized`.
+    pub noise_correlation: Option<Vec<Vec<f64>>>,
+    /// For each joint the smallest and the largest noise level of its rows over its mean one; none unless the estimator is `noise-weighted`.
+    pub noise_levels: Option<Vec<[f64; 2]>>,
+    /// Periods and their noise; none unless the estimator is `maximum-likelihood`.
+    pub periodic: Option<PeriodicFit>,
+    /// The simulated loop; none unless the estimator is `didim`, `clie` or `cloe`.
+    pub simulated: Option<SimulatedFit>,
+    /// The base parameters, in the order of the tree.
+    pub base_parameters: Vec<BaseParameterResult>,
+    /// Covariance of the base parameters by the method's own account, rows and columns in their order, symmetric; zero where a parameter is not excited.
+    pub base_parameter_covariance: Vec<Vec<f64>>,
+    /// The bodies: one of the full sets that give these base parameters, the nearest to the prior.
+    pub bodies: Vec<BodyResult>,
+    /// How far every parameter of a body or law could go in a possible machine that the data do not reject; none unless asked for.
+    pub possible_intervals: Option<Vec<ParameterInterval>>,
+    /// What was held at zero because the data hardly tell it; none unless asked for.
+    pub essential: Option<EssentialReport>,
+    /// The strongest correlations between estimates, strongest first.
+    pub correlations: Vec<CorrelatedPair>,
+    /// Friction and drives.
+    pub joints: Vec<JointResult>,
+    /// How friction was chosen, for the joints where the study asks for it.
+    pub friction_choice: Vec<JointFrictionResult>,
+    /// Payloads that were estimated.
+    pub payloads: Vec<PayloadResult>,
+    /// Offsets log by log; empty unless the study asks for them. The base parameters hold their mean.
+    pub offsets: Vec<LogOffset>,
+    /// Drive gains, joint by joint; none unless the study says that they are unknown.
+    pub drive_gains: Option<Vec<DriveGain>>,
+    /// Drives that turn with two joints.
+    pub couplings: Vec<LawResult>,
+    /// The fit on the logs that it was made from.
+    pub training: TrainingResult,
+    /// The test on logs that were not used.
+    pub validation: Vec<LogValidation>,
+    /// How well the 95 % band of the predicted torque holds on held-out logs.
+    pub torque_band: Vec<TorqueBand>,
+    /// Whether the full set is physically possible.
+    pub physical: PhysicalVerdict,
+    /// What the importer found in each log.
+    pub logs: Vec<LogSummary>,
+    /// Why there is no identified.urdf; none when there is one.
+    pub no_urdf: Option<String>,
+    /// Where the time went.
+    pub timings_s: Timings,
+}
+
+/// The machine of a result.
+#[derive(Clone, Debug, Serialize)]
+pub struct RobotSummary {
+    /// Its name.
+    pub name: String,
+    /// The description.
+    pub file: String,
+    /// Degrees of freedom.
+    pub dof: usize,
+    /// Joint names in the order of all vectors.
+    pub joints: Vec<String>,
+    /// Gravity in the base frame, m/s².
+    pub gravity_m_s2: [f64; 3],
+    /// Order of the ten inertial parameters of a body.
+    pub parameter_order: [String; 10],
+}
+
+/// How a fit was made.
+#[derive(Clone, Debug, Serialize)]
+pub struct MethodSummary {
+    /// The study's `estimator.method`.
+    pub estimator: String,
+    /// `complete`, `not-all-excited` or `iteration-limit`.
+    pub status: String,
+    /// Solutions made.
+    pub iterations: usize,
+    /// What the error bars account for.
+    pub covariance: String,
+    /// Time segments behind the covariance.
+    pub clusters: usize,
+    /// From positions to accelerations, with the cut-off in force for all logs.
+    pub motion: MotionSettings,
+    /// Condition number of the weighted regressor's base columns.
+    pub condition_number: f64,
+    /// The same after each column was divided by its norm.
+    pub condition_number_scaled: f64,
+    /// How the base columns were chosen.
+    pub base_columns: String,
+    /// Smallest share of a column that counted as independent, largest that counted as dependent.
+    pub base_gap: [f64; 2],
+    /// Base parameters that the data do not excite; they were held at the prior (or zero).
+    pub not_excited: Vec<String>,
+    /// With load-dependent friction: the base parameters, by the estimate without it, whose torque is the load.
+    pub load_parameters: Option<Vec<f64>>,
+}
+
+/// One base parameter.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct BaseParameterResult {
+    /// Symbol of its own column: `Izz1`.
+    pub symbol: String,
+    /// What it sums: `Izz1 + 0.49 m2`.
+    pub expression: String,
+    /// Its unit at a turning joint.
+    pub unit: String,
+    /// The estimate.
+    pub value: f64,
+    /// Its standard deviation, by the method's covariance.
+    pub std: f64,
+    /// The same if residuals were white: what a naive tool would print.
+    pub std_white: f64,
+    /// Half the width of the 95 % interval.
+    #[serde(default)]
+    pub half_width_95: f64,
+    /// `100 std / |value|`.
+    pub relative_std_percent: Option<f64>,
+    /// By the description's own numbers.
+    pub prior: Option<f64>,
+    /// Of the physically possible set in `bodies` and `joints`; none when that was not asked for.
+    #[serde(default)]
+    pub physical: Option<f64>,
+    /// False when the data do not excite it; value is then the prior's and std means nothing.
+    pub excited: bool,
+}
+
+/// One body of the full set.
+#[derive(Clone, Debug, Serialize)]
+pub struct BodyResult {
+    /// Name of its own link.
+    pub name: String,
+    /// All links lumped into it.
+    pub links: Vec<String>,
+    /// Mass.
+    pub mass_kg: f64,
+    /// Centre of mass in the body frame; none for a body without mass.
+    pub com_m: Option<[f64; 3]>,
+    /// Inertia about the body frame's origin: xx, xy, xz, yy, yz, zz.
+    pub inertia_at_origin_kgm2: [f64; 6],
+    /// All ten, in the project's order.
+    pub parameters: [f64; 10],
+    /// The description's own ten; none when unknown.
+    pub prior: Option<[f64; 10]>,
+    /// Smallest eigenvalue of the pseudo-inertia: positive for a possible body.
+    pub pseudo_inertia_min_eigenvalue: f64,
+}
+
+/// A parameter of a law.
+#[derive(Clone, Debug, Serialize)]
+pub struct LawResult {
+    /// Its symbol.
+    pub symbol: String,
+    /// Its unit at a turning joint.
+    pub unit: String,
+    /// Its value in the full set of `bodies`: the physically possible one unless `estimator.physical` is false.
+    pub value: f64,
+    /// Standard deviation of the unconstrained estimate; none where it is not a base parameter by itself.
+    pub std: Option<f64>,
+    /// The base parameter that it stands in.
+    pub base_parameter: Option<String>,
+}
+
+/// Friction and drive of one joint.
+#[derive(Clone, Debug, Serialize)]
+pub struct JointResult {
+    /// The joint.
+    pub name: String,
+    /// Its laws.
+    pub laws: Vec<LawResult>,
+    /// Standard deviation of its filtered residual, Nm (N).
+    pub residual_std_nm: f64,
+    /// How strongly its residual is correlated in time: the lag-1 correlation that matters for the error bars.
+    pub residual_correlation: Option<f64>,
+    /// Lag of its torque behind the motion by all training logs; none where they do not tell. The model itself is fitted to the torque as logged.
+    pub torque_lag: Option<TorqueLag>,
+}
+
+/// The offset of one joint in one log.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LogOffset {
+    /// The log.
+    pub log: String,
+    /// The joint.
+    pub joint: String,
+    /// What it differs from the mean over the training logs, Nm (N).
+    pub deviation_nm: f64,
+    /// The deviation's standard deviation.
+    pub std_nm: f64,
+}
+
+/// Figures of the fit on its own data.
+#[derive(Clone, Debug, Serialize)]
+pub struct TrainingResult {
+    /// The logs.
+    pub logs: Vec<String>,
+    /// Filtered rows of each joint.
+    pub samples: usize,
+    /// `100 ‖τ - τ̂‖ / ‖τ‖`, filtered, all joints stacked.
+    pub relative_error_percent: Option<f64>,
+    /// Joint by joint.
+    pub joints: Vec<TrainingJoint>,
+}
+
+/// One joint of [`TrainingResult`].
+#[derive(Clone, Debug, Serialize)]
+pub struct TrainingJoint {
+    /// The joint.
+    pub name: String,
+    /// Root mean square residual, Nm (N).
+    pub rmse_nm: f64,
+    /// `100 ‖τ - τ̂‖ / ‖τ‖`.
+    pub relative_error_percent: Option<f64>,
+}
+
+/// Whether a full set is possible.
+#[derive(Clone, Debug, Serialize)]
+pub struct PhysicalVerdict {
+    /// All pseudo-inertias positive definite, no negative friction or drive inertia.
+    pub consistent: bool,
+    /// What is not.
+    pub violations: Vec<String>,
+    /// What the verdict is about.
+    pub note: String,
+    /// The physically consistent fit behind the bodies; none when it was not asked for or failed.
+    pub fit: Option<PhysicalFitResult>,
+    /// Why it failed.
+    pub failure: Option<String>,
+    /// Bodies whose description is no possible body, so that a rough one of ordinary mass stands in as their prior.
+    pub impossible_priors: Vec<String>,
+    /// Which sign of the torque a possible machine explains; none without a possible machine for either.
+    pub sign: Option<SignEvidence>,
+}
+
+/// A physically consistent fit.
+#[derive(Clone, Debug, Serialize)]
+pub struct PhysicalFitResult {
+    /// `solved`, `stalled` or `iteration-limit`; all of them meet every constraint.
+    pub status: String,
+    /// Iterations of the solver.
+    pub iterations: usize,
+    /// Stationarity of its certificate, relative.
+    pub stationarity: f64,
+    /// Duality gap of its certificate, relative.
+    pub duality_gap: f64,
+    /// How far the base parameters moved from the estimate in all, in standard deviations of white residuals.
+    pub moved_sigma: f64,
+    /// The largest move of a base parameter in units of its reported standard deviation.
+    pub largest_move_std: Option<f64>,
+    /// Limits that hold with equality and push: friction or drive inertia at zero.
+    pub active: Vec<String>,
+    /// Body by body.
+    pub bodies: Vec<PhysicalBodyResult>,
+}
+
+/// How possible a body is.
+#[derive(Clone, Debug, Serialize)]
+pub struct PhysicalBodyResult {
+    /// Its name.
+    pub name: String,
+    /// Smallest eigenvalue of its pseudo-inertia in units of the description's body.
+    pub margin: f64,
+    /// Whether the data want it outside of what is possible.
+    pub on_the_boundary: bool,
+}
+
+/// What is known of a log.
+#[derive(Clone, Debug, Serialize)]
+pub struct LogSummary {
+    /// Its name.
+    pub log: String,
+    /// `identify` or `validate`.
+    pub role: Role,
+    /// The importer's report.
+    pub import: ImportReport,
+    /// Cut-off of the differentiator in force.
+    pub motion_cutoff_hz: Option<f64>,
+    /// Cut-off of the parallel filter.
+    pub filter_cutoff_hz: Option<f64>,
+    /// Rate of the filtered rows.
+    pub filtered_rate_hz: f64,
+    /// Filtered rows of each joint.
+    pub filtered_rows: u64,
+    /// The log against the description's own inertials.
+    pub prior_agreement: Option<PriorAgreement>,
+    /// Lag of torque behind motion by joint, seconds, estimated together with the model from this log alone; none where the log does not tell.
+    pub torque_lag_s: Vec<Option<f64>>,
+    /// Standard deviations of the lags.
+    pub torque_lag_std_s: Vec<Option<f64>>,
+    /// Half the widths of their 95 % intervals.
+    pub torque_lag_half_width_95_s: Vec<Option<f64>>,
+    /// What follows from both.
+    pub model_findings: Vec<Finding>,
+}
+
+/// Where the time went, in seconds.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Timings {
+    /// Reading the robot, base parameters.
+    pub machine: f64,
+    /// Logs to triangular factors.
+    pub logs: f64,
+    /// Factors to estimates.
+    pub estimation: f64,
+    /// Held-out logs.
+    pub validation: f64,
+    /// All of it.
+    pub total: f64,
+}
+
+/// How the friction of one joint was chosen.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct JointFrictionResult {
+    /// The joint.
+    pub joint: String,
+    /// What was chosen, or why nothing was: the study's own keys then stay in force.
+    pub chosen: String,
+    /// The choice as keys of `[drive.joints.NAME]`; none when nothing was chosen.
+    pub drive: Option<JointDrive>,
+    /// Blocks of time that were left out in turn.
+    pub folds: usize,
+    /// What was compared, each with its best constants.
+    pub candidates: Vec<FrictionCandidate>,
+}

@@ -1,0 +1,280 @@
+//! From an estimate to the sections of `result.json`.
+
+use super::identification::{
+    BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LawResult, LogOffset, MethodSummary,
+    PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RobotSummary, TrainingJoint, TrainingResult,
+};
+use crate::study::{JointDrive, StudyRobot};
+use dynident_estimation::consistent::{PhysicalFit, PhysicalStatus};
+use dynident_estimation::{Estimate, EstimateStatus};
+use dynident_identification::examination::TorqueLag;
+use dynident_identification::friction::JointFriction;
+use dynident_identification::{Identification, Recording, RegressorModel};
+use dynident_model::laws::Law;
+use dynident_model::{INERTIAL_NAMES, InertialParameters};
+
+pub(crate) fn robot_summary(robot: &StudyRobot) -> RobotSummary {
+    RobotSummary {
+        name: robot.model().name().to_owned(),
+        file: robot.robot.path.display().to_string(),
+        dof: robot.model().dof(),
+        joints: robot.parametric.joint_names(),
+        gravity_m_s2: robot.model().gravity().0,
+        parameter_order: INERTIAL_NAMES.map(str::to_owned),
+    }
+}
+
+pub(crate) fn method_summary(identification: &Identification, estimator: &str) -> MethodSummary {
+    let (model, estimate, motion) = (identification.model(), identification.estimate(), &identification.motion);
+    let (weakest, strongest) = model.base().gap();
+    MethodSummary {
+        estimator: estimator.to_owned(),
+        status: match estimate.status {
+            EstimateStatus::Complete => "complete",
+            EstimateStatus::NotAllExcited => "not-all-excited",
+            EstimateStatus::IterationLimit => "iteration-limit",
+        }
+        .to_owned(),
+        iterations: estimate.iterations,
+        covariance: if estimate.clusters > 0 {
+            "time segments: accounts for residuals correlated in time".to_owned()
+        } else {
+            "white residuals".to_owned()
+        },
+        clusters: estimate.clusters,
+        motion: motion.clone(),
+        condition_number: estimate.condition_number_raw,
+        condition_number_scaled: estimate.condition_number_scaled,
+        base_columns: "from the machine's structure: columns from base to tip, bodies then laws; a column that depends on earlier ones is regrouped into them"
+            .to_owned(),
+        base_gap: [weakest, strongest],
+        not_excited: estimate.rank.fixed.iter().map(|fixed| fixed.name.clone()).collect(),
+        load_parameters: model.load_parameters.clone(),
+    }
+}
+
+pub(crate) fn base_parameters(
+    model: &RegressorModel,
+    estimate: &Estimate,
+    physical: Option<&[f64]>,
+) -> Vec<BaseParameterResult> {
+    let expressions = model.base().expressions();
+    let columns = model.layout().columns();
+    (0..columns.len())
+        .map(|index| BaseParameterResult {
+            symbol: columns[index].symbol(),
+            expression: expressions[index].clone(),
+            unit: columns[index].unit().to_owned(),
+            value: estimate.values[index],
+            std: estimate.std[index],
+            half_width_95: estimate.half_width_95[index],
+            std_white: estimate.covariance_white[(index, index)].max(0.0).sqrt(),
+            relative_std_percent: estimate.relative_std_percent[index],
+            prior: model.parametric.nominal_base().map(|prior| prior[index]),
+            physical: physical.map(|values| values[index]),
+            excited: !estimate.rank.fixed.iter().any(|fixed| fixed.column == index),
+        })
+        .collect()
+}
+
+pub(crate) fn bodies(model: &RegressorModel, inertials: &[InertialParameters]) -> Vec<BodyResult> {
+    model
+        .model()
+        .bodies()
+        .iter()
+        .zip(inertials)
+        .map(|(body, inertial)| BodyResult {
+            name: body.name().to_owned(),
+            links: body.links.iter().map(|link| link.name.clone()).collect(),
+            mass_kg: inertial.mass_kg(),
+            com_m: inertial.com_m().map(|com| com.0),
+            inertia_at_origin_kgm2: core::array::from_fn(|k| inertial.0[4 + k]),
+            parameters: inertial.0,
+            prior: body.prior().map(|prior| prior.0),
+            pseudo_inertia_min_eigenvalue: inertial.pseudo_inertia().symmetric_eigenvalues().min(),
+        })
+        .collect()
+}
+
+pub(crate) fn law_results(
+    model: &RegressorModel,
+    estimate: &Estimate,
+    parameters: &[f64],
+    wanted: impl Fn(&Law) -> bool,
+) -> Vec<LawResult> {
+    let first_law = 10 * model.model().dof();
+    let expressions = model.base().expressions();
+    let of_law = |(x, law): (usize, &Law)| {
+        let column = first_law + x;
+        let place = model.base().independent().iter().position(|&index| index == column);
+        // A law that other parameters were regrouped into has no value of its own either.
+        let alone = place.filter(|&place| expressions[place] == law.symbol());
+        let home = place.or_else(|| {
+            let d = model.base().dependent().iter().position(|&index| index == column)?;
+            let column = model.base().regrouping().column(d);
+            (0..column.len()).find(|&b| column[b].abs() > 1e-9)
+        });
+        LawResult {
+            symbol: law.symbol(),
+            unit: law.unit().to_owned(),
+            value: parameters[column],
+            std: alone.map(|place| estimate.std[place]),
+            base_parameter: home.map(|place| expressions[place].clone()),
+        }
+    };
+    model.laws().iter().enumerate().filter(|(_, law)| wanted(law)).map(of_law).collect()
+}
+
+/// Deviations of single logs' offsets from their mean; the last log's is what the others leave.
+pub(crate) fn offset_results(identification: &Identification, recordings: &[Recording]) -> Vec<LogOffset> {
+    let (model, columns, estimate) =
+        (identification.model(), &identification.training.columns, identification.estimate());
+    let training: Vec<usize> = identification.training.logs.iter().map(|log| log.index).collect();
+    let joints = model.joint_names();
+    let mut offsets = Vec::new();
+    for (joint, name) in joints.iter().enumerate() {
+        let own: Vec<&(usize, usize, usize)> = columns.offsets.iter().filter(|(_, of, _)| *of == joint).collect();
+        if own.is_empty() {
+            continue;
+        }
+        let mut add = |log: usize, deviation_nm: f64, variance: f64| {
+            let std_nm = variance.max(0.0).sqrt();
+            offsets.push(LogOffset { log: recordings[log].name.clone(), joint: name.clone(), deviation_nm, std_nm });
+        };
+        for &&(log, _, column) in &own {
+            add(log, estimate.values[column], estimate.covariance[(column, column)]);
+        }
+        let sum: f64 = own.iter().map(|(_, _, column)| estimate.values[*column]).sum();
+        let pairs = own.iter().flat_map(|a| own.iter().map(move |b| (a.2, b.2)));
+        let variance = pairs.map(|pair| estimate.covariance[pair]).sum();
+        if let Some(&last) = training.last() {
+            add(last, -sum, variance);
+        }
+    }
+    offsets
+}
+
+pub(crate) fn joint_results(
+    model: &RegressorModel,
+    estimate: &Estimate,
+    parameters: &[f64],
+    lags: &[Option<TorqueLag>],
+) -> Vec<JointResult> {
+    model
+        .model()
+        .joints()
+        .iter()
+        .enumerate()
+        .map(|(index, joint)| JointResult {
+            name: joint.name.clone(),
+            laws: law_results(model, estimate, parameters, |law| {
+                !matches!(law, Law::Coupling(_)) && law.joints() == [index]
+            }),
+            residual_std_nm: estimate.joint_sigma[index],
+            residual_correlation: estimate.effective_lag1.get(index).copied().filter(|rho| rho.is_finite()),
+            torque_lag: lags[index],
+        })
+        .collect()
+}
+
+pub(crate) fn training_result(
+    identification: &Identification,
+    recordings: &[Recording],
+) -> Result<TrainingResult, dynident_estimation::EstimationError> {
+    let (problem, estimate) = (&identification.training.problem, identification.estimate());
+    let names = identification.model().joint_names();
+    let mut sums = vec![(0_usize, 0.0, 0.0); names.len()];
+    for equation in problem.equations() {
+        let theta: Vec<f64> = equation.columns.iter().map(|&column| estimate.values[column]).collect();
+        let factor = equation.factor.total();
+        let sum = &mut sums[equation.joint];
+        sum.0 += factor.rows();
+        sum.1 += factor.residual_sum_of_squares(&theta)?;
+        sum.2 += factor.torque_norm().powi(2);
+    }
+    let percent = |error: f64, torque: f64| (torque > 0.0).then(|| 100.0 * (error / torque).sqrt());
+    let (error, torque) = sums.iter().fold((0.0, 0.0), |(e, t), sum| (e + sum.1, t + sum.2));
+    Ok(TrainingResult {
+        logs: identification.training.logs.iter().map(|log| recordings[log.index].name.clone()).collect(),
+        samples: sums.iter().map(|sum| sum.0).max().unwrap_or(0),
+        relative_error_percent: percent(error, torque),
+        joints: names
+            .into_iter()
+            .zip(sums)
+            .map(|(name, (rows, error, torque))| TrainingJoint {
+                name,
+                rmse_nm: (error / rows.max(1) as f64).sqrt(),
+                relative_error_percent: percent(error, torque),
+            })
+            .collect(),
+    })
+}
+
+pub(crate) fn verdict(model: &RegressorModel, inertials: &[InertialParameters], parameters: &[f64]) -> PhysicalVerdict {
+    let mut violations = Vec::new();
+    for (body, inertial) in model.model().bodies().iter().zip(inertials) {
+        let least = inertial.pseudo_inertia().symmetric_eigenvalues().min();
+        if inertial.mass_kg() <= 0.0 {
+            violations.push(format!("{}: mass {:.4} kg", body.name(), inertial.mass_kg()));
+        } else if least <= 0.0 {
+            violations
+                .push(format!("{}: pseudo-inertia not positive definite (least eigenvalue {least:.2e})", body.name()));
+        }
+    }
+    for (law, value) in model.laws().iter().zip(&parameters[10 * model.model().dof()..]) {
+        if *value < 0.0 && law.is_nonnegative() {
+            violations.push(format!("{} = {value:.4} {}", law.symbol(), law.unit()));
+        }
+    }
+    PhysicalVerdict {
+        consistent: violations.is_empty(),
+        violations,
+        fit: None,
+        failure: None,
+        impossible_priors: Vec::new(),
+        sign: None,
+        note: "of the full set nearest to the prior; plain least squares does not enforce it, and another set with the same torques may pass"
+            .to_owned(),
+    }
+}
+
+/// The section of `result.json` about the fit.
+pub(crate) fn physical_fit_result(fit: &PhysicalFit, estimate: &Estimate) -> PhysicalFitResult {
+    PhysicalFitResult {
+        status: match fit.status {
+            PhysicalStatus::Solved => "solved",
+            PhysicalStatus::Stalled => "stalled",
+            PhysicalStatus::IterationLimit => "iteration-limit",
+        }
+        .to_owned(),
+        iterations: fit.iterations,
+        stationarity: fit.stationarity,
+        duality_gap: fit.duality_gap,
+        moved_sigma: fit.moved_sigma,
+        largest_move_std: fit
+            .moves_in_std(&estimate.values, &estimate.std)
+            .ok()
+            .and_then(|moves| moves.into_iter().flatten().map(f64::abs).max_by(f64::total_cmp)),
+        active: fit.active.clone(),
+        bodies: fit
+            .bodies
+            .iter()
+            .map(|body| PhysicalBodyResult {
+                name: body.name.clone(),
+                margin: body.least_whitened_eigenvalue,
+                on_the_boundary: body.on_the_boundary,
+            })
+            .collect(),
+    }
+}
+
+pub(crate) fn friction_results(choice: &[JointFriction]) -> Vec<JointFrictionResult> {
+    let of_joint = |joint: &JointFriction| JointFrictionResult {
+        joint: joint.joint.clone(),
+        chosen: joint.chosen.clone(),
+        drive: joint.terms.as_deref().map(JointDrive::stating),
+        folds: joint.folds,
+        candidates: joint.candidates.clone(),
+    };
+    choice.iter().map(of_joint).collect()
+}

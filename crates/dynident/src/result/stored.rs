@@ -1,0 +1,219 @@
+//! A finished model, read back from `result.json`.
+
+use super::identification::{BaseParameterResult, JointFrictionResult, RESULT_SCHEMA};
+use crate::error::Error;
+use crate::study::{JointDrive, Study};
+use dynident_dynamics::ParametricModel;
+use dynident_identification::RegressorModel;
+use dynident_identification::payload::{KnownArm, Refit, known_payloads};
+use dynident_recording::MotionSettings;
+use nalgebra::DMatrix;
+use serde::Deserialize;
+use std::path::Path;
+
+/// The part of `result.json` that a model is.
+#[derive(Clone, Debug, Deserialize)]
+pub(crate) struct StoredModel {
+    schema: String,
+    method: StoredMethod,
+    #[serde(default)]
+    friction_choice: Vec<JointFrictionResult>,
+    base_parameters: Vec<BaseParameterResult>,
+    #[serde(default)]
+    base_parameter_covariance: Vec<Vec<f64>>,
+    #[serde(default)]
+    payloads: Vec<StoredPayload>,
+    #[serde(default)]
+    drive_gains: Option<Vec<StoredGain>>,
+}
+
+/// The part of a stored gain that a model needs.
+#[derive(Clone, Debug, Deserialize)]
+struct StoredGain {
+    gain: f64,
+}
+
+/// The part of a stored payload that a model needs.
+#[derive(Clone, Debug, Deserialize)]
+struct StoredPayload {
+    name: String,
+    base_parameters_added: Vec<f64>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct StoredMethod {
+    motion: MotionSettings,
+    #[serde(default)]
+    load_parameters: Option<Vec<f64>>,
+}
+
+impl StoredModel {
+    /// Reads a result of `identify`.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is no result, or is one of another version.
+    pub(crate) fn read(path: &Path) -> Result<Self, Error> {
+        let wrong = |message: String| Error::Result { path: path.to_owned(), message };
+        let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
+        let stored: Self = serde_json::from_slice(&bytes).map_err(|error| {
+            wrong(format!("line {}, column {}: not a result of `identify`: {error}", error.line(), error.column()))
+        })?;
+        if stored.schema != RESULT_SCHEMA {
+            let found = &stored.schema;
+            return Err(wrong(format!("schema `{found}`, not `{RESULT_SCHEMA}`: identify again with this version")));
+        }
+        for joint in &stored.friction_choice {
+            let mut laws = joint.drive.iter().flat_map(|drive| drive.laws.iter().flatten());
+            laws.try_for_each(|law| law.validate(&format!("friction_choice of joint `{}`", joint.joint)))
+                .map_err(wrong)?;
+        }
+        Ok(stored)
+    }
+
+    /// The study with the friction that was chosen when the model was made.
+    pub(crate) fn friction_of(&self, study: &Study) -> Study {
+        let mut study = study.clone();
+        for joint in &self.friction_choice {
+            if let Some(drive) = &joint.drive {
+                let own = study.drive.joints.entry(joint.joint.clone()).or_default();
+                *own = JointDrive { drive_inertia: own.drive_inertia, offset: own.offset, ..drive.clone() };
+            }
+        }
+        study
+    }
+
+    /// The cut-off of the motion that it was made with.
+    pub(crate) fn cutoff_hz(&self) -> Option<f64> {
+        self.method.motion.differentiator.cutoff_hz()
+    }
+
+    /// Its base parameters, which must be those of `model`.
+    ///
+    /// # Errors
+    /// Other base parameters, values that are not finite.
+    pub(crate) fn base_values(&self, path: &Path, model: &ParametricModel) -> Result<Vec<f64>, Error> {
+        let wrong = |message: String| Error::Result { path: path.to_owned(), message };
+        let expressions = model.base().expressions();
+        if self.base_parameters.len() != expressions.len() {
+            return Err(wrong(format!(
+                "{} base parameters, but the study's machine has {}: use the study that the result was made with",
+                self.base_parameters.len(),
+                expressions.len()
+            )));
+        }
+        let mut values = Vec::with_capacity(expressions.len());
+        for (stored, expression) in self.base_parameters.iter().zip(&expressions) {
+            if stored.expression != *expression {
+                return Err(wrong(format!(
+                    "base parameter `{}` where the study's machine has `{expression}`: use the study that the result was made with",
+                    stored.expression
+                )));
+            }
+            if !stored.value.is_finite() {
+                return Err(wrong(format!("the value of `{expression}` is not a finite number")));
+            }
+            values.push(stored.value);
+        }
+        Ok(values)
+    }
+
+    /// The base parameters of its physically consistent set, where it has one.
+    ///
+    /// # Errors
+    /// Values that are not finite.
+    pub(crate) fn consistent_values(&self, path: &Path) -> Result<Option<Vec<f64>>, Error> {
+        let values: Option<Vec<f64>> = self.base_parameters.iter().map(|stored| stored.physical).collect();
+        if values.as_ref().is_some_and(|values| values.iter().any(|value| !value.is_finite())) {
+            let message = "a physical value of a base parameter is not a finite number".to_owned();
+            return Err(Error::Result { path: path.to_owned(), message });
+        }
+        Ok(values)
+    }
+
+    /// The model with the load and the gains that it was made with.
+    ///
+    /// # Errors
+    /// Loads or gains that do not belong to `model`.
+    pub(crate) fn regressor_model(&self, path: &Path, model: &ParametricModel) -> Result<RegressorModel, Error> {
+        let wrong = |message: &str| Error::Result { path: path.to_owned(), message: message.to_owned() };
+        if let Some(load) = &self.method.load_parameters
+            && (load.len() != self.base_parameters.len() || load.iter().any(|value| !value.is_finite()))
+        {
+            return Err(wrong("load_parameters are not one finite number per base parameter: identify again"));
+        }
+        let torque_gains: Vec<f64> = self.drive_gains.iter().flatten().map(|stored| stored.gain).collect();
+        let usable = torque_gains.iter().all(|gain| gain.is_finite());
+        if !(torque_gains.is_empty() || torque_gains.len() == model.dof() && usable) {
+            return Err(wrong("drive_gains are not one finite number for each joint: identify again"));
+        }
+        let load_parameters = self.method.load_parameters.clone();
+        Ok(RegressorModel { parametric: model.clone(), load_parameters, torque_gains })
+    }
+
+    /// The arm whose payloads are looked for.
+    ///
+    /// # Errors
+    /// [`Error::Result`] if it is another robot's, or has no usable covariance.
+    pub(crate) fn known_arm(&self, path: &Path, model: &ParametricModel, refit: Refit) -> Result<KnownArm, Error> {
+        let wrong = |message: &str| Error::Result { path: path.to_owned(), message: message.to_owned() };
+        let values = self.base_values(path, model)?;
+        let (rows, n) = (&self.base_parameter_covariance, values.len());
+        if rows.len() != n || rows.iter().any(|row| row.len() != n || row.iter().any(|value| !value.is_finite())) {
+            return Err(wrong(
+                "base_parameter_covariance is not one finite number for each pair of base parameters: identify the arm again with this version",
+            ));
+        }
+        if self.drive_gains.is_some() {
+            return Err(wrong(
+                "the arm was found with unknown gains: write them as torque.scale of the format and identify it again",
+            ));
+        }
+        let covariance = DMatrix::from_fn(n, n, |row, column| rows[row][column]);
+        KnownArm::new(values, covariance, refit, self.cutoff_hz()).map_err(|error| wrong(&error.to_string()))
+    }
+
+    /// What payloads add to the base parameters.
+    ///
+    /// # Errors
+    /// Payloads that do not belong to `model`, or that a log carries and nobody knows.
+    pub(crate) fn payloads(
+        &self,
+        path: &Path,
+        study: &Study,
+        study_path: &Path,
+        model: &RegressorModel,
+    ) -> Result<StoredPayloads, Error> {
+        let known = known_payloads(&study.payloads(), model);
+        let mut added = known.map_err(|error| Error::study(study_path, error.to_string()))?;
+        let wrong = |message: String| Error::Result { path: path.to_owned(), message };
+        for payload in &self.payloads {
+            let values = &payload.base_parameters_added;
+            if values.len() != model.layout().columns().len() || values.iter().any(|value| !value.is_finite()) {
+                let name = &payload.name;
+                return Err(wrong(format!("payload `{name}`: not one finite number per base parameter")));
+            }
+            added.push((payload.name.clone(), values.clone()));
+        }
+        for name in study.log.iter().filter_map(|log| log.payload.as_ref()) {
+            if added.iter().all(|(known, _)| known != name) {
+                return Err(wrong(format!(
+                    "payload `{name}`, which a [[log]] carries, is not among its payloads: give its mass_kg and com_m in the study, or identify it"
+                )));
+            }
+        }
+        Ok(StoredPayloads { added })
+    }
+}
+
+/// What payloads add to the base parameters: those of the result, and those that the study knows.
+pub(crate) struct StoredPayloads {
+    added: Vec<(String, Vec<f64>)>,
+}
+
+impl StoredPayloads {
+    /// The base parameters that explain a log with this payload.
+    pub(crate) fn base_values(&self, carried: Option<&String>, theta: &[f64]) -> Vec<f64> {
+        let added = self.added.iter().find(|(name, _)| Some(name) == carried);
+        theta.iter().enumerate().map(|(k, value)| value + added.map_or(0.0, |(_, added)| added[k])).collect()
+    }
+}

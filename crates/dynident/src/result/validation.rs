@@ -1,0 +1,21 @@
+//! What `validate` prints: the schema of its JSON.
+
+use super::identification::LogSummary;
+use dynident_identification::examination::LogValidation;
+use serde::Serialize;
+
+/// Name and version of the schema of [`ValidationFile`].
+pub const VALIDATION_SCHEMA: &str = "dynident/validation/1";
+
+/// What `validate` prints as JSON.
+#[derive(Clone, Debug, Serialize)]
+pub struct ValidationFile {
+    /// [`VALIDATION_SCHEMA`].
+    pub schema: String,
+    /// Name of the study.
+    pub name: String,
+    /// Figures by log.
+    pub validation: Vec<LogValidation>,
+    /// What the importer found.
+    pub logs: Vec<LogSummary>,
+}

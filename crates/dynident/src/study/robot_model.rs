@@ -1,0 +1,155 @@
+//! The robot of a study: its description, and the parametric model with joints locked, gravity and torque terms in force.
+
+use super::{CoulombChoice, Folders, JointDrive, Study};
+use crate::error::Error;
+use dynident_dynamics::{BaseParameters, PanelLayout, ParametricModel};
+use dynident_model::laws::{CoulombShape, Coupling, CouplingEffect, DriveChoice, Law, laws_per_joint};
+use dynident_model::{Model, Robot, Vec3, load_robot};
+use std::path::Path;
+
+/// A study's robot: its description, and what the study makes of it.
+#[derive(Clone, Debug)]
+pub struct StudyRobot {
+    /// The description as read.
+    pub robot: Robot,
+    /// The model with joints locked, gravity and base in force, its torque terms, base parameters and nominal values.
+    pub parametric: ParametricModel,
+    /// Joint names in the order of the log's columns.
+    pub log_joints: Vec<String>,
+}
+
+impl StudyRobot {
+    /// Builds the robot that a study describes.
+    ///
+    /// # Errors
+    /// If the description cannot be read, or names in the study are not in it.
+    pub fn new(study: &Study, study_path: &Path, folders: &Folders) -> Result<Self, Error> {
+        let robot = load_robot(folders.find(&study.robot.file, study.source.as_deref())?)?;
+        let in_study = |source| Error::Model { path: study_path.to_owned(), source };
+        let mut model = robot.model.clone();
+        if let Some([x, y, z]) = study.robot.gravity_m_s2 {
+            model = model.with_gravity(Vec3([x, y, z])).map_err(in_study)?;
+        }
+        let radians = study.robot.base_rpy_deg.map(|rpy| rpy.map(f64::to_radians)).or(study.robot.base_rpy_rad);
+        if let Some([roll, pitch, yaw]) = radians {
+            model = model.with_base_orientation(roll, pitch, yaw).map_err(in_study)?;
+        }
+        let known: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
+        let unknown = |joint: &str| {
+            in_study(dynident_model::ModelError::UnknownJoint { joint: joint.to_owned(), known: known.clone() })
+        };
+        let mut locked: Vec<(String, f64)> = study.robot.lock.iter().map(|(name, at)| (name.clone(), *at)).collect();
+        if let Some(joints) = &study.robot.joints {
+            for (index, joint) in joints.iter().enumerate() {
+                if !known.contains(joint) {
+                    return Err(unknown(joint));
+                }
+                if joints[..index].contains(joint) || study.robot.lock.contains_key(joint) {
+                    let message = format!("robot.joints: `{joint}` stands twice, or is locked as well: name it once");
+                    return Err(Error::study(study_path, message));
+                }
+            }
+            let rest = known.iter().filter(|name| !joints.contains(name) && !study.robot.lock.contains_key(*name));
+            locked.extend(rest.map(|name| (name.clone(), 0.0)));
+        }
+        model = model.locked(&locked).map_err(in_study)?;
+        if model.dof() == 0 {
+            return Err(Error::study(study_path, "no joint is left to move: unlock one".to_owned()));
+        }
+        let log_joints = study
+            .robot
+            .joints
+            .clone()
+            .unwrap_or_else(|| model.joints().iter().map(|joint| joint.name.clone()).collect());
+        if let Some(joint) = model.joints().iter().find(|joint| !log_joints.contains(&joint.name)) {
+            return Err(unknown(&joint.name));
+        }
+        for joint in study.drive.joints.keys() {
+            model.joint_index(joint).ok_or_else(|| unknown(joint))?;
+        }
+        let mut laws = laws_per_joint(&model, |joint| drive_choice(study, &model.joints()[joint].name));
+        for (joint, description) in model.joints().iter().enumerate() {
+            let own = study.drive.joints.get(&description.name);
+            let step = friction_step(study, &description.name);
+            let further = own.and_then(|own| own.laws.as_ref()).unwrap_or(&study.drive.laws);
+            laws.extend(further.iter().flat_map(|law| law.laws(joint, step)));
+        }
+        for section in &study.coupling {
+            let [first, second] = &section.joints;
+            let first = model.joint_index(first).ok_or_else(|| unknown(first))?;
+            let second = model.joint_index(second).ok_or_else(|| unknown(second))?;
+            let coulomb = shape(section.coulomb.unwrap_or(study.drive.coulomb), study, &JointDrive::default());
+            let effects = [
+                section.inertia.then_some(CouplingEffect::Inertia),
+                section.viscous.then_some(CouplingEffect::Viscous),
+                coulomb.map(CouplingEffect::Coulomb),
+            ];
+            let couplings = effects.into_iter().flatten().map(|effect| {
+                Law::Coupling(Coupling { name: section.name.clone(), first, second, ratios: section.ratios, effect })
+            });
+            laws.extend(couplings);
+        }
+        let parametric =
+            ParametricModel::new(model, laws).map_err(|error| Error::study(study_path, error.to_string()))?;
+        Ok(Self { robot, parametric, log_joints })
+    }
+
+    /// Links, joints and gravity.
+    pub fn model(&self) -> &Model {
+        self.parametric.model()
+    }
+
+    /// Torque terms beside the rigid bodies.
+    pub fn laws(&self) -> &[Law] {
+        self.parametric.laws()
+    }
+
+    /// Base parameters of bodies and terms.
+    pub fn base(&self) -> &BaseParameters {
+        self.parametric.base()
+    }
+
+    /// Regressor blocks of the base columns.
+    pub fn layout(&self) -> &PanelLayout {
+        self.parametric.layout()
+    }
+
+    /// Nominal values of all parameters.
+    pub fn nominal(&self) -> &[f64] {
+        self.parametric.nominal()
+    }
+
+    /// Base parameters by the description's own inertials, damping and friction; `None` while a moving body's inertial is unknown.
+    pub fn nominal_base(&self) -> Option<&[f64]> {
+        self.parametric.nominal_base()
+    }
+}
+
+pub(crate) fn drive_choice(study: &Study, joint: &str) -> DriveChoice {
+    let default = JointDrive::default();
+    let own = study.drive.joints.get(joint).unwrap_or(&default);
+    DriveChoice {
+        drive_inertia: own.drive_inertia.unwrap_or(study.drive.drive_inertia),
+        viscous: own.viscous.unwrap_or(study.drive.viscous),
+        coulomb: shape(own.coulomb.unwrap_or(study.drive.coulomb), study, own),
+        offset: own.offset.unwrap_or(study.drive.offset),
+    }
+}
+
+/// The step of friction that is no Coulomb friction: the joint's Coulomb step, or a smooth one where it has none.
+pub(crate) fn friction_step(study: &Study, joint: &str) -> CoulombShape {
+    let width = study.drive.joints.get(joint).and_then(|own| own.coulomb_width).unwrap_or(study.drive.coulomb_width);
+    drive_choice(study, joint).coulomb.unwrap_or(CoulombShape::Smooth { width })
+}
+
+fn shape(choice: CoulombChoice, study: &Study, own: &JointDrive) -> Option<CoulombShape> {
+    match choice {
+        CoulombChoice::None => None,
+        CoulombChoice::Sign => {
+            Some(CoulombShape::Sign { dead_band: own.coulomb_dead_band.unwrap_or(study.drive.coulomb_dead_band) })
+        }
+        CoulombChoice::Smooth => {
+            Some(CoulombShape::Smooth { width: own.coulomb_width.unwrap_or(study.drive.coulomb_width) })
+        }
+    }
+}

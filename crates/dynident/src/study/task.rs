@@ -1,0 +1,186 @@
+//! From a study to what is identified: the recordings with their files, the estimator with its settings, joints whose friction is chosen.
+
+use super::friction::FrictionChoice;
+use super::robot_model::drive_choice;
+use super::{EstimatorMethod, Folders, Study, StudyRobot};
+use crate::error::Error;
+use dynident_identification::estimators::{Estimator, SimulatedLoopSettings};
+use dynident_identification::friction::FrictionSearch;
+use dynident_identification::payload::Payload;
+use dynident_identification::{IdentificationSettings, IdentificationTask, Recording};
+use dynident_recording::{FilterError, Log, RecordingError, Reference};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+impl Study {
+    /// The study's identification with its robot: recordings, payloads, settings.
+    ///
+    /// # Errors
+    /// Files that are in none of the study's folders, a controller or a commanded motion that does not fit the robot.
+    pub fn task(&self, path: &Path, robot: &StudyRobot, folders: &Folders) -> Result<IdentificationTask, Error> {
+        let files = self.log_files(folders)?;
+        let recordings = self.recordings(robot, folders, &files)?;
+        let mut task = IdentificationTask::new(robot.parametric.clone(), recordings);
+        task.payloads = self.payloads();
+        task.settings = self.settings(path, robot)?;
+        Ok(task)
+    }
+
+    /// All logs' files.
+    pub(crate) fn log_files(&self, folders: &Folders) -> Result<Vec<PathBuf>, Error> {
+        self.log.iter().map(|log| folders.find(&log.file, self.source.as_deref())).collect()
+    }
+
+    /// The logs whose files are `files`.
+    pub(crate) fn recordings(
+        &self,
+        robot: &StudyRobot,
+        folders: &Folders,
+        files: &[PathBuf],
+    ) -> Result<Vec<Recording>, Error> {
+        files.iter().enumerate().map(|(index, file)| self.recording(robot, folders, index, file)).collect()
+    }
+
+    /// Log number `index`, whose file is `file`.
+    pub(crate) fn recording(
+        &self,
+        robot: &StudyRobot,
+        folders: &Folders,
+        index: usize,
+        file: &Path,
+    ) -> Result<Recording, Error> {
+        let log = Log::file(file, self.format_of(index), &robot.log_joints);
+        let mut recording = Recording::training(self.log_name(index), log);
+        recording.role = self.log[index].role;
+        recording.payload.clone_from(&self.log[index].payload);
+        if self.needs_commanded_motion() {
+            recording.commanded = self.commanded(robot, folders, index)?.map(Arc::new);
+        }
+        Ok(recording)
+    }
+
+    /// What logs were recorded with.
+    pub(crate) fn payloads(&self) -> Vec<Payload> {
+        let payload = |section: &super::PayloadSection| Payload {
+            name: section.name.clone(),
+            link: section.link.clone(),
+            known: section.known(),
+        };
+        self.payload.iter().map(payload).collect()
+    }
+
+    fn needs_commanded_motion(&self) -> bool {
+        let by_estimator = match self.estimator.method {
+            EstimatorMethod::MaximumLikelihood => self.estimator.periods.period_s.is_none(),
+            EstimatorMethod::Didim | EstimatorMethod::Clie | EstimatorMethod::Cloe => true,
+            EstimatorMethod::Ordinary
+            | EstimatorMethod::Weighted
+            | EstimatorMethod::Generalized
+            | EstimatorMethod::Huber
+            | EstimatorMethod::Tukey
+            | EstimatorMethod::NoiseWeighted
+            | EstimatorMethod::Instrumental => false,
+        };
+        by_estimator || self.motion.differentiator.reference().is_some()
+    }
+
+    /// The motion that was commanded in log number `index`, its joints in the model's order: the log's own `reference`, or the differentiator's; `None` if neither is given.
+    fn commanded(&self, robot: &StudyRobot, folders: &Folders, index: usize) -> Result<Option<Reference>, Error> {
+        let own = self.log[index].reference.as_ref();
+        let Some(settings) = own.or_else(|| self.motion.differentiator.reference()) else { return Ok(None) };
+        let failed = |source| Error::recording(&self.log_name(index), source);
+        let filter = |source| failed(RecordingError::Filter(source));
+        let dof = robot.model().dof();
+        let reference = match (&settings.file, settings.closed_form().map_err(filter)?) {
+            (_, Some(closed)) => closed,
+            (Some(file), None) => {
+                let path = folders.find(file, self.source.as_deref())?;
+                settings.placed(Reference::read(&path, dof).map_err(failed)?).map_err(filter)?
+            }
+            (None, None) => return Ok(None),
+        };
+        let found = reference.joints();
+        if found != dof {
+            let problem =
+                format!("it moves {found} joints, the robot has {dof}: give one for each, in the robot's order");
+            return Err(filter(FilterError::Reference { problem }));
+        }
+        Ok(Some(reference))
+    }
+
+    /// Filters, estimator, what is known of the bodies, whose friction is chosen.
+    pub(crate) fn settings(&self, path: &Path, robot: &StudyRobot) -> Result<IdentificationSettings, Error> {
+        let mut settings = IdentificationSettings::default();
+        settings.motion = self.motion.clone();
+        settings.parallel_filter = self.parallel_filter.clone();
+        settings.estimation = self.estimator.common();
+        settings.estimation.estimator = self.estimator(path, robot)?;
+        settings.estimation.exogeneity_test.clone_from(&self.estimator.instruments);
+        settings.consistency = self.estimator.physical.settings();
+        settings.intervals = self.estimator.intervals;
+        settings.friction = self.friction_searches(robot);
+        (settings.offsets, settings.gains) = (self.drive.offsets, self.drive.gains);
+        Ok(settings)
+    }
+
+    fn estimator(&self, path: &Path, robot: &StudyRobot) -> Result<Estimator, Error> {
+        let section = &self.estimator;
+        let simulated = || self.simulated_loop(path, robot).map(Box::new);
+        Ok(match section.method {
+            EstimatorMethod::Ordinary => Estimator::Ordinary,
+            EstimatorMethod::Weighted => Estimator::Weighted,
+            EstimatorMethod::Generalized => Estimator::Generalized,
+            EstimatorMethod::Huber => Estimator::Huber,
+            EstimatorMethod::Tukey => Estimator::Tukey,
+            EstimatorMethod::NoiseWeighted => Estimator::NoiseWeighted(section.noise_levels.clone()),
+            EstimatorMethod::Instrumental => Estimator::Instrumental(section.instruments.clone().unwrap_or_default()),
+            EstimatorMethod::MaximumLikelihood => Estimator::MaximumLikelihood(section.periods.clone()),
+            EstimatorMethod::Didim => Estimator::Didim(simulated()?),
+            EstimatorMethod::Clie => Estimator::Clie(simulated()?),
+            EstimatorMethod::Cloe => Estimator::Cloe(simulated()?),
+        })
+    }
+
+    /// The experiment of estimators that simulate the closed loop: `[controller]`, `[simulation]` and `[estimator.simulated]`.
+    fn simulated_loop(&self, path: &Path, robot: &StudyRobot) -> Result<SimulatedLoopSettings, Error> {
+        let method = self.estimator.method.name();
+        let wrong = |message: String| Error::Method { path: path.to_owned(), method, message };
+        let Some(controller) = &self.controller else {
+            return Err(wrong(
+                "say which controller drove the robot in [controller] (kind and gains); where it is not known, take method = \"instrumental\""
+                    .to_owned(),
+            ));
+        };
+        let dof = robot.model().dof();
+        controller.validate(dof).map_err(|error| wrong(format!("[controller]: {error}")))?;
+        let simulation = self.simulation.clone().unwrap_or_default();
+        simulation.validate(dof).map_err(|error| wrong(format!("[simulation]: {error}")))?;
+        let section = &self.estimator.simulated;
+        Ok(SimulatedLoopSettings {
+            controller: controller.clone(),
+            rate_hz: simulation.rate_hz,
+            loop_settings: simulation.loop_settings(Some(robot.model())),
+            start: section.start,
+            tolerance: section.tolerance,
+            max_iterations: section.max_iterations,
+            difference: section.difference,
+        })
+    }
+
+    /// The joints whose friction the training logs choose.
+    fn friction_searches(&self, robot: &StudyRobot) -> Vec<FrictionSearch> {
+        let drive = &self.drive;
+        let is_chosen = |name: &str| {
+            let own = drive.joints.get(name).and_then(|own| own.friction);
+            own.unwrap_or(drive.friction) == FrictionChoice::Auto
+        };
+        let names = robot.model().joints().iter().map(|joint| &joint.name).filter(|name| is_chosen(name));
+        let search = |name: &String| FrictionSearch {
+            coulomb: drive_choice(self, name).coulomb,
+            dead_band: drive.coulomb_dead_band,
+            width: drive.coulomb_width,
+            ..FrictionSearch::of(name)
+        };
+        names.map(search).collect()
+    }
+}
