@@ -32,7 +32,7 @@ impl Role {
 #[derive(Clone, Debug)]
 pub enum Samples {
     /// Raw samples of a file, a stream or of arrays: clock, filters and derivatives are made here. Joints are found by name.
-    Log(Log),
+    Log(Box<Log>),
     /// A motion that is made already, joints in the model's order.
     Motion(Box<MotionRecord>),
 }
@@ -55,12 +55,12 @@ pub struct Recording {
 impl Recording {
     /// A log to fit to.
     pub fn training(name: impl Into<String>, log: Log) -> Self {
-        Self::new(name.into(), Role::Identify, Samples::Log(log))
+        Self::new(name.into(), Role::Identify, Samples::Log(Box::new(log)))
     }
 
     /// A log to test on.
     pub fn held_out(name: impl Into<String>, log: Log) -> Self {
-        Self::new(name.into(), Role::Validate, Samples::Log(log))
+        Self::new(name.into(), Role::Validate, Samples::Log(Box::new(log)))
     }
 
     /// A motion that is made already, to fit to.

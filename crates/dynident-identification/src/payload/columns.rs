@@ -252,6 +252,9 @@ impl LoadColumns {
     }
 
     /// The rows as they are for the arm alone once all that differs from log to log stands at its estimate.
+    ///
+    /// # Errors
+    /// A problem of other columns.
     pub fn arm_problem(&self, problem: &LinearProblem, x: &[f64]) -> Result<LinearProblem, EstimationError> {
         let mut arm = LinearProblem::new(problem.columns()[..self.base].to_vec(), problem.joints().to_vec())
             .with_fallback(problem.fallback()[..self.base].to_vec())?;

@@ -59,7 +59,7 @@ impl ParallelFilterSettings {
         let automatic =
             motion_cutoff_hz.map_or(1, |cutoff| (rate_hz / (1.75 * cutoff)).floor().clamp(1.0, 1000.0) as usize);
         let factor = self.factor.unwrap_or(automatic);
-        (factor > 1 || self.cutoff_hz.is_some()).then(|| DecimationSettings {
+        (factor > 1 || self.cutoff_hz.is_some()).then_some(DecimationSettings {
             factor,
             cutoff_hz: self.cutoff_hz,
             transition_hz: self.transition_hz,

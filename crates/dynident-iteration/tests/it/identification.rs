@@ -92,7 +92,7 @@ fn settings(estimator: Estimator) -> RunIdentificationSettings {
 }
 
 fn friction_of(task: &IterationTask, estimate: &RunEstimate) -> Vec<f64> {
-    let symbols: Vec<String> = task.machine.layout().columns().iter().map(|column| column.symbol()).collect();
+    let symbols: Vec<String> = task.machine.layout().columns().iter().map(dynident_dynamics::Column::symbol).collect();
     let value = |symbol: &str| estimate.values[symbols.iter().position(|other| other == symbol).unwrap()];
     ["fv1", "fc1", "fv2", "fc2"].map(value).to_vec()
 }
