@@ -173,14 +173,7 @@ fn identified(
     if chosen.is_empty() {
         return Err(IdentificationError::NoTrainingLog);
     }
-    if let Some(knowledge) = &settings.consistency {
-        let mut named = knowledge.clone();
-        if !settings.friction.is_empty() {
-            // Terms that the logs are to choose are not there yet.
-            named.laws.clear();
-        }
-        named.check_names(robot.model(), robot.laws()).map_err(IdentificationError::Consistency)?;
-    }
+    settings.check_names(robot)?;
 
     // Rows and factors, with the filters in force and the friction that the logs choose.
     let cutoff_hz = job.arm().and_then(KnownArm::cutoff_hz);

@@ -67,12 +67,17 @@ impl RegressorModel {
     /// The same with the bodies of an estimate of `other`, where load-dependent friction needs them.
     #[must_use]
     pub fn with_load_of(mut self, other: &Self, values: &[f64]) -> Self {
-        if self.layout().columns().iter().any(|column| matches!(column, Column::Law(law) if law.needs_load())) {
+        if self.needs_load() {
             let known = other.layout().columns();
             let value = |column: &Column| known.iter().position(|c| c == column).map_or(0.0, |place| values[place]);
             self.load_parameters = Some(self.layout().columns().iter().map(value).collect());
         }
         self
+    }
+
+    /// Whether some friction depends on the joint's load.
+    pub fn needs_load(&self) -> bool {
+        self.layout().columns().iter().any(|column| matches!(column, Column::Law(law) if law.needs_load()))
     }
 
     /// The first joint whose friction depends on its temperature.

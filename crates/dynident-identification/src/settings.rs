@@ -1,9 +1,11 @@
 //! How a model is identified: filters, estimator, what is known of the bodies, whose friction is chosen.
 
 use crate::consistent::ConsistencySettings;
+use crate::error::IdentificationError;
 use crate::estimators::{Estimator, InstrumentSettings};
 use crate::friction::FrictionSearch;
 use crate::rows::ParallelFilterSettings;
+use dynident_dynamics::ParametricModel;
 use dynident_estimation::{
     CovarianceMethod, EssentialSettings, OrdinarySettings, RankSettings, SegmentSettings, WeightedSettings,
 };
@@ -103,5 +105,21 @@ impl Default for IdentificationSettings {
             offsets: OffsetChoice::default(),
             gains: GainChoice::default(),
         }
+    }
+}
+
+impl IdentificationSettings {
+    /// Checks that the bodies and terms of which something is known are there.
+    ///
+    /// # Errors
+    /// A name that the robot does not have.
+    pub fn check_names(&self, robot: &ParametricModel) -> Result<(), IdentificationError> {
+        let Some(knowledge) = &self.consistency else { return Ok(()) };
+        let mut named = knowledge.clone();
+        if !self.friction.is_empty() {
+            // Terms that the logs are to choose are not there yet.
+            named.laws.clear();
+        }
+        named.check_names(robot.model(), robot.laws()).map_err(IdentificationError::Consistency)
     }
 }

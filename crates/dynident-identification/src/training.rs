@@ -88,21 +88,22 @@ struct Job<'a> {
 impl Job<'_> {
     fn fit(&self, model: RegressorModel) -> Result<Training, IdentificationError> {
         let settings = self.logs.settings;
-        let (first, plain) = self.fit_once(model)?;
+        let first = self.rows_once(model)?;
         let candidates: Vec<_> = settings
             .friction
             .iter()
             .filter_map(|search| Some((first.model.model().joint_index(&search.joint)?, search)))
             .map(|(joint, search)| (joint, candidate_columns(search, joint)))
             .collect();
+        if candidates.is_empty() && !first.model.needs_load() {
+            return Ok(first);
+        }
+        let started = Instant::now();
+        let plain = plain_estimate(&settings.estimation, &first.problem)?;
+        let [first_read_s, estimated_s] = [first.timings_s[0], first.timings_s[1] + started.elapsed().as_secs_f64()];
         if candidates.is_empty() {
-            let model = first.model.clone().with_load_of(&first.model, &plain.values);
-            if model.load_parameters.is_none() {
-                return Ok(first);
-            }
-            let [read, estimated] = first.timings_s;
-            let (mut second, _) = self.fit_once(model)?;
-            second.timings_s = [second.timings_s[0] + read, second.timings_s[1] + estimated];
+            let mut second = self.rows_once(first.model.clone().with_load_of(&first.model, &plain.values))?;
+            second.timings_s = [second.timings_s[0] + first_read_s, second.timings_s[1] + estimated_s];
             return Ok(second);
         }
         // All candidates as columns of one set of factors, from which each candidate model is a selection.
@@ -112,7 +113,7 @@ impl Job<'_> {
         let wide = first.model.with_further_columns(further).with_load_of(&first.model, &plain.values);
         let started = Instant::now();
         let factors = self.read(&wide)?;
-        let read_s = first.timings_s[0] + started.elapsed().as_secs_f64();
+        let read_s = first_read_s + started.elapsed().as_secs_f64();
         let started = Instant::now();
         let wide_problem = self.problem(&wide, &self.columns(&wide)?, &factors)?;
         let equal_weights = matches!(settings.estimation.estimator, Estimator::Ordinary);
@@ -123,24 +124,22 @@ impl Job<'_> {
         let logs = factors.into_iter().map(|log| log.of(&wide, &model)).collect::<Result<Vec<_>, _>>()?;
         let columns = self.columns(&model)?;
         let problem = self.problem(&model, &columns, &logs)?;
-        let timings_s = [read_s, first.timings_s[1] + started.elapsed().as_secs_f64()];
+        let timings_s = [read_s, estimated_s + started.elapsed().as_secs_f64()];
         let joints = joints_with_rows(&logs, model.dof());
         Ok(Training { model, logs, joints, problem, columns, friction_choice, gains: None, timings_s })
     }
 
-    fn fit_once(&self, model: RegressorModel) -> Result<(Training, Estimate), IdentificationError> {
+    /// The rows with this model's columns.
+    fn rows_once(&self, model: RegressorModel) -> Result<Training, IdentificationError> {
         let columns = self.columns(&model)?;
         let started = Instant::now();
         let logs = self.read(&model)?;
         let read_s = started.elapsed().as_secs_f64();
         let started = Instant::now();
         let problem = self.problem(&model, &columns, &logs)?;
-        let estimate = plain_estimate(&self.logs.settings.estimation, &problem)?;
         let timings_s = [read_s, started.elapsed().as_secs_f64()];
         let joints = joints_with_rows(&logs, model.dof());
-        let training =
-            Training { model, joints, logs, problem, columns, friction_choice: Vec::new(), gains: None, timings_s };
-        Ok((training, estimate))
+        Ok(Training { model, joints, logs, problem, columns, friction_choice: Vec::new(), gains: None, timings_s })
     }
 
     fn columns(&self, model: &RegressorModel) -> Result<LoadColumns, IdentificationError> {

@@ -14,7 +14,6 @@ use dynident_iteration::{
 use dynident_model::laws::{Coulomb, CoulombShape, Law, Viscous};
 use dynident_model::sample::planar_2r;
 use dynident_model::{InertialParameters, Model};
-use dynident_recording::DifferentiatorSettings;
 use dynident_simulation::controllers::{ComputedTorqueSettings, JointPdSettings};
 use dynident_simulation::{
     ControllerSettings, FrictionCompensation, LoopSettings, Plant, Record, Reference, SensorSettings,
@@ -68,7 +67,7 @@ fn computed_torque() -> ControllerSettings {
 }
 
 fn noise() -> SensorSettings {
-    SensorSettings { position_std: 1e-5.into(), torque_std: 0.05.into(), ..SensorSettings::default() }
+    SensorSettings { position_std: 1e-6.into(), torque_std: 0.05.into(), ..SensorSettings::default() }
 }
 
 fn record(model: &Model, shape: CoulombShape) -> Record {
@@ -84,16 +83,16 @@ fn task(shape: CoulombShape) -> IterationTask {
 }
 
 fn settings(estimator: Estimator) -> RunIdentificationSettings {
-    RunIdentificationSettings {
-        differentiator: DifferentiatorSettings::Butterworth { order: 4, cutoff_hz: Some(15.0) },
-        estimation: EstimationSettings::of(estimator),
-        ..RunIdentificationSettings::default()
-    }
+    RunIdentificationSettings { estimation: EstimationSettings::of(estimator), ..RunIdentificationSettings::default() }
 }
 
-fn friction_of(task: &IterationTask, estimate: &RunEstimate) -> Vec<f64> {
+/// Viscous and Coulomb friction of both joints, and their error bars.
+fn friction_of(task: &IterationTask, estimate: &RunEstimate) -> Vec<[f64; 2]> {
     let symbols: Vec<String> = task.machine.layout().columns().iter().map(dynident_dynamics::Column::symbol).collect();
-    let value = |symbol: &str| estimate.values[symbols.iter().position(|other| other == symbol).unwrap()];
+    let value = |symbol: &str| {
+        let place = symbols.iter().position(|other| other == symbol).unwrap();
+        [estimate.values[place], estimate.std[place]]
+    };
     ["fv1", "fc1", "fv2", "fc2"].map(value).to_vec()
 }
 
@@ -114,9 +113,9 @@ fn every_estimator_that_needs_no_more_than_a_log_identifies_a_run() {
     for estimator in estimators {
         let name = estimator.name();
         let found = identify_run(&task, std::slice::from_ref(&record), &settings(estimator)).unwrap();
-        // The step of Coulomb friction is sharper than a filter of 15 Hz passes: a few percent of 1.5 Nm are its share.
-        for (found, truth) in friction_of(&task, &found).iter().zip([0.8, 1.5, 0.5, 1.0]) {
-            assert!((found - truth).abs() < 0.15, "{name}: {found} for {truth}");
+        for ([found, std], truth) in friction_of(&task, &found).into_iter().zip([0.8, 1.5, 0.5, 1.0]) {
+            // Five bars; or a twentieth of the Coulomb friction, of whose step the smoothing of the motion blurs a share.
+            assert!((found - truth).abs() < (5.0 * std).max(0.05) && std < 0.3, "{name}: {found} +- {std} for {truth}");
         }
         assert!(found.possible.is_some(), "{name}: {:?}", found.impossible);
         // The record has no delay but the half sample of a held torque, which is taken out.
@@ -177,8 +176,9 @@ fn a_payload_that_is_known_is_taken_off() {
     let record = record(&arm(2.0), shape);
     let found = identify_run(&task, std::slice::from_ref(&record), &settings).unwrap();
     let truth = task.machine.nominal_base().unwrap();
-    for (k, (found, truth)) in found.values.iter().zip(truth).enumerate() {
-        let is_friction = *truth == 0.0;
-        assert!(is_friction || (found - truth).abs() < 0.05, "{k}: {found} for {truth}");
+    for (k, truth) in truth.iter().enumerate().filter(|(_, truth)| **truth != 0.0) {
+        // Bodies only: friction is no nominal value. Without the payload taken off, first moments would be 1 and 2 too large.
+        let (value, std) = (found.values[k], found.std[k]);
+        assert!((value - truth).abs() < 5.0 * std && std < 0.2, "{k}: {value} +- {std} for {truth}");
     }
 }

@@ -6,7 +6,7 @@ mod inspection;
 mod iterations;
 mod numbers;
 mod simulation;
-mod stored;
+pub(crate) mod stored;
 mod validation;
 
 pub use design::{

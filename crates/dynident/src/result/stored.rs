@@ -7,7 +7,31 @@ use dynident_dynamics::ParametricModel;
 use dynident_identification::RegressorModel;
 use dynident_identification::payload::{KnownArm, Refit, known_payloads};
 use nalgebra::DMatrix;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use std::path::Path;
+
+/// Reads the keys of `T` from a result of `identify`, of this version's schema; all others may be there or not.
+///
+/// # Errors
+/// A file that cannot be read, is no result, or is one of another version.
+pub(crate) fn read_part<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
+    #[derive(Deserialize)]
+    struct Schema {
+        schema: String,
+    }
+    let wrong = |message: String| Error::Result { path: path.to_owned(), message };
+    let not_a_result = |error: serde_json::Error| {
+        let (line, column) = (error.line(), error.column());
+        wrong(format!("line {line}, column {column}: not a result of `identify`: {error}"))
+    };
+    let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
+    let Schema { schema } = serde_json::from_slice(&bytes).map_err(not_a_result)?;
+    if schema != RESULT_SCHEMA {
+        return Err(wrong(format!("schema `{schema}`, not `{RESULT_SCHEMA}`: identify again with this version")));
+    }
+    serde_json::from_slice(&bytes).map_err(not_a_result)
+}
 
 impl ResultFile {
     /// Reads a result of `identify`.
@@ -16,14 +40,7 @@ impl ResultFile {
     /// A file that cannot be read, is no result, or is one of another version.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let wrong = |message: String| Error::Result { path: path.to_owned(), message };
-        let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
-        let stored: Self = serde_json::from_slice(&bytes).map_err(|error| {
-            wrong(format!("line {}, column {}: not a result of `identify`: {error}", error.line(), error.column()))
-        })?;
-        if stored.schema != RESULT_SCHEMA {
-            let found = &stored.schema;
-            return Err(wrong(format!("schema `{found}`, not `{RESULT_SCHEMA}`: identify again with this version")));
-        }
+        let stored: Self = read_part(path)?;
         for joint in &stored.friction_choice {
             let mut laws = joint.drive.iter().flat_map(|drive| drive.laws.iter().flatten());
             laws.try_for_each(|law| law.validate(&format!("friction_choice of joint `{}`", joint.joint)))

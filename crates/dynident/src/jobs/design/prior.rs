@@ -1,11 +1,21 @@
 //! The information that `[design.prior]` stands for.
 
 use crate::error::Error;
-use crate::result::{BaseParameterResult, ResultFile};
+use crate::result::BaseParameterResult;
+use crate::result::stored::read_part;
 use crate::study::{Folders, PriorSection, StudyRobot};
 use dynident_dynamics::Column;
 use nalgebra::DMatrix;
+use serde::Deserialize;
 use std::path::Path;
+
+/// What a prior needs of an earlier result.
+#[derive(Deserialize)]
+struct EarlierEstimate {
+    base_parameters: Vec<BaseParameterResult>,
+    #[serde(default)]
+    base_parameter_covariance: Vec<Vec<f64>>,
+}
 
 /// A value below this share of the largest of its kind in its body is known no better than one of this size.
 const FLOOR: f64 = 0.1;
@@ -104,7 +114,7 @@ fn inverse(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 /// Inverse covariance of an earlier result in the machine's columns; zero for those that it did not excite.
 fn of_result(path: &Path, machine: &StudyRobot) -> Result<DMatrix<f64>, Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
-    let stored = ResultFile::read(path)?;
+    let stored: EarlierEstimate = read_part(path)?;
     let place = places(&stored.base_parameters, machine).map_err(wrong)?;
     let rows = &stored.base_parameter_covariance;
     if rows.is_empty() {

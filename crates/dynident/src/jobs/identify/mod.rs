@@ -91,11 +91,13 @@ fn identified(
     let with_arm = arm.as_ref().map(|(_, stored)| stored.friction_of(study));
     let study = with_arm.as_ref().unwrap_or(study);
     let robot = StudyRobot::new(study, study_path, &folders)?;
+    let in_study = |error| Error::identification(study_path, error);
+    // Names first: no log is read for a study that is wrong.
+    study.settings(study_path, &robot)?.check_names(&robot.parametric).map_err(in_study)?;
     let task = study.task(study_path, &robot, &folders)?;
     let mut timings = Timings { machine: start.elapsed().as_secs_f64(), ..Timings::default() };
 
     // The identification itself.
-    let in_study = |error| Error::identification(study_path, error);
     let execution = options.execution();
     let found = match (&arm, &study.arm, source) {
         (Some((path, stored)), Some(section), _) => {
