@@ -106,6 +106,7 @@ fn an_older_result_reads_without_the_keys_that_came_later() {
     value["schema"] = "dynident/result/2".into();
     let message = read(&value, folder.path()).unwrap_err().to_string();
     assert!(message.contains("dynident/result/2") && message.contains("identify again"), "{message}");
+    value["schema"] = "dynident/result/1".into();
     value.as_object_mut().unwrap().remove("base_parameters");
     let message = read(&value, folder.path()).unwrap_err().to_string();
     assert!(message.contains("base_parameters"), "{message}");
