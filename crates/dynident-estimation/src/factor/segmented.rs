@@ -14,7 +14,7 @@ pub struct SegmentSettings {
     /// segments, and segments of any log worth fitting then last longer than its residuals are correlated.
     pub max_segments: usize,
     /// Rows of a segment at first; doubled whenever the log outgrows `max_segments`. Default 16. A multiple of
-    /// [`BLOCK_ROWS`](crate::BLOCK_ROWS) is faster for logs known to be long.
+    /// [`BLOCK_ROWS`](crate::factor::BLOCK_ROWS) is faster for logs known to be long.
     pub first_length_rows: usize,
 }
 

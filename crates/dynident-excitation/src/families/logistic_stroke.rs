@@ -11,7 +11,7 @@ use dynident_lanes::Scalar;
 /// the middle φ = ω (t - c) with ω = κ/w: the paper's stroke of that steepness (peak speed Aω/4), which it becomes
 /// everywhere as κ grows. κ = 2√3 has the flattest speed at the middle; κ near 4 resembles a minimum-jerk move.
 ///
-/// φ(u) can be inverted in closed form, so position still tells speed and acceleration: [`LogisticStroke::rates`].
+/// φ(u) can be inverted in closed form, so position still tells speed and acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogisticStroke {
     /// Way from start to end, rad (m).

@@ -75,7 +75,7 @@ impl SplicedLogisticSettings {
 /// ωT = 40) with a speed of about that times ω, which changes sign there. [`LogisticStrokes`](super::LogisticStrokes)
 /// are exactly at rest.
 ///
-/// Position tells speed and acceleration: [`SplicedLogistic::map`].
+/// Position tells speed and acceleration.
 #[derive(Clone, Debug)]
 pub struct SplicedLogistic {
     settings: SplicedLogisticSettings,
