@@ -101,9 +101,8 @@ impl Estimator {
     }
 }
 
-/// What an estimator alone can tell, beside its estimate.
+/// What an estimator alone can tell, beside its estimate. Exhaustive, so that whoever writes results is asked for a new kind.
 #[derive(Clone, Debug, Default)]
-#[non_exhaustive]
 pub enum Findings {
     /// Nothing.
     #[default]

@@ -214,7 +214,7 @@ fn result_file(
         Findings::Periodic(found) => periodic = Some(found),
         Findings::Series(found) => series = Some(found),
         Findings::Simulated(found) => simulated = Some(found),
-        _ => {}
+        Findings::None => {}
     }
     let held_out = found.held_out.iter();
     let bands = held_out.clone().flat_map(|log| &log.validation.residuals).filter_map(|joint| joint.band.clone());
