@@ -55,7 +55,7 @@ fn the_simultaneous_fit_reaches_the_bound_with_the_motion_unknown() -> Result<()
 }
 
 #[test]
-fn unknown_names_and_no_runs_are_told() {
+fn unknown_names_and_no_runs_are_reported() {
     let wrong = BenchmarkSettings { estimators: vec!["best".to_owned()], ..settings() };
     let message = benchmark(&wrong, &Silent).map(|_| ()).map_err(|error| error.to_string());
     assert!(message.is_err_and(|message| message.contains("--estimators best") && message.contains("weighted")));

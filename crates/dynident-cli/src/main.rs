@@ -51,7 +51,7 @@ enum Command {
     Inspect(commands::inspect::Options),
     /// Dynamics of a robot for a table of states, as CSV with 17 digits.
     Evaluate(commands::evaluate::Options),
-    /// Find the motion that tells most about a study's machine, inside every limit.
+    /// Find the motion that determines most about a study's robot, inside every limit.
     Design(commands::design::Options),
     /// Fit a study's model to its logs and test it on the held-out ones.
     Identify(commands::identify::Options),
@@ -80,7 +80,7 @@ fn main() -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => {
             let asked = !error.use_stderr();
-            // Nothing is left to tell if the terminal has gone.
+            // Nothing is left to report if the terminal has gone.
             let _ = error.print();
             return ExitCode::from(if asked { 0 } else { 2 });
         }

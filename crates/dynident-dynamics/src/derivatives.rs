@@ -68,7 +68,7 @@ impl Kernel for Single<'_> {
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum By {
+enum DerivativeBy {
     Position,
     Velocity,
 }
@@ -79,7 +79,7 @@ pub(crate) fn newton_euler_derivatives<T: Scalar>(model: &Model, scratch: &mut C
     crate::mass_matrix::composite_rigid_bodies(model, scratch);
     scratch.matrices.swap(0, 2);
     crate::inverse_dynamics::newton_euler(model, scratch);
-    for (slot, by) in [By::Position, By::Velocity].into_iter().enumerate() {
+    for (slot, by) in [DerivativeBy::Position, DerivativeBy::Velocity].into_iter().enumerate() {
         scratch.matrices[slot].fill(T::ZERO);
         for joint in 0..model.dof() {
             vary(model, scratch, joint, by, slot);
@@ -89,7 +89,7 @@ pub(crate) fn newton_euler_derivatives<T: Scalar>(model: &Model, scratch: &mut C
 
 /// One column of one derivative matrix.
 #[inline(always)]
-fn vary<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>, joint: usize, by: By, slot: usize) {
+fn vary<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>, joint: usize, by: DerivativeBy, slot: usize) {
     let (maps, dof) = (model.maps(), model.dof());
     let CoreScratch { bodies, derivative, matrices, dq, .. } = scratch;
     // Outward: children of a varied body stand after it, so one sweep from `joint` reaches the subtree.
@@ -157,7 +157,7 @@ fn vary<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>, joint: usize, by
     let map = &maps[joint];
     let axis = map.axis.splat::<T>();
     let mut slide = Vec3::ZERO;
-    if by == By::Position {
+    if by == DerivativeBy::Position {
         // The parent sees the child's wrench turned (or carried) by the joint as well.
         let body = &bodies[joint];
         if map.turns {
@@ -200,7 +200,7 @@ fn own_variation<T: Scalar>(
     index: usize,
     axis: Vec3<T>,
     own: Vec3<T>,
-    by: By,
+    by: DerivativeBy,
 ) -> BodyDerivative<T> {
     let map = &model.maps()[index];
     let body = &bodies[index];
@@ -208,13 +208,13 @@ fn own_variation<T: Scalar>(
     // Angular velocity that arrives from the parent, in this body's frame.
     let arriving = if map.turns { body.omega - own } else { body.omega };
     match (by, map.turns) {
-        (By::Velocity, true) => BodyDerivative { omega: axis, alpha: arriving.cross(axis), ..zero },
-        (By::Velocity, false) => {
+        (DerivativeBy::Velocity, true) => BodyDerivative { omega: axis, alpha: arriving.cross(axis), ..zero },
+        (DerivativeBy::Velocity, false) => {
             let coriolis = arriving.cross(axis);
             BodyDerivative { acceleration: coriolis + coriolis, ..zero }
         }
         // Turning the frame by δq turns what arrives by -δq: δ(Rᵀ x) = -axis × Rᵀ x = Rᵀ x × axis.
-        (By::Position, true) => {
+        (DerivativeBy::Position, true) => {
             let omega = arriving.cross(axis);
             let arriving_alpha = body.alpha - arriving.cross(own);
             // alpha also holds axis · q̈, which axis × removes.
@@ -222,7 +222,7 @@ fn own_variation<T: Scalar>(
             BodyDerivative { omega, alpha, acceleration: body.acceleration.cross(axis), ..zero }
         }
         // Sliding by δq moves the origin along the axis: δa = α × axis + ω × (ω × axis).
-        (By::Position, false) => {
+        (DerivativeBy::Position, false) => {
             let acceleration = body.omega.cross_add(body.omega.cross(axis), body.alpha.cross(axis));
             BodyDerivative { acceleration, ..zero }
         }

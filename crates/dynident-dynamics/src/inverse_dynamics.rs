@@ -3,11 +3,11 @@
 use crate::states::BodyState;
 use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Workspace, put_lanes, take, take_lanes};
 use dynident_lanes::{Kernel, Lane, Scalar, dispatch, dispatch_single};
-use dynident_model::laws::JointMotion;
+use dynident_model::terms::JointMotion;
 use dynident_model::{InertialParameters, JointMap, Mat3, Model, Transform, Vec3};
 
 /// Joint torques `τ = M(q) q̈ + C(q, q̇) q̇ + g(q)` of the rigid bodies with the model's inertial parameters, without friction and
-/// drives. One entry per joint: Nm for turning joints, N for sliding ones.
+/// drives. One entry per joint: Nm for revolute joints, N for sliding ones.
 ///
 /// Recursive Newton-Euler: Luh, Walker and Paul (1980); Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 5.3.
 /// Allocation-free. Bodies without a prior count as massless: see [`Model::bodies_without_prior`].

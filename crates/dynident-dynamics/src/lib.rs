@@ -14,7 +14,7 @@
 //! | derivatives of the torque by q, q̇, q̈ | [`inverse_dynamics_derivatives`] | analytic |
 //! | where the bodies are | [`body_placements`] | forward kinematics |
 //! | torque regressor, all ten parameters of each body | [`torque_regressor`] | linear in the parameters |
-//! | regressor of chosen columns, many samples | [`regressor_panels()`] with a [`PanelLayout`]; derivatives: [`regressor_panels_pull_back`] | |
+//! | regressor of chosen columns, many samples | [`regressor_panels()`] with a [`PanelLayout`]; derivatives: [`regressor_panels_adjoint`] | |
 //! | base parameters | [`BaseParameters`]; cross-check: [`numerical_rank`] | from the robot's structure |
 //! | **all of it for identification** | [`ParametricModel`] | robot, torque terms, base parameters, layout, nominal values |
 //!
@@ -52,7 +52,6 @@ mod gravity;
 mod independent_columns;
 mod inverse_dynamics;
 mod kinematics;
-mod law_history;
 mod mass_matrix;
 mod motion_equation;
 mod parametric_model;
@@ -60,6 +59,7 @@ mod regressor;
 mod regressor_adjoint;
 mod regressor_panels;
 mod states;
+mod term_history;
 mod workspace;
 
 pub use base_parameters::{
@@ -72,13 +72,13 @@ pub use gravity::gravity_torque;
 pub use independent_columns::{IndependentColumns, independent_columns};
 pub use inverse_dynamics::{inverse_dynamics, inverse_dynamics_batch};
 pub use kinematics::body_placements;
-pub use law_history::LawHistory;
 pub use mass_matrix::mass_matrix;
 pub use motion_equation::mass_matrix_and_bias;
 pub use parametric_model::{ParametricModel, ParametricModelError};
 pub use regressor::torque_regressor;
-pub use regressor_adjoint::{MotionGradient, regressor_panels_pull_back};
+pub use regressor_adjoint::{MotionGradient, regressor_panels_adjoint};
 pub use regressor_panels::{Column, PanelLayout, Panels, all_columns, regressor_panels, regressor_panels_following};
+pub use term_history::TermHistory;
 pub use workspace::{BatchWorkspace, Workspace};
 
 #[cfg(doctest)]

@@ -3,7 +3,7 @@
 use crate::base_parameters::{BaseParameterSettings, BaseParameters};
 use crate::regressor_panels::{Column, PanelLayout};
 use dynident_model::Model;
-use dynident_model::laws::Law;
+use dynident_model::terms::TorqueTerm;
 use thiserror::Error;
 
 /// Why a parametric model could not be put together.
@@ -41,12 +41,12 @@ pub enum ParametricModelError {
 ///
 /// ```
 /// use dynident_dynamics::ParametricModel;
-/// use dynident_model::laws::{DriveChoice, laws_per_joint};
+/// use dynident_model::terms::{DriveChoice, terms_per_joint};
 /// # let text = r#"<robot name="pendulum"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="2"/>
 /// #   <inertia ixx="0.2" iyy="0.2" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
 /// #   <joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>"#;
 /// let model = dynident_model::read_urdf(text)?.model;
-/// let friction = laws_per_joint(&model, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
+/// let friction = terms_per_joint(&model, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
 /// let pendulum = ParametricModel::new(model, friction)?;
 /// assert_eq!(pendulum.base().expressions(), ["mx1", "mz1", "Iyy1", "fv1"]);
 /// // The first moment of the rod, 2 kg half a metre below its hinge.
@@ -57,7 +57,7 @@ pub enum ParametricModelError {
 #[derive(Clone, Debug)]
 pub struct ParametricModel {
     model: Model,
-    laws: Vec<Law>,
+    terms: Vec<TorqueTerm>,
     base: BaseParameters,
     layout: PanelLayout,
     nominal: Vec<f64>,
@@ -69,15 +69,15 @@ impl ParametricModel {
     ///
     /// # Errors
     /// A term of a joint that the model does not have.
-    pub fn new(model: Model, laws: Vec<Law>) -> Result<Self, ParametricModelError> {
-        if let Some(law) = laws.iter().find(|law| law.joints().iter().any(|&joint| joint >= model.dof())) {
-            return Err(ParametricModelError::NoSuchJoint { term: law.symbol(), joints: model.dof() });
+    pub fn new(model: Model, terms: Vec<TorqueTerm>) -> Result<Self, ParametricModelError> {
+        if let Some(term) = terms.iter().find(|term| term.joints().iter().any(|&joint| joint >= model.dof())) {
+            return Err(ParametricModelError::NoSuchJoint { term: term.symbol(), joints: model.dof() });
         }
-        let base = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
+        let base = BaseParameters::new(&model, &terms, &BaseParameterSettings::default());
         let layout = PanelLayout::new(&model, base.base_columns());
-        let nominal = described(&model, &laws);
+        let nominal = described(&model, &terms);
         let nominal_base = model.bodies_without_prior().is_empty().then(|| base.values(&nominal));
-        Ok(Self { model, laws, base, layout, nominal, nominal_base })
+        Ok(Self { model, terms, base, layout, nominal, nominal_base })
     }
 
     /// The same with other nominal values: ten for each body, then one for each term.
@@ -85,7 +85,7 @@ impl ParametricModel {
     /// # Errors
     /// Another number of values than there are parameters, or values that are not finite.
     pub fn with_nominal(mut self, nominal: Vec<f64>) -> Result<Self, ParametricModelError> {
-        let expected = 10 * self.model.dof() + self.laws.len();
+        let expected = 10 * self.model.dof() + self.terms.len();
         if nominal.len() != expected {
             return Err(ParametricModelError::NominalLength { expected, found: nominal.len() });
         }
@@ -102,12 +102,12 @@ impl ParametricModel {
     ///
     /// # Errors
     /// As [`new`](Self::new).
-    pub fn with_laws(&self, laws: Vec<Law>) -> Result<Self, ParametricModelError> {
-        let mut other = Self::new(self.model.clone(), laws)?;
+    pub fn with_terms(&self, terms: Vec<TorqueTerm>) -> Result<Self, ParametricModelError> {
+        let mut other = Self::new(self.model.clone(), terms)?;
         let bodies = 10 * self.model.dof();
         other.nominal[..bodies].copy_from_slice(&self.nominal[..bodies]);
-        for (place, law) in other.laws.iter().enumerate() {
-            if let Some(known) = self.laws.iter().position(|kept| kept == law) {
+        for (place, term) in other.terms.iter().enumerate() {
+            if let Some(known) = self.terms.iter().position(|kept| kept == term) {
                 other.nominal[bodies + place] = self.nominal[bodies + known];
             }
         }
@@ -117,9 +117,9 @@ impl ParametricModel {
 
     /// The same with further terms behind the base columns of the layout, whether they depend on these or not: one set of rows for choosing among them. Base parameters and terms stay as they are.
     #[must_use]
-    pub fn with_further_columns(&self, further: impl IntoIterator<Item = Law>) -> Self {
+    pub fn with_further_columns(&self, further: impl IntoIterator<Item = TorqueTerm>) -> Self {
         let mut columns = self.base.base_columns();
-        columns.extend(further.into_iter().map(Column::Law));
+        columns.extend(further.into_iter().map(Column::Term));
         let mut wide = self.clone();
         if let Some(values) = &mut wide.nominal_base {
             values.resize(columns.len(), 0.0);
@@ -134,8 +134,8 @@ impl ParametricModel {
     }
 
     /// Torque terms beside the rigid bodies, in the order of their parameters.
-    pub fn laws(&self) -> &[Law] {
-        &self.laws
+    pub fn terms(&self) -> &[TorqueTerm] {
+        &self.terms
     }
 
     /// Base parameters of bodies and terms.
@@ -170,8 +170,8 @@ impl ParametricModel {
 }
 
 /// All parameters by the description: inertials, and what it says of damping and friction.
-fn described(model: &Model, laws: &[Law]) -> Vec<f64> {
+fn described(model: &Model, terms: &[TorqueTerm]) -> Vec<f64> {
     let mut parameters = model.parameter_vector();
-    parameters.extend(laws.iter().map(|law| law.described(model).unwrap_or(0.0)));
+    parameters.extend(terms.iter().map(|term| term.described(model).unwrap_or(0.0)));
     parameters
 }

@@ -56,7 +56,7 @@ impl Kernel for Single<'_> {
     }
 }
 
-/// Where the blocks of the regressor go. A trait and not a closure, because only a method can be told to be inlined into the code of each
+/// Where the blocks of the regressor go. A trait and not a closure, because only a method can be determined to be inlined into the code of each
 /// processor level.
 pub(crate) trait BlockSink<T: Lane> {
     /// Takes the ten entries of body `body` for the joints `path[bundle * PER_BUNDLE..]`, one joint to each lane group.

@@ -2,14 +2,14 @@
 //!
 //! With `V` the cost's derivatives by the entries of `Y`, the cost varies as `Σ V_ji · Y_ji`, and `Y_ji = e_jᵀ N_i + l_jᵀ F_i` for each body `i` and each joint `j` that moves it (see
 //! `regressor.rs`). Backwards through that: every pair gives its share to the axis `(e_j, l_j)` and to the body's motion `(ω, α, a)`; shares then travel inward from frame
-//! to frame, and what each joint's turning or sliding changes on the way is the derivative by its position. One sweep gives all derivatives, at about twice the cost of the regressor.
+//! to frame, and what each joint's revolute or prismatic changes on the way is the derivative by its position. One sweep gives all derivatives, at about twice the cost of the regressor.
 
 use crate::inverse_dynamics::outward;
 use crate::regressor_panels::{Column, PanelLayout, Panels};
-use crate::states::{AdjointScratch, BodyCotangent};
+use crate::states::{AdjointScratch, BodyAdjoint};
 use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, put_lanes, take_lanes};
 use dynident_lanes::{Kernel, Lane, Scalar, dispatch};
-use dynident_model::laws::JointMotion;
+use dynident_model::terms::JointMotion;
 use dynident_model::{Mat3, Model, Transform, Vec3};
 
 /// Derivatives of a cost by a block's motion, joint-major as the motion.
@@ -23,51 +23,51 @@ pub struct MotionGradient<'a> {
     pub by_ddq: &'a mut [f64],
 }
 
-/// Adds to `gradient` the derivatives of a cost by the motion, given its derivatives by every regressor entry: `cotangent` holds them in the shape that
-/// [`regressor_panels`](crate::regressor_panels()) fills (its torque columns are not read). Exact; laws included.
+/// Adds to `gradient` the derivatives of a cost by the motion, given its derivatives by every regressor entry: `adjoint` holds them in the shape that
+/// [`regressor_panels`](crate::regressor_panels()) fills (its torque columns are not read). Exact; terms included.
 ///
 /// Allocation-free.
 ///
 /// # Panics
 /// If an array's length is not joints × samples, the panels have another shape, or layout or workspace belong to a model with another tree.
-pub fn regressor_panels_pull_back(
+pub fn regressor_panels_adjoint(
     model: &Model,
     workspace: &mut BatchWorkspace,
     layout: &PanelLayout,
     motion: &JointMotion<'_>,
-    cotangent: &Panels,
+    adjoint: &Panels,
     gradient: &mut MotionGradient<'_>,
 ) {
     let MotionGradient { by_q, by_dq, by_ddq } = gradient;
     workspace.check(model, motion.samples, &[motion.q, motion.dq, motion.ddq, by_q, by_dq, by_ddq]);
     workspace.check_tree(model);
     layout.check_tree(model);
-    assert_eq!(cotangent.samples(), motion.samples, "one row of derivatives per sample");
+    assert_eq!(adjoint.samples(), motion.samples, "one row of derivatives per sample");
     let BatchWorkspace { level, scratch, .. } = workspace;
-    dispatch(*level, PullBack { model, scratch, layout, motion, cotangent, by_q, by_dq, by_ddq });
+    dispatch(*level, AdjointKernel { model, scratch, layout, motion, adjoint, by_q, by_dq, by_ddq });
     let samples = motion.samples;
     for joint in 0..model.dof() {
         for (place, &global) in layout.joint_columns(joint).iter().enumerate() {
-            if let Column::Law(law) = &layout.columns()[global] {
-                let weights = &cotangent.joint(joint)[place * samples..(place + 1) * samples];
-                law.pull_back(joint, motion, weights, by_dq, by_ddq);
+            if let Column::Term(term) = &layout.columns()[global] {
+                let weights = &adjoint.joint(joint)[place * samples..(place + 1) * samples];
+                term.apply_adjoint(joint, motion, weights, by_dq, by_ddq);
             }
         }
     }
 }
 
-struct PullBack<'a> {
+struct AdjointKernel<'a> {
     model: &'a Model,
     scratch: &'a mut AnyScratch,
     layout: &'a PanelLayout,
     motion: &'a JointMotion<'a>,
-    cotangent: &'a Panels,
+    adjoint: &'a Panels,
     by_q: &'a mut [f64],
     by_dq: &'a mut [f64],
     by_ddq: &'a mut [f64],
 }
 
-impl Kernel for PullBack<'_> {
+impl Kernel for AdjointKernel<'_> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(self) {
@@ -77,7 +77,7 @@ impl Kernel for PullBack<'_> {
             take_lanes(&mut scratch.core.q, self.motion.q, samples, at);
             take_lanes(&mut scratch.core.dq, self.motion.dq, samples, at);
             take_lanes(&mut scratch.core.ddq, self.motion.ddq, samples, at);
-            let source = Source { layout: self.layout, cotangent: self.cotangent, at };
+            let source = Source { layout: self.layout, adjoint: self.adjoint, at };
             reverse_sweep(self.model, &mut scratch.core, &mut scratch.adjoint, &source);
             for (joint, state) in scratch.adjoint.joints.iter().enumerate() {
                 let range = joint * samples..(joint + 1) * samples;
@@ -105,7 +105,7 @@ fn add_lanes<T: Lane>(value: T, row: &mut [f64], at: usize) {
 /// Where the cost's derivatives by the regressor stand.
 struct Source<'a> {
     layout: &'a PanelLayout,
-    cotangent: &'a Panels,
+    adjoint: &'a Panels,
     at: usize,
 }
 
@@ -113,9 +113,9 @@ impl Source<'_> {
     /// Derivatives by the ten entries of body `body` in the row of the `k`-th joint on its path; zero for columns that the layout leaves out and for lanes past the end.
     #[inline(always)]
     fn block<T: Lane>(&self, body: usize, k: usize, joint: usize) -> [T; 10] {
-        let samples = self.cotangent.samples();
+        let samples = self.adjoint.samples();
         let (present, place) = self.layout.body_columns(body, k);
-        let panel = self.cotangent.joint(joint);
+        let panel = self.adjoint.joint(joint);
         let mut start = place * samples + self.at;
         let mut block = [T::ZERO; 10];
         for (parameter, to) in block.iter_mut().enumerate() {
@@ -164,7 +164,7 @@ fn reverse_sweep<T: Lane>(
         }
         let axis = map.axis.splat::<T>();
         axes[own] = if map.turns { (axis, Vec3::ZERO) } else { (Vec3::ZERO, axis) };
-        by_motion[index] = BodyCotangent { omega: Vec3::ZERO, alpha: Vec3::ZERO, acceleration: Vec3::ZERO };
+        by_motion[index] = BodyAdjoint { omega: Vec3::ZERO, alpha: Vec3::ZERO, acceleration: Vec3::ZERO };
     }
     for pair in by_axes.iter_mut() {
         *pair = (Vec3::ZERO, Vec3::ZERO);
@@ -221,8 +221,8 @@ fn reverse_sweep<T: Lane>(
             let coriolis = share.acceleration.cross(arriving_omega);
             joint.dq = axis.dot(coriolis + coriolis);
             joint.ddq = axis.dot(share.acceleration);
-            let turning = rate.cross(share.acceleration);
-            share.omega += turning + turning;
+            let revolute = rate.cross(share.acceleration);
+            share.omega += revolute + revolute;
             joint.q = slid;
         }
         let Some(parent) = map.parent else { continue };
@@ -251,7 +251,7 @@ fn pair_share<T: Scalar>(
     (angular, linear): (Vec3<T>, Vec3<T>),
     (omega, alpha, acceleration): (Vec3<T>, Vec3<T>, Vec3<T>),
     by_axis: &mut (Vec3<T>, Vec3<T>),
-    by_motion: &mut BodyCotangent<T>,
+    by_motion: &mut BodyAdjoint<T>,
 ) {
     let w = weights;
     let h = Vec3([w[1], w[2], w[3]]);
@@ -314,21 +314,21 @@ mod tests {
             let (q, dq, ddq) = (array(dof * samples), array(dof * samples), array(dof * samples));
             let motion = JointMotion { samples, q: &q, dq: &dq, ddq: &ddq };
             let layout = PanelLayout::new(&model, all_columns(&model, &[]));
-            let mut cotangent = Panels::default();
-            cotangent.resize(&layout, samples);
+            let mut adjoint = Panels::default();
+            adjoint.resize(&layout, samples);
             for joint in 0..dof {
-                let values = array(cotangent.joint(joint).len());
-                cotangent.joint_mut(joint).copy_from_slice(&values);
+                let values = array(adjoint.joint(joint).len());
+                adjoint.joint_mut(joint).copy_from_slice(&values);
             }
             for level in Level::available() {
                 let mut gradient = [vec![0.0; dof * samples], vec![0.0; dof * samples], vec![0.0; dof * samples]];
                 let [by_q, by_dq, by_ddq] = &mut gradient;
-                regressor_panels_pull_back(
+                regressor_panels_adjoint(
                     &model,
                     &mut BatchWorkspace::with_level(&model, level),
                     &layout,
                     &motion,
-                    &cotangent,
+                    &adjoint,
                     &mut MotionGradient { by_q, by_dq, by_ddq },
                 );
                 for s in [0, 5, samples - 1] {
@@ -337,7 +337,7 @@ mod tests {
                         .map(|joint| {
                             let mut row = vec![0.0; 10 * dof];
                             for (place, &column) in layout.joint_columns(joint).iter().enumerate() {
-                                row[column] = cotangent.joint(joint)[place * samples + s];
+                                row[column] = adjoint.joint(joint)[place * samples + s];
                             }
                             row
                         })

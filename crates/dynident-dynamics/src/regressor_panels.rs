@@ -1,16 +1,16 @@
 //! The regressor of blocks of samples, joint by joint: what the triangular factors take in.
 //!
-//! A joint's row has entries only for the bodies that it moves and for the laws that it feels, so each joint has its own narrow panel: columns
+//! A joint's row has entries only for the bodies that it moves and for the terms that it feels, so each joint has its own narrow panel: columns
 //! after one another, each with one value per sample. The whole regressor is never stored.
 
-use crate::law_history::LawHistory;
 use crate::regressor::{BlockSink, Work, regressor_blocks};
+use crate::term_history::TermHistory;
 use crate::workspace::{AnyScratch, BatchWorkspace, put_lanes, same_tree, take_lanes, tree};
 use dynident_lanes::{AlignedBuffer, Kernel, Lane, dispatch};
-use dynident_model::laws::{JointMotion, Law, LawInput, LawMemory};
+use dynident_model::terms::{HysteresisState, JointMotion, TermInput, TorqueTerm};
 use dynident_model::{INERTIAL_NAMES, Model};
 
-/// One column of the full regressor: a parameter of the machine.
+/// One column of the full regressor: a parameter of the robot.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Column {
     /// Parameter `parameter` (index into [`INERTIAL_NAMES`]) of body `body`.
@@ -20,8 +20,8 @@ pub enum Column {
         /// Which of its ten parameters.
         parameter: usize,
     },
-    /// The parameter of a law.
-    Law(Law),
+    /// The parameter of a term.
+    Term(TorqueTerm),
 }
 
 impl Column {
@@ -29,7 +29,7 @@ impl Column {
     pub fn symbol(&self) -> String {
         match self {
             Self::Body { body, parameter } => format!("{}{}", INERTIAL_NAMES[*parameter], body + 1),
-            Self::Law(law) => law.symbol(),
+            Self::Term(term) => term.symbol(),
         }
     }
 
@@ -39,15 +39,15 @@ impl Column {
             Self::Body { parameter: 0, .. } => "kg",
             Self::Body { parameter: 1..=3, .. } => "kg m",
             Self::Body { .. } => "kg m^2",
-            Self::Law(law) => law.unit(),
+            Self::Term(term) => term.unit(),
         }
     }
 }
 
-/// All columns of a machine: ten per body from base to tip, then the laws.
-pub fn all_columns(model: &Model, laws: &[Law]) -> Vec<Column> {
+/// All columns of a robot: ten per body from base to tip, then the terms.
+pub fn all_columns(model: &Model, terms: &[TorqueTerm]) -> Vec<Column> {
     let bodies = (0..model.dof()).flat_map(|body| (0..10).map(move |parameter| Column::Body { body, parameter }));
-    bodies.chain(laws.iter().cloned().map(Column::Law)).collect()
+    bodies.chain(terms.iter().cloned().map(Column::Term)).collect()
 }
 
 /// Which columns every joint's panel has, and where.
@@ -69,8 +69,8 @@ pub struct PanelLayout {
 struct JointPanel {
     /// Global column of every panel column.
     columns: Vec<usize>,
-    /// The laws among them: place in the panel, and index into the global columns.
-    laws: Vec<(usize, usize)>,
+    /// The terms among them: place in the panel, and index into the global columns.
+    terms: Vec<(usize, usize)>,
 }
 
 impl PanelLayout {
@@ -81,7 +81,7 @@ impl PanelLayout {
     pub fn new(model: &Model, columns: Vec<Column>) -> Self {
         let dof = model.dof();
         let mut joints: Vec<JointPanel> =
-            (0..dof).map(|_| JointPanel { columns: Vec::new(), laws: Vec::new() }).collect();
+            (0..dof).map(|_| JointPanel { columns: Vec::new(), terms: Vec::new() }).collect();
         let paths: Vec<Vec<usize>> = (0..dof).map(|body| model.path(body)).collect();
         let mut place_start = vec![0];
         for path in &paths {
@@ -104,10 +104,10 @@ impl PanelLayout {
                     }
                     parameters[*body] |= 1 << parameter;
                 }
-                Column::Law(law) => {
-                    for joint in law.joints() {
+                Column::Term(term) => {
+                    for joint in term.joints() {
                         let place = joints[joint].columns.len();
-                        joints[joint].laws.push((place, global));
+                        joints[joint].terms.push((place, global));
                         joints[joint].columns.push(global);
                     }
                 }
@@ -197,10 +197,10 @@ pub fn regressor_panels(
     motion: &JointMotion<'_>,
     panels: &mut Panels,
 ) {
-    regressor_panels_following(model, workspace, layout, motion, &mut LawHistory::default(), panels);
+    regressor_panels_following(model, workspace, layout, motion, &mut TermHistory::default(), panels);
 }
 
-/// [`regressor_panels`](regressor_panels()) of a block that follows others of the same recording: laws with memory go on where `history` left them, load-dependent ones know their load, and others their temperature.
+/// [`regressor_panels`](regressor_panels()) of a block that follows others of the same recording: terms with memory go on where `history` left them, load-dependent ones know their load, and others their temperature.
 ///
 /// # Panics
 /// As [`regressor_panels`](regressor_panels()), or if the history has load parameters of another number than the layout's columns. Temperatures of another number than joints × samples count as none.
@@ -209,7 +209,7 @@ pub fn regressor_panels_following(
     workspace: &mut BatchWorkspace,
     layout: &PanelLayout,
     motion: &JointMotion<'_>,
-    history: &mut LawHistory,
+    history: &mut TermHistory,
     panels: &mut Panels,
 ) {
     workspace.check(model, motion.samples, &[motion.q, motion.dq, motion.ddq]);
@@ -224,21 +224,21 @@ pub fn regressor_panels_following(
     }
     for (joint, panel) in layout.joints.iter().enumerate() {
         let mut load_is_known = false;
-        for &(place, global) in &panel.laws {
-            let Column::Law(law) = &layout.columns[global] else { continue };
+        for &(place, global) in &panel.terms {
+            let Column::Term(term) = &layout.columns[global] else { continue };
             let columns = panels.joint_mut(joint);
-            if let (true, false, Some(parameters)) = (law.needs_load(), load_is_known, &history.load_parameters) {
+            if let (true, false, Some(parameters)) = (term.needs_load(), load_is_known, &history.load_parameters) {
                 load_of(&layout.columns, panel, parameters, columns, samples, &mut history.load);
                 load_is_known = true;
             }
-            if law.has_memory() && history.memories.len() < layout.columns.len() {
-                history.memories.resize_with(layout.columns.len(), LawMemory::default);
+            if term.has_memory() && history.memories.len() < layout.columns.len() {
+                history.memories.resize_with(layout.columns.len(), HysteresisState::default);
             }
-            let mut none = LawMemory::default();
+            let mut none = HysteresisState::default();
             let memory = history.memories.get_mut(global).unwrap_or(&mut none);
             let temperature_c = history.temperature_c.get(joint * samples..(joint + 1) * samples);
-            let mut input = LawInput { load: load_is_known.then_some(&history.load[..]), temperature_c, memory };
-            law.column_following(joint, motion, &mut input, &mut columns[place * samples..(place + 1) * samples]);
+            let mut input = TermInput { load: load_is_known.then_some(&history.load[..]), temperature_c, memory };
+            term.column_following(joint, motion, &mut input, &mut columns[place * samples..(place + 1) * samples]);
         }
     }
 }

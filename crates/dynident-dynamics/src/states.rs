@@ -34,7 +34,7 @@ impl<T: Scalar> BodyState<T> {
 /// Articulated-body inertia of a subtree about its root's frame: `moment = rotation α + coupling a`, `force = couplingᵀ α + mass a`; and what
 /// its joint needs of it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Articulated<T> {
+pub(crate) struct ArticulatedInertia<T> {
     /// Symmetric; upper triangle by rows.
     pub(crate) rotation: [T; 6],
     pub(crate) coupling: Mat3<T>,
@@ -46,7 +46,7 @@ pub(crate) struct Articulated<T> {
     pub(crate) rest_torque: T,
 }
 
-impl<T: Scalar> Articulated<T> {
+impl<T: Scalar> ArticulatedInertia<T> {
     pub(crate) const ZERO: Self = Self {
         rotation: [T::ZERO; 6],
         coupling: Mat3::ZERO,
@@ -108,19 +108,19 @@ pub(crate) struct AdjointScratch<T> {
     pub(crate) axes: Vec<(Vec3<T>, Vec3<T>)>,
     /// The cost's derivatives by them.
     pub(crate) by_axes: Vec<(Vec3<T>, Vec3<T>)>,
-    pub(crate) by_motion: Vec<BodyCotangent<T>>,
-    pub(crate) joints: Vec<JointCotangent<T>>,
+    pub(crate) by_motion: Vec<BodyAdjoint<T>>,
+    pub(crate) joints: Vec<JointAdjoint<T>>,
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct BodyCotangent<T> {
+pub(crate) struct BodyAdjoint<T> {
     pub(crate) omega: Vec3<T>,
     pub(crate) alpha: Vec3<T>,
     pub(crate) acceleration: Vec3<T>,
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct JointCotangent<T> {
+pub(crate) struct JointAdjoint<T> {
     pub(crate) q: T,
     pub(crate) dq: T,
     pub(crate) ddq: T,
@@ -134,14 +134,14 @@ impl<T: Scalar> AdjointScratch<T> {
             path_start.push(path.len());
         }
         let (pairs, dof) = (path.len(), model.dof());
-        let still = BodyCotangent { omega: Vec3::ZERO, alpha: Vec3::ZERO, acceleration: Vec3::ZERO };
+        let still = BodyAdjoint { omega: Vec3::ZERO, alpha: Vec3::ZERO, acceleration: Vec3::ZERO };
         Self {
             path,
             path_start,
             axes: vec![(Vec3::ZERO, Vec3::ZERO); pairs],
             by_axes: vec![(Vec3::ZERO, Vec3::ZERO); pairs],
             by_motion: vec![still; dof],
-            joints: vec![JointCotangent { q: T::ZERO, dq: T::ZERO, ddq: T::ZERO }; dof],
+            joints: vec![JointAdjoint { q: T::ZERO, dq: T::ZERO, ddq: T::ZERO }; dof],
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Scratch memory of the algorithms: one per thread, allocated once.
 
 use crate::composite::Composite;
-use crate::states::{AdjointScratch, Articulated, AxisScratch, BodyDerivative, BodyState};
+use crate::states::{AdjointScratch, ArticulatedInertia, AxisScratch, BodyDerivative, BodyState};
 use core::any::Any;
 use dynident_lanes::{Kernel, Lane, Level, Scalar, dispatch, dispatch_single};
 use dynident_model::{JointMap, Mat3, Model, Transform, Vec3};
@@ -27,7 +27,7 @@ pub(crate) struct CoreScratch<T> {
     pub(crate) cosine: Vec<T>,
     pub(crate) bodies: Vec<BodyState<T>>,
     pub(crate) composites: Vec<Composite<T>>,
-    pub(crate) articulated: Vec<Articulated<T>>,
+    pub(crate) articulated: Vec<ArticulatedInertia<T>>,
     pub(crate) derivative: Vec<BodyDerivative<T>>,
     /// Square matrices (dof × dof), row-major.
     pub(crate) matrices: [Vec<T>; 3],
@@ -45,7 +45,7 @@ impl<T: Scalar> CoreScratch<T> {
             cosine: zeros(),
             bodies: vec![BodyState::REST; dof],
             composites: vec![Composite::ZERO; dof],
-            articulated: vec![Articulated::ZERO; dof],
+            articulated: vec![ArticulatedInertia::ZERO; dof],
             derivative: vec![BodyDerivative::ZERO; dof],
             matrices: core::array::from_fn(|_| vec![T::ZERO; dof * dof]),
         }

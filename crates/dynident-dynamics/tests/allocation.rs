@@ -8,8 +8,10 @@ use dynident_dynamics::{
     mass_matrix_and_bias, potential_energy, regressor_panels, torque_regressor,
 };
 use dynident_lanes::Level;
-use dynident_model::laws::{CoulombShape, Coupling, CouplingEffect, DriveChoice, JointMotion, Law, laws_per_joint};
 use dynident_model::sample::random_tree;
+use dynident_model::terms::{
+    CoulombShape, Coupling, CouplingEffect, DriveChoice, JointMotion, TorqueTerm, terms_per_joint,
+};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::hint::black_box;
@@ -96,16 +98,16 @@ fn batches_allocate_nothing() {
     let (dof, samples) = (7, 37);
     let model = random_tree(5, dof);
     let shape = CoulombShape::Sign { dead_band: 0.0 };
-    let mut laws = laws_per_joint(&model, |_| DriveChoice {
+    let mut terms = terms_per_joint(&model, |_| DriveChoice {
         drive_inertia: true,
         viscous: true,
         coulomb: Some(shape),
         offset: true,
     });
-    laws.extend([CouplingEffect::Inertia, CouplingEffect::Coulomb(shape)].map(|effect| {
-        Law::Coupling(Coupling { name: "wrist".to_owned(), first: 5, second: 6, ratios: [1.0, 1.0], effect })
+    terms.extend([CouplingEffect::Inertia, CouplingEffect::Coulomb(shape)].map(|effect| {
+        TorqueTerm::Coupling(Coupling { name: "wrist".to_owned(), first: 5, second: 6, ratios: [1.0, 1.0], effect })
     }));
-    let layout = PanelLayout::new(&model, all_columns(&model, &laws));
+    let layout = PanelLayout::new(&model, all_columns(&model, &terms));
     let (q, dq, ddq) = (vec![0.3; dof * samples], vec![-0.7; dof * samples], vec![1.1; dof * samples]);
     let motion = JointMotion { samples, q: &q, dq: &dq, ddq: &ddq };
     let fewer = JointMotion { samples: 20, q: &q[..dof * 20], dq: &dq[..dof * 20], ddq: &ddq[..dof * 20] };

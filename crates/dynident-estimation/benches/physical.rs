@@ -33,7 +33,7 @@ fn main() {
     }
 }
 
-/// Processor time of this thread, s, which other work on the machine does not lengthen; wall time where there is none.
+/// Processor time of this thread, s, which other work on the robot does not lengthen; wall time where there is none.
 fn seconds(start: Instant) -> f64 {
     let own = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let nanoseconds = own.and_then(|text| text.split(' ').next().and_then(|field| field.parse::<f64>().ok()));

@@ -17,7 +17,7 @@ pub enum EstimationError {
     },
     /// A number in a row is NaN, infinite or too large to be squared.
     #[error(
-        "row {row}, column {column}: {value} cannot be used in a fit (largest magnitude {limit:e}); remove this sample or mend its source"
+        "row {row}, column {column}: {value} cannot be used in a fit (largest magnitude {limit:e}); remove this sample or fix its source"
     )]
     Unusable {
         /// Row within the rows given, from 0.
@@ -52,14 +52,14 @@ pub enum EstimationError {
         columns: usize,
     },
     /// A setting has no meaning.
-    #[error("setting {setting} = {value}: {mend}")]
+    #[error("setting {setting} = {value}: {fix}")]
     Setting {
         /// Name of the setting.
         setting: &'static str,
         /// Its value.
         value: f64,
         /// What to give instead.
-        mend: &'static str,
+        fix: &'static str,
     },
     /// There are not more rows than free parameters, so nothing can be said about the noise.
     #[error(
@@ -104,12 +104,12 @@ pub enum EstimationError {
     },
     /// The parameters that an iteration begins with cannot be simulated.
     #[error(
-        "the simulation does not get through with the starting values; start from a description or an estimate that is a possible machine"
+        "the simulation does not get through with the starting values; start from a description or an estimate that is a physically consistent set"
     )]
     NoSimulation,
     /// Unknowns of the motion, or parameters beside it, that the rows leave open.
     #[error(
-        "the rows do not tell {name} from the unknowns before it; leave it out, give the motion fewer unknowns, or a longer or livelier log"
+        "the rows do not separate {name} from the unknowns before it; leave it out, give the motion fewer unknowns, or a longer or livelier log"
     )]
     Undetermined {
         /// The unknown.

@@ -33,10 +33,10 @@
 //! | torque constants of the drives | [`joint_gains`] |
 //! | other error bars | [`CovarianceMethod`] |
 //! | bodies and friction that can be real | [`consistent::physical_fit`] |
-//! | how far a body's parameters can be off | [`consistent::PossibleIntervals`] |
+//! | how far a body's parameters can be off | [`consistent::ConsistentIntervals`] |
 //! | only the parameters that the data need | [`essential`] |
 //! | errors on motion that was not used | [`Validation`], [`CrossValidation`] |
-//! | what the residuals look like | [`Whiteness`], [`Normality`], [`Regimes`] |
+//! | what the residuals look like | [`Whiteness`], [`Normality`], [`SpeedRanges`] |
 //!
 //! The modules, from the bottom up: [`factor`] (rows to triangles, problems, rank), [`uncertainty`] (the estimate and
 //! its covariance), [`linear`] and [`nonlinear`] estimators, [`consistent`] (bodies that can be real) and [`diagnostics`].
@@ -54,8 +54,8 @@ pub mod uncertainty;
 
 pub use diagnostics::{
     CorrelatedPair, CrossValidation, EssentialEnd, EssentialReport, EssentialSettings, FoldErrors, JointFolds,
-    Normality, NormalityReport, Regimes, RegimesReport, Validation, ValidationReport, Whiteness, WhitenessReport,
-    essential, strongest_correlations,
+    Normality, NormalityReport, SpeedRanges, SpeedRangesReport, Validation, ValidationReport, Whiteness,
+    WhitenessReport, essential, strongest_correlations,
 };
 pub use error::EstimationError;
 pub use factor::{

@@ -234,7 +234,7 @@ mod tests {
             assert!(designed.violation <= 0.0, "{optimiser:?}: {}", designed.violation);
             assert!(history.len() >= generations);
             assert!(history.windows(2).all(|w| w[1].best_so_far <= w[0].best_so_far));
-            // The median random start is inside position and speed limits; a search must beat it by more than a factor
+            // The median random start is inside position and velocity limits; a search must beat it by more than a factor
             // e in the determinant.
             let (positions, speeds) = ranges(&set);
             let logged = grid(6.0, 601);

@@ -46,7 +46,7 @@ pub struct DesignSettings {
     pub search_samples: Option<usize>,
     /// Rate at which the robot will be logged, Hz: every sample counts for the information. Default 100.
     pub rate_hz: f64,
-    /// Stop after so many seconds with the best so far; none by default. The result then depends on the machine.
+    /// Stop after so many seconds with the best so far; none by default. The result then depends on the robot.
     pub time_limit_s: Option<f64>,
     /// Seed of the random starts. Default 1.
     pub seed: u64,
@@ -90,7 +90,7 @@ pub struct DesignTask<'a> {
     pub criteria: &'a [&'a dyn Criterion],
     /// Everything that must be kept.
     pub limits: &'a LimitSet,
-    /// The columns to be identified: base columns, laws included.
+    /// The columns to be identified: base columns, terms included.
     pub layout: &'a PanelLayout,
     /// Standard deviation of each joint's torque, Nm (N).
     pub torque_std_nm: &'a [f64],
@@ -208,8 +208,8 @@ pub fn design(
         // A search that was ended still comes back inside the limits: some tenths of a second.
         let ended = over();
         let budget = if ended { LAST_EVALUATIONS } else { settings.polish_evaluations };
-        let tell = watch("polish");
-        let stop = |value, violation| tell(value, violation) && !ended;
+        let report = watch("polish");
+        let stop = |value, violation| report(value, violation) && !ended;
         let found = rounds.polish(criterion, &margins, state, budget, stop)?;
         evaluations.fetch_add(found.evaluations as u64, Ordering::Relaxed);
         state = found.best.state;
@@ -273,7 +273,7 @@ fn joint_scales(parameters: &[f64], joints: usize) -> Vec<f64> {
     parameters.chunks(per_joint).flat_map(|part| vec![rms(part); part.len()]).collect()
 }
 
-/// Position ranges and speed limits for random starts: the study's where it narrows the description's.
+/// Position ranges and velocity limits for random starts: the study's where it narrows the description's.
 pub(crate) fn ranges(limits: &LimitSet) -> (Vec<[f64; 2]>, Vec<f64>) {
     let free = |joint: &dynident_model::Joint| if joint.turns() { core::f64::consts::PI } else { 0.5 };
     let mut ranges: Vec<[f64; 2]> = limits.model().joints().iter().map(|joint| [-free(joint), free(joint)]).collect();
@@ -298,5 +298,5 @@ pub(crate) fn ranges(limits: &LimitSet) -> (Vec<[f64; 2]>, Vec<f64>) {
     (ranges, speeds)
 }
 
-/// Speed of random starts where none is limited, rad/s (m/s).
+/// Velocity of random starts where none is limited, rad/s (m/s).
 const UNKNOWN_SPEED: f64 = 2.0;

@@ -1,6 +1,6 @@
 //! What every trajectory family offers to criteria, limits and optimisers.
 
-use crate::motion::{Motion, MotionCotangent};
+use crate::motion::{Motion, MotionAdjoint};
 use dynident_model::sample::Random;
 use nalgebra::DMatrix;
 
@@ -25,7 +25,7 @@ pub trait Family: core::fmt::Debug + Send + Sync {
     /// there is none.
     fn bounds(&self) -> Vec<[f64; 2]>;
 
-    /// A random start of sensible size for joints with the given position range `[lower, upper]` and speed limit;
+    /// A random start of sensible size for joints with the given position range `[lower, upper]` and velocity limit;
     /// inside [`bounds`](Family::bounds).
     fn random(&self, ranges: &[[f64; 2]], speeds: &[f64], random: &mut Random) -> Vec<f64>;
 
@@ -39,7 +39,7 @@ pub trait Family: core::fmt::Debug + Send + Sync {
     ///
     /// # Panics
     /// If lengths differ.
-    fn pull_back(&self, parameters: &[f64], times_s: &[f64], cotangent: &MotionCotangent, gradient: &mut [f64]);
+    fn apply_adjoint(&self, parameters: &[f64], times_s: &[f64], adjoint: &MotionAdjoint, gradient: &mut [f64]);
 
     /// Adds `Σ_s Σ_o w_o(s) b_o(s) b_o(s)ᵀ` of one joint to `out` (square, the joint's parameters), where `b_o` are the
     /// derivatives of that joint's q, q̇, q̈ and jerk by its parameters and `w_o` the numbers of `weights` in the same
@@ -55,7 +55,7 @@ pub trait Family: core::fmt::Debug + Send + Sync {
         _parameters: &[f64],
         _times_s: &[f64],
         _joint: usize,
-        _weights: &MotionCotangent,
+        _weights: &MotionAdjoint,
         _out: &mut DMatrix<f64>,
     ) -> bool {
         false

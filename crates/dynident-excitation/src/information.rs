@@ -1,9 +1,9 @@
 //! The information that a motion gathers about the base parameters, and what a cost on it pulls on the motion.
 
 use crate::column_products::{add_gram, times_matrix};
-use crate::motion::{Motion, MotionCotangent};
+use crate::motion::{Motion, MotionAdjoint};
 use dynident_dynamics::{
-    BatchWorkspace, MotionGradient, PanelLayout, Panels, regressor_panels, regressor_panels_pull_back,
+    BatchWorkspace, MotionGradient, PanelLayout, Panels, regressor_panels, regressor_panels_adjoint,
 };
 use dynident_lanes::Level;
 use dynident_model::Model;
@@ -21,7 +21,7 @@ pub struct Information<'a> {
     level: Level,
     workspace: BatchWorkspace,
     panels: Panels,
-    cotangent: Panels,
+    adjoint: Panels,
     packed: Vec<f64>,
 }
 
@@ -47,12 +47,12 @@ impl<'a> Information<'a> {
             level: Level::detect(),
             workspace: BatchWorkspace::new(model),
             panels: Panels::default(),
-            cotangent: Panels::default(),
+            adjoint: Panels::default(),
             packed: Vec::new(),
         }
     }
 
-    /// `D` of the motion; its regressor stays for [`pull_back`](Information::pull_back). `weight` counts every sample
+    /// `D` of the motion; its regressor stays for [`apply_adjoint`](Information::apply_adjoint). `weight` counts every sample
     /// so many times.
     pub fn of(&mut self, motion: &Motion, weight: f64) -> DMatrix<f64> {
         let count = self.layout.columns().len();
@@ -69,15 +69,15 @@ impl<'a> Information<'a> {
     /// Adds the derivatives of a cost by the motion of the last [`of`](Information::of), given its symmetric derivative
     /// `by_information = ∂f/∂D`: the regressor's entries get `2 W_j G / σ_j²`, and one reverse sweep takes them to the
     /// motion.
-    pub fn pull_back(
+    pub fn apply_adjoint(
         &mut self,
         motion: &Motion,
         weight: f64,
         by_information: &DMatrix<f64>,
-        out: &mut MotionCotangent,
+        out: &mut MotionAdjoint,
     ) {
         let count = self.layout.columns().len();
-        self.cotangent.resize(self.layout, motion.samples);
+        self.adjoint.resize(self.layout, motion.samples);
         for joint in 0..self.model.dof() {
             let columns = self.layout.joint_columns(joint);
             let length = columns.len() * motion.samples;
@@ -90,16 +90,16 @@ impl<'a> Information<'a> {
                 count,
                 2.0 * weight * self.weights[joint],
                 &mut self.packed,
-                &mut self.cotangent.joint_mut(joint)[..length],
+                &mut self.adjoint.joint_mut(joint)[..length],
             );
         }
         let mut gradient = MotionGradient { by_q: &mut out.q, by_dq: &mut out.dq, by_ddq: &mut out.ddq };
-        regressor_panels_pull_back(
+        regressor_panels_adjoint(
             self.model,
             &mut self.workspace,
             self.layout,
             &motion.view(),
-            &self.cotangent,
+            &self.adjoint,
             &mut gradient,
         );
     }

@@ -8,7 +8,7 @@
 //! | find the best motion | [`design()`], or [`design_without_gradients()`] to compare with |
 //! | look at all limits again | [`check::check_limits`], which shares no code with the search |
 //! | learn why no motion keeps them | [`limits::diagnose()`] |
-//! | know the error bars beforehand | [`Information`] of the motion, [`forecast()`] of every parameter |
+//! | know the error bars beforehand | [`Information`] of the motion, [`predicted_covariance()`] of every parameter |
 //! | move one joint after another | [`step_wise`]: strokes over windows, as in the paper |
 //! | hand the motion to a robot | [`export`]: CSV, ROS 2, URScript |
 //!
@@ -71,7 +71,7 @@
 //! assert!(reports.iter().all(|report| !report.violated), "{reports:?}");
 //!
 //! // Standard deviations of m r_x, m r_z and I_yy of either link, white torque noise assumed: none worse than 0.1.
-//! let predicted = forecast(&best.information, 1);
+//! let predicted = predicted_covariance(&best.information, 1);
 //! assert_eq!(predicted.std.len(), 6);
 //! assert!(predicted.std.iter().all(|std| std.is_some_and(|std| std < 0.1)), "{predicted:?}");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -88,16 +88,16 @@ mod design;
 pub mod export;
 pub mod families;
 mod family;
-mod forecast;
 mod information;
 pub mod limits;
 mod motion;
 pub mod optimisers;
+mod predicted_covariance;
 pub mod step_wise;
 
 pub use derivative_free::{DerivativeFree, design_without_gradients};
 pub use design::{Design, DesignProgress, DesignSettings, DesignTask, design, grid};
 pub use family::Family;
-pub use forecast::{Direction, Forecast, forecast};
 pub use information::Information;
-pub use motion::{Motion, MotionCotangent};
+pub use motion::{Motion, MotionAdjoint};
+pub use predicted_covariance::{Direction, PredictedCovariance, predicted_covariance};

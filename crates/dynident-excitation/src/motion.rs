@@ -1,6 +1,6 @@
 //! Joint motion at a list of times, and what a cost pulls on it.
 
-use dynident_model::laws::JointMotion;
+use dynident_model::terms::JointMotion;
 
 /// Position, velocity, acceleration and jerk of all joints, joint-major: joint `j`, sample `s` stands at `j * samples +
 /// s`. rad (m) and seconds.
@@ -42,4 +42,4 @@ impl Motion {
 }
 
 /// Derivatives of a scalar cost by every number of a [`Motion`], in the same layout.
-pub type MotionCotangent = Motion;
+pub type MotionAdjoint = Motion;

@@ -70,7 +70,7 @@ pub enum IdentificationError {
         /// What is wrong.
         source: EstimationError,
     },
-    /// An estimate that is not possible.
+    /// An estimate that cannot be made.
     #[error(transparent)]
     Estimation(#[from] EstimationError),
     /// A log or robot that lacks what the estimator chosen needs.

@@ -7,7 +7,7 @@ use crate::consistent::{
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, TrainingRows, estimate};
 use crate::examination::{
-    HeldOutExamination, LogTrace, SignEvidence, TestedModel, TorqueLag, Uncertainty, examine_held_out,
+    HeldOutExamination, LogTrace, ModelUnderTest, TorqueLag, TorqueSignCheck, Uncertainty, examine_held_out,
     examine_training, pooled_delay, sign_evidence,
 };
 use crate::execution::Execution;
@@ -53,14 +53,14 @@ pub struct ConsistentParameters {
 /// What the training recordings say of the estimate.
 #[derive(Clone, Debug)]
 pub struct TrainingExamination {
-    /// For each training recording the delays of its torque, joint by joint; none where it does not tell.
+    /// For each training recording the delays of its torque, joint by joint; none where it does not determine.
     pub delays: Vec<Vec<Option<TorqueLag>>>,
     /// Measured and predicted torque over time.
     pub traces: Vec<LogTrace>,
     /// The delays of all recordings together, joint by joint.
     pub pooled_delays: Vec<Option<TorqueLag>>,
     /// How well consistent sets explain the torque with either sign; none where a fit fails, and for payloads.
-    pub sign: Option<SignEvidence>,
+    pub sign: Option<TorqueSignCheck>,
 }
 
 /// An identified model with everything that was found on the way.
@@ -71,9 +71,9 @@ pub struct Identification {
     pub motion: MotionSettings,
     /// The training recordings as factors, the model with the friction that was chosen, payload columns, gains.
     pub training: Training,
-    /// The estimate and what its estimator can tell.
+    /// The estimate and what its estimator can determine.
     pub estimation: Estimation,
-    /// What was held at zero because the data hardly tell it, if that was asked for.
+    /// What was held at zero because the data hardly determine it, if that was asked for.
     pub essential: Option<EssentialReport>,
     /// Bodies, friction and drives.
     pub consistent: ConsistentParameters,
@@ -302,7 +302,7 @@ fn arm_alone(
 }
 
 /// How well consistent sets explain the torque with either sign; none where a fit fails.
-fn torque_sign(training: &Training, estimate: &Estimate) -> Result<Option<SignEvidence>, IdentificationError> {
+fn torque_sign(training: &Training, estimate: &Estimate) -> Result<Option<TorqueSignCheck>, IdentificationError> {
     let (alone, arm) = arm_alone(training, estimate)?;
     Ok(sign_evidence(&training.model.parametric, alone.as_ref().unwrap_or(&training.problem), &arm))
 }
@@ -341,8 +341,12 @@ fn examine_all_held_out(
         let uncertainty = Uncertainty::of(estimate, columns.base_covariance(index, &estimate.covariance));
         let physical =
             physical.map(|values| columns.base_values(index, &[values, &estimate.values[columns.base()..]].concat()));
-        let tested =
-            TestedModel { theta: &theta, physical: physical.as_deref(), uncertainty: Some(&uncertainty), traced: true };
+        let tested = ModelUnderTest {
+            theta: &theta,
+            physical: physical.as_deref(),
+            uncertainty: Some(&uncertainty),
+            traced: true,
+        };
         examine_held_out(logs, &training.model, index, &tested)
     };
     logs.of_role(Role::Validate).into_iter().map(one).collect()

@@ -10,7 +10,7 @@
 //! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/ur10_arrays.rs"));
 //! use dynident_dynamics::ParametricModel;
 //! use dynident_identification::{Execution, IdentificationTask, Recording, identify};
-//! use dynident_model::laws::{DriveChoice, laws_per_joint};
+//! use dynident_model::terms::{DriveChoice, terms_per_joint};
 //! use dynident_recording::JointSamples;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
@@ -19,7 +19,7 @@
 //! # let (q_test, tau_test) = recorded(&dynident_model::read_urdf(&urdf)?.model, 2.0);
 //!
 //! let arm = dynident_model::read_urdf(&urdf)?.model;
-//! let friction = laws_per_joint(&arm, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
+//! let friction = terms_per_joint(&arm, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
 //! let robot = ParametricModel::new(arm, friction)?;
 //!
 //! let train = JointSamples::at_rate(200.0, q, tau).into_log("train", &robot.joint_names())?;
@@ -49,17 +49,17 @@
 //! ```
 //! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/ur10_arrays.rs"));
 //! use dynident_identification::estimators::{TrainingRows, estimate};
-//! use dynident_identification::examination::{TestedModel, examine_held_out, examine_training};
+//! use dynident_identification::examination::{ModelUnderTest, examine_held_out, examine_training};
 //! use dynident_identification::{Execution, IdentificationSettings, Logs, consistent_stage, training_rows};
 //! # use dynident_dynamics::ParametricModel;
 //! # use dynident_identification::Recording;
-//! # use dynident_model::laws::{DriveChoice, laws_per_joint};
+//! # use dynident_model::terms::{DriveChoice, terms_per_joint};
 //! # use dynident_recording::JointSamples;
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
 //! # let arm = dynident_model::read_urdf(&std::fs::read_to_string(path)?)?.model;
 //! # let (train, test) = (recorded(&arm, 0.3), recorded(&arm, 2.0));
-//! # let friction = laws_per_joint(&arm, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
+//! # let friction = terms_per_joint(&arm, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
 //! # let truth = [true_arm(&arm).parameter_vector(), vec![VISCOUS; 6]].concat();
 //! # let robot = ParametricModel::new(arm, friction)?;
 //! # let log = |(q, tau)| JointSamples::at_rate(RATE_HZ, q, tau).into_log("arrays", &robot.joint_names());
@@ -81,7 +81,7 @@
 //! // What the recordings say of it: the lag of the torque, and the error on motion that was not used.
 //! let (lags, _) = examine_training(&logs, &training.model, 0, &estimate.values)?;
 //! assert_eq!(lags.len(), 6);
-//! let tested = TestedModel { theta: &fit.base_values, physical: None, uncertainty: None, traced: false };
+//! let tested = ModelUnderTest { theta: &fit.base_values, physical: None, uncertainty: None, traced: false };
 //! let held_out = examine_held_out(&logs, &training.model, 1, &tested)?;
 //! assert!(held_out.validation.model.relative_error_percent.unwrap() < 1.0);
 //! # for (value, truth) in estimate.values.iter().zip(robot.base().values(&truth)) {

@@ -1,4 +1,4 @@
-//! How a long job tells where it is.
+//! How a long job says where it is.
 
 /// Hears how far a job has come. Calls may come from several threads.
 pub trait Progress: Sync {
@@ -10,7 +10,7 @@ pub trait Progress: Sync {
     fn end(&self);
 }
 
-/// Tells nobody.
+/// Reports to nobody.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Silent;
 

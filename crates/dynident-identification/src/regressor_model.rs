@@ -2,7 +2,7 @@
 
 use dynident_dynamics::{BaseParameters, Column, PanelLayout, ParametricModel};
 use dynident_model::Model;
-use dynident_model::laws::Law;
+use dynident_model::terms::TorqueTerm;
 
 /// A parametric model, and what estimates have added to it: the load behind load-dependent friction, the gains of logged torque.
 #[derive(Clone, Debug)]
@@ -28,8 +28,8 @@ impl RegressorModel {
     }
 
     /// Torque terms beside the rigid bodies.
-    pub fn laws(&self) -> &[Law] {
-        self.parametric.laws()
+    pub fn terms(&self) -> &[TorqueTerm] {
+        self.parametric.terms()
     }
 
     /// Base parameters of bodies and terms.
@@ -54,7 +54,7 @@ impl RegressorModel {
 
     /// The same with further terms behind its base columns, dependent or not: for choosing among them from one set of factors.
     #[must_use]
-    pub fn with_further_columns(&self, further: impl IntoIterator<Item = Law>) -> Self {
+    pub fn with_further_columns(&self, further: impl IntoIterator<Item = TorqueTerm>) -> Self {
         let mut wide = self.clone();
         wide.parametric = self.parametric.with_further_columns(further);
         let columns = wide.layout().columns().len();
@@ -77,13 +77,13 @@ impl RegressorModel {
 
     /// Whether some friction depends on the joint's load.
     pub fn needs_load(&self) -> bool {
-        self.layout().columns().iter().any(|column| matches!(column, Column::Law(law) if law.needs_load()))
+        self.layout().columns().iter().any(|column| matches!(column, Column::Term(term) if term.needs_load()))
     }
 
     /// The first joint whose friction depends on its temperature.
     pub fn joint_that_needs_temperature(&self) -> Option<usize> {
         let needing = self.layout().columns().iter().filter_map(|column| match column {
-            Column::Law(law) if law.needs_temperature() => law.joints().first().copied(),
+            Column::Term(term) if term.needs_temperature() => term.joints().first().copied(),
             _ => None,
         });
         needing.min()

@@ -48,7 +48,7 @@ pub struct EstimationSettings {
     pub segments: SegmentSettings,
     /// Instruments that only test whether noise in the regressor biases the estimator; none by default.
     pub exogeneity_test: Option<InstrumentSettings>,
-    /// Hold parameters that the data hardly tell at zero; not by default.
+    /// Hold parameters that the data hardly determine at zero; not by default.
     pub essential: Option<EssentialSettings>,
     /// Base columns that are held at given values (place among the base columns, value); none by default.
     pub held: Vec<(usize, f64)>,
@@ -71,7 +71,7 @@ impl EstimationSettings {
     }
 }
 
-/// Everything that [`identify`](crate::identify()) can be told beside robot and recordings; the default is weighted least squares with consistent parameters.
+/// Everything that [`identify`](crate::identify()) can be given beside robot and recordings; the default is weighted least squares with consistent parameters.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct IdentificationSettings {
@@ -118,8 +118,8 @@ impl IdentificationSettings {
         let mut named = knowledge.clone();
         if !self.friction.is_empty() {
             // Terms that the logs are to choose are not there yet.
-            named.laws.clear();
+            named.terms.clear();
         }
-        named.check_names(robot.model(), robot.laws()).map_err(IdentificationError::Consistency)
+        named.check_names(robot.model(), robot.terms()).map_err(IdentificationError::Consistency)
     }
 }

@@ -108,8 +108,8 @@ impl Job<'_> {
         }
         // All candidates as columns of one set of factors, from which each candidate model is a selection.
         let known = first.model.layout().columns();
-        let further = candidates.iter().flat_map(|(_, columns)| columns).map(|column| column.law.clone());
-        let further = further.filter(|law| !known.contains(&Column::Law(law.clone())));
+        let further = candidates.iter().flat_map(|(_, columns)| columns).map(|column| column.term.clone());
+        let further = further.filter(|term| !known.contains(&Column::Term(term.clone())));
         let wide = first.model.with_further_columns(further).with_load_of(&first.model, &plain.values);
         let started = Instant::now();
         let factors = self.read(&wide)?;

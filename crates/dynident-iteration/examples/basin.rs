@@ -35,7 +35,7 @@ struct Start {
     controller: ControllerSettings,
     torque: Vec<f64>,
     /// Whether the trajectory can be run inside the torque limits by a perfect controller.
-    possible: bool,
+    feasible: bool,
 }
 
 /// How a scheme did on a start.
@@ -97,17 +97,17 @@ fn start(seed: u64) -> Result<Start, Box<dyn Error>> {
         peak.iter_mut().zip(tau).for_each(|(peak, tau)| *peak = peak.max(tau.abs()));
     }
     let torque: Vec<f64> = peak.iter().map(|peak| peak * wide(0.9, 4.0)).collect();
-    let possible = peak.iter().zip(&torque).all(|(peak, limit)| peak <= limit);
+    let feasible = peak.iter().zip(&torque).all(|(peak, limit)| peak <= limit);
     Ok(Start {
         arm,
         model_free: ControllerSettings::JointPd(model_free),
         controller: ControllerSettings::FiniteTime(controller),
         torque,
-        possible,
+        feasible,
     })
 }
 
-fn robot(start: &Start, locked: Option<usize>) -> Result<SimulatedRobot, Box<dyn Error>> {
+fn simulated(start: &Start, locked: Option<usize>) -> Result<SimulatedRobot, Box<dyn Error>> {
     let mut plant = Plant::new(&start.arm, &[], &[])?;
     if let Some(joint) = locked {
         plant = plant.with_locked(&[start.arm.joints()[joint].name.clone()])?;
@@ -118,11 +118,11 @@ fn robot(start: &Start, locked: Option<usize>) -> Result<SimulatedRobot, Box<dyn
     Ok(SimulatedRobot::new(plant, settings)?)
 }
 
-fn verdict(start: &Start, outcome: &IterationOutcome, machine: &ParametricModel) -> Verdict {
+fn verdict(start: &Start, outcome: &IterationOutcome, robot: &ParametricModel) -> Verdict {
     if matches!(outcome.status, IterationStatus::Refused { .. }) {
         return Verdict::Refused;
     }
-    let truth = machine.base().values(&start.arm.parameter_vector());
+    let truth = robot.base().values(&start.arm.parameter_vector());
     let largest = truth.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     let last = outcome.runs.last().and_then(|run| run.estimate.as_ref());
     let found = last.is_some_and(|estimate| {
@@ -136,47 +136,47 @@ fn with_controllers(start: &Start, settings: IterationSettings) -> IterationSett
     IterationSettings { model_free, controller, max_runs: RUNS, ..settings }
 }
 
-/// All joints in one trajectory, possible machines, rejection.
+/// All joints in one trajectory, physically consistent robots, rejection.
 fn ours(start: &Start) -> Result<(Verdict, usize), Box<dyn Error>> {
     // Nothing is known of the bodies.
-    let machine = ParametricModel::new(start.arm.clone(), Vec::new())?.with_nominal(vec![0.0; 20])?;
+    let robot = ParametricModel::new(start.arm.clone(), Vec::new())?.with_nominal(vec![0.0; 20])?;
     let (path, windows) = reference(&[1, 0])?;
     let legs = vec![Leg::windowed(path, windows)?];
     let torque_limits = Some(start.torque.clone());
-    let task = IterationTask { machine: machine.clone(), legs, known: Vec::new(), torque_limits };
+    let task = IterationTask { robot: robot.clone(), legs, known: Vec::new(), torque_limits };
     let mut settings = with_controllers(start, IterationSettings::default());
     // Torque limits are felt as noise of the fit: what counts is that the arm is found.
     settings.settled.parameter_tolerance = 1e-3;
     let iteration = Iteration::new(task, settings)?;
-    let mut robot = robot(start, None)?;
-    let outcome = iterate(&iteration, &mut [&mut robot], None, &mut |_, _| {})?;
-    Ok((verdict(start, &outcome, &machine), outcome.runs.len()))
+    let mut driven = simulated(start, None)?;
+    let outcome = iterate(&iteration, &mut [&mut driven], None, &mut |_, _| {})?;
+    Ok((verdict(start, &outcome, &robot), outcome.runs.len()))
 }
 
 /// Joint 2 with joint 1 locked, joint 1 with joint 2 locked; the map; every estimate straight into the controller.
 fn literal(start: &Start) -> Result<(Verdict, usize), Box<dyn Error>> {
-    let machine = ParametricModel::new(start.arm.clone(), Vec::new())?.with_nominal(vec![0.0; 20])?;
+    let robot = ParametricModel::new(start.arm.clone(), Vec::new())?.with_nominal(vec![0.0; 20])?;
     let mut legs = Vec::new();
     for joint in [1, 0] {
         let (path, windows) = reference(&[joint])?;
         legs.push(Leg::windowed(path, windows)?);
     }
-    let task = IterationTask { machine: machine.clone(), legs, known: Vec::new(), torque_limits: None };
+    let task = IterationTask { robot: robot.clone(), legs, known: Vec::new(), torque_limits: None };
     let mut settings = with_controllers(start, IterationSettings::literal(0.5));
     // It is given all its runs: its error bars know nothing of the map's bias.
     settings.settled.parameter_sigmas = 0.0;
     let iteration = Iteration::new(task, settings)?;
-    let (mut second, mut first) = (robot(start, Some(0))?, robot(start, Some(1))?);
+    let (mut second, mut first) = (simulated(start, Some(0))?, simulated(start, Some(1))?);
     let robots: &mut [&mut dyn Robot] = &mut [&mut second, &mut first];
     let outcome = iterate(&iteration, robots, None, &mut |_, _| {})?;
-    Ok((verdict(start, &outcome, &machine), outcome.runs.len()))
+    Ok((verdict(start, &outcome, &robot), outcome.runs.len()))
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let numbers: Vec<u64> = std::env::args().skip(1).map(|text| text.parse()).collect::<Result<_, _>>()?;
     let (arms, first) = (numbers.first().copied().unwrap_or(1000), numbers.get(1).copied().unwrap_or(1));
     let schemes: [(&str, Scheme); 2] = [("ours", ours), ("literal", literal)];
-    // Scheme, start possible or not: found, refused, lost.
+    // Scheme, start feasible or not: found, refused, lost.
     let mut counts = [[[0_usize; 3]; 2]; 2];
     let mut runs = [0_usize; 2];
     for seed in first..first + arms {
@@ -188,9 +188,9 @@ fn main() -> Result<(), Box<dyn Error>> {
                 Verdict::Refused => 1,
                 Verdict::Lost => 2,
             };
-            counts[place][usize::from(!start.possible)][outcome] += 1;
+            counts[place][usize::from(!start.feasible)][outcome] += 1;
             runs[place] += made;
-            if start.possible && verdict != Verdict::Found && place == 0 {
+            if start.feasible && verdict != Verdict::Found && place == 0 {
                 println!("{name}: seed {seed} was not found");
             }
         }

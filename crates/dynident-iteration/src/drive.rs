@@ -37,7 +37,7 @@ pub struct IterationOutcome {
 }
 
 /// What came of a plan.
-enum Made {
+enum PlannedRun {
     Run(Box<RunRecord>, Vec<RobotRun>),
     Stopped(IterationStatus),
 }
@@ -49,7 +49,7 @@ impl Iteration {
     /// As [`IterationTask::validate`] and [`IterationSettings::validate`].
     pub fn new(task: IterationTask, settings: IterationSettings) -> Result<Self, SimulationError> {
         task.validate()?;
-        settings.validate(task.machine.dof())?;
+        settings.validate(task.robot.dof())?;
         Ok(Self { task, settings })
     }
 
@@ -79,7 +79,7 @@ impl Iteration {
         let limits = self.task.torque_limits.as_ref()?;
         let estimate = records.iter().rev().find(|record| record.accepted)?.estimate.as_ref()?;
         let mut model = self.controller_model(records, &estimate.for_controller()?).ok()?;
-        let dof = self.task.machine.dof();
+        let dof = self.task.robot.dof();
         let mut tau = vec![0.0; dof];
         for leg in &self.task.legs {
             let (motion, rate_hz) = (leg.reference().motion(), leg.reference().rate_hz());
@@ -90,7 +90,7 @@ impl Iteration {
                 model.reference_torque(&at(&motion.q), &at(&motion.dq), &at(&motion.ddq), &mut tau);
                 for (joint, (tau, limit)) in tau.iter().zip(limits).enumerate() {
                     if tau.abs() > limit * BEYOND {
-                        let name = &self.task.machine.model().joints()[joint].name;
+                        let name = &self.task.robot.model().joints()[joint].name;
                         return Some(format!(
                             "the trajectory asks joint {name} for {:.3} Nm at {:.2} s by the model found, its limit is {limit:.3} Nm: give another trajectory",
                             tau.abs(),
@@ -107,9 +107,9 @@ impl Iteration {
     pub fn robot(&self, records: &[RunRecord]) -> Cow<'_, ParametricModel> {
         let estimates = records.iter().filter_map(|record| record.estimate.as_ref());
         let choice = estimates.map(|estimate| &estimate.friction).find(|choice| !choice.is_empty());
-        match choice.map(|choice| chosen_model(&self.task.machine, choice)) {
+        match choice.map(|choice| chosen_model(&self.task.robot, choice)) {
             Some(Ok(robot)) => Cow::Owned(robot),
-            _ => Cow::Borrowed(&self.task.machine),
+            _ => Cow::Borrowed(&self.task.robot),
         }
     }
 
@@ -117,8 +117,8 @@ impl Iteration {
     fn identified(&self, records: &[Record], before: &[RunRecord]) -> Result<RunEstimate, IterationError> {
         match self.robot(before) {
             Cow::Borrowed(_) => identify_run(&self.task, records, &self.settings.identification),
-            Cow::Owned(machine) => {
-                let task = IterationTask { machine, ..self.task.clone() };
+            Cow::Owned(robot) => {
+                let task = IterationTask { robot, ..self.task.clone() };
                 let settings = &self.settings.identification;
                 let settings = RunIdentificationSettings { friction: Vec::new(), ..settings.clone() };
                 identify_run(&task, records, &settings)
@@ -129,17 +129,17 @@ impl Iteration {
     /// The model of a controller with these parameters, after these records.
     ///
     /// # Errors
-    /// Parameters of another machine.
+    /// Parameters of another robot.
     pub fn controller_model(
         &self,
         records: &[RunRecord],
         parameters: &ModelParameters,
     ) -> Result<ControllerModel, SimulationError> {
-        let machine = self.robot(records);
+        let robot = self.robot(records);
         match parameters {
-            ModelParameters::All(values) => ControllerModel::from_parameters(machine.model(), machine.laws(), values),
+            ModelParameters::All(values) => ControllerModel::from_parameters(robot.model(), robot.terms(), values),
             ModelParameters::Base(values) => {
-                ControllerModel::from_columns(machine.model(), &machine.base().base_columns(), values)
+                ControllerModel::from_columns(robot.model(), &robot.base().base_columns(), values)
             }
         }
     }
@@ -150,7 +150,7 @@ impl Iteration {
         robots: &mut [&mut dyn Robot],
         plan: &RunPlan,
         before: &[RunRecord],
-    ) -> Result<Made, IterationError> {
+    ) -> Result<PlannedRun, IterationError> {
         let legs = &self.task.legs;
         let controller = plan.controller(&self.settings);
         let model = plan.model.as_ref().map(|parameters| self.controller_model(before, parameters)).transpose()?;
@@ -164,11 +164,11 @@ impl Iteration {
             match &came.status {
                 RobotStatus::Waiting { .. } => {
                     let reason = came.status.to_string();
-                    return Ok(Made::Stopped(IterationStatus::Waiting { reason }));
+                    return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
                 }
                 RobotStatus::Failed { fault } => {
                     let reason = format!("run {}: {fault}", plan.run);
-                    return Ok(Made::Stopped(IterationStatus::Refused { reason }));
+                    return Ok(PlannedRun::Stopped(IterationStatus::Refused { reason }));
                 }
                 _ => {}
             }
@@ -191,11 +191,11 @@ impl Iteration {
             Ok(()) => record.accepted = true,
             Err(reason) => record.reason = Some(reason),
         }
-        Ok(Made::Run(Box::new(record), runs))
+        Ok(PlannedRun::Run(Box::new(record), runs))
     }
 
     fn recorded(&self, plan: &RunPlan, name: &str, runs: &[RobotRun]) -> RunRecord {
-        let joints = self.task.machine.dof();
+        let joints = self.task.robot.dof();
         let mut worst = vec![0.0_f64; joints];
         for (run, leg) in runs.iter().zip(&self.task.legs) {
             let own = match &run.truth {
@@ -248,8 +248,8 @@ pub fn iterate(
             Next::Finished(status) => return Ok(IterationOutcome { status, runs: records }),
         };
         match iteration.made(robots, &plan, &records)? {
-            Made::Stopped(status) => return Ok(IterationOutcome { status, runs: records }),
-            Made::Run(record, runs) => {
+            PlannedRun::Stopped(status) => return Ok(IterationOutcome { status, runs: records }),
+            PlannedRun::Run(record, runs) => {
                 if let Some(store) = store {
                     store.keep(&record, &runs)?;
                 }

@@ -32,7 +32,7 @@ pub enum IterationError {
     Record {
         /// Its joints.
         joints: Vec<String>,
-        /// What is wrong, and the mend.
+        /// What is wrong, and the fix.
         problem: String,
     },
     /// A file of the iteration's folder that cannot be read or written. What was there before is untouched.
@@ -48,7 +48,7 @@ pub enum IterationError {
     State {
         /// The file.
         path: PathBuf,
-        /// What is wrong, and the mend.
+        /// What is wrong, and the fix.
         problem: String,
     },
 }

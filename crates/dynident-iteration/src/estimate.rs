@@ -20,12 +20,12 @@ use dynident_simulation::{Record, require_length};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// What a run tells of the base parameters.
+/// What a run says about the base parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunEstimate {
     /// Base parameters.
     pub values: Vec<f64>,
-    /// Their standard deviations; zero for what was given or is not told by the data.
+    /// Their standard deviations; zero for what was given or is not determined by the data.
     pub std: Vec<f64>,
     /// Their covariance, row by row.
     pub covariance: Vec<Vec<f64>>,
@@ -33,22 +33,22 @@ pub struct RunEstimate {
     pub rows: usize,
     /// Standard deviation of each joint's residual, Nm (N).
     pub joint_sigma: Vec<f64>,
-    /// Base parameters that the data do not tell: they have the prior's values.
+    /// Base parameters that the data do not determine: they have the prior's values.
     pub fixed: Vec<usize>,
-    /// All parameters of the possible machine that fits best, ten for each body and one for each law, if it was asked for.
+    /// All parameters of the physically consistent set that fits best, ten for each body and one for each term, if it was asked for.
     pub possible: Option<Vec<f64>>,
     /// Why there is none although it was asked for.
     pub impossible: Option<String>,
     /// The friction that this run chose, for itself and the runs after it; empty where it was stated or chosen before.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub friction: Vec<JointFriction>,
-    /// By how much each joint's torque comes after the motion, where the run tells; empty where windows leave rows out.
+    /// By how much each joint's torque comes after the motion, where the run determines; empty where windows leave rows out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub torque_lags: Vec<Option<TorqueLag>>,
 }
 
 impl RunEstimate {
-    /// What a controller gets: the possible machine if it was asked for, else the estimate as it is. None where the possible machine was asked for and does not exist.
+    /// What a controller gets: the physically consistent set if it was asked for, else the estimate as it is. None where the physically consistent set was asked for and does not exist.
     pub fn for_controller(&self) -> Option<ModelParameters> {
         match (&self.possible, &self.impossible) {
             (Some(parameters), _) => Some(ModelParameters::All(parameters.clone())),
@@ -57,7 +57,7 @@ impl RunEstimate {
         }
     }
 
-    /// How many times wider its error bars are than another's: the geometric mean over the parameters that both tell; 1 where there is none.
+    /// How many times wider its error bars are than another's: the geometric mean over the parameters that both determine; 1 where there is none.
     pub(crate) fn wider_than(&self, other: &Self) -> f64 {
         let pairs = self.std.iter().zip(&other.std).filter(|(own, other)| **own > 0.0 && **other > 0.0);
         let (sum, count) =
@@ -82,7 +82,7 @@ pub fn identify_run(
     let recordings = recordings(task, records, settings)?;
     let all: Vec<usize> = (0..recordings.len()).collect();
     let identification = identification_settings(task, settings);
-    let (robot, execution) = (&task.machine, Execution::default());
+    let (robot, execution) = (&task.robot, Execution::default());
     let logs = Logs::new(robot.model(), &recordings, &identification, &all, None, execution)?;
     let training = training_rows(&logs, robot.clone().into(), &all, &settings.payloads, None)?;
     if training.problem.joint_rows().iter().sum::<usize>() == 0 {
@@ -111,7 +111,7 @@ fn recordings(
     task.legs.iter().zip(records).enumerate().map(one).collect()
 }
 
-/// What the identification is told.
+/// What the identification is given.
 fn identification_settings(task: &IterationTask, settings: &RunIdentificationSettings) -> IdentificationSettings {
     let mut identification = IdentificationSettings::default();
     identification.motion.differentiator = settings.differentiator.clone();
@@ -154,7 +154,7 @@ fn joint_by_joint(
     training: &Training,
     settings: &RunIdentificationSettings,
 ) -> Result<RunEstimate, IterationError> {
-    let robot = &task.machine;
+    let robot = &task.robot;
     let (names, joints) = (robot.base().expressions(), robot.joint_names());
     let fallback = robot.base().values(robot.nominal());
     let steps = step_by_step(task, logs, &names, &joints, &fallback)?;

@@ -96,11 +96,11 @@ impl Leg {
     }
 }
 
-/// What an iteration is about: a machine, the trajectories of every run, and parameters that are not looked for.
+/// What an iteration is about: a robot, the trajectories of every run, and parameters that are not looked for.
 #[derive(Clone, Debug)]
 pub struct IterationTask {
-    /// The machine.
-    pub machine: ParametricModel,
+    /// The robot.
+    pub robot: ParametricModel,
     /// The trajectories of every run, in order.
     pub legs: Vec<Leg>,
     /// Base columns whose values are given: (place among the base columns, value). Of the paper's joint 1: what joint 2 has shown.
@@ -114,16 +114,16 @@ impl IterationTask {
     ///
     /// # Errors
     /// A reference of one sample only.
-    pub fn new(machine: ParametricModel, reference: Reference) -> Result<Self, FilterError> {
-        Ok(Self { machine, legs: vec![Leg::whole(reference)?], known: Vec::new(), torque_limits: None })
+    pub fn new(robot: ParametricModel, reference: Reference) -> Result<Self, FilterError> {
+        Ok(Self { robot, legs: vec![Leg::whole(reference)?], known: Vec::new(), torque_limits: None })
     }
 
-    /// Checks that legs and known columns belong to the machine.
+    /// Checks that legs and known columns belong to the robot.
     ///
     /// # Errors
     /// No legs, other numbers of joints, windows that are no intervals, columns that do not exist, values that are not finite.
     pub fn validate(&self) -> Result<(), SimulationError> {
-        let dof = self.machine.dof();
+        let dof = self.robot.dof();
         require(!self.legs.is_empty(), "legs", 0.0, "give one or more")?;
         for leg in &self.legs {
             require_length("joints of the reference", dof, leg.reference.joints())?;
@@ -141,7 +141,7 @@ impl IterationTask {
             }
         }
         for (column, value) in &self.known {
-            let count = self.machine.base().count();
+            let count = self.robot.base().count();
             require(*column < count, "known column", *column as f64, "there is no such base parameter")?;
             require(value.is_finite(), "known value", *value, "give a finite number")?;
         }
@@ -150,7 +150,7 @@ impl IterationTask {
 
     /// The known value of each base column, if it has one.
     pub(crate) fn known_values(&self) -> Vec<Option<f64>> {
-        let mut values = vec![None; self.machine.base().count()];
+        let mut values = vec![None; self.robot.base().count()];
         for (column, value) in &self.known {
             values[*column] = Some(*value);
         }

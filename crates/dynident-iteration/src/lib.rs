@@ -17,16 +17,16 @@
 //! use dynident_dynamics::ParametricModel;
 //! use dynident_excitation::Motion;
 //! use dynident_iteration::{Iteration, IterationSettings, IterationStatus, IterationTask, SimulatedRobot, iterate};
-//! use dynident_model::laws::{DriveChoice, laws_per_joint};
+//! use dynident_model::terms::{DriveChoice, terms_per_joint};
 //! use dynident_simulation::{LoopSettings, Plant, Reference};
 //! # let text = r#"<robot name="pendulum"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 -0.5"/>
 //! #   <mass value="2"/><inertia ixx="0.2" iyy="0.2" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
 //! #   <joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint>
 //! # </robot>"#;
 //! let rod = dynident_model::read_urdf(text)?.model;
-//! let friction = laws_per_joint(&rod, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
+//! let friction = terms_per_joint(&rod, |_| DriveChoice { viscous: true, ..DriveChoice::default() });
 //!
-//! // The true pendulum has friction that nobody has told the controller of.
+//! // The true pendulum has friction that the controller does not know of.
 //! let plant = Plant::new(&rod, &friction, &[0.5])?;
 //! let mut robot = SimulatedRobot::new(plant, LoopSettings::default())?;
 //!

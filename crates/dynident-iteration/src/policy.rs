@@ -50,7 +50,7 @@ impl RunPlan {
     }
 }
 
-/// The run after `records`, or how the iteration has ended. `prior` is what the machine is believed to be before any run.
+/// The run after `records`, or how the iteration has ended. `prior` is what the robot is believed to be before any run.
 pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &[f64]) -> Next {
     let run = records.len() + 1;
     let model_free = |stiffness| Next::Run(RunPlan { run, model: None, damping: 1.0, stiffness });
@@ -109,7 +109,7 @@ fn model_of(record: &RunRecord) -> Option<ModelParameters> {
 }
 
 /// The run whose estimate is worth most: the newest good one, unless its error bars are far wider than those of an earlier run; and a rejected one where its error bars are clearly narrower. Bad tracking
-/// says that the model which the run was made with is bad, not that the run tells little: a joint that is thrown about may tell more than one that hardly moves.
+/// says that the model which the run was made with is bad, not that the run determines little: a joint that is thrown about may determine more than one that hardly moves.
 fn most_trusted(records: &[RunRecord]) -> Option<&RunRecord> {
     records.iter().filter(|record| model_of(record).is_some()).reduce(|best, record| {
         let most = if record.accepted { FAR_WIDER } else { CLEARLY_NARROWER };
@@ -124,10 +124,10 @@ pub(crate) fn verdict(record: &RunRecord, before: &[RunRecord], settings: &Itera
         return Err(record.outcome.clone());
     }
     let Some(estimate) = &record.estimate else {
-        return Err(record.reason.clone().unwrap_or_else(|| "it tells nothing of the parameters".to_owned()));
+        return Err(record.reason.clone().unwrap_or_else(|| "it says nothing of the parameters".to_owned()));
     };
     if let Some(reason) = &estimate.impossible {
-        return Err(format!("no possible machine fits it: {reason}"));
+        return Err(format!("no physically consistent set fits it: {reason}"));
     }
     let Some(good) = before.iter().rev().find(|record| record.accepted) else { return Ok(()) };
     let (now, then) = (record.tracking_error(), good.tracking_error());

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "of", content = "values", rename_all = "kebab-case")]
 pub enum ModelParameters {
-    /// Ten for each body, then one for each law.
+    /// Ten for each body, then one for each term.
     All(Vec<f64>),
     /// One for each base parameter.
     Base(Vec<f64>),
@@ -62,7 +62,7 @@ pub struct RunRecord {
     pub accepted: bool,
     /// Why not, or why there is no estimate.
     pub reason: Option<String>,
-    /// What it tells of the parameters; none if it tells nothing.
+    /// What it says about the parameters; none if it determines nothing.
     pub estimate: Option<RunEstimate>,
 }
 

@@ -21,7 +21,7 @@ pub enum Scheme {
     StepByStep,
 }
 
-/// How one run is identified: the motion as it follows from a record, then all that an identification can be told.
+/// How one run is identified: the motion as it follows from a record, then all that an identification can be determined.
 #[derive(Clone, Debug)]
 pub struct RunIdentificationSettings {
     /// All joints at once (the default), or step by step.
@@ -37,7 +37,7 @@ pub struct RunIdentificationSettings {
     /// The estimator, what counts as excited, where error bars come from. Default weighted least squares. Step by step
     /// takes ordinary or weighted least squares.
     pub estimation: EstimationSettings,
-    /// Joints whose friction the first run that can tell chooses, for itself and all runs after it. Default none.
+    /// Joints whose friction the first run that can determine chooses, for itself and all runs after it. Default none.
     pub friction: Vec<FrictionSearch>,
     /// What is known of the bodies of the consistent set that controllers get; `None` gives them the estimate as it is.
     pub consistency: Option<ConsistencySettings>,
@@ -71,7 +71,7 @@ pub enum StartWith {
     /// A controller without a model.
     #[default]
     ModelFree,
-    /// The controller with the prior of the machine.
+    /// The controller with the prior of the robot.
     Prior,
 }
 
@@ -154,7 +154,7 @@ impl Default for IterationSettings {
 }
 
 impl IterationSettings {
-    /// The paper's scheme as it stands: speeds and accelerations by the map from position (Eqs. 15, 16) with the lag of at most `max_lag_s` estimated, step by step, every estimate straight into the
+    /// The paper's scheme as it stands: velocities and accelerations by the map from position (Eqs. 15, 16) with the lag of at most `max_lag_s` estimated, step by step, every estimate straight into the
     /// controller, nothing rejected.
     pub fn literal(max_lag_s: f64) -> Self {
         Self {
@@ -184,9 +184,8 @@ impl IterationSettings {
         if self.model_free.needs_model() {
             return Err(SimulationError::NoModel { controller: self.model_free.name() });
         }
-        let within = |what: &str, value: f64, low: f64, high: f64, mend| {
-            require((low..=high).contains(&value), what, value, mend)
-        };
+        let within =
+            |what: &str, value: f64, low: f64, high: f64, fix| require((low..=high).contains(&value), what, value, fix);
         within("worse_factor", self.worse_factor, 1.0, 1e6, "give 1 to 1e6")?;
         within("stiffen", self.stiffen, 1.0, 100.0, "give 1 to 100")?;
         within("most_halvings", self.most_halvings as f64, 0.0, 50.0, "give at most 50")?;

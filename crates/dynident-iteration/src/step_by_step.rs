@@ -40,7 +40,7 @@ pub(crate) fn step_by_step(
         rows: 0,
     };
     for joint in (0..joints.len()).rev() {
-        let columns = task.machine.layout().joint_columns(joint);
+        let columns = task.robot.layout().joint_columns(joint);
         let is_known = |column: usize| given[column].is_some() || steps.found[column];
         let (known, unknown): (Vec<usize>, Vec<usize>) =
             (0..columns.len()).partition(|&place| is_known(columns[place]));
@@ -51,7 +51,7 @@ pub(crate) fn step_by_step(
         let mut factor = SegmentedFactor::new(unknown.len(), dynident_estimation::SegmentSettings::default())?;
         let mut wide = TriangularFactor::new(unknown.len() + uncertain.len());
         let (mut narrow_panel, mut wide_panel) = (Vec::new(), Vec::new());
-        let model = RegressorModel::from(task.machine.clone());
+        let model = RegressorModel::from(task.robot.clone());
         for leg in 0..task.legs.len() {
             let visit = |JointRows { joint: of, rows, panel }: &JointRows<'_>| {
                 let rows = *rows;

@@ -28,7 +28,7 @@ fn outcome(folder: &Path) -> Result<IterationOutcome, IterationError> {
     let steps = [1, 0].map(|joint| Step { joint, period_s: 5.0 });
     let family = StepWiseLogistic::new(&[0.0; 2], &steps, &SplicedLogisticSettings::default()).unwrap();
     let reference = Reference::of_family(&family, &[1.0, 8.0, 1.0, 8.0], 500.0, None).unwrap();
-    let machine = ParametricModel::new(arm.clone(), Vec::new()).unwrap().with_nominal(vec![0.0; 20]).unwrap();
+    let robot = ParametricModel::new(arm.clone(), Vec::new()).unwrap().with_nominal(vec![0.0; 20]).unwrap();
     let mut settings = IterationSettings {
         model_free: ControllerSettings::JointPd(JointPdSettings { kp: 200.0.into(), kd: 60.0.into() }),
         controller: ControllerSettings::FiniteTime(FiniteTimeSettings::with_gains(20.0, 10.0)),
@@ -37,7 +37,7 @@ fn outcome(folder: &Path) -> Result<IterationOutcome, IterationError> {
     };
     settings.settled.parameter_sigmas = 0.0;
     settings.settled.parameter_tolerance = 0.0;
-    let iteration = Iteration::new(IterationTask::new(machine, reference)?, settings)?;
+    let iteration = Iteration::new(IterationTask::new(robot, reference)?, settings)?;
     let sensors = SensorSettings { record_rate_hz: Some(500.0), ..SensorSettings::birdy_standard(5) };
     let looped =
         LoopSettings { integrator: Integrator::Rk4 { steps_per_sample: 1 }, sensors, ..LoopSettings::default() };

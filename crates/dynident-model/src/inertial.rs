@@ -3,7 +3,7 @@
 use crate::spatial::{Mat3, Transform, Vec3};
 use nalgebra::{Matrix3, Matrix4};
 
-/// Names of the ten parameters in the project's order (the paper's `p_i` with its misprint mended).
+/// Names of the ten parameters in the project's order (the paper's `p_i` with its misprint fixed).
 pub const INERTIAL_NAMES: [&str; 10] = ["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
 
 /// `[m, m r_x, m r_y, m r_z, I_xx, I_xy, I_xz, I_yy, I_yz, I_zz]` of one rigid body: mass in kg, first moment in kg m,
@@ -77,7 +77,7 @@ impl InertialParameters {
         Self(core::array::from_fn(|k| self.0[k] + other.0[k]))
     }
 
-    /// The pseudo-inertia `P = [Σ h; hᵀ m]` with `Σ = ½ tr(I) 1 - I` and `h = m r`: the body is physically possible exactly when
+    /// The pseudo-inertia `P = [Σ h; hᵀ m]` with `Σ = ½ tr(I) 1 - I` and `h = m r`: the body is physically consistent exactly when
     /// `P` is positive (semi-)definite (Traversaro et al. 2016; Wensing, Kim and Slotine 2018).
     pub fn pseudo_inertia(&self) -> Matrix4<f64> {
         let i = self.inertia_at_origin().0;

@@ -2,7 +2,7 @@
 
 use crate::spatial::{Mat3, Transform, Vec3};
 
-/// The kinds of joint with a degree of freedom.
+/// The kinds of joint with a degree of degrees_of_freedom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointKind {
     /// Turns about its axis, between limits; position in radians.
@@ -31,7 +31,7 @@ pub struct JointLimits {
     pub lower: Option<f64>,
     /// Highest position, rad or m.
     pub upper: Option<f64>,
-    /// Highest speed, rad/s or m/s.
+    /// Highest velocity, rad/s or m/s.
     pub velocity: Option<f64>,
     /// Highest torque or force, Nm or N.
     pub effort: Option<f64>,
@@ -42,7 +42,7 @@ pub struct JointLimits {
 pub struct Mimic {
     /// Name of the joint that is followed.
     pub source: String,
-    /// Ratio of the two speeds.
+    /// Ratio of the two velocities.
     pub multiplier: f64,
     /// Position (rad or m) while the source stands at zero.
     pub offset: f64,
@@ -73,8 +73,8 @@ pub struct Joint {
     pub mimic: Option<Mimic>,
 }
 
-/// The numbers of one joint in the form that algorithms use: `parent_from_child` of a turning joint is
-/// `R(q) = constant + cosine · cos q + sine · sin q` with a fixed translation; of a sliding joint `R = constant` and
+/// The numbers of one joint in the form that algorithms use: `parent_from_child` of a revolute joint is
+/// `R(q) = constant + cosine · cos q + sine · sin q` with a fixed translation; of a prismatic joint `R = constant` and
 /// `translation + slide · q`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointMap {
@@ -86,13 +86,13 @@ pub struct JointMap {
     pub axis: Vec3,
     /// The part of the rotation that does not change with `q`.
     pub constant: Mat3,
-    /// The part in proportion to `cos q` (zero for a sliding joint).
+    /// The part in proportion to `cos q` (zero for a prismatic joint).
     pub cosine: Mat3,
-    /// The part in proportion to `sin q` (zero for a sliding joint).
+    /// The part in proportion to `sin q` (zero for a prismatic joint).
     pub sine: Mat3,
     /// Translation at `q = 0`, in metres.
     pub translation: Vec3,
-    /// Axis in the parent frame for a sliding joint, zero for a turning one.
+    /// Axis in the parent frame for a prismatic joint, zero for a turning one.
     pub slide: Vec3,
 }
 

@@ -13,12 +13,12 @@
 //! | gravity, mounting, locked joints | [`Model::with_gravity`], [`Model::with_base_orientation`], [`Model::locked`] |
 //! | masses, centres of mass, inertias | [`Model::inertials`], [`InertialParameters`] |
 //! | other ones in their place | [`Model::with_inertials`] |
-//! | friction, drive inertia, offsets of every joint | [`laws::laws_per_joint`]; one by one: [`laws::Law`] |
+//! | friction, drive inertia, offsets of every joint | [`terms::terms_per_joint`]; one by one: [`terms::TorqueTerm`] |
 //! | can these bodies be real? | [`audit()`], [`InertialParameters::pseudo_inertia`] |
 //! | new inertials into the user's own URDF | [`link_changes`], [`rewrite_urdf`] |
 //!
 //! ```
-//! use dynident_model::laws::{CoulombShape, DriveChoice, laws_per_joint};
+//! use dynident_model::terms::{CoulombShape, DriveChoice, terms_per_joint};
 //! use dynident_model::{AuditLevel, audit, read_urdf};
 //!
 //! let text = r#"
@@ -42,7 +42,7 @@
 //!
 //! // What acts on its joint beside the rigid bodies, each with one parameter.
 //! let coulomb = Some(CoulombShape::Smooth { width: 0.01 });
-//! let terms = laws_per_joint(&pendulum, |_| DriveChoice { viscous: true, coulomb, ..DriveChoice::default() });
+//! let terms = terms_per_joint(&pendulum, |_| DriveChoice { viscous: true, coulomb, ..DriveChoice::default() });
 //! assert_eq!(terms.iter().map(|term| term.symbol()).collect::<Vec<_>>(), ["fv1", "fc1"]);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -54,11 +54,11 @@ pub mod dh;
 mod error;
 mod inertial;
 mod joint;
-pub mod laws;
 mod place;
 mod read;
 pub mod sample;
 mod spatial;
+pub mod terms;
 mod tree;
 pub mod urdf;
 

@@ -10,7 +10,7 @@ pub struct Located<F: Error> {
     pub line: u32,
     /// Column, from 1, in characters.
     pub column: u32,
-    /// What is wrong, and the mend.
+    /// What is wrong, and the fix.
     pub fault: F,
 }
 

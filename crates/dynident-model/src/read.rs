@@ -1,4 +1,4 @@
-//! From a file to a machine: URDF or D-H table, told apart by the file's name or its content.
+//! From a file to a robot: URDF or D-H table, distinguished by the file's name or its content.
 
 use crate::dh::{DhError, read_dh};
 use crate::place::line_and_column;
@@ -21,10 +21,10 @@ pub enum DescriptionFormat {
     Dh,
 }
 
-/// A machine and where it came from.
+/// A robot and where it came from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Robot {
-    /// The machine.
+    /// The robot.
     pub model: Model,
     /// What the file is written in.
     pub format: DescriptionFormat,
@@ -36,7 +36,7 @@ pub struct Robot {
     pub unread: Vec<UnreadElement>,
 }
 
-/// Why a file gave no machine. Every message begins with the file, and with line and column where there are any.
+/// Why a file gave no robot. Every message begins with the file, and with line and column where there are any.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ReadError {

@@ -1,4 +1,4 @@
-//! Sample machines for tests, benchmarks and examples, and the small seeded generator that they share.
+//! Sample robots for tests, benchmarks and examples, and the small seeded generator that they share.
 
 use crate::inertial::InertialParameters;
 use crate::joint::{Joint, JointKind, JointLimits};
@@ -7,7 +7,7 @@ use crate::tree::{Body, Link, Model};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// SplitMix64 (Steele, Lea and Flood 2014): seeded, the same on every machine.
+/// SplitMix64 (Steele, Lea and Flood 2014): seeded, the same on every robot.
 #[derive(Clone, Debug)]
 pub struct Random(SplitMix64);
 
@@ -40,7 +40,7 @@ impl Random {
         v.scale(1.0 / v.norm())
     }
 
-    /// A physically possible body: three positive principal moments that keep the triangle inequality, about a centre of mass within 0.3 m.
+    /// A physically consistent body: three positive principal moments that keep the triangle inequality, about a centre of mass within 0.3 m.
     pub fn body(&mut self) -> InertialParameters {
         let mass = self.uniform(0.2, 5.0);
         let second: [f64; 3] = core::array::from_fn(|_| mass * self.uniform(0.001, 0.04));
@@ -76,7 +76,7 @@ fn plain_body(name: String, inertial: Option<InertialParameters>) -> Body {
 }
 
 /// A random tree of `dof` joints: turning and sliding (one in four), general axes and placements, branches, sometimes several trees on the base;
-/// physically possible bodies; gravity in a general direction.
+/// physically consistent bodies; gravity in a general direction.
 ///
 /// # Panics
 /// Never: every part is valid by construction.
@@ -105,7 +105,7 @@ pub fn random_tree(seed: u64, dof: usize) -> Model {
         .expect("a random tree is valid by construction")
 }
 
-/// The paper's planar arm: two turning joints with parallel axes along z, first link of length `a1_m`, gravity along -y
+/// The paper's planar arm: two revolute joints with parallel axes along z, first link of length `a1_m`, gravity along -y
 /// (*Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*, Fig. 1 and Table 1).
 ///
 /// # Panics

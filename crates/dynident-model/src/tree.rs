@@ -1,4 +1,4 @@
-//! The link tree: an immutable model of the machine.
+//! The link tree: an immutable model of the robot.
 
 use crate::error::ModelError;
 use crate::inertial::InertialParameters;
@@ -41,7 +41,7 @@ impl Body {
     }
 }
 
-/// A machine on a fixed base: joints and bodies in an order where parents come before children. Body `i` moves with joint `i`;
+/// A robot on a fixed base: joints and bodies in an order where parents come before children. Body `i` moves with joint `i`;
 /// positions, velocities and torques are vectors in this order.
 #[doc(alias("robot", "kinematic tree", "multibody"))]
 #[derive(Clone, Debug, PartialEq)]
@@ -97,12 +97,12 @@ impl Model {
         Ok(Self { name: name.to_owned(), gravity: STANDARD_GRAVITY, joints, bodies, base, maps, inertials })
     }
 
-    /// The machine's name.
+    /// The robot's name.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Degrees of freedom: the length of every joint vector.
+    /// Degrees of degrees_of_freedom: the length of every joint vector.
     pub fn dof(&self) -> usize {
         self.joints.len()
     }
@@ -174,7 +174,7 @@ impl Model {
         path
     }
 
-    /// The same machine under another gravity (base frame, m/s²).
+    /// The same robot under another gravity (base frame, m/s²).
     ///
     /// # Errors
     /// If a component is not finite.
@@ -186,7 +186,7 @@ impl Model {
         Ok(self)
     }
 
-    /// The same machine mounted with its base turned by roll, pitch, yaw (radians, fixed axes) against the world: gravity turns the other
+    /// The same robot mounted with its base turned by roll, pitch, yaw (radians, fixed axes) against the world: gravity turns the other
     /// way in the base frame.
     ///
     /// # Errors
@@ -196,7 +196,7 @@ impl Model {
         self.with_gravity(gravity)
     }
 
-    /// The same machine with other inertial parameters: body `i` becomes one link with `inertials[i]` in the body frame.
+    /// The same robot with other inertial parameters: body `i` becomes one link with `inertials[i]` in the body frame.
     ///
     /// # Errors
     /// If the count differs or a number is not finite.
@@ -218,7 +218,7 @@ impl Model {
         Ok(model)
     }
 
-    /// The same machine with the named joints held at the given positions (rad or m): each one's body joins its parent's.
+    /// The same robot with the named joints held at the given positions (rad or m): each one's body joins its parent's.
     ///
     /// # Errors
     /// If a name is unknown or given twice, or a position is not finite.

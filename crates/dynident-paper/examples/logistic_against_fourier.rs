@@ -82,10 +82,10 @@ fn compared(path: &Path, family: &str, duration_s: Option<f64>, seeds: u64) -> R
     let outcome = design_study(&study, path, &options, |_| ControlFlow::Continue(()))?;
     let (true, Some(log_det)) = (outcome.file.feasible, outcome.file.log_det) else { return Ok(None) };
     let reference = Reference::new(RATE_HZ, outcome.sampled(RATE_HZ).1)?;
-    let model = outcome.machine.model();
-    let machine = ParametricModel::new(model.clone(), Vec::new())?;
-    let truth = machine.base().values(machine.nominal());
-    let task = IterationTask::new(machine, reference.clone())?;
+    let model = outcome.robot.model();
+    let robot = ParametricModel::new(model.clone(), Vec::new())?;
+    let truth = robot.base().values(robot.nominal());
+    let task = IterationTask::new(robot, reference.clone())?;
     let identification = RunIdentificationSettings {
         differentiator: DifferentiatorSettings::Deviation {
             reference: ReferenceSettings::default(),

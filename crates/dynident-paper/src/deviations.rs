@@ -33,7 +33,7 @@ const DEVIATIONS: &[[&str; 3]] = &[
     [
         "section 2.2",
         "the genetic algorithm's ranges are not stated, and it does not reach the optimum",
-        "A in 0.1 to pi rad, w in 0.1 to 3 1/s, delta in 0.1 to 10 s; its distance from the optimum is told",
+        "A in 0.1 to pi rad, w in 0.1 to 3 1/s, delta in 0.1 to 10 s; its distance from the optimum is given",
     ],
     [
         "Eq. 23",
@@ -53,8 +53,8 @@ const DEVIATIONS: &[[&str; 3]] = &[
     ["section 3", "'joint at rest' needs something that holds it", "the resting joint is locked"],
     [
         "Table 6, Fig. 15",
-        "the Fourier coefficients, the duration and the way to speed and acceleration are not given; an error of 0.02 without noise can only come from fitting or an unsettled run",
-        "five harmonics designed inside (18), whole settled periods, speed and acceleration by a Fourier fit of the measured positions",
+        "the Fourier coefficients, the duration and the way to velocity and acceleration are not given; an error of 0.02 without noise can only come from fitting or an unsettled run",
+        "five harmonics designed inside (18), whole settled periods, velocity and acceleration by a Fourier fit of the measured positions",
     ],
     ["Eq. 25", "the verification motion sin t breaks (18) itself", "kept as the paper's verification, and said"],
 ];

@@ -93,13 +93,9 @@ pub(crate) fn fourier(arm: &Arm, out: &Path, seed: u64, options: &RunOptions<'_>
 fn identified(arm: &Arm, motion: &Motion) -> Result<[f64; 6], IterationError> {
     let reference = Reference::new(RATE_HZ, motion.clone())?;
     let second = vec![vec![[PERIOD_S, 2.0 * PERIOD_S]]; 2];
-    let machine = ParametricModel::new(arm.model.clone(), Vec::new())?.with_nominal(prior(false))?;
-    let task = IterationTask {
-        machine,
-        legs: vec![Leg::windowed(reference, second)?],
-        known: Vec::new(),
-        torque_limits: None,
-    };
+    let robot = ParametricModel::new(arm.model.clone(), Vec::new())?.with_nominal(prior(false))?;
+    let task =
+        IterationTask { robot, legs: vec![Leg::windowed(reference, second)?], known: Vec::new(), torque_limits: None };
     let mut settings = IterationSettings::default();
     settings.identification.differentiator =
         DifferentiatorSettings::FourierFit { base_hz: 1.0 / PERIOD_S, harmonics: FITTED, trend: false };

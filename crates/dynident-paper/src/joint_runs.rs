@@ -127,8 +127,8 @@ fn one_joint(arm: &Arm, protocol: &Protocol, joint: usize, known: &[(usize, f64)
     if protocol.literal {
         leg = leg.with_differentiator(Arc::new(LiteralMap { paths: paths.to_vec() }));
     }
-    let machine = ParametricModel::new(arm.model.clone(), Vec::new())?.with_nominal(prior(protocol.literal))?;
-    let task = IterationTask { machine, legs: vec![leg], known: known.to_vec(), torque_limits: None };
+    let robot = ParametricModel::new(arm.model.clone(), Vec::new())?.with_nominal(prior(protocol.literal))?;
+    let task = IterationTask { robot, legs: vec![leg], known: known.to_vec(), torque_limits: None };
     let iteration = Iteration::new(task, iteration_settings(protocol))?;
     let resting = arm.model.joints()[1 - joint].name.clone();
     let plant = Plant::new(&arm.model, &[], &[])?.with_locked(&[resting])?;
@@ -140,7 +140,7 @@ fn one_joint(arm: &Arm, protocol: &Protocol, joint: usize, known: &[(usize, f64)
     })?;
     if let Some(run) = outcome.runs.iter().find(|run| run.estimate.is_none()) {
         let reason = run.reason.clone().unwrap_or_else(|| run.outcome.clone());
-        let problem = format!("run {} of joint {} tells nothing: {reason}", run.run, joint + 1);
+        let problem = format!("run {} of joint {} determines nothing: {reason}", run.run, joint + 1);
         return Err(IterationError::State { path: arm.description.clone(), problem });
     }
     let values = outcome.runs.iter().map(|run| {
@@ -179,7 +179,7 @@ fn iteration_settings(protocol: &Protocol) -> IterationSettings {
     settings
 }
 
-/// What is believed before the first run. The paper begins with zeros; a possible machine needs a mass: half a kilogram
+/// What is believed before the first run. The paper begins with zeros; a physically consistent set needs a mass: half a kilogram
 /// half way along each link.
 pub(crate) fn prior(literal: bool) -> Vec<f64> {
     let link = if literal { [0.0; 10] } else { [0.5, 0.25, 0.0, 0.0, 0.02, 0.0, 0.0, 0.2, 0.0, 0.2] };
@@ -190,7 +190,7 @@ fn table(number: usize, joint: usize, as_paper: &Runs, own: &Runs) -> PaperTable
     let title = format!("Inertial parameter identification values of the first three times of joint {}", joint + 1);
     let columns =
         ["parameter", "run", "paper", "its error", "as in the paper", "its error", "inside (18)", "its error"];
-    let note = "as in the paper: Table 3's stroke, the literal map, 100 Hz, every estimate straight into the controller; inside (18): the optimum's stroke, 1 kHz, the deviation from the reference differentiated, the possible machine in the controller";
+    let note = "as in the paper: Table 3's stroke, the literal map, 100 Hz, every estimate straight into the controller; inside (18): the optimum's stroke, 1 kHz, the deviation from the reference differentiated, the physically consistent set in the controller";
     let mut table = PaperTable::new(number, &title, &columns, note);
     for place in 0..3 {
         let truth = TRUTH[3 * joint + place];

@@ -42,7 +42,7 @@ pub struct PaperFile {
     /// Seed of all that is random.
     pub seed: u64,
     /// What was to be reached.
-    pub reached: Vec<Reached>,
+    pub reached: Vec<GoalFigures>,
     /// Tables 2 to 6, by number.
     pub tables: BTreeMap<String, PaperTable>,
     /// Figures 2 to 7, 9 to 17.
@@ -55,7 +55,7 @@ pub struct PaperFile {
 
 /// One goal.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Reached {
+pub struct GoalFigures {
     /// What is measured.
     pub what: String,
     /// Its value.
@@ -66,7 +66,7 @@ pub struct Reached {
     pub met: bool,
 }
 
-impl Reached {
+impl GoalFigures {
     fn at_most(what: &str, value: f64, goal: f64) -> Self {
         Self { what: what.to_owned(), value, goal, met: value <= goal }
     }
@@ -115,10 +115,10 @@ pub fn reproduce(out: &Path, seed: u64, options: &RunOptions<'_>) -> Result<Pape
         version: env!("CARGO_PKG_VERSION").to_owned(),
         seed,
         reached: vec![
-            Reached::at_most("observation matrix against Eq. 7", difference, 1e-12),
-            Reached::at_most("H of the optimum inside (18)", optimised.fitness[0], 161.3 * 1.001),
-            Reached::at_most("largest parameter error after three runs", runs.error_after_three, 0.007),
-            Reached::at_most("largest parameter error after six runs", runs.error_after_six, 1e-6),
+            GoalFigures::at_most("observation matrix against Eq. 7", difference, 1e-12),
+            GoalFigures::at_most("H of the optimum inside (18)", optimised.fitness[0], 161.3 * 1.001),
+            GoalFigures::at_most("largest parameter error after three runs", runs.error_after_three, 0.007),
+            GoalFigures::at_most("largest parameter error after six runs", runs.error_after_six, 1e-6),
         ],
         tables: tables.iter().map(|table| (table.number.to_string(), table.clone())).collect(),
         figures,

@@ -14,7 +14,7 @@ use dynident_report::LinePlot;
 const DELTA_RATE_HZ: f64 = 100.0;
 
 /// The paper's design problem, solved.
-pub(crate) struct Optimised {
+pub(crate) struct OptimumMotion {
     pub(crate) figure_7: PaperFigure,
     pub(crate) table_3: PaperTable,
     /// The optimum inside (18), joint 1 first.
@@ -24,7 +24,7 @@ pub(crate) struct Optimised {
 }
 
 /// Designs by the study in `out/study`, as `dynident design` does.
-pub(crate) fn optimised(arm: &Arm, seed: u64, options: &RunOptions<'_>) -> Result<Optimised, Error> {
+pub(crate) fn optimised(arm: &Arm, seed: u64, options: &RunOptions<'_>) -> Result<OptimumMotion, Error> {
     let mut study = Study::load(&arm.design)?;
     study.design.get_or_insert_default().search.seed = seed;
     let outcome = design_study(&study, &arm.design, options, |_| ControlFlow::Continue(()))?;
@@ -36,7 +36,7 @@ pub(crate) fn optimised(arm: &Arm, seed: u64, options: &RunOptions<'_>) -> Resul
     };
     let [optimum, genetic] =
         [&file.optimum_strokes, &file.strokes].map(|strokes| ["joint1", "joint2"].map(|joint| stroke(strokes, joint)));
-    Ok(Optimised {
+    Ok(OptimumMotion {
         figure_7: figure_7(&outcome.history, optimum_fitness),
         table_3: table_3(file, optimum, genetic),
         optimum,

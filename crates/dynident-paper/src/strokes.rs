@@ -38,7 +38,7 @@ fn spliced(omega: f64, period_s: f64, duration_s: f64) -> Option<(Vec<f64>, f64)
 pub(crate) fn figure_3() -> PaperFigure {
     let (q, rest) = spliced(1.0, 40.0, 40.0).unwrap_or_default();
     let plot = LinePlot::new("Spliced logistic function", "t, s", "q, rad", grid(40.0, POINTS)).line("A = 1, ω = 1", q);
-    PaperFigure::new(3, plot, "speed and acceleration at both ends and at the splice are below 1e-4")
+    PaperFigure::new(3, plot, "velocity and acceleration at both ends and at the splice are below 1e-4")
         .value("largest_rate_at_rest", rest)
 }
 

@@ -1,23 +1,23 @@
-//! What can go wrong between a log file and a motion: each message names the file, the place and the mend.
+//! What can go wrong between a log file and a motion: each message names the file, the place and the fix.
 
 use crate::place::LogPlace;
 use std::path::PathBuf;
 
 /// A [`LogFormat`](crate::LogFormat) that contradicts itself or the list of joints.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("log format, key `{key}`: {problem}; {mend}")]
+#[error("log format, key `{key}`: {problem}; {fix}")]
 pub struct FormatError {
     /// The key, dotted as in the study file: `torque.scale`.
     pub key: String,
     /// What is wrong with it.
     pub problem: String,
     /// What to write instead.
-    pub mend: String,
+    pub fix: String,
 }
 
 impl FormatError {
-    pub(crate) fn new(key: impl Into<String>, problem: impl Into<String>, mend: impl Into<String>) -> Self {
-        Self { key: key.into(), problem: problem.into(), mend: mend.into() }
+    pub(crate) fn new(key: impl Into<String>, problem: impl Into<String>, fix: impl Into<String>) -> Self {
+        Self { key: key.into(), problem: problem.into(), fix: fix.into() }
     }
 }
 
@@ -93,7 +93,7 @@ pub enum RecordingError {
         hint: String,
     },
     /// A row with too few or too many fields.
-    #[error("{place}: {found} fields where {expected} are expected; mend or delete the line{hint}")]
+    #[error("{place}: {found} fields where {expected} are expected; fix or delete the line{hint}")]
     RaggedRow {
         /// Where.
         place: LogPlace,
@@ -105,7 +105,7 @@ pub enum RecordingError {
         hint: &'static str,
     },
     /// A field that is no number.
-    #[error("{place}, column {column}: `{text}` is not a number; {mend}")]
+    #[error("{place}, column {column}: `{text}` is not a number; {fix}")]
     NotANumber {
         /// Where.
         place: LogPlace,
@@ -114,7 +114,7 @@ pub enum RecordingError {
         /// The field, shortened and escaped.
         text: String,
         /// What to do.
-        mend: &'static str,
+        fix: &'static str,
     },
     /// A field that is empty, NaN or infinite under `missing = "error"`.
     #[error("{place}, column {column}: `{text}` is not a finite number; set missing = \"drop\" to leave such rows out")]
@@ -201,7 +201,7 @@ pub enum RecordingError {
         /// What is wrong.
         problem: String,
     },
-    /// No sample at which a way that needs the commanded motion applies.
+    /// No sample at which a differentiator that needs the commanded motion applies.
     #[error(
         "{log}: at none of {samples} samples does {method} apply: the joints do not follow this reference; \
          check its file, start_s and max_lag_s"
@@ -243,14 +243,14 @@ fn no_rows(place: &LogPlace) -> String {
 #[non_exhaustive]
 pub enum FilterError {
     /// A setting outside its range.
-    #[error("filter setting `{name}` = {value}: {mend}")]
+    #[error("filter setting `{name}` = {value}: {fix}")]
     Setting {
         /// The setting.
         name: &'static str,
         /// Its value.
         value: f64,
         /// The range.
-        mend: &'static str,
+        fix: &'static str,
     },
     /// A cut-off at or above half the sampling rate.
     #[error("cut-off {cutoff_hz} Hz is not below half the sampling rate of {rate_hz} Hz; lower it")]
@@ -270,23 +270,23 @@ pub enum FilterError {
         /// Samples needed.
         needed: usize,
     },
-    /// A fit whose unknowns the samples do not tell apart.
-    #[error("{method}: {samples} samples do not determine the fit: {mend}")]
+    /// A fit whose unknowns the samples do not distinguish.
+    #[error("{method}: {samples} samples do not determine the fit: {fix}")]
     Undetermined {
         /// The differentiator.
         method: &'static str,
         /// Samples given.
         samples: usize,
         /// What to do.
-        mend: &'static str,
+        fix: &'static str,
     },
     /// A commanded motion that makes no sense.
     #[error("the reference motion is wrong: {problem}")]
     Reference {
-        /// What is wrong, and the mend.
+        /// What is wrong, and the fix.
         problem: String,
     },
-    /// A way that needs the commanded motion, without one.
+    /// A differentiator that needs the commanded motion, without one.
     #[error(
         "{method} needs the motion that was commanded: name its table, reference = \"trajectory.csv\", in the differentiator or in the log"
     )]

@@ -1,5 +1,5 @@
 //! **What was measured?** From a log to a motion: sources of rows, column mapping, units, clock and gaps, filters,
-//! every way from q to dq and ddq, and the parallel filter that decimates regressor and torque alike. All values are
+//! every differentiator, and the parallel filter that decimates regressor and torque alike. All values are
 //! SI.
 //!
 //! # Tour
@@ -10,8 +10,8 @@
 //! | the same of arrays in memory | [`JointSamples`], or [`MemoryLog`] for a table whose columns a format explains |
 //! | the same of anything else that gives rows | a type with [`LogSource`], made a [`Log`] |
 //! | the samples as logged, no filter | [`LogReader`] |
-//! | another way from q to dq and ddq | [`DifferentiatorSettings`] ([`derivative`] lists them); one's own: [`Differentiator`] |
-//! | ways that use the commanded motion | [`Reference`], [`MotionStream::following`] |
+//! | another differentiator | [`DifferentiatorSettings`] ([`derivative`] lists them); one's own: [`Differentiator`] |
+//! | differentiators that use the commanded motion | [`Reference`], [`MotionStream::following`] |
 //! | what was found on the way: gaps, dead channels, lags | [`MotionStream::report`], [`report`] |
 //! | a cut-off from the data | [`cutoff()`] |
 //! | regressor and torque through one filter, decimated | [`Decimator`] |

@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         KeyFigures::new()
             .judged("held-out torque error", "2.7 %", "second run", Tone::Good)
             .judged("parameters identified", "52 of 54", "two are not excited", Tone::Warning)
-            .judged("physically possible", "no", "", Tone::Bad)
+            .judged("physically consistent", "no", "", Tone::Bad)
             .figure("condition number", "48.6", ""),
     );
     page.add(Text::new("A paragraph.").point(Tone::Plain, "a point").point(Tone::Bad, "a bad one & its reason"));

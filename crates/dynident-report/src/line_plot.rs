@@ -183,7 +183,7 @@ impl LinePlot {
     }
 }
 
-/// The page's colours: told apart by people who see colours differently (Okabe and Ito), and dark enough on white.
+/// The page's colours: distinguished by people who see colours differently (Okabe and Ito), and dark enough on white.
 pub(crate) const COLOURS: [&str; 8] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00", "#56b4e9", "#7a3fb0", "#5f6368"];
 

@@ -3,23 +3,23 @@
 use crate::controllers::Controller;
 use crate::error::{SimulationError, require_length};
 use crate::feedback::Feedback;
+use crate::motion_buffer::{Arrays, MotionBuffer, ReferenceBuffer, Row};
 use crate::per_joint::PerJoint;
 use crate::plant::{Integrator, Plant};
 use crate::reference::Reference;
 use crate::run::{Divergence, LimitedQuantity, Run, RunStatus};
 use crate::sensors::SensorSettings;
-use crate::tape::{Arrays, ReferenceTape, Row, Tape};
 use dynident_model::Model;
 use serde::{Deserialize, Serialize};
 
-/// A speed that no robot has: beyond it a run counts as diverged, rad/s (m/s).
+/// A velocity that no robot has: beyond it a run counts as diverged, rad/s (m/s).
 const BEYOND: f64 = 1e4;
 
 /// Where a run starts.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Start {
-    /// On the reference, with its speed.
+    /// On the reference, with its velocity.
     #[default]
     Reference,
     /// On the reference's position, at rest.
@@ -28,7 +28,7 @@ pub enum Start {
     At {
         /// Positions, rad (m).
         q: Vec<f64>,
-        /// Speeds, rad/s (m/s).
+        /// Velocities, rad/s (m/s).
         dq: Vec<f64>,
     },
 }
@@ -46,7 +46,7 @@ pub struct RunLimits {
     /// Highest position, rad (m).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub upper: Option<PerJoint>,
-    /// Highest speed, rad/s (m/s).
+    /// Highest velocity, rad/s (m/s).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speed: Option<PerJoint>,
     /// Largest distance from the reference, rad (m).
@@ -55,7 +55,7 @@ pub struct RunLimits {
 }
 
 impl RunLimits {
-    /// Position, speed and torque limits of the description; where it has none, the largest number there is (infinity has no place in JSON).
+    /// Position, velocity and torque limits of the description; where it has none, the largest number there is (infinity has no place in JSON).
     pub fn of_model(model: &Model) -> Self {
         let each = |of: fn(&dynident_model::JointLimits) -> Option<f64>, none: f64| {
             Some(PerJoint::Each(model.joints().iter().map(|joint| of(&joint.limits).unwrap_or(none)).collect()))
@@ -72,7 +72,7 @@ impl RunLimits {
     /// Checks the numbers for so many joints.
     ///
     /// # Errors
-    /// Lists of another length, numbers that are not numbers, limits of torque, speed or error that are not positive.
+    /// Lists of another length, numbers that are not numbers, limits of torque, velocity or error that are not positive.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         self.values(joints).map(|_| ())
     }
@@ -162,7 +162,7 @@ pub fn closed_loop(
     require_length("joints of the reference", joints, reference.joints())?;
     require_length("joints of the controller", joints, controller.joints())?;
     let samples = reference.samples();
-    let mut target = ReferenceTape::new(reference);
+    let mut target = ReferenceBuffer::new(reference);
     target.go_to(0);
     match &settings.start {
         Start::Reference => plant.set_state(0.0, target.target().q, target.target().dq),
@@ -193,7 +193,7 @@ pub fn closed_loop(
     };
     let mut feedback = Feedback::new(&settings.sensors, plant, reference.rate_hz());
     let (mut tau, mut ddq) = (vec![0.0; joints], vec![0.0; joints]);
-    let mut tape = Tape::new(joints);
+    let mut tape = MotionBuffer::new(joints);
     let mut kept = 0;
     for sample in 0..samples {
         let time_s = run.time_s(sample);

@@ -9,14 +9,14 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum SimulationError {
     /// A number outside of its range.
-    #[error("{what} = {value}: {mend}")]
+    #[error("{what} = {value}: {fix}")]
     Value {
         /// The setting, as in a file.
         what: String,
         /// The value given.
         value: f64,
         /// What to do.
-        mend: &'static str,
+        fix: &'static str,
     },
     /// A list that has not one entry for each joint (or parameter).
     #[error("{what}: {found} entries where {expected} are needed")]
@@ -34,19 +34,19 @@ pub enum SimulationError {
         /// The controller.
         controller: &'static str,
     },
-    /// A law that acts on a joint which does not exist.
-    #[error("law {law} acts on a joint that the robot of {joints} joints does not have")]
-    LawJoint {
-        /// The law's symbol.
-        law: String,
+    /// A term that acts on a joint which does not exist.
+    #[error("term {term} acts on a joint that the robot of {joints} joints does not have")]
+    TermJoint {
+        /// The term's symbol.
+        term: String,
         /// How many joints there are.
         joints: usize,
     },
     /// Friction or inertia that would create energy.
-    #[error("{law} = {value}: a simulated robot needs zero or more")]
+    #[error("{term} = {value}: a simulated robot needs zero or more")]
     Negative {
-        /// The law's symbol.
-        law: String,
+        /// The term's symbol.
+        term: String,
         /// Its parameter.
         value: f64,
     },
@@ -67,8 +67,8 @@ pub enum SimulationError {
 ///
 /// # Errors
 /// As said.
-pub fn require(holds: bool, what: impl Into<String>, value: f64, mend: &'static str) -> Result<(), SimulationError> {
-    if holds { Ok(()) } else { Err(SimulationError::Value { what: what.into(), value, mend }) }
+pub fn require(holds: bool, what: impl Into<String>, value: f64, fix: &'static str) -> Result<(), SimulationError> {
+    if holds { Ok(()) } else { Err(SimulationError::Value { what: what.into(), value, fix }) }
 }
 
 /// `Ok` if the numbers are equal, else [`SimulationError::Length`].

@@ -2,7 +2,7 @@
 
 use crate::controllers::Measured;
 use crate::plant::Plant;
-use crate::sensors::{SensorSettings, SpeedSource};
+use crate::sensors::{SensorSettings, VelocitySource};
 use dynident_model::sample::Random;
 
 /// Distinguishes the stream of the feedback's noise from those of the record.
@@ -18,7 +18,7 @@ pub(crate) struct Feedback<'a> {
     dq: Vec<f64>,
     place: usize,
     slots: usize,
-    /// Share of a new difference in the filtered speed; the speed itself and the position before.
+    /// Share of a new difference in the filtered velocity; the velocity itself and the position before.
     share: f64,
     filtered: Vec<f64>,
     last_q: Vec<f64>,
@@ -33,8 +33,8 @@ impl<'a> Feedback<'a> {
         let joints = plant.dof();
         let slots = settings.feedback_delay_samples + 1;
         let share = match settings.speed {
-            SpeedSource::True => 1.0,
-            SpeedSource::Differences { cutoff_hz } => 1.0 - (-core::f64::consts::TAU * cutoff_hz / rate_hz).exp(),
+            VelocitySource::True => 1.0,
+            VelocitySource::Differences { cutoff_hz } => 1.0 - (-core::f64::consts::TAU * cutoff_hz / rate_hz).exp(),
         };
         Self {
             settings,
@@ -51,7 +51,7 @@ impl<'a> Feedback<'a> {
             started: false,
             perfect: settings.encoder_steps.is_none()
                 && (0..joints).all(|joint| settings.position_std.of(joint) == 0.0)
-                && settings.speed == SpeedSource::True
+                && settings.speed == VelocitySource::True
                 && slots == 1,
         }
     }
@@ -71,8 +71,8 @@ impl<'a> Feedback<'a> {
             let reading = self.settings.position(joint, q[joint], self.turns[joint], &mut self.random);
             self.q[own + joint] = reading;
             self.dq[own + joint] = match self.settings.speed {
-                SpeedSource::True => dq[joint],
-                SpeedSource::Differences { .. } => {
+                VelocitySource::True => dq[joint],
+                VelocitySource::Differences { .. } => {
                     if self.started {
                         let difference = (reading - self.last_q[joint]) * self.rate_hz;
                         self.filtered[joint] += self.share * (difference - self.filtered[joint]);

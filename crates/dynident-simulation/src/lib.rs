@@ -40,13 +40,13 @@ mod closed_loop;
 pub mod controllers;
 mod error;
 mod feedback;
+mod motion_buffer;
 mod per_joint;
 mod plant;
 mod record;
 mod reference;
 mod run;
 mod sensors;
-mod tape;
 
 pub use closed_loop::{LoopSettings, RunLimits, Start, closed_loop};
 pub use controllers::{Controller, ControllerModel, ControllerSettings, FrictionCompensation};
@@ -56,4 +56,4 @@ pub use plant::{Disturbance, Integrator, Plant, PlantFault, TimeCourse, with_len
 pub use record::Record;
 pub use reference::{Reference, ReferenceSample};
 pub use run::{Divergence, LimitedQuantity, Run, RunStatus};
-pub use sensors::{SensorSettings, SpeedSource};
+pub use sensors::{SensorSettings, VelocitySource};

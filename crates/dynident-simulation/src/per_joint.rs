@@ -42,7 +42,7 @@ impl PerJoint {
         &self,
         what: &str,
         joints: usize,
-        mend: &'static str,
+        fix: &'static str,
         holds: impl Fn(f64) -> bool,
     ) -> Result<Vec<f64>, SimulationError> {
         if let Self::Each(values) = self {
@@ -50,7 +50,7 @@ impl PerJoint {
         }
         let values: Vec<f64> = (0..joints).map(|joint| self.of(joint)).collect();
         for &value in &values {
-            require(holds(value), what, value, mend)?;
+            require(holds(value), what, value, fix)?;
         }
         Ok(values)
     }

@@ -39,7 +39,7 @@ pub enum RunStatus {
 pub enum LimitedQuantity {
     /// Position.
     Position,
-    /// Speed.
+    /// Velocity.
     Speed,
     /// Distance from the reference.
     TrackingError,
@@ -69,7 +69,7 @@ pub enum Divergence {
         /// The joint's place.
         joint: usize,
     },
-    /// A speed beyond all robots.
+    /// A velocity beyond all robots.
     Speed {
         /// The joint's place.
         joint: usize,
@@ -129,7 +129,7 @@ pub struct Run {
     pub reference: Arc<Motion>,
     /// True positions, rad (m).
     pub q: Vec<f64>,
-    /// True speeds.
+    /// True velocities.
     pub dq: Vec<f64>,
     /// True accelerations just after each sample, if they were asked for; else empty.
     pub ddq: Vec<f64>,
@@ -137,7 +137,7 @@ pub struct Run {
     pub tau: Vec<f64>,
     /// Positions as the controller saw them.
     pub measured_q: Vec<f64>,
-    /// Speeds as the controller saw them.
+    /// Velocities as the controller saw them.
     pub measured_dq: Vec<f64>,
     /// Per joint: the largest true distance from the reference, rad (m).
     pub max_error: Vec<f64>,

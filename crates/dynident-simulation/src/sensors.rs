@@ -5,10 +5,10 @@ use crate::per_joint::PerJoint;
 use dynident_model::sample::Random;
 use serde::{Deserialize, Serialize};
 
-/// Where the controller's speeds come from.
+/// Where the controller's velocities come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum SpeedSource {
+pub enum VelocitySource {
     /// A perfect tachometer.
     #[default]
     True,
@@ -43,9 +43,9 @@ pub struct SensorSettings {
     /// Step of recorded torques, Nm (N). Default none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_step: Option<PerJoint>,
-    /// Where the controller's speeds come from. Default true speeds.
-    pub speed: SpeedSource,
-    /// How many samples late the controller sees positions and speeds. Default 0.
+    /// Where the controller's velocities come from. Default true velocities.
+    pub speed: VelocitySource,
+    /// How many samples late the controller sees positions and velocities. Default 0.
     pub feedback_delay_samples: usize,
     /// Samples a second of the record. Default the controller's rate.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -70,7 +70,7 @@ impl Default for SensorSettings {
             torque_std: 0.0.into(),
             torque_correlation: 0.0,
             torque_step: None,
-            speed: SpeedSource::True,
+            speed: VelocitySource::True,
             feedback_delay_samples: 0,
             record_rate_hz: None,
             jitter_std_s: 0.0,
@@ -117,7 +117,7 @@ impl SensorSettings {
             self.torque_correlation,
             "give 0 or more, below 1",
         )?;
-        if let SpeedSource::Differences { cutoff_hz } = self.speed {
+        if let VelocitySource::Differences { cutoff_hz } = self.speed {
             require(cutoff_hz > 0.0 && cutoff_hz.is_finite(), "speed.cutoff_hz", cutoff_hz, "give a positive cut-off")?;
         }
         let delay = self.feedback_delay_samples;

@@ -3,8 +3,8 @@
 #![allow(unsafe_code, reason = "a global allocator cannot be written without")]
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use dynident_model::laws::{Coulomb, CoulombShape, DriveInertia, Law, MaxwellSlip, Stribeck, Viscous};
 use dynident_model::sample::random_tree;
+use dynident_model::terms::{Coulomb, CoulombShape, DriveInertia, MaxwellSlip, Stribeck, TorqueTerm, Viscous};
 use dynident_simulation::controllers::{
     ComputedTorqueSettings, FiniteTimeSettings, JointPdSettings, SlotineLiSettings,
 };
@@ -44,17 +44,17 @@ static ALLOCATOR: Counting = Counting;
 fn longer_runs_allocate_no_more_often() {
     let model = random_tree(3, 4);
     let shape = CoulombShape::Sign { dead_band: 0.0 };
-    let laws = [
-        Law::Coulomb(Coulomb { joint: 0, shape }),
-        Law::Stribeck(Stribeck { joint: 0, speed: 0.1, exponent: 2.0, shape }),
-        Law::Coulomb(Coulomb { joint: 1, shape: CoulombShape::Smooth { width: 0.01 } }),
-        Law::Viscous(Viscous { joint: 2 }),
-        Law::MaxwellSlip(MaxwellSlip { joint: 3, yield_displacement: 0.01 }),
-        Law::DriveInertia(DriveInertia { joint: 3 }),
+    let terms = [
+        TorqueTerm::Coulomb(Coulomb { joint: 0, shape }),
+        TorqueTerm::Stribeck(Stribeck { joint: 0, speed: 0.1, exponent: 2.0, shape }),
+        TorqueTerm::Coulomb(Coulomb { joint: 1, shape: CoulombShape::Smooth { width: 0.01 } }),
+        TorqueTerm::Viscous(Viscous { joint: 2 }),
+        TorqueTerm::MaxwellSlip(MaxwellSlip { joint: 3, yield_displacement: 0.01 }),
+        TorqueTerm::DriveInertia(DriveInertia { joint: 3 }),
     ];
     let values = [0.5, 0.2, 0.3, 0.4, 0.1, 0.2];
-    let mut plant = Plant::new(&model, &laws, &values).unwrap();
-    let believed = ControllerModel::new(&model, &laws, &values).unwrap();
+    let mut plant = Plant::new(&model, &terms, &values).unwrap();
+    let believed = ControllerModel::new(&model, &terms, &values).unwrap();
     let friction = FrictionCompensation::Reference;
     let controllers = [
         ControllerSettings::JointPd(JointPdSettings { kp: 50.0.into(), kd: 20.0.into() }),

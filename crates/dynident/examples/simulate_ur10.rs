@@ -4,13 +4,13 @@
 //! cargo run --release -p dynident --example simulate_ur10 -- examples/ur10_simulated
 //! ```
 //!
-//! The true machine is `robots/ur10.urdf` with masses, centres of mass and inertias changed by 10 to 15 %, and with drive inertia,
+//! The true robot is `robots/ur10.urdf` with masses, centres of mass and inertias changed by 10 to 15 %, and with drive inertia,
 //! viscous and Coulomb friction and a torque offset in every joint. `train.csv` and `test.csv` hold 20 s at 125 Hz each: what an encoder
 //! says of the position, and the torque with slightly coloured noise. `truth.json` holds the parameters. Same seed, same files.
 
 use dynident_dynamics::{BatchWorkspace, all_columns, inverse_dynamics_batch};
-use dynident_model::laws::{CoulombShape, DriveChoice, JointMotion, Law, laws_per_joint};
 use dynident_model::sample::Random;
+use dynident_model::terms::{CoulombShape, DriveChoice, JointMotion, TorqueTerm, terms_per_joint};
 use dynident_model::{InertialParameters, JointLimits, Model, read_urdf};
 use serde_json::json;
 use std::error::Error;
@@ -26,10 +26,10 @@ const RAMP_S: f64 = 2.0;
 const HARMONICS: usize = 6;
 /// Middle of the motion, rad: upper arm raised, elbow bent.
 const HOME_RAD: [f64; 6] = [0.0, -1.2, 1.1, -0.6, 0.8, 0.0];
-/// Largest departure from the middle, rad, and largest share of the limit of speed.
+/// Largest departure from the middle, rad, and largest share of the limit of velocity.
 const REACH_RAD: [f64; 6] = [2.4, 0.9, 1.3, 2.0, 2.0, 2.4];
 const SPEED_SHARE: f64 = 0.8;
-/// Speed at which the true Coulomb friction has reached 76 %, rad/s.
+/// Velocity at which the true Coulomb friction has reached 76 %, rad/s.
 const FRICTION_WIDTH: f64 = 0.01;
 const ENCODER_STEP_RAD: f64 = TAU / 131_072.0;
 const ENCODER_NOISE_RAD: f64 = 1e-5;
@@ -55,19 +55,19 @@ pub fn files() -> Result<Vec<(&'static str, String)>, Box<dyn Error>> {
     let mut random = Random::new(SEED);
     let robot = read_urdf(include_str!("../../../robots/ur10.urdf"))?.model;
     let truth = changed(&robot, &mut random)?;
-    let laws = laws_per_joint(&truth, |_| DriveChoice {
+    let terms = terms_per_joint(&truth, |_| DriveChoice {
         drive_inertia: true,
         viscous: true,
         coulomb: Some(CoulombShape::Smooth { width: FRICTION_WIDTH }),
         offset: true,
     });
     let drives: Vec<f64> = DRIVES.concat();
-    let mut log = || csv(&truth, &laws, &drives, &mut random);
+    let mut log = || csv(&truth, &terms, &drives, &mut random);
     let (train, test) = (log(), log());
-    Ok(vec![("train.csv", train), ("test.csv", test), ("truth.json", truth_json(&truth, &laws, &drives)?)])
+    Ok(vec![("train.csv", train), ("test.csv", test), ("truth.json", truth_json(&truth, &terms, &drives)?)])
 }
 
-/// The robot with other inertials. One factor for all moments of a body keeps it physically possible.
+/// The robot with other inertials. One factor for all moments of a body keeps it physically consistent.
 fn changed(robot: &Model, random: &mut Random) -> Result<Model, Box<dyn Error>> {
     let mut factor = || {
         let change = random.uniform(0.10, 0.15);
@@ -84,16 +84,16 @@ fn changed(robot: &Model, random: &mut Random) -> Result<Model, Box<dyn Error>> 
 }
 
 /// One log: a random motion, and what encoders and torque sensors make of it.
-fn csv(truth: &Model, laws: &[Law], drives: &[f64], random: &mut Random) -> String {
+fn csv(truth: &Model, terms: &[TorqueTerm], drives: &[f64], random: &mut Random) -> String {
     let (dof, samples) = (truth.dof(), (DURATION_S * RATE_HZ) as usize + 1);
     let [q, dq, ddq] = motion(truth, samples, random);
     let motion = JointMotion { samples, q: &q, dq: &dq, ddq: &ddq };
     let mut tau = vec![0.0; dof * samples];
     inverse_dynamics_batch(truth, &mut BatchWorkspace::new(truth), &motion, &mut tau);
     let mut column = vec![0.0; samples];
-    for (law, value) in laws.iter().zip(drives) {
-        for joint in law.joints() {
-            law.column(joint, &motion, &mut column);
+    for (term, value) in terms.iter().zip(drives) {
+        for joint in term.joints() {
+            term.column(joint, &motion, &mut column);
             for (tau, column) in tau[joint * samples..].iter_mut().zip(&column) {
                 *tau += value * column;
             }
@@ -125,11 +125,11 @@ fn csv(truth: &Model, laws: &[Law], drives: &[f64], random: &mut Random) -> Stri
 }
 
 /// Positions, velocities and accelerations, joint-major: a finite Fourier series about the home position, faded in and out, as large as
-/// reach and limit of speed allow.
+/// reach and limit of velocity allow.
 fn motion(model: &Model, samples: usize, random: &mut Random) -> [Vec<f64>; 3] {
     let mut out: [Vec<f64>; 3] = Default::default();
     for (joint, home) in HOME_RAD.iter().enumerate() {
-        // Smaller with frequency, so that every harmonic takes the same share of the speed.
+        // Smaller with frequency, so that every harmonic takes the same share of the velocity.
         let coefficients: Vec<[f64; 2]> =
             (1..=HARMONICS).map(|k| [(); 2].map(|()| random.uniform(-1.0, 1.0) / k as f64)).collect();
         let shape: Vec<[f64; 3]> = (0..samples).map(|s| faded_series(&coefficients, s as f64 / RATE_HZ)).collect();
@@ -169,9 +169,9 @@ fn envelope(t: f64) -> [f64; 3] {
     ]
 }
 
-fn truth_json(truth: &Model, laws: &[Law], drives: &[f64]) -> Result<String, Box<dyn Error>> {
+fn truth_json(truth: &Model, terms: &[TorqueTerm], drives: &[f64]) -> Result<String, Box<dyn Error>> {
     let values = truth.parameter_vector().into_iter().chain(drives.iter().copied());
-    let parameters: Vec<_> = all_columns(truth, laws)
+    let parameters: Vec<_> = all_columns(truth, terms)
         .iter()
         .zip(values)
         .map(|(column, value)| json!({ "symbol": column.symbol(), "value": value, "unit": column.unit() }))

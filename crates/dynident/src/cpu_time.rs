@@ -1,7 +1,7 @@
 //! The processor time of this process.
 
-/// Seconds of processor time, all threads together; `None` where the system does not tell.
-#[cfg_attr(unix, allow(clippy::unnecessary_wraps, reason = "other systems do not tell"))]
+/// Seconds of processor time, all threads together; `None` where the system does not say.
+#[cfg_attr(unix, allow(clippy::unnecessary_wraps, reason = "other systems do not say"))]
 pub(crate) fn cpu_seconds() -> Option<f64> {
     #[cfg(unix)]
     {

@@ -1,4 +1,4 @@
-//! Everything that can stop a job, each with the file, the place and the mend in its message.
+//! Everything that can stop a job, each with the file, the place and the fix in its message.
 
 use dynident_estimation::EstimationError;
 use dynident_identification::IdentificationError;
@@ -28,7 +28,7 @@ pub enum Error {
         line: u32,
         /// Column, from 1.
         column: u32,
-        /// What is wrong, and the mend.
+        /// What is wrong, and the fix.
         message: String,
     },
     /// A study that is wrong as a whole.
@@ -36,11 +36,11 @@ pub enum Error {
     Study {
         /// The study file.
         path: PathBuf,
-        /// What is wrong, and the mend.
+        /// What is wrong, and the fix.
         message: String,
     },
     /// A file of the study that is in none of its folders.
-    #[error("{} is in none of the study's folders (tried {}); mend its path, or name its folder with --data{}",
+    #[error("{} is in none of the study's folders (tried {}); fix its path, or name its folder with --data{}",
         file.display(), list(tried), source_of_data.as_ref().map_or(String::new(), |s| format!(". The recordings are public: {s}")))]
     Missing {
         /// The file.
@@ -53,7 +53,7 @@ pub enum Error {
     /// A robot description that cannot be read.
     #[error(transparent)]
     Robot(Box<ReadError>),
-    /// A machine that does not fit together.
+    /// A robot that does not fit together.
     #[error("{}: {source}", path.display())]
     Model {
         /// The robot description or study.
@@ -70,7 +70,7 @@ pub enum Error {
         source: Box<RecordingError>,
     },
     /// A report that could not be put together.
-    #[error("report.html: {0}; this is a defect of the program: please tell its authors")]
+    #[error("report.html: {0}; this is a defect of the program: please report it")]
     Report(#[from] dynident_report::ReportError),
     /// A parallel filter that does not exist at the log's rate.
     #[error("log `{log}`, [parallel_filter]: {source}")]
@@ -102,7 +102,7 @@ pub enum Error {
         /// Samples that one filtered row needs.
         needed: usize,
     },
-    /// An estimate that is not possible.
+    /// An estimate that cannot be made.
     #[error("{}: {source}", path.display())]
     Estimation {
         /// The study file.
@@ -117,7 +117,7 @@ pub enum Error {
         path: PathBuf,
         /// The method.
         method: &'static str,
-        /// What is wrong, and the mend.
+        /// What is wrong, and the fix.
         message: String,
     },
     /// Instruments that do not belong to the log.
@@ -125,7 +125,7 @@ pub enum Error {
     Instruments {
         /// The log.
         log: String,
-        /// What is wrong, and the mend.
+        /// What is wrong, and the fix.
         message: String,
     },
     /// A result that does not belong to the study.
@@ -133,7 +133,7 @@ pub enum Error {
     Result {
         /// The result file.
         path: PathBuf,
-        /// What is wrong, and the mend.
+        /// What is wrong, and the fix.
         message: String,
     },
     /// A table of states that cannot be used.
@@ -143,7 +143,7 @@ pub enum Error {
         path: PathBuf,
         /// Line, from 1.
         line: u64,
-        /// What is wrong, and the mend.
+        /// What is wrong, and the fix.
         message: String,
     },
     /// An output that cannot be written. What was there before is untouched.

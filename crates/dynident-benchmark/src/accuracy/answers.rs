@@ -59,7 +59,7 @@ pub(super) fn robust(rows: &Rows<'_>, weight: RowWeight) -> Result<Answer, Ident
     Ok(answer(found.estimate))
 }
 
-/// Instruments are the regressor of what the controller was told to do.
+/// Instruments are the regressor of what the controller was commanded to do.
 pub(super) fn instrumental(trial: &Trial<'_>) -> Result<Answer, IdentificationError> {
     let instruments = filtered(trial, &with_motion(trial, &trial.scenario.reference), trial.cutoff_hz)?;
     let problem = trial.rows.instrumented(&instruments)?;

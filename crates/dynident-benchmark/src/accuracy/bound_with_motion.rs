@@ -1,4 +1,4 @@
-//! The Cramér-Rao bound for estimators that are not told the motion.
+//! The Cramér-Rao bound for estimators that are not given the motion.
 
 use super::noise::NoiseLevel;
 use super::scenario::{RATE_HZ, SERIES, Scenario};

@@ -3,7 +3,7 @@
 use super::answers::{estimated, instrumental, physical, robust, simultaneous, true_motion, weighted, wide};
 use super::rows::Rows;
 use super::scenario::{Record, Scenario};
-use super::shared::Shared;
+use super::shared::TrialData;
 use dynident_estimation::{CovarianceMethod, RowWeight};
 use dynident_identification::IdentificationError;
 use dynident_identification::estimators::{Estimator, NoiseLevels};
@@ -12,7 +12,7 @@ use dynident_recording::MotionBlock;
 /// One simulated experiment, as estimators see it.
 #[derive(Debug)]
 pub struct Trial<'a> {
-    /// The machine and its excitation. Estimators may use the model's structure and the reference motion; its true parameters are for the judge.
+    /// The robot and its excitation. Estimators may use the model's structure and the reference motion; its true parameters are for the judge.
     pub scenario: &'a Scenario,
     /// What encoders and torque sensors said.
     pub record: &'a Record,
@@ -24,10 +24,10 @@ pub struct Trial<'a> {
     pub rows: &'a Rows<'a>,
     /// Where an iterative estimator starts: the true base parameters with 15 % Gaussian error.
     pub start: &'a [f64],
-    /// A drawing office's idea of the machine: every body's ten true parameters times a common factor with 15 % Gaussian error, no friction and no drives.
+    /// A drawing office's idea of the robot: every body's ten true parameters times a common factor with 15 % Gaussian error, no friction and no drives.
     pub prior: &'a [f64],
     /// What several estimators need, made once.
-    pub(super) shared: &'a Shared<'a>,
+    pub(super) shared: &'a TrialData<'a>,
 }
 
 /// What an estimator says.
@@ -118,7 +118,7 @@ pub const ESTIMATORS: &[BenchmarkEstimator] = &[
         let rows = trial.shared.periodic(trial)?;
         estimated(rows, Estimator::NoiseWeighted(NoiseLevels::default()), CovarianceMethod::Jackknife)
     }),
-    entry("physical", "the possible machine that fits those rows best", physical),
+    entry("physical", "the physically consistent set that fits those rows best", physical),
     entry(
         "simultaneous",
         "Fourier series of the motion and parameters from one likelihood, torque noise autoregressive",

@@ -12,7 +12,7 @@ pub struct ParameterFigures {
     pub truth: f64,
     /// The Cramér-Rao bound on its standard deviation.
     pub bound: f64,
-    /// The same bound when the motion is unknown as well, and only positions as noisy as these tell of it.
+    /// The same bound when the motion is unknown as well, and only positions as noisy as these hold information about it.
     pub bound_with_motion: f64,
     /// Mean error of the runs that did not fail.
     pub bias: f64,
@@ -39,7 +39,7 @@ pub struct CellFigures {
     pub bias_over_bound: Option<f64>,
     /// `√(mean over parameters of (RMSE/bound)²)`: 1 is the best that any unbiased estimator can do.
     pub rmse_over_bound: Option<f64>,
-    /// `√(mean over parameters of (RMSE/bound_with_motion)²)`: 1 is the best that any unbiased estimator can do that is not told the motion.
+    /// `√(mean over parameters of (RMSE/bound_with_motion)²)`: 1 is the best that any unbiased estimator can do that is not given the motion.
     pub rmse_over_bound_with_motion: Option<f64>,
     /// The parameter that is worst by RMSE over bound.
     pub worst_parameter: Option<String>,

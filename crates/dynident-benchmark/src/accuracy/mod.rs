@@ -22,7 +22,7 @@ pub use rows::Rows;
 pub use scenario::{DURATION_S, HARMONICS, RATE_HZ, Record, Scenario};
 
 use bound_with_motion::BoundWithMotion;
-use shared::Shared;
+use shared::TrialData;
 use thread_time::thread_seconds;
 
 use dynident_identification::{IdentificationError, Progress};
@@ -263,7 +263,7 @@ fn one_run(
     let (motion, cutoff_hz) = pipeline::motion(&record)
         .map_err(|source| BenchmarkError::Filter { robot: scenario.robot.to_owned(), source })?;
     let rows = Rows::new(scenario, &motion, Some(cutoff_hz))?;
-    let shared = Shared::default();
+    let shared = TrialData::default();
     let trial = Trial {
         scenario,
         record: &record,
@@ -285,7 +285,7 @@ fn one_run(
         .collect())
 }
 
-/// FNV-1a: a seed from a place, the same on every machine.
+/// FNV-1a: a seed from a place, the same on every robot.
 fn hash(bytes: &[u8]) -> u64 {
     let mut hasher = FnvHasher::default();
     hasher.write(bytes);

@@ -22,7 +22,7 @@ pub struct NoiseLevel {
 }
 
 impl NoiseLevel {
-    /// Standard deviation of a position as the encoder tells it, rad: noise, and rounding to its steps.
+    /// Standard deviation of a position as the encoder reports it, rad: noise, and rounding to its steps.
     pub(super) fn position_std_rad(&self) -> f64 {
         let step = self.encoder_steps.map_or(0.0, |steps| core::f64::consts::TAU / f64::from(steps));
         self.position_std_deg.to_radians().hypot(step / 12.0_f64.sqrt())

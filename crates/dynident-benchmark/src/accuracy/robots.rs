@@ -1,9 +1,9 @@
-//! The machines of the benchmark.
+//! The robots of the benchmark.
 
 use super::BenchmarkError;
 use dynident_model::{Model, read_urdf};
 
-/// A machine that the benchmark knows.
+/// A robot that the benchmark knows.
 #[derive(Clone, Copy, Debug)]
 pub struct BenchmarkRobot {
     /// Its name on the command line.
@@ -12,7 +12,7 @@ pub struct BenchmarkRobot {
     urdf: &'static str,
 }
 
-/// The registry: one line for each machine.
+/// The registry: one line for each robot.
 pub const ROBOTS: &[BenchmarkRobot] = &[
     BenchmarkRobot { name: "planar2r", urdf: include_str!("../../robots/planar2r.urdf") },
     BenchmarkRobot { name: "ur10", urdf: include_str!("../../robots/ur10.urdf") },

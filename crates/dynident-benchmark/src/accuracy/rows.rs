@@ -38,9 +38,9 @@ struct Block {
 }
 
 /// Keeps rows as they leave the parallel filter.
-struct Keeping(Vec<Block>);
+struct BlockStore(Vec<Block>);
 
-impl RowConsumer for Keeping {
+impl RowConsumer for BlockStore {
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
         self.0.push(Block { joint: rows.joint, rows: rows.rows, panel: rows.panel.to_vec() });
         Ok(())
@@ -93,7 +93,7 @@ impl<'a> Rows<'a> {
         if let Some(blocks) = self.blocks.get() {
             return Ok(blocks);
         }
-        let mut kept = Keeping(Vec::new());
+        let mut kept = BlockStore(Vec::new());
         logs(self.scenario, &self.recordings, &self.settings)?.pass(&self.scenario.model, 0).run(&mut kept)?;
         Ok(self.blocks.get_or_init(|| kept.0))
     }

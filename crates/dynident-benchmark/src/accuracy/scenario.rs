@@ -1,4 +1,4 @@
-//! A machine with true parameters and an excitation, and what a recording of it looks like.
+//! A robot with true parameters and an excitation, and what a recording of it looks like.
 //!
 //! The motion is given, not simulated: the excitation trajectory followed with the small smooth error that a speed-proportional lag leaves, `q = q_d - ε q̇_d`. Torque is exact inverse dynamics
 //! with friction plus noise. There is no controller, so torque noise does not feed back into the motion.
@@ -12,8 +12,8 @@ use dynident_excitation::{Family, Motion};
 use dynident_identification::RegressorModel;
 use dynident_identification::estimators::FourierSeries;
 use dynident_model::Model;
-use dynident_model::laws::{CoulombShape, DriveChoice, JointMotion, Law, TermAction, laws_per_joint};
 use dynident_model::sample::Random;
+use dynident_model::terms::{CoulombShape, DriveChoice, JointMotion, TermAction, TorqueTerm, terms_per_joint};
 use nalgebra::DMatrix;
 
 /// Samples per second of a recording.
@@ -35,14 +35,14 @@ const COULOMB_WIDTH: f64 = 0.02;
 /// Joints without limits get these, so that the excitation is finite.
 const SPEED_RAD_S: f64 = 2.0;
 
-/// A machine, its excitation, and the truth about both.
+/// A robot, its excitation, and the truth about both.
 #[derive(Debug)]
 pub struct Scenario {
     /// The robot's name.
     pub robot: &'static str,
     /// The robot.
     pub model: RegressorModel,
-    /// What the controller was told to do.
+    /// What the controller was commanded to do.
     pub reference: Motion,
     pub(super) truth: Vec<f64>,
     pub(super) motion: Motion,
@@ -71,22 +71,22 @@ impl Scenario {
             coulomb: Some(CoulombShape::Smooth { width: COULOMB_WIDTH }),
             offset: true,
         };
-        let laws = laws_per_joint(&model, |_| drive);
-        let made = ParametricModel::new(model, laws).map_err(|source| BenchmarkError::Excitation {
+        let terms = terms_per_joint(&model, |_| drive);
+        let made = ParametricModel::new(model, terms).map_err(|source| BenchmarkError::Excitation {
             robot: robot.name.to_owned(),
             reason: source.to_string(),
         })?;
         let parametric = RegressorModel::from(made);
-        let (model, laws, layout) = (parametric.model(), parametric.laws(), parametric.layout());
+        let (model, terms, layout) = (parametric.model(), parametric.terms(), parametric.layout());
         let (base, reference) = (parametric.base(), excitation(robot, model, layout, seed)?);
         let motion = followed(&reference);
         let mut parameters = model.parameter_vector();
-        parameters.extend(vec![0.0; laws.len()]);
+        parameters.extend(vec![0.0; terms.len()]);
         let bodies_only = torque(model, layout, &motion, &base.values(&parameters));
-        let first = parameters.len() - laws.len();
-        for (law, value) in laws.iter().zip(&mut parameters[first..]) {
-            let joint = law.joints()[0];
-            *value = drive_value(law, &motion, &bodies_only[motion.of(joint)], joint);
+        let first = parameters.len() - terms.len();
+        for (term, value) in terms.iter().zip(&mut parameters[first..]) {
+            let joint = term.joints()[0];
+            *value = drive_value(term, &motion, &bodies_only[motion.of(joint)], joint);
         }
         let truth = base.values(&parameters);
         let torque = torque(model, layout, &motion, &truth);
@@ -130,7 +130,7 @@ impl Scenario {
                 *value *= factor;
             }
         }
-        prior.extend(vec![0.0; self.model.laws().len()]);
+        prior.extend(vec![0.0; self.model.terms().len()]);
         prior
     }
 
@@ -172,11 +172,11 @@ impl Scenario {
 }
 
 /// Drives in proportion to what the bodies ask of the joint: viscous and Coulomb friction of 15 % each, drive inertia of 20 %, an offset of 3 % of the root mean square torque of inertia and gravity.
-fn drive_value(law: &Law, motion: &Motion, bodies: &[f64], joint: usize) -> f64 {
+fn drive_value(term: &TorqueTerm, motion: &Motion, bodies: &[f64], joint: usize) -> f64 {
     let rms = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();
     // A joint that the bodies hardly load (a last link about its own axis) has friction all the same.
     let torque = rms(bodies).max(0.5);
-    match law.action() {
+    match term.action() {
         TermAction::Damping { .. } => 0.15 * torque / rms(&motion.dq[motion.of(joint)]),
         TermAction::Inertia { .. } => 0.20 * torque / rms(&motion.ddq[motion.of(joint)]),
         TermAction::Friction(_) | TermAction::Hysteresis => 0.15 * torque,

@@ -10,7 +10,7 @@ use dynident_recording::MotionBlock;
 
 /// One trial's shared work.
 #[derive(Debug, Default)]
-pub(super) struct Shared<'a> {
+pub(super) struct TrialData<'a> {
     periodic: OnceCell<Option<Periodic<'a>>>,
     spent_s: Cell<f64>,
 }
@@ -22,7 +22,7 @@ struct Periodic<'a> {
     rows: Rows<'a>,
 }
 
-impl<'a> Shared<'a> {
+impl<'a> TrialData<'a> {
     /// Seconds spent here so far.
     pub(super) fn spent_s(&self) -> f64 {
         self.spent_s.get()

@@ -1,6 +1,6 @@
 //! Families and criteria of excitation design side by side: the same limits, the same processor time. Prints the table of the book's page on designs.
 //!
-//! Time is that of this process on one core, so that what else the machine does counts little: designs of a modest budget follow one another, each with the next seed, until the time is used
+//! Time is that of this process on one core, so that what else the robot does counts little: designs of a modest budget follow one another, each with the next seed, until the time is used
 //! up, and the best stands in the table.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing a table is what this program is for")]
@@ -41,7 +41,7 @@ const FAMILIES: [(&str, &str); 9] = [
     ("Fourier, 5 harmonics", r#"kind = "fourier""#),
     ("Fourier, 10 harmonics", "kind = \"fourier\"\nharmonics = 10"),
     ("multisine, 10 harmonics", "kind = \"multisine\"\nharmonics = 10"),
-    ("quintics, 9 way-points", "kind = \"quintic\"\nway_points = 9"),
+    ("quintics, 9 waypoints", "kind = \"quintic\"\nway_points = 9"),
     ("B-spline, 40 points", "kind = \"b-spline\"\ncontrol_points = 40"),
     ("B-spline, 60 points", "kind = \"b-spline\"\ncontrol_points = 60"),
     ("logistic strokes, 6 overlapping", r#"kind = "logistic-strokes""#),

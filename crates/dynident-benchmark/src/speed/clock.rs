@@ -62,7 +62,7 @@ impl Report<'_> {
     }
 }
 
-/// One line about the machine. Without an `algo` it is no figure.
+/// One line about the robot. Without an `algo` it is no figure.
 pub(crate) fn environment(levels: &[Level]) -> String {
     let processor = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let processor = processor.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));

@@ -4,8 +4,8 @@ use super::clock::Report;
 use dynident_dynamics::{Workspace, mass_matrix};
 use dynident_excitation::Motion;
 use dynident_model::Model;
-use dynident_model::laws::{Coulomb, CoulombShape, Law};
 use dynident_model::sample::Random;
+use dynident_model::terms::{Coulomb, CoulombShape, TorqueTerm};
 use dynident_simulation::controllers::{FiniteTimeSettings, JointPdSettings};
 use dynident_simulation::{
     ControllerModel, ControllerSettings, Integrator, LoopSettings, Plant, Reference, SimulationError, Start,
@@ -42,8 +42,8 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), Simulat
     }
     // Dry friction in every joint, as many Nm as the mass matrix' diagonal at zero has kg m²: some joints stick, some slide.
     let shape = CoulombShape::Sign { dead_band: 0.0 };
-    let laws: Vec<Law> = (0..dof).map(|joint| Law::Coulomb(Coulomb { joint, shape })).collect();
-    let mut rough = Plant::new(model, &laws, &scaled(1.0))?;
+    let terms: Vec<TorqueTerm> = (0..dof).map(|joint| TorqueTerm::Coulomb(Coulomb { joint, shape })).collect();
+    let mut rough = Plant::new(model, &terms, &scaled(1.0))?;
     let settings = LoopSettings { integrator: EULER, start, ..LoopSettings::default() };
     closed_loop(&mut rough, controller.as_mut(), &reference, &settings)?;
     report.time("pd_step_euler_friction", SAMPLES, || {

@@ -32,7 +32,7 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>) {
     let speeds: Vec<f64> = joints.iter().map(|joint| joint.limits.velocity.unwrap_or(2.0)).collect();
     let parameters = family.random(&ranges, &speeds, &mut Random::new(1));
     let times = grid(10.0, SAMPLES);
-    let (mut motion, mut cotangent) = (Motion::default(), Motion::default());
+    let (mut motion, mut adjoint) = (Motion::default(), Motion::default());
     let (mut workspace, mut values) = (limits.workspace(), Vec::new());
     let mut gradient = vec![0.0; family.parameters()];
     report.time("design_gradient_256", 1, || {
@@ -40,13 +40,13 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>) {
         limits.values(&mut workspace, &motion, &mut values);
         let d = information.of(&motion, 1.0);
         if let Some((_, by_information)) = DOptimal.value_and_derivative(&d) {
-            cotangent.reset(motion.joints, motion.samples);
+            adjoint.reset(motion.joints, motion.samples);
             // As in a search: only what is broken has a weight.
             let weights: Vec<f64> = values.iter().map(|value| value.max(0.0)).collect();
-            limits.pull_back(&mut workspace, &motion, &weights, &mut cotangent);
-            information.pull_back(&motion, 1.0, &by_information, &mut cotangent);
+            limits.apply_adjoint(&mut workspace, &motion, &weights, &mut adjoint);
+            information.apply_adjoint(&motion, 1.0, &by_information, &mut adjoint);
             gradient.fill(0.0);
-            family.pull_back(&parameters, &times, &cotangent, &mut gradient);
+            family.apply_adjoint(&parameters, &times, &adjoint, &mut gradient);
         }
         black_box(&gradient);
     });

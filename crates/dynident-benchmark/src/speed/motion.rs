@@ -79,7 +79,7 @@ impl Motion {
         (0..self.samples).map(|s| [at(&self.q, s), at(&self.dq, s), at(&self.ddq, s)]).collect()
     }
 
-    pub(crate) fn view(&self) -> dynident_model::laws::JointMotion<'_> {
-        dynident_model::laws::JointMotion { samples: self.samples, q: &self.q, dq: &self.dq, ddq: &self.ddq }
+    pub(crate) fn view(&self) -> dynident_model::terms::JointMotion<'_> {
+        dynident_model::terms::JointMotion { samples: self.samples, q: &self.q, dq: &self.dq, ddq: &self.ddq }
     }
 }

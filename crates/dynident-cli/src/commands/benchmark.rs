@@ -1,6 +1,6 @@
 //! `dynident benchmark`.
 
-use super::{Context, json, pretty_json, told};
+use super::{Context, json, message_of, pretty_json};
 use crate::{Verdict, summary, terminal};
 use dynident::{check_writable, write_whole};
 use dynident_benchmark::accuracy::{BenchmarkSettings, benchmark, cells_csv};
@@ -41,13 +41,13 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     };
     settings.validate().map_err(|error| error.to_string())?;
     if let Some(out) = &options.out {
-        check_writable(out).map_err(told)?;
+        check_writable(out).map_err(message_of)?;
     }
     let file = benchmark(&settings, &*context.progress()).map_err(|error| error.to_string())?;
     if let Some(out) = &options.out {
-        write_whole(&out.join("benchmark.csv"), cells_csv(&file.cells).as_bytes()).map_err(told)?;
+        write_whole(&out.join("benchmark.csv"), cells_csv(&file.cells).as_bytes()).map_err(message_of)?;
         // The JSON last: where it stands, everything stands.
-        write_whole(&out.join("benchmark.json"), &pretty_json(&file)?).map_err(told)?;
+        write_whole(&out.join("benchmark.json"), &pretty_json(&file)?).map_err(message_of)?;
     }
     if context.json {
         terminal::print(&json(&file)?);

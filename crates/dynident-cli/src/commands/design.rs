@@ -1,7 +1,7 @@
 //! `dynident design STUDY.toml --out DIR`.
 
 use super::search::Search;
-use super::{Context, json, pretty_json, told, told_in};
+use super::{Context, json, known_in, message_of, pretty_json};
 use crate::{Verdict, summary, terminal};
 use clap::ValueEnum;
 use dynident::excitation::DesignProgress;
@@ -24,7 +24,7 @@ pub(crate) struct Options {
     /// Do not search: judge this trajectory (t_s, q1.., dq1.., ddq1.. or positions alone) against the study's limits, with a forecast.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["check_log", "seed"])]
     check: Option<PathBuf>,
-    /// Do not search: judge a log of the study, by its name or file: what the finished run tells about each parameter.
+    /// Do not search: judge a log of the study, by its name or file: what the finished run determines about each parameter.
     #[arg(long, value_name = "NAME", conflicts_with = "seed")]
     check_log: Option<String>,
     /// Seed of the random starts, in place of the study's.
@@ -57,11 +57,11 @@ fn rate(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
-    let mut study = Study::load(&options.study).map_err(told)?;
+    let mut study = Study::load(&options.study).map_err(message_of)?;
     if let Some(seed) = options.seed {
         study.design.get_or_insert_default().search.seed = seed;
     }
-    check_writable(&options.out).map_err(told)?;
+    check_writable(&options.out).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let search = Search::new(context);
@@ -71,17 +71,17 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         (None, Some(log)) => check_log(&study, &options.study, log, &run),
         (None, None) => design_study(&study, &options.study, &run, watch),
     };
-    let outcome = outcome.map_err(told_in(&options.study))?;
+    let outcome = outcome.map_err(known_in(&options.study))?;
     search.end();
     if Search::stopped() {
         terminal::remark("stopped: this is the best motion so far");
     }
     let files = files(&outcome, options)?;
     for (name, contents) in &files {
-        write_whole(&options.out.join(name), contents).map_err(told)?;
+        write_whole(&options.out.join(name), contents).map_err(message_of)?;
     }
     // The design last: where it stands, everything stands.
-    write_whole(&options.out.join("design.json"), &pretty_json(&outcome.file)?).map_err(told)?;
+    write_whole(&options.out.join("design.json"), &pretty_json(&outcome.file)?).map_err(message_of)?;
     if !outcome.file.feasible && !options.to.is_empty() {
         terminal::remark("no file for the robot was written: the motion breaks its limits");
     }
@@ -106,14 +106,14 @@ fn files(outcome: &DesignOutcome, options: &Options) -> Result<Vec<(&'static str
         at(rate_hz, &|sampled| write(sampled).map_err(|error| error.to_string()))
     };
     let mut files = vec![
-        ("preview.svg", outcome.preview_svg().map_err(told)?.into_bytes()),
-        ("path.svg", outcome.path_svg().map_err(told)?.into_bytes()),
+        ("preview.svg", outcome.preview_svg().map_err(message_of)?.into_bytes()),
+        ("path.svg", outcome.path_svg().map_err(message_of)?.into_bytes()),
     ];
     // Who brings a trajectory has it, maybe under this very name.
     if file.given.is_none() {
         files.insert(0, ("trajectory.csv", plain(trajectory_csv)?));
     }
-    if let Some(picture) = outcome.fitness_svg().map_err(told)? {
+    if let Some(picture) = outcome.fitness_svg().map_err(message_of)? {
         files.push(("fitness.csv", fitness_csv(&outcome.history).into_bytes()));
         files.push(("fitness.svg", picture.into_bytes()));
     }

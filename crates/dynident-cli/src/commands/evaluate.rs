@@ -1,6 +1,6 @@
 //! `dynident evaluate ROBOT --states S.csv --quantity Q`.
 
-use super::{Context, json, told};
+use super::{Context, json, message_of};
 use crate::{Verdict, terminal};
 use clap::ValueEnum;
 use dynident::Quantity;
@@ -46,9 +46,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let robot = dynident::model::load_robot(&options.robot).map_err(|error| error.to_string())?;
     if context.json || options.out.is_some() {
         let mut table = Vec::new();
-        let rows = dynident::evaluate(&robot.model, &options.states, quantity, &mut table).map_err(told)?;
+        let rows = dynident::evaluate(&robot.model, &options.states, quantity, &mut table).map_err(message_of)?;
         if let Some(path) = &options.out {
-            dynident::write_whole(path, &table).map_err(told)?;
+            dynident::write_whole(path, &table).map_err(message_of)?;
         }
         if context.json {
             let table = String::from_utf8_lossy(&table);
@@ -65,7 +65,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     match flushed {
         // A reader that has gone (`| head`) has seen what it wanted.
         Err(dynident::Error::Output { source, .. }) if source.kind() == io::ErrorKind::BrokenPipe => Ok(Verdict::Good),
-        done => done.map(|()| Verdict::Good).map_err(told),
+        done => done.map(|()| Verdict::Good).map_err(message_of),
     }
 }
 

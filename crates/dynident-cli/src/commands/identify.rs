@@ -1,6 +1,6 @@
 //! `dynident identify STUDY.toml --out DIR`.
 
-use super::{Context, json, judged, pretty_json, told, told_in};
+use super::{Context, json, judged, known_in, message_of, pretty_json};
 use crate::{Verdict, summary, terminal};
 use dynident::{RunOptions, Study, check_writable, identify, write_whole};
 use std::path::PathBuf;
@@ -25,22 +25,22 @@ pub(crate) struct Options {
 }
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
-    let study = Study::load(&options.study).map_err(told)?;
-    check_writable(&options.out).map_err(told)?;
+    let study = Study::load(&options.study).map_err(message_of)?;
+    check_writable(&options.out).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
-    let identification = identify(&study, &options.study, &run).map_err(told_in(&options.study))?;
+    let identification = identify(&study, &options.study, &run).map_err(known_in(&options.study))?;
     let result = &identification.result;
     if let Some(urdf) = &identification.urdf {
-        write_whole(&options.out.join(URDF), urdf.as_bytes()).map_err(told)?;
+        write_whole(&options.out.join(URDF), urdf.as_bytes()).map_err(message_of)?;
     } else if options.out.join(URDF).exists() {
         let old = options.out.join(URDF);
         terminal::remark(&format!("{} is of an earlier run and does not belong to this result", old.display()));
     }
-    let report = identification.report().map_err(told)?;
-    write_whole(&options.out.join("report.html"), report.as_bytes()).map_err(told)?;
+    let report = identification.report().map_err(message_of)?;
+    write_whole(&options.out.join("report.html"), report.as_bytes()).map_err(message_of)?;
     // The result last: where it stands, everything stands.
-    write_whole(&options.out.join("result.json"), &pretty_json(result)?).map_err(told)?;
+    write_whole(&options.out.join("result.json"), &pretty_json(result)?).map_err(message_of)?;
     if context.json {
         terminal::print(&json(result)?);
     } else if !context.quiet {

@@ -1,7 +1,7 @@
 //! `dynident iterate STUDY.toml --out DIR`.
 
 use super::search::Search;
-use super::{Context, json, told, told_in};
+use super::{Context, json, known_in, message_of};
 use crate::{Verdict, summary, terminal};
 use dynident::study::LegOrder;
 use dynident::{IterationWatch, RunOptions, Study, check_writable, iterate_study};
@@ -27,11 +27,11 @@ pub(crate) struct Options {
 }
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
-    let mut study = Study::load(&options.study).map_err(told)?;
+    let mut study = Study::load(&options.study).map_err(message_of)?;
     if let Some(seed) = options.seed {
         study.simulation.get_or_insert_default().sensors.seed = seed;
     }
-    check_writable(&options.out).map_err(told)?;
+    check_writable(&options.out).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let search = Search::new(context);
@@ -43,7 +43,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let mut watch = IterationWatch { design: &|at| search.hear(at), run: &mut hear };
     let file = iterate_study(&study, &options.study, &options.out, !options.fresh, &run, &mut watch);
     progress.end();
-    let file = file.map_err(told_in(&options.study))?;
+    let file = file.map_err(known_in(&options.study))?;
     search.end();
     if context.json {
         terminal::print(&json(&file)?);

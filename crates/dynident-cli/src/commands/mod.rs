@@ -56,7 +56,7 @@ pub(crate) fn pretty_json<T: Serialize>(value: &T) -> Result<Vec<u8>, String> {
 
 /// An error's message.
 #[allow(clippy::needless_pass_by_value, reason = "the shape that map_err wants")]
-pub(crate) fn told(error: dynident::Error) -> String {
+pub(crate) fn message_of(error: dynident::Error) -> String {
     error.to_string()
 }
 
@@ -91,7 +91,7 @@ pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
 }
 
 /// The message of an error that a study led to. Where it speaks of another file, the study that names that file is named as well.
-pub(crate) fn told_in(study: &Path) -> impl Fn(dynident::Error) -> String {
+pub(crate) fn known_in(study: &Path) -> impl Fn(dynident::Error) -> String {
     use dynident::Error::{Filter, Missing, NothingLeft, Recording, Robot};
     move |error| match error {
         Recording { .. } | Filter { .. } | NothingLeft { .. } | Missing { .. } | Robot(_) => {

@@ -1,6 +1,6 @@
 //! `dynident reproduce --out DIR`.
 
-use super::{Context, json, pretty_json, told};
+use super::{Context, json, message_of, pretty_json};
 use crate::{Verdict, summary, terminal};
 use dynident::{RunOptions, write_whole};
 use dynident_paper::reproduce;
@@ -20,9 +20,9 @@ pub(crate) struct Options {
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     let progress = context.progress();
     let run = RunOptions { data: None, threads: context.threads, progress: &*progress };
-    let file = reproduce(&options.out, options.seed, &run).map_err(told)?;
+    let file = reproduce(&options.out, options.seed, &run).map_err(message_of)?;
     // The JSON last: where it stands, everything stands.
-    write_whole(&options.out.join("paper.json"), &pretty_json(&file)?).map_err(told)?;
+    write_whole(&options.out.join("paper.json"), &pretty_json(&file)?).map_err(message_of)?;
     if context.json {
         terminal::print(&json(&file)?);
     } else if !context.quiet {

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Set by the first Ctrl-C: the search ends with its best motion.
 static STOP: AtomicBool = AtomicBool::new(false);
 
-/// A line that tells how far a search is.
+/// A line that says how far a search is.
 pub(crate) struct Search {
     line: Option<ProgressBar>,
 }

@@ -1,7 +1,7 @@
 //! `dynident simulate STUDY.toml --out DIR`.
 
 use super::search::Search;
-use super::{Context, json, pretty_json, told, told_in};
+use super::{Context, json, known_in, message_of, pretty_json};
 use crate::{Verdict, summary, terminal};
 use dynident::{RunOptions, Study, check_writable, simulate_study, write_whole};
 use std::path::PathBuf;
@@ -23,20 +23,20 @@ pub(crate) struct Options {
 }
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
-    let mut study = Study::load(&options.study).map_err(told)?;
+    let mut study = Study::load(&options.study).map_err(message_of)?;
     if let Some(seed) = options.seed {
         study.simulation.get_or_insert_default().sensors.seed = seed;
     }
-    check_writable(&options.out).map_err(told)?;
+    check_writable(&options.out).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let search = Search::new(context);
     let simulation =
-        simulate_study(&study, &options.study, &run, &|at| search.hear(at)).map_err(told_in(&options.study))?;
+        simulate_study(&study, &options.study, &run, &|at| search.hear(at)).map_err(known_in(&options.study))?;
     search.end();
-    write_whole(&options.out.join("log.csv"), simulation.log.as_bytes()).map_err(told)?;
+    write_whole(&options.out.join("log.csv"), simulation.log.as_bytes()).map_err(message_of)?;
     // The truth last: where it stands, everything stands.
-    write_whole(&options.out.join("truth.json"), &pretty_json(&simulation.file)?).map_err(told)?;
+    write_whole(&options.out.join("truth.json"), &pretty_json(&simulation.file)?).map_err(message_of)?;
     if context.json {
         terminal::print(&json(&simulation.file)?);
     } else if !context.quiet {

@@ -1,6 +1,6 @@
 //! `dynident validate DIR/result.json --study STUDY.toml`.
 
-use super::{Context, json, judged, told, told_in};
+use super::{Context, json, judged, known_in, message_of};
 use crate::{Verdict, summary, terminal};
 use dynident::{RunOptions, Study, validate};
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use std::path::PathBuf;
 pub(crate) struct Options {
     /// The result.json of an identification.
     result: PathBuf,
-    /// A study with the same machine; its logs with the role "validate" are used, or all of them if none has it.
+    /// A study with the same robot; its logs with the role "validate" are used, or all of them if none has it.
     #[arg(long, value_name = "STUDY.toml")]
     study: PathBuf,
     /// Folder of the recordings, in place of the study's own.
@@ -22,10 +22,10 @@ pub(crate) struct Options {
 }
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
-    let study = Study::load(&options.study).map_err(told)?;
+    let study = Study::load(&options.study).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
-    let file = validate(&options.result, &study, &options.study, &run).map_err(told_in(&options.study))?;
+    let file = validate(&options.result, &study, &options.study, &run).map_err(known_in(&options.study))?;
     terminal::print(&if context.json { json(&file)? } else { summary::validation(&file.validation, &file.logs) });
     Ok(judged(&file.validation, options.max_validation_error))
 }

@@ -32,7 +32,7 @@ pub(super) fn findings(logs: &[LogSummary]) -> String {
         text += &wrapped(&sentence(group, logs), 4);
     }
     if groups.iter().any(|group| group.level == Level::Problem) {
-        text += "  A PROBLEM spoils the result: mend it before trusting any figure here.\n";
+        text += "  A PROBLEM spoils the result: fix it before trusting any figure here.\n";
     }
     text
 }

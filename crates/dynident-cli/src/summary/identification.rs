@@ -211,7 +211,7 @@ fn parameters(r: &ResultFile) -> String {
     if !vague.is_empty() {
         text += &wrapped(
             &format!(
-                "hardly known (error bar above the value): {} of them, worst first {}; other motion would tell more",
+                "hardly known (error bar above the value): {} of them, worst first {}; other motion would determine more",
                 vague.len(),
                 listed(&vague, SHOWN)
             ),
@@ -226,15 +226,15 @@ fn parameters(r: &ResultFile) -> String {
     text
 }
 
-/// Whether the full set is possible, in two lines.
+/// Whether the full set is physically consistent, in two lines.
 fn physics(r: &ResultFile) -> String {
     let bodies = r.physical.violations.len();
     wrapped(
         &if r.physical.consistent {
-            "physics: bodies and friction are physically possible".to_owned()
+            "physics: bodies and friction are physically consistent".to_owned()
         } else {
             format!(
-                "physics: NOT possible as it stands ({bodies} violations, listed in result.json under `physical`). Torques are predicted as \
+                "physics: NOT consistent as it stands ({bodies} violations, listed in result.json under `physical`). Torques are predicted as \
                  well as shown above; masses and inertias of single bodies are not measured values, and a simulator may refuse them."
             )
         },
@@ -253,7 +253,7 @@ fn masses(intervals: &[ParameterInterval]) -> String {
             end(interval.upper, "open"),
         ]
     });
-    let header = ["mass, 95 % of what is possible", "kg", "from", "to"].map(str::to_owned);
+    let header = ["mass, 95 % of what is physically consistent", "kg", "from", "to"].map(str::to_owned);
     table(&header, 1..4, rows.collect())
 }
 

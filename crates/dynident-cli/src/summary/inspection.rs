@@ -31,7 +31,7 @@ pub(crate) fn inspection(i: &Inspection) -> String {
     let header = ["joint", "type", "lower", "upper", "speed", "torque", "mass kg"].map(str::to_owned);
     text += &table(&header, 2..7, rows.collect());
     let base = &i.base_parameters;
-    let _ = writeln!(text, "\n{} base parameters (what motion and torque can tell):", base.count);
+    let _ = writeln!(text, "\n{} base parameters (what motion and torque can determine):", base.count);
     for expression in &base.expressions {
         text += &wrapped(&format!("  {expression}"), 6);
     }

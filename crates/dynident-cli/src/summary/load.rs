@@ -52,7 +52,9 @@ fn of_payload(payload: &PayloadResult) -> String {
     let title = format!("payload {} at {}", name(&payload.name), name(&payload.link));
     let mut text = if rows.is_empty() {
         wrapped(
-            &format!("{title}: neither mass nor centre of mass are told alone; result.json has the sums that are"),
+            &format!(
+                "{title}: neither mass nor centre of mass are determined alone; result.json has the sums that are"
+            ),
             2,
         )
     } else {
@@ -62,7 +64,7 @@ fn of_payload(payload: &PayloadResult) -> String {
         text += &wrapped(&format!("not identified: {}", payload.not_identified.join("; ")), 2);
     }
     if let Some(reason) = &payload.failure {
-        text += &wrapped(&format!("no possible body: {reason}"), 2);
+        text += &wrapped(&format!("no consistent body: {reason}"), 2);
     }
     text
 }

@@ -48,7 +48,7 @@ pub(super) fn table(header: &[String], numbers: core::ops::Range<usize>, rows: V
     lines.join("\n") + "\n"
 }
 
-/// A name that fits its column: the end is kept, as it tells joints apart.
+/// A name that fits its column: the end is kept, as it distinguishes joints.
 pub(super) fn name(name: &str) -> String {
     let length = name.chars().count();
     if length <= NAME {

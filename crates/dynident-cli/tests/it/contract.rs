@@ -16,7 +16,7 @@ fn has(value: &Value, keys: &[&str]) {
 }
 
 /// Identifies the good study with a held-out part into `out`; returns standard output.
-fn identify_held_out(out: &Path, further: &[&str]) -> crate::common::Ran {
+fn identify_held_out(out: &Path, further: &[&str]) -> crate::common::CommandOutcome {
     let study = std::fs::read_to_string(broken().join("good.toml")).unwrap();
     let study = study.replace("file = \"log.csv\"", "file = \"log.csv\"\nrows = [0, 250]");
     let path = out.join("study.toml");

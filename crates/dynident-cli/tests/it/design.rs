@@ -1,5 +1,5 @@
 //! The command `design`: feasible motions, the contract's keys, the same result on any number of threads, refusals and diagnoses.
-use crate::common::{Ran, repository, run_in};
+use crate::common::{CommandOutcome, repository, run_in};
 use serde_json::Value;
 use std::path::Path;
 
@@ -20,7 +20,7 @@ fn study(folder: &Path, design: &str, acceleration: f64) {
     std::fs::write(folder.join("study.toml"), text).unwrap();
 }
 
-fn run(folder: &Path, further: &[&str]) -> Ran {
+fn run(folder: &Path, further: &[&str]) -> CommandOutcome {
     run_in(folder, &[&["design", "study.toml", "--out", "out"], further].concat())
 }
 
@@ -59,7 +59,7 @@ fn a_design_is_feasible_complete_and_the_same_on_any_number_of_threads() {
     }
     assert_eq!(first["schema"], "dynident/design/1");
     assert_eq!((&first["feasible"], &first["seed"]), (&Value::Bool(true), &Value::from(4)));
-    // Position, speed, acceleration and torque of six joints.
+    // Position, velocity, acceleration and torque of six joints.
     let limits = first["limits"].as_array().unwrap();
     assert_eq!(limits.len(), 24);
     assert!(limits.iter().all(|limit| limit["worst_ratio"].as_f64().unwrap() <= 1.0 + 1e-6), "{limits:?}");

@@ -1,10 +1,10 @@
 //! The paper's design through the command: its optimum, the genetic algorithm's distance from it, Table 3 against the paper's own limits, and other optimisers for the ordinary problem.
-use crate::common::{Ran, repository, run_in};
+use crate::common::{CommandOutcome, repository, run_in};
 use serde_json::Value;
 use std::path::Path;
 
 /// The example with other words for some of its own, run in `folder`.
-fn run(folder: &Path, example: &str, changes: &[(&str, &str)]) -> (Ran, Option<Value>) {
+fn run(folder: &Path, example: &str, changes: &[(&str, &str)]) -> (CommandOutcome, Option<Value>) {
     let robot = repository("examples/robots/paper_2r.toml").canonicalize().unwrap();
     let mut text = std::fs::read_to_string(repository(&format!("examples/{example}"))).unwrap();
     for (from, to) in [("robots/paper_2r.toml", robot.to_str().unwrap())].iter().chain(changes) {

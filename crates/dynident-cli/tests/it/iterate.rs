@@ -22,9 +22,9 @@ fn json(file: &Path) -> Value {
 fn the_papers_example_converges_and_resumes() {
     let out = tempfile::tempdir().unwrap();
     let study = example("iterate_paper_2r.toml");
-    let told = dynident(&["iterate"], &study, out.path());
-    assert_eq!(told.status.code(), Some(0), "{}", String::from_utf8_lossy(&told.stderr));
-    assert!(String::from_utf8_lossy(&told.stdout).contains("converged"));
+    let output = dynident(&["iterate"], &study, out.path());
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("converged"));
     let file = out.path().join("iterations.json");
     let first = json(&file);
     assert_eq!(first["schema"], "dynident/iterations/1");
@@ -62,19 +62,19 @@ fn runs_used_up_are_exit_status_one() {
     let text = text.replace("max_runs = 6", "max_runs = 1").replace("robots/paper_2r.toml", robots.to_str().unwrap());
     let study = out.path().join("study.toml");
     std::fs::write(&study, text).unwrap();
-    let told = dynident(&["iterate", "--json"], &study, &out.path().join("result"));
-    assert_eq!(told.status.code(), Some(1), "{}", String::from_utf8_lossy(&told.stderr));
-    let object: Value = serde_json::from_slice(&told.stdout).unwrap();
+    let output = dynident(&["iterate", "--json"], &study, &out.path().join("result"));
+    assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stderr));
+    let object: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((&object["converged"], &object["status"]), (&Value::Bool(false), &Value::from("runs-used-up")));
 }
 
 #[test]
 fn a_simulation_writes_log_and_truth() {
     let out = tempfile::tempdir().unwrap();
-    let told = dynident(&["simulate", "--json"], &example("iterate_paper_2r.toml"), out.path());
+    let output = dynident(&["simulate", "--json"], &example("iterate_paper_2r.toml"), out.path());
     let truth = json(&out.path().join("truth.json"));
     assert_eq!(truth["schema"], "dynident/simulation/1");
-    assert_eq!(told.status.code(), Some(0), "{}", String::from_utf8_lossy(&told.stderr));
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     let samples = truth["samples"].as_u64().unwrap() as usize;
     let log = std::fs::read_to_string(out.path().join("log.csv")).unwrap();
     assert!(log.starts_with("t_s,q1,q2,tau1,tau2\n"));

@@ -1,7 +1,7 @@
-//! Base parameters: the combinations of parameters that joint torques can tell apart.
+//! Base parameters: the combinations of parameters that joint torques can distinguish.
 //!
-//! One choice for one machine: the columns of the regressor from base to tip in the order of [`all_columns`](crate::all_columns); a column
-//! that depends on earlier ones is regrouped into them (Gautier and Khalil 1990; Gautier 1991). The dependencies come from the machine's
+//! One choice for one robot: the columns of the regressor from base to tip in the order of [`all_columns`](crate::all_columns); a column
+//! that depends on earlier ones is regrouped into them (Gautier and Khalil 1990; Gautier 1991). The dependencies come from the robot's
 //! structure ([`structural`]); the rank of regressors at random states ([`numerical_rank`], [`numerical_rank_by_body`]) is the cross-check.
 
 mod expression;
@@ -15,10 +15,10 @@ pub use one_joint_motions::numerical_rank_by_body;
 use crate::independent_columns::{IndependentColumns, split_columns};
 use crate::regressor_panels::{Column, all_columns};
 use dynident_model::Model;
-use dynident_model::laws::Law;
+use dynident_model::terms::TorqueTerm;
 use nalgebra::DMatrix;
 
-/// How finely dependence is told from independence.
+/// How finely dependence is separated from independence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BaseParameterSettings {
     /// A direction counts as dependent below this share of its size. The default, 2e-5, lies above what rounded angles of a description do
@@ -32,7 +32,7 @@ impl Default for BaseParameterSettings {
     }
 }
 
-/// The base parameters of a machine with its laws.
+/// The base parameters of a robot with its terms.
 #[doc(alias("minimal parameters", "identifiable parameters"))]
 #[derive(Clone, Debug)]
 pub struct BaseParameters {
@@ -41,10 +41,10 @@ pub struct BaseParameters {
 }
 
 impl BaseParameters {
-    /// Base parameters from the machine's structure: no data, no random numbers.
-    pub fn new(model: &Model, laws: &[Law], settings: &BaseParameterSettings) -> Self {
-        let columns = all_columns(model, laws);
-        let directions = structural::identifiable_directions(model, laws, settings.tolerance);
+    /// Base parameters from the robot's structure: no data, no random numbers.
+    pub fn new(model: &Model, terms: &[TorqueTerm], settings: &BaseParameterSettings) -> Self {
+        let columns = all_columns(model, terms);
+        let directions = structural::identifiable_directions(model, terms, settings.tolerance);
         let split = split_columns(&directions, settings.tolerance);
         Self { columns, split }
     }
@@ -94,7 +94,7 @@ impl BaseParameters {
         values
     }
 
-    /// The parameters that no motion can tell: they stand in no base parameter.
+    /// The parameters that no motion can determine: they stand in no base parameter.
     pub fn unidentifiable(&self) -> Vec<usize> {
         let k = &self.split.regrouping;
         let dependent = self.split.dependent.iter().enumerate();

@@ -4,8 +4,8 @@ use crate::independent_columns::independent_columns;
 use crate::regressor_panels::{PanelLayout, Panels, all_columns, regressor_panels};
 use crate::workspace::BatchWorkspace;
 use dynident_model::Model;
-use dynident_model::laws::{JointMotion, Law};
 use dynident_model::sample::Random;
+use dynident_model::terms::{JointMotion, TorqueTerm};
 use nalgebra::DMatrix;
 
 /// What random states say about the columns.
@@ -19,10 +19,10 @@ pub struct NumericalRank {
     pub strongest_dependent: f64,
 }
 
-/// Stacks regressors of `2 · columns / dof + 10` random states (positions within ±π rad or ±1 m, speeds within ±2, accelerations within ±5) and splits their columns
+/// Stacks regressors of `2 · columns / dof + 10` random states (positions within ±π rad or ±1 m, velocities within ±2, accelerations within ±5) and splits their columns
 /// at `tolerance`. Deterministic in `seed`.
-pub fn numerical_rank(model: &Model, laws: &[Law], seed: u64, tolerance: f64) -> NumericalRank {
-    let columns = all_columns(model, laws);
+pub fn numerical_rank(model: &Model, terms: &[TorqueTerm], seed: u64, tolerance: f64) -> NumericalRank {
+    let columns = all_columns(model, terms);
     let (dof, count) = (model.dof(), columns.len());
     let samples = 2 * count / dof.max(1) + 10;
     let mut random = Random::new(seed);

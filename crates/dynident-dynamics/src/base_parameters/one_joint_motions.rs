@@ -1,4 +1,4 @@
-//! The rank of the bodies' regressor from motions that differ in one joint: the cross-check for machines of any length.
+//! The rank of the bodies' regressor from motions that differ in one joint: the cross-check for robots of any length.
 //!
 //! Two states that differ in joint `j` alone (its position, velocity and acceleration) give the joints further in torques whose **difference** depends on body `j` and the bodies
 //! further out alone; so do the torques of joint `j` themselves. The rows of all joints, base to tip, make an upper block triangle, whose rank
@@ -19,7 +19,7 @@ fn pairs(joints_on_path: usize) -> usize {
     5 + 20 / joints_on_path
 }
 
-/// A lower bound of the rank of the bodies' columns, body by body: which of the ten columns of each the torques can tell from those of the bodies before it, at states as those of
+/// A lower bound of the rank of the bodies' columns, body by body: which of the ten columns of each the torques can separate from those of the bodies before it, at states as those of
 /// [`numerical_rank`](super::numerical_rank) that differ in one joint. Where the structure says that a column is independent, it must be among these. Deterministic in `seed`.
 pub fn numerical_rank_by_body(model: &Model, seed: u64, tolerance: f64) -> NumericalRank {
     let maps = model.maps();

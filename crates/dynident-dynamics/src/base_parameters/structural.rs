@@ -1,4 +1,4 @@
-//! Which parameters a machine's torques depend on, from its structure alone.
+//! Which parameters a robot's torques depend on, from its structure alone.
 //!
 //! Torques vanish for all motions exactly when every entry `M_jk(q)` of the mass matrix and every gravity torque vanishes for all `q` (velocity torques follow from the mass
 //! matrix). With `C_j(q)` the composite inertia that hangs on joint `j` and `w` a twist at its frame,
@@ -15,7 +15,7 @@
 
 use crate::independent_columns::Columns;
 use crate::inverse_dynamics::inertial_wrench;
-use dynident_model::laws::{Law, MotionFunction};
+use dynident_model::terms::{MotionFunction, TorqueTerm};
 use dynident_model::{InertialParameters, Joint, Model, Transform, Vec3};
 use nalgebra::{DVector, Matrix6, SMatrix, SVector};
 use std::collections::HashMap;
@@ -23,44 +23,44 @@ use std::collections::HashMap;
 type Matrix10 = SMatrix<f64, 10, 10>;
 type Vector10 = SVector<f64, 10>;
 
-/// Rows over all columns (bodies, then laws) whose span is what torques depend on: those that each body gives, base to tip, then those of friction. A body's rows
-/// have entries for it, for the bodies further out and for the laws; they are kept where they arise and carried outward column by column.
+/// Rows over all columns (bodies, then terms) whose span is what torques depend on: those that each body gives, base to tip, then those of friction. A body's rows
+/// have entries for it, for the bodies further out and for the terms; they are kept where they arise and carried outward column by column.
 pub(super) struct IdentifiableDirections<'a> {
     model: &'a Model,
-    laws: usize,
-    /// Of each body: its functionals of its ten composite parameters, with the constants of the laws beside them.
+    terms: usize,
+    /// Of each body: its functionals of its ten composite parameters, with the constants of the terms beside them.
     functionals: Vec<Vec<DVector<f64>>>,
     /// Of each body: row of its first functional; the last is where the rows of friction begin.
     first_row: Vec<usize>,
     /// Of each body: the constant part of a composite's way to the parent, transposed.
     carry: Vec<Matrix10>,
-    /// Over the laws alone.
+    /// Over the terms alone.
     friction: Vec<DVector<f64>>,
 }
 
-/// The directions that `model` and `laws` allow to be told, where a share below `tolerance` counts as none.
+/// The directions that `model` and `terms` allow to be determined, where a share below `tolerance` counts as none.
 pub(super) fn identifiable_directions<'a>(
     model: &'a Model,
-    laws: &[Law],
+    terms: &[TorqueTerm],
     tolerance: f64,
 ) -> IdentifiableDirections<'a> {
-    let (dof, slots) = (model.dof(), source_slots(model, laws));
-    let mut twists: Vec<Vec<Arriving>> = Vec::with_capacity(dof);
+    let (dof, slots) = (model.dof(), source_slots(model, terms));
+    let mut twists: Vec<Vec<ArrivingTwist>> = Vec::with_capacity(dof);
     let mut composites: Vec<Vec<Vector10>> = Vec::with_capacity(dof);
     let (mut functionals, mut first_row, mut carry) = (Vec::new(), vec![0], Vec::new());
     for (j, joint) in model.joints().iter().enumerate() {
         let motion = Harmonics::of(joint);
         let arriving = arriving_twists(model, j, &motion, joint.parent.map(|p| &twists[p][..]), slots, tolerance);
-        // Conditions on this body's composite by its own joint, with the constants of the laws beside them.
-        let own = arriving.iter().map(|w| (power(model, j, w), law_constants(laws, j, w, slots)));
+        // Conditions on this body's composite by its own joint, with the constants of the terms beside them.
+        let own = arriving.iter().map(|w| (power(model, j, w), term_constants(terms, j, w, slots)));
         // Conditions that come from further in: all but the constant harmonic bind this composite alone.
         let inherited: &[Vector10] = joint.parent.map_or(&[], |p| &composites[p]);
         let through = inherited
             .iter()
-            .flat_map(|f| motion.inertia[1..].iter().map(move |t| (t.transpose() * f, DVector::zeros(laws.len()))));
+            .flat_map(|f| motion.inertia[1..].iter().map(move |t| (t.transpose() * f, DVector::zeros(terms.len()))));
         let stacked: Vec<DVector<f64>> = own
             .chain(through)
-            .map(|(f, constants)| DVector::from_iterator(10 + laws.len(), f.iter().chain(constants.iter()).copied()))
+            .map(|(f, constants)| DVector::from_iterator(10 + terms.len(), f.iter().chain(constants.iter()).copied()))
             .collect();
         let bound = basis(&stacked, tolerance);
         let carried = inherited.iter().map(|f| motion.inertia[0].transpose() * f);
@@ -72,8 +72,8 @@ pub(super) fn identifiable_directions<'a>(
         functionals.push(bound);
         carry.push(motion.inertia[0].transpose());
     }
-    let friction = friction_conditions(laws);
-    IdentifiableDirections { model, laws: laws.len(), functionals, first_row, carry, friction }
+    let friction = friction_conditions(terms);
+    IdentifiableDirections { model, terms: terms.len(), functionals, first_row, carry, friction }
 }
 
 impl Columns for IdentifiableDirections<'_> {
@@ -110,27 +110,27 @@ impl Columns for IdentifiableDirections<'_> {
             }
             blocks[j] = block;
         }
-        for law in 0..self.laws {
-            let constants = self.functionals.iter().flatten().map(|v| v[10 + law]);
-            take(&constants.chain(self.friction.iter().map(|row| row[law])).collect::<Vec<f64>>());
+        for term in 0..self.terms {
+            let constants = self.functionals.iter().flatten().map(|v| v[10 + term]);
+            take(&constants.chain(self.friction.iter().map(|row| row[term])).collect::<Vec<f64>>());
         }
     }
 }
 
-/// Joints back to which a twist's source is known at least: in longer machines only couplings ask further.
+/// Joints back to which a twist's source is known at least: in longer robots only couplings ask further.
 const SOURCES: usize = 48;
 
 /// Slots for the sources of twists: joint `k` has slot `k` modulo their number, so that a source is known as long as a coupling may ask for it.
-fn source_slots(model: &Model, laws: &[Law]) -> usize {
-    let reach = laws.iter().map(|law| {
-        let joints = law.joints();
+fn source_slots(model: &Model, terms: &[TorqueTerm]) -> usize {
+    let reach = terms.iter().map(|term| {
+        let joints = term.joints();
         joints.iter().max().zip(joints.iter().min()).map_or(0, |(most, least)| most - least)
     });
     SOURCES.max(reach.max().unwrap_or(0) + 1).min(model.dof())
 }
 
 /// A twist that can arrive at a joint, and as which joint's axis (or as gravity, last) its constant part counts.
-struct Arriving {
+struct ArrivingTwist {
     twist: nalgebra::Vector6<f64>,
     source: DVector<f64>,
 }
@@ -198,10 +198,10 @@ fn arriving_twists(
     model: &Model,
     j: usize,
     motion: &Harmonics,
-    parent: Option<&[Arriving]>,
+    parent: Option<&[ArrivingTwist]>,
     slots: usize,
     tolerance: f64,
-) -> Vec<Arriving> {
+) -> Vec<ArrivingTwist> {
     let joint = &model.joints()[j];
     let mut stacked = Vec::new();
     let mut push = |twist: &nalgebra::Vector6<f64>, source: DVector<f64>| {
@@ -218,11 +218,11 @@ fn arriving_twists(
     let gravity = model.gravity();
     // In units of about one, as the axes are.
     let size = gravity.norm().max(f64::MIN_POSITIVE);
-    let at_base = [Arriving {
+    let at_base = [ArrivingTwist {
         twist: [0.0, 0.0, 0.0, -gravity[0] / size, -gravity[1] / size, -gravity[2] / size].into(),
         source: mark(slots) / size,
     }];
-    let from: &[Arriving] = match parent {
+    let from: &[ArrivingTwist] = match parent {
         Some(parent) => parent,
         None if gravity.norm() > 0.0 => &at_base,
         None => &[],
@@ -238,7 +238,7 @@ fn arriving_twists(
     }
     basis(&stacked, tolerance)
         .iter()
-        .map(|v| Arriving {
+        .map(|v| ArrivingTwist {
             twist: nalgebra::Vector6::from_column_slice(&v.as_slice()[..6]),
             source: v.rows(6, slots + 1).into_owned(),
         })
@@ -246,7 +246,7 @@ fn arriving_twists(
 }
 
 /// `Φ_jᵀ I(π) w` as a functional of the ten parameters.
-fn power(model: &Model, j: usize, w: &Arriving) -> Vector10 {
+fn power(model: &Model, j: usize, w: &ArrivingTwist) -> Vector10 {
     let joint = &model.joints()[j];
     let (alpha, acceleration) =
         (Vec3([w.twist[0], w.twist[1], w.twist[2]]), Vec3([w.twist[3], w.twist[4], w.twist[5]]));
@@ -257,29 +257,29 @@ fn power(model: &Model, j: usize, w: &Arriving) -> Vector10 {
     })
 }
 
-/// What the laws add to the entry of joint `j` that `w` stands for.
-fn law_constants(laws: &[Law], j: usize, w: &Arriving, slots: usize) -> DVector<f64> {
-    DVector::from_fn(laws.len(), |x, _| {
-        let law = &laws[x];
-        if !law.acts_on(j) {
+/// What the terms add to the entry of joint `j` that `w` stands for.
+fn term_constants(terms: &[TorqueTerm], j: usize, w: &ArrivingTwist, slots: usize) -> DVector<f64> {
+    DVector::from_fn(terms.len(), |x, _| {
+        let term = &terms[x];
+        if !term.acts_on(j) {
             return 0.0;
         }
-        let inward = law.joints().into_iter().filter(|k| *k <= j);
-        let inertia: f64 = inward.map(|k| w.source[k % slots] * law.mass_matrix_entry(j, k)).sum();
-        inertia + w.source[slots] * law.constant_torque(j)
+        let inward = term.joints().into_iter().filter(|k| *k <= j);
+        let inertia: f64 = inward.map(|k| w.source[k % slots] * term.mass_matrix_entry(j, k)).sum();
+        inertia + w.source[slots] * term.constant_torque(j)
     })
 }
 
-/// Friction depends on speeds alone, so it mixes with nothing above. Each distinct function of the motion in each joint's row is one condition; laws that say the same
+/// Friction depends on velocities alone, so it mixes with nothing above. Each distinct function of the motion in each joint's row is one condition; terms that say the same
 /// twice share it.
-fn friction_conditions(laws: &[Law]) -> Vec<DVector<f64>> {
+fn friction_conditions(terms: &[TorqueTerm]) -> Vec<DVector<f64>> {
     let mut places: HashMap<(usize, String), usize> = HashMap::new();
     let mut conditions: Vec<DVector<f64>> = Vec::new();
-    for (x, law) in laws.iter().enumerate() {
-        for MotionFunction { row, function, factor } in law.functions() {
+    for (x, term) in terms.iter().enumerate() {
+        for MotionFunction { row, function, factor } in term.functions() {
             let place = *places.entry((row, function)).or_insert(conditions.len());
             if place == conditions.len() {
-                conditions.push(DVector::zeros(laws.len()));
+                conditions.push(DVector::zeros(terms.len()));
             }
             conditions[place][x] += factor;
         }

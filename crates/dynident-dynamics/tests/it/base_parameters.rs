@@ -5,11 +5,11 @@ use dynident_dynamics::{
     torque_regressor,
 };
 use dynident_model::Model;
-use dynident_model::laws::{CoulombShape, Coupling, CouplingEffect, DriveChoice, Law, laws_per_joint};
 use dynident_model::sample::{Random, planar_2r, random_tree};
+use dynident_model::terms::{CoulombShape, Coupling, CouplingEffect, DriveChoice, TorqueTerm, terms_per_joint};
 
-fn all_laws(model: &Model) -> Vec<Law> {
-    laws_per_joint(model, |_| DriveChoice {
+fn all_terms(model: &Model) -> Vec<TorqueTerm> {
+    terms_per_joint(model, |_| DriveChoice {
         drive_inertia: true,
         viscous: true,
         coulomb: Some(CoulombShape::Sign { dead_band: 0.0 }),
@@ -20,7 +20,7 @@ fn all_laws(model: &Model) -> Vec<Law> {
 #[test]
 fn the_planar_arm_has_exactly_the_papers_table_2() {
     let mut random = Random::new(1);
-    // a1 = 0.7, so that a1 and its square can be told from 1: θ1 = Izz1 + a1² m2, θ2 = m1 r1x + a1 m2, θ3 = m1 r1y, θ4..6 = Izz2, m2 r2x, m2 r2y.
+    // a1 = 0.7, so that a1 and its square can be determined from 1: θ1 = Izz1 + a1² m2, θ2 = m1 r1x + a1 m2, θ3 = m1 r1y, θ4..6 = Izz2, m2 r2x, m2 r2y.
     let model = planar_2r(0.7, random.body(), random.body());
     let base = BaseParameters::new(&model, &[], &BaseParameterSettings::default());
     let mut expressions = base.expressions();
@@ -34,11 +34,11 @@ fn the_planar_arm_has_exactly_the_papers_table_2() {
 fn structure_and_random_states_choose_the_same_columns() {
     for seed in 0..40 {
         let model = random_tree(seed, 1 + seed as usize % 7);
-        for laws in [Vec::new(), all_laws(&model)] {
-            let base = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
+        for terms in [Vec::new(), all_terms(&model)] {
+            let base = BaseParameters::new(&model, &terms, &BaseParameterSettings::default());
             // Random geometry leaves no column closer than 1e-6 to dependence unless it is dependent (then rounding, about 1e-13).
-            let numerical = numerical_rank(&model, &laws, 77, 1e-8);
-            assert_eq!(base.independent(), numerical.independent, "seed {seed}, {} laws", laws.len());
+            let numerical = numerical_rank(&model, &terms, 77, 1e-8);
+            assert_eq!(base.independent(), numerical.independent, "seed {seed}, {} laws", terms.len());
         }
     }
 }
@@ -106,30 +106,30 @@ fn assert_full_torques(model: &Model, seed: u64) {
 fn drives_regroup_where_structure_says_so() {
     let mut random = Random::new(9);
     let model = planar_2r(1.0, random.body(), random.body());
-    let laws = all_laws(&model);
-    let base = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
+    let terms = all_terms(&model);
+    let base = BaseParameters::new(&model, &terms, &BaseParameterSettings::default());
     // Joint 1's drive turns with link 1 alone: one more parameter for joint 2's drive only, and three of friction and offset a joint.
     assert_eq!(base.count(), 6 + 1 + 6);
     assert!(base.expressions().iter().any(|e| e == "Izz1 + m2 + Ia1"), "{:?}", base.expressions());
-    assert_eq!(base.independent(), numerical_rank(&model, &laws, 5, 1e-8).independent);
+    assert_eq!(base.independent(), numerical_rank(&model, &terms, 5, 1e-8).independent);
 }
 
 #[test]
-fn couplings_and_laws_said_twice_are_seen() {
+fn couplings_and_terms_given_twice_are_found() {
     let model = random_tree(4, 4);
     let coupling =
-        |effect| Law::Coupling(Coupling { name: "m".into(), first: 2, second: 3, ratios: [1.0, -0.5], effect });
-    let mut laws = all_laws(&model);
-    laws.extend([
+        |effect| TorqueTerm::Coupling(Coupling { name: "m".into(), first: 2, second: 3, ratios: [1.0, -0.5], effect });
+    let mut terms = all_terms(&model);
+    terms.extend([
         coupling(CouplingEffect::Inertia),
         coupling(CouplingEffect::Viscous),
         coupling(CouplingEffect::Coulomb(CoulombShape::Sign { dead_band: 0.0 })),
     ]);
-    let base = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
-    assert_eq!(base.independent(), numerical_rank(&model, &laws, 5, 1e-8).independent);
+    let base = BaseParameters::new(&model, &terms, &BaseParameterSettings::default());
+    assert_eq!(base.independent(), numerical_rank(&model, &terms, 5, 1e-8).independent);
     let once = base.count();
-    laws.push(coupling(CouplingEffect::Viscous));
-    let twice = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
+    terms.push(coupling(CouplingEffect::Viscous));
+    let twice = BaseParameters::new(&model, &terms, &BaseParameterSettings::default());
     assert_eq!(twice.count(), once);
     assert!(twice.expressions().iter().any(|e| e == "fv_m + fv_m"));
 }

@@ -4,16 +4,16 @@ use crate::golden::{ARMS, Golden, ROBOTS, robot, text};
 use dynident_dynamics::{
     BaseParameterSettings, BaseParameters, Column, Workspace, inverse_dynamics, numerical_rank, torque_regressor,
 };
-use dynident_model::laws::{CoulombShape, Coupling, CouplingEffect, DriveChoice, Law, laws_per_joint};
 use dynident_model::sample::Random;
+use dynident_model::terms::{CoulombShape, Coupling, CouplingEffect, DriveChoice, TorqueTerm, terms_per_joint};
 use dynident_model::{Model, load_robot, read_urdf};
 use dynident_testing::{recordings, repository};
 use std::collections::BTreeMap;
 
 const SIGN: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };
 
-fn friction(model: &Model) -> Vec<Law> {
-    laws_per_joint(model, |_| DriveChoice {
+fn friction(model: &Model) -> Vec<TorqueTerm> {
+    terms_per_joint(model, |_| DriveChoice {
         viscous: true,
         coulomb: Some(SIGN),
         offset: true,
@@ -21,16 +21,16 @@ fn friction(model: &Model) -> Vec<Law> {
     })
 }
 
-fn drive_inertia(model: &Model) -> Vec<Law> {
-    laws_per_joint(model, |_| DriveChoice { drive_inertia: true, ..DriveChoice::default() })
+fn drive_inertia(model: &Model) -> Vec<TorqueTerm> {
+    terms_per_joint(model, |_| DriveChoice { drive_inertia: true, ..DriveChoice::default() })
 }
 
-fn drive_inertia_and_friction(model: &Model) -> Vec<Law> {
-    laws_per_joint(model, |_| DriveChoice { drive_inertia: true, viscous: true, coulomb: Some(SIGN), offset: true })
+fn drive_inertia_and_friction(model: &Model) -> Vec<TorqueTerm> {
+    terms_per_joint(model, |_| DriveChoice { drive_inertia: true, viscous: true, coulomb: Some(SIGN), offset: true })
 }
 
-fn base(model: &Model, laws: &[Law]) -> BaseParameters {
-    BaseParameters::new(model, laws, &BaseParameterSettings::default())
+fn base(model: &Model, terms: &[TorqueTerm]) -> BaseParameters {
+    BaseParameters::new(model, terms, &BaseParameterSettings::default())
 }
 
 #[test]
@@ -101,13 +101,13 @@ fn structure_agrees_with_random_states_and_the_split_is_clear() {
         // Random states of a humanoid with its drives are some thousand rows and columns: the bodies alone are the harder part.
         let cases =
             if model.dof() > 9 { vec![Vec::new()] } else { vec![Vec::new(), drive_inertia_and_friction(&model)] };
-        for laws in cases {
-            let ours = base(&model, &laws);
+        for terms in cases {
+            let ours = base(&model, &terms);
             let (weakest, strongest) = ours.gap();
-            let numerical = numerical_rank(&model, &laws, 77, 1e-9);
+            let numerical = numerical_rank(&model, &terms, 77, 1e-9);
             println!(
                 "{name}, {} laws: {} base parameters; structural gap {strongest:.1e} .. {weakest:.1e}, at random states {:.1e} .. {:.1e}",
-                laws.len(),
+                terms.len(),
                 ours.count(),
                 numerical.strongest_dependent,
                 numerical.weakest_independent
@@ -123,7 +123,7 @@ fn structure_agrees_with_random_states_and_the_split_is_clear() {
     }
 }
 
-/// Many descriptions write π/2 as 1.5708. The machine that is meant keeps its base parameters.
+/// Many descriptions write π/2 as 1.5708. The robot that is meant keeps its base parameters.
 #[test]
 fn rounded_right_angles_add_no_base_parameters() {
     for (name, count) in [("ur10", 36), ("panda_arm7", 43), ("iiwa14", 43)] {
@@ -210,14 +210,14 @@ fn the_tx40_has_the_published_base_parameters() {
         return;
     };
     let model = load_robot(folder.join("tx40_mdh_modified.urdf")).unwrap().model;
-    let mut laws = drive_inertia_and_friction(&model);
-    laws.extend([CouplingEffect::Inertia, CouplingEffect::Viscous, CouplingEffect::Coulomb(SIGN)].map(|effect| {
-        Law::Coupling(Coupling { name: "m6".to_owned(), first: 4, second: 5, ratios: [1.0, 1.0], effect })
+    let mut terms = drive_inertia_and_friction(&model);
+    terms.extend([CouplingEffect::Inertia, CouplingEffect::Viscous, CouplingEffect::Coulomb(SIGN)].map(|effect| {
+        TorqueTerm::Coupling(Coupling { name: "m6".to_owned(), first: 4, second: 5, ratios: [1.0, 1.0], effect })
     }));
-    let ours = base(&model, &laws);
+    let ours = base(&model, &terms);
     println!("TX40: structural gap {:?}", ours.gap());
     assert_eq!(ours.count(), 61);
-    let numerical = numerical_rank(&model, &laws, 5, 1e-9);
+    let numerical = numerical_rank(&model, &terms, 5, 1e-9);
     assert_eq!(ours.independent(), numerical.independent);
 
     let table = std::fs::read_to_string(folder.join("published_base_parameters.csv")).unwrap();

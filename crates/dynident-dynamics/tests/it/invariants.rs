@@ -7,8 +7,8 @@ use dynident_dynamics::{
 };
 use dynident_lanes::Level;
 use dynident_model::Model;
-use dynident_model::laws::JointMotion;
 use dynident_model::sample::{Random, random_tree};
+use dynident_model::terms::JointMotion;
 
 /// Two ways of summing the same products over some ten bodies, in double precision.
 const ROUNDING: f64 = 1e-11;

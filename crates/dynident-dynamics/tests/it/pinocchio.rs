@@ -10,7 +10,7 @@ use dynident_dynamics::{
     potential_energy, regressor_panels, torque_regressor,
 };
 use dynident_lanes::Level;
-use dynident_model::laws::JointMotion;
+use dynident_model::terms::JointMotion;
 use dynident_model::{Model, Transform, Vec3};
 use serde_json::Value;
 

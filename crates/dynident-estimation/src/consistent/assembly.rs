@@ -10,7 +10,7 @@ use super::{PhysicalError, PhysicalSettings};
 use nalgebra::{DMatrix, DVector, Matrix4};
 
 /// A program with what its variables and constraints stand for.
-pub(super) struct Assembled {
+pub(super) struct AssembledProgram {
     pub(super) program: Program,
     /// Names of the constraints by label.
     pub(super) names: Vec<String>,
@@ -21,7 +21,7 @@ pub(super) struct Assembled {
     pub(super) constant: f64,
 }
 
-impl Assembled {
+impl AssembledProgram {
     pub(super) fn new(problem: &PhysicalProblem, settings: &PhysicalSettings) -> Self {
         let mut count = 0;
         let starts: Vec<Option<usize>> = problem

@@ -163,11 +163,11 @@ fn singular_values(a: &Matrix4<f64>) -> (Vector4<f64>, Matrix4<f64>, Matrix4<f64
                 let t = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
                 let c = 1.0 / t.hypot(1.0);
                 let s = c * t;
-                for turning in [&mut b, &mut v] {
+                for revolute in [&mut b, &mut v] {
                     for row in 0..4 {
-                        let (x, y) = (turning[(row, p)], turning[(row, q)]);
-                        turning[(row, p)] = c * x - s * y;
-                        turning[(row, q)] = s * x + c * y;
+                        let (x, y) = (revolute[(row, p)], revolute[(row, q)]);
+                        revolute[(row, p)] = c * x - s * y;
+                        revolute[(row, q)] = s * x + c * y;
                     }
                 }
             }

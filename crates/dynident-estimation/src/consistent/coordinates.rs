@@ -1,7 +1,7 @@
 //! A body's ten parameters as a symmetric 4 × 4 matrix, whitened by a reference body.
 //!
 //! The pseudo-inertia `P = [Σ h; hᵀ m]`, `Σ = ½ tr(I) 1 − I`, `h = m r` is linear in the ten parameters, and a body is
-//! physically possible exactly when P is positive definite (Traversaro et al. 2016; Wensing, Kim and Slotine, RA-L 3
+//! physically consistent exactly when P is positive definite (Traversaro et al. 2016; Wensing, Kim and Slotine, RA-L 3
 //! (2018) 60, eq. 12). With a reference body `P0 = L Lᵀ` the solver works on `Q = L⁻¹ P L⁻ᵀ`: no units, the reference
 //! is the unit matrix, and bodies of a gram and of a tonne look alike.
 

@@ -24,18 +24,18 @@ pub enum PhysicalError {
         value: f64,
     },
     /// A setting has no meaning.
-    #[error("setting {setting} = {value}: {mend}")]
+    #[error("setting {setting} = {value}: {fix}")]
     Setting {
         /// Name of the setting.
         setting: &'static str,
         /// Its value.
         value: f64,
         /// What to give instead.
-        mend: &'static str,
+        fix: &'static str,
     },
-    /// A body's reference is not a possible body.
+    /// A body's reference is not a consistent body.
     #[error(
-        "body {body}: its prior is no possible body (least eigenvalue of the pseudo-inertia {least_eigenvalue:.3e}); mend its mass and inertia or give a rough body of its size"
+        "body {body}: its prior is no consistent body (least eigenvalue of the pseudo-inertia {least_eigenvalue:.3e}); fix its mass and inertia or give a rough body of its size"
     )]
     InfeasiblePrior {
         /// The body.
@@ -43,9 +43,9 @@ pub enum PhysicalError {
         /// Smallest eigenvalue of its pseudo-inertia, in SI units.
         least_eigenvalue: f64,
     },
-    /// A body that is given as known is not a possible one, nor without mass.
+    /// A body that is given as known is not a consistent one, nor without mass.
     #[error(
-        "body {body}: the values given as known are no possible body (least eigenvalue of the pseudo-inertia {least_eigenvalue:.3e}); mend them or leave the body unknown"
+        "body {body}: the values given as known are no consistent body (least eigenvalue of the pseudo-inertia {least_eigenvalue:.3e}); fix them or leave the body unknown"
     )]
     InfeasibleKnown {
         /// The body.

@@ -1,6 +1,6 @@
 //! The physically consistent fit.
 
-use super::assembly::Assembled;
+use super::assembly::AssembledProgram;
 use super::cone::least_eigenvalue;
 use super::conic::Program;
 use super::coordinates::pseudo_inertia;
@@ -34,7 +34,7 @@ pub struct PhysicalBodyFit {
     pub least_whitened_eigenvalue: f64,
     /// Smallest eigenvalue of the pseudo-inertia in SI units.
     pub least_eigenvalue: f64,
-    /// Whether the data want the body outside of what is possible: its margin is used up.
+    /// Whether the data want the body outside of what is physically consistent: its margin is used up.
     pub on_the_boundary: bool,
 }
 
@@ -56,7 +56,7 @@ pub struct PhysicalFit {
     pub duality_gap: f64,
     /// `½‖R₁ B π − ρ₁‖²`: half the squared distance from the data's own optimum, in standard deviations of the rows.
     pub data_objective: f64,
-    /// γ times the distance from the prior. A possible set fits the data better by at most γ times how much farther
+    /// γ times the distance from the prior. A consistent set fits the data better by at most γ times how much farther
     /// from the prior it lies.
     pub prior_objective: f64,
     /// `√(2 data_objective)`: how many standard deviations (of white residuals) the fit moved from the data's own
@@ -88,7 +88,7 @@ impl PhysicalFit {
     }
 }
 
-/// The bodies, friction and drives that fit the data best among those that are physically possible:
+/// The bodies, friction and drives that fit the data best among those that are physically consistent:
 ///
 /// ```text
 ///     minimise ½‖R₁ B π − ρ₁‖² + γ D(π, π0)
@@ -97,7 +97,7 @@ impl PhysicalFit {
 ///
 /// A convex problem with one optimum (Sousa and Cortesão, IJRR 33 (2014) 931; Wensing, Kim and Slotine, RA-L 3 (2018)
 /// 60; Lee, Wensing and Park, T-RO 36 (2020) 348). Data see base parameters only; the prior decides what they leave
-/// open: another possible set fits better by at most γ times how much farther from the prior it lies. The result is
+/// open: another consistent set fits better by at most γ times how much farther from the prior it lies. The result is
 /// judged by a duality gap that does not depend on the route.
 ///
 /// ```
@@ -126,7 +126,7 @@ impl PhysicalFit {
 #[doc(alias("lmi", "sdp", "pseudo-inertia", "physical consistency", "log-cholesky"))]
 pub fn physical_fit(problem: &PhysicalProblem, settings: &PhysicalSettings) -> Result<PhysicalFit, PhysicalError> {
     settings.validate()?;
-    let assembled = Assembled::new(problem, settings);
+    let assembled = AssembledProgram::new(problem, settings);
     let start = assembled.interior_start(problem)?;
     let solved = match settings.route {
         PhysicalRoute::InteriorPoint => interior_point_else_log_cholesky(&assembled.program, &start, settings),
@@ -163,7 +163,7 @@ fn interior_point_else_log_cholesky(
 fn finished(
     problem: &PhysicalProblem,
     settings: &PhysicalSettings,
-    assembled: &Assembled,
+    assembled: &AssembledProgram,
     solved: &Solved,
 ) -> PhysicalFit {
     let parameters = assembled.parameters(problem, &solved.x);

@@ -1,5 +1,5 @@
-//! Intervals of standard parameters that respect what is possible: how far can a mass, a moment of inertia, a friction
-//! go before the data object, no body or law ever being impossible?
+//! Intervals of standard parameters that respect what is physically consistent: how far can a mass, a moment of inertia, a friction
+//! go before the data object, every body and term staying physically consistent?
 
 use super::description::{BaseMap, PhysicalProblem, expect, finite};
 use super::fit::{PhysicalFit, physical_fit};
@@ -8,7 +8,7 @@ use crate::uncertainty::student_half_width;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Settings of [`PossibleIntervals`].
+/// Settings of [`ConsistentIntervals`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct IntervalSettings {
@@ -39,7 +39,7 @@ impl IntervalSettings {
     /// [`PhysicalSettings::validate`].
     pub fn validate(&self) -> Result<(), PhysicalError> {
         self.physical.validate()?;
-        let error = |setting, value, mend| Err(PhysicalError::Setting { setting, value, mend });
+        let error = |setting, value, fix| Err(PhysicalError::Setting { setting, value, fix });
         if !(0.5..=0.9999).contains(&self.level) {
             return error("level", self.level, "give a level from 0.5 to 0.9999, such as 0.95");
         }
@@ -59,7 +59,7 @@ impl IntervalSettings {
 pub enum IntervalEnd {
     /// Beyond it the data are fitted too badly.
     Data,
-    /// Beyond it nothing is possible that the data allow: the body's cone or a limit stops it before the data's cost
+    /// Beyond it nothing is physically consistent that the data allow: the body's cone or a limit stops it before the data's cost
     /// reaches its threshold.
     Constraint,
     /// Neither holds it: the value can be as large as one likes.
@@ -70,8 +70,8 @@ pub enum IntervalEnd {
 
 /// An interval of one standard parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct PossibleInterval {
-    /// The value of the possible set that fits best.
+pub struct ConsistentInterval {
+    /// The value of the consistent set that fits best.
     pub value: f64,
     /// Lower end; none where it is open.
     pub lower: Option<f64>,
@@ -84,17 +84,17 @@ pub struct PossibleInterval {
 /// Profile-likelihood intervals of standard parameters within the constraints of a [`PhysicalProblem`]:
 ///
 /// ```text
-///     { p : min over possible π with π_i = p of ½‖R₁ B π − ρ₁‖²  ≤  C_min + ½ t² κ_i }
+///     { p : min over consistent π with π_i = p of ½‖R₁ B π − ρ₁‖²  ≤  C_min + ½ t² κ_i }
 /// ```
 ///
-/// C_min belongs to the best possible set, t is Student's quantile, and κ_i is how much larger than for white residuals
+/// C_min belongs to the best consistent set, t is Student's quantile, and κ_i is how much larger than for white residuals
 /// the variance of what the data say in the direction of π_i is, `κ_i = gᵀΣg / gᵀ(R₁ᵀR₁)⁻¹g`, from the covariance Σ of
 /// the base parameters that is thought honest. Without active constraints this is the usual interval `π̂_i ± t σ_i`; an
 /// end that only physics holds is said to be so, and one that nothing holds is open. Profile likelihood: Venzon and
 /// Moolgavkar, Applied Statistics 37 (1988) 87; here every profile is a convex problem, solved by pulling the parameter
 /// with a spring and moving the spring's other end.
 #[derive(Clone, Debug)]
-pub struct PossibleIntervals {
+pub struct ConsistentIntervals {
     problem: PhysicalProblem,
     settings: IntervalSettings,
     best: PhysicalFit,
@@ -107,8 +107,8 @@ pub struct PossibleIntervals {
     sizes: Vec<f64>,
 }
 
-impl PossibleIntervals {
-    /// The best possible set, from which intervals are then measured. `covariance` of the base parameters, shape (base,
+impl ConsistentIntervals {
+    /// The best consistent set, from which intervals are then measured. `covariance` of the base parameters, shape (base,
     /// base), replaces that of white residuals; `degrees_of_freedom` are those of Student's distribution.
     ///
     /// # Errors
@@ -156,7 +156,7 @@ impl PossibleIntervals {
         })
     }
 
-    /// The best possible set that all intervals hold.
+    /// The best consistent set that all intervals hold.
     pub fn best(&self) -> &PhysicalFit {
         &self.best
     }
@@ -166,7 +166,7 @@ impl PossibleIntervals {
     ///
     /// # Errors
     /// [`PhysicalError::Mismatch`] if there is no such parameter, and those of [`physical_fit`].
-    pub fn of(&self, index: usize) -> Result<PossibleInterval, PhysicalError> {
+    pub fn of(&self, index: usize) -> Result<ConsistentInterval, PhysicalError> {
         if index >= self.sizes.len() {
             return Err(PhysicalError::Mismatch {
                 what: "index of a standard parameter, below".into(),
@@ -178,11 +178,11 @@ impl PossibleIntervals {
         let known = self.problem.bodies.get(index / 10).is_some_and(|body| body.known.is_some());
         if known {
             let held_by = [IntervalEnd::Constraint; 2];
-            return Ok(PossibleInterval { value, lower: Some(value), upper: Some(value), held_by });
+            return Ok(ConsistentInterval { value, lower: Some(value), upper: Some(value), held_by });
         }
         let (lower, below) = self.end(index, -1.0)?;
         let (upper, above) = self.end(index, 1.0)?;
-        Ok(PossibleInterval { value, lower, upper, held_by: [below, above] })
+        Ok(ConsistentInterval { value, lower, upper, held_by: [below, above] })
     }
 
     /// One end. The parameter is pulled by a spring whose other end moves out until the data's cost has risen by the
@@ -191,7 +191,7 @@ impl PossibleIntervals {
         let (value, size) = (self.best.parameters[index], self.sizes[index]);
         let far = self.settings.open_beyond * size;
         // Where data say little the spring is as soft as the reference is large, so that no fit starts far outside of
-        // what is possible.
+        // what is physically consistent.
         let softness = self.deviations[index].clamp(1.0e-9 * size, size);
         let guess = self.quantile * self.mean_inflation.sqrt();
         // Unconstrained, a parameter with this deviation gives way by half of it.
@@ -199,7 +199,7 @@ impl PossibleIntervals {
         let mut wanted = None;
         let mut below = Point { reach: 0.0, root: 0.0, parameter: value };
         let mut above: Option<Point> = None;
-        // Where the solver gave up: a pull so strong that doubles cannot tell the cost beside it.
+        // Where the solver gave up: a pull so strong that doubles cannot determine the cost beside it.
         let mut hopeless = f64::INFINITY;
         for _ in 0..self.settings.max_fits {
             let Some((parameter, moved)) = self.pulled(index, 1.0 / softness, value + side * reach)? else {
@@ -337,7 +337,7 @@ mod tests {
     use crate::consistent::{PhysicalBody, PhysicalScalar, rough_body};
     use crate::factor::TriangularFactor;
 
-    /// Free quantile of ordinary intervals at many degrees of freedom.
+    /// Free quantile of ordinary intervals at many degrees of degrees_of_freedom.
     const T: f64 = 1.959_964;
 
     fn body() -> PhysicalBody {
@@ -362,8 +362,8 @@ mod tests {
         PhysicalProblem::new(BaseMap::new(matrix).unwrap(), vec![body()], vec![friction("fv")], &factor).unwrap()
     }
 
-    fn intervals(measured: &[(usize, f64, f64)], covariance: Option<&DMatrix<f64>>) -> PossibleIntervals {
-        PossibleIntervals::new(&problem(measured), covariance, 1.0e6, IntervalSettings::default()).unwrap()
+    fn intervals(measured: &[(usize, f64, f64)], covariance: Option<&DMatrix<f64>>) -> ConsistentIntervals {
+        ConsistentIntervals::new(&problem(measured), covariance, 1.0e6, IntervalSettings::default()).unwrap()
     }
 
     /// All ten parameters of a body well inside the cone, and friction.
@@ -401,7 +401,7 @@ mod tests {
         assert!((mass.upper.unwrap() - (2.0 + T * 0.01)).abs() < 0.02 * T * 0.01, "{mass:?}");
     }
 
-    /// Data that say −0.1 ± 0.1 of a friction: the best possible one is zero, and the profile above it is ½((p +
+    /// Data that say −0.1 ± 0.1 of a friction: the best consistent one is zero, and the profile above it is ½((p +
     /// 0.1)/0.1)² − ½.
     #[test]
     fn friction_that_the_data_want_negative() {
@@ -417,7 +417,7 @@ mod tests {
     /// Mass and first moment measured, inertia not at all: the parallel axis theorem holds it from below, nothing from
     /// above.
     #[test]
-    fn an_unmeasured_moment_is_held_by_what_is_possible() {
+    fn an_unmeasured_moment_is_held_by_physical_consistency() {
         let measured = [(0, 2.0, 1e-4), (1, 0.0, 1e-4), (2, 0.6, 1e-4), (3, 0.0, 1e-4), (10, 0.5, 0.1)];
         let found = intervals(&measured, None);
         let interval = found.of(4).unwrap();
@@ -452,8 +452,10 @@ mod tests {
         let found = intervals(&all(0.01), None);
         assert!(matches!(found.of(11), Err(PhysicalError::Mismatch { .. })));
         let settings = IntervalSettings { level: 1.0, ..IntervalSettings::default() };
-        assert!(PossibleIntervals::new(&problem(&all(0.01)), None, 10.0, settings).is_err());
+        assert!(ConsistentIntervals::new(&problem(&all(0.01)), None, 10.0, settings).is_err());
         let wrong = DMatrix::identity(3, 3);
-        assert!(PossibleIntervals::new(&problem(&all(0.01)), Some(&wrong), 10.0, IntervalSettings::default()).is_err());
+        assert!(
+            ConsistentIntervals::new(&problem(&all(0.01)), Some(&wrong), 10.0, IntervalSettings::default()).is_err()
+        );
     }
 }

@@ -9,7 +9,7 @@
 //!             [   0    0    0    1 ]
 //! ```
 //!
-//! (Rucker and Wensing, RA-L 7 (2022) 2771, eq. 19), so that any ten numbers are a possible body. Where the best body
+//! (Rucker and Wensing, RA-L 7 (2022) 2771, eq. 19), so that any ten numbers are a consistent body. Where the best body
 //! lies on the cone's boundary the bare fit runs away (d → −∞) and never ends. Here `−μ ln det S` keeps the optimum of
 //! every stage finite, and μ falls until the duality gap `μ ν` is below the tolerance. The coordinates map all numbers
 //! one to one onto the cone's interior, so that a stage has one stationary point only: the optimum.

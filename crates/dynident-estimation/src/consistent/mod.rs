@@ -4,7 +4,7 @@
 //! Data determine base parameters; a [`PhysicalProblem`] says which sums of the bodies' own parameters those are, and
 //! what is known of the bodies beside (mass, a box for the centre of mass, an ellipsoid around it). [`physical_fit`]
 //! finds the consistent set that fits best, a convex problem (linear matrix inequalities) whose solution comes with a
-//! certificate; [`PossibleIntervals`] how far each parameter can move before the fit becomes significantly worse. Two
+//! certificate; [`ConsistentIntervals`] how far each parameter can move before the fit becomes significantly worse. Two
 //! solvers that share nothing but the certificate agree on the optimum.
 
 mod assembly;
@@ -26,6 +26,6 @@ mod stacked;
 pub use description::{BaseMap, Ellipsoid, Limits, PhysicalBody, PhysicalProblem, PhysicalScalar, rough_body};
 pub use error::PhysicalError;
 pub use fit::{PhysicalBodyFit, PhysicalFit, PhysicalStatus, physical_fit};
-pub use intervals::{IntervalEnd, IntervalSettings, PossibleInterval, PossibleIntervals};
+pub use intervals::{ConsistentInterval, ConsistentIntervals, IntervalEnd, IntervalSettings};
 pub use priors::PhysicalPrior;
 pub use settings::{PhysicalRoute, PhysicalSettings};

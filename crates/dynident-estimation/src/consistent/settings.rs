@@ -58,11 +58,11 @@ impl PhysicalSettings {
     /// [`PhysicalError::Setting`] for a prior weight outside 1e-9 to 1e9, a margin outside 1e-9 to 0.5, a tolerance
     /// outside 1e-10 to 1e-2, or no iterations.
     pub fn validate(&self) -> Result<(), PhysicalError> {
-        let within = |setting, value: f64, least: f64, greatest: f64, mend| {
+        let within = |setting, value: f64, least: f64, greatest: f64, fix| {
             if (least..=greatest).contains(&value) {
                 Ok(())
             } else {
-                Err(PhysicalError::Setting { setting, value, mend })
+                Err(PhysicalError::Setting { setting, value, fix })
             }
         };
         within(

@@ -51,7 +51,7 @@ struct Fold {
     /// `R_vvᵀ R_vv` and `R_vvᵀ r_v`.
     gram: DMatrix<f64>,
     right: DVector<f64>,
-    /// Whether a common column is told from earlier ones.
+    /// Whether a common column is separated from earlier ones.
     independent: Vec<bool>,
 }
 
@@ -99,8 +99,8 @@ impl<'a> CrossValidation<'a> {
     /// segments than blocks; [`EstimationError::Empty`].
     pub fn new(problem: &'a LinearProblem, folds: usize) -> Result<Self, EstimationError> {
         if folds < 2 {
-            let mend = "give at least 2 blocks";
-            return Err(EstimationError::Setting { setting: "folds", value: folds as f64, mend });
+            let fix = "give at least 2 blocks";
+            return Err(EstimationError::Setting { setting: "folds", value: folds as f64, fix });
         }
         if problem.equations().is_empty() {
             return Err(EstimationError::Empty);
@@ -136,7 +136,7 @@ impl<'a> CrossValidation<'a> {
     /// # Errors
     /// [`EstimationError::Mismatch`] for numbers out of range or another number of weights;
     /// [`EstimationError::Setting`] for an impossible weight; [`EstimationError::TooFewRows`] when a block leaves fewer
-    /// rows of the joint, or all blocks but one of all joints, than could tell the columns apart.
+    /// rows of the joint, or all blocks but one of all joints, than could distinguish the columns.
     pub fn joint(
         &self,
         joint: usize,
@@ -175,8 +175,8 @@ impl<'a> CrossValidation<'a> {
                 };
                 let weight = weights[equation.joint];
                 if !(weight.is_finite() && weight >= 0.0) {
-                    let mend = "give a finite weight that is not negative";
-                    return Err(EstimationError::Setting { setting: "weight", value: weight, mend });
+                    let fix = "give a finite weight that is not negative";
+                    return Err(EstimationError::Setting { setting: "weight", value: weight, fix });
                 }
                 // Later rows have nothing but torque, and what the triangle cannot explain does not count.
                 let seen = order.iter().filter_map(|&global| place[global]).max().map_or(0, |local| local + 1);
@@ -314,7 +314,7 @@ impl Kernel for Residuals<'_> {
     fn run<T: Lane>(self) -> Self::Output {
         let Self { fold, places, theta } = self;
         let (start, end) = (fold.independent.len(), theta.len());
-        // All parameters: a common column that the rows do not tell from earlier ones is zero.
+        // All parameters: a common column that the rows do not determine from earlier ones is zero.
         for row in (0..start).rev() {
             let entries = fold.triangle.row(row);
             let mut value = [0.0; SIDE_BY_SIDE];

@@ -1,4 +1,4 @@
-//! Essential parameters: which base parameters do the data really tell, and what does the fit lose without the others?
+//! Essential parameters: which base parameters do the data really determine, and what does the fit lose without the others?
 
 use crate::error::EstimationError;
 use crate::uncertainty::{Estimate, f_tail, student_half_width};
@@ -30,11 +30,11 @@ impl EssentialSettings {
     /// [`EstimationError::Setting`] for a ratio below 1 or a significance that is not between 0 and 1.
     pub fn validate(&self) -> Result<(), EstimationError> {
         if !(self.ratio >= 1.0 && self.ratio.is_finite()) {
-            return Err(EstimationError::Setting { setting: "ratio", value: self.ratio, mend: "give 1 or more" });
+            return Err(EstimationError::Setting { setting: "ratio", value: self.ratio, fix: "give 1 or more" });
         }
         if !(self.significance > 0.0 && self.significance < 1.0) {
-            let mend = "give a probability above 0 and below 1";
-            return Err(EstimationError::Setting { setting: "significance", value: self.significance, mend });
+            let fix = "give a probability above 0 and below 1";
+            return Err(EstimationError::Setting { setting: "significance", value: self.significance, fix });
         }
         Ok(())
     }
@@ -176,8 +176,8 @@ fn without(estimate: &Estimate, columns: &[usize]) -> (f64, Estimate) {
     reduced.covariance = &map * &estimate.covariance * map.transpose();
     reduced.covariance_white = &map * white * map.transpose();
     reduced.std = reduced.covariance.diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect();
-    let half = |(std, freedom): (&f64, &f64)| student_half_width(0.95, *freedom) * std;
-    reduced.half_width_95 = reduced.std.iter().zip(&reduced.std_freedom).map(half).collect();
+    let half = |(std, degrees_of_freedom): (&f64, &f64)| student_half_width(0.95, *degrees_of_freedom) * std;
+    reduced.half_width_95 = reduced.std.iter().zip(&reduced.std_degrees_of_freedom).map(half).collect();
     let relative = |(std, value): (&f64, &f64)| (*std > 0.0 && *value != 0.0).then(|| 100.0 * std / value.abs());
     reduced.relative_std_percent = reduced.std.iter().zip(&reduced.values).map(relative).collect();
     (f, reduced)
@@ -188,7 +188,7 @@ fn without(estimate: &Estimate, columns: &[usize]) -> (f64, Estimate) {
 pub struct CorrelatedPair {
     /// The two names.
     pub parameters: [String; 2],
-    /// Their correlation, −1 to 1: near ±1 the data tell a sum of the two, not each.
+    /// Their correlation, −1 to 1: near ±1 the data determine a sum of the two, not each.
     pub correlation: f64,
 }
 

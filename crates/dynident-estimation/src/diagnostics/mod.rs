@@ -2,14 +2,14 @@
 //!
 //! [`Validation`] sums up the errors of predicted torque; [`CrossValidation`] leaves out one part of the logs after the
 //! other to compare sets of columns. [`essential`] drops parameters that the data do not support, one by one.
-//! [`Whiteness`], [`Normality`] and [`Regimes`] are fed sample after sample and say whether residuals are white,
+//! [`Whiteness`], [`Normality`] and [`SpeedRanges`] are fed sample after sample and say whether residuals are white,
 //! normal, or larger at reversals; their memory does not grow.
 
 mod cross_validation;
 mod essential;
 mod nonnegative;
 mod normality;
-mod regimes;
+mod speed_ranges;
 mod validation;
 mod whiteness;
 
@@ -19,6 +19,6 @@ pub use essential::{
     strongest_correlations,
 };
 pub use normality::{Normality, NormalityReport};
-pub use regimes::{RegimeFigures, Regimes, RegimesReport};
+pub use speed_ranges::{SpeedRangeFigures, SpeedRanges, SpeedRangesReport};
 pub use validation::{JointValidation, Validation, ValidationReport};
 pub use whiteness::{Whiteness, WhitenessReport};

@@ -63,7 +63,7 @@ impl InstrumentedProblem {
         self.rows.add(log, joint, both, factor)
     }
 
-    /// Values at which columns are fixed that the instruments do not tell apart; zero unless said otherwise.
+    /// Values at which columns are fixed that the instruments do not distinguish; zero unless said otherwise.
     ///
     /// # Errors
     /// As [`LinearProblem::with_fallback`].

@@ -257,7 +257,7 @@ impl Prior {
 
 fn finite(setting: &'static str, values: &[f64]) -> Result<(), EstimationError> {
     match values.iter().find(|value| !value.is_finite()) {
-        Some(&value) => Err(EstimationError::Setting { setting, value, mend: "give finite numbers" }),
+        Some(&value) => Err(EstimationError::Setting { setting, value, fix: "give finite numbers" }),
         None => Ok(()),
     }
 }

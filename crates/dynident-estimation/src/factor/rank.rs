@@ -35,14 +35,14 @@ impl RankSettings {
         for (setting, value) in [("rank.tolerance", self.tolerance), ("rank.negligible_column", self.negligible_column)]
         {
             if !(1.0e-14..1.0).contains(&value) {
-                return Err(EstimationError::Setting { setting, value, mend: "give a share from 1e-14 to below 1" });
+                return Err(EstimationError::Setting { setting, value, fix: "give a share from 1e-14 to below 1" });
             }
         }
         Ok(())
     }
 }
 
-/// A column that the data do not tell apart from earlier ones.
+/// A column that the data do not distinguish from earlier ones.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FixedColumn {
     /// Its number.

@@ -43,10 +43,10 @@ impl SegmentSettings {
     pub fn validate(&self) -> Result<(), EstimationError> {
         if self.max_segments < 2 {
             let value = self.max_segments as f64;
-            return Err(EstimationError::Setting { setting: "max_segments", value, mend: "give at least 2" });
+            return Err(EstimationError::Setting { setting: "max_segments", value, fix: "give at least 2" });
         }
         if self.first_length_rows == 0 {
-            return Err(EstimationError::Setting { setting: "first_length_rows", value: 0.0, mend: "give at least 1" });
+            return Err(EstimationError::Setting { setting: "first_length_rows", value: 0.0, fix: "give at least 1" });
         }
         Ok(())
     }
@@ -231,7 +231,7 @@ impl SegmentedFactor {
             });
         }
         if let Some(&value) = map.iter().find(|value| !value.is_finite()) {
-            return Err(EstimationError::Setting { setting: "map of columns", value, mend: "give finite numbers" });
+            return Err(EstimationError::Setting { setting: "map of columns", value, fix: "give finite numbers" });
         }
         Ok(self.transformed(core::slice::from_ref(map)))
     }

@@ -20,7 +20,7 @@ const LARGEST: f64 = 1.0e140;
 ///         [  0   ρ ]    ‖τ − Wθ‖² = ‖r − R_W θ‖² + ρ²  for every θ
 /// ```
 ///
-/// Rows come in blocks and are forgotten; factors of blocks, logs and machines [`merge`](Self::merge). The diagonal is
+/// Rows come in blocks and are forgotten; factors of blocks, logs and robots [`merge`](Self::merge). The diagonal is
 /// never negative, so the factor of given rows is unique (up to rounding) where their columns are independent. With
 /// fewer rows than columns, or dependent columns, the identities above still hold and nothing becomes NaN; rank
 /// decisions are made later, with scaled columns and a stated tolerance (`rank.rs`), never from this diagonal.
@@ -270,7 +270,7 @@ impl TriangularFactor {
             return Err(EstimationError::Setting {
                 setting: "weight",
                 value: weight,
-                mend: "give a finite weight that is not negative",
+                fix: "give a finite weight that is not negative",
             });
         }
         let mut scaled = self.clone();

@@ -3,7 +3,7 @@
 use super::weighted::{WeightedSettings, noise_of_joints};
 use crate::error::{EstimationError, expect};
 use crate::factor::{LinearProblem, SegmentedFactor, solve, split};
-use crate::uncertainty::{Estimate, Fitted};
+use crate::uncertainty::{Estimate, PointEstimate};
 use nalgebra::{DMatrix, DVector};
 
 /// Rows of all joints side by side: one row of `[W_1 τ_1 | W_2 τ_2 | … | W_n τ_n]` for every instant of a log, held as
@@ -199,8 +199,8 @@ pub fn generalized_least_squares(
     let mut triangle = whitened.stacked().combined(&[1.0])?;
     let choice = split(&triangle, &settings.rank);
     let share = choice.free.len() as f64 / joints as f64;
-    let freedom = rows as f64 - share;
-    if freedom <= joints as f64 {
+    let degrees_of_freedom = rows as f64 - share;
+    if degrees_of_freedom <= joints as f64 {
         return Err(EstimationError::TooFewRows {
             what: "every joint".into(),
             rows,
@@ -214,13 +214,13 @@ pub fn generalized_least_squares(
     loop {
         let (products, torque) = problem.residual_products(&solution.values);
         let squares: Vec<f64> = products.diagonal().iter().copied().collect();
-        let sigma = noise_of_joints(&squares, &torque, &vec![freedom; joints]);
+        let sigma = noise_of_joints(&squares, &torque, &vec![degrees_of_freedom; joints]);
         omega = DMatrix::from_fn(joints, joints, |i, j| {
             if i == j {
                 sigma[i] * sigma[i]
             } else {
                 let bound = HIGHEST_CORRELATION * sigma[i] * sigma[j];
-                (products[(i, j)] / freedom).clamp(-bound, bound)
+                (products[(i, j)] / degrees_of_freedom).clamp(-bound, bound)
             }
         });
         if let Some(previous) = &previous {
@@ -239,7 +239,7 @@ pub fn generalized_least_squares(
         iterations += 1;
     }
     let sigma: Vec<f64> = omega.diagonal().iter().map(|variance| variance.sqrt()).collect();
-    let fitted = Fitted {
+    let fitted = PointEstimate {
         triangle,
         split: choice,
         solution,

@@ -5,7 +5,7 @@ use super::projection::Projection;
 use super::weighted::noise_of_joints;
 use crate::error::EstimationError;
 use crate::factor::{InstrumentedProblem, RankSettings, solve, split};
-use crate::uncertainty::{CovarianceMethod, Fitted, f_tail, joint_freedom};
+use crate::uncertainty::{CovarianceMethod, PointEstimate, f_tail, joint_degrees_of_freedom};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -37,8 +37,8 @@ impl HausmanSettings {
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
         if !(1.0e-6..=0.5).contains(&self.level) {
-            let mend = "give a probability from 1e-6 to 0.5";
-            return Err(EstimationError::Setting { setting: "level", value: self.level, mend });
+            let fix = "give a probability from 1e-6 to 0.5";
+            return Err(EstimationError::Setting { setting: "level", value: self.level, fix });
         }
         Ok(())
     }
@@ -63,7 +63,7 @@ pub struct HausmanTest {
     pub verdict: HausmanVerdict,
     /// The statistic; none when undecided.
     pub f: Option<f64>,
-    /// Degrees of freedom: tested columns; time segments (or rows, with white residuals) less those.
+    /// Degrees of degrees_of_freedom: tested columns; time segments (or rows, with white residuals) less those.
     pub degrees_of_freedom: [f64; 2],
     /// Probability of such an F where least squares is right.
     pub p_value: Option<f64>,
@@ -137,16 +137,16 @@ pub fn hausman_test(
     if tested.is_empty() {
         return Ok(undecided("nothing of the regressor's noise is independent of the regressor".into(), [0.0; 2]));
     }
-    let freedom = match joint_freedom(&stacked, choice.free.len()) {
-        Ok(freedom) => freedom,
+    let degrees_of_freedom = match joint_degrees_of_freedom(&stacked, choice.free.len()) {
+        Ok(degrees_of_freedom) => degrees_of_freedom,
         Err(error) => return Ok(undecided(error.to_string(), [tested.len() as f64, 0.0])),
     };
     let solution = solve(&triangle, &choice, &settings.rank, augmented.fallback());
     let (squares, torque) = stacked.joint_squares(&solution.values)?;
-    let joint_sigma = noise_of_joints(&squares, &torque, &freedom);
+    let joint_sigma = noise_of_joints(&squares, &torque, &degrees_of_freedom);
     let degrees = triangle.rows() - choice.free.len();
     let weighted: f64 = squares.iter().zip(&weights).map(|(square, weight)| square * weight * weight).sum();
-    let fit = Fitted {
+    let fit = PointEstimate {
         triangle,
         split: choice,
         solution,
@@ -159,7 +159,7 @@ pub fn hausman_test(
     .into_estimate(&stacked, &settings.rank, settings.covariance)?;
     let q = tested.len();
     let pieces = if fit.clusters > 0 { fit.clusters } else { degrees + q };
-    let freedom = [q as f64, pieces.saturating_sub(q) as f64];
+    let degrees_of_freedom = [q as f64, pieces.saturating_sub(q) as f64];
     let columns: Vec<HausmanColumn> = tested
         .iter()
         .filter(|&&column| fit.std[column] > 0.0)
@@ -171,7 +171,7 @@ pub fn hausman_test(
         .collect();
     if pieces <= q {
         let reason = format!("{pieces} time segments for {q} tested columns: use shorter segments or longer logs");
-        return Ok(HausmanTest { columns, ..undecided(reason, freedom) });
+        return Ok(HausmanTest { columns, ..undecided(reason, degrees_of_freedom) });
     }
     // On the scale of the standard deviations, where units do not matter.
     let std: Vec<f64> = tested.iter().map(|&column| fit.std[column]).collect();
@@ -180,14 +180,14 @@ pub fn hausman_test(
     let square = correlation.cholesky().map(|factor| t.dot(&factor.solve(&t))).filter(|square| square.is_finite());
     let Some(square) = square else {
         let reason = "the covariance of the tested columns is singular: use shorter segments or longer logs".into();
-        return Ok(HausmanTest { columns, ..undecided(reason, freedom) });
+        return Ok(HausmanTest { columns, ..undecided(reason, degrees_of_freedom) });
     };
-    let scale = if fit.clusters > 0 { freedom[1] / (pieces as f64 - 1.0) } else { 1.0 };
+    let scale = if fit.clusters > 0 { degrees_of_freedom[1] / (pieces as f64 - 1.0) } else { 1.0 };
     let f = square * scale / q as f64;
-    let p_value = f_tail(f, freedom[0], freedom[1]);
+    let p_value = f_tail(f, degrees_of_freedom[0], degrees_of_freedom[1]);
     let verdict =
         if p_value < settings.level { HausmanVerdict::RejectLeastSquares } else { HausmanVerdict::FilteringWasEnough };
-    Ok(HausmanTest { verdict, f: Some(f), degrees_of_freedom: freedom, p_value: Some(p_value), columns, reason: None })
+    Ok(HausmanTest { verdict, f: Some(f), degrees_of_freedom, p_value: Some(p_value), columns, reason: None })
 }
 
 /// Coefficients of an equation's `[Z | W | τ]` in `[W_free | V_noisy | τ − W_fixed θ_fixed]`.

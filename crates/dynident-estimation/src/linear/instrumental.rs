@@ -4,7 +4,7 @@ use super::projection::Projection;
 use super::weighted::{WeightedSettings, noise_change, noise_of_joints};
 use crate::error::EstimationError;
 use crate::factor::{FactorWorkspace, InstrumentedProblem, RankSettings, Split, TriangularFactor, solve, split};
-use crate::uncertainty::{CovarianceMethod, Estimate, EstimateStatus, Fitted, joint_freedom};
+use crate::uncertainty::{CovarianceMethod, Estimate, EstimateStatus, PointEstimate, joint_degrees_of_freedom};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -48,8 +48,8 @@ impl InstrumentalSettings {
         let (tolerance, max_iterations) = (self.tolerance, self.max_iterations);
         WeightedSettings { rank, covariance, tolerance, max_iterations }.validate()?;
         if !(self.weak_below.is_finite() && self.weak_below > 0.0) {
-            let mend = "give a positive limit for the first-stage F, 10 by default";
-            return Err(EstimationError::Setting { setting: "weak_below", value: self.weak_below, mend });
+            let fix = "give a positive limit for the first-stage F, 10 by default";
+            return Err(EstimationError::Setting { setting: "weak_below", value: self.weak_below, fix });
         }
         Ok(())
     }
@@ -100,7 +100,7 @@ pub(crate) const NOISY: f64 = 1.0e-7;
 /// Econometric Theory 9 (1993) 222.
 ///
 /// # Errors
-/// As [`weighted_least_squares`](crate::weighted_least_squares). Columns that the instruments do not tell apart are
+/// As [`weighted_least_squares`](crate::weighted_least_squares). Columns that the instruments do not distinguish are
 /// fixed and named in the estimate's rank report; weak instruments are reported: neither is an error.
 #[doc(alias("iv", "idim-iv", "2sls", "tsls"))]
 pub fn instrumental_variables(
@@ -112,13 +112,13 @@ pub fn instrumental_variables(
     let mut weights = vec![1.0; problem.joints().len()];
     let mut projection = Projection::new(problem, &stacked, &weights, &settings.rank)?;
     let choice = split(&projection.explained, &settings.rank);
-    let freedom = joint_freedom(&stacked, choice.free.len())?;
+    let degrees_of_freedom = joint_degrees_of_freedom(&stacked, choice.free.len())?;
     let mut solution = solve(&projection.explained, &choice, &settings.rank, problem.fallback());
     let mut joint_sigma;
     let (mut iterations, mut converged) = (1, false);
     loop {
         let (squares, torque) = stacked.joint_squares(&problem.over_both(&solution.values))?;
-        joint_sigma = noise_of_joints(&squares, &torque, &freedom);
+        joint_sigma = noise_of_joints(&squares, &torque, &degrees_of_freedom);
         if iterations > 1 {
             converged = noise_change(&joint_sigma, &weights) <= settings.tolerance;
         }
@@ -146,7 +146,7 @@ pub fn instrumental_variables(
         rows
     })?;
     let second = second.stacked();
-    let estimate = Fitted {
+    let estimate = PointEstimate {
         triangle: projection.explained,
         split: choice,
         solution,

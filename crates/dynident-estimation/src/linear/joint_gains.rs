@@ -1,4 +1,4 @@
-//! Torque in a unit that nobody knows: one gain for each joint beside the parameters, told by a load that is known.
+//! Torque in a unit that nobody knows: one gain for each joint beside the parameters, determined by a load that is known.
 
 use super::ordinary::{OrdinarySettings, ordinary_least_squares};
 use super::weighted::{WeightedSettings, weighted_least_squares};
@@ -132,7 +132,7 @@ fn check(problem: &GainProblem<'_>) -> Result<(), EstimationError> {
     for known in &problem.known {
         expect("values of a known load", rows.columns().len(), known.len())?;
         if let Some(&value) = known.iter().find(|value| !value.is_finite()) {
-            return Err(EstimationError::Setting { setting: "known load", value, mend: "give finite numbers" });
+            return Err(EstimationError::Setting { setting: "known load", value, fix: "give finite numbers" });
         }
     }
     if rows.prior().is_some() {
@@ -140,8 +140,8 @@ fn check(problem: &GainProblem<'_>) -> Result<(), EstimationError> {
         return Err(EstimationError::Mismatch { what, expected: 0, found: 1 });
     }
     if problem.known.iter().flatten().all(|&value| value == 0.0) {
-        let mend = "let at least one log carry a load that is known";
-        return Err(EstimationError::Setting { setting: "known load", value: 0.0, mend });
+        let fix = "let at least one log carry a load that is known";
+        return Err(EstimationError::Setting { setting: "known load", value: 0.0, fix });
     }
     Ok(())
 }
@@ -207,7 +207,7 @@ fn start(
     let rows = problem.rows;
     let (count, joints) = (rows.columns().len(), rows.joints().len());
     let names = rows.columns().iter().chain(rows.joints()).cloned().collect();
-    // Parameters that are not told are zero, gains one.
+    // Parameters that are not determined are zero, gains one.
     let fallback = (0..count + joints).map(|column| f64::from(u8::from(column >= count))).collect();
     let mut linear = LinearProblem::new(names, rows.joints().to_vec()).with_fallback(fallback)?;
     for (equation, factor) in rows.equations().iter().zip(merged) {

@@ -108,7 +108,7 @@ fn check(problem: &LinearProblem, known: &KnownColumns) -> Result<(), Estimation
     }
     match known.values.iter().chain(known.covariance.iter()).find(|value| !value.is_finite()) {
         Some(&value) => {
-            Err(EstimationError::Setting { setting: "known columns", value, mend: "give finite values and covariance" })
+            Err(EstimationError::Setting { setting: "known columns", value, fix: "give finite values and covariance" })
         }
         None => Ok(()),
     }
@@ -123,9 +123,9 @@ fn sensitivity(
 ) -> Result<DMatrix<f64>, EstimationError> {
     let weights: Vec<f64> = own.joint_sigma.iter().map(|sigma| 1.0 / sigma).collect();
     let triangle = problem.combined(&weights)?.regressor_triangle();
-    let told: Vec<usize> =
+    let determined: Vec<usize> =
         (0..free.len()).filter(|place| own.rank.fixed.iter().all(|fixed| fixed.column != *place)).collect();
-    let columns: Vec<usize> = told.iter().map(|&place| free[place]).collect();
+    let columns: Vec<usize> = determined.iter().map(|&place| free[place]).collect();
     let mut own_rows = triangle.select_columns(&columns);
     let norms: Vec<f64> = own_rows.column_iter().map(|column| column.norm()).collect();
     for (mut column, norm) in own_rows.column_iter_mut().zip(&norms) {
@@ -139,7 +139,7 @@ fn sensitivity(
         return Err(EstimationError::Overflow { name: problem.columns()[free[0]].clone() });
     }
     let mut sensitivity = DMatrix::zeros(free.len(), known.columns.len());
-    for (row, (&place, norm)) in told.iter().zip(&norms).enumerate() {
+    for (row, (&place, norm)) in determined.iter().zip(&norms).enumerate() {
         sensitivity.set_row(place, &(-solved.row(row) / *norm));
     }
     Ok(sensitivity)
@@ -178,14 +178,14 @@ fn joined(
     let std: Vec<f64> = DVector::from(covariance.diagonal()).iter().map(|variance| variance.max(0.0).sqrt()).collect();
     let normal = student_half_width(0.95, f64::INFINITY);
     let (mut values, mut half_width_95) = (vec![0.0; count], vec![0.0; count]);
-    let mut std_freedom = vec![f64::INFINITY; count];
+    let mut std_degrees_of_freedom = vec![f64::INFINITY; count];
     for (&column, &value) in known.columns.iter().zip(&known.values) {
         (values[column], half_width_95[column]) = (value, normal * std[column]);
     }
     for (place, &column) in free.iter().enumerate() {
         values[column] = own.values[place];
         half_width_95[column] = own.half_width_95[place].hypot(normal * carried[(place, place)].max(0.0).sqrt());
-        std_freedom[column] = own.std_freedom[place];
+        std_degrees_of_freedom[column] = own.std_degrees_of_freedom[place];
     }
     let mut rank = own.rank;
     for fixed in &mut rank.fixed {
@@ -199,7 +199,7 @@ fn joined(
         covariance,
         covariance_white,
         std,
-        std_freedom,
+        std_degrees_of_freedom,
         half_width_95,
         rank,
         ..own

@@ -7,7 +7,7 @@
 //! | a level for each joint | [`weighted_least_squares`] |
 //! | the same, some columns known | [`weighted_least_squares_with_known`] |
 //! | correlated between joints | [`generalized_least_squares`] |
-//! | a level that depends on the speed | [`noise_weighted_least_squares`] |
+//! | a level that depends on the velocity | [`noise_weighted_least_squares`] |
 //! | gross errors | [`robust_least_squares`] |
 //! | in the columns too | [`instrumental_variables`]; [`hausman_test`] says whether it matters |
 //!

@@ -49,7 +49,7 @@ impl NoiseLevelSettings {
     /// outside 1e-9 to 1, fewer than two passes, or rank settings out of range.
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
-        let error = |setting, value, mend| Err(EstimationError::Setting { setting, value, mend });
+        let error = |setting, value, fix| Err(EstimationError::Setting { setting, value, fix });
         if self.window_rows < 5 {
             return error(
                 "window_rows",
@@ -82,10 +82,10 @@ pub struct NoiseWeightedEstimate {
 
 /// `θ = argmin Σ_j Σ_k (τ_jk − w_jk θ)² / σ_jk²`, `σ_jk² = s σ_j² + (1 − s) · mean of r² over the window around row k`,
 /// iterated: rows of joint j at instant k count by the reciprocal of the noise level there, which the residuals of the
-/// solution before tell.
+/// solution before determine.
 ///
 /// Feng's reading of iteratively reweighted least squares, where weights are the reciprocal noise: torque noise of a
-/// drive is larger at speed, friction is modelled worse at reversals, and one σ for the whole joint lets the worst part
+/// drive is larger at velocity, friction is modelled worse at reversals, and one σ for the whole joint lets the worst part
 /// decide. Unlike Huber's and Tukey's weights a row is not judged by its own residual but by its neighbourhood's, so
 /// that normal noise loses nothing but what the level's own uncertainty costs. After Han et al., "An iterative approach
 /// for accurate dynamic model identification", IEEE Trans. Ind. Electron. (2020); for estimated weights in general

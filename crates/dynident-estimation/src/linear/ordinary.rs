@@ -2,7 +2,7 @@
 
 use crate::error::EstimationError;
 use crate::factor::{LinearProblem, RankSettings, solve, split};
-use crate::uncertainty::{CovarianceMethod, Estimate, Fitted, joint_freedom};
+use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom};
 use serde::{Deserialize, Serialize};
 
 /// Settings of [`ordinary_least_squares`].
@@ -46,11 +46,15 @@ pub fn ordinary_least_squares(
     let weights = vec![1.0; problem.joints().len()];
     let triangle = stacked.combined(&weights)?;
     let split = split(&triangle, &settings.rank);
-    let freedom = joint_freedom(&stacked, split.free.len())?;
+    let degrees_of_freedom = joint_degrees_of_freedom(&stacked, split.free.len())?;
     let solution = solve(&triangle, &split, &settings.rank, problem.fallback());
     let (squares, _) = stacked.joint_squares(&solution.values)?;
-    let joint_sigma = squares.iter().zip(&freedom).map(|(square, freedom)| (square / freedom).sqrt()).collect();
+    let joint_sigma = squares
+        .iter()
+        .zip(&degrees_of_freedom)
+        .map(|(square, degrees_of_freedom)| (square / degrees_of_freedom).sqrt())
+        .collect();
     let weighted_variance = squares.iter().sum::<f64>() / (triangle.rows() - split.free.len()) as f64;
-    Fitted { triangle, split, solution, weights, joint_sigma, weighted_variance, iterations: 1, converged: true }
+    PointEstimate { triangle, split, solution, weights, joint_sigma, weighted_variance, iterations: 1, converged: true }
         .into_estimate(&stacked, &settings.rank, settings.covariance)
 }

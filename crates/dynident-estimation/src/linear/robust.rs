@@ -3,7 +3,7 @@
 use super::weighted::{WeightedSettings, weighted_least_squares};
 use crate::error::EstimationError;
 use crate::factor::{LinearProblem, RankSettings, SegmentedFactor, Split, solve, split};
-use crate::uncertainty::{CovarianceMethod, Estimate, Fitted, joint_freedom};
+use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -121,16 +121,16 @@ impl RobustSettings {
             return Err(EstimationError::Setting {
                 setting,
                 value,
-                mend: "give a number of deviations from 0.1 to 100",
+                fix: "give a number of deviations from 0.1 to 100",
             });
         }
         if !(1.0e-13..=1.0).contains(&self.tolerance) {
-            let mend = "give a relative change from 1e-13 to 1";
-            return Err(EstimationError::Setting { setting: "tolerance", value: self.tolerance, mend });
+            let fix = "give a relative change from 1e-13 to 1";
+            return Err(EstimationError::Setting { setting: "tolerance", value: self.tolerance, fix });
         }
         if self.max_passes < 2 {
             let value = self.max_passes as f64;
-            return Err(EstimationError::Setting { setting: "max_passes", value, mend: "give at least 2" });
+            return Err(EstimationError::Setting { setting: "max_passes", value, fix: "give at least 2" });
         }
         Ok(())
     }
@@ -257,7 +257,7 @@ pub fn robust_least_squares<E: From<EstimationError>>(
         let weights: Vec<f64> = scales.iter().map(|scale| 1.0 / scale).collect();
         let triangle = stacked.combined(&weights)?;
         let choice = choice.get_or_insert_with(|| split(&triangle, &settings.rank));
-        joint_freedom(&stacked, choice.free.len())?;
+        joint_degrees_of_freedom(&stacked, choice.free.len())?;
         let solution = solve(&triangle, choice, &settings.rank, problem.fallback());
         let scale_change = new_scales.iter().zip(&scales).map(|(new, old)| (new / old - 1.0).abs()).fold(0.0, f64::max);
         // Rows have unit noise: the norm is the change in error bars, over all directions.
@@ -270,7 +270,7 @@ pub fn robust_least_squares<E: From<EstimationError>>(
         let settled = largest <= if preliminary { settings.tolerance.max(0.1) } else { settings.tolerance };
         let last = passes >= settings.max_passes;
         if (settled && !preliminary) || last {
-            let fitted = Fitted {
+            let fitted = PointEstimate {
                 weighted_variance: variance_factor(&gathered.tally),
                 triangle,
                 split: choice.clone(),

@@ -2,7 +2,7 @@
 
 use crate::error::EstimationError;
 use crate::factor::{LinearProblem, RankSettings, solve, split};
-use crate::uncertainty::{CovarianceMethod, Estimate, Fitted, joint_freedom};
+use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom};
 use serde::{Deserialize, Serialize};
 
 /// Settings of [`weighted_least_squares`].
@@ -39,11 +39,11 @@ impl WeightedSettings {
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
         if !(1.0e-12..=1.0).contains(&self.tolerance) {
-            let mend = "give a relative change from 1e-12 to 1";
-            return Err(EstimationError::Setting { setting: "tolerance", value: self.tolerance, mend });
+            let fix = "give a relative change from 1e-12 to 1";
+            return Err(EstimationError::Setting { setting: "tolerance", value: self.tolerance, fix });
         }
         if self.max_iterations == 0 {
-            return Err(EstimationError::Setting { setting: "max_iterations", value: 0.0, mend: "give at least 1" });
+            return Err(EstimationError::Setting { setting: "max_iterations", value: 0.0, fix: "give at least 1" });
         }
         Ok(())
     }
@@ -75,13 +75,13 @@ pub fn weighted_least_squares(
     let mut weights = vec![1.0; problem.joints().len()];
     let mut triangle = stacked.combined(&weights)?;
     let split = split(&triangle, &settings.rank);
-    let freedom = joint_freedom(&stacked, split.free.len())?;
+    let degrees_of_freedom = joint_degrees_of_freedom(&stacked, split.free.len())?;
     let mut solution = solve(&triangle, &split, &settings.rank, problem.fallback());
     let mut joint_sigma;
     let (mut iterations, mut converged) = (1, false);
     loop {
         let (squares, torque) = stacked.joint_squares(&solution.values)?;
-        joint_sigma = noise_of_joints(&squares, &torque, &freedom);
+        joint_sigma = noise_of_joints(&squares, &torque, &degrees_of_freedom);
         // From the second solution on, the weights in use are the last σ's reciprocals.
         if iterations > 1 {
             converged = noise_change(&joint_sigma, &weights) <= settings.tolerance;
@@ -98,7 +98,7 @@ pub fn weighted_least_squares(
     }
     // The rows were scaled by the last weights; what noise is left in them is one up to the tolerance, unless the limit
     // came first.
-    Fitted { triangle, split, solution, weights, joint_sigma, weighted_variance: 1.0, iterations, converged }
+    PointEstimate { triangle, split, solution, weights, joint_sigma, weighted_variance: 1.0, iterations, converged }
         .into_estimate(&stacked, &settings.rank, settings.covariance)
 }
 
@@ -108,12 +108,12 @@ pub(crate) fn noise_change(joint_sigma: &[f64], weights: &[f64]) -> f64 {
 }
 
 /// Noise of every joint, never below the rounding of its torque.
-pub(crate) fn noise_of_joints(squares: &[f64], torque: &[f64], freedom: &[f64]) -> Vec<f64> {
-    let largest = torque.iter().zip(freedom).map(|(t, f)| t / f).fold(0.0, f64::max);
+pub(crate) fn noise_of_joints(squares: &[f64], torque: &[f64], degrees_of_freedom: &[f64]) -> Vec<f64> {
+    let largest = torque.iter().zip(degrees_of_freedom).map(|(t, f)| t / f).fold(0.0, f64::max);
     let of_joint = |joint: usize| {
-        let rms = (if torque[joint] > 0.0 { torque[joint] / freedom[joint] } else { largest }).sqrt();
+        let rms = (if torque[joint] > 0.0 { torque[joint] / degrees_of_freedom[joint] } else { largest }).sqrt();
         let floor = SMALLEST_SIGMA * if rms > 0.0 { rms } else { 1.0 };
-        (squares[joint] / freedom[joint]).sqrt().max(floor)
+        (squares[joint] / degrees_of_freedom[joint]).sqrt().max(floor)
     };
     (0..squares.len()).map(of_joint).collect()
 }

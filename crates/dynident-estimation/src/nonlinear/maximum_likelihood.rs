@@ -14,7 +14,7 @@ pub struct InstantRows<'a> {
     pub regressor: &'a DMatrix<f64>,
     /// τ, one entry per joint.
     pub torque: &'a DVector<f64>,
-    /// `∂W/∂x_i` for every measured variable x_i of the motion at this instant (positions; or positions, speeds and
+    /// `∂W/∂x_i` for every measured variable x_i of the motion at this instant (positions; or positions, velocities and
     /// accelerations), each of W's shape.
     pub regressor_by_motion: &'a [DMatrix<f64>],
 }
@@ -177,11 +177,11 @@ impl MaximumLikelihoodSettings {
         covariance("motion_covariance", &self.motion_covariance, false)?;
         covariance("torque_covariance", &self.torque_covariance, true)?;
         if !(1.0e-12..=1.0).contains(&self.tolerance) {
-            let mend = "give a length in error bars from 1e-12 to 1";
-            return Err(EstimationError::Setting { setting: "tolerance", value: self.tolerance, mend });
+            let fix = "give a length in error bars from 1e-12 to 1";
+            return Err(EstimationError::Setting { setting: "tolerance", value: self.tolerance, fix });
         }
         if self.max_iterations == 0 {
-            return Err(EstimationError::Setting { setting: "max_iterations", value: 0.0, mend: "give at least 1" });
+            return Err(EstimationError::Setting { setting: "max_iterations", value: 0.0, fix: "give at least 1" });
         }
         Ok(())
     }
@@ -197,8 +197,8 @@ fn covariance(setting: &'static str, matrix: &DMatrix<f64>, definite: bool) -> R
     if finite && symmetric && enough {
         return Ok(());
     }
-    let mend = "give a covariance: finite, symmetric, and for the torque positive definite";
-    Err(EstimationError::Setting { setting, value: least, mend })
+    let fix = "give a covariance: finite, symmetric, and for the torque positive definite";
+    Err(EstimationError::Setting { setting, value: least, fix })
 }
 
 /// Rows `L⁻¹ [W̃ | r + W̃ θ]` with `S = L Lᵀ`, and the cost at θ.
@@ -231,7 +231,7 @@ fn gathered<E: From<EstimationError>>(
             return Err(EstimationError::Setting {
                 setting: "torque_covariance",
                 value: settings.torque_covariance.diagonal().min(),
-                mend: "its size and the motion's differ by too many powers of ten: check units",
+                fix: "its size and the motion's differ by too many powers of ten: check units",
             });
         };
         let error = spread.tr_mul(&factor.solve(&residual));

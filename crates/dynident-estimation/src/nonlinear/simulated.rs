@@ -17,7 +17,7 @@ pub struct SimulatedRows {
     pub regressor: DMatrix<f64>,
 }
 
-/// The experiment over again with other parameters: the same machine model, controller, reference and filters.
+/// The experiment over again with other parameters: the same robot model, controller, reference and filters.
 /// `estimation` does not know how.
 pub trait SimulatedMotion {
     /// What can go wrong in a simulation.
@@ -27,7 +27,7 @@ pub trait SimulatedMotion {
     /// is none): the step is then halved.
     ///
     /// # Errors
-    /// Whatever no other parameters would mend.
+    /// Whatever no other parameters would fix.
     fn simulate(&mut self, parameters: &[f64]) -> Result<Option<SimulatedRows>, Self::Error>;
 }
 
@@ -79,7 +79,7 @@ impl SimulatedSettings {
     /// [`EstimationError::Setting`].
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
-        let error = |setting, value, mend| Err(EstimationError::Setting { setting, value, mend });
+        let error = |setting, value, fix| Err(EstimationError::Setting { setting, value, fix });
         if !(1.0e-10..=1.0).contains(&self.tolerance) {
             return error("tolerance", self.tolerance, "give a length in error bars from 1e-10 to 1");
         }
@@ -267,9 +267,9 @@ impl SimulatedProblem {
         expect("starting values", self.names.len(), self.start.len())?;
         expect("scales", self.names.len(), self.scale.len())?;
         expect("noise of rows", self.measured.len(), self.noise_std.len())?;
-        let usable = |setting, values: &[f64], positive: bool, mend| {
+        let usable = |setting, values: &[f64], positive: bool, fix| {
             let bad = values.iter().find(|value| !value.is_finite() || positive && **value <= 0.0);
-            bad.map_or(Ok(()), |&value| Err(EstimationError::Setting { setting, value, mend }))
+            bad.map_or(Ok(()), |&value| Err(EstimationError::Setting { setting, value, fix }))
         };
         usable("start", &self.start, false, "give finite values")?;
         usable("scale", &self.scale, true, "give each parameter's ordinary size, greater than zero")?;

@@ -5,7 +5,7 @@ use super::autoregression::autoregression;
 use super::simultaneous_rows::{ChannelRows, WhiteRows, cost};
 use crate::error::{EstimationError, expect};
 use crate::factor::{RankSettings, solve, split};
-use crate::uncertainty::{CovarianceMethod, Estimate, Fitted, joint_freedom};
+use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -88,7 +88,7 @@ impl SimultaneousSettings {
     /// rank settings out of range.
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
-        let error = |setting, value, mend| Err(EstimationError::Setting { setting, value, mend });
+        let error = |setting, value, fix| Err(EstimationError::Setting { setting, value, fix });
         if self.most_autoregression > 64 {
             return error("most_autoregression", self.most_autoregression as f64, "give 0 to 64");
         }
@@ -125,7 +125,7 @@ const FAR: f64 = 1.0;
 /// Least squares on a measured motion takes that motion for exact. What noise in the positions does to the torque of
 /// heavy links is then part of the residual: coloured, correlated across joints, and as strong as the torque's own
 /// noise where it matters most. Here the motion (the coefficients of a Fourier series, say) is unknown too; positions
-/// and torques both tell of it, each by its precision. Its unknowns must be few against the rows: then the σ_c are
+/// and torques both hold information about it, each by its precision. Its unknowns must be few against the rows: then the σ_c are
 /// consistent, which they are not when every instant has unknowns of its own (see
 /// [`maximum_likelihood`](crate::maximum_likelihood()) for that case, with known covariances).
 ///
@@ -142,7 +142,7 @@ const FAR: f64 = 1.0;
 ///
 /// # Errors
 /// [`EstimationError::Setting`], [`EstimationError::Mismatch`] for other shapes, [`EstimationError::Empty`],
-/// [`EstimationError::TooFewRows`], [`EstimationError::Undetermined`] when the rows do not tell an unknown from those
+/// [`EstimationError::TooFewRows`], [`EstimationError::Undetermined`] when the rows do not separate an unknown from those
 /// before it, the errors of the covariance, and whatever the model returns. Reaching `max_iterations` is a status, not
 /// an error.
 #[doc(alias("joint estimation", "bundle adjustment"))]
@@ -217,11 +217,11 @@ pub fn simultaneous_least_squares<M: SimultaneousModel>(
     let weights: Vec<f64> = sigma.iter().map(|sigma| 1.0 / sigma).collect();
     let triangle = stacked.combined(&weights)?;
     let choice = split(&triangle, &settings.rank);
-    joint_freedom(&stacked, choice.free.len())?;
+    joint_degrees_of_freedom(&stacked, choice.free.len())?;
     let solution = solve(&triangle, &choice, &settings.rank, problem.fallback());
     let noise = sigma.iter().zip(colours).map(|(&std, autoregression)| ChannelNoise { std, autoregression });
     let noise = noise.collect();
-    let estimate = Fitted {
+    let estimate = PointEstimate {
         triangle,
         split: choice,
         solution,
@@ -250,8 +250,8 @@ pub fn simultaneous_bound(
 ) -> Result<DMatrix<f64>, EstimationError> {
     expect("channels' noise", channels.len(), noise.len())?;
     if let Some(wrong) = noise.iter().find(|noise| !(noise.std.is_finite() && noise.std > 0.0)) {
-        let mend = "give a positive standard deviation";
-        return Err(EstimationError::Setting { setting: "std", value: wrong.std, mend });
+        let fix = "give a positive standard deviation";
+        return Err(EstimationError::Setting { setting: "std", value: wrong.std, fix });
     }
     let colours: Vec<Vec<f64>> = noise.iter().map(|noise| noise.autoregression.clone()).collect();
     let sigma: Vec<f64> = noise.iter().map(|noise| noise.std).collect();
@@ -332,7 +332,7 @@ mod tests {
         // The tolerance of the steps, 1e-9 of error bars of 0.1.
         assert!((theta - ts / qs).abs() < 1e-9 && (c - qs / ss).abs() < 1e-9, "{theta} {c}");
         let [sigma_q, sigma_tau] = [found.noise[0].std, found.noise[1].std];
-        // Each of the two unknowns takes one degree of freedom, half from each channel or all from one: σ is known to a
+        // Each of the two unknowns takes one degree of degrees_of_freedom, half from each channel or all from one: σ is known to a
         // per cent of its own error.
         assert!((sigma_q / 0.3 - 1.0).abs() < 0.2 && (sigma_tau / 0.5 - 1.0).abs() < 0.2);
         let std = ((sigma_tau.powi(2) + (theta * sigma_q).powi(2)) / (c * c * ss)).sqrt();
@@ -355,7 +355,7 @@ mod tests {
     const TRUE_PARAMETERS: [f64; 4] = [2.0, 5.0, 0.7, 0.2];
 
     impl Pendulum {
-        /// Value, speed and acceleration of every basis function at sample k.
+        /// Value, velocity and acceleration of every basis function at sample k.
         fn basis(k: usize) -> [[f64; 5]; 3] {
             let t = k as f64 * STEP_S;
             let mut basis = [[0.0; 5]; 3];
@@ -477,7 +477,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_told_is_named() {
+    fn what_cannot_be_determined_is_named() {
         struct Still(Line);
         impl SimultaneousModel for Still {
             type Error = EstimationError;

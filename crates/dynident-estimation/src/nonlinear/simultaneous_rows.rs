@@ -199,8 +199,8 @@ impl WhiteRows {
         let mut sigma = Vec::with_capacity(residuals.len());
         for (place, ((channel, r), leverage)) in self.channels.iter().zip(residuals).zip(leverage).enumerate() {
             let rows = r.len();
-            let freedom = rows as f64 - leverage;
-            if freedom < 1.0 {
+            let degrees_of_freedom = rows as f64 - leverage;
+            if degrees_of_freedom < 1.0 {
                 let what = format!("channel {}", place + 1);
                 return Err(EstimationError::TooFewRows { what, rows, parameters: *leverage });
             }
@@ -211,7 +211,7 @@ impl WhiteRows {
             let places = channel.places.iter().enumerate();
             let moved: f64 = places.map(|(k, &place)| channel.normal[(k, k)] * unknowns[place].powi(2)).sum();
             let floor = SMALLEST_SIGMA * (moved / rows as f64).sqrt();
-            let found = (r.norm_squared() / freedom).sqrt().max(floor);
+            let found = (r.norm_squared() / degrees_of_freedom).sqrt().max(floor);
             sigma.push(if found > 0.0 { found } else { 1.0 });
         }
         Ok(sigma)

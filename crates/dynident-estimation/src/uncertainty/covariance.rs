@@ -57,8 +57,8 @@ pub(crate) struct Covariances {
     pub(crate) white: DMatrix<f64>,
     /// Clusters G (0 for the white method).
     pub(crate) clusters: usize,
-    /// Degrees of freedom behind every column's variance (infinite for fixed columns).
-    pub(crate) freedom: Vec<f64>,
+    /// Degrees of degrees_of_freedom behind every column's variance (infinite for fixed columns).
+    pub(crate) degrees_of_freedom: Vec<f64>,
     /// For every joint the mean score variance over what white noise would give.
     pub(crate) inflation: Vec<f64>,
     /// For every joint the correlation of the scores of neighbouring segments.
@@ -93,8 +93,15 @@ pub(crate) fn covariances(
     );
     let moment = match method {
         CovarianceMethod::White => {
-            let freedom = vec![(fit.rows - free) as f64; problem.columns().len()];
-            return Ok(Covariances { chosen: white.clone(), white, clusters: 0, freedom, inflation, neighbours });
+            let degrees_of_freedom = vec![(fit.rows - free) as f64; problem.columns().len()];
+            return Ok(Covariances {
+                chosen: white.clone(),
+                white,
+                clusters: 0,
+                degrees_of_freedom,
+                inflation,
+                neighbours,
+            });
         }
         CovarianceMethod::Jackknife => jackknife(&scores)?,
         CovarianceMethod::Segments => segments(&scores, fit.rows)?,
@@ -106,7 +113,7 @@ pub(crate) fn covariances(
         chosen: scores.spread(&(moment.matrix + prior)),
         white,
         clusters: moment.clusters,
-        freedom: scores.freedom(moment.independent),
+        degrees_of_freedom: scores.degrees_of_freedom(moment.independent),
         inflation,
         neighbours,
     })

@@ -1,25 +1,25 @@
 //! The distributions that intervals and tests are read from: Student's t, Fisher's F, chi-squared.
 //!
 //! The incomplete beta and gamma functions are those of `statrs`; its inverse for Student's t loses digits from a
-//! thousand degrees of freedom on (decision 0005), where an expansion about the normal distribution has them all.
+//! thousand degrees of degrees_of_freedom on (decision 0005), where an expansion about the normal distribution has them all.
 
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use statrs::function::{beta::checked_beta_reg, gamma::checked_gamma_ur};
 
-/// Probability that a chi-squared variable with `freedom` degrees of freedom exceeds `value`; NaN for a NaN or for no
-/// freedom.
-pub(crate) fn chi_squared_tail(value: f64, freedom: f64) -> f64 {
-    if value.is_nan() || freedom.is_nan() || freedom <= 0.0 {
+/// Probability that a chi-squared variable with `degrees_of_freedom` degrees of degrees_of_freedom exceeds `value`; NaN for a NaN or for no
+/// degrees_of_freedom.
+pub(crate) fn chi_squared_tail(value: f64, degrees_of_freedom: f64) -> f64 {
+    if value.is_nan() || degrees_of_freedom.is_nan() || degrees_of_freedom <= 0.0 {
         return f64::NAN;
     }
     if value <= 0.0 {
         return 1.0;
     }
     // What is far below the smallest number: the function takes no infinity.
-    checked_gamma_ur(0.5 * freedom, (0.5 * value).min(1.0e300)).unwrap_or(f64::NAN)
+    checked_gamma_ur(0.5 * degrees_of_freedom, (0.5 * value).min(1.0e300)).unwrap_or(f64::NAN)
 }
 
-/// Probability that an F variable with `numerator` and `denominator` degrees of freedom exceeds `value`.
+/// Probability that an F variable with `numerator` and `denominator` degrees of degrees_of_freedom exceeds `value`.
 pub(crate) fn f_tail(value: f64, numerator: f64, denominator: f64) -> f64 {
     if value.is_nan() || !(numerator > 0.0 && denominator > 0.0) {
         return f64::NAN;
@@ -28,7 +28,7 @@ pub(crate) fn f_tail(value: f64, numerator: f64, denominator: f64) -> f64 {
     checked_beta_reg(0.5 * denominator, 0.5 * numerator, share).unwrap_or(f64::NAN)
 }
 
-/// The t for which a Student variable with `freedom` degrees of freedom (they need not be whole) lies between -t and t
+/// The t for which a Student variable with `degrees_of_freedom` degrees of degrees_of_freedom (they need not be whole) lies between -t and t
 /// with probability `level`. Below one degree it is that of one, from a million on that of a million, 1e-6 from the
 /// normal distribution's. NaN unless `level` lies between 0 and 1.
 ///
@@ -37,13 +37,13 @@ pub(crate) fn f_tail(value: f64, numerator: f64, denominator: f64) -> f64 {
 /// assert!((t - 2.228_139).abs() < 1e-6);
 /// ```
 #[doc(alias("student t", "quantile"))]
-pub fn student_half_width(level: f64, freedom: f64) -> f64 {
-    if !(level > 0.0 && level < 1.0) || freedom.is_nan() {
+pub fn student_half_width(level: f64, degrees_of_freedom: f64) -> f64 {
+    if !(level > 0.0 && level < 1.0) || degrees_of_freedom.is_nan() {
         return f64::NAN;
     }
-    let (freedom, below) = (freedom.clamp(1.0, 1.0e6), 0.5 + 0.5 * level);
-    if freedom < 500.0 {
-        return StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |student| student.inverse_cdf(below));
+    let (degrees_of_freedom, below) = (degrees_of_freedom.clamp(1.0, 1.0e6), 0.5 + 0.5 * level);
+    if degrees_of_freedom < 500.0 {
+        return StudentsT::new(0.0, 1.0, degrees_of_freedom).map_or(f64::NAN, |student| student.inverse_cdf(below));
     }
     // Abramowitz and Stegun 26.7.5; the first omitted term is below 1e-13 at 95 %.
     let x = Normal::standard().inverse_cdf(below);
@@ -55,7 +55,7 @@ pub fn student_half_width(level: f64, freedom: f64) -> f64 {
         x * (((3.0 * y + 19.0) * y + 17.0) * y - 15.0) / 384.0,
         x * ((((79.0 * y + 776.0) * y + 1482.0) * y - 1920.0) * y - 945.0) / 92160.0,
     ];
-    terms.iter().rev().fold(0.0, |sum, term| sum / freedom + term)
+    terms.iter().rev().fold(0.0, |sum, term| sum / degrees_of_freedom + term)
 }
 
 #[cfg(test)]
@@ -84,18 +84,19 @@ mod tests {
     /// Values of printed tables.
     #[test]
     fn tables() {
-        for (x, freedom, p) in [(3.841_459, 1.0, 0.05), (124.342_113, 100.0, 0.05), (23.209_251, 10.0, 0.01)] {
-            assert!((chi_squared_tail(x, freedom) - p).abs() < 1e-7, "{x} {freedom}");
+        for (x, degrees_of_freedom, p) in [(3.841_459, 1.0, 0.05), (124.342_113, 100.0, 0.05), (23.209_251, 10.0, 0.01)]
+        {
+            assert!((chi_squared_tail(x, degrees_of_freedom) - p).abs() < 1e-7, "{x} {degrees_of_freedom}");
         }
-        for (freedom, t) in [(5.0, 2.570_582), (30.0, 2.042_272), (120.0, 1.979_930)] {
-            assert!((student_half_width(0.95, freedom) - t).abs() < 1e-5);
+        for (degrees_of_freedom, t) in [(5.0, 2.570_582), (30.0, 2.042_272), (120.0, 1.979_930)] {
+            assert!((student_half_width(0.95, degrees_of_freedom) - t).abs() < 1e-5);
         }
     }
 
-    /// SciPy 1.17.1, `t.ppf(0.5 + level / 2, freedom)`, on both sides of where the expansion begins.
+    /// SciPy 1.17.1, `t.ppf(0.5 + level / 2, degrees_of_freedom)`, on both sides of where the expansion begins.
     #[test]
     fn half_widths_of_many_degrees() {
-        for (level, freedom, t) in [
+        for (level, degrees_of_freedom, t) in [
             (0.95, 21.5, 2.076_672_956_261_701_7),
             (0.95, 499.0, 1.964_729_390_987_688_6),
             (0.95, 501.0, 1.964_710_322_175_482_7),
@@ -104,7 +105,10 @@ mod tests {
             (0.95, 1.0e4, 1.960_201_239_890_626),
             (0.50, 1.0e5, 0.674_492_203_553_292),
         ] {
-            assert!((student_half_width(level, freedom) / t - 1.0).abs() < 1e-11, "{level} {freedom}");
+            assert!(
+                (student_half_width(level, degrees_of_freedom) / t - 1.0).abs() < 1e-11,
+                "{level} {degrees_of_freedom}"
+            );
         }
     }
 

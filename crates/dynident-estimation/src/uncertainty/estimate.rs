@@ -40,10 +40,10 @@ pub struct Estimate {
     pub clusters: usize,
     /// Square roots of the diagonal of `covariance`.
     pub std: Vec<f64>,
-    /// How many independent squares the variance of each value was found from (Satterthwaite's degrees of freedom; N −
+    /// How many independent squares the variance of each value was found from (Satterthwaite's degrees of degrees_of_freedom; N −
     /// p for white errors). With few, an interval is wider than 1.96 std.
-    pub std_freedom: Vec<f64>,
-    /// Half the width of the 95 % interval: `t₀.₉₇₅(std_freedom) · std`; zero for fixed columns.
+    pub std_degrees_of_freedom: Vec<f64>,
+    /// Half the width of the 95 % interval: `t₀.₉₇₅(std_degrees_of_freedom) · std`; zero for fixed columns.
     pub half_width_95: Vec<f64>,
     /// `100 std / |value|`; none for a fixed column or a value of zero.
     pub relative_std_percent: Vec<Option<f64>>,
@@ -75,7 +75,7 @@ pub struct Estimate {
 }
 
 /// All that an estimator decided, before uncertainty is put on it.
-pub(crate) struct Fitted {
+pub(crate) struct PointEstimate {
     pub(crate) triangle: TriangularFactor,
     pub(crate) split: Split,
     pub(crate) solution: Solution,
@@ -87,7 +87,7 @@ pub(crate) struct Fitted {
     pub(crate) converged: bool,
 }
 
-impl Fitted {
+impl PointEstimate {
     pub(crate) fn into_estimate(
         self,
         stacked: &StackedProblem<'_>,
@@ -130,10 +130,10 @@ impl Fitted {
             names: problem.columns().to_vec(),
             half_width_95: std
                 .iter()
-                .zip(&covariances.freedom)
+                .zip(&covariances.degrees_of_freedom)
                 .map(|(s, f)| student_half_width(0.95, *f) * s)
                 .collect(),
-            std_freedom: covariances.freedom,
+            std_degrees_of_freedom: covariances.degrees_of_freedom,
             relative_std_percent: std.iter().zip(&self.solution.values).map(relative).collect(),
             std,
             covariance: covariances.chosen,
@@ -155,9 +155,9 @@ impl Fitted {
     }
 }
 
-/// Checks that all rows together and each joint's share leave freedom for the noise, and gives `N_j − p/n` for every
+/// Checks that all rows together and each joint's share leave degrees_of_freedom for the noise, and gives `N_j − p/n` for every
 /// joint.
-pub(crate) fn joint_freedom(stacked: &StackedProblem<'_>, free: usize) -> Result<Vec<f64>, EstimationError> {
+pub(crate) fn joint_degrees_of_freedom(stacked: &StackedProblem<'_>, free: usize) -> Result<Vec<f64>, EstimationError> {
     let problem = stacked.problem;
     let rows = problem.joint_rows();
     let all: usize = rows.iter().sum();
@@ -171,9 +171,9 @@ pub(crate) fn joint_freedom(stacked: &StackedProblem<'_>, free: usize) -> Result
     rows.iter()
         .zip(problem.joints())
         .map(|(&rows, joint)| {
-            let freedom = rows as f64 - share;
-            if freedom > 0.0 {
-                Ok(freedom)
+            let degrees_of_freedom = rows as f64 - share;
+            if degrees_of_freedom > 0.0 {
+                Ok(degrees_of_freedom)
             } else {
                 Err(EstimationError::TooFewRows { what: format!("joint {joint}"), rows, parameters: share })
             }

@@ -106,14 +106,14 @@ impl<'a> Scores<'a> {
         })
     }
 
-    /// Degrees of freedom of every column's variance, `independent` times those of its clusters under white noise;
+    /// Degrees of degrees_of_freedom of every column's variance, `independent` times those of its clusters under white noise;
     /// infinite for fixed columns.
-    pub(super) fn freedom(&self, independent: f64) -> Vec<f64> {
+    pub(super) fn degrees_of_freedom(&self, independent: f64) -> Vec<f64> {
         // What share of each estimate's variance comes from each cluster.
         let shares: Vec<Vec<f64>> = self.joints.iter().flat_map(|joint| joint.shares(self.inverse)).collect();
-        let freedom =
+        let degrees_of_freedom =
             |place: &Option<usize>| place.map_or(f64::INFINITY, |k| (independent * satterthwaite(&shares, k)).max(1.0));
-        self.place.iter().map(freedom).collect()
+        self.place.iter().map(degrees_of_freedom).collect()
     }
 }
 
@@ -146,7 +146,7 @@ impl JointScores<'_> {
     }
 }
 
-/// `(Σ_g h_g)² / Σ_g h_g²`: the degrees of freedom of a sum of independent squares with expectations h_g.
+/// `(Σ_g h_g)² / Σ_g h_g²`: the degrees of degrees_of_freedom of a sum of independent squares with expectations h_g.
 ///
 /// Satterthwaite, Biometrics Bulletin 2 (1946) 110; for clusters Bell and McCaffrey, Survey Methodology 28 (2002) 169,
 /// here without the correlation that the fit puts between clusters, and less the one degree that the jackknife's factor

@@ -64,8 +64,9 @@ fn robust_estimates_agree_with_statsmodels() {
         // 0.9, so it is within 1e-12.
         close_all(name, &found.estimate.values, &numbers(&data[name]["values"]), RELATIVE);
         close_all("scale", &found.estimate.joint_sigma, &[data[name]["scale"].as_f64().unwrap()], RELATIVE);
-        let widths = found.estimate.std.iter().zip(&found.estimate.std_freedom);
-        let widths: Vec<f64> = widths.map(|(std, freedom)| student_half_width(0.95, *freedom) * std).collect();
+        let widths = found.estimate.std.iter().zip(&found.estimate.std_degrees_of_freedom);
+        let widths: Vec<f64> =
+            widths.map(|(std, degrees_of_freedom)| student_half_width(0.95, *degrees_of_freedom) * std).collect();
         close_all("half width", &found.estimate.half_width_95, &widths, RELATIVE);
         // Twelve of 240 rows are off.
         assert!((0.03..0.08).contains(&found.outlier_share[0]), "{:?}", found.outlier_share);

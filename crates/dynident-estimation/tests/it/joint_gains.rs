@@ -67,7 +67,7 @@ fn intervals_hold_the_truth() {
             runs += 1;
         }
     }
-    // 300 intervals tell 95 % to 1.3 %, somewhat less as two of one run are correlated: 90 to 99 %.
+    // 300 intervals give 95 % to 1.3 %, somewhat less as two of one run are correlated: 90 to 99 %.
     let share = inside as f64 / f64::from(runs);
     assert!((0.90..=0.99).contains(&share), "{share}");
 }

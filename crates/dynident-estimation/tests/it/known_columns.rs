@@ -50,7 +50,7 @@ fn intervals_of_the_second_step_hold_the_truth() {
         without += usize::from(error <= of(DMatrix::zeros(2, 2)).half_width_95[2]);
         runs += 1;
     }
-    // 400 runs tell 95 % to 1.1 %: three of these below; above, the bars are cautious by what the residual counts
+    // 400 runs give 95 % to 1.1 %: three of these below; above, the bars are cautious by what the residual counts
     // again. Without the first step's errors they are too short.
     let share = |count: usize| count as f64 / f64::from(runs);
     assert!((0.917..=0.995).contains(&share(inside)), "{}", share(inside));
@@ -67,7 +67,7 @@ fn known_exactly_it_is_the_fit_of_what_is_left() {
     let strong = problem.clone().with_prior(vec![0.0, -1.1, 0.0], DMatrix::from_row_slice(1, 3, &[0.0, 1e7, 0.0]));
     let expected = weighted_least_squares(&strong.unwrap(), &settings).unwrap();
     for column in 0..3 {
-        // The prior's own rows change degrees of freedom by one in 1600.
+        // The prior's own rows change degrees of degrees_of_freedom by one in 1600.
         assert!((found.values[column] - expected.values[column]).abs() < 1e-6, "{column}");
         assert!((found.std[column] - expected.std[column]).abs() < 2e-3 * expected.std[column] + 2e-7, "{column}");
     }

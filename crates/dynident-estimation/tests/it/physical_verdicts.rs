@@ -32,7 +32,7 @@ fn seen(bodies: Vec<PhysicalBody>, scalars: Vec<PhysicalScalar>) -> PhysicalProb
 }
 
 #[test]
-fn the_nearest_possible_vector_of_a_possible_one_is_itself() {
+fn the_nearest_feasible_vector_of_a_feasible_one_is_itself() {
     let own = [1.2, 0.02, 0.0, -0.01, 0.02, 0.0, 0.001, 0.025, 0.0, 0.02];
     // Rows of unit weight: one for each parameter.
     let rows_of = |right: &[f64]| {
@@ -48,7 +48,7 @@ fn the_nearest_possible_vector_of_a_possible_one_is_itself() {
     }
     let moves = fit.moves_in_std(&own, &[1.0; 10]).unwrap();
     assert!(moves.iter().all(|m| m.unwrap().abs() < 4e-4));
-    // A pure mass deficit is mended by the mass alone where rows see every parameter alike.
+    // A pure mass deficit is fixed by the mass alone where rows see every parameter alike.
     let mut heavy = own;
     heavy[0] = -1.0;
     heavy[1] = 0.0;
@@ -92,7 +92,7 @@ fn contradictions_are_named() {
     assert!(total > 4.0 && total < 4.001, "rows want no mass at all: {total}");
     assert!(fit.active.iter().any(|name| name.contains("total mass at least")), "{:?}", fit.active);
 
-    // All mass within 5 cm of the origin, yet its centre beyond 10 cm: each possible alone.
+    // All mass within 5 cm of the origin, yet its centre beyond 10 cm: each feasible alone.
     let mut far = body("forearm");
     far.com_box_m = Some([[0.1, -0.1, -0.1], [0.2, 0.1, 0.1]]);
     far.inside = Some(dynident_estimation::consistent::Ellipsoid { centre_m: [0.0; 3], semi_axes_m: [0.05; 3] });

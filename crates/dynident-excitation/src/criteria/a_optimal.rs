@@ -1,6 +1,6 @@
 //! A-optimality: the sum of the parameters' variances, `tr D⁻¹`.
 
-use super::{Criterion, Valued};
+use super::{Criterion, ValueAndGradient};
 use crate::definite_inverse::log_det_and_inverse;
 use nalgebra::DMatrix;
 
@@ -13,7 +13,7 @@ impl Criterion for AOptimal {
         "a-optimal"
     }
 
-    fn value_and_derivative(&self, information: &DMatrix<f64>) -> Valued {
+    fn value_and_derivative(&self, information: &DMatrix<f64>) -> ValueAndGradient {
         let (_, inverse) = log_det_and_inverse(information)?;
         let trace = inverse.trace();
         Some((trace.ln(), -(&inverse * &inverse) / trace))

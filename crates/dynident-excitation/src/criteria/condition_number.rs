@@ -1,6 +1,6 @@
 //! The condition number of the stacked regressor, `√(λ_max / λ_min)` of its information.
 
-use super::{Criterion, Valued};
+use super::{Criterion, ValueAndGradient};
 use nalgebra::{DMatrix, SymmetricEigen};
 
 /// `cond(W)` by p-norms of the eigenvalues: `½ (log ‖λ‖_p + log ‖1/λ‖_p)`, smooth where eigenvalues meet (and at an
@@ -41,7 +41,7 @@ impl Criterion for ConditionNumber {
         if self.scaled { "condition-number-scaled" } else { "condition-number" }
     }
 
-    fn value_and_derivative(&self, information: &DMatrix<f64>) -> Valued {
+    fn value_and_derivative(&self, information: &DMatrix<f64>) -> ValueAndGradient {
         let (matrix, scale) = self.scaling(information)?;
         let eigen = SymmetricEigen::new(matrix);
         let (largest, smallest) = (eigen.eigenvalues.max(), eigen.eigenvalues.min());

@@ -1,7 +1,7 @@
 //! D-optimality: the volume of the parameters' confidence ellipsoid, `-log det D`. Does not depend on units or on the
 //! choice of base columns, but for a constant.
 
-use super::{Criterion, Valued};
+use super::{Criterion, ValueAndGradient};
 use crate::definite_inverse::log_det_and_inverse;
 use nalgebra::DMatrix;
 
@@ -14,7 +14,7 @@ impl Criterion for DOptimal {
         "d-optimal"
     }
 
-    fn value_and_derivative(&self, information: &DMatrix<f64>) -> Valued {
+    fn value_and_derivative(&self, information: &DMatrix<f64>) -> ValueAndGradient {
         let (log_det, inverse) = log_det_and_inverse(information)?;
         Some((-log_det, -inverse))
     }

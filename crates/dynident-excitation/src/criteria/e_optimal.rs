@@ -1,6 +1,6 @@
 //! E-optimality: the variance along the worst direction, `1 / λ_min(D)`.
 
-use super::{Criterion, Valued};
+use super::{Criterion, ValueAndGradient};
 use nalgebra::{DMatrix, SymmetricEigen};
 
 /// `log ‖1/λ‖_p`, a smooth bound on `-log λ_min`.
@@ -21,7 +21,7 @@ impl Criterion for EOptimal {
         "e-optimal"
     }
 
-    fn value_and_derivative(&self, information: &DMatrix<f64>) -> Valued {
+    fn value_and_derivative(&self, information: &DMatrix<f64>) -> ValueAndGradient {
         let eigen = SymmetricEigen::new(information.clone());
         let smallest = eigen.eigenvalues.min();
         if smallest <= 0.0 || !smallest.is_finite() {

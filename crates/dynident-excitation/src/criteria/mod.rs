@@ -17,7 +17,7 @@ use nalgebra::DMatrix;
 
 /// A value and its symmetric derivative by `D`; `None` where `D` is not positive definite (some parameter is not
 /// excited at all).
-pub type Valued = Option<(f64, DMatrix<f64>)>;
+pub type ValueAndGradient = Option<(f64, DMatrix<f64>)>;
 
 /// A criterion on the information matrix.
 pub trait Criterion: core::fmt::Debug + Send + Sync {
@@ -25,7 +25,7 @@ pub trait Criterion: core::fmt::Debug + Send + Sync {
     fn name(&self) -> &'static str;
 
     /// Value and derivative of the smooth form that optimisers use.
-    fn value_and_derivative(&self, information: &DMatrix<f64>) -> Valued;
+    fn value_and_derivative(&self, information: &DMatrix<f64>) -> ValueAndGradient;
 
     /// About how much the value changes when a motion of so many columns is made larger by half: what searches measure
     /// penalties and steps with.

@@ -1,6 +1,6 @@
 //! V-optimality: how well the fitted model will predict the torque of a task.
 
-use super::{Criterion, Valued};
+use super::{Criterion, ValueAndGradient};
 use crate::definite_inverse::log_det_and_inverse;
 use nalgebra::DMatrix;
 
@@ -29,7 +29,7 @@ impl Criterion for Prediction {
         "prediction"
     }
 
-    fn value_and_derivative(&self, information: &DMatrix<f64>) -> Valued {
+    fn value_and_derivative(&self, information: &DMatrix<f64>) -> ValueAndGradient {
         let (_, inverse) = log_det_and_inverse(information)?;
         let spread = &inverse * &self.task;
         let trace = spread.trace();

@@ -11,14 +11,14 @@ use nalgebra::DMatrix;
 const LEAST_SAMPLES: usize = 1001;
 
 /// A trajectory judged as it will be used: every logged sample, every limit between samples.
-pub(crate) struct Assessed {
+pub(crate) struct Assessment {
     pub(crate) parameters: Vec<f64>,
     pub(crate) figure: Option<f64>,
     pub(crate) information: DMatrix<f64>,
     pub(crate) violation: f64,
 }
 
-impl Assessed {
+impl Assessment {
     pub(crate) fn better_than(&self, other: &Self) -> bool {
         match (self.violation <= 0.0, other.violation <= 0.0) {
             (true, true) => self.figure.unwrap_or(f64::INFINITY) < other.figure.unwrap_or(f64::INFINITY),
@@ -36,7 +36,7 @@ pub(crate) fn assess(
     parameters: Vec<f64>,
     fine: &[f64],
     logged: &[f64],
-) -> (Assessed, Vec<f64>) {
+) -> (Assessment, Vec<f64>) {
     let mut motion = Motion::default();
     task.family.motion(&parameters, logged, &mut motion);
     let information =
@@ -45,7 +45,7 @@ pub(crate) fn assess(
     let dense = grid(task.family.duration_s(), (4 * fine.len()).max(LEAST_SAMPLES));
     let worst = extremes(task, &parameters, &dense);
     let violation = worst.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    (Assessed { figure: criterion.figure(&information), parameters, information, violation }, worst)
+    (Assessment { figure: criterion.figure(&information), parameters, information, violation }, worst)
 }
 
 /// The largest value of every limit's row, refined between samples.

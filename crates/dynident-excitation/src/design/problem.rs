@@ -9,7 +9,7 @@ use crate::motion::Motion;
 use crate::optimisers::{ConstrainedProblem, Known};
 use nalgebra::DMatrix;
 
-/// A place that is broken weighs so much more than a speed: a search may wander outside a joint's limits and come back,
+/// A place that is broken weighs so much more than a velocity: a search may wander outside a joint's limits and come back,
 /// but not to the other side of an obstacle.
 const PLACE_SCALE: f64 = 5.0;
 
@@ -38,7 +38,7 @@ pub(super) struct Problem<'a> {
     /// Where the gradient was last asked for; a rejected trial may have followed.
     at_gradient: Vec<f64>,
     motion: Motion,
-    cotangent: Motion,
+    adjoint: Motion,
     by_information: Option<DMatrix<f64>>,
     values: Vec<f64>,
     metric: Option<Metric>,
@@ -76,7 +76,7 @@ impl<'a> Problem<'a> {
             parameters: Vec::new(),
             at_gradient: Vec::new(),
             motion: Motion::default(),
-            cotangent: Motion::default(),
+            adjoint: Motion::default(),
             by_information: None,
             values: Vec::new(),
             metric: if shaped { Metric::new(task, times) } else { None },
@@ -141,16 +141,16 @@ impl ConstrainedProblem for Problem<'_> {
     fn gradient(&mut self, weights: &[f64], gradient: &mut [f64]) {
         gradient.fill(0.0);
         self.at_gradient.clone_from(&self.parameters);
-        self.cotangent.reset(self.motion.joints, self.motion.samples);
+        self.adjoint.reset(self.motion.joints, self.motion.samples);
         self.scaled_weights.clear();
         for (weights, scale) in weights.chunks_exact(self.times.len()).zip(&self.scales) {
             self.scaled_weights.extend(weights.iter().map(|weight| scale * weight));
         }
-        self.task.limits.pull_back(&mut self.workspace, &self.motion, &self.scaled_weights, &mut self.cotangent);
+        self.task.limits.apply_adjoint(&mut self.workspace, &self.motion, &self.scaled_weights, &mut self.adjoint);
         if let Some(derivative) = &self.by_information {
-            self.information.pull_back(&self.motion, self.weight, derivative, &mut self.cotangent);
+            self.information.apply_adjoint(&self.motion, self.weight, derivative, &mut self.adjoint);
         }
-        self.task.family.pull_back(&self.parameters, self.times, &self.cotangent, gradient);
+        self.task.family.apply_adjoint(&self.parameters, self.times, &self.adjoint, gradient);
     }
 
     fn prepare_metric(&mut self, known: &Known<'_>) -> bool {

@@ -1,9 +1,9 @@
 //! When a search ends outside the limits: a search for the limits alone.
 
-use super::assess::{Assessed, assess};
+use super::assess::{Assessment, assess};
 use super::rounds::Rounds;
 use super::{DesignProgress, DesignSettings, DesignTask, ranges};
-use crate::criteria::{Criterion, Valued};
+use crate::criteria::{Criterion, ValueAndGradient};
 use crate::optimisers::OptimiserError;
 use dynident_model::sample::Random;
 use nalgebra::DMatrix;
@@ -30,7 +30,7 @@ impl Criterion for Anything {
         "anything"
     }
 
-    fn value_and_derivative(&self, information: &DMatrix<f64>) -> Valued {
+    fn value_and_derivative(&self, information: &DMatrix<f64>) -> ValueAndGradient {
         Some((0.0, DMatrix::zeros(information.nrows(), information.ncols())))
     }
 
@@ -54,15 +54,15 @@ impl Criterion for Anything {
 pub(crate) fn restored(
     task: &DesignTask<'_>,
     settings: &DesignSettings,
-    kept: Assessed,
+    kept: Assessment,
     [fine, logged]: [&[f64]; 2],
     stop: &(dyn Fn(&DesignProgress) -> bool + Sync),
-) -> Result<(Assessed, usize), OptimiserError> {
+) -> Result<(Assessment, usize), OptimiserError> {
     let criterion = task.criteria[task.criteria.len() - 1];
     let mut random = Random::new(settings.seed ^ 0x5e57);
     let (positions, speeds) = ranges(task.limits);
     let (mut best, mut evaluations) = (kept, 0);
-    let tell = |value: f64, violation: f64, evaluations: usize| {
+    let report = |value: f64, violation: f64, evaluations: usize| {
         stop(&DesignProgress { round: "restoration", value, violation, evaluations: evaluations as u64 })
     };
     // Without a criterion nothing says how long a step may be where no limit pushes.
@@ -74,7 +74,7 @@ pub(crate) fn restored(
         for _ in 0..ROUNDS {
             let budget = settings.polish_evaluations.max(EVALUATIONS);
             let found = plain.polish(&Anything, &margins, parameters.into(), budget, |value, violation| {
-                violation <= 0.0 || tell(value, violation, evaluations)
+                violation <= 0.0 || report(value, violation, evaluations)
             })?;
             evaluations += found.evaluations;
             parameters = found.best.feasible;
@@ -86,7 +86,7 @@ pub(crate) fn restored(
             if whole {
                 let budget = settings.polish_evaluations;
                 let found = rounds.polish(criterion, &margins, parameters.into(), budget, |value, violation| {
-                    tell(value, violation, evaluations)
+                    report(value, violation, evaluations)
                 })?;
                 evaluations += found.evaluations;
                 let (assessed, _) = assess(task, criterion, found.best.feasible, fine, logged);
@@ -95,14 +95,14 @@ pub(crate) fn restored(
                 }
                 return Ok((best, evaluations));
             }
-            if !on_samples || tell(0.0, best.violation, evaluations) {
+            if !on_samples || report(0.0, best.violation, evaluations) {
                 break;
             }
             for (margin, c) in margins.iter_mut().zip(&worst) {
                 *margin += if *c > 0.0 { c.min(WIDEST) + 1e-6 } else { 0.0 };
             }
         }
-        if tell(0.0, best.violation, evaluations) {
+        if report(0.0, best.violation, evaluations) {
             break;
         }
     }

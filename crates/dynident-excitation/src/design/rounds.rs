@@ -19,7 +19,7 @@ const PENALTY_GROWTH: f64 = 3.0;
 /// Evaluations that this slow way needs.
 const FULL_EVALUATIONS: f64 = 1000.0;
 
-/// Violation at which a start is told apart from others well enough.
+/// Violation at which a start is distinguished from others well enough.
 const LOOSE: f64 = 3e-3;
 /// One in so many starts is followed to the end.
 const FOLLOWED: usize = 4;

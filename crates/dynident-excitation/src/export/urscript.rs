@@ -12,7 +12,7 @@ pub struct UrScriptSettings {
     pub lookahead_time_s: f64,
     /// `gain` of servoj, 100 to 2000. Default 300.
     pub gain: f64,
-    /// Speed of the slow move to the first point, rad/s. Default 0.3.
+    /// Velocity of the slow move to the first point, rad/s. Default 0.3.
     pub approach_speed: f64,
 }
 

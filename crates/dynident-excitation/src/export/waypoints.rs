@@ -1,4 +1,4 @@
-//! Plain way-points: time and positions under the joints' own names.
+//! Plain waypoints: time and positions under the joints' own names.
 
 use super::{ExportError, Sampled};
 use core::fmt::Write;

@@ -6,7 +6,7 @@ use crate::motion::Motion;
 use dynident_model::sample::Random;
 use nalgebra::{DMatrix, DVector};
 
-/// A random start for joints with unequal ranges and speeds.
+/// A random start for joints with unequal ranges and velocities.
 pub(crate) fn start(family: &dyn Family, seed: u64) -> Vec<f64> {
     let joints = family.joints();
     let ranges: Vec<_> = (0..joints).map(|joint| [-1.5 - joint as f64 * 0.2, 2.0]).collect();
@@ -95,9 +95,9 @@ pub(crate) fn gradient_at(family: &dyn Family, parameters: &[f64], seed: u64) {
 /// As [`gradient`], at given parameters and times.
 pub(crate) fn gradient_on(family: &dyn Family, parameters: &[f64], times: &[f64], seed: u64) {
     let mut random = Random::new(seed ^ 0x77);
-    let mut cotangent = Motion::default();
-    cotangent.reset(family.joints(), times.len());
-    for values in [&mut cotangent.q, &mut cotangent.dq, &mut cotangent.ddq, &mut cotangent.dddq] {
+    let mut adjoint = Motion::default();
+    adjoint.reset(family.joints(), times.len());
+    for values in [&mut adjoint.q, &mut adjoint.dq, &mut adjoint.ddq, &mut adjoint.dddq] {
         for value in values.iter_mut() {
             *value = random.normal();
         }
@@ -106,13 +106,13 @@ pub(crate) fn gradient_on(family: &dyn Family, parameters: &[f64], times: &[f64]
     let mut cost = |parameters: &[f64]| -> f64 {
         family.motion(parameters, times, &mut motion);
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        dot(&motion.q, &cotangent.q)
-            + dot(&motion.dq, &cotangent.dq)
-            + dot(&motion.ddq, &cotangent.ddq)
-            + dot(&motion.dddq, &cotangent.dddq)
+        dot(&motion.q, &adjoint.q)
+            + dot(&motion.dq, &adjoint.dq)
+            + dot(&motion.ddq, &adjoint.ddq)
+            + dot(&motion.dddq, &adjoint.dddq)
     };
     let mut gradient = vec![1.0; parameters.len()];
-    family.pull_back(parameters, times, &cotangent, &mut gradient);
+    family.apply_adjoint(parameters, times, &adjoint, &mut gradient);
     let scale = gradient.iter().fold(1.0_f64, |peak, value| peak.max(value.abs()));
     for index in 0..parameters.len() {
         let mut moved = parameters.to_vec();
@@ -163,7 +163,7 @@ pub(crate) fn curvature(family: &dyn Family, seed: u64) {
                 };
                 one[sample] = 1.0;
                 let mut gradient = vec![0.0; parameters.len()];
-                family.pull_back(&parameters, &times, &unit, &mut gradient);
+                family.apply_adjoint(&parameters, &times, &unit, &mut gradient);
                 let row = DVector::from_column_slice(&gradient[joint * each..(joint + 1) * each]);
                 expected.ger(weights[sample], &row, &row, 1.0);
             }

@@ -6,7 +6,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum FamilyError {
     /// A setting has no meaning or asks for no motion.
-    #[error("family {family}, setting {setting} = {value}: {mend}")]
+    #[error("family {family}, setting {setting} = {value}: {fix}")]
     Setting {
         /// The family.
         family: &'static str,
@@ -15,7 +15,7 @@ pub enum FamilyError {
         /// Its value.
         value: f64,
         /// What would do.
-        mend: &'static str,
+        fix: &'static str,
     },
     /// A list has the wrong number of entries.
     #[error("family {family}, {what}: expected {expected} entries, found {found}")]
@@ -41,9 +41,9 @@ pub(crate) fn require(
     family: &'static str,
     setting: &'static str,
     value: f64,
-    mend: &'static str,
+    fix: &'static str,
 ) -> Result<(), FamilyError> {
-    if ok { Ok(()) } else { Err(FamilyError::Setting { family, setting, value, mend }) }
+    if ok { Ok(()) } else { Err(FamilyError::Setting { family, setting, value, fix }) }
 }
 
 /// The checks that all families share: some joints, and a duration with which rates can be computed.

@@ -47,7 +47,7 @@ impl FourierSettings {
 ///
 /// q(t) = q0 + Σ_k a_k/(kω) sin kωt + b_k/(kω) cos kωt, k = 1..H, ω = 2π · periods / duration,
 ///
-/// so that a_k, b_k are amplitudes of speed in rad/s (m/s). Eq. 24 of the paper is the same series with its
+/// so that a_k, b_k are amplitudes of velocity in rad/s (m/s). Eq. 24 of the paper is the same series with its
 /// coefficients in rad: a_k/(kω), b_k/(kω) here.
 ///
 /// At rest at both ends means q̇(0) = Σ a_k = 0 and q̈(0) = -ω Σ k b_k = 0; both are solved beforehand by an

@@ -1,4 +1,4 @@
-//! Sweeps at constant speeds, from slow to fast, for friction curves.
+//! Sweeps at constant velocity, from slow to fast, for friction curves.
 
 use super::error::{FamilyError, MOST, require, require_frame};
 use super::linear::{Basis, LinearFamily};
@@ -22,11 +22,11 @@ pub enum LadderPace {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FrictionLadderSettings {
-    /// Number of speeds. Default 6.
+    /// Number of velocities. Default 6.
     pub rungs: usize,
-    /// The slowest speed as a part of the fastest; the others lie between in geometric steps. Default 0.05.
+    /// The slowest velocity as a part of the fastest; the others lie between in geometric steps. Default 0.05.
     pub slowest_part: f64,
-    /// Seconds in which a speed is reached or left. Default 0.2.
+    /// Seconds in which a velocity is reached or left. Default 0.2.
     pub ramp_s: f64,
     /// How time is shared. Default equal time.
     pub pace: LadderPace,
@@ -44,7 +44,7 @@ impl FrictionLadderSettings {
     /// Checks the settings for so many joints and seconds.
     ///
     /// # Errors
-    /// No rung, a part outside 0..1, or ramps that leave no time at constant speed.
+    /// No rung, a part outside 0..1, or ramps that leave no time at constant velocity.
     pub fn validate(&self, joints: usize, duration_s: f64) -> Result<(), FamilyError> {
         require((1..=MOST).contains(&self.rungs), NAME, "rungs", self.rungs as f64, "give 1 to 1000")?;
         require(
@@ -64,18 +64,18 @@ impl FrictionLadderSettings {
         )
     }
 
-    /// Seconds at constant speed, of one joint.
+    /// Seconds at constant velocity, of one joint.
     fn cruising_s(&self, joints: usize, duration_s: f64) -> f64 {
         let turns = if self.one_by_one { joints } else { 1 };
         duration_s / turns as f64 - 4.0 * self.rungs as f64 * self.ramp_s
     }
 }
 
-/// Sweeps there and back at constant speed, one pair for each rung of a ladder of speeds, joined by smooth ramps.
+/// Sweeps there and back at constant velocity, one pair for each rung of a ladder of velocities, joined by smooth ramps.
 ///
 /// q(t) = q_mid + V g(t): the shape g is fixed by the settings, so a joint has two free numbers: the middle of its
-/// longest sweep in rad (m) and the fastest speed V in rad/s (m/s; negative begins the other way). During each sweep
-/// q̈ = 0 exactly, so torque is gravity and friction; the speed ramps up by a polynomial with continuous q̈ and jerk.
+/// longest sweep in rad (m) and the fastest velocity V in rad/s (m/s; negative begins the other way). During each sweep
+/// q̈ = 0 exactly, so torque is gravity and friction; the velocity ramps up by a polynomial with continuous q̈ and jerk.
 /// Both ends are at rest and equal.
 ///
 /// # Source
@@ -139,7 +139,7 @@ impl FrictionLadder {
 }
 
 impl FrictionLadderBasis {
-    /// The times in which `joint` moves at constant speed, and its speed as a part of V: `[from_s, to_s, part]`.
+    /// The times in which `joint` moves at constant velocity, and its velocity as a part of V: `[from_s, to_s, part]`.
     pub fn sweeps(&self, joint: usize) -> Vec<[f64; 3]> {
         let turn = self.turn_s * joint as f64;
         let mut sweeps = Vec::with_capacity(2 * self.rungs.len());
@@ -152,7 +152,7 @@ impl FrictionLadderBasis {
         sweeps
     }
 
-    /// Way gone in a sweep at unit speed, with derivatives: a ramp up, constant speed, and the same ramp subtracted.
+    /// Way gone in a sweep at unit velocity, with derivatives: a ramp up, constant velocity, and the same ramp subtracted.
     fn sweep(&self, time_s: f64, cruise_s: f64) -> [f64; 4] {
         let scales = [self.ramp_s, 1.0, 1.0 / self.ramp_s, self.ramp_s.powi(-2)];
         let up = smooth_ramp(time_s / self.ramp_s);
@@ -202,7 +202,7 @@ mod tests {
     use crate::family::Family;
     use proptest::prelude::*;
 
-    /// In every sweep the speed is the rung's and the acceleration is nothing; geometric ladder; the middle is the
+    /// In every sweep the velocity is the rung's and the acceleration is nothing; geometric ladder; the middle is the
     /// middle.
     #[test]
     fn sweeps_are_at_constant_speed() {

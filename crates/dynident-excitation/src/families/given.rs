@@ -3,7 +3,7 @@
 use super::error::{FamilyError, require};
 use super::polynomials::quintic_hermite;
 use crate::family::Family;
-use crate::motion::{Motion, MotionCotangent};
+use crate::motion::{Motion, MotionAdjoint};
 use dynident_model::sample::Random;
 
 const NAME: &str = "given";
@@ -117,7 +117,7 @@ impl Family for Given {
         }
     }
 
-    fn pull_back(&self, _: &[f64], _: &[f64], _: &MotionCotangent, gradient: &mut [f64]) {
+    fn apply_adjoint(&self, _: &[f64], _: &[f64], _: &MotionAdjoint, gradient: &mut [f64]) {
         assert!(gradient.is_empty(), "gradient of {NAME}");
     }
 }
@@ -148,7 +148,7 @@ mod tests {
         let (mut found, mut expected) = (Motion::default(), Motion::default());
         given.motion(&[], &between, &mut found);
         series.motion(&parameters, &between, &mut expected);
-        // Fastest harmonic 5 · 2π/8 = 3.93 rad/s, speeds below 4 rad/s in all: q⁽⁶⁾ below 4 · 3.93⁵ = 3.8e3; h at most
+        // Fastest harmonic 5 · 2π/8 = 3.93 rad/s, velocities below 4 rad/s in all: q⁽⁶⁾ below 4 · 3.93⁵ = 3.8e3; h at most
         // 0.07.
         let worst = found.q.iter().zip(&expected.q).fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
         assert!(worst < 0.07_f64.powi(6) * 3.8e3 / (720.0 * 64.0), "{worst}");

@@ -3,14 +3,14 @@
 use super::error::{FamilyError, require};
 use super::polynomials::quintic_hermite;
 use crate::family::Family;
-use crate::motion::{Motion, MotionCotangent};
+use crate::motion::{Motion, MotionAdjoint};
 use core::ops::Range;
 use dynident_model::sample::Random;
 use serde::{Deserialize, Serialize};
 
 const NAME: &str = "joined";
 
-/// How a [`Joined`] family connects its members.
+/// How a [`JoinedFamily`] family connects its members.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct JoinedSettings {
@@ -30,13 +30,13 @@ impl Default for JoinedSettings {
 
 /// Members one after another, with a move between each two, and from and to given postures.
 ///
-/// A move is the quintic polynomial that takes over position, speed and acceleration of both ends (so a plain periodic
-/// series can be joined too); between members at rest it is the minimum-jerk move. Speed and acceleration are
+/// A move is the quintic polynomial that takes over position, velocity and acceleration of both ends (so a plain periodic
+/// series can be joined too); between members at rest it is the minimum-jerk move. Velocity and acceleration are
 /// continuous everywhere if they are within the members.
 ///
 /// Free numbers: those of the first member (all its joints), of the second, and so on.
 #[derive(Debug)]
-pub struct Joined {
+pub struct JoinedFamily {
     members: Vec<Box<dyn Family>>,
     settings: JoinedSettings,
     joints: usize,
@@ -49,7 +49,7 @@ enum Piece {
     MoveTo(usize),
 }
 
-/// Position, speed and acceleration of all joints at both ends of one member: `[joint][order][end]` as a [`Motion`] of
+/// Position, velocity and acceleration of all joints at both ends of one member: `[joint][order][end]` as a [`Motion`] of
 /// two samples.
 fn ends_of(member: &dyn Family, parameters: &[f64]) -> Motion {
     let mut ends = Motion::default();
@@ -57,7 +57,7 @@ fn ends_of(member: &dyn Family, parameters: &[f64]) -> Motion {
     ends
 }
 
-impl Joined {
+impl JoinedFamily {
     /// The members in this order.
     ///
     /// # Errors
@@ -162,7 +162,7 @@ impl Joined {
     }
 }
 
-impl Family for Joined {
+impl Family for JoinedFamily {
     fn name(&self) -> &'static str {
         NAME
     }
@@ -223,12 +223,12 @@ impl Family for Joined {
         }
     }
 
-    fn pull_back(&self, parameters: &[f64], times_s: &[f64], cotangent: &MotionCotangent, gradient: &mut [f64]) {
+    fn apply_adjoint(&self, parameters: &[f64], times_s: &[f64], adjoint: &MotionAdjoint, gradient: &mut [f64]) {
         assert_eq!(parameters.len(), self.parameters(), "parameters of {NAME}");
         assert_eq!(gradient.len(), self.parameters(), "gradient of {NAME}");
-        assert_eq!((cotangent.joints, cotangent.samples), (self.joints, times_s.len()), "cotangent of {NAME}");
+        assert_eq!((adjoint.joints, adjoint.samples), (self.joints, times_s.len()), "cotangent of {NAME}");
         let own = self.ranges();
-        let arrays = [&cotangent.q, &cotangent.dq, &cotangent.ddq, &cotangent.dddq];
+        let arrays = [&adjoint.q, &adjoint.dq, &adjoint.ddq, &adjoint.dddq];
         // What the moves pull on both ends of each member.
         let mut ends = vec![Motion::default(); self.members.len()];
         for end in &mut ends {
@@ -242,14 +242,14 @@ impl Family for Joined {
                     for joint in 0..self.joints {
                         for (to, &sample) in part.of(joint).zip(&samples) {
                             let from = joint * times_s.len() + sample;
-                            part.q[to] = cotangent.q[from];
-                            part.dq[to] = cotangent.dq[from];
-                            part.ddq[to] = cotangent.ddq[from];
-                            part.dddq[to] = cotangent.dddq[from];
+                            part.q[to] = adjoint.q[from];
+                            part.dq[to] = adjoint.dq[from];
+                            part.ddq[to] = adjoint.ddq[from];
+                            part.dddq[to] = adjoint.dddq[from];
                         }
                     }
                     let range = own[index].clone();
-                    self.members[index].pull_back(&parameters[range.clone()], &times, &part, &mut gradient[range]);
+                    self.members[index].apply_adjoint(&parameters[range.clone()], &times, &part, &mut gradient[range]);
                 }
                 Piece::MoveTo(index) => {
                     for (&time, &sample) in times.iter().zip(&samples) {
@@ -276,7 +276,7 @@ impl Family for Joined {
         }
         for ((member, range), end) in self.members.iter().zip(own).zip(&ends) {
             let times = [0.0, member.duration_s()];
-            member.pull_back(&parameters[range.clone()], &times, end, &mut gradient[range]);
+            member.apply_adjoint(&parameters[range.clone()], &times, end, &mut gradient[range]);
         }
     }
 }
@@ -298,7 +298,7 @@ mod tests {
         ]
     }
 
-    fn at(seed: u64, family: &Joined) -> Vec<f64> {
+    fn at(seed: u64, family: &JoinedFamily) -> Vec<f64> {
         family.random(&[[-1.0, 1.0], [-2.0, 0.5]], &[1.0, 2.0], &mut Random::new(seed))
     }
 
@@ -307,7 +307,7 @@ mod tests {
     #[test]
     fn joins_are_smooth() {
         let settings = JoinedSettings { move_s: 1.5, start: Some(vec![0.1, 0.2]), end: Some(vec![-0.3, 0.4]) };
-        let family = Joined::new(members(), &settings).unwrap();
+        let family = JoinedFamily::new(members(), &settings).unwrap();
         let parameters = at(1, &family);
         let duration = family.duration_s();
         assert!((duration - (5.0 + 6.0 + 20.0 + 4.0 * 1.5)).abs() < 1e-12);
@@ -337,7 +337,7 @@ mod tests {
 
     #[test]
     fn refuses_what_does_not_fit() {
-        let make = |members, settings: &JoinedSettings| Joined::new(members, settings);
+        let make = |members, settings: &JoinedSettings| JoinedFamily::new(members, settings);
         assert!(make(vec![], &JoinedSettings::default()).is_err());
         assert!(make(members(), &JoinedSettings { move_s: 0.0, ..Default::default() }).is_err());
         assert!(make(members(), &JoinedSettings { start: Some(vec![0.0]), ..Default::default() }).is_err());
@@ -350,13 +350,13 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(12))]
         #[test]
         fn exact(seed in any::<u64>(), open in any::<bool>()) {
-            // Moves long enough that the checks' speeds hold.
+            // Moves long enough that the checks' velocities hold.
             let end = (!open).then(|| vec![0.2, -0.1]);
             let mut list = members();
             if let Some(member) = list.get_mut(1) {
                 *member = Box::new(Fourier::new(2, 6.0, &FourierSettings::default()).unwrap());
             }
-            let family = Joined::new(list, &JoinedSettings { move_s: 6.0, start: end.clone(), end }).unwrap();
+            let family = JoinedFamily::new(list, &JoinedSettings { move_s: 6.0, start: end.clone(), end }).unwrap();
             check::derivatives(&family, seed);
             check::gradient(&family, seed);
             check::rest(&family, seed);
@@ -365,7 +365,7 @@ mod tests {
         /// Members in motion at their ends pull through the moves too.
         #[test]
         fn gradient_through_moves_in_motion(seed in any::<u64>()) {
-            let family = Joined::new(members(), &JoinedSettings { move_s: 9.0, ..Default::default() }).unwrap();
+            let family = JoinedFamily::new(members(), &JoinedSettings { move_s: 9.0, ..Default::default() }).unwrap();
             check::gradient_at(&family, &at(seed, &family), seed);
         }
     }

@@ -3,7 +3,7 @@
 use super::random_start::{grid, scale_and_shift};
 use super::sampled_basis::{GridCache, SampledBasis};
 use crate::family::Family;
-use crate::motion::{Motion, MotionCotangent};
+use crate::motion::{Motion, MotionAdjoint};
 use dynident_model::sample::Random;
 use nalgebra::DMatrix;
 
@@ -115,16 +115,16 @@ impl<B: Basis> Family for LinearFamily<B> {
         );
     }
 
-    fn pull_back(&self, parameters: &[f64], times_s: &[f64], cotangent: &MotionCotangent, gradient: &mut [f64]) {
+    fn apply_adjoint(&self, parameters: &[f64], times_s: &[f64], adjoint: &MotionAdjoint, gradient: &mut [f64]) {
         assert_eq!(parameters.len(), self.parameters(), "parameters of {}", B::NAME);
         assert_eq!(gradient.len(), self.parameters(), "gradient of {}", B::NAME);
-        assert_eq!((cotangent.joints, cotangent.samples), (self.joints, times_s.len()), "cotangent of {}", B::NAME);
+        assert_eq!((adjoint.joints, adjoint.samples), (self.joints, times_s.len()), "cotangent of {}", B::NAME);
         let functions = self.sets() * self.basis.columns();
         self.grids.each(
             functions,
             times_s,
             |times| self.sample(times),
-            |basis, from| basis.pull_back(from, cotangent, gradient),
+            |basis, from| basis.apply_adjoint(from, adjoint, gradient),
         );
     }
 
@@ -137,7 +137,7 @@ impl<B: Basis> Family for LinearFamily<B> {
         _parameters: &[f64],
         times_s: &[f64],
         joint: usize,
-        weights: &MotionCotangent,
+        weights: &MotionAdjoint,
         out: &mut DMatrix<f64>,
     ) -> bool {
         let columns = self.basis.columns();

@@ -8,10 +8,10 @@ use dynident_lanes::Scalar;
 ///
 /// times an amplitude, from 0 at t = c - w to 1 at t = c + w. φ runs to ±∞ at the window's ends, so that s reaches 0
 /// and 1 there with **all** derivatives zero: the exact soft start and stop that Eq. 11 of the paper asks for. Around
-/// the middle φ = ω (t - c) with ω = κ/w: the paper's stroke of that steepness (peak speed Aω/4), which it becomes
-/// everywhere as κ grows. κ = 2√3 has the flattest speed at the middle; κ near 4 resembles a minimum-jerk move.
+/// the middle φ = ω (t - c) with ω = κ/w: the paper's stroke of that steepness (peak velocity Aω/4), which it becomes
+/// everywhere as κ grows. κ = 2√3 has the flattest velocity at the middle; κ near 4 resembles a minimum-jerk move.
 ///
-/// φ(u) can be inverted in closed form, so position still tells speed and acceleration.
+/// φ(u) can be inverted in closed form, so position still determines velocity and acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogisticStroke {
     /// Way from start to end, rad (m).
@@ -29,7 +29,7 @@ pub struct LogisticStroke {
 pub(super) const LAST: f64 = 1.0 - 1.0 / 2048.0;
 
 impl LogisticStroke {
-    /// The least κ: the speed has its one peak at the middle.
+    /// The least κ: the velocity has its one peak at the middle.
     pub const LEAST_SHARPNESS: f64 = 3.464_101_615_137_755;
 
     /// The steepness ω = κ/w in 1/s, the paper's ω.

@@ -5,7 +5,7 @@ use super::logistic_stroke::{LAST, LogisticStroke, StrokeDerivatives, logistic_a
 use super::random_start::{grid, scale_and_shift};
 use super::sampled_basis::{load_some, store_some};
 use crate::family::Family;
-use crate::motion::{Motion, MotionCotangent};
+use crate::motion::{Motion, MotionAdjoint};
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use dynident_model::sample::Random;
 use nalgebra::{DMatrix, DVector};
@@ -21,7 +21,7 @@ const MOST_LOG_SLOT: f64 = 3.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StrokeOrder {
-    /// A sum of strokes anywhere within the duration: more information, no map from position to speed.
+    /// A sum of strokes anywhere within the duration: more information, no map from position to velocity.
     Overlapping,
     /// One after another in slots of free length that fill the duration: the map holds on every stroke.
     Spliced,
@@ -278,7 +278,7 @@ struct Backward<'a> {
     strokes: &'a [LogisticStroke],
     times_s: &'a [f64],
     joint: usize,
-    cotangent: &'a MotionCotangent,
+    adjoint: &'a MotionAdjoint,
 }
 
 impl Kernel for Backward<'_> {
@@ -286,16 +286,16 @@ impl Kernel for Backward<'_> {
     type Output = Vec<[f64; 4]>;
     #[inline(always)]
     fn run<T: Lane>(self) -> Vec<[f64; 4]> {
-        let Self { strokes, times_s, joint, cotangent } = self;
-        let start = cotangent.of(joint).start;
+        let Self { strokes, times_s, joint, adjoint } = self;
+        let start = adjoint.of(joint).start;
         let mut sums = vec![[T::ZERO; 4]; strokes.len()];
         for (index, times) in times_s.chunks(T::LANES).enumerate() {
             let at = start + index * T::LANES;
             let pulls: [T; 4] = [
-                load_some(&cotangent.q, at, times.len()),
-                load_some(&cotangent.dq, at, times.len()),
-                load_some(&cotangent.ddq, at, times.len()),
-                load_some(&cotangent.dddq, at, times.len()),
+                load_some(&adjoint.q, at, times.len()),
+                load_some(&adjoint.dq, at, times.len()),
+                load_some(&adjoint.ddq, at, times.len()),
+                load_some(&adjoint.dddq, at, times.len()),
             ];
             for (stroke, sum) in strokes.iter().zip(&mut sums) {
                 match chunk_of::<T>(stroke, times) {
@@ -410,15 +410,15 @@ impl Family for LogisticStrokes {
         }
     }
 
-    fn pull_back(&self, parameters: &[f64], times_s: &[f64], cotangent: &MotionCotangent, gradient: &mut [f64]) {
+    fn apply_adjoint(&self, parameters: &[f64], times_s: &[f64], adjoint: &MotionAdjoint, gradient: &mut [f64]) {
         assert_eq!(parameters.len(), self.parameters(), "parameters of {NAME}");
         assert_eq!(gradient.len(), self.parameters(), "gradient of {NAME}");
-        assert_eq!((cotangent.joints, cotangent.samples), (self.joints, times_s.len()), "cotangent of {NAME}");
+        assert_eq!((adjoint.joints, adjoint.samples), (self.joints, times_s.len()), "cotangent of {NAME}");
         let each = self.each();
         for (joint, own) in gradient.chunks_mut(each).enumerate() {
             let (_, strokes) = self.strokes(parameters, joint);
-            let raw = dispatch(Level::detect(), Backward { strokes: &strokes, times_s, joint, cotangent });
-            own[0] += cotangent.q[cotangent.of(joint)].iter().sum::<f64>();
+            let raw = dispatch(Level::detect(), Backward { strokes: &strokes, times_s, joint, adjoint });
+            own[0] += adjoint.q[adjoint.of(joint)].iter().sum::<f64>();
             self.chain(&parameters[joint * each..(joint + 1) * each], &raw, own);
         }
     }
@@ -428,7 +428,7 @@ impl Family for LogisticStrokes {
         parameters: &[f64],
         times_s: &[f64],
         joint: usize,
-        weights: &MotionCotangent,
+        weights: &MotionAdjoint,
         out: &mut DMatrix<f64>,
     ) -> bool {
         assert_eq!((weights.joints, weights.samples), (self.joints, times_s.len()), "weights of {NAME}");

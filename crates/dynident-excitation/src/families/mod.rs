@@ -5,13 +5,13 @@
 //! | [`SplicedLogistic`]: the paper's Eqs. 12 to 14 | 2 or 3 | nearly (e^-10) |
 //! | [`LogisticStrokes`]: strokes with overlap, or one after another | 3 K or 3 K - 1 | exactly |
 //! | [`Fourier`]: H harmonics | 2 H + 1, at rest 2 H - 1 | by choice |
-//! | [`Quintic`]: piecewise through M way-points | M - 1, free rates 3 M - 5 | exactly |
+//! | [`Quintic`]: piecewise through M waypoints | M - 1, free rates 3 M - 5 | exactly |
 //! | [`BSpline`]: degree 5, n control points | n - 5 | exactly |
 //! | [`Multisine`]: Schroeder phases | 2 | with ramps |
-//! | [`FrictionLadder`]: constant-speed sweeps | 2 | exactly |
+//! | [`FrictionLadder`]: constant-velocity sweeps | 2 | exactly |
 //! | [`StaticPostures`]: K postures held | K | exactly |
 //! | [`StepWiseLogistic`]: spliced logistic functions, one joint after another | 2 | nearly (e^-10) |
-//! | [`Joined`]: families one after another | sum | as its members |
+//! | [`JoinedFamily`]: families one after another | sum | as its members |
 //! | [`StartingAt`]: a family moved to a start posture | as the family | as the family |
 //! | [`Given`]: a motion that is known already | none | as it is |
 
@@ -41,7 +41,7 @@ pub use error::FamilyError;
 pub use fourier::{Fourier, FourierSettings};
 pub use friction_ladder::{FrictionLadder, FrictionLadderSettings, LadderPace};
 pub use given::Given;
-pub use joined::{Joined, JoinedSettings};
+pub use joined::{JoinedFamily, JoinedSettings};
 pub use linear::{Basis, LinearFamily};
 pub use logistic_stroke::LogisticStroke;
 pub use logistic_strokes::{LogisticStrokes, LogisticStrokesSettings, StrokeOrder};

@@ -1,4 +1,4 @@
-//! Piecewise quintic polynomials through way-points.
+//! Piecewise quintic polynomials through waypoints.
 
 use super::error::{FamilyError, MOST, require, require_frame};
 use super::linear::{Basis, LinearFamily};
@@ -12,12 +12,12 @@ const NAME: &str = "quintic";
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct QuinticSettings {
-    /// Number of way-points, ends included, equally spaced in time. Default 6.
+    /// Number of waypoints, ends included, equally spaced in time. Default 6.
     pub way_points: usize,
-    /// Speed and acceleration at the inner way-points are free numbers too. Default false: the motion comes to rest at
-    /// every way-point.
+    /// Velocity and acceleration at the inner waypoints are free numbers too. Default false: the motion comes to rest at
+    /// every waypoint.
     pub free_rates: bool,
-    /// The last way-point is the first one. Default true.
+    /// The last waypoint is the first one. Default true.
     pub returns: bool,
 }
 
@@ -31,7 +31,7 @@ impl QuinticSettings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// Fewer way-points than a motion needs (2, or 3 if it returns), or more than 1000.
+    /// Fewer waypoints than a motion needs (2, or 3 if it returns), or more than 1000.
     pub fn validate(&self) -> Result<(), FamilyError> {
         let least = if self.returns { 3 } else { 2 };
         require(
@@ -44,14 +44,14 @@ impl QuinticSettings {
     }
 }
 
-/// Quintic polynomials between way-points at equal times, with continuous speed and acceleration, at rest at both ends.
+/// Quintic polynomials between waypoints at equal times, with continuous velocity and acceleration, at rest at both ends.
 ///
-/// Free numbers a joint: positions of the way-points (the last one left out if the motion returns), then, with free
-/// rates, q̇ of the inner way-points in rad/s and q̈ in rad/s². The jerk may jump at way-points.
+/// Free numbers a joint: positions of the waypoints (the last one left out if the motion returns), then, with free
+/// rates, q̇ of the inner waypoints in rad/s and q̈ in rad/s². The jerk may jump at waypoints.
 ///
 /// # Source
 /// Atkeson, An and Hollerbach, Estimation of inertial parameters of manipulator loads and links, IJRR 5(3), 1986 (the
-/// paper's reference 7): fifth-order polynomials between way-points; Armstrong, IJRR 8(6), 1989, frees the
+/// paper's reference 7): fifth-order polynomials between waypoints; Armstrong, IJRR 8(6), 1989, frees the
 /// accelerations.
 pub type Quintic = LinearFamily<QuinticBasis>;
 

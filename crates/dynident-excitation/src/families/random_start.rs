@@ -1,11 +1,11 @@
-//! Random starts that use a sensible part of each joint's range and speed.
+//! Random starts that use a sensible part of each joint's range and velocity.
 
 use dynident_model::sample::Random;
 
 /// How to scale and shift the shape `q`, `dq` of one joint so that it uses a random part (0.3 to 0.9) of the range or
-/// of the speed limit, whichever binds first, at a random place inside the range.
+/// of the velocity limit, whichever binds first, at a random place inside the range.
 ///
-/// An infinite range counts as ±π, an unknown speed limit (infinite or not positive) as none, an empty range as one
+/// An infinite range counts as ±π, an unknown velocity limit (infinite or not positive) as none, an empty range as one
 /// point.
 pub(crate) fn scale_and_shift(q: &[f64], dq: &[f64], range: [f64; 2], speed: f64, random: &mut Random) -> [f64; 2] {
     use core::f64::consts::PI;

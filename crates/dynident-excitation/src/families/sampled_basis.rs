@@ -1,6 +1,6 @@
 //! A basis of functions of time, sampled once on a grid, and the two products with it that a linear family needs.
 
-use crate::motion::{Motion, MotionCotangent};
+use crate::motion::{Motion, MotionAdjoint};
 use dynident_lanes::{AlignedBuffer, Kernel, Lane, Level, dispatch};
 use nalgebra::DMatrix;
 use std::sync::{Arc, PoisonError, RwLock};
@@ -81,8 +81,8 @@ impl SampledBasis {
     }
 
     /// Adds the derivative of a cost by the parameters.
-    pub(crate) fn pull_back(&self, from: usize, cotangent: &MotionCotangent, gradient: &mut [f64]) {
-        dispatch(Level::detect(), Backward { basis: self, from, cotangent, gradient });
+    pub(crate) fn apply_adjoint(&self, from: usize, adjoint: &MotionAdjoint, gradient: &mut [f64]) {
+        dispatch(Level::detect(), Backward { basis: self, from, adjoint, gradient });
     }
 
     /// Adds Σ weight · column columnᵀ of one joint over samples and orders. Most weights are zero.
@@ -213,7 +213,7 @@ pub(crate) fn store_some<T: Lane>(value: T, array: &mut [f64], at: usize, count:
 struct Backward<'a> {
     basis: &'a SampledBasis,
     from: usize,
-    cotangent: &'a MotionCotangent,
+    adjoint: &'a MotionAdjoint,
     gradient: &'a mut [f64],
 }
 
@@ -221,10 +221,10 @@ impl Kernel for Backward<'_> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(self) {
-        let Self { basis, from, cotangent, gradient } = self;
+        let Self { basis, from, adjoint, gradient } = self;
         let samples = basis.times_s.len();
         let each = basis.columns;
-        let mut sums = vec![T::ZERO; each * cotangent.joints];
+        let mut sums = vec![T::ZERO; each * adjoint.joints];
         for block in 0..samples.div_ceil(BLOCK) {
             for start in (0..BLOCK).step_by(T::LANES) {
                 let sample = block * BLOCK + start;
@@ -233,12 +233,12 @@ impl Kernel for Backward<'_> {
                     let columns = basis.set(joint);
                     let [first, end] = columns.supports[block];
                     let cells = columns.cells(each, block);
-                    let at = joint * cotangent.samples + from + sample;
+                    let at = joint * adjoint.samples + from + sample;
                     let pulls: [T; 4] = [
-                        load_some(&cotangent.q, at, count),
-                        load_some(&cotangent.dq, at, count),
-                        load_some(&cotangent.ddq, at, count),
-                        load_some(&cotangent.dddq, at, count),
+                        load_some(&adjoint.q, at, count),
+                        load_some(&adjoint.dq, at, count),
+                        load_some(&adjoint.ddq, at, count),
+                        load_some(&adjoint.dddq, at, count),
                     ];
                     for column in first..end {
                         let cell = &cells[column * CELL..(column + 1) * CELL];
@@ -339,17 +339,17 @@ mod tests {
             let times: Vec<f64> = (0..samples).map(|_| random.uniform(0.0, 1.0)).collect();
             let parameters: Vec<f64> = (0..4 * joints).map(|_| random.normal()).collect();
             let basis = SampledBasis::new(4, sets, &times, row);
-            let (mut motion, mut cotangent) = (Motion::default(), Motion::default());
+            let (mut motion, mut adjoint) = (Motion::default(), Motion::default());
             motion.reset(joints, samples);
-            cotangent.reset(joints, samples);
-            for values in [&mut cotangent.q, &mut cotangent.dq, &mut cotangent.ddq, &mut cotangent.dddq] {
+            adjoint.reset(joints, samples);
+            for values in [&mut adjoint.q, &mut adjoint.dq, &mut adjoint.ddq, &mut adjoint.dddq] {
                 for value in values.iter_mut() {
                     *value = random.normal();
                 }
             }
             basis.motion(&parameters, 0, &mut motion);
             let mut gradient = vec![0.5; parameters.len()];
-            basis.pull_back(0, &cotangent, &mut gradient);
+            basis.apply_adjoint(0, &adjoint, &mut gradient);
             let mut expected = vec![0.5; parameters.len()];
             for joint in 0..joints {
                 for (sample, &time) in times.iter().enumerate() {
@@ -357,7 +357,7 @@ mod tests {
                     row(if sets == 1 { 0 } else { joint }, time, &mut functions);
                     let at = joint * samples + sample;
                     let got = [motion.q[at], motion.dq[at], motion.ddq[at], motion.dddq[at]];
-                    let pull = [cotangent.q[at], cotangent.dq[at], cotangent.ddq[at], cotangent.dddq[at]];
+                    let pull = [adjoint.q[at], adjoint.dq[at], adjoint.ddq[at], adjoint.dddq[at]];
                     for order in 0..4 {
                         let sum: f64 = (0..4).map(|c| parameters[4 * joint + c] * functions[c][order]).sum();
                         assert!((sum - got[order]).abs() < 1e-13);

@@ -3,7 +3,7 @@
 use super::error::{FamilyError, MOST, require, require_frame};
 use super::random_start::{grid, scale_and_shift};
 use crate::family::Family;
-use crate::motion::{Motion, MotionCotangent};
+use crate::motion::{Motion, MotionAdjoint};
 use dynident_model::sample::Random;
 use serde::{Deserialize, Serialize};
 
@@ -68,14 +68,14 @@ impl SplicedLogisticSettings {
 /// q(t) = h + A/(1 + e^-(ω rem(t, T) - ωT/4)) in the first half of each period, h + A/(1 + e^(ω rem(t, T) - 3ωT/4)) in
 /// the second.
 ///
-/// Free numbers a joint: A in rad (m), ω in 1/s, and h in rad (m) unless given. Peak speed Aω/4, peak acceleration
+/// Free numbers a joint: A in rad (m), ω in 1/s, and h in rad (m) unless given. Peak velocity Aω/4, peak acceleration
 /// Aω²/(6√3).
 ///
 /// At the splices the joint is at rest only nearly: it is A/(1 + e^(ωT/4)) away from its asymptote (4.5e-5 A for
-/// ωT = 40) with a speed of about that times ω, which changes sign there. [`LogisticStrokes`](super::LogisticStrokes)
+/// ωT = 40) with a velocity of about that times ω, which changes sign there. [`LogisticStrokes`](super::LogisticStrokes)
 /// are exactly at rest.
 ///
-/// Position tells speed and acceleration.
+/// Position determines velocity and acceleration.
 #[derive(Clone, Debug)]
 pub struct SplicedLogistic {
     settings: SplicedLogisticSettings,
@@ -208,7 +208,7 @@ impl Family for SplicedLogistic {
                 own[0] = random.uniform(0.3, 0.9) * most.signum() * most.abs().min(fast);
             } else {
                 let span = motion.of(joint);
-                // The grid may miss the middle of a stroke: its speed is known to be ω/4.
+                // The grid may miss the middle of a stroke: its velocity is known to be ω/4.
                 let peak = [0.25 * own[1]];
                 let [scale, shift] = scale_and_shift(&motion.q[span], &peak, range, speeds[joint], random);
                 own[0] *= scale;
@@ -237,17 +237,17 @@ impl Family for SplicedLogistic {
         }
     }
 
-    fn pull_back(&self, parameters: &[f64], times_s: &[f64], cotangent: &MotionCotangent, gradient: &mut [f64]) {
+    fn apply_adjoint(&self, parameters: &[f64], times_s: &[f64], adjoint: &MotionAdjoint, gradient: &mut [f64]) {
         assert_eq!(parameters.len(), self.parameters(), "parameters of {NAME}");
         assert_eq!(gradient.len(), self.parameters(), "gradient of {NAME}");
-        assert_eq!((cotangent.joints, cotangent.samples), (self.joints, times_s.len()), "cotangent of {NAME}");
+        assert_eq!((adjoint.joints, adjoint.samples), (self.joints, times_s.len()), "cotangent of {NAME}");
         for (joint, own) in parameters.chunks(self.each()).enumerate() {
             let (amplitude, omega) = (own[0], own[1]);
             let mut sum = [0.0; 3];
-            for (at, &time) in cotangent.of(joint).zip(times_s) {
+            for (at, &time) in adjoint.of(joint).zip(times_s) {
                 let phase = self.phase(joint, omega, time);
                 let f = logistic(phase.argument);
-                let pulls = [cotangent.q[at], cotangent.dq[at], cotangent.ddq[at], cotangent.dddq[at]];
+                let pulls = [adjoint.q[at], adjoint.dq[at], adjoint.ddq[at], adjoint.dddq[at]];
                 let orders = if phase.frozen { 1 } else { 4 };
                 let mut power = 1.0;
                 for (order, pull) in pulls.into_iter().enumerate().take(orders) {
@@ -333,7 +333,7 @@ mod tests {
             check::derivatives(&family(2, 60.0, &settings), seed);
         }
 
-        /// On the strokes: at a splice, which moves with ω where T does, the speed jumps by e^-10 and has no
+        /// On the strokes: at a splice, which moves with ω where T does, the velocity jumps by e^-10 and has no
         /// derivative.
         #[test]
         fn gradient_is_exact(seed in any::<u64>(), repetitions in 1_usize..4, fixed in any::<bool>(), given in any::<bool>()) {

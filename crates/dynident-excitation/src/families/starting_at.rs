@@ -2,7 +2,7 @@
 
 use super::error::{FamilyError, require};
 use crate::family::Family;
-use crate::motion::{Motion, MotionCotangent};
+use crate::motion::{Motion, MotionAdjoint};
 use dynident_model::sample::Random;
 
 /// Part of a joint's range that a random start uses at least, wherever the start posture stands in it.
@@ -64,7 +64,7 @@ impl Family for StartingAt {
     }
 
     /// As the family's, in ranges about the start posture: what leaves the joint's own range there is for the search to
-    /// mend.
+    /// fix.
     fn random(&self, ranges: &[[f64; 2]], speeds: &[f64], random: &mut Random) -> Vec<f64> {
         let mut ranges = ranges.to_vec();
         for (joint, start) in self.given() {
@@ -99,18 +99,18 @@ impl Family for StartingAt {
         }
     }
 
-    fn pull_back(&self, parameters: &[f64], times_s: &[f64], cotangent: &MotionCotangent, gradient: &mut [f64]) {
-        self.inner.pull_back(parameters, times_s, cotangent, gradient);
+    fn apply_adjoint(&self, parameters: &[f64], times_s: &[f64], adjoint: &MotionAdjoint, gradient: &mut [f64]) {
+        self.inner.apply_adjoint(parameters, times_s, adjoint, gradient);
         if times_s.is_empty() {
             return;
         }
         // ∂(s - q(0)): what all positions of a joint pull, at the start and the other way.
         let mut at_start = Motion::default();
-        at_start.reset(cotangent.joints, 1);
+        at_start.reset(adjoint.joints, 1);
         for (joint, _) in self.given() {
-            at_start.q[joint] = -cotangent.q[cotangent.of(joint)].iter().sum::<f64>();
+            at_start.q[joint] = -adjoint.q[adjoint.of(joint)].iter().sum::<f64>();
         }
-        self.inner.pull_back(parameters, &[0.0], &at_start, gradient);
+        self.inner.apply_adjoint(parameters, &[0.0], &at_start, gradient);
     }
 }
 

@@ -3,7 +3,7 @@
 use super::error::FamilyError;
 use super::spliced_logistic::{SplicedLogistic, SplicedLogisticSettings};
 use crate::family::Family;
-use crate::motion::{Motion, MotionCotangent};
+use crate::motion::{Motion, MotionAdjoint};
 use dynident_model::sample::Random;
 
 /// Free numbers a step: A, ω.
@@ -22,7 +22,7 @@ pub struct Step {
 /// order of the steps.
 ///
 /// Before and after its turn a joint stands where its function starts, A/(1 + e^(ωT/4)) from its offset; a joint
-/// without a turn stands at its offset. Speed and acceleration jump by what the splice leaves (Eq. 17 of the paper asks
+/// without a turn stands at its offset. Velocity and acceleration jump by what the splice leaves (Eq. 17 of the paper asks
 /// for less than 1e-4).
 #[derive(Clone, Debug)]
 pub struct StepWiseLogistic {
@@ -118,20 +118,20 @@ impl Family for StepWiseLogistic {
         }
     }
 
-    fn pull_back(&self, parameters: &[f64], times_s: &[f64], cotangent: &MotionCotangent, gradient: &mut [f64]) {
+    fn apply_adjoint(&self, parameters: &[f64], times_s: &[f64], adjoint: &MotionAdjoint, gradient: &mut [f64]) {
         assert_eq!(gradient.len(), self.parameters(), "gradient of {}", self.name());
         let mut alone = Motion::default();
         let parts = parameters.chunks_exact(EACH).zip(gradient.chunks_exact_mut(EACH));
         for (turn, (own, gradient)) in self.steps.iter().zip(parts) {
             alone.reset(1, times_s.len());
-            for (sample, (at, time)) in cotangent.of(turn.joint).zip(times_s).enumerate() {
-                alone.q[sample] = cotangent.q[at];
+            for (sample, (at, time)) in adjoint.of(turn.joint).zip(times_s).enumerate() {
+                alone.q[sample] = adjoint.q[at];
                 if turn.moves(*time) {
                     (alone.dq[sample], alone.ddq[sample], alone.dddq[sample]) =
-                        (cotangent.dq[at], cotangent.ddq[at], cotangent.dddq[at]);
+                        (adjoint.dq[at], adjoint.ddq[at], adjoint.dddq[at]);
                 }
             }
-            turn.family.pull_back(own, &turn.own_times(times_s), &alone, gradient);
+            turn.family.apply_adjoint(own, &turn.own_times(times_s), &alone, gradient);
         }
     }
 }

@@ -9,7 +9,7 @@ impl LimitSet {
     /// where no such limit is set.
     ///
     /// A twice differentiable x leaves its chord by at most `h²/8 max |ẍ|`, so position is bounded by the acceleration
-    /// limit and speed by the jerk limit; acceleration passes its samples by at most `h/2 max |jerk|`. Torque, power
+    /// limit and velocity by the jerk limit; acceleration passes its samples by at most `h/2 max |jerk|`. Torque, power
     /// and places have no such closed bound here: see [`peaks`](super::peaks).
     pub fn sampling_margins(&self, step_s: f64) -> Vec<Option<f64>> {
         let size = |kind: LimitKind, subject: &str| {

@@ -12,8 +12,8 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// A run slower by a factor s with every limit that is then still broken made just wide enough, the factor chosen for
 /// the smallest sum of relative changes, `s - 1 + Σ c_i(s)`.
 ///
-/// `c` is the constraint's value: the share of the limit that is missing, for the floor metres. A slower run mends
-/// speed, acceleration, jerk and the part of torque that gravity does not ask for, so the sum falls before it rises; it
+/// `c` is the constraint's value: the share of the limit that is missing, for the floor metres. A slower run fixes
+/// velocity, acceleration, jerk and the part of torque that gravity does not ask for, so the sum falls before it rises; it
 /// is looked at on a grid up to where s - 1 alone costs more than limits alone, then by golden section. `None` if a
 /// motion is not finite.
 pub(super) fn smallest_combination(set: &LimitSet, times_s: &[f64], motion: &Motion) -> Option<Relaxation> {

@@ -45,7 +45,7 @@ pub struct JointLimit {
     /// Lowest and highest position, rad or m.
     #[serde(default)]
     pub position: Option<[f64; 2]>,
-    /// Highest speed, rad/s or m/s.
+    /// Highest velocity, rad/s or m/s.
     #[serde(default)]
     pub speed: Option<f64>,
     /// Highest acceleration, rad/s² or m/s².
@@ -122,7 +122,7 @@ pub struct ColumnLimit {
 }
 
 impl Limits {
-    /// The description's own limits: position where both ends are given, speed, torque from `effort`. Acceleration,
+    /// The description's own limits: position where both ends are given, velocity, torque from `effort`. Acceleration,
     /// jerk, power and space stay free.
     pub fn from_model(model: &Model) -> Self {
         let joints = model.joints().iter().map(|joint| JointLimit {

@@ -59,15 +59,15 @@ pub struct Diagnosis {
     /// Broken limits, worst first; empty for a feasible motion.
     pub broken: Vec<BrokenLimit>,
     /// Single changes that would do, the smallest first (by relative change). Where limits of several kinds are broken
-    /// that no slower run mends, the smallest combination instead; empty only where the motion is not finite.
+    /// that no slower run fixes, the smallest combination instead; empty only where the motion is not finite.
     pub relaxations: Vec<Relaxation>,
 }
 
 /// Looks at a motion on a dense grid of times (1 kHz or so) that includes both ends.
 ///
-/// Running the same path slower by a factor s divides speed by s, acceleration by s² and jerk by s³, and leaves of the
+/// Running the same path slower by a factor s divides velocity by s, acceleration by s² and jerk by s³, and leaves of the
 /// torque gravity as it is; the smallest s is found by bisection on the constraint values themselves. Gravity alone
-/// above a torque limit, or a broken position, place or distance, cannot be mended so.
+/// above a torque limit, or a broken position, place or distance, cannot be fixed so.
 ///
 /// # Panics
 /// If there is not one time per sample.

@@ -1,4 +1,4 @@
-//! What can be told to be impossible before any search: a start outside the limits, a time too short for any motion.
+//! What can be seen to be infeasible before any search: a start outside the limits, a time too short for any motion.
 
 use super::description::Limits;
 use super::error::LimitError;
@@ -41,7 +41,7 @@ impl Limits {
     }
 
     /// Checks that every joint can go `displacement` (rad or m, less if its range is smaller) from rest to rest within
-    /// `duration_s`, by its speed, acceleration and jerk limits.
+    /// `duration_s`, by its velocity, acceleration and jerk limits.
     ///
     /// # Errors
     /// As [`validate`](Limits::validate); the slowest joint, if it needs longer; a duration or displacement that is not
@@ -67,7 +67,7 @@ impl Limits {
     }
 }
 
-/// The least time, s, from rest to rest over `displacement` (rad or m, not negative) with the given largest speed,
+/// The least time, s, from rest to rest over `displacement` (rad or m, not negative) with the given largest velocity,
 /// acceleration and jerk; `None` is no limit.
 ///
 /// Double-S profile (Biagiotti and Melchiorri, *Trajectory Planning for Automatic Machines and Robots* (2008), section
@@ -77,7 +77,7 @@ fn shortest_duration_s(displacement: f64, speed: Option<f64>, acceleration: Opti
     if d <= 0.0 {
         return 0.0;
     }
-    // Time at the top speed, were there no ramps, and the times to reach v from rest and back by acceleration and jerk.
+    // Time at the top velocity, were there no ramps, and the times to reach v from rest and back by acceleration and jerk.
     let ramp = |v: f64| match (acceleration, jerk) {
         (Some(a), Some(j)) if v * j >= a * a => a / j + v / a,
         (_, Some(j)) => 2.0 * (v / j).sqrt(),
@@ -147,7 +147,7 @@ mod tests {
         assert_eq!(shortest_duration_s(1.0, Some(2.0), None, None), 0.5);
         assert_eq!(shortest_duration_s(1.0, None, Some(4.0), None), 1.0);
         assert_eq!(shortest_duration_s(4.0, None, None, Some(2.0)), 4.0);
-        // Top speed not reached, and reached.
+        // Top velocity not reached, and reached.
         assert_eq!(shortest_duration_s(1.0, Some(2.0), Some(4.0), None), 1.0);
         assert_eq!(shortest_duration_s(1.0, Some(1.0), Some(4.0), None), 1.25);
     }

@@ -1,4 +1,4 @@
-//! Position, speed, acceleration and jerk of single joints: bands on the motion itself.
+//! Position, velocity, acceleration and jerk of single joints: bands on the motion itself.
 
 use super::description::JointLimit;
 use super::kind::{Constraint, LimitKind};
@@ -55,7 +55,7 @@ fn array(motion: &Motion, kind: LimitKind) -> &[f64] {
     }
 }
 
-/// One row of a [`LimitSet`](super::LimitSet) that bounds a single joint's position (order 0), speed, acceleration or
+/// One row of a [`LimitSet`](super::LimitSet) that bounds a single joint's position (order 0), velocity, acceleration or
 /// jerk (3): `c = |x - middle| / half - 1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct JointBand {
@@ -103,7 +103,7 @@ impl Term for JointMotionLimits {
         }
     }
 
-    fn pull_back(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
+    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
         let motion = inputs.motion;
         for (band, row) in self.0.iter().zip(weights.chunks_exact(motion.samples)) {
             let (scale, range) = (1.0 / band.half, motion.of(band.joint));

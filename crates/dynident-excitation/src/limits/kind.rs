@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub enum LimitKind {
     /// Joint position.
     Position,
-    /// Joint speed.
+    /// Joint velocity.
     Speed,
     /// Joint acceleration.
     Acceleration,

@@ -121,7 +121,7 @@ impl Term for PlaceLimits {
         }
     }
 
-    fn pull_back(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
+    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
         for ((point, room, _), row) in self.0.iter().zip(weights.chunks_exact(inputs.motion.samples)) {
             for (sample, &weight) in row.iter().enumerate() {
                 if weight != 0.0 {

@@ -35,7 +35,7 @@ impl Term for PowerLimits {
         }
     }
 
-    fn pull_back(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
+    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
         let motion = inputs.motion;
         for ((joint, constraint), row) in self.0.iter().zip(weights.chunks_exact(motion.samples)) {
             let scale = 1.0 / constraint.size;

@@ -48,7 +48,7 @@ impl Term for SelfCollisionLimits {
         }
     }
 
-    fn pull_back(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
+    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
         let joints = inputs.motion.joints;
         for ((pair, constraint), row) in self.rows.iter().zip(weights.chunks_exact(inputs.motion.samples)) {
             for (sample, &weight) in row.iter().enumerate() {

@@ -8,9 +8,9 @@ use super::place::PlaceLimits;
 use super::power::PowerLimits;
 use super::self_collision::SelfCollisionLimits;
 use super::term::{Inputs, Pull, Term};
-use super::torque::{TorqueLimits, torque_pull_back};
+use super::torque::{TorqueLimits, torque_adjoint};
 use super::wrench::{Wrench, pull_wrenches};
-use crate::motion::{Motion, MotionCotangent};
+use crate::motion::{Motion, MotionAdjoint};
 use dynident_dynamics::{BatchWorkspace, Workspace, body_placements, inverse_dynamics_batch};
 use dynident_model::{Model, Transform};
 
@@ -29,7 +29,7 @@ pub struct LimitSet {
 }
 
 /// Scratch of one thread for one [`LimitSet`]; torques and placements of the last motion stay in it, so that
-/// [`pull_back`](LimitSet::pull_back) after [`values`](LimitSet::values) does not repeat them.
+/// [`apply_adjoint`](LimitSet::apply_adjoint) after [`values`](LimitSet::values) does not repeat them.
 #[derive(Debug)]
 pub struct LimitWorkspace {
     batch: BatchWorkspace,
@@ -174,22 +174,22 @@ impl LimitSet {
         }
     }
 
-    /// Adds to `cotangent` what a cost with derivatives `weights` by the [`values`](LimitSet::values) pulls on the
+    /// Adds to `adjoint` what a cost with derivatives `weights` by the [`values`](LimitSet::values) pulls on the
     /// motion. Exact, but for the corners of `|x|` at zero and of distances between parallel segments, where it is one
     /// of the one-sided derivatives.
     ///
     /// # Panics
     /// If sizes differ.
-    pub fn pull_back(
+    pub fn apply_adjoint(
         &self,
         workspace: &mut LimitWorkspace,
         motion: &Motion,
         weights: &[f64],
-        cotangent: &mut MotionCotangent,
+        adjoint: &mut MotionAdjoint,
     ) {
         let (samples, dof) = (motion.samples, self.model.dof());
         assert_eq!(weights.len(), self.constraints.len() * samples, "one weight per value");
-        assert_eq!((cotangent.joints, cotangent.samples), (dof, samples), "the cotangent has the motion's shape");
+        assert_eq!((adjoint.joints, adjoint.samples), (dof, samples), "the cotangent has the motion's shape");
         if samples == 0 {
             return;
         }
@@ -203,12 +203,12 @@ impl LimitSet {
         let mut rest = weights;
         for (term, rows) in self.terms.iter().zip(&self.rows_of) {
             let (own, others) = rest.split_at(rows * samples);
-            let mut pull = Pull { motion: &mut *cotangent, tau: by_torque, wrenches };
-            term.pull_back(&inputs, own, &mut pull);
+            let mut pull = Pull { motion: &mut *adjoint, tau: by_torque, wrenches };
+            term.apply_adjoint(&inputs, own, &mut pull);
             rest = others;
         }
         if self.torque {
-            torque_pull_back(&self.model, single, motion, by_torque, cotangent);
+            torque_adjoint(&self.model, single, motion, by_torque, adjoint);
         }
         if self.placements {
             by_position.resize(dof, 0.0);
@@ -220,7 +220,7 @@ impl LimitSet {
                 by_position.fill(0.0);
                 pull_wrenches(&self.model, &placements[of.clone()], &mut wrenches[of], by_position);
                 for (joint, pulled) in by_position.iter().enumerate() {
-                    cotangent.q[joint * samples + sample] += pulled;
+                    adjoint.q[joint * samples + sample] += pulled;
                 }
             }
         }

@@ -2,7 +2,7 @@
 
 use super::kind::Constraint;
 use super::wrench::Wrench;
-use crate::motion::{Motion, MotionCotangent};
+use crate::motion::{Motion, MotionAdjoint};
 use core::fmt::Debug;
 use dynident_model::{Transform, Vec3};
 
@@ -27,7 +27,7 @@ impl Inputs<'_> {
 /// Where derivatives of the cost go: by the motion, by the torques, and by the places of points as forces on the
 /// bodies.
 pub(crate) struct Pull<'a> {
-    pub(crate) motion: &'a mut MotionCotangent,
+    pub(crate) motion: &'a mut MotionAdjoint,
     pub(crate) tau: &'a mut [f64],
     /// Sample by sample, one per body.
     pub(crate) wrenches: &'a mut [Wrench],
@@ -51,7 +51,7 @@ pub(crate) trait Term: Debug + Send + Sync {
     fn values(&self, inputs: &Inputs<'_>, out: &mut [f64]);
 
     /// Adds what a cost with derivatives `weights` by the values pulls.
-    fn pull_back(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>);
+    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>);
 
     /// True if the values need torques.
     fn needs_torque(&self) -> bool {

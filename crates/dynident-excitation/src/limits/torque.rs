@@ -3,7 +3,7 @@
 use super::description::JointLimit;
 use super::kind::{Constraint, LimitKind};
 use super::term::{Inputs, Pull, Term};
-use crate::motion::{Motion, MotionCotangent};
+use crate::motion::{Motion, MotionAdjoint};
 use dynident_dynamics::{Workspace, inverse_dynamics_derivatives};
 use dynident_model::Model;
 
@@ -44,7 +44,7 @@ impl Term for TorqueLimits {
         }
     }
 
-    fn pull_back(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
+    fn apply_adjoint(&self, inputs: &Inputs<'_>, weights: &[f64], pull: &mut Pull<'_>) {
         for ((joint, constraint), row) in self.0.iter().zip(weights.chunks_exact(inputs.motion.samples)) {
             let (scale, range) = (1.0 / constraint.size, inputs.motion.of(*joint));
             for ((to, weight), tau) in pull.tau[range.clone()].iter_mut().zip(row).zip(&inputs.tau[range]) {
@@ -58,17 +58,17 @@ impl Term for TorqueLimits {
     }
 }
 
-/// Adds to `cotangent` what a cost with derivatives `by_torque` (joint-major) by the rigid-body torques pulls:
+/// Adds to `adjoint` what a cost with derivatives `by_torque` (joint-major) by the rigid-body torques pulls:
 /// `(∂τ/∂q)ᵀ w`, `(∂τ/∂q̇)ᵀ w`, `Mᵀ w` at every sample where a weight is not zero.
 ///
 /// # Panics
 /// If sizes differ.
-pub(crate) fn torque_pull_back(
+pub(crate) fn torque_adjoint(
     model: &Model,
     workspace: &mut Workspace,
     motion: &Motion,
     by_torque: &[f64],
-    cotangent: &mut MotionCotangent,
+    adjoint: &mut MotionAdjoint,
 ) {
     let (dof, samples) = (motion.joints, motion.samples);
     assert_eq!(by_torque.len(), dof * samples, "one weight per torque");
@@ -92,9 +92,9 @@ pub(crate) fn torque_pull_back(
             let row = row * dof..(row + 1) * dof;
             for column in 0..dof {
                 let to = column * samples + sample;
-                cotangent.q[to] += weight * derivatives.by_position[row.clone()][column];
-                cotangent.dq[to] += weight * derivatives.by_velocity[row.clone()][column];
-                cotangent.ddq[to] += weight * derivatives.by_acceleration[row.clone()][column];
+                adjoint.q[to] += weight * derivatives.by_position[row.clone()][column];
+                adjoint.dq[to] += weight * derivatives.by_velocity[row.clone()][column];
+                adjoint.ddq[to] += weight * derivatives.by_acceleration[row.clone()][column];
             }
         }
     }

@@ -80,7 +80,7 @@ fn validate_joint(limit: &JointLimit) -> Result<(), LimitError> {
     let name = &limit.joint;
     if let Some(position) = limit.position {
         range(&format!("position of joint `{name}`"), position)?;
-        // Half the width must be a number to divide by, and the ends far enough apart to be told from rounding.
+        // Half the width must be a number to divide by, and the ends far enough apart to be separated from rounding.
         let (middle, half) = middle_and_half(position);
         if half <= 1e-12 * middle.abs().max(1.0) {
             return Err(LimitError::ZeroRange { joint: name.clone(), position: position[0] });

@@ -155,7 +155,7 @@ pub(crate) struct AugmentedLagrangianResult {
     pub violation: f64,
     /// Whether that is within the tolerance.
     pub feasible: bool,
-    /// The last iterate with its multipliers and penalty. While constraints are still violated it tells more than
+    /// The last iterate with its multipliers and penalty. While constraints are still violated it determines more than
     /// [`best`](Self::best), which may be an early point that kept them by standing still.
     pub end: AugmentedLagrangianState,
     /// `f + Σ λ_i c_i` there over the violated constraints: to first order the objective that is left once they are

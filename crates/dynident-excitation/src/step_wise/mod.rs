@@ -31,15 +31,15 @@ const EACH: usize = 3;
 /// Why a joint cannot be designed for alone.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum StepWiseError {
-    /// A joint that slides: its motion alone tells a mass, and no window is needed for that.
-    #[error("joint `{joint}` slides: step-wise designs are for turning joints; name the joints that take part")]
+    /// A joint that slides: its motion alone determines a mass, and no window is needed for that.
+    #[error("joint `{joint}` slides: step-wise designs are for revolute joints; name the joints that take part")]
     Slides {
         /// The joint.
         joint: String,
     },
     /// A joint on which gravity does not act.
     #[error(
-        "gravity does not act about joint `{joint}` while the others rest: its motion alone tells one parameter, for any stroke; name the joints that take part"
+        "gravity does not act about joint `{joint}` while the others rest: its motion alone determines one parameter, for any stroke; name the joints that take part"
     )]
     NoGravity {
         /// The joint.
@@ -47,7 +47,7 @@ pub enum StepWiseError {
     },
 }
 
-/// The part of gravity, m/s², that acts across a turning joint's axis while the robot stands at `rest` (rad, m).
+/// The part of gravity, m/s², that acts across a revolute joint's axis while the robot stands at `rest` (rad, m).
 ///
 /// # Errors
 /// A joint that slides, or along whose axis gravity stands.
@@ -109,7 +109,7 @@ impl StepWiseProblem {
         self.joints.iter().zip(strokes).map(|(joint, stroke)| joint.constants.condition_number(stroke)).collect()
     }
 
-    /// Position, speed, acceleration and rest of one stroke. What limits the arm's place is for the check of the whole
+    /// Position, velocity, acceleration and rest of one stroke. What limits the arm's place is for the check of the whole
     /// motion.
     pub fn limits(&self, place: usize, stroke: &Stroke) -> [StrokeLimit; 5] {
         self.joints[place].constants.limits(stroke)

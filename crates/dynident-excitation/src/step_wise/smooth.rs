@@ -25,7 +25,7 @@ pub(super) struct SmoothStroke {
     x: [f64; 4],
 }
 
-/// Three pairs of singular values; speed, acceleration, both at rest, window.
+/// Three pairs of singular values; velocity, acceleration, both at rest, window.
 const PAIRS: usize = 3;
 const CONSTRAINTS: usize = PAIRS + 5;
 const MARGIN: f64 = 1e-6;

@@ -40,11 +40,11 @@ impl Stroke {
 pub enum StrokeQuantity {
     /// Highest position, A/(1 + e^(-ωT/4)), in rad. The lowest is above zero for every stroke.
     Position,
-    /// Peak speed A ω/4, in rad/s.
+    /// Peak velocity A ω/4, in rad/s.
     Speed,
     /// Peak acceleration A ω²/(6√3), in rad/s².
     Acceleration,
-    /// Speed at start, splice and end, in rad/s.
+    /// Velocity at start, splice and end, in rad/s.
     RestSpeed,
     /// Acceleration at start, splice and end, in rad/s².
     RestAcceleration,
@@ -87,15 +87,15 @@ pub struct StrokeConstants {
     pub gravity: f64,
     /// Samples a second; the clock ticks at every mid-point.
     pub rate_hz: f64,
-    /// T ω, period times steepness. At 40 speed and acceleration at rest are below 1e-4 for every slow stroke.
+    /// T ω, period times steepness. At 40 velocity and acceleration at rest are below 1e-4 for every slow stroke.
     pub period_times_steepness: f64,
     /// Positions, counted from the start of the stroke, are between 0 and this, rad.
     pub position_limit_rad: f64,
-    /// Highest speed, rad/s.
+    /// Highest velocity, rad/s.
     pub speed_limit: f64,
     /// Highest acceleration, rad/s².
     pub acceleration_limit: f64,
-    /// Bound of speed (rad/s) and acceleration (rad/s²) at rest (equation 17).
+    /// Bound of velocity (rad/s) and acceleration (rad/s²) at rest (equation 17).
     pub rest_limit: f64,
     /// ε of equation 19 where a limit is broken.
     pub penalty: f64,

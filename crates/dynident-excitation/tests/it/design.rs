@@ -8,7 +8,7 @@ use dynident_excitation::check::check_limits;
 use dynident_excitation::criteria::{Criterion, DOptimal};
 use dynident_excitation::families::{Fourier, FourierSettings};
 use dynident_excitation::limits::{LimitSet, Limits};
-use dynident_excitation::{Design, DesignSettings, DesignTask, Family, Motion, design, forecast, grid};
+use dynident_excitation::{Design, DesignSettings, DesignTask, Family, Motion, design, grid, predicted_covariance};
 use dynident_model::sample::Random;
 use dynident_model::{Model, load_robot};
 
@@ -81,8 +81,11 @@ fn the_forecast_comes_true() {
     let mut panels = Panels::default();
     regressor_panels(&model, &mut BatchWorkspace::new(&model), &layout, &motion.view(), &mut panels);
     let columns = layout.columns().len();
-    let expected: Vec<f64> =
-        forecast(&design.information, 3).std.into_iter().map(|std| std.expect("every parameter is excited")).collect();
+    let expected: Vec<f64> = predicted_covariance(&design.information, 3)
+        .std
+        .into_iter()
+        .map(|std| std.expect("every parameter is excited"))
+        .collect();
     let mut random = Random::new(77);
     let truth: Vec<f64> = (0..columns).map(|_| random.uniform(-1.0, 1.0)).collect();
     // The 200 runs; the standard deviation of a standard deviation from 200 runs is 5 %, so single parameters

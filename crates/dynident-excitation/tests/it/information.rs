@@ -3,8 +3,8 @@
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, PanelLayout};
 use dynident_excitation::criteria::{AOptimal, ConditionNumber, Criterion, DOptimal, EOptimal};
 use dynident_excitation::{Information, Motion};
-use dynident_model::laws::{CoulombShape, DriveChoice, laws_per_joint};
 use dynident_model::sample::{Random, random_tree};
+use dynident_model::terms::{CoulombShape, DriveChoice, terms_per_joint};
 
 #[test]
 fn derivatives_by_the_motion_equal_differences() {
@@ -17,13 +17,13 @@ fn derivatives_by_the_motion_equal_differences() {
     ];
     for seed in 0..6 {
         let model = random_tree(seed, 3);
-        let laws = laws_per_joint(&model, |_| DriveChoice {
+        let terms = terms_per_joint(&model, |_| DriveChoice {
             drive_inertia: true,
             viscous: true,
             coulomb: Some(CoulombShape::Smooth { width: 0.5 }),
             offset: true,
         });
-        let base = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
+        let base = BaseParameters::new(&model, &terms, &BaseParameterSettings::default());
         let layout = PanelLayout::new(&model, base.base_columns());
         let mut information = Information::new(&model, &layout, &[0.5, 1.0, 2.0], None);
         let mut random = Random::new(90 + seed);
@@ -40,7 +40,7 @@ fn derivatives_by_the_motion_equal_differences() {
             let (_, by_information) = criterion.value_and_derivative(&d).unwrap();
             let mut gradient = Motion::default();
             gradient.reset(3, samples);
-            information.pull_back(&motion, 0.7, &by_information, &mut gradient);
+            information.apply_adjoint(&motion, 0.7, &by_information, &mut gradient);
             let mut value = |motion: &Motion| criterion.value_and_derivative(&information.of(motion, 0.7)).unwrap().0;
             for entry in [0, 17, 80, 179] {
                 for which in 0..3 {

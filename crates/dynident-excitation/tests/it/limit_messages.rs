@@ -137,7 +137,7 @@ fn first_joint(limit: &JointLimit) -> Limits {
 #[test]
 fn too_fast_a_path_gives_its_smallest_stretch() {
     let (model, times, motion) = swing(0.5, 4.0, 0.0);
-    // Peaks: speed 2, acceleration 8. Speed asks for 2 / 1.6 = 1.25, acceleration for √(8 / 4.5) = 4/3.
+    // Peaks: velocity 2, acceleration 8. Velocity asks for 2 / 1.6 = 1.25, acceleration for √(8 / 4.5) = 4/3.
     let limits = first_joint(&JointLimit { speed: Some(1.6), acceleration: Some(4.5), ..JointLimit::default() });
     let diagnosis = diagnose(&LimitSet::new(&limits, &model).unwrap(), &times, &motion);
     assert_eq!(diagnosis.broken.len(), 2);
@@ -154,7 +154,7 @@ fn a_single_broken_kind_gives_the_limit_that_would_do() {
     let limits = first_joint(&JointLimit { position: Some([-1.0, 1.0]), ..JointLimit::default() });
     let diagnosis = diagnose(&LimitSet::new(&limits, &model).unwrap(), &times, &motion);
     let [Relaxation::Limits { kind: LimitKind::Position, changes }] = &diagnosis.relaxations[..] else {
-        panic!("a slower run does not mend a position: {diagnosis:?}")
+        panic!("a slower run does not fix a position: {diagnosis:?}")
     };
     assert!((changes[0].2 - 1.2).abs() < 1e-5, "{changes:?}");
     // sin(4t) is at its top first at π/8 s, and again with the same value later.
@@ -186,15 +186,15 @@ fn a_stretch_leaves_gravity() {
     };
     assert!(worst(factor) <= 1.0 + 2e-6, "{}", worst(factor));
     assert!(worst(factor * 0.999) > 1.0 + 1e-6);
-    // Held out level, gravity alone (1 kg at 0.5 m and 1 kg at 1.5 m: 19.6 Nm) breaks 10 Nm at any speed.
+    // Held out level, gravity alone (1 kg at 0.5 m and 1 kg at 1.5 m: 19.6 Nm) breaks 10 Nm at any velocity.
     let (model, times, motion) = swing(0.2, 8.0, 0.0);
     let limits = first_joint(&JointLimit { torque: Some(10.0), position: Some([-0.1, 0.1]), ..JointLimit::default() });
     let diagnosis = diagnose(&LimitSet::new(&limits, &model).unwrap(), &times, &motion);
     let [Relaxation::Combined { factor, changes, .. }] = &diagnosis.relaxations[..] else {
-        panic!("neither a slower run nor one kind of limit alone mends both: {diagnosis:?}")
+        panic!("neither a slower run nor one kind of limit alone fixes both: {diagnosis:?}")
     };
     assert!(diagnosis.sentences().last().unwrap().starts_with("No single change"), "{:?}", diagnosis.sentences());
-    // The position needs half a range of 0.2 rad at any speed. Whatever the factor, the relaxed limits must hold by the
+    // The position needs half a range of 0.2 rad at any velocity. Whatever the factor, the relaxed limits must hold by the
     // independent check ...
     let relaxed = |scale: f64| {
         let needed = |wanted| changes.iter().find(|(kind, _)| *kind == wanted).unwrap().1.2 * scale;

@@ -36,9 +36,9 @@ fn gradient_agrees(model: &Model, seed: u64, swept: bool) {
         for weight in &mut weights[row * motion.samples..(row + 1) * motion.samples] {
             *weight = random.uniform(-1.0, 1.0);
         }
-        let mut cotangent = Motion::default();
-        cotangent.reset(model.dof(), motion.samples);
-        set.pull_back(&mut workspace(&set, swept), &motion, &weights, &mut cotangent);
+        let mut adjoint = Motion::default();
+        adjoint.reset(model.dof(), motion.samples);
+        set.apply_adjoint(&mut workspace(&set, swept), &motion, &weights, &mut adjoint);
         let h = 1e-6;
         let mut ahead = motion.clone();
         let mut behind = motion.clone();
@@ -51,7 +51,7 @@ fn gradient_agrees(model: &Model, seed: u64, swept: bool) {
             (&mut ahead.dddq, &mut behind.dddq),
         ]
         .into_iter()
-        .zip([&cotangent.q, &cotangent.dq, &cotangent.ddq, &cotangent.dddq])
+        .zip([&adjoint.q, &adjoint.dq, &adjoint.ddq, &adjoint.dddq])
         {
             for ((ahead, behind), pulled) in ahead.iter_mut().zip(behind).zip(pulled) {
                 let direction = random.uniform(-1.0, 1.0);
@@ -69,7 +69,7 @@ fn gradient_agrees(model: &Model, seed: u64, swept: bool) {
 }
 
 #[test]
-fn pull_back_equals_central_differences() {
+fn the_adjoint_equals_central_differences() {
     for swept in [false, true] {
         gradient_agrees(&ur10(), 3, swept);
         for seed in 0..12 {
@@ -78,7 +78,7 @@ fn pull_back_equals_central_differences() {
     }
 }
 
-/// Half a turn in one step, straight over the column: both samples stand outside, and only the way between them tells.
+/// Half a turn in one step, straight over the column: both samples stand outside, and only the way between them determines.
 #[test]
 fn a_column_is_seen_between_two_samples() {
     let model = ur10();

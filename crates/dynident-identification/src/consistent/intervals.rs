@@ -1,25 +1,25 @@
-//! How far each parameter of a body or law could go: intervals that respect what is possible.
+//! How far each parameter of a body or term could go: intervals that respect what is physically consistent.
 
 use super::error::ConsistencyError;
 use super::problem::consistency_problem;
 use super::settings::ConsistencySettings;
 use crate::progress::Progress;
 use dynident_dynamics::{Column, ParametricModel};
-use dynident_estimation::consistent::{IntervalEnd, IntervalSettings, PhysicalSettings, PossibleIntervals};
+use dynident_estimation::consistent::{ConsistentIntervals, IntervalEnd, IntervalSettings, PhysicalSettings};
 use dynident_estimation::{Estimate, LinearProblem};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// The 95 % interval of one parameter of a body or law, over all possible machines that the data do not reject.
+/// The 95 % interval of one parameter of a body or term, over all physically consistent robots that the data do not reject.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ParameterInterval {
     /// Symbol of the parameter: `m3`, `mx3`, `Ixx3` (about the body frame's origin), `fv3`.
     pub symbol: String,
-    /// The body's or the joint's name; none for a law of several joints.
+    /// The body's or the joint's name; none for a term of several joints.
     pub of: Option<String>,
-    /// Its unit at a turning joint.
+    /// Its unit at a revolute joint.
     pub unit: String,
-    /// Of the possible set that fits best.
+    /// Of the consistent set that fits best.
     pub value: f64,
     /// Lower end; none where it is open.
     pub lower: Option<f64>,
@@ -45,12 +45,22 @@ pub fn consistent_intervals(
     }
     let own = IntervalSettings::default();
     let physical = PhysicalSettings { prior_weight: own.physical.prior_weight, ..settings.fit() };
-    // Each base parameter's variance has its own degrees of freedom; a sum of several has about the middle one's.
-    let mut freedoms: Vec<f64> = estimate.std_freedom.iter().copied().filter(|freedom| freedom.is_finite()).collect();
-    freedoms.sort_by(f64::total_cmp);
-    let freedom = freedoms.get(freedoms.len() / 2).copied().unwrap_or(estimate.degrees_of_freedom as f64);
-    let intervals =
-        PossibleIntervals::new(&problem, Some(&estimate.covariance), freedom, IntervalSettings { physical, ..own })?;
+    // Each base parameter's variance has its own degrees of degrees_of_freedom; a sum of several has about the middle one's.
+    let mut degrees_of_freedom: Vec<f64> = estimate
+        .std_degrees_of_freedom
+        .iter()
+        .copied()
+        .filter(|degrees_of_freedom| degrees_of_freedom.is_finite())
+        .collect();
+    degrees_of_freedom.sort_by(f64::total_cmp);
+    let degrees_of_freedom =
+        degrees_of_freedom.get(degrees_of_freedom.len() / 2).copied().unwrap_or(estimate.degrees_of_freedom as f64);
+    let intervals = ConsistentIntervals::new(
+        &problem,
+        Some(&estimate.covariance),
+        degrees_of_freedom,
+        IntervalSettings { physical, ..own },
+    )?;
     let columns = robot.base().all_columns();
     progress.begin("intervals of bodies", Some(columns.len() as u64));
     let joints = robot.model().joints();
@@ -62,7 +72,7 @@ pub fn consistent_intervals(
             progress.advance(1);
             let of = match column {
                 Column::Body { body, .. } => Some(robot.model().bodies()[*body].name().to_owned()),
-                Column::Law(law) => match law.joints()[..] {
+                Column::Term(term) => match term.joints()[..] {
                     [joint] => Some(joints[joint].name.clone()),
                     _ => None,
                 },

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 /// All parameters `π` with `B π = θ` (B takes parameters to base parameters) whose weighted distance to `prior` is least:
 /// `π = π₀ + S Bᵀ (B S Bᵀ)⁻¹ (θ - B π₀)`.
 ///
-/// The weights S say how far each parameter may move: masses by kilograms, first moments and inertias by what such a mass does at the machine's size.
+/// The weights S say how far each parameter may move: masses by kilograms, first moments and inertias by what such a mass does at the robot's size.
 /// Torques depend on θ alone, so every choice predicts the same; masses and inertias of single bodies are **not** measured values.
 pub fn nearest_to_nominal(robot: &ParametricModel, theta: &[f64]) -> Vec<f64> {
     let (model, base, prior) = (robot.model(), robot.base(), robot.nominal());
@@ -20,8 +20,8 @@ pub fn nearest_to_nominal(robot: &ParametricModel, theta: &[f64]) -> Vec<f64> {
             Column::Body { parameter: 0, .. } => 1.0,
             Column::Body { parameter: 1..=3, .. } => length,
             Column::Body { .. } => length * length,
-            Column::Law(law) if law.is_drive_inertia() => length * length,
-            Column::Law(_) => 1.0,
+            Column::Term(term) if term.is_drive_inertia() => length * length,
+            Column::Term(_) => 1.0,
         };
         scale * scale
     };

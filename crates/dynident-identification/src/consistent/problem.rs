@@ -16,11 +16,11 @@ const LEAST_RELATIVE_SIGMA: f64 = 1.0e-4;
 /// Share of a rough body that is mixed into a description's: bodies drawn as rods or plates have no extent at all in some direction.
 const ROUGH_SHARE: f64 = 1.0e-2;
 
-/// The possible set of parameters that fits the data best, from the factors that an estimate was made from and the noise of its joints (standard deviations, Nm); otherwise the reason why there is
+/// The consistent set of parameters that fits the data best, from the factors that an estimate was made from and the noise of its joints (standard deviations, Nm); otherwise the reason why there is
 /// none. See [`physical_fit`].
 ///
 /// # Errors
-/// In words: limits that exclude each other, a prior that is no possible body, names that are not there, numbers that are not finite.
+/// In words: limits that exclude each other, a prior that is no consistent body, names that are not there, numbers that are not finite.
 pub fn consistent_parameters(
     robot: &ParametricModel,
     problem: &LinearProblem,
@@ -31,7 +31,7 @@ pub fn consistent_parameters(
     Ok(physical_fit(&problem, &settings.fit())?)
 }
 
-/// The possible set of parameters whose base parameters are nearest to `theta` in the data's own metric: for estimates that are not those of least squares on the same factors.
+/// The consistent set of parameters whose base parameters are nearest to `theta` in the data's own metric: for estimates that are not those of least squares on the same factors.
 ///
 /// # Errors
 /// As [`consistent_parameters`].
@@ -56,20 +56,20 @@ pub fn inconsistent_nominal_bodies(robot: &ParametricModel, settings: &Consisten
     });
     stated
         .filter_map(|(index, body)| {
-            let (possible, least) = consistent_body(&robot.nominal()[10 * index..10 * index + 10]);
-            (!possible).then(|| (body.name().to_owned(), least))
+            let (consistent, least) = consistent_body(&robot.nominal()[10 * index..10 * index + 10]);
+            (!consistent).then(|| (body.name().to_owned(), least))
         })
         .collect()
 }
 
-/// Whether ten parameters are those of a possible body, or of one that is as thin as a plate; and the least eigenvalue of their pseudo-inertia.
+/// Whether ten parameters are those of a consistent body, or of one that is as thin as a plate; and the least eigenvalue of their pseudo-inertia.
 fn consistent_body(own: &[f64]) -> (bool, f64) {
     let stated = InertialParameters(core::array::from_fn(|k| own[k]));
     let least = stated.pseudo_inertia().symmetric_eigenvalues().min();
     (stated.mass_kg() > 0.0 && least >= -1.0e-9 * stated.mass_kg(), least)
 }
 
-/// What is asked of the machine's bodies and laws: what [`consistent_parameters`] solves.
+/// What is asked of the robot's bodies and terms: what [`consistent_parameters`] solves.
 ///
 /// # Errors
 /// As [`consistent_parameters`].
@@ -79,8 +79,8 @@ pub fn consistency_problem(
     joint_sigma: &[f64],
     settings: &ConsistencySettings,
 ) -> Result<PhysicalProblem, ConsistencyError> {
-    let (model, laws, base, prior) = (robot.model(), robot.laws(), robot.base(), robot.nominal());
-    settings.check_names(model, laws)?;
+    let (model, terms, base, prior) = (robot.model(), robot.terms(), robot.base(), robot.nominal());
+    settings.check_names(model, terms)?;
     let mut squares = vec![0.0; problem.joints().len()];
     for equation in problem.equations() {
         squares[equation.joint] += equation.factor.total().torque_norm().powi(2);
@@ -124,13 +124,13 @@ pub fn consistency_problem(
             inside: knowledge.inside.map(inside),
         }
     });
-    let scalars = laws.iter().zip(&prior[10 * model.dof()..]).map(|(law, &value)| {
-        let bounded = law.is_nonnegative();
-        let own = settings.laws.get(&law.symbol());
-        let scale = if law.is_drive_inertia() { mean_mass * length * length } else { 1.0 };
+    let scalars = terms.iter().zip(&prior[10 * model.dof()..]).map(|(term, &value)| {
+        let bounded = term.is_nonnegative();
+        let own = settings.terms.get(&term.symbol());
+        let scale = if term.is_drive_inertia() { mean_mass * length * length } else { 1.0 };
         let lower = own.map(|limits| limits[0]);
         PhysicalScalar {
-            name: law.symbol(),
+            name: term.symbol(),
             lower: if bounded { Some(lower.unwrap_or(0.0).max(0.0)) } else { lower },
             upper: own.map(|limits| limits[1]),
             prior: if bounded { value.max(0.0) } else { value },
@@ -144,7 +144,7 @@ pub fn consistency_problem(
     }
 }
 
-/// A length that the machine's links have: the mean distance between successive joints, at least a centimetre.
+/// A length that the robot's links have: the mean distance between successive joints, at least a centimetre.
 pub fn typical_length_m(model: &Model) -> f64 {
     let lengths: Vec<f64> = model.joints().iter().map(|joint| joint.placement.translation.norm()).collect();
     (lengths.iter().sum::<f64>() / lengths.len().max(1) as f64).max(0.01)

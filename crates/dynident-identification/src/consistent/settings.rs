@@ -1,9 +1,9 @@
-//! What is known of a machine's bodies and laws before the data: settings of the possible machine that fits best.
+//! What is known of a robot's bodies and terms before the data: settings of the physically consistent set that fits best.
 
 use super::error::ConsistencyError;
 use dynident_estimation::consistent::{PhysicalError, PhysicalPrior, PhysicalRoute, PhysicalSettings};
 use dynident_model::Model;
-use dynident_model::laws::Law;
+use dynident_model::terms::TorqueTerm;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
@@ -39,7 +39,7 @@ pub struct BodyKnowledge {
     pub known: Option<[f64; 10]>,
 }
 
-/// How the possible machine that fits best is found, and what is known of it. See [`PhysicalSettings`] and
+/// How the physically consistent set that fits best is found, and what is known of it. See [`PhysicalSettings`] and
 /// [`PhysicalBody`](dynident_estimation::consistent::PhysicalBody).
 ///
 /// ```
@@ -70,9 +70,10 @@ pub struct ConsistencySettings {
     pub total_mass_kg: Option<[f64; 2]>,
     /// What is known of single bodies, by the name of their link.
     pub bodies: BTreeMap<String, BodyKnowledge>,
-    /// Least and greatest parameter of a law, by its symbol (`fv1 = [0.0, 5.0]`); friction and drive inertia stay at zero or more.
+    /// Least and greatest parameter of a term, by its symbol (`fv1 = [0.0, 5.0]`); friction and drive inertia stay at zero or more.
     #[serde(deserialize_with = "intervals")]
-    pub laws: BTreeMap<String, [f64; 2]>,
+    #[serde(rename = "laws")]
+    pub terms: BTreeMap<String, [f64; 2]>,
 }
 
 impl Default for ConsistencySettings {
@@ -88,7 +89,7 @@ impl Default for ConsistencySettings {
             max_iterations,
             total_mass_kg: None,
             bodies: BTreeMap::new(),
-            laws: BTreeMap::new(),
+            terms: BTreeMap::new(),
         }
     }
 }
@@ -112,7 +113,7 @@ impl ConsistencySettings {
     ///
     /// # Errors
     /// The name, with those that there are.
-    pub fn check_names(&self, model: &Model, laws: &[Law]) -> Result<(), ConsistencyError> {
+    pub fn check_names(&self, model: &Model, terms: &[TorqueTerm]) -> Result<(), ConsistencyError> {
         for name in self.bodies.keys() {
             if model.bodies().iter().any(|body| body.name() == name) {
                 continue;
@@ -123,8 +124,8 @@ impl ConsistencySettings {
             let known = model.bodies().iter().map(|body| body.name().to_owned()).collect();
             return Err(ConsistencyError::UnknownBody { name: name.clone(), known });
         }
-        let known: Vec<String> = laws.iter().map(Law::symbol).collect();
-        match self.laws.keys().find(|symbol| !known.contains(symbol)) {
+        let known: Vec<String> = terms.iter().map(TorqueTerm::symbol).collect();
+        match self.terms.keys().find(|symbol| !known.contains(symbol)) {
             Some(symbol) => Err(ConsistencyError::UnknownTerm { symbol: symbol.clone(), known }),
             None => Ok(()),
         }

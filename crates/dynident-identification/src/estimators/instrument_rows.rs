@@ -6,7 +6,7 @@ use crate::error::IdentificationError;
 use crate::rows::{PANEL_SAMPLES, in_model_order, motion_band_hz};
 use dynident_dynamics::{BatchWorkspace, Panels, regressor_panels};
 use dynident_estimation::{EstimationError, SegmentedFactor};
-use dynident_model::laws::JointMotion;
+use dynident_model::terms::JointMotion;
 use dynident_recording::{Decimator, MotionBlock};
 
 /// The factors of one log's `[Z | W | τ]`, one for each joint.

@@ -6,12 +6,12 @@ use super::simulated::torque_sigma;
 use crate::error::IdentificationError;
 use crate::regressor_model::RegressorModel;
 use crate::rows::motion_band_hz;
-use dynident_dynamics::{BatchWorkspace, LawHistory, Panels, regressor_panels_following};
+use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_estimation::{
     CovarianceMethod, Estimate, InstantRows, InstantVisitor, LinearProblem, MaximumLikelihoodEstimate,
     MaximumLikelihoodSettings, maximum_likelihood, student_half_width,
 };
-use dynident_model::laws::JointMotion;
+use dynident_model::terms::JointMotion;
 use dynident_recording::{AveragedPeriods, MotionBlock, MotionSettings, averaged_periods};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -22,7 +22,7 @@ const MOST_DIFFERENCE: f64 = 0.1;
 const NO_MOTION: f64 = 1e-4;
 /// Noise of a torque counts as at least this share of its root mean square.
 const LEAST_RELATIVE_SIGMA: f64 = 1e-4;
-/// Steps of central differences of the regressor by position, speed and acceleration; it is linear in the last.
+/// Steps of central differences of the regressor by position, velocity and acceleration; it is linear in the last.
 const STEPS: [f64; 3] = [1e-5, 1e-5, 1.0];
 
 /// The repeated motion.
@@ -58,7 +58,7 @@ impl PeriodSettings {
     }
 }
 
-/// What the periods of a repeated motion told.
+/// What the periods of a repeated motion give.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PeriodicFit {
     /// Their length, s.
@@ -67,7 +67,7 @@ pub struct PeriodicFit {
     pub periods: Vec<usize>,
     /// Instants of all mean periods that were fitted to.
     pub instants: usize,
-    /// For each joint the standard deviation of a single sample's smoothed position, speed and acceleration, rad, rad/s, rad/s² (m).
+    /// For each joint the standard deviation of a single sample's smoothed position, velocity and acceleration, rad, rad/s, rad/s² (m).
     pub motion_std: Vec<[f64; 3]>,
     /// For each joint the standard deviation of a single sample's smoothed torque, Nm (N).
     pub torque_std: Vec<f64>,
@@ -77,7 +77,7 @@ pub struct PeriodicFit {
     pub degrees_of_freedom: usize,
 }
 
-/// The mean period of one log, joints in the model's order: for each joint position, speed, acceleration, then the torques of all.
+/// The mean period of one log, joints in the model's order: for each joint position, velocity, acceleration, then the torques of all.
 struct MeanPeriod {
     averaged: AveragedPeriods,
     samples: usize,
@@ -85,9 +85,9 @@ struct MeanPeriod {
     stride: usize,
 }
 
-/// The estimate, and what the periods told.
+/// The estimate, and what the periods give.
 ///
-/// Torque passes the differentiator's smoothing as the positions do, so that both have the same noise band, and of the mean period as many instants count as that band tells apart.
+/// Torque passes the differentiator's smoothing as the positions do, so that both have the same noise band, and of the mean period as many instants count as that band distinguishes.
 pub(super) fn periodic(
     rows: &TrainingRows<'_>,
     periods: &PeriodSettings,
@@ -95,10 +95,10 @@ pub(super) fn periodic(
     let TrainingRows { logs, model, problem, .. } = *rows;
     let method = "maximum-likelihood";
     let wrong = |message: String| IdentificationError::Estimator { method, message };
-    if let Some(law) = model.laws().iter().find(|law| law.has_memory() || law.needs_load()) {
+    if let Some(term) = model.terms().iter().find(|term| term.has_memory() || term.needs_load()) {
         return Err(wrong(format!(
             "{} depends on more than the motion of one instant: leave that law out, or take another method",
-            law.symbol()
+            term.symbol()
         )));
     }
     rows.begin("periods");
@@ -168,14 +168,14 @@ pub(super) fn periodic(
 /// Noise of a single sample between all channels, over all logs.
 fn pooled(means: &[MeanPeriod]) -> DMatrix<f64> {
     let channels = means.first().map_or(0, |mean| mean.averaged.sample_covariance.len());
-    let (mut sum, mut freedom) = (DMatrix::zeros(channels, channels), 0.0);
+    let (mut sum, mut degrees_of_freedom) = (DMatrix::zeros(channels, channels), 0.0);
     for mean in means {
         let own = (mean.samples * (mean.averaged.periods - 1)) as f64;
         let covariance = &mean.averaged.sample_covariance;
         sum += DMatrix::from_fn(channels, channels, |a, b| covariance[a][b]) * own;
-        freedom += own;
+        degrees_of_freedom += own;
     }
-    sum / freedom.max(1.0)
+    sum / degrees_of_freedom.max(1.0)
 }
 
 /// The mean period of log number `index`.
@@ -239,7 +239,7 @@ fn mean_period(
         if difference > MOST_DIFFERENCE * size.max(NO_MOTION) {
             return Err(wrong(format!(
                 "the motion does not repeat every {period_s} s: positions of {} differ by {difference:.2e} rad from period to period, and move by {size:.2e} rad (root mean squares); \
-                 mend period_s, or skip the start with skip_s",
+                 fix period_s, or skip the start with skip_s",
                 joints[joint].name
             )));
         }
@@ -300,7 +300,7 @@ impl<'a> Instants<'a> {
             }
             let [q, dq, ddq] = &states;
             let motion = JointMotion { samples, q, dq, ddq };
-            let mut history = LawHistory::new(None);
+            let mut history = TermHistory::new(None);
             regressor_panels_following(model, &mut self.workspace, layout, &motion, &mut history, &mut self.panels);
             let mut regressor = DMatrix::zeros(dof, columns);
             let mut by_motion = vec![DMatrix::zeros(dof, columns); variables];
@@ -328,16 +328,16 @@ fn estimate_of(
     problem: &LinearProblem,
 ) -> Result<Estimate, dynident_estimation::EstimationError> {
     let joints = problem.joints().len();
-    let freedom = found.degrees_of_freedom as f64;
-    let widened = (found.cost / freedom).max(1.0);
+    let degrees_of_freedom = found.degrees_of_freedom as f64;
+    let widened = (found.cost / degrees_of_freedom).max(1.0);
     let std: Vec<f64> = found.std.iter().map(|std| std * widened.sqrt()).collect();
-    let half = student_half_width(0.95, freedom);
+    let half = student_half_width(0.95, degrees_of_freedom);
     let relative = |(std, value): (&f64, &f64)| (*std > 0.0 && *value != 0.0).then(|| 100.0 * std / value.abs());
     Ok(Estimate {
         joint_sigma: torque_sigma(problem, &found.values)?,
         half_width_95: std.iter().map(|std| half * std).collect(),
         relative_std_percent: std.iter().zip(&found.values).map(relative).collect(),
-        std_freedom: vec![freedom; std.len()],
+        std_degrees_of_freedom: vec![degrees_of_freedom; std.len()],
         covariance: &found.covariance * widened,
         covariance_white: found.covariance,
         covariance_method: CovarianceMethod::White,

@@ -31,7 +31,7 @@ use crate::regressor_model::RegressorModel;
 use dynident_estimation::{
     Estimate, EstimationError, LinearProblem, RowWeight, ordinary_least_squares, weighted_least_squares,
 };
-use simulated::Compared;
+use simulated::ComparedSignal;
 
 /// How base parameters are estimated, with the settings that belong to the estimator alone.
 #[derive(Clone, Debug, Default)]
@@ -101,7 +101,7 @@ impl Estimator {
     }
 }
 
-/// What an estimator alone can tell, beside its estimate. Exhaustive, so that whoever writes results is asked for a new kind.
+/// What an estimator alone can determine, beside its estimate. Exhaustive, so that whoever writes results is asked for a new kind.
 #[derive(Clone, Debug, Default)]
 pub enum Findings {
     /// Nothing.
@@ -126,7 +126,7 @@ pub enum Findings {
 pub struct Estimation {
     /// The estimate.
     pub estimate: Estimate,
-    /// What the estimator alone can tell.
+    /// What the estimator alone can determine.
     pub findings: Findings,
     /// Least squares against instruments, where there are any.
     pub noise_in_regressor: Option<NoiseInRegressor>,
@@ -196,9 +196,9 @@ pub fn estimate(
             (estimate, Findings::Periodic(found))
         }
         Estimator::Simultaneous(periods) => simultaneous::simultaneous(rows, periods)?,
-        Estimator::Didim(settings) => simulated(settings, Compared::TorqueRows)?,
-        Estimator::Clie(settings) => simulated(settings, Compared::Torque)?,
-        Estimator::Cloe(settings) => simulated(settings, Compared::Position)?,
+        Estimator::Didim(settings) => simulated(settings, ComparedSignal::TorqueRows)?,
+        Estimator::Clie(settings) => simulated(settings, ComparedSignal::Torque)?,
+        Estimator::Cloe(settings) => simulated(settings, ComparedSignal::Position)?,
     };
     Ok(Estimation { estimate, findings, noise_in_regressor })
 }

@@ -2,9 +2,9 @@
 
 use crate::regressor_model::RegressorModel;
 use core::f64::consts::TAU;
-use dynident_dynamics::{BatchWorkspace, MotionGradient, Panels, regressor_panels, regressor_panels_pull_back};
+use dynident_dynamics::{BatchWorkspace, MotionGradient, Panels, regressor_panels, regressor_panels_adjoint};
 use dynident_estimation::{ChannelRows, EstimationError, SimultaneousModel};
-use dynident_model::laws::JointMotion;
+use dynident_model::terms::JointMotion;
 use nalgebra::{DMatrix, DVector};
 
 /// Samples whose regressor is made at a time.
@@ -99,7 +99,7 @@ impl<'a> PeriodicModel<'a> {
         self.model.dof()
     }
 
-    /// Coefficients of the series that fit the positions best, joint by joint; `None` where the record does not tell them apart.
+    /// Coefficients of the series that fit the positions best, joint by joint; `None` where the record does not distinguish them.
     pub fn fitted_motion(&self) -> Option<Vec<f64>> {
         let normal = self.row_basis.tr_mul(&self.row_basis).cholesky()?;
         Some(normal.solve(&self.row_basis.tr_mul(&self.row_q)).as_slice().to_vec())
@@ -170,26 +170,26 @@ impl SimultaneousModel for PeriodicModel<'_> {
         let rows = self.row_basis.nrows();
         let mut by_parameters: Vec<DMatrix<f64>> =
             (0..joints).map(|_| DMatrix::zeros(rows, parameters.len())).collect();
-        // Slopes of each torque by positions, speeds and accelerations, means over rows: (rows, 3 joints).
+        // Slopes of each torque by positions, velocities and accelerations, means over rows: (rows, 3 joints).
         let mut slopes: Vec<DMatrix<f64>> = (0..joints).map(|_| DMatrix::zeros(rows, 3 * joints)).collect();
         let share = 1.0 / mean_of as f64;
         self.walk(motion, |workspace, first, block, panels| {
             let count = block.samples;
-            let mut cotangent = Panels::default();
-            cotangent.resize(layout, count);
-            (0..joints).for_each(|joint| cotangent.joint_mut(joint).fill(0.0));
+            let mut adjoint = Panels::default();
+            adjoint.resize(layout, count);
+            (0..joints).for_each(|joint| adjoint.joint_mut(joint).fill(0.0));
             for joint in 0..joints {
                 let mut gradient = vec![0.0; 3 * joints * count];
                 for (&column, to) in
-                    layout.joint_columns(joint).iter().zip(cotangent.joint_mut(joint).chunks_exact_mut(count))
+                    layout.joint_columns(joint).iter().zip(adjoint.joint_mut(joint).chunks_exact_mut(count))
                 {
                     to.fill(parameters[column]);
                 }
                 let (by_q, rest) = gradient.split_at_mut(joints * count);
                 let (by_dq, by_ddq) = rest.split_at_mut(joints * count);
                 let mut all = MotionGradient { by_q, by_dq, by_ddq };
-                regressor_panels_pull_back(model, workspace, layout, block, &cotangent, &mut all);
-                cotangent.joint_mut(joint).fill(0.0);
+                regressor_panels_adjoint(model, workspace, layout, block, &adjoint, &mut all);
+                adjoint.joint_mut(joint).fill(0.0);
                 for k in 0..count {
                     let row = (first + k) / mean_of;
                     if row >= rows {
@@ -293,9 +293,9 @@ fn means(matrix: &DMatrix<f64>, count: usize) -> DMatrix<f64> {
 mod tests {
     use super::*;
     use dynident_dynamics::ParametricModel;
-    use dynident_model::laws::{CoulombShape, DriveChoice, laws_per_joint};
     use dynident_model::read_urdf;
     use dynident_model::sample::Random;
+    use dynident_model::terms::{CoulombShape, DriveChoice, terms_per_joint};
 
     /// Against differences of the residuals, which know nothing of slopes: their error is rounding over the step, 1e-7 to 1e-6 of entries that are of order one to a hundred.
     #[test]
@@ -307,8 +307,8 @@ mod tests {
             coulomb: Some(CoulombShape::Smooth { width: 0.02 }),
             offset: true,
         };
-        let laws = laws_per_joint(&robot, |_| drive);
-        let model = RegressorModel::from(ParametricModel::new(robot, laws).unwrap());
+        let terms = terms_per_joint(&robot, |_| drive);
+        let model = RegressorModel::from(ParametricModel::new(robot, terms).unwrap());
         let mut random = Random::new(1);
         let theta: Vec<f64> = model.layout().columns().iter().map(|_| 1.0 + random.normal()).collect();
         let record = PeriodicRecord {

@@ -18,13 +18,13 @@ impl From<EstimationError> for Stop {
 }
 
 /// Hands a log's rows to a visitor.
-struct Visiting<'a, 'b> {
+struct VisitorConsumer<'a, 'b> {
     log: usize,
     visit: &'a mut RowVisitor<'b>,
     refused: Option<EstimationError>,
 }
 
-impl RowConsumer for Visiting<'_, '_> {
+impl RowConsumer for VisitorConsumer<'_, '_> {
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
         if self.refused.is_none() {
             let block = RowBlock { log: self.log, joint: rows.joint, rows: rows.rows, panel: rows.panel };
@@ -47,7 +47,7 @@ impl From<Stop> for IdentificationError {
 pub(super) fn every_row(rows: &TrainingRows<'_>, visit: &mut RowVisitor<'_>) -> Result<(), Stop> {
     rows.begin("reweighting rows");
     for (log, &index) in rows.training.iter().enumerate() {
-        let mut consumer = Visiting { log, visit: &mut *visit, refused: None };
+        let mut consumer = VisitorConsumer { log, visit: &mut *visit, refused: None };
         rows.logs.pass(rows.model, index).run(&mut consumer).map_err(Stop::Log)?;
         if let Some(refused) = consumer.refused {
             return Err(refused.into());

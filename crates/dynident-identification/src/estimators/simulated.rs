@@ -55,7 +55,7 @@ pub struct SimulatedLoopSettings {
 
 /// What is compared with the record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Compared {
+pub(super) enum ComparedSignal {
     /// Torque, with the regressor of the simulated motion beside it: DIDIM.
     TorqueRows,
     /// Torque: CLIE.
@@ -64,7 +64,7 @@ pub(super) enum Compared {
     Position,
 }
 
-impl Compared {
+impl ComparedSignal {
     fn method(self) -> &'static str {
         match self {
             Self::TorqueRows => "didim",
@@ -90,7 +90,7 @@ pub struct SimulatedFit {
     pub rate_hz: f64,
     /// What was compared: `torque` or `position`.
     pub compared: String,
-    /// Where the iteration began: at the `estimate` (the possible machine that fits the measured rows best) or the `description`.
+    /// Where the iteration began: at the `estimate` (the physically consistent set that fits the measured rows best) or the `description`.
     pub start: String,
     /// Steps.
     pub iterations: usize,
@@ -107,7 +107,7 @@ pub struct SimulatedFit {
 pub(super) fn simulated(
     rows: &TrainingRows<'_>,
     experiment: &SimulatedLoopSettings,
-    compared: Compared,
+    compared: ComparedSignal,
 ) -> Result<(Estimate, SimulatedFit), IdentificationError> {
     let TrainingRows { logs, model, problem, training } = *rows;
     let estimation = &logs.settings.estimation;
@@ -118,7 +118,7 @@ pub(super) fn simulated(
     settings.limits = RunLimits { torque: settings.limits.torque, ..RunLimits::default() };
     let SensorSettings { speed, feedback_delay_samples, .. } = settings.sensors;
     settings.sensors = SensorSettings { speed, feedback_delay_samples, ..SensorSettings::default() };
-    settings.accelerations = compared != Compared::Torque;
+    settings.accelerations = compared != ComparedSignal::Torque;
     let controller_model = if controller.needs_model() {
         let unknown = model.model().bodies_without_prior();
         if !unknown.is_empty() {
@@ -129,7 +129,7 @@ pub(super) fn simulated(
             )));
         }
         let nominal = model.parametric.nominal();
-        let described = ControllerModel::from_parameters(model.model(), model.laws(), nominal);
+        let described = ControllerModel::from_parameters(model.model(), model.terms(), nominal);
         Some(described.map_err(|error| wrong(format!("[controller]: {error}")))?)
     } else {
         None
@@ -165,7 +165,7 @@ pub(super) fn simulated(
         match simulated.simulate(&values)? {
             Some(rows) => {
                 let sigma = deviations(&simulated, &(&measured - &rows.output), &measured, 0);
-                begun.push(Begun { values, name, sigma });
+                begun.push(SimulatedStart { values, name, sigma });
             }
             None => refused.push(format!("of the {name} ({})", failure(&simulated))),
         }
@@ -175,7 +175,7 @@ pub(super) fn simulated(
     }
     begun.sort_by(|a, b| log_sum(&a.sigma).total_cmp(&log_sum(&b.sigma)));
     logs.execution.progress.begin("simulating the closed loop", None);
-    let mut best: Option<Settled> = None;
+    let mut best: Option<StartOutcome> = None;
     let (mut iterations, mut simulations) = (0, 0);
     for start in begun {
         let settled = settled(rows, &mut simulated, (start, experiment), (&measured, &plain.std))?;
@@ -190,7 +190,7 @@ pub(super) fn simulated(
         }
     }
     logs.end();
-    let Some(Settled { found, start: start_name, .. }) = best else {
+    let Some(StartOutcome { found, start: start_name, .. }) = best else {
         return Err(EstimationError::NoSimulation.into());
     };
     let rows = linearised(rows, &simulated, &found)?;
@@ -209,7 +209,7 @@ pub(super) fn simulated(
     let fit = SimulatedFit {
         controller: controller.name().to_owned(),
         rate_hz: *rate_hz,
-        compared: if compared == Compared::Position { "position" } else { "torque" }.to_owned(),
+        compared: if compared == ComparedSignal::Position { "position" } else { "torque" }.to_owned(),
         start: start_name.to_owned(),
         iterations,
         simulations,
@@ -231,14 +231,14 @@ pub(crate) fn torque_sigma(problem: &LinearProblem, values: &[f64]) -> Result<Ve
 }
 
 /// A start that can be simulated.
-struct Begun {
+struct SimulatedStart {
     values: Vec<f64>,
     name: &'static str,
     sigma: Vec<f64>,
 }
 
 /// What came of one start.
-struct Settled {
+struct StartOutcome {
     found: SimulatedEstimate,
     start: &'static str,
     sigma: Vec<f64>,
@@ -254,9 +254,9 @@ fn log_sum(sigma: &[f64]) -> f64 {
 fn settled(
     rows: &TrainingRows<'_>,
     simulated: &mut SimulatedLoop<'_>,
-    (start, experiment): (Begun, &SimulatedLoopSettings),
+    (start, experiment): (SimulatedStart, &SimulatedLoopSettings),
     (measured, std): (&DVector<f64>, &[f64]),
-) -> Result<Settled, IdentificationError> {
+) -> Result<StartOutcome, IdentificationError> {
     let settings = SimulatedSettings {
         criterion: simulated.compared.criterion(),
         rank: rows.logs.settings.estimation.rank,
@@ -264,7 +264,7 @@ fn settled(
         max_iterations: experiment.max_iterations,
         difference: experiment.difference,
     };
-    let Begun { values, name, mut sigma } = start;
+    let SimulatedStart { values, name, mut sigma } = start;
     let largest = values.iter().fold(0.0_f64, |most, value| most.max(value.abs())).max(1e-9);
     let scale = values.iter().zip(std).map(|(value, std)| value.abs().max(*std).max(1e-3 * largest)).collect();
     let mut fit = SimulatedProblem {
@@ -283,7 +283,7 @@ fn settled(
         let changed = next.iter().zip(&sigma).any(|(new, old)| (new / old - 1.0).abs() > SETTLED);
         sigma = next;
         if !changed || round == ROUNDS || found.status == EstimateStatus::IterationLimit {
-            return Ok(Settled { found, start: name, sigma, iterations, simulations });
+            return Ok(StartOutcome { found, start: name, sigma, iterations, simulations });
         }
         fit.noise_std = by_row(simulated, &sigma);
         fit.start.clone_from(&found.values);
@@ -306,7 +306,7 @@ fn start_values(
         let settings = rows.logs.settings.consistency.as_ref().unwrap_or(&default);
         match consistent_parameters(&model.parametric, problem, &plain.joint_sigma, settings) {
             Ok(fit) => starts.push((fit.base_values, "estimate")),
-            Err(reason) => why.push(format!("there is no possible machine to start from: {reason}")),
+            Err(reason) => why.push(format!("there is no physically consistent set to start from: {reason}")),
         }
     }
     if choice != SimulationStart::Estimate {

@@ -2,13 +2,13 @@
 
 use super::TrainingRows;
 use super::row_pass::Stop;
-use super::simulated::Compared;
+use super::simulated::ComparedSignal;
 use crate::error::IdentificationError;
 use crate::regressor_model::RegressorModel;
 use crate::rows::{JointRows, RowBuilder, RowConsumer, motion_band_hz};
 use dynident_estimation::{SimulatedMotion, SimulatedRows};
 use dynident_excitation::Motion;
-use dynident_model::laws::Law;
+use dynident_model::terms::TorqueTerm;
 use dynident_recording::{DecimationSettings, Decimator, FilterError, MotionBlock};
 use dynident_simulation::{ControllerModel, ControllerSettings, LoopSettings, Plant, Reference, Run, closed_loop};
 use nalgebra::{DMatrix, DVector};
@@ -42,7 +42,7 @@ pub(super) struct SimulatedLoop<'a> {
     pub(super) controller: &'a ControllerSettings,
     pub(super) controller_model: Option<ControllerModel>,
     pub(super) settings: LoopSettings,
-    pub(super) compared: Compared,
+    pub(super) compared: ComparedSignal,
     pub(super) logs: Vec<LoopLog>,
     /// Makes an error from what is wrong.
     pub(super) wrong: &'a dyn Fn(String) -> IdentificationError,
@@ -55,7 +55,7 @@ impl LoopLog {
     pub(super) fn read(
         training: &TrainingRows<'_>,
         index: usize,
-        compared: Compared,
+        compared: ComparedSignal,
         rate_hz: f64,
         wrong: &dyn Fn(String) -> IdentificationError,
     ) -> Result<Self, IdentificationError> {
@@ -64,7 +64,7 @@ impl LoopLog {
         let name = recording.name.clone();
         let Some(commanded) = recording.commanded.as_deref() else {
             return Err(wrong(format!(
-                "log `{name}`: say what the controller was told to follow: reference = \"trajectory.csv\" under [[log]]"
+                "log `{name}`: say what the controller was commanded to follow: reference = \"trajectory.csv\" under [[log]]"
             )));
         };
         let Some(mut stream) = recording.open(model.model(), motion)? else {
@@ -79,7 +79,7 @@ impl LoopLog {
         let mut outputs = Outputs::new(dof, filter.as_ref(), stream.rate_hz()).map_err(in_filter)?;
         let (mut block, mut pieces, mut samples) = (MotionBlock::default(), Vec::new(), 0);
         while stream.next_block(&mut block).map_err(|source| IdentificationError::recording(&name, source))? {
-            let values = if compared == Compared::Position { &block.q } else { &block.tau };
+            let values = if compared == ComparedSignal::Position { &block.q } else { &block.tau };
             for (joint, &place) in places.iter().enumerate() {
                 outputs.take(joint, block.segment, block.joint(values, place));
             }
@@ -101,19 +101,20 @@ impl LoopLog {
         };
         if let Some(time_s) = pieces.iter().filter(|piece| piece.rows > 0).find_map(over) {
             return Err(wrong(format!(
-                "log `{name}`: at {time_s:.3} s of the log its reference has not begun or is over while it still moves; cut the log with time_range_s, or mend the reference's start_s"
+                "log `{name}`: at {time_s:.3} s of the log its reference has not begun or is over while it still moves; cut the log with time_range_s, or fix the reference's start_s"
             )));
         }
         let count = ((ends_s - begins_s) * rate_hz).ceil() as usize + 2;
-        let mut told = Motion::default();
-        told.reset(dof, count);
+        let mut command = Motion::default();
+        command.reset(dof, count);
         for joint in 0..dof {
             for sample in 0..count {
                 let at = joint * count + sample;
-                [told.q[at], told.dq[at], told.ddq[at]] = commanded.at(joint, begins_s + sample as f64 / rate_hz);
+                [command.q[at], command.dq[at], command.ddq[at]] =
+                    commanded.at(joint, begins_s + sample as f64 / rate_hz);
             }
         }
-        let reference = Reference::new(rate_hz, told).map_err(|error| wrong(format!("log `{name}`: {error}")))?;
+        let reference = Reference::new(rate_hz, command).map_err(|error| wrong(format!("log `{name}`: {error}")))?;
         let rows = outputs.rows.iter().map(Vec::len).collect();
         Ok(Self { name, rate_hz: log_rate_hz, pieces, filter, reference, begins_s, rows, measured: outputs.rows })
     }
@@ -135,14 +136,14 @@ impl SimulatedLoop<'_> {
     fn plant(&self, theta: &[f64]) -> Result<Plant, String> {
         let model = ControllerModel::from_columns(self.model.model(), self.model.layout().columns(), theta)
             .map_err(|error| error.to_string())?;
-        let (laws, values): (Vec<Law>, Vec<f64>) = model.laws().iter().cloned().unzip();
-        Plant::new(model.model(), &laws, &values).map_err(|error| error.to_string())
+        let (terms, values): (Vec<TorqueTerm>, Vec<f64>) = model.terms().iter().cloned().unzip();
+        Plant::new(model.model(), &terms, &values).map_err(|error| error.to_string())
     }
 
     /// One log's rows of a run.
     fn rows_of(&self, log: &LoopLog, run: &Run, out: &mut Gathered) -> Result<(), IdentificationError> {
         let dof = self.model.model().dof();
-        let motion = (self.compared != Compared::Torque)
+        let motion = (self.compared != ComparedSignal::Torque)
             .then(|| sampled(run, log.begins_s))
             .transpose()
             .map_err(|source| IdentificationError::Filter { log: log.name.clone(), source })?;
@@ -151,7 +152,7 @@ impl SimulatedLoop<'_> {
         let layout = self.model.layout();
         let places: Vec<usize> = (0..dof).collect();
         let builder = || RowBuilder::new(self.model, &places, log.rate_hz, log.filter.as_ref());
-        let mut builder = (self.compared == Compared::TorqueRows).then(builder).transpose().map_err(in_filter)?;
+        let mut builder = (self.compared == ComparedSignal::TorqueRows).then(builder).transpose().map_err(in_filter)?;
         let mut panels = PanelRows { joints: vec![Vec::new(); dof] };
         let mut values = Vec::new();
         for piece in &log.pieces {
@@ -173,7 +174,7 @@ impl SimulatedLoop<'_> {
                 values.clear();
                 for row in 0..piece.rows {
                     values.push(match &motion {
-                        Some(motion) if self.compared == Compared::Position => motion.at(joint, time(row))[0],
+                        Some(motion) if self.compared == ComparedSignal::Position => motion.at(joint, time(row))[0],
                         _ => held_torque(run, joint, time(row) - log.begins_s),
                     });
                     if let (Some(motion), true) = (&motion, builder.is_some()) {
@@ -218,7 +219,7 @@ impl SimulatedMotion for SimulatedLoop<'_> {
             }
         };
         let rows = self.rows();
-        let with_regressor = self.compared == Compared::TorqueRows;
+        let with_regressor = self.compared == ComparedSignal::TorqueRows;
         let mut out = Gathered {
             output: Vec::with_capacity(rows),
             regressor: DMatrix::zeros(if with_regressor { rows } else { 0 }, parameters.len()),
@@ -292,7 +293,7 @@ impl RowConsumer for PanelRows {
     }
 }
 
-/// The motion of a run at any time of the log's clock: between the controller's samples the quintic that has both ends' position, speed and acceleration.
+/// The motion of a run at any time of the log's clock: between the controller's samples the quintic that has both ends' position, velocity and acceleration.
 fn sampled(run: &Run, begins_s: f64) -> Result<dynident_recording::Reference, FilterError> {
     let times: Vec<f64> = (0..run.samples).map(|sample| begins_s + run.time_s(sample)).collect();
     let joints: Vec<[Vec<f64>; 3]> = (0..run.joints.len())

@@ -38,7 +38,7 @@ pub struct SeriesFit {
 }
 
 /// One log as it was recorded.
-struct Recorded {
+struct RawRecord {
     record: PeriodicRecord,
     series: FourierSeries,
 }
@@ -50,7 +50,7 @@ pub(super) fn simultaneous(
 ) -> Result<(Estimate, Findings), IdentificationError> {
     let TrainingRows { logs, model, problem, .. } = *rows;
     let wrong = |message: String| IdentificationError::Estimator { method: "simultaneous", message };
-    let terms = model.laws().iter();
+    let terms = model.terms().iter();
     if let Some(term) = terms.clone().find(|t| t.has_memory() || t.needs_load() || t.needs_temperature()) {
         return Err(wrong(format!(
             "{} depends on more than the motion of one instant: leave that law out, or take another method",
@@ -58,10 +58,10 @@ pub(super) fn simultaneous(
         )));
     }
     rows.begin("motion and torque");
-    let recorded: Vec<Recorded> =
+    let recorded: Vec<RawRecord> =
         rows.training.iter().map(|&index| read(rows, index, periods, &wrong)).collect::<Result<_, _>>()?;
     logs.end();
-    let of = |log: &Recorded| log.series.samples_of_row(log.record.rate_hz);
+    let of = |log: &RawRecord| log.series.samples_of_row(log.record.rate_hz);
     let models = recorded.iter().map(|log| PeriodicModel::new(model, &log.record, log.series, of(log)));
     let mut records = PeriodicRecords(models.collect());
     let mut motion = Vec::new();
@@ -69,7 +69,7 @@ pub(super) fn simultaneous(
         let name = &logs.recordings[index].name;
         let Some(fitted) = record.fitted_motion() else {
             return Err(wrong(format!(
-                "log `{name}` does not tell the harmonics of its motion apart: give fewer with [estimator.periods] harmonics = ..., or a longer log"
+                "log `{name}` does not distinguish the harmonics of its motion: give fewer with [estimator.periods] harmonics = ..., or a longer log"
             )));
         };
         check_motion(record, &fitted).map_err(|(joint, message)| {
@@ -100,7 +100,7 @@ pub(super) fn simultaneous(
         let rows = &left[channel];
         (rows.iter().map(|x| x * x).sum::<f64>() / rows.len().max(1) as f64).sqrt()
     };
-    let series = |(log, recorded): (usize, &Recorded)| {
+    let series = |(log, recorded): (usize, &RawRecord)| {
         let [position, torque] = [0, 1].map(|part| (2 * log + part) * dof..(2 * log + part + 1) * dof);
         SeriesFit {
             period_s: recorded.series.period_s,
@@ -135,7 +135,7 @@ fn read(
     index: usize,
     periods: &PeriodSettings,
     wrong: &dyn Fn(String) -> IdentificationError,
-) -> Result<Recorded, IdentificationError> {
+) -> Result<RawRecord, IdentificationError> {
     let TrainingRows { logs, model, .. } = *rows;
     let recording = &logs.recordings[index];
     let name = &recording.name;
@@ -189,7 +189,7 @@ fn read(
     }
     let tau = channels.split_off(places.len());
     let record = PeriodicRecord { rate_hz, q: channels.concat(), tau: tau.concat() };
-    Ok(Recorded { record, series: FourierSeries { period_s, harmonics } })
+    Ok(RawRecord { record, series: FourierSeries { period_s, harmonics } })
 }
 
 /// Whether the positions are those of the fitted series; if not, the joint and what is wrong.
@@ -205,7 +205,7 @@ fn check_motion(record: &PeriodicModel<'_>, fitted: &[f64]) -> Result<(), (usize
             return Err((
                 joint,
                 format!(
-                    "are {remainder:.2e} from the Fourier series of that period and move by {size:.2e} rad (root mean squares): mend period_s, give more harmonics, or skip the start with skip_s"
+                    "are {remainder:.2e} from the Fourier series of that period and move by {size:.2e} rad (root mean squares): fix period_s, give more harmonics, or skip the start with skip_s"
                 ),
             ));
         }

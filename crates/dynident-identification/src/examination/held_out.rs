@@ -41,7 +41,7 @@ pub struct HeldOutExamination {
     pub statistics: LogStatistics,
     /// How well the nominal values explain it, where they are known.
     pub nominal_agreement: Option<PriorAgreement>,
-    /// Delays of the torque, joint by joint; none where the log does not tell.
+    /// Delays of the torque, joint by joint; none where the log does not determine.
     pub delays: Vec<Option<TorqueLag>>,
     /// Measured and predicted torque over time, if asked for.
     pub trace: Option<LogTrace>,
@@ -109,7 +109,7 @@ impl RowConsumer for Test<'_> {
 
 /// What is tested on a recording.
 #[derive(Clone, Copy, Debug)]
-pub struct TestedModel<'a> {
+pub struct ModelUnderTest<'a> {
     /// Base parameters.
     pub theta: &'a [f64],
     /// Those of the physically consistent set.
@@ -128,9 +128,9 @@ pub fn examine_held_out(
     logs: &Logs<'_>,
     model: &RegressorModel,
     index: usize,
-    tested: &TestedModel<'_>,
+    tested: &ModelUnderTest<'_>,
 ) -> Result<HeldOutExamination, IdentificationError> {
-    let TestedModel { theta, physical, uncertainty, traced } = *tested;
+    let ModelUnderTest { theta, physical, uncertainty, traced } = *tested;
     let (recording, joints) = (&logs.recordings[index], model.joint_names());
     let columns = (0..model.dof()).map(|joint| model.layout().joint_columns(joint)).collect();
     let nominal = model.parametric.nominal_base();

@@ -9,11 +9,11 @@ mod torque_sign;
 mod torque_trace;
 mod training;
 
-pub use held_out::{HeldOutExamination, LogValidation, TestedModel, examine_held_out};
+pub use held_out::{HeldOutExamination, LogValidation, ModelUnderTest, examine_held_out};
 pub use nominal_agreement::{PriorAgreement, agreement_findings};
 pub use residuals::{JointResiduals, TorqueBand, Uncertainty};
 pub use torque_delay::{TorqueLag, delay_findings, pooled_delay};
-pub use torque_sign::{SignEvidence, sign_evidence, sign_findings};
+pub use torque_sign::{TorqueSignCheck, sign_evidence, sign_findings};
 pub use torque_trace::{JointTrace, LogTrace};
 pub use training::examine_training;
 

@@ -2,9 +2,10 @@
 
 use dynident_dynamics::{Column, PanelLayout};
 use dynident_estimation::{
-    Estimate, Normality, NormalityReport, Regimes, RegimesReport, Whiteness, WhitenessReport, student_half_width,
+    Estimate, Normality, NormalityReport, SpeedRanges, SpeedRangesReport, Whiteness, WhitenessReport,
+    student_half_width,
 };
-use dynident_model::laws::Law;
+use dynident_model::terms::TorqueTerm;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -17,8 +18,8 @@ pub struct JointResiduals {
     pub whiteness: Option<WhitenessReport>,
     /// Jarque and Bera's test; none for a short log.
     pub normality: Option<NormalityReport>,
-    /// Residual by speed; none where the speed is not among the model's columns (no viscous friction, nor both directions of it).
-    pub regimes: Option<RegimesReport>,
+    /// Residual by velocity; none where the velocity is not among the model's columns (no viscous friction, nor both directions of it).
+    pub regimes: Option<SpeedRangesReport>,
     /// The predicted torque's 95 % band; none where the covariance is not at hand. Written as `torque_band` of a result, for a finished model's test has none.
     #[serde(skip)]
     pub band: Option<TorqueBand>,
@@ -48,8 +49,12 @@ pub struct Uncertainty {
 impl Uncertainty {
     /// Of base parameters with the given covariance.
     pub fn of(estimate: &Estimate, covariance: DMatrix<f64>) -> Self {
-        let freedom = estimate.degrees_of_freedom as f64;
-        Self { covariance, joint_sigma: estimate.joint_sigma.clone(), width: student_half_width(0.95, freedom) }
+        let degrees_of_freedom = estimate.degrees_of_freedom as f64;
+        Self {
+            covariance,
+            joint_sigma: estimate.joint_sigma.clone(),
+            width: student_half_width(0.95, degrees_of_freedom),
+        }
     }
 }
 
@@ -58,11 +63,11 @@ pub(crate) struct JointWatch {
     /// The joint's columns among all.
     own: DMatrix<f64>,
     sigma: Option<(f64, f64)>,
-    /// Places among the panel's columns whose sum is the speed: viscous friction, or its two directions. None where there are no such columns.
+    /// Places among the panel's columns whose sum is the velocity: viscous friction, or its two directions. None where there are no such columns.
     speed: Vec<usize>,
     whiteness: Whiteness,
     normality: Normality,
-    regimes: Regimes,
+    regimes: SpeedRanges,
     inside: usize,
     samples: usize,
     widths: f64,
@@ -72,14 +77,14 @@ impl JointWatch {
     pub(crate) fn new(layout: &PanelLayout, joint: usize, uncertainty: Option<&Uncertainty>) -> Self {
         let columns = layout.joint_columns(joint);
         let all = layout.columns();
-        let places = |is: &dyn Fn(&Law) -> bool| -> Vec<usize> {
+        let places = |is: &dyn Fn(&TorqueTerm) -> bool| -> Vec<usize> {
             let own = columns.iter().enumerate();
-            own.filter(|(_, column)| matches!(&all[**column], Column::Law(law) if is(law)))
+            own.filter(|(_, column)| matches!(&all[**column], Column::Term(term) if is(term)))
                 .map(|(place, _)| place)
                 .collect()
         };
-        let viscous = places(&|law| matches!(law, Law::Viscous(law) if law.joint == joint));
-        let directions = places(&|law| matches!(law, Law::DirectionalViscous(law) if law.joint == joint));
+        let viscous = places(&|term| matches!(term, TorqueTerm::Viscous(term) if term.joint == joint));
+        let directions = places(&|term| matches!(term, TorqueTerm::DirectionalViscous(term) if term.joint == joint));
         let speed = if viscous.is_empty() && directions.len() == 2 { directions } else { viscous };
         // V = L Lᵀ of the joint's columns: the variance of a prediction w is ‖Lᵀ w‖². Covariances from few segments are singular, so by eigenvalues.
         let own = uncertainty.map_or_else(
@@ -97,7 +102,7 @@ impl JointWatch {
             speed,
             whiteness: Whiteness::default(),
             normality: Normality::default(),
-            regimes: Regimes::default(),
+            regimes: SpeedRanges::default(),
             inside: 0,
             samples: 0,
             widths: 0.0,

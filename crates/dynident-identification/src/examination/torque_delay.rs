@@ -43,7 +43,7 @@ pub struct TorqueLag {
     pub matters: bool,
 }
 
-/// Gathers a log's first samples, then tells their lags.
+/// Gathers a log's first samples, then determines their lags.
 pub(crate) struct DelayCheck<'a> {
     model: &'a RegressorModel,
     theta: &'a [f64],
@@ -92,7 +92,7 @@ impl<'a> DelayCheck<'a> {
         }
     }
 
-    /// Lag of torque behind motion by joint; `None` where the log does not tell it.
+    /// Lag of torque behind motion by joint; `None` where the log does not determine it.
     pub(crate) fn delays(&self, settings: &IdentificationSettings, motion: &MotionSettings) -> Vec<Option<TorqueLag>> {
         let joints = self.model.model().dof();
         let filter = settings.parallel_filter.decimation(self.rate_hz, motion_band_hz(motion));
@@ -207,7 +207,7 @@ impl<'a> DelayCheck<'a> {
         let base = layout.columns().len();
         let names = (0..base + rows.len()).map(|column| format!("column {column}")).collect();
         let joints = (0..rows.len()).map(|joint| format!("joint {joint}")).collect();
-        // What the log does not tell stays as it was fitted, for the slope was made with it.
+        // What the log does not determine stays as it was fitted, for the slope was made with it.
         let fallback = self.theta.iter().copied().chain(vec![0.0; rows.len()]).collect();
         let mut problem = LinearProblem::new(names, joints).with_fallback(fallback)?;
         for (joint, rows) in rows.iter().enumerate() {

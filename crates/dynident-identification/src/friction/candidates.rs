@@ -1,16 +1,16 @@
 //! The friction that a joint may have when the data choose: terms, and for each term a grid of its constants, every one a column.
 
-use dynident_model::laws::{
-    Coulomb, CoulombShape, Direction, DirectionalViscous, Law, LoadFriction, MaxwellSlip, Power, PowerExponent,
-    Sigmoid, Stribeck, Viscous,
+use dynident_model::terms::{
+    Coulomb, CoulombShape, Direction, DirectionalViscous, LoadFriction, MaxwellSlip, Power, PowerExponent, Sigmoid,
+    Stribeck, TorqueTerm, Viscous,
 };
 
 /// Widths of the smooth Coulomb step, rad/s or m/s; beside them the sign and what the study states.
 const WIDTHS: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
-/// Stribeck speeds, rad/s or m/s.
+/// Stribeck velocities, rad/s or m/s.
 const STRIBECK_SPEEDS: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.4];
 const STRIBECK_EXPONENTS: [f64; 2] = [1.0, 2.0];
-/// Width of the step under the Stribeck term as a share of its speed: beyond half its speed the step is done.
+/// Width of the step under the Stribeck term as a share of its velocity: beyond half its velocity the step is done.
 const STRIBECK_WIDTH: f64 = 0.25;
 const SIGMOID_WIDTHS: [f64; 3] = [0.02, 0.05, 0.1];
 /// Yield displacements of the Maxwell-slip elements, rad or m.
@@ -18,7 +18,7 @@ const YIELDS: [f64; 6] = [3.0e-4, 1.0e-3, 3.0e-3, 1.0e-2, 3.0e-2, 1.0e-1];
 
 /// What a candidate model is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Term {
+pub(crate) enum FrictionKind {
     Viscous,
     AsymmetricViscous,
     Coulomb,
@@ -30,7 +30,7 @@ pub(crate) enum Term {
     MaxwellSlip,
 }
 
-impl Term {
+impl FrictionKind {
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Viscous => "viscous",
@@ -60,23 +60,23 @@ impl Term {
     }
 
     /// The candidate that a torque term belongs to; none where data do not choose it.
-    fn of(law: &Law) -> Option<Self> {
-        match law {
-            Law::Viscous(_) => Some(Self::Viscous),
-            Law::Coulomb(_) => Some(Self::Coulomb),
-            Law::DirectionalViscous(_) => Some(Self::AsymmetricViscous),
-            Law::Stribeck(_) => Some(Self::Stribeck),
-            Law::Sigmoid(_) => Some(Self::Sigmoid),
-            Law::Power(Power { exponent: PowerExponent::CubeRoot, .. }) => Some(Self::CubeRoot),
-            Law::Power(Power { exponent: PowerExponent::Quadratic, .. }) => Some(Self::Quadratic),
-            Law::Load(_) => Some(Self::Load),
-            Law::MaxwellSlip(_) => Some(Self::MaxwellSlip),
-            Law::DirectionalCoulomb(_)
-            | Law::TemperatureViscous(_)
-            | Law::TemperatureCoulomb(_)
-            | Law::Offset(_)
-            | Law::DriveInertia(_)
-            | Law::Coupling(_) => None,
+    fn of(term: &TorqueTerm) -> Option<Self> {
+        match term {
+            TorqueTerm::Viscous(_) => Some(Self::Viscous),
+            TorqueTerm::Coulomb(_) => Some(Self::Coulomb),
+            TorqueTerm::DirectionalViscous(_) => Some(Self::AsymmetricViscous),
+            TorqueTerm::Stribeck(_) => Some(Self::Stribeck),
+            TorqueTerm::Sigmoid(_) => Some(Self::Sigmoid),
+            TorqueTerm::Power(Power { exponent: PowerExponent::CubeRoot, .. }) => Some(Self::CubeRoot),
+            TorqueTerm::Power(Power { exponent: PowerExponent::Quadratic, .. }) => Some(Self::Quadratic),
+            TorqueTerm::Load(_) => Some(Self::Load),
+            TorqueTerm::MaxwellSlip(_) => Some(Self::MaxwellSlip),
+            TorqueTerm::DirectionalCoulomb(_)
+            | TorqueTerm::TemperatureViscous(_)
+            | TorqueTerm::TemperatureCoulomb(_)
+            | TorqueTerm::Offset(_)
+            | TorqueTerm::DriveInertia(_)
+            | TorqueTerm::Coupling(_) => None,
         }
     }
 
@@ -102,10 +102,10 @@ impl Term {
 /// One column that a joint may have.
 #[derive(Clone, Debug)]
 pub(crate) struct CandidateColumn {
-    pub(crate) term: Term,
-    pub(crate) law: Law,
+    pub(crate) kind: FrictionKind,
+    pub(crate) term: TorqueTerm,
     /// What is stated when this column is chosen: itself, or both directions of a term that has two.
-    pub(crate) stated: Vec<Law>,
+    pub(crate) stated: Vec<TorqueTerm>,
 }
 
 /// A joint whose friction the training logs choose, and where the search begins.
@@ -141,34 +141,36 @@ pub(crate) fn candidate_columns(search: &FrictionSearch, joint: usize) -> Vec<Ca
         _ => search.width,
     };
     let mut columns = Vec::new();
-    let mut add = |laws: Vec<Law>| {
-        let column = |law: &Law| Some(CandidateColumn { term: Term::of(law)?, law: law.clone(), stated: laws.clone() });
-        columns.extend(laws.iter().filter_map(column));
+    let mut add = |terms: Vec<TorqueTerm>| {
+        let column = |term: &TorqueTerm| {
+            Some(CandidateColumn { kind: FrictionKind::of(term)?, term: term.clone(), stated: terms.clone() })
+        };
+        columns.extend(terms.iter().filter_map(column));
     };
-    add(vec![Law::Viscous(Viscous { joint })]);
+    add(vec![TorqueTerm::Viscous(Viscous { joint })]);
     for shape in shapes {
-        add(vec![Law::Coulomb(Coulomb { joint, shape })]);
+        add(vec![TorqueTerm::Coulomb(Coulomb { joint, shape })]);
     }
     let both = [Direction::Forward, Direction::Backward];
-    let directions = both.map(|direction| Law::DirectionalViscous(DirectionalViscous { joint, direction }));
+    let directions = both.map(|direction| TorqueTerm::DirectionalViscous(DirectionalViscous { joint, direction }));
     add(directions.to_vec());
     for width in SIGMOID_WIDTHS {
         for offset_speed in [-0.5 * width, 0.5 * width] {
-            add(vec![Law::Sigmoid(Sigmoid { joint, steepness: 2.0 / width, offset_speed })]);
+            add(vec![TorqueTerm::Sigmoid(Sigmoid { joint, steepness: 2.0 / width, offset_speed })]);
         }
     }
     for speed in STRIBECK_SPEEDS {
         for exponent in STRIBECK_EXPONENTS {
             let shape = CoulombShape::Smooth { width: STRIBECK_WIDTH * speed };
-            add(vec![Law::Stribeck(Stribeck { joint, speed, exponent, shape })]);
+            add(vec![TorqueTerm::Stribeck(Stribeck { joint, speed, exponent, shape })]);
         }
     }
     for exponent in [PowerExponent::CubeRoot, PowerExponent::Quadratic] {
-        add(vec![Law::Power(Power { joint, exponent, rounding: Power::ROUNDING })]);
+        add(vec![TorqueTerm::Power(Power { joint, exponent, rounding: Power::ROUNDING })]);
     }
-    add(vec![Law::Load(LoadFriction { joint, shape: CoulombShape::Smooth { width: load_width } })]);
+    add(vec![TorqueTerm::Load(LoadFriction { joint, shape: CoulombShape::Smooth { width: load_width } })]);
     for yield_displacement in YIELDS {
-        add(vec![Law::MaxwellSlip(MaxwellSlip { joint, yield_displacement })]);
+        add(vec![TorqueTerm::MaxwellSlip(MaxwellSlip { joint, yield_displacement })]);
     }
     columns
 }

@@ -5,11 +5,11 @@
 //! standard error of the least (Hastie, Tibshirani and Friedman, *The Elements of Statistical Learning*, 7.10; the standard error is that of the difference, block by block,
 //! because blocks differ among themselves far more than candidates do).
 
-use super::candidates::{CandidateColumn, Term};
+use super::candidates::{CandidateColumn, FrictionKind};
 use crate::regressor_model::RegressorModel;
 use dynident_dynamics::{Column, ParametricModel, ParametricModelError};
 use dynident_estimation::{CrossValidation, Estimate, EstimationError, FoldErrors, JointFolds, LinearProblem};
-use dynident_model::laws::{Law, sort_terms};
+use dynident_model::terms::{TorqueTerm, sort_terms};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -19,7 +19,7 @@ const FOLDS: [usize; 2] = [10, 5];
 const MOST_ADDED: usize = 3;
 /// Rounds over all joints: from the second on, the others have the friction that was chosen for them.
 const ROUNDS: usize = 2;
-/// Root mean square speed below which a joint does not move, rad/s or m/s: what the position noise of a standing joint looks like.
+/// Root mean square velocity below which a joint does not move, rad/s or m/s: what the position noise of a standing joint looks like.
 const MOVING: f64 = 1.0e-3;
 
 /// How the friction of one joint was chosen.
@@ -30,7 +30,7 @@ pub struct JointFriction {
     /// What was chosen, or why nothing was: the stated terms then stay in force.
     pub chosen: String,
     /// The joint's friction; none when nothing was chosen.
-    pub terms: Option<Vec<Law>>,
+    pub terms: Option<Vec<TorqueTerm>>,
     /// Blocks of time that were left out in turn.
     pub folds: usize,
     /// What was compared, each with its best constants.
@@ -41,7 +41,7 @@ pub struct JointFriction {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrictionCandidate {
     /// Its terms.
-    pub law: String,
+    pub term: String,
     /// Symbols of the parameters that are not zero.
     pub parameters: Vec<String>,
     /// Parameters and tuned constants.
@@ -55,14 +55,14 @@ pub struct FrictionCandidate {
 }
 
 /// The terms that the given columns state, each once.
-fn stated(columns: &[&CandidateColumn]) -> Vec<Law> {
-    let mut terms: Vec<Law> = Vec::new();
-    for law in columns.iter().flat_map(|column| &column.stated) {
-        if !terms.contains(law) {
-            terms.push(law.clone());
+fn stated(columns: &[&CandidateColumn]) -> Vec<TorqueTerm> {
+    let mut kinds: Vec<TorqueTerm> = Vec::new();
+    for term in columns.iter().flat_map(|column| &column.stated) {
+        if !kinds.contains(term) {
+            kinds.push(term.clone());
         }
     }
-    terms
+    kinds
 }
 
 /// The robot with the choice in force: a joint's friction is replaced, its drive inertia and offset stay.
@@ -74,13 +74,14 @@ pub fn chosen_model(
     choice: &[JointFriction],
 ) -> Result<ParametricModel, ParametricModelError> {
     let joint_of = |name: &str| robot.model().joint_index(name);
-    let replaced: Vec<(usize, &[Law])> =
+    let replaced: Vec<(usize, &[TorqueTerm])> =
         choice.iter().filter_map(|joint| Some((joint_of(&joint.joint)?, joint.terms.as_deref()?))).collect();
-    let is_replaced = |law: &Law| law.is_joint_friction() && replaced.iter().any(|(joint, _)| law.joints() == [*joint]);
-    let mut laws: Vec<Law> = robot.laws().iter().filter(|law| !is_replaced(law)).cloned().collect();
-    laws.extend(replaced.iter().flat_map(|(_, terms)| terms.iter().cloned()));
-    sort_terms(&mut laws);
-    robot.with_laws(laws)
+    let is_replaced =
+        |term: &TorqueTerm| term.is_joint_friction() && replaced.iter().any(|(joint, _)| term.joints() == [*joint]);
+    let mut terms: Vec<TorqueTerm> = robot.terms().iter().filter(|term| !is_replaced(term)).cloned().collect();
+    terms.extend(replaced.iter().flat_map(|(_, kinds)| kinds.iter().cloned()));
+    sort_terms(&mut terms);
+    robot.with_terms(terms)
 }
 
 /// Chooses friction for joints whose `candidates` are among the columns of `wide_problem`; `plain` is the fit with the stated terms, in which joints count alike if `equal_weights`.
@@ -123,10 +124,11 @@ pub(crate) fn choose_friction(
     };
     let rows = wide_problem.joint_rows();
     let norms = wide_problem.column_norms();
-    let place =
-        |law: &Law| wide.layout().columns().iter().position(|column| matches!(column, Column::Law(l) if l == law));
+    let place = |term: &TorqueTerm| {
+        wide.layout().columns().iter().position(|column| matches!(column, Column::Term(l) if l == term))
+    };
     let of_joint = |joint: usize, columns: &[CandidateColumn], before: &[Option<Vec<usize>>]| {
-        let variable: Vec<usize> = columns.iter().filter_map(|column| place(&column.law)).collect();
+        let variable: Vec<usize> = columns.iter().filter_map(|column| place(&column.term)).collect();
         let speed = norms[variable[0]] / (rows[joint].max(1) as f64).sqrt();
         if speed < MOVING {
             return Ok((refused(joint, "the joint does not move in the training logs"), Vec::new()));
@@ -134,8 +136,8 @@ pub(crate) fn choose_friction(
         // The stated model, as far as the data excite it, without this joint's friction, and with that of others as chosen before.
         let chosen_before = |other: usize| choose.iter().position(|&c| c == other).and_then(|c| before[c].as_ref());
         let kept = |index: &usize| match &model.layout().columns()[*index] {
-            Column::Law(law) if law.is_joint_friction() => {
-                law.joints().iter().all(|&other| other != joint && chosen_before(other).is_none())
+            Column::Term(term) if term.is_joint_friction() => {
+                term.joints().iter().all(|&other| other != joint && chosen_before(other).is_none())
             }
             _ => true,
         };
@@ -162,7 +164,7 @@ pub(crate) fn choose_friction(
             .into_iter()
             .zip(candidates)
             .map(|((friction, places), (_, columns))| {
-                let wide = places.iter().filter_map(|&at| place(&columns[at].law)).collect();
+                let wide = places.iter().filter_map(|&at| place(&columns[at].term)).collect();
                 let known = friction.terms.is_some().then_some(wide);
                 (friction, known)
             })
@@ -172,14 +174,14 @@ pub(crate) fn choose_friction(
 }
 
 /// A candidate with the best of its constants.
-struct Evaluated {
-    terms: Vec<Term>,
+struct ScoredCandidate {
+    kinds: Vec<FrictionKind>,
     /// Places of its columns.
     places: Vec<usize>,
     errors: FoldErrors,
 }
 
-impl Evaluated {
+impl ScoredCandidate {
     /// Columns that have a value at all.
     fn present(&self) -> Vec<usize> {
         self.places.iter().zip(&self.errors.coefficients).filter(|(_, value)| **value != 0.0).map(|(p, _)| *p).collect()
@@ -187,32 +189,37 @@ impl Evaluated {
 
     fn complexity(&self, columns: &[CandidateColumn]) -> usize {
         let present = self.present();
-        let tuned = |term: &&Term| present.iter().any(|&place| columns[place].term == **term);
-        present.len() + self.terms.iter().filter(tuned).map(|term| term.constants()).sum::<usize>()
+        let tuned = |kind: &&FrictionKind| present.iter().any(|&place| columns[place].kind == **kind);
+        present.len() + self.kinds.iter().filter(tuned).map(|kind| kind.constants()).sum::<usize>()
     }
 
     /// Its terms that have a value at all.
     fn present_name(&self, columns: &[CandidateColumn]) -> String {
-        let mut terms: Vec<Term> = self.present().iter().map(|&place| columns[place].term).collect();
-        terms.dedup();
-        let names: Vec<&str> = terms.into_iter().map(Term::name).collect();
+        let mut kinds: Vec<FrictionKind> = self.present().iter().map(|&place| columns[place].kind).collect();
+        kinds.dedup();
+        let names: Vec<&str> = kinds.into_iter().map(FrictionKind::name).collect();
         if names.is_empty() { "none".to_owned() } else { names.join(" + ") }
     }
 
     fn name(&self) -> String {
-        self.terms.iter().map(|term| term.name()).collect::<Vec<_>>().join(" + ")
+        self.kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(" + ")
     }
 }
 
-/// The best constants of a model with the given terms. Constants of `before` are kept, but for those of the step, which shares its speeds with the new term.
-fn tuned(folds: &JointFolds, columns: &[CandidateColumn], terms: Vec<Term>, before: Option<&Evaluated>) -> Evaluated {
+/// The best constants of a model with the given terms. Constants of `before` are kept, but for those of the step, which shares its velocities with the new term.
+fn tuned(
+    folds: &JointFolds,
+    columns: &[CandidateColumn],
+    kinds: Vec<FrictionKind>,
+    before: Option<&ScoredCandidate>,
+) -> ScoredCandidate {
     let mut choices: Vec<Vec<usize>> = vec![Vec::new()];
-    for &term in &terms {
-        let all: Vec<usize> = (0..columns.len()).filter(|&place| columns[place].term == term).collect();
+    for &kind in &kinds {
+        let all: Vec<usize> = (0..columns.len()).filter(|&place| columns[place].kind == kind).collect();
         let kept = before
-            .filter(|_| term != Term::Coulomb)
-            .and_then(|before| before.places.iter().copied().find(|&place| columns[place].term == term));
-        let options: Vec<Vec<usize>> = match (term.takes_one(), kept) {
+            .filter(|_| kind != FrictionKind::Coulomb)
+            .and_then(|before| before.places.iter().copied().find(|&place| columns[place].kind == kind));
+        let options: Vec<Vec<usize>> = match (kind.takes_one(), kept) {
             (false, _) => vec![all],
             (true, Some(kept)) => vec![vec![kept]],
             (true, None) => all.into_iter().map(|place| vec![place]).collect(),
@@ -224,39 +231,44 @@ fn tuned(folds: &JointFolds, columns: &[CandidateColumn], terms: Vec<Term>, befo
     }
     let nonnegative: Vec<Vec<bool>> = choices
         .iter()
-        .map(|places| places.iter().map(|&place| columns[place].law.is_nonnegative()).collect())
+        .map(|places| places.iter().map(|&place| columns[place].term.is_nonnegative()).collect())
         .collect();
     let models: Vec<(&[usize], &[bool])> =
         choices.iter().zip(&nonnegative).map(|(places, nonnegative)| (&places[..], &nonnegative[..])).collect();
     let errors = folds.errors_of_all(&models);
-    let evaluated =
-        choices.into_iter().zip(errors).map(|(places, errors)| Evaluated { terms: terms.clone(), places, errors });
+    let evaluated = choices.into_iter().zip(errors).map(|(places, errors)| ScoredCandidate {
+        kinds: kinds.clone(),
+        places,
+        errors,
+    });
     // The first of equals, so that the choice is the same everywhere.
     evaluated
         .reduce(|best, next| if next.errors.rms() < best.errors.rms() { next } else { best })
-        .unwrap_or_else(|| Evaluated { terms, places: Vec::new(), errors: folds.errors(&[], &[]) })
+        .unwrap_or_else(|| ScoredCandidate { kinds, places: Vec::new(), errors: folds.errors(&[], &[]) })
 }
 
 /// The choice for one joint, and the places of its columns.
 fn search(joint: String, count: usize, folds: &JointFolds, columns: &[CandidateColumn]) -> (JointFriction, Vec<usize>) {
     let mut met = vec![
-        tuned(folds, columns, vec![Term::Viscous, Term::Coulomb], None),
-        tuned(folds, columns, vec![Term::Viscous, Term::Sigmoid], None),
+        tuned(folds, columns, vec![FrictionKind::Viscous, FrictionKind::Coulomb], None),
+        tuned(folds, columns, vec![FrictionKind::Viscous, FrictionKind::Sigmoid], None),
     ];
     let mut at = usize::from(met[1].errors.rms() < met[0].errors.rms());
-    let mut additions: Vec<Term> = columns.iter().map(|column| column.term).filter(|term| term.is_addition()).collect();
+    let mut additions: Vec<FrictionKind> =
+        columns.iter().map(|column| column.kind).filter(|kind| kind.is_addition()).collect();
     additions.dedup();
     for _ in 0..MOST_ADDED {
         let start = met.len();
         for &added in &additions {
-            if met[at].terms.contains(&added) {
+            if met[at].kinds.contains(&added) {
                 continue;
             }
-            let replaced = |term: &Term| added == Term::AsymmetricViscous && *term == Term::Viscous;
-            let mut terms: Vec<Term> = met[at].terms.iter().copied().filter(|term| !replaced(term)).collect();
-            terms.push(added);
-            terms.sort();
-            let with_constants_kept = tuned(folds, columns, terms, Some(&met[at]));
+            let replaced =
+                |kind: &FrictionKind| added == FrictionKind::AsymmetricViscous && *kind == FrictionKind::Viscous;
+            let mut kinds: Vec<FrictionKind> = met[at].kinds.iter().copied().filter(|kind| !replaced(kind)).collect();
+            kinds.push(added);
+            kinds.sort();
+            let with_constants_kept = tuned(folds, columns, kinds, Some(&met[at]));
             met.push(with_constants_kept);
         }
         let Some(best) =
@@ -279,9 +291,9 @@ fn search(joint: String, count: usize, folds: &JointFolds, columns: &[CandidateC
         complexity(*a).cmp(&complexity(*b)).then(met[*a].errors.rms().total_cmp(&met[*b].errors.rms()))
     };
     let chosen = (0..met.len()).filter(within).min_by(order).unwrap_or(least);
-    let candidate = |(index, one): (usize, &Evaluated)| FrictionCandidate {
-        law: one.name(),
-        parameters: one.present().iter().map(|&place| columns[place].law.symbol()).collect(),
+    let candidate = |(index, one): (usize, &ScoredCandidate)| FrictionCandidate {
+        term: one.name(),
+        parameters: one.present().iter().map(|&place| columns[place].term.symbol()).collect(),
         complexity: one.complexity(columns),
         cv_error_nm: one.errors.rms(),
         excess_standard_errors: if index == least || excess[index][1] <= 0.0 {

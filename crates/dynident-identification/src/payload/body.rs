@@ -1,4 +1,4 @@
-//! From what the logs tell of a payload to a body with mass, centre of mass and inertia, and to a possible one.
+//! From what the logs hold information about a payload to a body with mass, centre of mass and inertia, and to a consistent one.
 
 use super::columns::PayloadColumns;
 use dynident_estimation::consistent::{
@@ -47,20 +47,25 @@ pub(crate) fn jacobian(p: &[f64; 10]) -> DMatrix<f64> {
 
 const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
-/// The possible body nearest to the estimate in the metric of its covariance; otherwise the reason why there is none.
-pub(crate) fn possible_body(name: &str, columns: &PayloadColumns, estimate: &Estimate) -> Result<PhysicalFit, String> {
+/// The consistent body nearest to the estimate in the metric of its covariance; otherwise the reason why there is none.
+pub(crate) fn nearest_consistent_body(
+    name: &str,
+    columns: &PayloadColumns,
+    estimate: &Estimate,
+) -> Result<PhysicalFit, String> {
     let said = |error: &dyn core::fmt::Display| error.to_string();
     let n = columns.kept.len();
     let fixed = |place: &usize| estimate.rank.fixed.iter().any(|fixed| fixed.column == columns.first + place);
-    let told: Vec<usize> = (0..n).filter(|place| !fixed(place)).collect();
+    let determined: Vec<usize> = (0..n).filter(|place| !fixed(place)).collect();
     let value = |place: usize| estimate.values[columns.first + place];
     let mass = if columns.kept.first() == Some(&0) { value(0).abs() } else { 1.0 }.max(LEAST_MASS_KG);
     let reference = rough_body(mass, LENGTH_M);
     // Both accounts of the error together: one from few segments has directions without any.
     let entry = |i: usize, j: usize| estimate.covariance[(i, j)] + estimate.covariance_white[(i, j)];
-    let mut covariance =
-        DMatrix::from_fn(told.len(), told.len(), |i, j| entry(columns.first + told[i], columns.first + told[j]));
-    for (i, &place) in told.iter().enumerate() {
+    let mut covariance = DMatrix::from_fn(determined.len(), determined.len(), |i, j| {
+        entry(columns.first + determined[i], columns.first + determined[j])
+    });
+    for (i, &place) in determined.iter().enumerate() {
         let length = match columns.kept[place] {
             0 => 1.0,
             1..=3 => LENGTH_M,
@@ -70,16 +75,16 @@ pub(crate) fn possible_body(name: &str, columns: &PayloadColumns, estimate: &Est
     }
     // V = L Lᵀ: rows L⁻¹ φ = L⁻¹ φ̂ have unit noise.
     let lower = covariance.cholesky().ok_or_else(|| "its covariance is not positive definite".to_owned())?.l();
-    let values = DVector::from_iterator(told.len(), told.iter().map(|&place| value(place)));
+    let values = DVector::from_iterator(determined.len(), determined.iter().map(|&place| value(place)));
     let (Some(rows), Some(target)) = (lower.clone().try_inverse(), lower.solve_lower_triangular(&values)) else {
         return Err("its covariance is not positive definite".to_owned());
     };
-    let mut panel = vec![0.0; (n + 1) * told.len()];
-    for (i, &place) in told.iter().enumerate() {
-        panel[place * told.len()..(place + 1) * told.len()].copy_from_slice(rows.column(i).as_slice());
+    let mut panel = vec![0.0; (n + 1) * determined.len()];
+    for (i, &place) in determined.iter().enumerate() {
+        panel[place * determined.len()..(place + 1) * determined.len()].copy_from_slice(rows.column(i).as_slice());
     }
-    panel[n * told.len()..].copy_from_slice(target.as_slice());
-    let factor = TriangularFactor::from_rows(n, &panel, told.len()).map_err(|error| said(&error))?;
+    panel[n * determined.len()..].copy_from_slice(target.as_slice());
+    let factor = TriangularFactor::from_rows(n, &panel, determined.len()).map_err(|error| said(&error))?;
     let map = BaseMap::from_regrouping(&columns.kept, &columns.dropped, &columns.regrouping).map_err(|e| said(&e))?;
     let body =
         PhysicalBody { name: name.to_owned(), reference, known: None, mass_kg: None, com_box_m: None, inside: None };

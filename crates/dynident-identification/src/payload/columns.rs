@@ -11,7 +11,7 @@ use crate::regressor_model::RegressorModel;
 use crate::settings::{GainChoice, IdentificationSettings, OffsetChoice};
 use dynident_dynamics::{Column, independent_columns};
 use dynident_estimation::{Estimate, EstimationError, LinearProblem, SegmentedFactor};
-use dynident_model::laws::{Law, Offset};
+use dynident_model::terms::{Offset, TorqueTerm};
 use dynident_model::{INERTIAL_NAMES, InertialParameters};
 use nalgebra::{DMatrix, DVector};
 
@@ -113,7 +113,7 @@ impl LoadColumns {
         let mut offsets = Vec::new();
         if per_log(settings) {
             let joints = model.joint_names();
-            let with_offset = |joint: &usize| model.laws().contains(&Law::Offset(Offset { joint: *joint }));
+            let with_offset = |joint: &usize| model.terms().contains(&TorqueTerm::Offset(Offset { joint: *joint }));
             // The last log's are the others' with the opposite sign: the base parameters hold the mean.
             for &log in training.split_last().map_or(&[][..], |(_, rest)| rest) {
                 for joint in (0..model.model().dof()).filter(with_offset) {
@@ -132,7 +132,7 @@ impl LoadColumns {
     pub fn arm_estimate(&self, estimate: &Estimate) -> Estimate {
         let mut arm = estimate.clone();
         let base = self.base;
-        for values in [&mut arm.values, &mut arm.std, &mut arm.std_freedom, &mut arm.half_width_95] {
+        for values in [&mut arm.values, &mut arm.std, &mut arm.std_degrees_of_freedom, &mut arm.half_width_95] {
             values.truncate(base);
         }
         arm.names.truncate(base);
@@ -169,7 +169,7 @@ impl LoadColumns {
         }
         let all = model.base().all_columns();
         for (joint, column, sign) in own {
-            let offset = Column::Law(Law::Offset(Offset { joint }));
+            let offset = Column::Term(TorqueTerm::Offset(Offset { joint }));
             if let Some(place) = all.iter().position(|column| *column == offset) {
                 map.set_column(column, &(base_column(model, place, self.base) * sign));
             }
@@ -339,7 +339,7 @@ fn check(
     if !settings.friction.is_empty() {
         return Err(PayloadError::FrictionChoice);
     }
-    if loaded && model.laws().iter().any(Law::needs_load) {
+    if loaded && model.terms().iter().any(TorqueTerm::needs_load) {
         return Err(PayloadError::LoadFriction);
     }
     Ok(())

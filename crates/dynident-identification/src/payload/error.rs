@@ -58,7 +58,7 @@ pub enum PayloadError {
         "load-dependent friction does not go with payloads, for its load is the bare arm's: leave out the law `load`"
     )]
     LoadFriction,
-    /// Gains that no recording tells.
+    /// Gains that no recording determines.
     #[error(
         "drive.gains = \"unknown\" needs training logs both without and with a payload that is known: give a [[payload]] with mass_kg and com_m, and a [[log]] that carries it"
     )]

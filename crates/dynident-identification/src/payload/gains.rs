@@ -8,7 +8,7 @@ use dynident_estimation::{Estimate, EstimationError, GainProblem, JointGain, Lin
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// Beyond this share of its value the half width of a gain's interval means that the logs do not tell it.
+/// Beyond this share of its value the half width of a gain's interval means that the logs do not determine it.
 const WIDEST: f64 = 0.5;
 
 /// The drive gain of one joint.
@@ -22,7 +22,7 @@ pub struct DriveGain {
     pub std: f64,
     /// Half the width of its 95 % interval.
     pub half_width_95: f64,
-    /// Whether the logs tell it.
+    /// Whether the logs determine it.
     pub identified: bool,
     /// Why not; none where they do.
     pub reason: Option<String>,
@@ -62,7 +62,7 @@ fn drive_gain(gain: JointGain) -> DriveGain {
     let reason = if !gain.identified {
         Some("joint does not feel the payload: any gain fits as well, with other parameters; move it so that the payload's weight or inertia loads it".to_owned())
     } else if wide {
-        Some("joint hardly feels the payload: its interval is wider than half its value; a heavier payload, farther out, or a motion that loads the joint more would tell".to_owned())
+        Some("joint hardly feels the payload: its interval is wider than half its value; a heavier payload, farther out, or a motion that loads the joint more would determine".to_owned())
     } else {
         None
     };
@@ -92,7 +92,7 @@ fn without_gains(full: Estimate, count: usize, scale: &[f64]) -> Estimate {
     estimate.names.truncate(count);
     estimate.values.truncate(count);
     estimate.std.truncate(count);
-    estimate.std_freedom.truncate(count);
+    estimate.std_degrees_of_freedom.truncate(count);
     estimate.half_width_95.truncate(count);
     estimate.relative_std_percent.truncate(count);
     estimate.covariance = estimate.covariance.view((0, 0), (count, count)).into_owned();

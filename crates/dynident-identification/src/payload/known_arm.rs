@@ -6,7 +6,7 @@ use crate::regressor_model::RegressorModel;
 use crate::settings::EstimationSettings;
 use dynident_dynamics::Column;
 use dynident_estimation::{Estimate, EstimationError, KnownColumns, LinearProblem, weighted_least_squares_with_known};
-use dynident_model::laws::Law;
+use dynident_model::terms::TorqueTerm;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -69,8 +69,8 @@ impl KnownArm {
     ) -> Result<Estimate, EstimationError> {
         let held: Vec<usize> = (0..columns.base())
             .filter(|&column| match &model.layout().columns()[column] {
-                Column::Law(Law::Offset(_)) => self.refit == Refit::Nothing,
-                Column::Law(law) if law.is_joint_friction() => self.refit != Refit::Friction,
+                Column::Term(TorqueTerm::Offset(_)) => self.refit == Refit::Nothing,
+                Column::Term(term) if term.is_joint_friction() => self.refit != Refit::Friction,
                 _ => true,
             })
             .collect();

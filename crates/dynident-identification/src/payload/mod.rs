@@ -11,6 +11,6 @@ pub use columns::{LoadColumns, Payload, known_payloads};
 pub use error::PayloadError;
 pub use gains::DriveGain;
 pub use known_arm::{KnownArm, Refit};
-pub use result::{Measured, PayloadParameter, PayloadResult, PossiblePayload, payload_results};
+pub use result::{ConsistentPayload, Measured, PayloadParameter, PayloadResult, payload_results};
 
 pub(crate) use gains::{Gains, drive_gains};

@@ -1,6 +1,6 @@
-//! What logs tell of payloads: values with error bars, and a body that it may be.
+//! What logs hold information about payloads: values with error bars, and a body that it may be.
 
-use super::body::{at_centre_of_mass, jacobian, possible_body};
+use super::body::{at_centre_of_mass, jacobian, nearest_consistent_body};
 use super::columns::{LoadColumns, Payload, PayloadColumns};
 use crate::recording::Recording;
 use dynident_estimation::Estimate;
@@ -19,7 +19,7 @@ pub struct Measured {
     pub half_width_95: f64,
 }
 
-/// A parameter of a payload, or a sum of parameters, that the logs tell.
+/// A parameter of a payload, or a sum of parameters, that the logs determine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PayloadParameter {
     /// What it sums, in the frame of the payload's link: `Ixx + Iyy`.
@@ -36,9 +36,9 @@ pub struct PayloadParameter {
     pub excited: bool,
 }
 
-/// The physically possible payload nearest to the estimate in the metric of its covariance. What the logs leave open is no measured value.
+/// The physically consistent payload nearest to the estimate in the metric of its covariance. What the logs leave open is no measured value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PossiblePayload {
+pub struct ConsistentPayload {
     /// Mass.
     pub mass_kg: f64,
     /// Centre of mass in the link's frame.
@@ -47,7 +47,7 @@ pub struct PossiblePayload {
     pub inertia_at_com_kgm2: [f64; 6],
     /// How far it lies from the estimate, in standard deviations.
     pub moved_sigma: f64,
-    /// Whether the logs want it outside of what is possible.
+    /// Whether the logs want it outside of what is physically consistent.
     pub on_the_boundary: bool,
 }
 
@@ -60,18 +60,18 @@ pub struct PayloadResult {
     pub link: String,
     /// Training logs that carry it.
     pub logs: Vec<String>,
-    /// What the logs tell of its ten parameters about the link's origin, one by one or as sums.
+    /// What the logs hold information about its ten parameters about the link's origin, one by one or as sums.
     pub parameters: Vec<PayloadParameter>,
-    /// Mass, kg; none where it is not told alone.
+    /// Mass, kg; none where it is not determined alone.
     pub mass_kg: Option<Measured>,
-    /// Centre of mass in the link's frame, m; none for coordinates that are not told alone.
+    /// Centre of mass in the link's frame, m; none for coordinates that are not determined alone.
     pub com_m: [Option<Measured>; 3],
-    /// Inertia about the centre of mass, axes of the link's frame, kg m²: xx, xy, xz, yy, yz, zz; none where it is not told alone.
+    /// Inertia about the centre of mass, axes of the link's frame, kg m²: xx, xy, xz, yy, yz, zz; none where it is not determined alone.
     pub inertia_at_com_kgm2: [Option<Measured>; 6],
-    /// What the logs cannot tell, in words.
+    /// What the logs cannot determine, in words.
     pub not_identified: Vec<String>,
     /// A body that it may be; none where there is none.
-    pub possible: Option<PossiblePayload>,
+    pub possible: Option<ConsistentPayload>,
     /// Why there is none.
     pub failure: Option<String>,
     /// What it adds to the base parameters, in their order: what `validate` predicts the torque of logs with it by.
@@ -112,7 +112,7 @@ fn result(
     let mut not_identified: Vec<String> = parameters
         .iter()
         .filter(|p| !p.excited)
-        .map(|p| format!("{}: these logs do not tell it from the arm", p.expression))
+        .map(|p| format!("{}: these logs do not separate it from the arm", p.expression))
         .collect();
     not_identified.extend(columns.dropped.iter().enumerate().map(|(place, &dropped)| {
         let column = columns.regrouping.column(place);
@@ -121,17 +121,17 @@ fn result(
             .map(|row| &parameters[row].expression[..])
             .collect();
         if homes.is_empty() {
-            format!("{}: no motion of this robot tells it", INERTIAL_NAMES[dropped])
+            format!("{}: no motion of this robot determines it", INERTIAL_NAMES[dropped])
         } else {
-            format!("{}: told only as a part of {}", INERTIAL_NAMES[dropped], homes.join(", "))
+            format!("{}: determined only as a part of {}", INERTIAL_NAMES[dropped], homes.join(", "))
         }
     }));
     let figures = figures(columns, estimate, &excited);
-    let (possible, failure) = match possible_body(&section.name, columns, estimate) {
+    let (possible, failure) = match nearest_consistent_body(&section.name, columns, estimate) {
         Ok(fit) => {
             let p: [f64; 10] = core::array::from_fn(|k| fit.parameters[k]);
             let [mass_kg, x, y, z, xx, xy, xz, yy, yz, zz] = at_centre_of_mass(&p);
-            let possible = PossiblePayload {
+            let possible = ConsistentPayload {
                 mass_kg,
                 com_m: [x, y, z],
                 inertia_at_com_kgm2: [xx, xy, xz, yy, yz, zz],
@@ -163,7 +163,7 @@ fn result(
     }
 }
 
-/// Mass, centre of mass and inertia about it, each where all that it is made of is told alone.
+/// Mass, centre of mass and inertia about it, each where all that it is made of is determined alone.
 fn figures(columns: &PayloadColumns, estimate: &Estimate, excited: &dyn Fn(usize) -> bool) -> [Option<Measured>; 10] {
     let place = |k: usize| {
         let place = columns.kept.iter().position(|&kept| kept == k)?;
@@ -171,7 +171,7 @@ fn figures(columns: &PayloadColumns, estimate: &Estimate, excited: &dyn Fn(usize
     };
     let places: [Option<usize>; 10] = core::array::from_fn(place);
     let p: [f64; 10] = core::array::from_fn(|k| places[k].map_or(0.0, |column| estimate.values[column]));
-    let mass_told = places[0].is_some() && p[0] != 0.0;
+    let mass_known = places[0].is_some() && p[0] != 0.0;
     let covariance = DMatrix::from_fn(10, 10, |i, j| match (places[i], places[j]) {
         (Some(i), Some(j)) => estimate.covariance[(i, j)],
         _ => 0.0,
@@ -183,16 +183,16 @@ fn figures(columns: &PayloadColumns, estimate: &Estimate, excited: &dyn Fn(usize
         .map(|&column| estimate.half_width_95[column] / estimate.std[column].max(f64::MIN_POSITIVE));
     let width = width.fold(0.0, f64::max);
     let (values, jacobian) =
-        if mass_told { (at_centre_of_mass(&p), jacobian(&p)) } else { (p, DMatrix::identity(10, 10)) };
+        if mass_known { (at_centre_of_mass(&p), jacobian(&p)) } else { (p, DMatrix::identity(10, 10)) };
     let variances = (&jacobian * covariance * jacobian.transpose()).diagonal();
     core::array::from_fn(|k| {
-        let told = match k {
+        let determined = match k {
             0 => places[0].is_some(),
-            1..=3 => mass_told && places[k].is_some(),
-            _ => mass_told && places[1..4].iter().all(Option::is_some) && places[k].is_some(),
+            1..=3 => mass_known && places[k].is_some(),
+            _ => mass_known && places[1..4].iter().all(Option::is_some) && places[k].is_some(),
         };
         let std = variances[k].max(0.0).sqrt();
-        told.then_some(Measured { value: values[k], std, half_width_95: width * std })
+        determined.then_some(Measured { value: values[k], std, half_width_95: width * std })
     })
 }
 

@@ -4,8 +4,8 @@ use super::mask::RowMask;
 use super::{JointRows, PANEL_SAMPLES, RawSamples, RowConsumer};
 use crate::error::IdentificationError;
 use crate::regressor_model::RegressorModel;
-use dynident_dynamics::{BatchWorkspace, LawHistory, Panels, regressor_panels_following};
-use dynident_model::laws::JointMotion;
+use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
+use dynident_model::terms::JointMotion;
 use dynident_recording::{DecimationSettings, Decimator, FilterError, MotionBlock};
 
 /// Some samples of a block's positions, velocities and accelerations, joints in the model's order.
@@ -31,7 +31,7 @@ pub struct RowBuilder<'a> {
     places: Vec<usize>,
     workspace: BatchWorkspace,
     panels: Panels,
-    history: LawHistory,
+    history: TermHistory,
     decimators: Option<Vec<Decimator>>,
     mask: Option<RowMask<'a>>,
     temperature_c: Vec<f64>,
@@ -66,7 +66,7 @@ impl<'a> RowBuilder<'a> {
             places: places.to_vec(),
             workspace: BatchWorkspace::new(model.model()),
             panels: Panels::default(),
-            history: LawHistory::new(model.load_parameters.clone()),
+            history: TermHistory::new(model.load_parameters.clone()),
             decimators,
             mask: None,
             temperature_c: Vec::new(),

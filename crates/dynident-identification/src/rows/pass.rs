@@ -164,7 +164,7 @@ impl LogPass<'_> {
     ) -> Result<Option<Vec<MotionBlock>>, IdentificationError> {
         let name = &self.recording.name;
         let mut keeper =
-            Keeper { blocks: (self.kept.is_some() && self.most_samples.is_none()).then(Vec::new), numbers: 0 };
+            BlockCache { blocks: (self.kept.is_some() && self.most_samples.is_none()).then(Vec::new), numbers: 0 };
         if self.reader_thread && self.most_samples.is_none() {
             let take = |block: MotionBlock| {
                 self.take(&block, builder, consumer)?;
@@ -185,12 +185,12 @@ impl LogPass<'_> {
 }
 
 /// Keeps blocks until they are too many.
-struct Keeper {
+struct BlockCache {
     blocks: Option<Vec<MotionBlock>>,
     numbers: usize,
 }
 
-impl Keeper {
+impl BlockCache {
     /// Returns the block if it is not kept.
     fn keep(&mut self, block: MotionBlock) -> Option<MotionBlock> {
         let MotionBlock { q, dq, ddq, tau, tau_smooth, temperature_c, .. } = &block;

@@ -1,6 +1,6 @@
 //! The files that a robot outside is handed: the trajectory with the model's torques, and the controller with its model.
 
-use super::law_description::describe;
+use super::term_description::describe;
 use super::{RobotFault, RunRequest};
 use core::fmt::Write as _;
 use dynident_model::INERTIAL_NAMES;
@@ -78,12 +78,12 @@ fn model_json(model: &ControllerModel) -> Value {
             })
         })
         .collect();
-    let laws: Vec<Value> = model.laws().iter().map(|(law, value)| describe(robot, law, *value)).collect();
+    let terms: Vec<Value> = model.terms().iter().map(|(term, value)| describe(robot, term, *value)).collect();
     json!({
         "gravity_m_s2": robot.gravity().0,
         "inertial_order": INERTIAL_NAMES,
         "joints": joints,
-        "laws": laws,
+        "laws": terms,
     })
 }
 

@@ -3,11 +3,11 @@
 mod conversation;
 mod folder;
 mod handover;
-mod law_description;
 mod log_table;
 mod process;
 mod protocol;
 mod simulated;
+mod term_description;
 
 pub use folder::{FolderRobot, FolderSettings};
 pub use handover::{CONTROLLER_SCHEMA, controller_json, trajectory_csv};

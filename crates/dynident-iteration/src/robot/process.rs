@@ -335,8 +335,8 @@ fn read_last_words(mut errors: impl Read, words: &Mutex<Vec<u8>>) {
 /// A message. JSON has no NaN and no infinity, but many programs write them: they are read as missing numbers, so that the verdict can name the sample.
 fn message(line: &str) -> Result<ToHost, serde_json::Error> {
     serde_json::from_str(line).or_else(|error| {
-        let mended = line.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null");
-        if mended == line { Err(error) } else { serde_json::from_str(&mended) }
+        let fixed = line.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null");
+        if fixed == line { Err(error) } else { serde_json::from_str(&fixed) }
     })
 }
 

@@ -1,4 +1,4 @@
-//! The messages between an experiment (the host) and a robot program (the client): one JSON object a line. The book's page `robot-protocol.md` tells them with examples.
+//! The messages between an experiment (the host) and a robot program (the client): one JSON object a line. The book's page `robot-protocol.md` describes them with examples.
 
 use serde::{Deserialize, Serialize};
 
@@ -32,7 +32,7 @@ pub enum ToClient {
         samples: usize,
         /// Positions to start from, rad (m).
         q: Vec<f64>,
-        /// Speeds to start with.
+        /// Velocities to start with.
         dq: Vec<f64>,
     },
     /// Hold this torque for one sample, then send the state.
@@ -46,7 +46,7 @@ pub enum ToClient {
     Bye {},
 }
 
-/// What the client writes to its standard output. Missing numbers (`null`) are read and told apart from garbage.
+/// What the client writes to its standard output. Missing numbers (`null`) are read and distinguished from garbage.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum ToHost {
@@ -76,7 +76,7 @@ pub enum ToHost {
         t_s: Option<f64>,
         /// Positions, rad (m).
         q: Vec<Option<f64>>,
-        /// Speeds, rad/s (m/s).
+        /// Velocities, rad/s (m/s).
         dq: Vec<Option<f64>>,
     },
     /// The run is over.

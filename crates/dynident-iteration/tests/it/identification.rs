@@ -11,8 +11,8 @@ use dynident_iteration::{
     Iteration, IterationSettings, IterationTask, Leg, Robot, RunEstimate, RunIdentificationSettings, SimulatedRobot,
     identify_run, iterate,
 };
-use dynident_model::laws::{Coulomb, CoulombShape, Law, Viscous};
 use dynident_model::sample::planar_2r;
+use dynident_model::terms::{Coulomb, CoulombShape, TorqueTerm, Viscous};
 use dynident_model::{InertialParameters, Model};
 use dynident_simulation::controllers::{ComputedTorqueSettings, JointPdSettings};
 use dynident_simulation::{
@@ -28,8 +28,8 @@ fn arm(tip_kg: f64) -> Model {
 }
 
 /// Viscous and Coulomb friction of both joints with this step.
-fn friction(shape: CoulombShape) -> Vec<Law> {
-    let of_joint = |joint| [Law::Viscous(Viscous { joint }), Law::Coulomb(Coulomb { joint, shape })];
+fn friction(shape: CoulombShape) -> Vec<TorqueTerm> {
+    let of_joint = |joint| [TorqueTerm::Viscous(Viscous { joint }), TorqueTerm::Coulomb(Coulomb { joint, shape })];
     (0..2).flat_map(of_joint).collect()
 }
 
@@ -78,8 +78,8 @@ fn record(model: &Model, shape: CoulombShape) -> Record {
 }
 
 fn task(shape: CoulombShape) -> IterationTask {
-    let machine = ParametricModel::new(arm(1.0), friction(shape)).unwrap();
-    IterationTask::new(machine, reference()).unwrap()
+    let robot = ParametricModel::new(arm(1.0), friction(shape)).unwrap();
+    IterationTask::new(robot, reference()).unwrap()
 }
 
 fn settings(estimator: Estimator) -> RunIdentificationSettings {
@@ -88,7 +88,7 @@ fn settings(estimator: Estimator) -> RunIdentificationSettings {
 
 /// Viscous and Coulomb friction of both joints, and their error bars.
 fn friction_of(task: &IterationTask, estimate: &RunEstimate) -> Vec<[f64; 2]> {
-    let symbols: Vec<String> = task.machine.layout().columns().iter().map(dynident_dynamics::Column::symbol).collect();
+    let symbols: Vec<String> = task.robot.layout().columns().iter().map(dynident_dynamics::Column::symbol).collect();
     let value = |symbol: &str| {
         let place = symbols.iter().position(|other| other == symbol).unwrap();
         [estimate.values[place], estimate.std[place]]
@@ -131,7 +131,7 @@ fn friction_is_chosen_once_and_kept_by_the_runs_after() {
     let mut identification = settings(Estimator::Weighted);
     identification.friction = ["joint1", "joint2"]
         .iter()
-        .zip(task.machine.joint_names())
+        .zip(task.robot.joint_names())
         .map(|(_, name)| FrictionSearch { coulomb: Some(stated), ..FrictionSearch::of(name) })
         .collect();
     let settings = IterationSettings {
@@ -149,33 +149,33 @@ fn friction_is_chosen_once_and_kept_by_the_runs_after() {
     assert!(first.friction.iter().all(|joint| joint.terms.is_some()), "{:?}", first.friction);
     assert!(second.friction.is_empty());
     let chosen = iteration.robot(&outcome.runs);
-    // A step fifty times narrower than the stated one is told apart from it.
+    // A step fifty times narrower than the stated one is distinguished from it.
     let widths: Vec<CoulombShape> = chosen
-        .laws()
+        .terms()
         .iter()
-        .filter_map(|law| if let Law::Coulomb(law) = law { Some(law.shape) } else { None })
+        .filter_map(|term| if let TorqueTerm::Coulomb(term) = term { Some(term.shape) } else { None })
         .collect();
     assert!(widths.iter().all(|shape| *shape != stated), "{widths:?}");
     assert_eq!(second.values.len(), chosen.base().count());
     // Stored runs read back: a killed iteration goes on with the chosen terms.
     let text = serde_json::to_string(&outcome.runs).unwrap();
     let read: Vec<dynident_iteration::RunRecord> = serde_json::from_str(&text).unwrap();
-    assert_eq!(iteration.robot(&read).laws(), chosen.laws());
+    assert_eq!(iteration.robot(&read).terms(), chosen.terms());
 }
 
 #[test]
 fn a_payload_that_is_known_is_taken_off() {
     let shape = CoulombShape::Smooth { width: 0.02 };
     let mut task = task(shape);
-    let link = task.machine.model().bodies()[1].links[0].name.clone();
+    let link = task.robot.model().bodies()[1].links[0].name.clone();
     // A tip of twice the mass is the arm with a payload of the same ten parameters.
-    let known = Some(task.machine.model().inertials()[1]);
+    let known = Some(task.robot.model().inertials()[1]);
     let mut settings = settings(Estimator::Weighted);
     settings.payloads = vec![Payload { name: "weight".to_owned(), link, known }];
     task.legs = vec![Leg::whole(reference()).unwrap().with_payload(Some("weight".to_owned()))];
     let record = record(&arm(2.0), shape);
     let found = identify_run(&task, std::slice::from_ref(&record), &settings).unwrap();
-    let truth = task.machine.nominal_base().unwrap();
+    let truth = task.robot.nominal_base().unwrap();
     for (k, truth) in truth.iter().enumerate().filter(|(_, truth)| **truth != 0.0) {
         // Bodies only: friction is no nominal value. Without the payload taken off, first moments would be 1 and 2 too large.
         let (value, std) = (found.values[k], found.std[k]);

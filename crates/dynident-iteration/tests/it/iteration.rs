@@ -50,7 +50,7 @@ fn exact() -> LoopSettings {
 }
 
 /// No prior: the description's inertials are unknown to the iteration.
-fn machine() -> ParametricModel {
+fn unknown_arm() -> ParametricModel {
     ParametricModel::new(paper_arm(), Vec::new()).unwrap().with_nominal(vec![0.0; 20]).unwrap()
 }
 
@@ -76,7 +76,7 @@ fn never_settled(mut settings: IterationSettings, max_runs: usize) -> IterationS
 fn one_leg(rate_hz: f64) -> IterationTask {
     let (reference, windows) = reference(&[1, 0], rate_hz);
     IterationTask {
-        machine: machine(),
+        robot: unknown_arm(),
         legs: vec![Leg::windowed(reference, windows).unwrap()],
         known: vec![],
         torque_limits: None,
@@ -96,9 +96,9 @@ fn the_papers_arm_is_found_in_both_orders_of_work() {
         println!("{scheme:?} {errors:?}");
         assert!(outcome.runs.iter().all(|run| run.accepted));
         assert!(errors[2] < 0.007 && errors[5] < 1e-6, "{scheme:?}: {errors:?}");
-        // The possible machine in the controller has the same base parameters: the constraint is not active.
+        // The physically consistent set in the controller has the same base parameters: the constraint is not active.
         let possible = outcome.runs[5].estimate.as_ref().unwrap().possible.as_ref().unwrap();
-        assert!(worst(&machine().base().values(possible)) < 1e-5);
+        assert!(worst(&unknown_arm().base().values(possible)) < 1e-5);
         // The better model follows better.
         let [first, last] = [0, 5].map(|run: usize| outcome.runs[run].tracking_error());
         assert!(last < 1e-3 * first, "{first} {last}");
@@ -113,7 +113,7 @@ fn the_literal_scheme_converges_from_the_papers_start() {
         let (reference, windows) = reference(&[joint], 100.0);
         Leg::windowed(reference, windows).unwrap()
     });
-    let task = IterationTask { machine: machine(), legs: legs.to_vec(), known: vec![], torque_limits: None };
+    let task = IterationTask { robot: unknown_arm(), legs: legs.to_vec(), known: vec![], torque_limits: None };
     let iteration = Iteration::new(task, never_settled(IterationSettings::literal(0.5), 6)).unwrap();
     let locked = |joint: &str| {
         let plant = Plant::new(&paper_arm(), &[], &[]).unwrap().with_locked(&[joint.to_owned()]).unwrap();
@@ -138,8 +138,12 @@ fn known_parameters_are_held() {
     for scheme in [Scheme::AllJoints, Scheme::StepByStep] {
         let (reference, windows) = reference(&[0], 200.0);
         let legs = vec![Leg::windowed(reference, windows).unwrap()];
-        let task =
-            IterationTask { machine: machine(), legs, known: vec![(3, 1.0), (4, 0.0), (5, 1.0)], torque_limits: None };
+        let task = IterationTask {
+            robot: unknown_arm(),
+            legs,
+            known: vec![(3, 1.0), (4, 0.0), (5, 1.0)],
+            torque_limits: None,
+        };
         let mut settings = never_settled(IterationSettings::default(), 2);
         settings.identification.scheme = scheme;
         let iteration = Iteration::new(task, settings).unwrap();
@@ -163,12 +167,12 @@ fn an_arm_that_cannot_follow_is_refused() {
     assert_eq!(stiffness, [1.0, 2.0, 4.0, 8.0]);
 }
 
-/// A record that holds nothing that counts tells nothing, and that is no convergence.
+/// A record that holds nothing that counts determines nothing, and that is no convergence.
 #[test]
 fn rows_that_do_not_count_are_no_estimate() {
     let (reference, _) = reference(&[1, 0], 100.0);
     let legs = vec![Leg::windowed(reference, vec![vec![], vec![]]).unwrap()];
-    let task = IterationTask { machine: machine(), legs, known: vec![], torque_limits: None };
+    let task = IterationTask { robot: unknown_arm(), legs, known: vec![], torque_limits: None };
     let iteration = Iteration::new(task, never_settled(IterationSettings::default(), 8)).unwrap();
     let outcome = iterate(&iteration, &mut [&mut robot(exact())], None, &mut |_, _| {}).unwrap();
     assert!(matches!(outcome.status, IterationStatus::Refused { .. }), "{}", outcome.status);

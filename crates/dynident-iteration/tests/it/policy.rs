@@ -12,10 +12,10 @@ use dynident_simulation::Reference;
 
 fn iteration() -> Iteration {
     let tip = InertialParameters([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0]);
-    let machine = ParametricModel::new(planar_2r(1.0, tip, tip), Vec::new()).unwrap();
+    let robot = ParametricModel::new(planar_2r(1.0, tip, tip), Vec::new()).unwrap();
     let rest = || vec![0.0; 20];
     let motion = Motion { samples: 10, joints: 2, q: rest(), dq: rest(), ddq: rest(), dddq: Vec::new() };
-    let task = IterationTask::new(machine, Reference::new(100.0, motion).unwrap()).unwrap();
+    let task = IterationTask::new(robot, Reference::new(100.0, motion).unwrap()).unwrap();
     Iteration::new(task, IterationSettings::default()).unwrap()
 }
 
@@ -35,8 +35,8 @@ fn estimate(value: f64, std: f64) -> RunEstimate {
     }
 }
 
-/// A run of a controller with the model `model` (without one if none), its tracking error and what it told.
-fn run(number: usize, model: Option<f64>, tracking: f64, accepted: bool, told: RunEstimate) -> RunRecord {
+/// A run of a controller with the model `model` (without one if none), its tracking error and what it determined.
+fn run(number: usize, model: Option<f64>, tracking: f64, accepted: bool, estimate: RunEstimate) -> RunRecord {
     let model = model.map(|value| ModelParameters::All(vec![value; 20]));
     RunRecord {
         run: number,
@@ -46,7 +46,7 @@ fn run(number: usize, model: Option<f64>, tracking: f64, accepted: bool, told: R
         max_tracking_error_rad: vec![tracking; 2],
         accepted,
         reason: None,
-        estimate: Some(told),
+        estimate: Some(estimate),
     }
 }
 
@@ -61,7 +61,7 @@ fn model(plan: &RunPlan) -> Option<f64> {
     plan.model.as_ref().map(|model| model.values()[0])
 }
 
-/// Bad tracking tells against the model that was loaded, not against what the run says of the parameters.
+/// Bad tracking speaks against the model that was loaded, not against what the run says of the parameters.
 #[test]
 fn a_rejected_run_with_narrower_bars_gives_the_next_model() {
     let first = run(1, None, 0.5, true, estimate(1.0, 1.0));
@@ -77,7 +77,7 @@ fn a_model_that_was_tried_and_rejected_is_not_tried_again() {
     let records = [
         run(1, None, 0.5, true, estimate(1.0, 1.0)),
         run(2, Some(1.0), 0.2, true, estimate(2.0, 1.0)),
-        // The step from 1 to 2 was too much, and this run tells less than the one before.
+        // The step from 1 to 2 was too much, and this run determines less than the one before.
         run(3, Some(2.0), 2.0, false, estimate(9.0, 5.0)),
     ];
     let plan = planned(&records);

@@ -6,7 +6,7 @@ use dynident_iteration::robot::{
     controller_json, trajectory_csv,
 };
 use dynident_iteration::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, SimulatedRobot};
-use dynident_model::laws::{Law, Viscous};
+use dynident_model::terms::{TorqueTerm, Viscous};
 use dynident_model::{Model, load_robot};
 use dynident_simulation::controllers::{ComputedTorqueSettings, FiniteTimeSettings, JointPdSettings};
 use dynident_simulation::{ControllerModel, ControllerSettings, LoopSettings, Plant, Reference};
@@ -112,7 +112,7 @@ fn programs_that_fail_have_a_verdict() {
     }
     let (died, run) = fault(ProcessMode::Step, "die");
     assert!(matches!(died, RobotFault::Died { .. }) && run.record.samples == 50, "{died}");
-    // A stop that the robot tells is no fault.
+    // A stop that the robot reports is no fault.
     let stopped = self::run(&mut ProcessRobot::new(settings(ProcessMode::Run, "stop"), joints()).unwrap());
     assert!(matches!(&stopped.status, RobotStatus::Stopped { reason } if reason == "protective stop"));
     assert_eq!(stopped.record.samples, 50);
@@ -266,8 +266,8 @@ fn mujoco_is_a_robot() {
             (centre + 0.3 * sine, 0.3 * omega * cosine, -0.3 * omega * omega * sine);
     }
     let reference = Reference::new(1000.0, motion).unwrap();
-    let laws: Vec<Law> = (0..7).map(|joint| Law::Viscous(Viscous { joint })).collect();
-    let believed = ControllerModel::new(&model, &laws, &[0.4; 7]).unwrap();
+    let terms: Vec<TorqueTerm> = (0..7).map(|joint| TorqueTerm::Viscous(Viscous { joint })).collect();
+    let believed = ControllerModel::new(&model, &terms, &[0.4; 7]).unwrap();
     let friction = dynident_simulation::FrictionCompensation::Measured;
     let gains = JointPdSettings { kp: vec![300.0, 300.0, 200.0, 200.0, 60.0, 60.0, 10.0].into(), kd: 0.5.into() };
     let controllers = [
@@ -281,7 +281,7 @@ fn mujoco_is_a_robot() {
         let command = command.into_iter().chain(["--damping", "0.5"].map(str::to_owned)).collect();
         let settings = ProcessSettings { command, ..settings(mode, "") };
         let mut mujoco = ProcessRobot::new(settings, names.clone()).unwrap();
-        let plant = Plant::new(&model, &laws, &[0.5; 7]).unwrap();
+        let plant = Plant::new(&model, &terms, &[0.5; 7]).unwrap();
         let mut own = SimulatedRobot::new(plant, LoopSettings::default()).unwrap();
         for controller in &controllers {
             let request = RunRequest { run: 1, reference: &reference, controller, model: Some(&believed) };

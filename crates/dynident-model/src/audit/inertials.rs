@@ -26,7 +26,7 @@ pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
     for (index, body) in model.bodies().iter().enumerate() {
         for link in &body.links {
             if let Some(inertial) = &link.inertial {
-                possible(&link.name, inertial, findings);
+                check_consistent(&link.name, inertial, findings);
                 likely(&link.name, inertial, lengths.bodies[index], findings);
             }
         }
@@ -37,7 +37,7 @@ pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
 }
 
 /// Mass and principal moments that a body can have.
-fn possible(link: &str, inertial: &InertialParameters, findings: &mut Findings) {
+fn check_consistent(link: &str, inertial: &InertialParameters, findings: &mut Findings) {
     let place = || format!("link {link}");
     let mass = inertial.mass_kg();
     if *inertial == InertialParameters::ZERO {
@@ -83,7 +83,7 @@ fn possible(link: &str, inertial: &InertialParameters, findings: &mut Findings) 
     }
 }
 
-/// Sizes that the machine's lengths make plausible.
+/// Sizes that the robot's lengths make plausible.
 fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &mut Findings) {
     let place = || format!("link {link}");
     let mass = inertial.mass_kg();
@@ -98,12 +98,12 @@ fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &m
     let distance = com.norm();
     if distance > FAR * length_m {
         let absurd = distance > ABSURDLY_FAR * length_m;
-        let mend = if absurd { "; if that is millimetres, divide by 1000" } else { ": check its frame and unit" };
+        let fix = if absurd { "; if that is millimetres, divide by 1000" } else { ": check its frame and unit" };
         findings.add(
             if absurd { Problem } else { Warning },
             "centre-of-mass-outside",
             place(),
-            format!("has its centre of mass {distance:.4} m from its frame, on a body of about {length_m:.3} m{mend}"),
+            format!("has its centre of mass {distance:.4} m from its frame, on a body of about {length_m:.3} m{fix}"),
         );
     }
     // Mean square distance of the mass from its centre: half the trace of the inertia over the mass.
@@ -147,7 +147,7 @@ fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &m
 }
 
 /// An inertia that was computed about the link's origin but written as if about the centre of mass: without the parallel-axis term
-/// a possible body remains, and that term is most of the inertia given.
+/// a consistent body remains, and that term is most of the inertia given.
 fn about_origin(link: &str, inertial: &InertialParameters, com: Vec3, inertia: &Mat3, findings: &mut Findings) {
     let mass = inertial.mass_kg();
     let shift = (Mat3::IDENTITY.scale(com.dot(com)) - Mat3::outer(com, com)).scale(mass);

@@ -5,14 +5,14 @@ use super::{Findings, Lengths};
 use crate::joint::{Joint, JointKind};
 use crate::tree::Model;
 
-/// No common machine has two joints further apart, m.
+/// No common robot has two joints further apart, m.
 const LARGEST_OFFSET_M: f64 = 10.0;
 /// Nearly five turns: more than any common multi-turn joint, far less than a half turn in degrees. rad.
 const LARGEST_TURN_RAD: f64 = 30.0;
 /// Longer than any common rail, m.
 const LARGEST_STROKE_M: f64 = 100.0;
 /// Faster than the joints of small legged robots by a factor of two, rad/s.
-const LARGEST_TURNING_SPEED_RAD_S: f64 = 100.0;
+const LARGEST_REVOLUTE_VELOCITY_RAD_S: f64 = 100.0;
 
 pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
     for joint in model.joints() {
@@ -33,7 +33,7 @@ pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
                     Problem,
                     "friction-negative",
                     place(),
-                    format!("has a negative {what}, which would drive the joint: mend the sign"),
+                    format!("has a negative {what}, which would drive the joint: fix the sign"),
                 );
             }
         }
@@ -114,7 +114,7 @@ fn limits(joint: &Joint, findings: &mut Findings) {
             place(),
             format!("has a velocity limit of {velocity} {unit}/s, so that it may not move: give the real one"),
         ),
-        Some(velocity) if turns && velocity > LARGEST_TURNING_SPEED_RAD_S => findings.add(
+        Some(velocity) if turns && velocity > LARGEST_REVOLUTE_VELOCITY_RAD_S => findings.add(
             Warning,
             "limit-unit",
             place(),

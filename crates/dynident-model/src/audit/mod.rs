@@ -1,4 +1,4 @@
-//! Audit of a model's physics: what a description says that no machine can be, or that is likely a slip.
+//! Audit of a model's physics: what a description says that no robot can be, or that is likely a slip.
 //!
 //! The limits below were chosen so that the published descriptions of common arms pass. A finding is advice: the identification itself does
 //! not use the prior inertials unless asked to.
@@ -15,7 +15,7 @@ pub enum AuditLevel {
     Info,
     /// Likely a slip, or something that a later step will need.
     Warning,
-    /// Physically impossible, or unusable.
+    /// Physically inconsistent, or unusable.
     Problem,
 }
 
@@ -39,7 +39,7 @@ pub struct AuditFinding {
     pub check: &'static str,
     /// `model`, `link NAME` or `joint NAME`.
     pub place: String,
-    /// What it is, why it matters, and the mend.
+    /// What it is, why it matters, and the fix.
     pub message: String,
 }
 

@@ -194,8 +194,8 @@ impl Source<'_> {
                     at.and_then(|at| Some((angle_keys[at], angles[at].as_ref()?)))
                 };
                 if let Some((key, number)) = misfit {
-                    let mend = if turns { "the keys in rad, deg and Nm" } else { "the keys in m and N" };
-                    return Err(self.fault(number.span().start, DhFault::WrongUnit { key, kind: kind.name(), mend }));
+                    let fix = if turns { "the keys in rad, deg and Nm" } else { "the keys in m and N" };
+                    return Err(self.fault(number.span().start, DhFault::WrongUnit { key, kind: kind.name(), fix }));
                 }
                 if !turns {
                     return self.number(length_key, length);

@@ -62,12 +62,12 @@ use thiserror::Error;
 /// Why a D-H table could not be read, with line and column.
 pub type DhError = Located<DhFault>;
 
-/// What is wrong in a D-H table, and the mend.
+/// What is wrong in a D-H table, and the fix.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum DhFault {
     /// Not TOML, a key that does not exist, or a value of the wrong kind.
-    #[error("{reason}; mend this entry of the D-H table")]
+    #[error("{reason}; fix this entry of the D-H table")]
     Toml {
         /// What the TOML parser says.
         reason: String,
@@ -89,14 +89,14 @@ pub enum DhFault {
         second: &'static str,
     },
     /// A key that does not fit the kind of joint.
-    #[error("`{key}` does not fit a {kind} joint: use {mend}")]
+    #[error("`{key}` does not fit a {kind} joint: use {fix}")]
     WrongUnit {
         /// The key.
         key: &'static str,
         /// Kind of the joint.
         kind: &'static str,
         /// The keys that fit.
-        mend: &'static str,
+        fix: &'static str,
     },
     /// A sign that is neither 1 nor -1.
     #[error("`sign` is {sign}: write 1 or -1")]
@@ -141,7 +141,7 @@ pub enum DhFault {
     )]
     Inertial,
     /// The parts do not make a model.
-    #[error("{0}; mend the table")]
+    #[error("{0}; fix the table")]
     Model(#[from] ModelError),
 }
 

@@ -49,7 +49,7 @@ const MAX_NODES: u32 = 2_000_000;
 /// What a URDF says.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UrdfRobot {
-    /// The machine on a fixed base, gravity along -z.
+    /// The robot on a fixed base, gravity along -z.
     pub model: Model,
     /// Elements inside links, inertials and joints that were not read, because URDF does not define them (often a misspelling) or
     /// because they repeat an earlier one, which counts. At most [`UrdfRobot::MAX_UNREAD`] are kept.
@@ -77,12 +77,12 @@ pub struct UnreadElement {
 /// Why a URDF could not be read, with line and column.
 pub type UrdfError = Located<UrdfFault>;
 
-/// What is wrong in a URDF, and the mend.
+/// What is wrong in a URDF, and the fix.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum UrdfFault {
     /// The XML is malformed.
-    #[error("malformed XML: {reason}; mend the markup here (is the file complete?)")]
+    #[error("malformed XML: {reason}; fix the markup here (is the file complete?)")]
     Xml {
         /// What the XML parser says.
         reason: String,
@@ -122,7 +122,7 @@ pub enum UrdfFault {
         owner: String,
         /// The element that is missing.
         element: &'static str,
-        /// More on the mend.
+        /// More on the fix.
         hint: &'static str,
     },
     /// A link with two inertials.
@@ -148,7 +148,7 @@ pub enum UrdfFault {
         attribute: &'static str,
     },
     /// Something that is not a usable number.
-    #[error("`{attribute}` of <{element}> holds `{text}`, which is {fault}: write {mend}")]
+    #[error("`{attribute}` of <{element}> holds `{text}`, which is {fault}: write {fix}")]
     Number {
         /// The element.
         element: String,
@@ -159,7 +159,7 @@ pub enum UrdfFault {
         /// What is wrong with it.
         fault: &'static str,
         /// What to write.
-        mend: &'static str,
+        fix: &'static str,
     },
     /// Too many or too few numbers.
     #[error("`{attribute}` of <{element}> holds {found} numbers: write {expected}, separated by spaces")]
@@ -184,7 +184,7 @@ pub enum UrdfFault {
         first_line: u32,
     },
     /// A joint names a link that does not exist.
-    #[error("joint `{joint}` names link `{link}`, which is not defined: add the link or mend the name")]
+    #[error("joint `{joint}` names link `{link}`, which is not defined: add the link or fix the name")]
     UnknownLink {
         /// The joint.
         joint: String,
@@ -193,7 +193,7 @@ pub enum UrdfFault {
     },
     /// A joint follows one that does not exist, or itself.
     #[error(
-        "joint `{joint}` mimics `{source_joint}`, which is no other joint of this robot: mend the name or delete <mimic>"
+        "joint `{joint}` mimics `{source_joint}`, which is no other joint of this robot: fix the name or delete <mimic>"
     )]
     UnknownMimic {
         /// The joint.
@@ -220,7 +220,7 @@ pub enum UrdfFault {
         joint: String,
         /// The type.
         kind: String,
-        /// More on the mend.
+        /// More on the fix.
         hint: &'static str,
     },
     /// An axis of length zero.
@@ -256,7 +256,7 @@ pub enum UrdfFault {
         limit: usize,
     },
     /// The parts do not make a model.
-    #[error("{0}; mend the description")]
+    #[error("{0}; fix the description")]
     Model(#[from] ModelError),
 }
 

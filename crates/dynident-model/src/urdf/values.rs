@@ -42,10 +42,10 @@ pub(super) fn numbers<const N: usize>(node: Node<'_, '_>, attribute: &str) -> Re
     let count = words.clone().count();
     let mut numbers = [0.0; N];
     for (number, word) in numbers.iter_mut().zip(words) {
-        *number = parse(word).map_err(|(fault, mend)| number_fault(node, found, word, fault, mend))?;
+        *number = parse(word).map_err(|(fault, fix)| number_fault(node, found, word, fault, fix))?;
         if number.abs() > MAX_MAGNITUDE {
-            let mend = "a value below 1e9 in m, rad, kg or kg m^2";
-            return Err(number_fault(node, found, word, "too large for a machine", mend));
+            let fix = "a value below 1e9 in m, rad, kg or kg m^2";
+            return Err(number_fault(node, found, word, "too large for a robot", fix));
         }
     }
     if count != N {
@@ -65,7 +65,7 @@ pub(super) fn number(node: Node<'_, '_>, attribute: &str) -> Result<Option<f64>,
     let Some(found) = node.attribute_node(attribute) else { return Ok(None) };
     refuse_xacro(node, found)?;
     let word = found.value().trim();
-    parse(word).map(Some).map_err(|(fault, mend)| number_fault(node, found, word, fault, mend))
+    parse(word).map(Some).map_err(|(fault, fix)| number_fault(node, found, word, fault, fix))
 }
 
 /// One number that must be there.
@@ -104,14 +104,14 @@ fn number_fault(
     attribute: Attribute<'_, '_>,
     word: &str,
     fault: &'static str,
-    mend: &'static str,
+    fix: &'static str,
 ) -> UrdfError {
     let fault = UrdfFault::Number {
         element: node.tag_name().name().to_owned(),
         attribute: attribute.name().to_owned(),
         text: shortened(word),
         fault,
-        mend,
+        fix,
     };
     fault_in(node, attribute, fault)
 }

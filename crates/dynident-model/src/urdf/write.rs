@@ -1,7 +1,7 @@
 //! Writing identified values back into the user's own URDF.
 //!
 //! Only `<inertial>` and the two friction values of `<dynamics>` change; every other byte stays, with its comments, order, spacing and
-//! line ends. A body is lumped from links that are fixed to each other, and a log cannot tell them apart: [`link_changes`] gives the
+//! line ends. A body is lumped from links that are fixed to each other, and a log cannot distinguish them: [`link_changes`] gives the
 //! whole body to the joint's own link, takes the `<inertial>` from the links fixed to it, and says so in a comment.
 
 use super::{UrdfError, parse};

@@ -1,4 +1,4 @@
-//! Broken descriptions: each is refused with file, line, column and the mend, and nothing panics.
+//! Broken descriptions: each is refused with file, line, column and the fix, and nothing panics.
 
 use crate::common::ARM;
 use dynident_model::{audit, link_changes, load_robot, read_dh, read_urdf, rewrite_urdf};
@@ -14,9 +14,9 @@ fn corpus() -> PathBuf {
 /// `file<TAB>line:column<TAB>what the message must say`, checked by eye against what is wrong in each file.
 const EXPECTED: &str = include_str!("../broken.tsv");
 
-/// How a message tells what to do.
-const MENDS: [&str; 18] = [
-    "; mend ",
+/// How a message says what to do.
+const FIXES: [&str; 18] = [
+    "; fix ",
     ": write ",
     ": add ",
     ": keep ",
@@ -33,11 +33,11 @@ const MENDS: [&str; 18] = [
     ": fill ",
     ": order ",
     "add the ",
-    "mend the ",
+    "fix the ",
 ];
 
 #[test]
-fn every_broken_file_is_refused_at_its_place_with_a_mend() {
+fn every_broken_file_is_refused_at_its_place_with_a_fix() {
     let mut expected: BTreeMap<&str, (&str, &str)> = EXPECTED
         .lines()
         .map(|line| {
@@ -56,7 +56,7 @@ fn every_broken_file_is_refused_at_its_place_with_a_mend() {
         assert!(message.starts_with(&start), "{message}\nshould start with {start}");
         assert!(message.contains(fragment), "{message}\nshould contain {fragment}");
         assert_eq!(message.lines().count(), 1, "{message}");
-        assert!(MENDS.iter().any(|mend| message.contains(mend)), "{message}\nnames no mend");
+        assert!(FIXES.iter().any(|fix| message.contains(fix)), "{message}\nnames no fix");
     }
     assert!(expected.is_empty(), "not in the corpus: {expected:?}");
 }

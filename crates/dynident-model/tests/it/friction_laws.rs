@@ -1,62 +1,62 @@
 //! Friction laws against differences, limits and what is known of them by hand.
-use dynident_model::laws::{
+use dynident_model::terms::{
     Coulomb, CoulombShape, Coupling, CouplingEffect, Direction, DirectionalCoulomb, DirectionalViscous, DriveInertia,
-    JointMotion, Law, LawInput, LawMemory, LoadFriction, MaxwellSlip, Offset, Power, PowerExponent, Sigmoid,
-    SpeedCurve, Stribeck, TemperatureCoulomb, TemperatureViscous, TermAction, Viscous,
+    HysteresisState, JointMotion, LoadFriction, MaxwellSlip, Offset, Power, PowerExponent, Sigmoid, Stribeck,
+    TemperatureCoulomb, TemperatureViscous, TermAction, TermInput, TorqueTerm, VelocityCurve, Viscous,
 };
 
 const STEP: CoulombShape = CoulombShape::Smooth { width: 0.05 };
 
-fn column(law: &Law, dq: &[f64]) -> Vec<f64> {
+fn column(term: &TorqueTerm, dq: &[f64]) -> Vec<f64> {
     let zeros = vec![0.0; dq.len()];
     let motion = JointMotion { samples: dq.len(), q: &zeros, dq, ddq: &zeros };
     let mut out = vec![f64::NAN; dq.len()];
-    law.column(0, &motion, &mut out);
+    term.column(0, &motion, &mut out);
     out
 }
 
-fn laws_of_speed() -> Vec<Law> {
+fn terms_of_velocity() -> Vec<TorqueTerm> {
     let joint = 0;
-    let mut laws = vec![
-        Law::Viscous(Viscous { joint }),
-        Law::Coulomb(Coulomb { joint, shape: STEP }),
-        Law::Sigmoid(Sigmoid { joint, steepness: 30.0, offset_speed: 0.02 }),
-        Law::Power(Power { joint, exponent: PowerExponent::CubeRoot, rounding: 1e-2 }),
-        Law::Power(Power { joint, exponent: PowerExponent::Quadratic, rounding: 1e-2 }),
+    let mut terms = vec![
+        TorqueTerm::Viscous(Viscous { joint }),
+        TorqueTerm::Coulomb(Coulomb { joint, shape: STEP }),
+        TorqueTerm::Sigmoid(Sigmoid { joint, steepness: 30.0, offset_speed: 0.02 }),
+        TorqueTerm::Power(Power { joint, exponent: PowerExponent::CubeRoot, rounding: 1e-2 }),
+        TorqueTerm::Power(Power { joint, exponent: PowerExponent::Quadratic, rounding: 1e-2 }),
     ];
     for direction in [Direction::Forward, Direction::Backward] {
-        laws.push(Law::DirectionalViscous(DirectionalViscous { joint, direction }));
-        laws.push(Law::DirectionalCoulomb(DirectionalCoulomb { joint, direction, shape: STEP }));
+        terms.push(TorqueTerm::DirectionalViscous(DirectionalViscous { joint, direction }));
+        terms.push(TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { joint, direction, shape: STEP }));
     }
     for exponent in [0.7, 1.0, 2.0] {
-        laws.push(Law::Stribeck(Stribeck { joint, speed: 0.1, exponent, shape: STEP }));
+        terms.push(TorqueTerm::Stribeck(Stribeck { joint, speed: 0.1, exponent, shape: STEP }));
     }
-    laws
+    terms
 }
 
 /// One law of every kind and shape, of joint 0 or of joints 0 and 1.
-fn laws_of_all_kinds() -> Vec<Law> {
+fn terms_of_all_kinds() -> Vec<TorqueTerm> {
     let (joint, reference_c) = (0, 20.0);
-    let mut laws = laws_of_speed();
+    let mut terms = terms_of_velocity();
     for shape in [STEP, CoulombShape::Sign { dead_band: 0.0 }] {
-        laws.extend([
-            Law::Coulomb(Coulomb { joint, shape }),
-            Law::DirectionalCoulomb(DirectionalCoulomb { joint, direction: Direction::Backward, shape }),
-            Law::Stribeck(Stribeck { joint, speed: 0.1, exponent: 1.5, shape }),
-            Law::Load(LoadFriction { joint, shape }),
-            Law::TemperatureCoulomb(TemperatureCoulomb { joint, reference_c, shape }),
+        terms.extend([
+            TorqueTerm::Coulomb(Coulomb { joint, shape }),
+            TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { joint, direction: Direction::Backward, shape }),
+            TorqueTerm::Stribeck(Stribeck { joint, speed: 0.1, exponent: 1.5, shape }),
+            TorqueTerm::Load(LoadFriction { joint, shape }),
+            TorqueTerm::TemperatureCoulomb(TemperatureCoulomb { joint, reference_c, shape }),
         ]);
     }
-    laws.extend([
-        Law::TemperatureViscous(TemperatureViscous { joint, reference_c }),
-        Law::MaxwellSlip(MaxwellSlip { joint, yield_displacement: 0.1 }),
-        Law::Offset(Offset { joint }),
-        Law::DriveInertia(DriveInertia { joint }),
+    terms.extend([
+        TorqueTerm::TemperatureViscous(TemperatureViscous { joint, reference_c }),
+        TorqueTerm::MaxwellSlip(MaxwellSlip { joint, yield_displacement: 0.1 }),
+        TorqueTerm::Offset(Offset { joint }),
+        TorqueTerm::DriveInertia(DriveInertia { joint }),
     ]);
     let coupling =
-        |effect| Law::Coupling(Coupling { name: "m".into(), first: 0, second: 1, ratios: [1.5, -0.5], effect });
-    laws.extend([CouplingEffect::Inertia, CouplingEffect::Viscous, CouplingEffect::Coulomb(STEP)].map(coupling));
-    laws
+        |effect| TorqueTerm::Coupling(Coupling { name: "m".into(), first: 0, second: 1, ratios: [1.5, -0.5], effect });
+    terms.extend([CouplingEffect::Inertia, CouplingEffect::Viscous, CouplingEffect::Coulomb(STEP)].map(coupling));
+    terms
 }
 
 /// What a simulation makes of a law is what its regressor column says.
@@ -65,15 +65,15 @@ fn columns_are_what_the_action_says() {
     let (q, dq, ddq) = ([0.3, -0.2], [0.07, 0.4], [2.0, -3.0]);
     let motion = JointMotion { samples: 1, q: &q, dq: &dq, ddq: &ddq };
     let load = 7.0;
-    for law in laws_of_all_kinds() {
-        let joints = law.joints();
+    for term in terms_of_all_kinds() {
+        let joints = term.joints();
         for &row in &joints {
             let mut out = [f64::NAN];
-            let mut memory = LawMemory::default();
-            let mut input = LawInput { load: Some(&[load]), temperature_c: None, memory: &mut memory };
-            law.column_following(row, &motion, &mut input, &mut out);
+            let mut memory = HysteresisState::default();
+            let mut input = TermInput { load: Some(&[load]), temperature_c: None, memory: &mut memory };
+            term.column_following(row, &motion, &mut input, &mut out);
             let across = |x: &[f64; 2]| x[*joints.iter().rfind(|&&other| other != row).unwrap_or(&row)];
-            let expected = match law.action() {
+            let expected = match term.action() {
                 TermAction::Inertia { factor } => factor * across(&ddq),
                 TermAction::Damping { factor } => factor * across(&dq),
                 TermAction::Constant => 1.0,
@@ -82,20 +82,21 @@ fn columns_are_what_the_action_says() {
                 TermAction::Friction(friction) => {
                     let speed: f64 = joints.iter().zip(friction.ratios).map(|(&joint, ratio)| ratio * dq[joint]).sum();
                     let curve = match friction.curve {
-                        SpeedCurve::Step { forward, backward } => {
+                        VelocityCurve::Step { forward, backward } => {
                             f64::from(forward && speed > 0.0) - f64::from(backward && speed < 0.0)
                         }
-                        SpeedCurve::Smooth(function) => function.value(speed),
+                        VelocityCurve::Smooth(function) => function.value(speed),
                     };
                     let faded = friction.fading.map_or(1.0, |[v, delta]| (-(speed / v).abs().powf(delta)).exp());
                     let share = joints.iter().zip(friction.ratios).find(|(joint, _)| **joint == row).unwrap().1;
                     share * curve * faded * if friction.by_load { load } else { 1.0 }
                 }
             };
-            assert!((out[0] - expected).abs() < 1e-14, "{law:?} in row {row}: {} {expected}", out[0]);
-            let across_entry = law.mass_matrix_entry(row, *joints.iter().rfind(|&&other| other != row).unwrap_or(&row));
-            assert_eq!(across_entry != 0.0, matches!(law.action(), TermAction::Inertia { .. }), "{law:?}");
-            assert_eq!(law.functions().is_empty(), !law.is_friction(), "{law:?}");
+            assert!((out[0] - expected).abs() < 1e-14, "{term:?} in row {row}: {} {expected}", out[0]);
+            let across_entry =
+                term.mass_matrix_entry(row, *joints.iter().rfind(|&&other| other != row).unwrap_or(&row));
+            assert_eq!(across_entry != 0.0, matches!(term.action(), TermAction::Inertia { .. }), "{term:?}");
+            assert_eq!(term.functions().is_empty(), !term.is_friction(), "{term:?}");
         }
     }
 }
@@ -107,15 +108,15 @@ fn slopes_equal_central_differences() {
     let moved = |by: f64| speeds.iter().map(|dq| dq + by).collect::<Vec<_>>();
     let zeros = vec![0.0; speeds.len()];
     let motion = JointMotion { samples: speeds.len(), q: &zeros, dq: &speeds, ddq: &zeros };
-    for law in laws_of_speed() {
-        let (more, less) = (column(&law, &moved(h)), column(&law, &moved(-h)));
+    for term in terms_of_velocity() {
+        let (more, less) = (column(&term, &moved(h)), column(&term, &moved(-h)));
         let (mut by_dq, mut by_ddq) = (zeros.clone(), zeros.clone());
-        law.pull_back(0, &motion, &vec![2.0; speeds.len()], &mut by_dq, &mut by_ddq);
+        term.apply_adjoint(0, &motion, &vec![2.0; speeds.len()], &mut by_dq, &mut by_ddq);
         for k in 0..speeds.len() {
             let expected = 2.0 * (more[k] - less[k]) / (2.0 * h);
-            // h² times a third derivative of at most 1/(0.006)³ or so, at speeds half a step from rest.
+            // h² times a third derivative of at most 1/(0.006)³ or so, at velocities half a step from rest.
             let tolerance = 1e-3 * (1.0 + expected.abs());
-            assert!((by_dq[k] - expected).abs() <= tolerance, "{law:?} at {}: {} {expected}", speeds[k], by_dq[k]);
+            assert!((by_dq[k] - expected).abs() <= tolerance, "{term:?} at {}: {} {expected}", speeds[k], by_dq[k]);
             assert!(by_ddq[k] == 0.0);
         }
     }
@@ -125,113 +126,115 @@ fn slopes_equal_central_differences() {
 fn at_rest_and_at_any_speed_all_is_finite_and_friction_takes_power() {
     let speeds = [0.0, 1e-300, -1e-300, 1e-9, 1.0, -1.0, 1e6, -1e6];
     let zeros = [0.0; 8];
-    for law in laws_of_speed() {
+    for term in terms_of_velocity() {
         let motion = JointMotion { samples: 8, q: &zeros, dq: &speeds, ddq: &zeros };
         let (mut by_dq, mut by_ddq) = (zeros, zeros);
-        law.pull_back(0, &motion, &[1.0; 8], &mut by_dq, &mut by_ddq);
-        for ((value, slope), dq) in column(&law, &speeds).iter().zip(by_dq).zip(speeds) {
-            assert!(value.is_finite() && slope.is_finite() && value * dq >= 0.0, "{law:?} at {dq}: {value} {slope}");
+        term.apply_adjoint(0, &motion, &[1.0; 8], &mut by_dq, &mut by_ddq);
+        for ((value, slope), dq) in column(&term, &speeds).iter().zip(by_dq).zip(speeds) {
+            assert!(value.is_finite() && slope.is_finite() && value * dq >= 0.0, "{term:?} at {dq}: {value} {slope}");
         }
     }
 }
 
 #[test]
-fn both_directions_together_are_the_symmetric_law() {
+fn both_directions_together_are_the_symmetric_term() {
     let speeds = [-0.4, -0.01, 0.0, 0.02, 1.3];
-    let sum = |make: &dyn Fn(Direction) -> Law| -> Vec<f64> {
+    let sum = |make: &dyn Fn(Direction) -> TorqueTerm| -> Vec<f64> {
         let (a, b) = (column(&make(Direction::Forward), &speeds), column(&make(Direction::Backward), &speeds));
         a.iter().zip(&b).map(|(a, b)| a + b).collect()
     };
-    let viscous = sum(&|direction| Law::DirectionalViscous(DirectionalViscous { joint: 0, direction }));
+    let viscous = sum(&|direction| TorqueTerm::DirectionalViscous(DirectionalViscous { joint: 0, direction }));
     assert_eq!(viscous, speeds);
-    let coulomb = sum(&|direction| Law::DirectionalCoulomb(DirectionalCoulomb { joint: 0, direction, shape: STEP }));
-    assert_eq!(coulomb, column(&Law::Coulomb(Coulomb { joint: 0, shape: STEP }), &speeds));
+    let coulomb =
+        sum(&|direction| TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { joint: 0, direction, shape: STEP }));
+    assert_eq!(coulomb, column(&TorqueTerm::Coulomb(Coulomb { joint: 0, shape: STEP }), &speeds));
 }
 
 #[test]
 fn known_values() {
     // Gaz with φ₃ = 0 is half a smooth step of width 2/φ₂.
     let speeds = [-0.3, -0.02, 0.0, 0.05];
-    let sigmoid = column(&Law::Sigmoid(Sigmoid { joint: 0, steepness: 40.0, offset_speed: 0.0 }), &speeds);
+    let sigmoid = column(&TorqueTerm::Sigmoid(Sigmoid { joint: 0, steepness: 40.0, offset_speed: 0.0 }), &speeds);
     for (value, dq) in sigmoid.iter().zip(speeds) {
         assert!((value - 0.5 * (dq / 0.05).tanh()).abs() < 1e-14);
     }
-    // At its own speed a share of 1/e is left.
+    // At its own velocity a share of 1/e is left.
     let shape = CoulombShape::Sign { dead_band: 0.0 };
-    let stribeck = Law::Stribeck(Stribeck { joint: 0, speed: 0.05, exponent: 1.6, shape });
+    let stribeck = TorqueTerm::Stribeck(Stribeck { joint: 0, speed: 0.05, exponent: 1.6, shape });
     assert!((column(&stribeck, &[-0.05])[0] + (-1.0_f64).exp()).abs() < 1e-14);
-    let root = Law::Power(Power { joint: 0, exponent: PowerExponent::CubeRoot, rounding: 1e-6 });
+    let root = TorqueTerm::Power(Power { joint: 0, exponent: PowerExponent::CubeRoot, rounding: 1e-6 });
     assert!((column(&root, &[-8.0])[0] + 2.0).abs() < 1e-9);
-    let square = Law::Power(Power { joint: 0, exponent: PowerExponent::Quadratic, rounding: 1e-6 });
+    let square = TorqueTerm::Power(Power { joint: 0, exponent: PowerExponent::Quadratic, rounding: 1e-6 });
     assert!((column(&square, &[-3.0])[0] + 9.0).abs() < 1e-9);
 }
 
 #[test]
 fn friction_by_load() {
-    let law = Law::Load(LoadFriction { joint: 0, shape: CoulombShape::Sign { dead_band: 0.0 } });
+    let term = TorqueTerm::Load(LoadFriction { joint: 0, shape: CoulombShape::Sign { dead_band: 0.0 } });
     let zeros = [0.0; 3];
     let motion = JointMotion { samples: 3, q: &zeros, dq: &[1.0, -2.0, 0.0], ddq: &zeros };
     let mut out = [f64::NAN; 3];
-    law.column_following(
+    term.column_following(
         0,
         &motion,
-        &mut LawInput { load: Some(&[-5.0, -7.0, 9.0]), temperature_c: None, memory: &mut LawMemory::default() },
+        &mut TermInput { load: Some(&[-5.0, -7.0, 9.0]), temperature_c: None, memory: &mut HysteresisState::default() },
         &mut out,
     );
     assert_eq!(out, [5.0, -7.0, 0.0]);
-    law.column(0, &motion, &mut out);
+    term.column(0, &motion, &mut out);
     assert_eq!(out, zeros);
 }
 
 #[test]
 fn a_slipping_spring_makes_the_loop_of_masing_and_remembers_across_blocks() {
     let limit = 0.1;
-    let law = Law::MaxwellSlip(MaxwellSlip { joint: 0, yield_displacement: limit });
+    let term = TorqueTerm::MaxwellSlip(MaxwellSlip { joint: 0, yield_displacement: limit });
     // Out by three yields, back by one, back by three, out again.
     let q: Vec<f64> = [0.0, 0.05, 0.1, 0.3, 0.2, 0.1, -0.1, 0.0].to_vec();
     let expected = [0.0, 0.5, 1.0, 1.0, 0.0, -1.0, -1.0, 0.0];
     let zeros = vec![0.0; q.len()];
     let mut whole = vec![f64::NAN; q.len()];
-    law.column(0, &JointMotion { samples: q.len(), q: &q, dq: &zeros, ddq: &zeros }, &mut whole);
+    term.column(0, &JointMotion { samples: q.len(), q: &q, dq: &zeros, ddq: &zeros }, &mut whole);
     for (value, expected) in whole.iter().zip(expected) {
         // Differences of positions below one.
         assert!((value - expected).abs() < 1e-14, "{whole:?}");
     }
     for split in 0..=q.len() {
-        let (mut memory, mut parts) = (LawMemory::default(), vec![f64::NAN; q.len()]);
+        let (mut memory, mut parts) = (HysteresisState::default(), vec![f64::NAN; q.len()]);
         for range in [0..split, split..q.len()] {
             let samples = range.len();
             let motion = JointMotion { samples, q: &q[range.clone()], dq: &zeros[..samples], ddq: &zeros[..samples] };
-            law.column_following(
+            term.column_following(
                 0,
                 &motion,
-                &mut LawInput { load: None, temperature_c: None, memory: &mut memory },
+                &mut TermInput { load: None, temperature_c: None, memory: &mut memory },
                 &mut parts[range],
             );
         }
         assert_eq!(parts, whole);
         memory.restart();
-        assert_eq!(memory, LawMemory::default());
+        assert_eq!(memory, HysteresisState::default());
     }
 }
 
 #[test]
 fn friction_changes_with_the_temperature_about_its_reference() {
-    use dynident_model::laws::{TemperatureCoulomb, TemperatureViscous};
+    use dynident_model::terms::{TemperatureCoulomb, TemperatureViscous};
     let (speeds, temperature) = ([0.4, -0.4, 0.0, 1.0], [25.0, 35.0, 35.0, 15.0]);
     let motion = JointMotion { samples: 4, q: &[0.0; 4], dq: &speeds, ddq: &[0.0; 4] };
     let shape = CoulombShape::Sign { dead_band: 0.0 };
-    let viscous = Law::TemperatureViscous(TemperatureViscous { joint: 0, reference_c: 25.0 });
-    let coulomb = Law::TemperatureCoulomb(TemperatureCoulomb { joint: 0, reference_c: 25.0, shape });
-    for (law, expected) in [(&viscous, [0.0, -4.0, 0.0, -10.0]), (&coulomb, [0.0, -10.0, 0.0, -10.0])] {
+    let viscous = TorqueTerm::TemperatureViscous(TemperatureViscous { joint: 0, reference_c: 25.0 });
+    let coulomb = TorqueTerm::TemperatureCoulomb(TemperatureCoulomb { joint: 0, reference_c: 25.0, shape });
+    for (term, expected) in [(&viscous, [0.0, -4.0, 0.0, -10.0]), (&coulomb, [0.0, -10.0, 0.0, -10.0])] {
         let mut out = [1.0; 4];
-        let mut input = LawInput { load: None, temperature_c: Some(&temperature), memory: &mut LawMemory::default() };
-        law.column_following(0, &motion, &mut input, &mut out);
-        assert_eq!(out, expected, "{}", law.symbol());
+        let mut input =
+            TermInput { load: None, temperature_c: Some(&temperature), memory: &mut HysteresisState::default() };
+        term.column_following(0, &motion, &mut input, &mut out);
+        assert_eq!(out, expected, "{}", term.symbol());
         // Without a temperature the joint is at its reference.
-        law.column(0, &motion, &mut out);
+        term.column(0, &motion, &mut out);
         assert_eq!(out, [0.0; 4]);
-        assert!(law.needs_temperature() && law.is_joint_friction() && !law.is_nonnegative());
+        assert!(term.needs_temperature() && term.is_joint_friction() && !term.is_nonnegative());
     }
     assert_eq!((&viscous.symbol()[..], viscous.unit()), ("fvT1", "Nm s/(rad K)"));
     assert_eq!((&coulomb.symbol()[..], coulomb.unit()), ("fcT1", "Nm/K"));

@@ -6,7 +6,7 @@ use dynident_model::{
 };
 use proptest::prelude::*;
 
-/// Physically possible bodies: a few point masses each.
+/// Physically consistent bodies: a few point masses each.
 fn bodies(seed: u64, count: usize) -> Vec<InertialParameters> {
     // A linear congruential generator (Knuth's MMIX constants): the test needs variety, not quality.
     let mut state = seed;

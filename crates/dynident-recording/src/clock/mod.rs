@@ -17,12 +17,12 @@ pub(crate) const NEGLIGIBLE_JITTER: f64 = 1e-3;
 /// when stamps are interpolated.
 pub(crate) const SHORTEST_STEP: f64 = 0.1;
 
-/// What the first rows tell about the clock.
+/// What the first rows determine about the clock.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Clock {
     /// Samples per second on the uniform grid.
     pub rate_hz: f64,
-    /// Whether samples count as evenly spaced (the stamps only told the mean rate).
+    /// Whether samples count as evenly spaced (the stamps only gave the mean rate).
     pub uniform: bool,
     /// Median step in seconds.
     pub median_step_s: f64,

@@ -22,7 +22,7 @@ impl CentralDifferences {
     /// If `order` is not 2, 4, 6 or 8.
     pub fn new(order: usize) -> Result<Self, FilterError> {
         if !matches!(order, 2 | 4 | 6 | 8) {
-            return Err(FilterError::Setting { name: "order", value: order as f64, mend: "give 2, 4, 6 or 8" });
+            return Err(FilterError::Setting { name: "order", value: order as f64, fix: "give 2, 4, 6 or 8" });
         }
         let points: Vec<f64> = (0..=order).map(|i| i as f64).collect();
         let weights = (0..=order).map(|place| fornberg(place as f64, &points)).collect();

@@ -6,7 +6,7 @@ use crate::error::FilterError;
 use crate::reference::Reference;
 use std::sync::Arc;
 
-/// `q = q_d + e`: any other way smooths and differentiates the deviation e alone, and the reference's own derivatives
+/// `q = q_d + e`: any other differentiator smooths and differentiates the deviation e alone, and the reference's own derivatives
 /// are added exactly:
 ///
 /// `dq = dq_d + S{e}'`, `ddq = ddq_d + S{e}''`
@@ -113,7 +113,7 @@ mod tests {
             let out = differentiated(&deviation(0.2, max_lag_s), 100.0, &q);
             for i in 0..1300 {
                 for order in 0..3 {
-                    // The lag is found to 1e-6 s at least, times the speeds.
+                    // The lag is found to 1e-6 s at least, times the velocities.
                     assert!((out[order][i] - exact[i][order]).abs() < 2e-5, "{order} {i}");
                 }
             }
@@ -143,12 +143,12 @@ mod tests {
         let columns = [times.clone(), vec![1.0; 101], vec![0.0; 101]];
         let reference = Arc::new(Reference::sampled(&times, &[columns]).unwrap());
         let smoother = Box::new(crate::derivative::CentralDifferences::new(2).unwrap());
-        let way = Deviation::new(reference, smoother, None).unwrap();
+        let differentiator = Deviation::new(reference, smoother, None).unwrap();
         let q: Vec<f64> = (0..150).map(|i| f64::from(i) * 0.01).collect();
         let mut out = [vec![0.0; 150], vec![0.0; 150], vec![0.0; 150]];
         let [y, dy, ddy] = &mut out;
         let place = Place { rate_hz: 100.0, joint: 0, first_time_s: 0.0 };
-        let marked = way.differentiate_at(place, &q, Derivatives { q: y, dq: dy, ddq: ddy }).unwrap();
+        let marked = differentiator.differentiate_at(place, &q, Derivatives { q: y, dq: dy, ddq: ddy }).unwrap();
         assert_eq!(marked, vec![101..150; 1]);
         assert!((out[1][50] - 1.0).abs() < 1e-12);
     }

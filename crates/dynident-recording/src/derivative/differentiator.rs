@@ -1,4 +1,4 @@
-//! From q to dq and ddq: the interface of every way there is, and of those that a caller plugs in.
+//! From q to dq and ddq: the interface of every differentiator there is, and of those that a caller plugs in.
 
 use crate::error::FilterError;
 use core::ops::Range;
@@ -14,7 +14,7 @@ pub struct Derivatives<'a> {
     pub ddq: &'a mut [f64],
 }
 
-/// Which samples are looked at: ways that know the commanded motion need the joint and the time.
+/// Which samples are looked at: differentiators that know the commanded motion need the joint and the time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
     /// Samples per second.
@@ -48,13 +48,13 @@ pub(crate) fn add_sample(ranges: &mut SampleRanges, i: usize) {
     }
 }
 
-/// One way from uniformly sampled positions of one joint to filtered position, velocity and acceleration.
+/// One differentiator: from uniformly sampled positions of one joint to filtered position, velocity and acceleration.
 ///
-/// A way that states its [`context_samples`](Self::context_samples) works through a long log in pieces: a window with
+/// A differentiator that states its [`context_samples`](Self::context_samples) works through a long log in pieces: a window with
 /// so many samples more on either side gives inside what the whole log would give. Ways that fit something to the whole
 /// piece, or estimate a lag over it, leave the default.
 ///
-/// Name, shortest signal and [`differentiate_at`](Self::differentiate_at) make a new way. It need not be known to this
+/// Name, shortest signal and [`differentiate_at`](Self::differentiate_at) make a new differentiator. It need not be known to this
 /// crate: [`MotionStream::with_differentiator`](crate::MotionStream::with_differentiator) takes it as it is.
 ///
 /// ```
@@ -111,10 +111,10 @@ pub trait Differentiator: core::fmt::Debug + Send + Sync {
         None
     }
 
-    /// Fills `out` from the positions `q` at `place`; which joint it is, and when, matters only to ways that follow a
+    /// Fills `out` from the positions `q` at `place`; which joint it is, and when, matters only to differentiators that follow a
     /// [`Reference`](crate::Reference).
     ///
-    /// Returns the samples at which this way does not apply: velocity and acceleration there mean nothing.
+    /// Returns the samples at which this differentiator does not apply: velocity and acceleration there mean nothing.
     ///
     /// # Errors
     /// [`FilterError`] if `q` is shorter than [`minimum_samples`](Self::minimum_samples) or the filter does not exist

@@ -29,7 +29,7 @@ impl FivePointCubic {
     /// If `passes` is not 1 to 1000 or the cut-off is not positive.
     pub fn new(passes: usize, cutoff_hz: f64) -> Result<Self, FilterError> {
         if !(1..=1000).contains(&passes) {
-            return Err(FilterError::Setting { name: "passes", value: passes as f64, mend: "give 1 to 1000" });
+            return Err(FilterError::Setting { name: "passes", value: passes as f64, fix: "give 1 to 1000" });
         }
         Ok(Self {
             cubic: SavitzkyGolay::new(5, 3)?,
@@ -118,7 +118,7 @@ mod tests {
     fn bad_settings_are_refused() {
         assert!(FivePointCubic::new(0, 1.0).is_err());
         assert!(FivePointCubic::new(1, 0.0).is_err());
-        let way = FivePointCubic::new(1, 1.0).unwrap();
-        assert!(way.smooth(10.0, &[0.0; 4], &mut [0.0; 4]).is_err());
+        let differentiator = FivePointCubic::new(1, 1.0).unwrap();
+        assert!(differentiator.smooth(10.0, &[0.0; 4], &mut [0.0; 4]).is_err());
     }
 }

@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_told_apart_is_refused() {
+    fn what_cannot_be_distinguished_is_refused() {
         assert!(FourierFit::new(0.0, 3, true).is_err());
         assert!(FourierFit::new(f64::NAN, 3, true).is_err());
         assert!(FourierFit::new(1.0, 0, true).is_err());

@@ -19,12 +19,12 @@ const TAPER: f64 = 2.0;
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Ends {
-    /// A smooth bridge back to the begin, over eight periods of the cut-off: value, speed and acceleration go on
+    /// A smooth bridge back to the begin, over eight periods of the cut-off: value, velocity and acceleration go on
     /// without a jump, whatever the motion does at its ends. The band ends gently, by half a cosine from the cut-off to
     /// twice it, so that what is left rings near the ends only; one period of the cut-off at either end does not count.
     #[default]
     Tapered,
-    /// The piece, then the piece backwards: value and acceleration go on without a jump, and so does the speed of a
+    /// The piece, then the piece backwards: value and acceleration go on without a jump, and so does the velocity of a
     /// motion that is at rest at both ends.
     Mirrored,
     /// The piece again: for whole periods of a settled periodic motion. Anything else leaks into all frequencies.
@@ -56,7 +56,7 @@ impl FrequencyDomain {
         if cutoff_hz.is_finite() && cutoff_hz > 0.0 {
             Ok(Self { cutoff_hz, ends })
         } else {
-            Err(FilterError::Setting { name: "cutoff_hz", value: cutoff_hz, mend: "give a positive frequency" })
+            Err(FilterError::Setting { name: "cutoff_hz", value: cutoff_hz, fix: "give a positive frequency" })
         }
     }
 
@@ -167,11 +167,11 @@ mod tests {
         // Even and odd numbers of samples; the second harmonic stands at the cut-off itself.
         for n in [400_usize, 401] {
             let (rate, base) = (100.0, 100.0 / n as f64);
-            let way = FrequencyDomain::new(2.0 * base * (1.0 + 1e-12), Ends::Periodic).unwrap();
+            let differentiator = FrequencyDomain::new(2.0 * base * (1.0 + 1e-12), Ends::Periodic).unwrap();
             let w = TAU * base;
             let at = |i: usize| (w * i as f64 / rate, 0.5 * w * 4.0);
             let q: Vec<f64> = (0..n).map(|i| 7.0 + at(i).0.sin() + 0.5 * (2.0 * at(i).0).cos()).collect();
-            let out = differentiated(&way, rate, &q);
+            let out = differentiated(&differentiator, rate, &q);
             for i in 0..n {
                 let x = at(i).0;
                 // Rounding of the transform: a few 1e-16 of the signal, times the frequency.
@@ -211,11 +211,11 @@ mod tests {
         };
         let q: Vec<f64> = (0..n).map(|i| at(i)[0]).collect();
         let worst = |ends: Ends| {
-            let way = FrequencyDomain::new(cutoff, ends).unwrap();
+            let differentiator = FrequencyDomain::new(cutoff, ends).unwrap();
             let mut out = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
             let [own_q, dq, ddq] = &mut out;
             let place = Place { rate_hz: rate, joint: 0, first_time_s: 0.0 };
-            let marked = way.differentiate_at(place, &q, Derivatives { q: own_q, dq, ddq }).unwrap();
+            let marked = differentiator.differentiate_at(place, &q, Derivatives { q: own_q, dq, ddq }).unwrap();
             let counts = |i: &usize| (500..n - 500).contains(i);
             let error = |k: usize| (0..n).filter(counts).map(|i| (out[k][i] - at(i)[k]).abs()).fold(0.0, f64::max);
             (marked, [error(0), error(1), error(2)])
@@ -224,7 +224,7 @@ mod tests {
         // One period of the cut-off at either end.
         assert_eq!(marked, [0..500, n - 500..n]);
         // What is left of a jump in the third derivative (10 rad/s³) behind a gentle band edge, a period of the cut-off
-        // away: below a thousandth of the speed (1.9 rad/s) and the acceleration (3 rad/s²).
+        // away: below a thousandth of the velocity (1.9 rad/s) and the acceleration (3 rad/s²).
         assert!(tapered[0] < 1e-3 && tapered[1] < 2e-3 && tapered[2] < 3e-3, "{tapered:?}");
         let (marked, mirrored) = worst(Ends::Mirrored);
         assert!(marked.is_empty() && mirrored[2] > 20.0 * tapered[2], "{mirrored:?} {tapered:?}");
@@ -261,11 +261,11 @@ mod tests {
         assert!(FrequencyDomain::new(f64::INFINITY, Ends::Periodic).is_err());
         // A polynomial needs ten samples.
         assert!(FrequencyDomain::new(3.0, Ends::Tapered).unwrap().smooth(10.0, &[0.0; 9], &mut [0.0; 9]).is_err());
-        let way = FrequencyDomain::new(3.0, Ends::Mirrored).unwrap();
-        assert!(way.smooth(10.0, &[0.0; 3], &mut [0.0; 3]).is_err());
-        assert!(way.smooth(6.0, &[0.0; 30], &mut [0.0; 30]).is_err());
+        let differentiator = FrequencyDomain::new(3.0, Ends::Mirrored).unwrap();
+        assert!(differentiator.smooth(10.0, &[0.0; 3], &mut [0.0; 3]).is_err());
+        assert!(differentiator.smooth(6.0, &[0.0; 30], &mut [0.0; 30]).is_err());
         let mut out = [1.0; 4];
-        way.smooth(10.0, &[2.0; 4], &mut out).unwrap();
+        differentiator.smooth(10.0, &[2.0; 4], &mut out).unwrap();
         assert_eq!(out, [2.0; 4]);
     }
 }

@@ -5,7 +5,7 @@ use core::f64::consts::TAU;
 
 /// Rows that are gathered before the next reduction to a triangle.
 const BLOCK: usize = 512;
-/// A column whose new part is smaller than this share of it cannot be told from the others: six digits of the fit would
+/// A column whose new part is smaller than this share of it cannot be determined from the others: six digits of the fit would
 /// be left.
 const DEPENDENT: f64 = 1e-10;
 
@@ -29,7 +29,7 @@ impl HarmonicFit {
     /// The fit to uniformly sampled values, by Householder reduction of blocks of rows.
     ///
     /// # Errors
-    /// If the samples do not tell the harmonics apart, or the highest one is not below half the rate.
+    /// If the samples do not distinguish the harmonics, or the highest one is not below half the rate.
     pub(crate) fn new(
         method: &'static str,
         base_hz: f64,
@@ -57,7 +57,7 @@ impl HarmonicFit {
         fit.coefficients = triangle.solution().ok_or(FilterError::Undetermined {
             method,
             samples: signal.len(),
-            mend: "the piece is too short for harmonics of this base frequency: raise base_hz, lower harmonics, or leave the trend out",
+            fix: "the piece is too short for harmonics of this base frequency: raise base_hz, lower harmonics, or leave the trend out",
         })?;
         fit.coefficients[0] += origin;
         Ok(fit)
@@ -111,11 +111,11 @@ impl HarmonicFit {
 /// A base frequency that is not positive, or harmonics that are not 1 to 200.
 pub(crate) fn check_series(base_hz: f64, harmonics: usize) -> Result<(), FilterError> {
     if !(base_hz.is_finite() && base_hz > 0.0) {
-        let mend = "give the trajectory's base frequency, positive, in Hz";
-        return Err(FilterError::Setting { name: "base_hz", value: base_hz, mend });
+        let fix = "give the trajectory's base frequency, positive, in Hz";
+        return Err(FilterError::Setting { name: "base_hz", value: base_hz, fix });
     }
     if !(1..=200).contains(&harmonics) {
-        return Err(FilterError::Setting { name: "harmonics", value: harmonics as f64, mend: "give 1 to 200" });
+        return Err(FilterError::Setting { name: "harmonics", value: harmonics as f64, fix: "give 1 to 200" });
     }
     Ok(())
 }

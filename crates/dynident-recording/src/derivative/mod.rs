@@ -1,14 +1,14 @@
 //! From q to dq and ddq.
 //!
-//! [`Differentiator`] is the interface, also for ways that this crate does not know; [`DifferentiatorSettings`] is the
+//! [`Differentiator`] is the interface, also for differentiators that this crate does not know; [`DifferentiatorSettings`] is the
 //! registry of those that it does. They come in three kinds:
 //!
 //! * filters and local fits, which work through a long log in pieces: [`ButterworthZeroPhase`] (the default),
 //!   [`LowPass`], [`CentralDifferences`], [`SmoothedDifferences`], [`SavitzkyGolay`], [`FivePointCubic`];
-//! * fits to a whole piece: [`FourierFit`], [`SpeedSeries`], [`FrequencyDomain`];
-//! * ways that use the commanded motion: [`PositionMap`], [`TimeWarp`], [`Deviation`].
+//! * fits to a whole piece: [`FourierFit`], [`VelocitySeries`], [`FrequencyDomain`];
+//! * differentiators that use the commanded motion: [`PositionMap`], [`TimeWarp`], [`Deviation`].
 //!
-//! A further way is a file here and its variant of [`DifferentiatorSettings`]; the compiler asks for the rest.
+//! A further differentiator is a file here and its variant of [`DifferentiatorSettings`]; the compiler asks for the rest.
 
 mod butterworth;
 mod central_differences;
@@ -23,10 +23,10 @@ mod reference_lag;
 mod savitzky_golay;
 mod settings;
 mod smoothed_differences;
-mod speed_series;
 #[cfg(test)]
 mod test_signals;
 mod time_warp;
+mod velocity_series;
 
 pub use butterworth::{ButterworthZeroPhase, LowPass};
 pub use central_differences::CentralDifferences;
@@ -39,5 +39,5 @@ pub use position_map::PositionMap;
 pub use savitzky_golay::SavitzkyGolay;
 pub use settings::DifferentiatorSettings;
 pub use smoothed_differences::SmoothedDifferences;
-pub use speed_series::SpeedSeries;
 pub use time_warp::TimeWarp;
+pub use velocity_series::VelocitySeries;

@@ -1,4 +1,4 @@
-//! Speed and acceleration read from the position on a known stroke: the paper's map.
+//! Velocity and acceleration read from the position on a known stroke: the paper's map.
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges, add_sample};
 use super::reference_lag::{check_joint, check_max_lag, lags, samples_of};
@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// Halvings that bring a bracket of any stroke below the last bit of its time.
 const HALVINGS: usize = 60;
 
-/// On a stroke that goes one way, position alone tells speed and acceleration, `dq = g(q)`, `ddq = g'(q) g(q)`. For the
+/// On a stroke that goes one differentiator, position alone determines velocity and acceleration, `dq = g(q)`, `ddq = g'(q) g(q)`. For the
 /// paper's logistic strokes in closed form, its Eqs. 15 and 16 ([`LogisticPath::rates`](crate::LogisticPath::rates));
 /// for any other reference by solving `q_d(s) = q` for s within the stroke.
 ///
@@ -18,7 +18,7 @@ const HALVINGS: usize = 60;
 ///   branch.
 /// * Outside the stroke, where the formulas have the wrong sign, and on strokes that turn or are not followed within
 ///   the longest lag, the map does not apply: such samples are returned as marked.
-/// * Where the reference rests there is no stroke: speed and acceleration are the reference's own, at most 1e-3 of
+/// * Where the reference rests there is no stroke: velocity and acceleration are the reference's own, at most 1e-3 of
 ///   their peaks.
 ///
 /// Noise σ of q comes out as at most ωσ in dq and ω²σ in ddq. A pure lag costs nothing; any other tracking error e =
@@ -40,7 +40,7 @@ impl PositionMap {
         Ok(Self { reference, max_lag_s })
     }
 
-    /// Speed and acceleration at `q` on a stroke of a sampled reference between two times.
+    /// Velocity and acceleration at `q` on a stroke of a sampled reference between two times.
     fn inverted(&self, joint: usize, q: f64, from_s: f64, to_s: f64) -> Option<[f64; 2]> {
         let [start, end] = [from_s, to_s].map(|t| self.reference.at(joint, t)[0]);
         let upward = end > start;
@@ -139,7 +139,7 @@ mod tests {
         let lag = 0.31;
         let q: Vec<f64> = (0..6100).map(|i| PATH.at(place().time_s(i) - lag)[0]).collect();
         // The sampled reference is the closed form to 1e-12 in q; near the stroke's ends its inverse is as good as the
-        // speed there allows.
+        // velocity there allows.
         for (reference, tolerance) in [(Reference::logistic(&[PATH]).unwrap(), 1e-6), (sampled(), 1e-5)] {
             let ([_, dq, ddq], marked) = mapped(reference, &q);
             assert!(marked.is_empty(), "{marked:?}");

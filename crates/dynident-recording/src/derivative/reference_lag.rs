@@ -65,7 +65,7 @@ pub(super) fn check_max_lag(max_lag_s: f64) -> Result<(), FilterError> {
     if max_lag_s > 0.0 && max_lag_s <= 60.0 {
         return Ok(());
     }
-    Err(FilterError::Setting { name: "max_lag_s", value: max_lag_s, mend: "give seconds, above 0 and at most 60" })
+    Err(FilterError::Setting { name: "max_lag_s", value: max_lag_s, fix: "give seconds, above 0 and at most 60" })
 }
 
 pub(super) fn check_joint(reference: &Reference, place: Place) -> Result<(), FilterError> {
@@ -128,7 +128,7 @@ fn best(
             break;
         }
     }
-    let moves = reference.peak_speed(joint) > 0.0;
+    let moves = reference.peak_velocity(joint) > 0.0;
     let rms = mean_square(lag_s, 1).sqrt();
     (lag_s, moves && (lag_s <= least || lag_s >= most || !rms.is_finite()))
 }

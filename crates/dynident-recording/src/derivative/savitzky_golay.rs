@@ -25,14 +25,14 @@ impl SavitzkyGolay {
             return Err(FilterError::Setting {
                 name: "window",
                 value: window as f64,
-                mend: "give an odd number, 3 to 501",
+                fix: "give an odd number, 3 to 501",
             });
         }
         if !(2..=8).contains(&degree) || degree >= window {
             return Err(FilterError::Setting {
                 name: "degree",
                 value: degree as f64,
-                mend: "give 2 to 8, below the window",
+                fix: "give 2 to 8, below the window",
             });
         }
         Ok(Self { window, weights: polynomial_weights(window, degree) })

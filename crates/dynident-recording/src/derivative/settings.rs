@@ -1,4 +1,4 @@
-//! What a study file may ask for under `differentiator`: the registry of every way that is offered.
+//! What a study file may ask for under `differentiator`: the registry of every differentiator that is offered.
 
 use super::butterworth::{ButterworthZeroPhase, LowPass};
 use super::central_differences::CentralDifferences;
@@ -11,14 +11,14 @@ use super::position_map::PositionMap;
 use super::reference_lag::check_max_lag;
 use super::savitzky_golay::SavitzkyGolay;
 use super::smoothed_differences::SmoothedDifferences;
-use super::speed_series::SpeedSeries;
 use super::time_warp::TimeWarp;
+use super::velocity_series::VelocitySeries;
 use crate::error::FilterError;
 use crate::reference::{Reference, ReferenceSettings};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// One way from q to dq and ddq with its settings, as a study file names it under `differentiator`.
+/// One differentiator with its settings, as a study file names it under `differentiator`.
 ///
 /// ```
 /// use dynident_recording::DifferentiatorSettings;
@@ -97,8 +97,9 @@ pub enum DifferentiatorSettings {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         cutoff_hz: Option<f64>,
     },
-    /// [`SpeedSeries`]: a Fourier series fitted to the filtered speed.
-    SpeedSeries {
+    /// [`VelocitySeries`]: a Fourier series fitted to the filtered velocity.
+    #[serde(rename = "speed-series")]
+    VelocitySeries {
         /// Base frequency of the motion.
         base_hz: f64,
         /// Highest harmonic, 1 to 200.
@@ -107,7 +108,7 @@ pub enum DifferentiatorSettings {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         cutoff_hz: Option<f64>,
     },
-    /// [`PositionMap`]: the paper's map, position to speed and acceleration on a known stroke.
+    /// [`PositionMap`]: the paper's map, position to velocity and acceleration on a known stroke.
     #[serde(alias = "logistic-map")]
     PositionMap {
         /// The commanded motion; a log may have its own.
@@ -131,7 +132,7 @@ pub enum DifferentiatorSettings {
         /// The commanded motion; a log may have its own.
         #[serde(default)]
         reference: ReferenceSettings,
-        /// Any of the ways that need no reference; zero-phase Butterworth by default.
+        /// Any of the differentiators that need no reference; zero-phase Butterworth by default.
         #[serde(default)]
         smoother: Box<DifferentiatorSettings>,
         /// Shift the reference by the joint's lag behind it, at most so many seconds; not shifted by default.
@@ -194,11 +195,11 @@ impl DifferentiatorSettings {
             | Self::FrequencyDomain { .. }
             | Self::SmoothedDifferences { .. }
             | Self::FivePointCubic { .. }
-            | Self::SpeedSeries { .. } => self.build(1.0).map(drop),
+            | Self::VelocitySeries { .. } => self.build(1.0).map(drop),
         }
     }
 
-    /// How the commanded motion is named; `None` for ways that need none.
+    /// How the commanded motion is named; `None` for differentiators that need none.
     pub fn reference(&self) -> Option<&ReferenceSettings> {
         match self {
             Self::PositionMap { reference, .. }
@@ -212,7 +213,7 @@ impl DifferentiatorSettings {
             | Self::FrequencyDomain { .. }
             | Self::SmoothedDifferences { .. }
             | Self::FivePointCubic { .. }
-            | Self::SpeedSeries { .. } => None,
+            | Self::VelocitySeries { .. } => None,
         }
     }
 
@@ -222,7 +223,7 @@ impl DifferentiatorSettings {
             | Self::LowPass { cutoff_hz, .. }
             | Self::FrequencyDomain { cutoff_hz, .. }
             | Self::FivePointCubic { cutoff_hz, .. }
-            | Self::SpeedSeries { cutoff_hz, .. } => Some(cutoff_hz),
+            | Self::VelocitySeries { cutoff_hz, .. } => Some(cutoff_hz),
             Self::Deviation { smoother, .. } => smoother.cutoff_place(),
             Self::CentralDifferences { .. }
             | Self::SavitzkyGolay { .. }
@@ -265,7 +266,7 @@ impl DifferentiatorSettings {
     /// As [`build`](Self::build), with the commanded motion, which stands before what the settings name.
     ///
     /// # Errors
-    /// A [`FilterError`] that names the setting; [`FilterError::NoReference`] if this way needs a motion and has none.
+    /// A [`FilterError`] that names the setting; [`FilterError::NoReference`] if this differentiator needs a motion and has none.
     pub fn build_following(
         &self,
         chosen_cutoff_hz: f64,
@@ -292,8 +293,8 @@ impl DifferentiatorSettings {
             Self::FivePointCubic { passes, cutoff_hz } => {
                 Box::new(FivePointCubic::new(*passes, cutoff_hz.unwrap_or(chosen_cutoff_hz))?)
             }
-            Self::SpeedSeries { base_hz, harmonics, cutoff_hz } => {
-                Box::new(SpeedSeries::new(*base_hz, *harmonics, cutoff_hz.unwrap_or(chosen_cutoff_hz))?)
+            Self::VelocitySeries { base_hz, harmonics, cutoff_hz } => {
+                Box::new(VelocitySeries::new(*base_hz, *harmonics, cutoff_hz.unwrap_or(chosen_cutoff_hz))?)
             }
             Self::PositionMap { reference, max_lag_s } => {
                 Box::new(PositionMap::new(motion(reference, "position-map")?, *max_lag_s)?)

@@ -5,7 +5,7 @@ use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use crate::error::FilterError;
 
 /// Central differences of the positions as logged, the acceleration then smoothed by a moving average of `window`
-/// samples; the torque is smoothed the same way where `smooth_torque` asks for it. Position and velocity stay as they
+/// samples; the torque is smoothed the same differentiator where `smooth_torque` asks for it. Position and velocity stay as they
 /// are.
 ///
 /// White noise σ of the position leaves `σ rate/√2` in dq (order 2). In ddq the average of second differences
@@ -27,8 +27,8 @@ impl SmoothedDifferences {
     /// If `order` is not 2, 4, 6 or 8, or `window` is even or beyond 501.
     pub fn new(order: usize, window: usize) -> Result<Self, FilterError> {
         if window.is_multiple_of(2) || !(3..=501).contains(&window) {
-            let mend = "give an odd number, 3 to 501";
-            return Err(FilterError::Setting { name: "window", value: window as f64, mend });
+            let fix = "give an odd number, 3 to 501";
+            return Err(FilterError::Setting { name: "window", value: window as f64, fix });
         }
         Ok(Self { differences: CentralDifferences::new(order)?, order, window })
     }
@@ -94,15 +94,15 @@ mod tests {
     #[test]
     fn a_cubic_is_differentiated_exactly_and_a_sine_loses_what_the_average_takes() {
         let (rate, n, window) = (100.0, 300_usize, 21_usize);
-        let way = SmoothedDifferences::new(4, window).unwrap();
+        let differentiator = SmoothedDifferences::new(4, window).unwrap();
         let t = |i: usize| i as f64 / rate;
-        let out = differentiated(&way, rate, &(0..n).map(|i| t(i).powi(3)).collect::<Vec<_>>());
+        let out = differentiated(&differentiator, rate, &(0..n).map(|i| t(i).powi(3)).collect::<Vec<_>>());
         for i in 0..n {
             // Rounding: positions of 27 to 1e-16, times rate² and the weights, whose sizes add up to 30 at the ends.
             assert!((out[2][i] - 6.0 * t(i)).abs() < 1e-8, "{i}");
         }
         let w = 3.0;
-        let out = differentiated(&way, rate, &(0..n).map(|i| (w * t(i)).sin()).collect::<Vec<_>>());
+        let out = differentiated(&differentiator, rate, &(0..n).map(|i| (w * t(i)).sin()).collect::<Vec<_>>());
         // The mean of W samples of a sine has the gain of Dirichlet's kernel.
         let x = 0.5 * w / rate;
         let gain = (window as f64 * x).sin() / (window as f64 * x.sin());
@@ -117,7 +117,7 @@ mod tests {
         assert!(SmoothedDifferences::new(2, 4).is_err());
         assert!(SmoothedDifferences::new(2, 503).is_err());
         assert!(SmoothedDifferences::new(3, 5).is_err());
-        let way = SmoothedDifferences::new(2, 11).unwrap();
-        assert!(way.smooth(1.0, &[0.0; 10], &mut [0.0; 10]).is_err());
+        let differentiator = SmoothedDifferences::new(2, 11).unwrap();
+        assert!(differentiator.smooth(1.0, &[0.0; 10], &mut [0.0; 10]).is_err());
     }
 }

@@ -1,4 +1,4 @@
-//! Signals and shorthands for the tests of the ways from q to dq and ddq.
+//! Signals and shorthands for the tests of the differentiators.
 
 use crate::derivative::differentiator::{Derivatives, Differentiator};
 
@@ -15,11 +15,11 @@ pub(crate) fn normal(seed: u64, n: usize) -> Vec<f64> {
     (0..n).map(|_| (-2.0 * uniform().ln()).sqrt() * (core::f64::consts::TAU * uniform()).cos()).collect()
 }
 
-/// q, dq and ddq by a way.
-pub(crate) fn differentiated(way: &dyn Differentiator, rate_hz: f64, q: &[f64]) -> [Vec<f64>; 3] {
+/// q, dq and ddq by a differentiator.
+pub(crate) fn differentiated(differentiator: &dyn Differentiator, rate_hz: f64, q: &[f64]) -> [Vec<f64>; 3] {
     let mut out = [vec![0.0; q.len()], vec![0.0; q.len()], vec![0.0; q.len()]];
     let [y, dy, ddy] = &mut out;
-    way.differentiate(rate_hz, q, Derivatives { q: y, dq: dy, ddq: ddy }).unwrap();
+    differentiator.differentiate(rate_hz, q, Derivatives { q: y, dq: dy, ddq: ddy }).unwrap();
     out
 }
 

@@ -22,7 +22,7 @@ fn state(signal: &[f64], basis: &[[Vec<f64>; 3]], place: usize) -> [f64; 3] {
 }
 
 /// `steps - 1` samples that lead from behind the signal's end back to its begin in `steps` steps: the quintic
-/// polynomial through value, speed and acceleration of both, which are those of polynomials of degree 4 fitted to
+/// polynomial through value, velocity and acceleration of both, which are those of polynomials of degree 4 fitted to
 /// `window` samples at either end. The signal and these, repeated, have no jump up to the second derivative.
 pub(crate) fn bridge(signal: &[f64], window: usize, steps: usize) -> Vec<f64> {
     let basis = orthonormal_polynomials(window, DEGREE);

@@ -45,7 +45,7 @@ impl DecimationSettings {
     /// # Errors
     /// A [`FilterError`] that names the setting.
     pub fn taps(&self, rate_hz: f64) -> Result<Vec<f64>, FilterError> {
-        let bad = |name, value, mend| Err(FilterError::Setting { name, value, mend });
+        let bad = |name, value, fix| Err(FilterError::Setting { name, value, fix });
         if !(1..=1000).contains(&self.factor) {
             return bad("factor", self.factor as f64, "give 1 to 1000");
         }

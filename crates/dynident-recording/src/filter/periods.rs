@@ -38,7 +38,7 @@ impl AveragedPeriods {
 /// // Two periods of three samples, 0.2 apart everywhere.
 /// let found = dynident_recording::averaged_periods(&[&[0.9, 1.9, 2.9, 1.1, 2.1, 3.1]], 3)?;
 /// assert!((found.mean[0][2] - 3.0).abs() < 1e-12);
-/// assert!((found.sample_covariance[0][0] - 0.02).abs() < 1e-12); // 2 · 0.1² over one degree of freedom
+/// assert!((found.sample_covariance[0][0] - 0.02).abs() < 1e-12); // 2 · 0.1² over one degree of degrees_of_freedom
 /// # Ok::<(), dynident_recording::FormatError>(())
 /// ```
 pub fn averaged_periods(channels: &[&[f64]], period_samples: usize) -> Result<AveragedPeriods, FormatError> {
@@ -61,10 +61,10 @@ pub fn averaged_periods(channels: &[&[f64]], period_samples: usize) -> Result<Av
             (0..period_samples).map(at).collect()
         })
         .collect();
-    let freedom = (period_samples * (periods - 1)) as f64;
+    let degrees_of_freedom = (period_samples * (periods - 1)) as f64;
     let entry = |a: usize, b: usize| {
         let deviation = |channel: usize, at: usize| channels[channel][at] - mean[channel][at % period_samples];
-        (0..periods * period_samples).map(|at| deviation(a, at) * deviation(b, at)).sum::<f64>() / freedom
+        (0..periods * period_samples).map(|at| deviation(a, at) * deviation(b, at)).sum::<f64>() / degrees_of_freedom
     };
     let sample_covariance = (0..channels.len()).map(|a| (0..channels.len()).map(|b| entry(a, b)).collect()).collect();
     Ok(AveragedPeriods { mean, sample_covariance, periods })

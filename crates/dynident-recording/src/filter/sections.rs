@@ -24,10 +24,10 @@ const LOWEST: f64 = 1e-5;
 /// If `order` is not 1 to 12, or the cut-off is not from 1e-5 of the rate to below half of it.
 pub(crate) fn butterworth_low_pass(order: usize, cutoff_hz: f64, rate_hz: f64) -> Result<Vec<Section>, FilterError> {
     if !(1..=12).contains(&order) {
-        return Err(FilterError::Setting { name: "order", value: order as f64, mend: "give 1 to 12" });
+        return Err(FilterError::Setting { name: "order", value: order as f64, fix: "give 1 to 12" });
     }
     if !(cutoff_hz.is_finite() && cutoff_hz > 0.0) {
-        return Err(FilterError::Setting { name: "cutoff_hz", value: cutoff_hz, mend: "give a positive frequency" });
+        return Err(FilterError::Setting { name: "cutoff_hz", value: cutoff_hz, fix: "give a positive frequency" });
     }
     if cutoff_hz.partial_cmp(&(0.5 * rate_hz)) != Some(core::cmp::Ordering::Less) {
         return Err(FilterError::AboveNyquist { cutoff_hz, rate_hz });
@@ -36,7 +36,7 @@ pub(crate) fn butterworth_low_pass(order: usize, cutoff_hz: f64, rate_hz: f64) -
         return Err(FilterError::Setting {
             name: "cutoff_hz",
             value: cutoff_hz,
-            mend: "raise it: below 1e-5 of the sampling rate the recursion has no digits left",
+            fix: "raise it: below 1e-5 of the sampling rate the recursion has no digits left",
         });
     }
     let warped = (PI * cutoff_hz / rate_hz).tan();

@@ -5,9 +5,9 @@ use super::source::LogTable;
 use crate::error::RecordingError;
 use crate::place::LogPlace;
 
-/// A table under way, and the columns of it that are wanted.
+/// A table under differentiator, and the columns of it that are wanted.
 #[derive(Debug)]
-pub(super) struct Selected {
+pub(super) struct ColumnSelection {
     pub(super) label: String,
     pub(super) table: Box<dyn LogTable>,
     /// Column of each slot.
@@ -18,7 +18,7 @@ pub(super) struct Selected {
     pub(super) rows: u64,
 }
 
-impl Selected {
+impl ColumnSelection {
     pub(super) fn new(label: String, table: Box<dyn LogTable>) -> Self {
         Self { label, table, fields: Vec::new(), values: Vec::new(), rows: 0 }
     }

@@ -226,7 +226,7 @@ pub enum ClockRule {
     /// Decided from the data, see [`Clock`](crate::clock::Clock).
     #[default]
     Auto,
-    /// Samples were taken at equal steps; the stamps only tell the mean rate.
+    /// Samples were taken at equal steps; the stamps only give the mean rate.
     Uniform,
     /// Samples were taken at the stamps; they are interpolated onto a uniform grid.
     Stamps,
@@ -331,7 +331,7 @@ impl LogFormat {
     /// Checks the description against itself and the study's joints.
     ///
     /// # Errors
-    /// A [`FormatError`] that names the key and the mend.
+    /// A [`FormatError`] that names the key and the fix.
     pub fn validate(&self, joints: &[String]) -> Result<(), FormatError> {
         if joints.is_empty() {
             return Err(FormatError::new("position", "the study names no joints", "list at least one joint"));
@@ -513,12 +513,12 @@ impl ChannelGroup {
                 _ => !value.is_finite(),
             });
             if let Some(value) = bad {
-                let mend = match name {
+                let fix = match name {
                     "sign" => "write 1 or -1",
                     "scale" => "give a finite factor other than zero",
                     _ => "give a finite number",
                 };
-                return Err(FormatError::new(at(name), format!("{value} is not allowed"), mend));
+                return Err(FormatError::new(at(name), format!("{value} is not allowed"), fix));
             }
         }
         if let Some(matrix) = &self.matrix {

@@ -102,7 +102,7 @@ impl JointSamples {
     }
 }
 
-/// A table of numbers in memory, its meaning told by a [`LogFormat`] as for a file. Clones share the numbers.
+/// A table of numbers in memory, its meaning given by a [`LogFormat`] as for a file. Clones share the numbers.
 ///
 /// ```
 /// use dynident_recording::{Log, LogFormat, LogReader, MemoryLog, RawBlock};

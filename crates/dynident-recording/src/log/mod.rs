@@ -1,7 +1,7 @@
 //! From where a log lies to joint values in SI.
 //!
 //! [`LogSource`] is where rows of numbers come from: [`TextLog`] (CSV and its kin), [`MemoryLog`] and [`JointSamples`]
-//! (arrays), or a type of the caller. [`LogFormat`] tells what the columns mean, and a [`Log`] is both together.
+//! (arrays), or a type of the caller. [`LogFormat`] says what the columns mean, and a [`Log`] is both together.
 //! [`LogReader`] is one pass over it: it pairs files, applies units, signs, gears and ranges ([`ChannelGroup`]), deals
 //! with missing values, and fills [`RawBlock`]s.
 //!

@@ -1,6 +1,6 @@
 //! Logs as a stream of blocks: paired files, ranges, mapping to joints. Memory does not grow with the log.
 
-use super::columns::Selected;
+use super::columns::ColumnSelection;
 use super::format::Missing;
 use super::mapping::Mapping;
 use super::source::LogSource;
@@ -64,7 +64,7 @@ struct Group {
 pub struct LogReader {
     label: String,
     joints: Vec<String>,
-    tables: Vec<Selected>,
+    tables: Vec<ColumnSelection>,
     groups: Vec<Group>,
     /// Slot of the time column in the main table and its factor to seconds.
     time: Option<(usize, f64)>,
@@ -89,7 +89,7 @@ impl LogReader {
         let format = &log.format;
         format.validate(&log.joints)?;
         let main = log.source();
-        let mut tables = vec![Selected::new(main.label(), main.open()?)];
+        let mut tables = vec![ColumnSelection::new(main.label(), main.open()?)];
         let time = match &format.time {
             Some(time) => Some((tables[0].want("time.column", &time.column)?, time.unit.seconds() * time.scale)),
             None => None,
@@ -110,7 +110,7 @@ impl LogReader {
             let table = paths.iter().position(|known| *known == path).unwrap_or(paths.len());
             if let (Some(path), true) = (&path, table == paths.len()) {
                 let source = file_source(path, format);
-                tables.push(Selected::new(source.label(), source.open()?));
+                tables.push(ColumnSelection::new(source.label(), source.open()?));
                 paths.push(Some(path.clone()));
             }
             let list = group.column_list(key)?;
@@ -119,7 +119,7 @@ impl LogReader {
             let mapping = Mapping::new(group, quantity, log.joints.len())?;
             groups.push(Group { quantity, table, columns: vec![Vec::new(); slots.len()], slots, mapping });
         }
-        tables.iter_mut().for_each(Selected::ready);
+        tables.iter_mut().for_each(ColumnSelection::ready);
 
         // The part of the log that is asked for, and what to call it in messages.
         let mut selection = Vec::new();

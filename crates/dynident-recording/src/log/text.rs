@@ -112,12 +112,12 @@ impl TextTable {
             place: self.place(),
             column: column_label(self.names.as_deref(), field),
             text,
-            mend: if comma {
+            fix: if comma {
                 "write decimal points instead of decimal commas"
             } else if first_row {
-                "mend the field; if this line is a header, set header = true"
+                "fix the field; if this line is a header, set header = true"
             } else {
-                "mend the field or delete the line"
+                "fix the field or delete the line"
             },
         }
     }

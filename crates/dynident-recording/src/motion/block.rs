@@ -24,7 +24,7 @@ impl MotionSettings {
     /// A [`FilterError`] that names the setting.
     pub fn validate(&self) -> Result<(), FilterError> {
         if !(0.0..=60.0).contains(&self.trim_s) {
-            return Err(FilterError::Setting { name: "trim_s", value: self.trim_s, mend: "give seconds, 0 to 60" });
+            return Err(FilterError::Setting { name: "trim_s", value: self.trim_s, fix: "give seconds, 0 to 60" });
         }
         self.differentiator.validate()
     }

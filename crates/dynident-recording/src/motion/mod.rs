@@ -1,7 +1,7 @@
 //! From a log to q, dq, ddq and torque on a uniform clock, block by block.
 //!
 //! [`MotionStream`] pulls rows through everything below: reader, clock, differentiator, checks. [`MotionBlock`] is what
-//! it gives, [`MotionSettings`] is what it is told.
+//! it gives, [`MotionSettings`] is how it is set up.
 
 mod block;
 mod marks;

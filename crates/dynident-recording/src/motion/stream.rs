@@ -1,4 +1,4 @@
-//! The whole way from a log file to q, dq, ddq and torque on a uniform clock, block by block.
+//! From a log file to q, dq, ddq and torque on a uniform clock, block by block.
 
 use super::block::{MotionBlock, MotionSettings};
 use super::marks::{kept_runs, part};
@@ -94,9 +94,9 @@ impl MotionStream {
         Self::following(log, settings, None)
     }
 
-    /// As [`new`](Self::new), with the commanded motion for a way that needs it, its joints in the order of the log's.
+    /// As [`new`](Self::new), with the commanded motion for a differentiator that needs it, its joints in the order of the log's.
     ///
-    /// Where the way does not apply to a joint, the samples of all joints are left out, the piece is cut there, and the
+    /// Where the differentiator does not apply to a joint, the samples of all joints are left out, the piece is cut there, and the
     /// report says how many.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! The paper's spliced logistic function as a path that position tells speed and acceleration on.
+//! The paper's spliced logistic function as a path that position determines velocity and acceleration on.
 
 use super::stroke::{Stroke, share_rests};
 use crate::error::FilterError;
@@ -45,7 +45,7 @@ impl LogisticPath {
     ///
     /// # Errors
     /// [`FilterError::Reference`]: numbers that are not finite, ω or T not positive, ωT below 20 (the strokes would not
-    /// come to rest: 1 % of the peak speed would be left) or beyond 1e4, repetitions not 1 to 1000.
+    /// come to rest: 1 % of the peak velocity would be left) or beyond 1e4, repetitions not 1 to 1000.
     pub fn validate(&self) -> Result<(), FilterError> {
         let wrong = |problem: String| Err(FilterError::Reference { problem });
         let Self { amplitude, omega, offset, period_s, repetitions } = *self;
@@ -92,7 +92,7 @@ impl LogisticPath {
         ]
     }
 
-    /// Speed and acceleration by position alone, Eqs. 15 and 16: `dq = ±(ω/A)(q - h)(A - q + h)`, plus on the way
+    /// Velocity and acceleration by position alone, Eqs. 15 and 16: `dq = ±(ω/A)(q - h)(A - q + h)`, plus on the way
     /// `there`, `ddq = (ω²/A²)(q - h)(A - q + h)(A - 2q + 2h)`. `None` outside the stroke, where the formulas give the
     /// wrong sign.
     pub fn rates(&self, q: f64, there: bool) -> Option<[f64; 2]> {
@@ -112,13 +112,13 @@ impl LogisticPath {
         time_s.rem_euclid(self.period_s) < 0.5 * self.period_s
     }
 
-    /// Peak speed |A|ω/4 and peak acceleration |A|ω²/(6√3).
+    /// Peak velocity |A|ω/4 and peak acceleration |A|ω²/(6√3).
     pub(crate) fn peaks(&self) -> [f64; 2] {
         let size = self.amplitude.abs() * self.omega;
         [0.25 * size, size * self.omega / (6.0 * 3.0_f64.sqrt())]
     }
 
-    /// Two strokes a period, none if A = 0. They move where the speed is above 1e-3 of its peak: up to ln(4000)/ω from
+    /// Two strokes a period, none if A = 0. They move where the velocity is above 1e-3 of its peak: up to ln(4000)/ω from
     /// the middle.
     pub(crate) fn strokes(&self) -> Vec<Stroke> {
         if self.amplitude == 0.0 {
@@ -157,7 +157,7 @@ mod tests {
             let t = f64::from(i) * 0.1 + 0.013;
             let [q, dq, ddq] = PATH.at(t);
             let half = 0.5 * PATH.period_s;
-            // Not across a splice, where the speed changes its sign.
+            // Not across a splice, where the velocity changes its sign.
             if (t.rem_euclid(half) < 2.0 * h) || (half - t.rem_euclid(half) < 2.0 * h) {
                 continue;
             }

@@ -1,4 +1,4 @@
-//! The motion that a robot was commanded to make: the seam through which ways that need it get it.
+//! The motion that a robot was commanded to make: the seam through which differentiators that need it get it.
 //!
 //! [`Reference`] is that motion at any time: samples, or the closed form of [`LogisticPath`]s. It knows its
 //! [`Stroke`]s, the pieces between rests. [`ReferenceSettings`] is how a study file names it.
@@ -20,10 +20,10 @@ use stroke::{between, share_rests, strokes_of};
 
 /// Most samples of a sampled reference.
 const MOST_SAMPLES: usize = 10_000_000;
-/// A joint rests where its speed and its acceleration are below these parts of their peaks.
+/// A joint rests where its velocity and its acceleration are below these parts of their peaks.
 const RESTING: [f64; 2] = [1e-3, 1e-2];
 
-/// Position, speed and acceleration of every joint as commanded, at any time.
+/// Position, velocity and acceleration of every joint as commanded, at any time.
 ///
 /// Nothing here knows how the motion was designed: it is either samples (what `design` writes as `trajectory.csv`), or
 /// the closed form of the paper's logistic strokes.
@@ -36,7 +36,7 @@ pub struct Reference {
 #[derive(Clone, Debug)]
 struct JointReference {
     path: JointPath,
-    /// Largest speed and acceleration.
+    /// Largest velocity and acceleration.
     peak: [f64; 2],
     strokes: Vec<Stroke>,
 }
@@ -47,7 +47,7 @@ enum JointPath {
     Logistic(LogisticPath),
 }
 
-/// Samples of one joint; between them the quintic that has both ends' position, speed and acceleration.
+/// Samples of one joint; between them the quintic that has both ends' position, velocity and acceleration.
 #[derive(Clone, Debug)]
 struct Sampled {
     times_s: std::sync::Arc<[f64]>,
@@ -224,7 +224,7 @@ impl Reference {
         }
     }
 
-    /// Whether the joint (as good as) rests there: speed at most 1e-3 and acceleration at most 1e-2 of their peaks.
+    /// Whether the joint (as good as) rests there: velocity at most 1e-3 and acceleration at most 1e-2 of their peaks.
     ///
     /// # Panics
     /// If there is no such joint.
@@ -242,8 +242,8 @@ impl Reference {
         self.joints[joint].strokes.iter().map(moved).collect()
     }
 
-    /// Largest speed of the joint, rad/s or m/s.
-    pub(crate) fn peak_speed(&self, joint: usize) -> f64 {
+    /// Largest velocity of the joint, rad/s or m/s.
+    pub(crate) fn peak_velocity(&self, joint: usize) -> f64 {
         self.joints[joint].peak[0]
     }
 
@@ -303,15 +303,15 @@ impl Sampled {
     }
 }
 
-/// The quintic through position, speed and acceleration at both ends of a step `h`, at `u` of the step (0 to 1).
+/// The quintic through position, velocity and acceleration at both ends of a step `h`, at `u` of the step (0 to 1).
 fn quintic(a: &[f64; 3], b: &[f64; 3], h: f64, u: f64) -> [f64; 3] {
     // p = q0 + v0 u + (a0/2) u² + c3 u³ + c4 u⁴ + c5 u⁵ in units of the step, from the three conditions at u = 1.
     let (v0, a0, v1, a1) = (a[1] * h, a[2] * h * h, b[1] * h, b[2] * h * h);
-    let way = b[0] - a[0] - v0 - 0.5 * a0;
+    let distance = b[0] - a[0] - v0 - 0.5 * a0;
     let (speed, bend) = (v1 - v0 - a0, a1 - a0);
-    let c3 = 10.0 * way - 4.0 * speed + 0.5 * bend;
-    let c4 = -15.0 * way + 7.0 * speed - bend;
-    let c5 = 6.0 * way - 3.0 * speed + 0.5 * bend;
+    let c3 = 10.0 * distance - 4.0 * speed + 0.5 * bend;
+    let c4 = -15.0 * distance + 7.0 * speed - bend;
+    let c5 = 6.0 * distance - 3.0 * speed + 0.5 * bend;
     [
         a[0] + u * (v0 + u * (0.5 * a0 + u * (c3 + u * (c4 + u * c5)))),
         (v0 + u * (a0 + u * (3.0 * c3 + u * (4.0 * c4 + u * 5.0 * c5)))) / h,

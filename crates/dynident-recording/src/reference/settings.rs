@@ -77,7 +77,7 @@ impl ReferenceSettings {
     /// if the start is not finite.
     pub fn validate(&self) -> Result<(), FilterError> {
         if !(self.start_s.is_finite() && self.start_s.abs() <= 1e6) {
-            return Err(FilterError::Setting { name: "start_s", value: self.start_s, mend: "give seconds" });
+            return Err(FilterError::Setting { name: "start_s", value: self.start_s, fix: "give seconds" });
         }
         if self.file.is_some() && !self.joints.is_empty() {
             return Err(FilterError::Reference {

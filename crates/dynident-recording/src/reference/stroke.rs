@@ -13,7 +13,7 @@ pub struct Stroke {
     pub from_s: f64,
     /// .. to here.
     pub to_s: f64,
-    /// Whether it goes one way only, so that position tells speed.
+    /// Whether it goes one differentiator only, so that position determines velocity.
     pub monotone: bool,
 }
 
@@ -64,7 +64,7 @@ pub(crate) fn strokes_of(times_s: &[f64], values: &[[f64; 3]], resting: &[bool])
 /// Samples of a given stroke that are looked at for turns.
 const LOOKS: u32 = 500;
 
-/// The stroke between two given times; `motion` tells speed and rest at a time.
+/// The stroke between two given times; `motion` tells velocity and rest at a time.
 pub(crate) fn between(from_s: f64, to_s: f64, motion: impl Fn(f64) -> (f64, bool)) -> Stroke {
     let looks = (0..LOOKS).map(|k| motion(from_s + (to_s - from_s) * (f64::from(k) + 0.5) / f64::from(LOOKS)));
     let speeds: Vec<f64> = looks.filter(|(_, rests)| !rests).map(|(speed, _)| speed).collect();

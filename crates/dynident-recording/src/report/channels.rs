@@ -138,7 +138,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantised_and_smooth_channels_are_told_apart() {
+    fn quantised_and_smooth_channels_are_distinguished() {
         let smooth: Vec<f64> = (0..2000).map(|i| (f64::from(i) * 0.01).sin()).collect();
         let quantised: Vec<f64> = smooth.iter().map(|x| (x / 0.003).round() * 0.003).collect();
         assert!(quantisation_step(&smooth).is_none());

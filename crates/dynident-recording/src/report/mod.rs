@@ -1,4 +1,4 @@
-//! What was found in a log, for people and for machines.
+//! What was found in a log, for people and for robots.
 //!
 //! `ChannelCheck` looks at every channel (dead, saturated, quantised), `TimeCheck` at the steps of the stamps,
 //! `Comparison` holds logged velocities and accelerations against the derivatives of the position, shifted by
@@ -94,7 +94,7 @@ pub struct ImportReport {
     pub segments: usize,
     /// Pieces too short for the filter, and the samples in them.
     pub short_segments: [u64; 2],
-    /// Samples left out because the way from q to dq and ddq does not apply there.
+    /// Samples left out because the differentiator does not apply there.
     pub unmapped_samples: u64,
     /// Every channel of every joint.
     pub channels: Vec<ChannelReport>,

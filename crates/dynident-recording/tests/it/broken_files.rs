@@ -1,4 +1,4 @@
-//! Broken logs: each gives an error that names the file, the place and the mend, and never a panic.
+//! Broken logs: each gives an error that names the file, the place and the fix, and never a panic.
 use dynident_recording::{ImportReport, LogFormat, MotionBlock, MotionSettings, MotionStream, RecordingError};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -93,7 +93,7 @@ fn every_broken_file_has_its_message() {
         let message = import(&folder().join(name), FORMAT).expect_err(name).to_string();
         assert!(message.contains(words), "{name}: {message}");
         assert!(message.contains(name), "{name}: {message}");
-        // The mend stands behind a semicolon or in brackets.
+        // The fix stands behind a semicolon or in brackets.
         assert!(message.contains(';') || message.contains('('), "{name}: {message}");
     }
 }

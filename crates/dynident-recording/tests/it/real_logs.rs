@@ -11,7 +11,7 @@ fn joints(n: usize) -> Vec<String> {
 struct Import {
     report: ImportReport,
     rows: usize,
-    /// Largest speed and acceleration.
+    /// Largest velocity and acceleration.
     dq: f64,
     ddq: f64,
 }

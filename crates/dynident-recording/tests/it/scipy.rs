@@ -130,8 +130,8 @@ fn the_frequency_domain_is_numpys_transform() {
     let x = numbers(&golden["signal"]);
     for case in golden["frequency_domain"].as_array().unwrap() {
         let ends = if case["mirrored"].as_bool().unwrap() { Ends::Mirrored } else { Ends::Periodic };
-        let way = FrequencyDomain::new(number(&case["cutoff_hz"]), ends).unwrap();
-        let ours = derivatives(&way, number(&case["rate_hz"]), &x);
+        let differentiator = FrequencyDomain::new(number(&case["cutoff_hz"]), ends).unwrap();
+        let ours = derivatives(&differentiator, number(&case["rate_hz"]), &x);
         for (ours, key) in ours.iter().zip(["q", "dq", "ddq"]) {
             // A transform's rounding, times the frequency against the signal's own: two digits.
             agree(ours, &numbers(&case[key]), 1e-12, &format!("{ends:?} {key}"));
@@ -152,9 +152,9 @@ fn averages_and_five_points_are_numpys_and_scipys() {
         agree(&ddq, &numbers(&case["ddq"]), 1e-11, &format!("window {window}"));
     }
     for case in golden["five_point_cubic"].as_array().unwrap() {
-        let way = FivePointCubic::new(case["passes"].as_u64().unwrap() as usize, 5.0).unwrap();
+        let differentiator = FivePointCubic::new(case["passes"].as_u64().unwrap() as usize, 5.0).unwrap();
         let mut smooth = vec![0.0; x.len()];
-        way.smooth(200.0, &x, &mut smooth).unwrap();
+        differentiator.smooth(200.0, &x, &mut smooth).unwrap();
         agree(&smooth, &numbers(&case["smooth"]), 1e-13, "five points");
     }
 }

@@ -128,7 +128,7 @@ fn samples_off_the_stroke_are_cut_out_and_counted() {
             let t = block.first_time_s + i as f64 / block.rate_hz;
             assert!((block.joint(&block.tau, 0)[i] / 100.0 - t).abs() < 1e-9, "the torque of another sample");
             let exact = path.at(t - 0.05)[1];
-            // At the splice the speed is 1e-3 of its peak of 0.75 or less.
+            // At the splice the velocity is 1e-3 of its peak of 0.75 or less.
             assert!((block.joint(&block.dq, 0)[i] - exact).abs() < 1.5e-3, "{t}");
         }
     }
@@ -151,7 +151,7 @@ fn samples_off_the_stroke_are_cut_out_and_counted() {
     assert!(error.contains("position-map") && error.contains("start_s"), "{error}");
 }
 
-/// A way whose pieces the stream cuts for memory sees the reference at the right times.
+/// A differentiator whose pieces the stream cuts for memory sees the reference at the right times.
 #[test]
 fn a_deviation_is_the_same_in_pieces_as_at_once() {
     let (rate, n) = (500.0, 40_000_usize);
@@ -178,7 +178,7 @@ fn a_deviation_is_the_same_in_pieces_as_at_once() {
     while stream.next_block(&mut block).unwrap() {
         for (ours, whole) in [(&block.q, &out[0]), (&block.dq, &out[1]), (&block.ddq, &out[2])] {
             for (i, value) in ours.iter().enumerate() {
-                // Speeds and accelerations of order one; the reference's time is rounded to 1e-14 s.
+                // Velocities and accelerations of order one; the reference's time is rounded to 1e-14 s.
                 assert!((value - whole[at + i]).abs() < 1e-9, "sample {}", at + i);
             }
         }

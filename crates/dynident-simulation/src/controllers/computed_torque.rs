@@ -15,7 +15,7 @@ pub struct ComputedTorqueSettings {
     pub kp: PerJoint,
     /// K_d, 1/s; `2 √K_p` damps critically.
     pub kd: PerJoint,
-    /// Which friction of the model is compensated; default at the reference's speed.
+    /// Which friction of the model is compensated; default at the reference's velocity.
     #[serde(default)]
     pub friction: FrictionCompensation,
 }

@@ -14,7 +14,7 @@ pub(super) const LITERAL_NAME: &str = "finite-time-literal";
 pub struct FiniteTimeSettings {
     /// K_p of the power α₁ of the position error. The paper: 2 and 4.
     pub kp: PerJoint,
-    /// K_d of the power α₂ of the speed error. The paper: 20 and 4.
+    /// K_d of the power α₂ of the velocity error. The paper: 20 and 4.
     pub kd: PerJoint,
     /// α₁, above 0 and at most 1 (1 is computed torque); default 0.7. `α₂ = 2 α₁/(1 + α₁)`.
     #[serde(default = "alpha_1")]
@@ -22,10 +22,10 @@ pub struct FiniteTimeSettings {
     /// Position error below which the power becomes linear, rad (m); default 1e-3. Zero leaves the power as it is.
     #[serde(default = "blend")]
     pub blend_position: f64,
-    /// Speed error below which the power becomes linear, rad/s (m/s); default 1e-2.
+    /// Velocity error below which the power becomes linear, rad/s (m/s); default 1e-2.
     #[serde(default = "blend_speed")]
     pub blend_speed: f64,
-    /// Which friction of the model is compensated; default at the reference's speed.
+    /// Which friction of the model is compensated; default at the reference's velocity.
     #[serde(default)]
     pub friction: FrictionCompensation,
 }
@@ -72,7 +72,7 @@ impl FiniteTimeSettings {
 
 /// `τ = M̂(q)(q̈_d + K_p Sig(e)^α₁ + K_d Sig(ė)^α₂) + Ĉ q̇ + ĝ`, `Sig(x)^α = |x|^α sign(x)`, `e = q_d - q`.
 ///
-/// Eq. 23 of the paper with its two signs mended (as printed, with `e = q_d - q`, the feedback is positive: [`literal`](Self::literal)) and `α₂ = 2 α₁/(1 + α₁)`, of which the paper's formula is a
+/// Eq. 23 of the paper with its two signs fixed (as printed, with `e = q_d - q`, the feedback is positive: [`literal`](Self::literal)) and `α₂ = 2 α₁/(1 + α₁)`, of which the paper's formula is a
 /// misprint. With an exact model in continuous time the errors vanish in finite time (Su and Zheng, RCIM 27 (2011) 550; Bhat and Bernstein 2000).
 ///
 /// The gain `K_p |e|^(α-1)` is infinite at zero, so that a sampled law ends in a limit cycle of about `(K_p dt²)^(1/(1-α₁))`. Inside `|x| < ε` the power is therefore replaced by the straight line

@@ -85,8 +85,8 @@ impl Controller for JointPid {
                 self.integral[joint] = grown.clamp(-self.limit[joint], self.limit[joint]);
             }
             self.last_error[joint] = error;
-            let speed_error = target.dq[joint] - measured.dq[joint];
-            tau[joint] = kp[joint] * error + self.integral[joint] + kd[joint] * speed_error;
+            let velocity_error = target.dq[joint] - measured.dq[joint];
+            tau[joint] = kp[joint] * error + self.integral[joint] + kd[joint] * velocity_error;
         }
     }
 }

@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 pub struct Target<'a> {
     /// Positions.
     pub q: &'a [f64],
-    /// Speeds.
+    /// Velocities.
     pub dq: &'a [f64],
     /// Accelerations.
     pub ddq: &'a [f64],
@@ -35,7 +35,7 @@ pub struct Target<'a> {
 pub struct Measured<'a> {
     /// Positions.
     pub q: &'a [f64],
-    /// Speeds.
+    /// Velocities.
     pub dq: &'a [f64],
 }
 
@@ -87,7 +87,7 @@ pub enum ControllerSettings {
     PdGravity(JointPdSettings),
     /// [`ComputedTorque`]: `τ = M̂ (q̈_d + K_p e + K_d ė) + ĥ`.
     ComputedTorque(ComputedTorqueSettings),
-    /// [`FiniteTime`]: the paper's law, with its signs mended.
+    /// [`FiniteTime`]: the paper's law, with its signs fixed.
     FiniteTime(FiniteTimeSettings),
     /// [`FiniteTime`] with the signs as Eq. 23 prints them: it drives the joints away from the path, and is here to show that.
     FiniteTimeLiteral(FiniteTimeSettings),

@@ -3,11 +3,11 @@
 use super::{Measured, Target};
 use crate::error::{SimulationError, require, require_length};
 use dynident_dynamics::{Column, Workspace, gravity_torque, inverse_dynamics};
-use dynident_model::laws::{JointMotion, Law, LawInput, LawMemory};
+use dynident_model::terms::{HysteresisState, JointMotion, TermInput, TorqueTerm};
 use dynident_model::{InertialParameters, Model};
 use serde::{Deserialize, Serialize};
 
-/// At which speed a controller takes the friction of its model.
+/// At which velocity a controller takes the friction of its model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FrictionCompensation {
@@ -16,16 +16,16 @@ pub enum FrictionCompensation {
     /// At the reference's: no noise and no feedback by friction.
     #[default]
     Reference,
-    /// At the measured: right while the joint lags, but a sign of a noisy speed chatters.
+    /// At the measured: right while the joint lags, but a sign of a noisy velocity chatters.
     Measured,
 }
 
-/// A robot model for control: bodies and laws with their parameters. Torques are linear in the parameters, so that a vector of base parameters alone is enough: see
-/// [`from_columns`](Self::from_columns). It need not be physically possible.
+/// A robot model for control: bodies and terms with their parameters. Torques are linear in the parameters, so that a vector of base parameters alone is enough: see
+/// [`from_columns`](Self::from_columns). It need not be physically consistent.
 pub struct ControllerModel {
     model: Model,
-    laws: Vec<(Law, f64)>,
-    memories: Vec<LawMemory>,
+    terms: Vec<(TorqueTerm, f64)>,
+    memories: Vec<HysteresisState>,
     workspace: Workspace,
     load: Vec<f64>,
     zeros: Vec<f64>,
@@ -35,45 +35,45 @@ impl core::fmt::Debug for ControllerModel {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("ControllerModel")
             .field("model", &self.model.name())
-            .field("laws", &self.laws)
+            .field("laws", &self.terms)
             .finish_non_exhaustive()
     }
 }
 
 impl Clone for ControllerModel {
     fn clone(&self) -> Self {
-        Self::assembled(self.model.clone(), self.laws.clone())
+        Self::assembled(self.model.clone(), self.terms.clone())
     }
 }
 
 impl ControllerModel {
-    /// The model with its own inertial parameters, and laws with theirs.
+    /// The model with its own inertial parameters, and terms with theirs.
     ///
     /// # Errors
-    /// Counts that differ, numbers that are not finite, laws of joints that do not exist.
-    pub fn new(model: &Model, laws: &[Law], law_parameters: &[f64]) -> Result<Self, SimulationError> {
-        require_length("parameters of laws", laws.len(), law_parameters.len())?;
-        for (law, &value) in laws.iter().zip(law_parameters) {
-            require(value.is_finite(), law.symbol(), value, "give a finite number")?;
-            if law.joints().iter().any(|&joint| joint >= model.dof()) {
-                return Err(SimulationError::LawJoint { law: law.symbol(), joints: model.dof() });
+    /// Counts that differ, numbers that are not finite, terms of joints that do not exist.
+    pub fn new(model: &Model, terms: &[TorqueTerm], term_parameters: &[f64]) -> Result<Self, SimulationError> {
+        require_length("parameters of laws", terms.len(), term_parameters.len())?;
+        for (term, &value) in terms.iter().zip(term_parameters) {
+            require(value.is_finite(), term.symbol(), value, "give a finite number")?;
+            if term.joints().iter().any(|&joint| joint >= model.dof()) {
+                return Err(SimulationError::TermJoint { term: term.symbol(), joints: model.dof() });
             }
         }
-        Ok(Self::assembled(model.clone(), laws.iter().cloned().zip(law_parameters.iter().copied()).collect()))
+        Ok(Self::assembled(model.clone(), terms.iter().cloned().zip(term_parameters.iter().copied()).collect()))
     }
 
-    /// The model with a vector of parameters: ten for each body from base to tip, then one for each law. Links and lengths are `model`'s.
+    /// The model with a vector of parameters: ten for each body from base to tip, then one for each term. Links and lengths are `model`'s.
     ///
     /// # Errors
     /// As [`new`](Self::new).
-    pub fn from_parameters(model: &Model, laws: &[Law], parameters: &[f64]) -> Result<Self, SimulationError> {
+    pub fn from_parameters(model: &Model, terms: &[TorqueTerm], parameters: &[f64]) -> Result<Self, SimulationError> {
         let bodies = 10 * model.dof();
-        require_length("parameters", bodies + laws.len(), parameters.len())?;
+        require_length("parameters", bodies + terms.len(), parameters.len())?;
         let inertials: Vec<InertialParameters> = parameters[..bodies]
             .chunks_exact(10)
             .map(|own| InertialParameters(core::array::from_fn(|k| own[k])))
             .collect();
-        Self::new(&model.with_inertials(&inertials)?, laws, &parameters[bodies..])
+        Self::new(&model.with_inertials(&inertials)?, terms, &parameters[bodies..])
     }
 
     /// The model with values of some columns of the regressor and zeros elsewhere, as an estimate of base parameters gives them
@@ -84,30 +84,30 @@ impl ControllerModel {
     pub fn from_columns(model: &Model, columns: &[Column], values: &[f64]) -> Result<Self, SimulationError> {
         require_length("values of columns", columns.len(), values.len())?;
         let mut inertials = vec![InertialParameters::ZERO; model.dof()];
-        let (mut laws, mut law_parameters) = (Vec::new(), Vec::new());
+        let (mut terms, mut term_parameters) = (Vec::new(), Vec::new());
         for (column, &value) in columns.iter().zip(values) {
             match column {
                 Column::Body { body, parameter } => {
                     require_length("bodies", model.dof(), model.dof().max(body + 1))?;
                     inertials[*body].0[*parameter] = value;
                 }
-                Column::Law(law) => {
-                    laws.push(law.clone());
-                    law_parameters.push(value);
+                Column::Term(term) => {
+                    terms.push(term.clone());
+                    term_parameters.push(value);
                 }
             }
         }
-        Self::new(&model.with_inertials(&inertials)?, &laws, &law_parameters)
+        Self::new(&model.with_inertials(&inertials)?, &terms, &term_parameters)
     }
 
-    fn assembled(model: Model, laws: Vec<(Law, f64)>) -> Self {
+    fn assembled(model: Model, terms: Vec<(TorqueTerm, f64)>) -> Self {
         let dof = model.dof();
         Self {
             workspace: Workspace::new(&model),
-            memories: vec![LawMemory::default(); laws.len()],
+            memories: vec![HysteresisState::default(); terms.len()],
             load: vec![0.0; dof],
             zeros: vec![0.0; dof],
-            laws,
+            terms,
             model,
         }
     }
@@ -122,14 +122,14 @@ impl ControllerModel {
         &self.model
     }
 
-    /// The laws and their parameters.
-    pub fn laws(&self) -> &[(Law, f64)] {
-        &self.laws
+    /// The terms and their parameters.
+    pub fn terms(&self) -> &[(TorqueTerm, f64)] {
+        &self.terms
     }
 
-    /// Ten parameters for each body, then one for each law.
+    /// Ten parameters for each body, then one for each term.
     pub fn parameters(&self) -> Vec<f64> {
-        self.model.parameter_vector().into_iter().chain(self.laws.iter().map(|(_, value)| *value)).collect()
+        self.model.parameter_vector().into_iter().chain(self.terms.iter().map(|(_, value)| *value)).collect()
     }
 
     /// That the model has so many joints.
@@ -142,10 +142,10 @@ impl ControllerModel {
 
     /// Springs of friction are undeflected.
     pub(crate) fn restart(&mut self) {
-        self.memories.iter_mut().for_each(LawMemory::restart);
+        self.memories.iter_mut().for_each(HysteresisState::restart);
     }
 
-    /// `M̂(q) a + ĥ(q, q̇)` at the measured motion with the accelerations `a`, and the torques of the laws: inertia and offset always, friction as asked.
+    /// `M̂(q) a + ĥ(q, q̇)` at the measured motion with the accelerations `a`, and the torques of the terms: inertia and offset always, friction as asked.
     pub fn torque(
         &mut self,
         measured: Measured<'_>,
@@ -154,9 +154,9 @@ impl ControllerModel {
         friction: FrictionCompensation,
         tau: &mut [f64],
     ) {
-        let Self { model, laws, memories, workspace, load, .. } = self;
+        let Self { model, terms, memories, workspace, load, .. } = self;
         tau.copy_from_slice(inverse_dynamics(model, workspace, measured.q, measured.dq, acceleration));
-        if laws.is_empty() {
+        if terms.is_empty() {
             return;
         }
         load.copy_from_slice(tau);
@@ -165,23 +165,23 @@ impl ControllerModel {
             _ => [target.q, target.dq],
         };
         let motion = JointMotion { samples: 1, q, dq, ddq: acceleration };
-        for ((law, value), memory) in laws.iter().zip(memories) {
-            if friction == FrictionCompensation::None && law.is_friction() {
+        for ((term, value), memory) in terms.iter().zip(memories) {
+            if friction == FrictionCompensation::None && term.is_friction() {
                 continue;
             }
             for joint in 0..tau.len() {
-                if law.acts_on(joint) {
+                if term.acts_on(joint) {
                     let mut column = [0.0];
                     let load = core::slice::from_ref(&load[joint]);
-                    let mut input = LawInput { load: Some(load), temperature_c: None, memory };
-                    law.column_following(joint, &motion, &mut input, &mut column);
+                    let mut input = TermInput { load: Some(load), temperature_c: None, memory };
+                    term.column_following(joint, &motion, &mut input, &mut column);
                     tau[joint] += value * column[0];
                 }
             }
         }
     }
 
-    /// The torques that a motion asks for, with all laws.
+    /// The torques that a motion asks for, with all terms.
     pub fn reference_torque(&mut self, q: &[f64], dq: &[f64], ddq: &[f64], tau: &mut [f64]) {
         let (measured, target) = (Measured { q, dq }, Target { q, dq, ddq });
         self.torque(measured, target, ddq, FrictionCompensation::Reference, tau);
@@ -190,9 +190,9 @@ impl ControllerModel {
     /// `ĝ(q)` and constant torques.
     pub(crate) fn gravity(&mut self, q: &[f64], out: &mut [f64]) {
         out.copy_from_slice(gravity_torque(&self.model, &mut self.workspace, q));
-        for (law, value) in &self.laws {
+        for (term, value) in &self.terms {
             for (joint, out) in out.iter_mut().enumerate() {
-                *out += value * law.constant_torque(joint);
+                *out += value * term.constant_torque(joint);
             }
         }
     }

@@ -4,7 +4,7 @@ use super::{Controller, ControllerModel, FrictionCompensation, Measured, Target}
 use crate::error::{SimulationError, require};
 use crate::per_joint::PerJoint;
 use dynident_dynamics::{Workspace, torque_regressor};
-use dynident_model::laws::{JointMotion, LawInput, LawMemory};
+use dynident_model::terms::{HysteresisState, JointMotion, TermInput};
 use dynident_model::{Model, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +21,7 @@ pub struct SlotineLiSettings {
     /// Γ: how fast every parameter is adapted, in the parameter's unit squared per joule. Default 0, no adaptation.
     #[serde(default)]
     pub gamma: f64,
-    /// Which friction of the model is compensated; default at the reference's speed.
+    /// Which friction of the model is compensated; default at the reference's velocity.
     #[serde(default)]
     pub friction: FrictionCompensation,
 }
@@ -46,7 +46,7 @@ impl SlotineLiSettings {
 /// `τ = Y(q, q̇, q̇_r, q̈_r) θ̂ + K_D s` with `s = ė + Λ e`, `q̇_r = q̇_d + Λ e`, `q̈_r = q̈_d + Λ ė`; adapted by `θ̂' = Γ Yᵀ s` (Slotine and Li, IJRR 6 (1987) 49).
 ///
 /// `Y` holds `C(q, q̇) q̇_r` with Christoffel's C, so that `Ṁ - 2C` is skew. That product is the symmetric bilinear form of the centrifugal torques, `C(q, u) v = c((u + v)/2) - c((u - v)/2)` with
-/// `c(w) = C(q, w) w`, and so a difference of two ordinary regressors. Adapted parameters start from the model's at every run and are those of the bodies, then of the laws. Load-dependent
+/// `c(w) = C(q, w) w`, and so a difference of two ordinary regressors. Adapted parameters start from the model's at every run and are those of the bodies, then of the terms. Load-dependent
 /// friction is left out: its torque is not linear in the parameters.
 #[derive(Debug)]
 pub struct SlotineLi {
@@ -58,7 +58,7 @@ pub struct SlotineLi {
     friction: FrictionCompensation,
     workspace: Workspace,
     parameters: Vec<f64>,
-    memories: Vec<LawMemory>,
+    memories: Vec<HysteresisState>,
     /// dof rows of Y.
     regressor: Vec<f64>,
     vectors: [Vec<f64>; 5],
@@ -80,7 +80,7 @@ impl SlotineLi {
             gamma: settings.gamma,
             friction: settings.friction,
             workspace: Workspace::new(model.model()),
-            memories: vec![LawMemory::default(); model.laws().len()],
+            memories: vec![HysteresisState::default(); model.terms().len()],
             regressor: vec![0.0; joints * parameters.len()],
             parameters,
             vectors: core::array::from_fn(|_| vec![0.0; joints]),
@@ -89,19 +89,19 @@ impl SlotineLi {
         })
     }
 
-    /// The parameters as adapted so far: ten for each body, then one for each law.
+    /// The parameters as adapted so far: ten for each body, then one for each term.
     pub fn parameters(&self) -> &[f64] {
         &self.parameters
     }
 
     fn fill_regressor(&mut self, target: Target<'_>, measured: Measured<'_>) {
         let Self { start, weightless, workspace, regressor, vectors, memories, .. } = self;
-        let [reference_speed, reference_acceleration, mean, half, _] = vectors;
-        let (joints, columns) = (mean.len(), 10 * mean.len() + start.laws().len());
+        let [reference_velocity, reference_acceleration, mean, half, _] = vectors;
+        let (joints, columns) = (mean.len(), 10 * mean.len() + start.terms().len());
         let bodies = 10 * joints;
         for joint in 0..joints {
-            mean[joint] = 0.5 * (measured.dq[joint] + reference_speed[joint]);
-            half[joint] = 0.5 * (measured.dq[joint] - reference_speed[joint]);
+            mean[joint] = 0.5 * (measured.dq[joint] + reference_velocity[joint]);
+            half[joint] = 0.5 * (measured.dq[joint] - reference_velocity[joint]);
         }
         regressor.fill(0.0);
         let y = torque_regressor(start.model(), workspace, measured.q, mean, reference_acceleration);
@@ -121,18 +121,18 @@ impl SlotineLi {
             _ => [target.q, target.dq],
         };
         let motion = JointMotion { samples: 1, q, dq, ddq: reference_acceleration };
-        for (place, ((law, _), memory)) in start.laws().iter().zip(memories).enumerate() {
+        for (place, ((term, _), memory)) in start.terms().iter().zip(memories).enumerate() {
             // A load would make the column depend on the other parameters.
-            if self.friction == FrictionCompensation::None && law.is_friction() || law.needs_load() {
+            if self.friction == FrictionCompensation::None && term.is_friction() || term.needs_load() {
                 continue;
             }
             for joint in 0..joints {
-                if law.acts_on(joint) {
+                if term.acts_on(joint) {
                     let entry = &mut regressor[joint * columns + bodies + place..][..1];
-                    law.column_following(
+                    term.column_following(
                         joint,
                         &motion,
-                        &mut LawInput { load: None, temperature_c: None, memory },
+                        &mut TermInput { load: None, temperature_c: None, memory },
                         entry,
                     );
                 }
@@ -152,7 +152,7 @@ impl Controller for SlotineLi {
 
     fn reset(&mut self) {
         self.parameters = self.start.parameters();
-        self.memories.iter_mut().for_each(LawMemory::restart);
+        self.memories.iter_mut().for_each(HysteresisState::restart);
         self.last_time_s = None;
     }
 
@@ -162,17 +162,17 @@ impl Controller for SlotineLi {
         let [lambda, kd] = &self.gains;
         for joint in 0..lambda.len() {
             let error = target.q[joint] - measured.q[joint];
-            let speed_error = target.dq[joint] - measured.dq[joint];
+            let velocity_error = target.dq[joint] - measured.dq[joint];
             self.vectors[0][joint] = target.dq[joint] + lambda[joint] * error;
-            self.vectors[1][joint] = target.ddq[joint] + lambda[joint] * speed_error;
-            self.vectors[4][joint] = speed_error + lambda[joint] * error;
+            self.vectors[1][joint] = target.ddq[joint] + lambda[joint] * velocity_error;
+            self.vectors[4][joint] = velocity_error + lambda[joint] * error;
             tau[joint] = kd[joint] * self.vectors[4][joint];
         }
         self.fill_regressor(target, measured);
         let columns = self.parameters.len();
-        let sliding = &self.vectors[4];
+        let prismatic = &self.vectors[4];
         if self.gamma > 0.0 && span_s > 0.0 {
-            for (joint, s) in sliding.iter().enumerate() {
+            for (joint, s) in prismatic.iter().enumerate() {
                 let row = &self.regressor[joint * columns..(joint + 1) * columns];
                 for (parameter, y) in self.parameters.iter_mut().zip(row) {
                     *parameter += span_s * self.gamma * y * s;

@@ -2,7 +2,7 @@
 //!
 //! Friction as in the fixed Runge-Kutta method: the integration stops where a sliding unit comes to rest (found on the method's dense output) and starts anew there.
 
-use super::equations::{At, Equations};
+use super::equations::{Equations, StateView};
 use super::runge_kutta::{margin, rest};
 use super::{PlantFault, State, euler};
 use core::cell::{Cell, RefCell};
@@ -27,7 +27,7 @@ impl ODE<f64, Vec<f64>> for Field<'_> {
         let mut equations = self.equations.borrow_mut();
         let (speeds, accelerations) = dydt.split_at_mut(self.tau.len());
         speeds.copy_from_slice(dq);
-        match equations.in_modes(At { time_s: self.start_s + t, q, dq, tau: self.tau }) {
+        match equations.in_modes(StateView { time_s: self.start_s + t, q, dq, tau: self.tau }) {
             Ok(()) => accelerations.copy_from_slice(&equations.acceleration),
             Err(fault) => {
                 self.fault.set(Some(fault));
@@ -98,7 +98,7 @@ pub(super) fn advance(
     let dof = tau.len();
     let mut left = duration_s;
     for _ in 0..STOPS {
-        let at = At { time_s: state.time_s, q: &state.q, dq: &state.dq, tau };
+        let at = StateView { time_s: state.time_s, q: &state.q, dq: &state.dq, tau };
         equations.decide(at)?;
         let y = [&state.q[..], &state.dq].concat();
         let shared = RefCell::new(&mut *equations);

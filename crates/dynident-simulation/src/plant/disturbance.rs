@@ -77,12 +77,12 @@ pub enum Disturbance {
 
 /// A disturbance with its joint looked up.
 #[derive(Clone, Debug)]
-pub(super) struct Placed {
+pub(super) struct JointDisturbance {
     joint: usize,
     disturbance: Disturbance,
 }
 
-impl Placed {
+impl JointDisturbance {
     pub(super) fn new(model: &Model, disturbance: &Disturbance) -> Result<Self, SimulationError> {
         let (Disturbance::Joint { joint, time, .. } | Disturbance::Body { joint, time, .. }) = disturbance;
         let index = model.joint_index(joint).ok_or_else(|| dynident_model::ModelError::UnknownJoint {
@@ -100,7 +100,7 @@ impl Placed {
         Ok(Self { joint: index, disturbance: disturbance.clone() })
     }
 
-    /// Adds the joint torques (forces) of the disturbance at a time: for a force f at the point p, `axis · ((p - o) × f)` of every turning joint on the way, `axis · f` of a sliding one.
+    /// Adds the joint torques (forces) of the disturbance at a time: for a force f at the point p, `axis · ((p - o) × f)` of every revolute joint on the way, `axis · f` of a sliding one.
     pub(super) fn add(&self, model: &Model, workspace: &mut Workspace, time_s: f64, q: &[f64], torque: &mut [f64]) {
         match &self.disturbance {
             Disturbance::Joint { torque: size, time, .. } => torque[self.joint] += size * time.at(time_s),
@@ -141,7 +141,7 @@ mod tests {
             let mut workspace = Workspace::new(&model);
             let name = model.joints()[5].name.clone();
             let point = [0.1, -0.2, 0.3];
-            let placed = Placed::new(
+            let placed = JointDisturbance::new(
                 &model,
                 &Disturbance::Body {
                     joint: name,
@@ -175,8 +175,11 @@ mod tests {
         assert!((sine.at(1.0) - 1.0).abs() < 1e-15);
         let text = "on = \"joint\"\njoint = \"joint1\"\ntorque = 2.0\ntime = { kind = \"constant\" }";
         let read: Disturbance = toml::from_str(text).unwrap();
-        assert!(Placed::new(&random_tree(1, 2), &read).is_ok());
-        assert!(Placed::new(&random_tree(1, 2), &toml::from_str(&text.replace("joint1", "elbow")).unwrap()).is_err());
+        assert!(JointDisturbance::new(&random_tree(1, 2), &read).is_ok());
+        assert!(
+            JointDisturbance::new(&random_tree(1, 2), &toml::from_str(&text.replace("joint1", "elbow")).unwrap())
+                .is_err()
+        );
         assert!(toml::from_str::<Disturbance>(&text.replace("torque", "tork")).is_err());
     }
 }

@@ -1,11 +1,11 @@
-//! The laws of a simulated robot, sorted by what they do to the equation of motion.
+//! The terms of a simulated robot, sorted by what they do to the equation of motion.
 
 use super::friction_unit::FrictionUnit;
 use crate::error::{SimulationError, require, require_length};
 use dynident_model::Model;
-use dynident_model::laws::{JointMotion, Law, LawInput, LawMemory, TermAction};
+use dynident_model::terms::{HysteresisState, JointMotion, TermAction, TermInput, TorqueTerm};
 
-/// Laws with their parameters: constants of the mass matrix and of the torque, linear damping, springs that slip, and friction that follows a speed.
+/// Terms with their parameters: constants of the mass matrix and of the torque, linear damping, springs that slip, and friction that follows a velocity.
 #[derive(Clone, Debug)]
 pub(super) struct Drives {
     /// Entries (row, column, value) that drives add to the mass matrix.
@@ -14,7 +14,7 @@ pub(super) struct Drives {
     pub(super) constant: Vec<f64>,
     /// Entries of the viscous matrix.
     pub(super) viscous: Vec<(usize, usize, f64)>,
-    /// Friction by speeds.
+    /// Friction by velocities.
     pub(super) units: Vec<FrictionUnit>,
     slips: Vec<Slip>,
     pub(super) by_load: bool,
@@ -23,15 +23,15 @@ pub(super) struct Drives {
 #[derive(Clone, Debug)]
 struct Slip {
     joint: usize,
-    law: Law,
+    term: TorqueTerm,
     value: f64,
-    memory: LawMemory,
+    memory: HysteresisState,
 }
 
 impl Drives {
-    pub(super) fn new(model: &Model, laws: &[Law], parameters: &[f64]) -> Result<Self, SimulationError> {
+    pub(super) fn new(model: &Model, terms: &[TorqueTerm], parameters: &[f64]) -> Result<Self, SimulationError> {
         let dof = model.dof();
-        require_length("parameters of laws", laws.len(), parameters.len())?;
+        require_length("parameters of laws", terms.len(), parameters.len())?;
         let mut drives = Self {
             inertia: Vec::new(),
             constant: vec![0.0; dof],
@@ -43,39 +43,40 @@ impl Drives {
         // One unit for each joint, then those of drives that turn with two.
         let mut own: Vec<FrictionUnit> = (0..dof).map(|joint| FrictionUnit::new(vec![(joint, 1.0)])).collect();
         let mut used = vec![false; dof];
-        for (law, &value) in laws.iter().zip(parameters) {
-            require(value.is_finite(), law.symbol(), value, "give a finite number")?;
-            if law.is_nonnegative() && value < 0.0 {
-                return Err(SimulationError::Negative { law: law.symbol(), value });
+        for (term, &value) in terms.iter().zip(parameters) {
+            require(value.is_finite(), term.symbol(), value, "give a finite number")?;
+            if term.is_nonnegative() && value < 0.0 {
+                return Err(SimulationError::Negative { term: term.symbol(), value });
             }
-            let joints = law.joints();
+            let joints = term.joints();
             if joints.iter().any(|&joint| joint >= dof) {
-                return Err(SimulationError::LawJoint { law: law.symbol(), joints: dof });
+                return Err(SimulationError::TermJoint { term: term.symbol(), joints: dof });
             }
             let entries = |factor: f64| match joints[..] {
                 [first, second] => vec![(first, second, factor * value), (second, first, factor * value)],
                 _ => joints.iter().map(|&joint| (joint, joint, factor * value)).collect(),
             };
-            match law.action() {
+            match term.action() {
                 TermAction::Inertia { factor } => drives.inertia.extend(entries(factor)),
                 TermAction::Damping { factor } => drives.viscous.extend(entries(factor)),
                 TermAction::Constant => joints.iter().for_each(|&joint| drives.constant[joint] += value),
                 TermAction::Hysteresis => {
-                    let slip = |&joint: &usize| Slip { joint, law: law.clone(), value, memory: LawMemory::default() };
+                    let slip =
+                        |&joint: &usize| Slip { joint, term: term.clone(), value, memory: HysteresisState::default() };
                     drives.slips.extend(joints.iter().map(slip));
                 }
                 // Simulated drives are at their reference temperature.
                 TermAction::Temperature => {}
                 TermAction::Friction(friction) => {
                     if value < 0.0 {
-                        return Err(SimulationError::Negative { law: law.symbol(), value });
+                        return Err(SimulationError::Negative { term: term.symbol(), value });
                     }
                     if let [joint] = joints[..] {
-                        own[joint].add(law, &friction, value);
+                        own[joint].add(term, &friction, value);
                         used[joint] = true;
                     } else {
                         let mut unit = FrictionUnit::new(joints.into_iter().zip(friction.ratios).collect());
-                        unit.add(law, &friction, value);
+                        unit.add(term, &friction, value);
                         drives.units.push(unit);
                     }
                 }
@@ -90,14 +91,14 @@ impl Drives {
     /// Takes the torques of slipping springs at positions `q` off `torque`. The deflection is that of the last [`follow`](Self::follow) moved on to `q`.
     pub(super) fn subtract_slips(&self, q: &[f64], torque: &mut [f64]) {
         for slip in &self.slips {
-            torque[slip.joint] -= slip.value * deflection(&slip.law, slip.joint, q, &mut slip.memory.clone());
+            torque[slip.joint] -= slip.value * deflection(&slip.term, slip.joint, q, &mut slip.memory.clone());
         }
     }
 
     /// The springs follow the joints to `q`.
     pub(super) fn follow(&mut self, q: &[f64]) {
         for slip in &mut self.slips {
-            deflection(&slip.law, slip.joint, q, &mut slip.memory);
+            deflection(&slip.term, slip.joint, q, &mut slip.memory);
         }
     }
 
@@ -111,10 +112,10 @@ impl Drives {
 }
 
 /// Deflection of a slipping spring over its yield displacement.
-fn deflection(law: &Law, joint: usize, q: &[f64], memory: &mut LawMemory) -> f64 {
+fn deflection(term: &TorqueTerm, joint: usize, q: &[f64], memory: &mut HysteresisState) -> f64 {
     let mut out = [0.0];
     // Only positions count.
     let motion = JointMotion { samples: 1, q, dq: q, ddq: q };
-    law.column_following(joint, &motion, &mut LawInput { load: None, temperature_c: None, memory }, &mut out);
+    term.column_following(joint, &motion, &mut TermInput { load: None, temperature_c: None, memory }, &mut out);
     out[0]
 }

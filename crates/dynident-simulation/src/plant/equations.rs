@@ -1,7 +1,7 @@
 //! The equation of motion of a simulated robot, put together at one state: `M q̈ = τ + d(t) - h(q, q̇) - τ₀ - springs - F_v q̇ - Cᵀ f`.
 
 use super::PlantFault;
-use super::disturbance::Placed;
+use super::disturbance::JointDisturbance;
 use super::drives::Drives;
 use super::factor::{eliminate, factor, solve};
 use super::friction_solver::FrictionSolver;
@@ -21,7 +21,7 @@ pub(super) enum Mode {
 
 /// A state of the robot as integrators see it.
 #[derive(Clone, Copy)]
-pub(super) struct At<'a> {
+pub(super) struct StateView<'a> {
     pub(super) time_s: f64,
     pub(super) q: &'a [f64],
     pub(super) dq: &'a [f64],
@@ -31,7 +31,7 @@ pub(super) struct At<'a> {
 pub(super) struct Equations {
     pub(super) model: Model,
     pub(super) drives: Drives,
-    pub(super) disturbances: Vec<Placed>,
+    pub(super) disturbances: Vec<JointDisturbance>,
     pub(super) locked: Vec<bool>,
     pub(super) any_locked: bool,
     workspace: Workspace,
@@ -82,9 +82,9 @@ impl Equations {
         (&self.model, &mut self.workspace)
     }
 
-    /// Mass matrix `M + implicit · F_v` and right-hand side without friction by speed.
+    /// Mass matrix `M + implicit · F_v` and right-hand side without friction by velocity.
     #[inline]
-    pub(super) fn assemble(&mut self, at: At<'_>, implicit: f64) {
+    pub(super) fn assemble(&mut self, at: StateView<'_>, implicit: f64) {
         let n = self.acceleration.len();
         let Self { model, workspace, drives, matrix, acceleration, load, .. } = self;
         let (mass_matrix, bias) = mass_matrix_and_bias(model, workspace, at.q, at.dq);
@@ -133,7 +133,7 @@ impl Equations {
             let torque = match mode {
                 Mode::Held => continue,
                 // Without a jump the direction does not matter.
-                mode => unit.sliding(unit.speed(dq), *mode == Mode::Forward),
+                mode => unit.prismatic(unit.speed(dq), *mode == Mode::Forward),
             };
             for &(joint, ratio) in &unit.joints {
                 if !self.locked[joint] {
@@ -186,7 +186,7 @@ impl Equations {
         }
     }
 
-    /// Friction of the chosen units so that `w = start + factor · acceleration` belongs to their maps; `start` gives a unit's speed, or nothing. With `jumps` the maps' jumps alone count.
+    /// Friction of the chosen units so that `w = start + factor · acceleration` belongs to their maps; `start` gives a unit's velocity, or nothing. With `jumps` the maps' jumps alone count.
     pub(super) fn rub(&mut self, start: Option<&[f64]>, factor: f64, jumps: bool) {
         let count = self.chosen.len();
         self.couple();
@@ -220,7 +220,7 @@ impl Equations {
     }
 
     /// Accelerations with every unit in its mode.
-    pub(super) fn in_modes(&mut self, at: At<'_>) -> Result<(), PlantFault> {
+    pub(super) fn in_modes(&mut self, at: StateView<'_>) -> Result<(), PlantFault> {
         self.assemble(at, 0.0);
         if self.drives.units.is_empty() {
             return self.factor_and_solve();
@@ -249,7 +249,7 @@ impl Equations {
     }
 
     /// Decides at a state which units are held: those at rest (`w = 0`, or held until now) whose friction can. `true` if any unit can hold.
-    pub(super) fn decide(&mut self, at: At<'_>) -> Result<bool, PlantFault> {
+    pub(super) fn decide(&mut self, at: StateView<'_>) -> Result<bool, PlantFault> {
         let mut at_rest = false;
         for (unit, mode) in self.drives.units.iter().zip(&mut self.modes) {
             let speed = unit.speed(at.dq);

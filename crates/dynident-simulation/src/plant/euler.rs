@@ -1,14 +1,14 @@
-//! Semi-implicit Euler: the new speeds move the joints.
+//! Semi-implicit Euler: the new velocities move the joints.
 //!
 //! `(M + h F_v)(q̇' - q̇)/h = τ - h(q, q̇) - F_v q̇ - Cᵀ f`, `q' = q + h q̇'`: viscous friction implicit as in MuJoCo's Euler integrator, and all other friction implicit as well, `f` in the
-//! map of the speeds after the step. Dry friction then neither chatters nor creates energy at any step.
+//! map of the velocities after the step. Dry friction then neither chatters nor creates energy at any step.
 
-use super::equations::{At, Equations};
+use super::equations::{Equations, StateView};
 use super::{PlantFault, State};
 
 pub(super) fn step(equations: &mut Equations, state: &mut State, tau: &[f64], h: f64) -> Result<(), PlantFault> {
     let State { time_s, q, dq, .. } = state;
-    equations.assemble(At { time_s: *time_s, q, dq, tau }, h);
+    equations.assemble(StateView { time_s: *time_s, q, dq, tau }, h);
     equations.factor_and_solve()?;
     let rubs = !equations.drives.units.is_empty();
     if rubs {

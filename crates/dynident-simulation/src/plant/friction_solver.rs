@@ -1,19 +1,19 @@
 //! The friction torques of all units at once.
 //!
-//! Speeds (or accelerations) after a step are `w = r - c A f` with the units' inverse inertia `A = C M⁻¹ Cᵀ`, and every torque belongs to its unit's map: `f_u ∈ f_u(w_u)`, a jump at rest
+//! Velocities (or accelerations) after a step are `w = r - c A f` with the units' inverse inertia `A = C M⁻¹ Cᵀ`, and every torque belongs to its unit's map: `f_u ∈ f_u(w_u)`, a jump at rest
 //! (implicit time stepping of dry friction: Moreau 1988; Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008). `A` is positive (semi-)definite and the maps are monotone, so
-//! that speeds are unique, friction takes energy, and a unit that its friction can hold stays at rest exactly.
+//! that velocities are unique, friction takes energy, and a unit that its friction can hold stays at rest exactly.
 //!
 //! Newton's method on the pattern of units at rest, as long as it brings the torques nearer to their solution; Gauss-Seidel sweeps, which always do (they descend in a convex function), where it does not.
 
 use super::factor::eliminate;
-use super::friction_unit::{FrictionUnit, Resolved};
+use super::friction_unit::{FrictionParts, FrictionUnit};
 
 /// Sweeps after which the torques are taken as they are. Newton's method ends after two or three rounds in all that was seen.
 const ROUNDS: usize = 400;
-/// Share of the largest speed below which a change counts as none.
+/// Share of the largest velocity below which a change counts as none.
 const SETTLED: f64 = 1e-13;
-/// Speeds below this are none: their products are too small for floating-point numbers.
+/// Velocities below this are none: their products are too small for floating-point numbers.
 const NONE: f64 = 1e-250;
 
 /// Torques and scratch, kept from step to step: the last solution is the next start.
@@ -21,7 +21,7 @@ const NONE: f64 = 1e-250;
 pub(super) struct FrictionSolver {
     /// The torques of the units.
     pub(super) torque: Vec<f64>,
-    /// The units' speeds (accelerations) with them; exactly zero where a unit is held.
+    /// The units' velocities (accelerations) with them; exactly zero where a unit is held.
     pub(super) speed: Vec<f64>,
     trial: Vec<f64>,
     matrix: Vec<f64>,
@@ -64,7 +64,7 @@ impl FrictionSolver {
         false
     }
 
-    /// One pass over the units, each solved exactly with the others' torques as they are. Returns the largest change, as a speed.
+    /// One pass over the units, each solved exactly with the others' torques as they are. Returns the largest change, as a velocity.
     fn sweep(&mut self, problem: &Problem<'_>) -> f64 {
         let mut change = 0.0_f64;
         for u in 0..problem.chosen.len() {
@@ -126,7 +126,7 @@ impl Problem<'_> {
     }
 
     /// What unit `u` does with the others' torques as they are.
-    fn resolve(&self, u: usize, torque: &[f64]) -> Resolved {
+    fn resolve(&self, u: usize, torque: &[f64]) -> FrictionParts {
         let n = self.chosen.len();
         let row = &self.a[u * n..(u + 1) * n];
         let others = row.iter().zip(torque).map(|(a, f)| a * f).sum::<f64>() - row[u] * torque[u];
@@ -135,7 +135,7 @@ impl Problem<'_> {
         if self.jumps { unit.resolve_jump(free, own) } else { unit.resolve(free, own) }
     }
 
-    /// How far each torque is from what its unit asks for with the others as they are: the largest, as a speed.
+    /// How far each torque is from what its unit asks for with the others as they are: the largest, as a velocity.
     fn defect(&self, torque: &[f64]) -> f64 {
         (0..self.chosen.len())
             .filter(|&u| self.own(u) > 0.0)
@@ -147,10 +147,10 @@ impl Problem<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynident_model::laws::{Coulomb, CoulombShape, Law};
     use dynident_model::sample::Random;
+    use dynident_model::terms::{Coulomb, CoulombShape, TorqueTerm};
 
-    /// Strongly coupled units of all kinds: every torque is in its map to rounding (1e-11 of the largest speed), whatever the mixture of rest and motion.
+    /// Strongly coupled units of all kinds: every torque is in its map to rounding (1e-11 of the largest velocity), whatever the mixture of rest and motion.
     #[test]
     fn torques_belong_to_their_speeds() {
         let mut random = Random::new(4);
@@ -167,7 +167,7 @@ mod tests {
                     } else {
                         CoulombShape::Smooth { width: 0.01 }
                     };
-                    unit.add_law(&Law::Coulomb(Coulomb { joint, shape }), random.uniform(0.1, 3.0));
+                    unit.add_term(&TorqueTerm::Coulomb(Coulomb { joint, shape }), random.uniform(0.1, 3.0));
                     unit
                 })
                 .collect();

@@ -1,14 +1,14 @@
-//! Friction of one speed: of a joint, or of a drive that turns with two joints.
+//! Friction of one velocity: of a joint, or of a drive that turns with two joints.
 
-use dynident_model::laws::{Law, SpeedCurve, SpeedFriction, TermAction};
+use dynident_model::terms::{TermAction, TorqueTerm, VelocityCurve, VelocityFriction};
 
-/// A friction law with its parameter; a Stribeck or load-dependent one changes its size with the state.
+/// A friction term with its parameter; a Stribeck or load-dependent one changes its size with the state.
 #[derive(Clone, Debug)]
 struct Term {
-    law: Law,
+    kind: TorqueTerm,
     value: f64,
     by_load: bool,
-    /// Speed and exponent of the Stribeck effect.
+    /// Velocity and exponent of the Stribeck effect.
     fading: Option<[f64; 2]>,
     /// For a sign, which at rest holds anything up to the level: in which directions it is felt.
     step: Option<[bool; 2]>,
@@ -16,10 +16,10 @@ struct Term {
     size: f64,
 }
 
-/// All friction that follows one speed `w = Σ ratio q̇`: the map `w ↦ f(w)`, set-valued at rest. The torque of a joint is `ratio f`.
+/// All friction that follows one velocity `w = Σ ratio q̇`: the map `w ↦ f(w)`, set-valued at rest. The torque of a joint is `ratio f`.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FrictionUnit {
-    /// The joints that make the speed, and their ratios.
+    /// The joints that make the velocity, and their ratios.
     pub(super) joints: Vec<(usize, f64)>,
     terms: Vec<Term>,
     /// Friction at rest is at most this in motion forward and backward.
@@ -31,10 +31,10 @@ pub(super) struct FrictionUnit {
 
 /// Where the friction of a unit ends up.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Resolved {
+pub(super) struct FrictionParts {
     pub(super) speed: f64,
     pub(super) torque: f64,
-    /// None: at rest, held by the jump of the map. Else the map's slope at the speed.
+    /// None: at rest, held by the jump of the map. Else the map's slope at the velocity.
     pub(super) slope: Option<f64>,
 }
 
@@ -43,26 +43,26 @@ impl FrictionUnit {
         Self { joints, ..Self::default() }
     }
 
-    /// Adds `law`, whose friction is `friction`, with its parameter.
-    pub(super) fn add(&mut self, law: &Law, friction: &SpeedFriction<'_>, value: f64) {
+    /// Adds `term`, whose friction is `friction`, with its parameter.
+    pub(super) fn add(&mut self, term: &TorqueTerm, friction: &VelocityFriction<'_>, value: f64) {
         let step = match friction.curve {
-            SpeedCurve::Step { forward, backward } => Some([forward, backward]),
-            SpeedCurve::Smooth(_) => None,
+            VelocityCurve::Step { forward, backward } => Some([forward, backward]),
+            VelocityCurve::Smooth(_) => None,
         };
         self.steps |= step.is_some();
         self.smooth |= step.is_none();
-        let SpeedFriction { by_load, fading, .. } = *friction;
+        let VelocityFriction { by_load, fading, .. } = *friction;
         self.by_load |= by_load;
         let size = if by_load { 0.0 } else { value };
-        self.terms.push(Term { law: law.clone(), value, by_load, fading, step, size });
+        self.terms.push(Term { kind: term.clone(), value, by_load, fading, step, size });
         self.update(0.0, 0.0);
     }
 
-    /// Adds a law that follows a speed.
+    /// Adds a term that follows a velocity.
     #[cfg(test)]
-    pub(super) fn add_law(&mut self, law: &Law, value: f64) {
-        let TermAction::Friction(friction) = law.action() else { panic!("{law:?} follows no speed") };
-        self.add(law, &friction, value);
+    pub(super) fn add_term(&mut self, term: &TorqueTerm, value: f64) {
+        let TermAction::Friction(friction) = term.action() else { panic!("{term:?} follows no speed") };
+        self.add(term, &friction, value);
     }
 
     /// Whether it can hold a joint at rest.
@@ -70,7 +70,7 @@ impl FrictionUnit {
         self.steps
     }
 
-    /// Takes the size of Stribeck and load-dependent terms at this speed and load; they keep it until the next call.
+    /// Takes the size of Stribeck and load-dependent terms at this velocity and load; they keep it until the next call.
     #[inline]
     pub(super) fn update(&mut self, speed: f64, load: f64) {
         let mut level = [0.0; 2];
@@ -102,7 +102,8 @@ impl FrictionUnit {
         let mut sum = [0.0; 2];
         if self.smooth {
             for term in &self.terms {
-                if let TermAction::Friction(SpeedFriction { curve: SpeedCurve::Smooth(curve), .. }) = term.law.action()
+                if let TermAction::Friction(VelocityFriction { curve: VelocityCurve::Smooth(curve), .. }) =
+                    term.kind.action()
                 {
                     sum[0] += term.size * curve.value(speed);
                     sum[1] += term.size * curve.slope(speed);
@@ -112,21 +113,21 @@ impl FrictionUnit {
         sum
     }
 
-    /// Friction torque at `speed` in motion forward (or backward): the map's branch, also where the speed has just crossed zero.
+    /// Friction torque at `speed` in motion forward (or backward): the map's branch, also where the velocity has just crossed zero.
     #[inline]
-    pub(super) fn sliding(&self, speed: f64, forward: bool) -> f64 {
+    pub(super) fn prismatic(&self, speed: f64, forward: bool) -> f64 {
         let jump = if forward { self.level[0] } else { -self.level[1] };
         jump + self.smooth(speed)[0]
     }
 
     /// The solution of `w + c f(w) = r` for c > 0: unique, because the map is monotone.
-    pub(super) fn resolve(&self, r: f64, c: f64) -> Resolved {
+    pub(super) fn resolve(&self, r: f64, c: f64) -> FrictionParts {
         let at_jump = self.resolve_jump(r, c);
         let (rest, jump) = (at_jump.speed, at_jump.torque);
         if !self.smooth || at_jump.slope.is_none() || !rest.is_finite() {
             return at_jump;
         }
-        // Between rest and `rest`: friction takes power, so that it brings the speed nearer to zero. Newton from rest, kept inside the bracket.
+        // Between rest and `rest`: friction takes power, so that it brings the velocity nearer to zero. Newton from rest, kept inside the bracket.
         let (mut low, mut high) = if rest > 0.0 { (0.0, rest) } else { (rest, 0.0) };
         let mut speed = 0.0;
         let mut own = self.smooth(speed);
@@ -148,20 +149,20 @@ impl FrictionUnit {
                 break;
             }
         }
-        Resolved { speed, torque: jump + own[0], slope: Some(own[1].max(0.0)) }
+        FrictionParts { speed, torque: jump + own[0], slope: Some(own[1].max(0.0)) }
     }
 
     /// [`resolve`](Self::resolve) with the jump alone.
     #[inline]
-    pub(super) fn resolve_jump(&self, r: f64, c: f64) -> Resolved {
+    pub(super) fn resolve_jump(&self, r: f64, c: f64) -> FrictionParts {
         if self.steps && r <= c * self.level[0] && r >= -c * self.level[1] {
-            return Resolved { speed: 0.0, torque: r / c, slope: None };
+            return FrictionParts { speed: 0.0, torque: r / c, slope: None };
         }
         let torque = if r > 0.0 { self.level[0] } else { -self.level[1] };
-        Resolved { speed: r - c * torque, torque, slope: Some(0.0) }
+        FrictionParts { speed: r - c * torque, torque, slope: Some(0.0) }
     }
 
-    /// Its speed from the joints'.
+    /// Its velocity from the joints'.
     #[inline]
     pub(super) fn speed(&self, dq: &[f64]) -> f64 {
         self.joints.iter().map(|&(joint, ratio)| ratio * dq[joint]).sum()
@@ -171,19 +172,19 @@ impl FrictionUnit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynident_model::laws::{Coulomb, CoulombShape, Power, PowerExponent, Sigmoid, Stribeck};
+    use dynident_model::terms::{Coulomb, CoulombShape, Power, PowerExponent, Sigmoid, Stribeck};
 
     /// The scalar problem is solved: w + c f(w) = r, for steep and flat maps alike. Rounding of r, with room.
     #[test]
     fn resolved_speeds_fulfil_their_equation() {
         let mut unit = FrictionUnit::new(vec![(0, 1.0)]);
         let shape = CoulombShape::Smooth { width: 1e-3 };
-        unit.add_law(&Law::Coulomb(Coulomb { joint: 3, shape: CoulombShape::Sign { dead_band: 0.1 } }), 0.5);
-        unit.add_law(&Law::Coulomb(Coulomb { joint: 3, shape }), 10.0);
-        unit.add_law(&Law::Sigmoid(Sigmoid { joint: 3, steepness: 20.0, offset_speed: 0.1 }), 0.7);
-        unit.add_law(&Law::Power(Power { joint: 3, exponent: PowerExponent::CubeRoot, rounding: 1e-6 }), 0.3);
-        unit.add_law(
-            &Law::Stribeck(Stribeck {
+        unit.add_term(&TorqueTerm::Coulomb(Coulomb { joint: 3, shape: CoulombShape::Sign { dead_band: 0.1 } }), 0.5);
+        unit.add_term(&TorqueTerm::Coulomb(Coulomb { joint: 3, shape }), 10.0);
+        unit.add_term(&TorqueTerm::Sigmoid(Sigmoid { joint: 3, steepness: 20.0, offset_speed: 0.1 }), 0.7);
+        unit.add_term(&TorqueTerm::Power(Power { joint: 3, exponent: PowerExponent::CubeRoot, rounding: 1e-6 }), 0.3);
+        unit.add_term(
+            &TorqueTerm::Stribeck(Stribeck {
                 joint: 3,
                 speed: 0.1,
                 exponent: 2.0,

@@ -4,7 +4,7 @@ use crate::error::{SimulationError, require};
 use dynident_model::sample::Random;
 use dynident_model::{Joint, Mat3, Model, Transform};
 
-/// The same machine with other joint placements: `change(joint, placement)` gives the new `parent_from_child` of each.
+/// The same robot with other joint placements: `change(joint, placement)` gives the new `parent_from_child` of each.
 ///
 /// # Errors
 /// A placement that is not finite.
@@ -22,7 +22,7 @@ pub fn with_placements(
     Ok(changed.with_gravity(model.gravity())?)
 }
 
-/// The machine as built: every joint's placement off by a normal error of `length_std_m` in each direction and of `angle_std_rad` about a random axis. The same seed gives the same machine.
+/// The robot as built: every joint's placement off by a normal error of `length_std_m` in each direction and of `angle_std_rad` about a random axis. The same seed gives the same robot.
 ///
 /// # Errors
 /// A standard deviation that is negative or not finite.

@@ -17,12 +17,12 @@ pub use integrator::Integrator;
 pub use lengths::{with_length_errors, with_placements};
 
 use crate::error::{SimulationError, require, require_length};
-use disturbance::Placed;
+use disturbance::JointDisturbance;
 use drives::Drives;
 use dynident_dynamics::{kinetic_energy, potential_energy};
 use dynident_model::Model;
-use dynident_model::laws::Law;
-use equations::{At, Equations, Mode};
+use dynident_model::terms::TorqueTerm;
+use equations::{Equations, Mode, StateView};
 use runge_kutta::Stages;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -34,7 +34,7 @@ pub enum PlantFault {
     /// The mass matrix is not positive definite.
     #[error("the mass matrix of the simulated robot is not positive definite")]
     MassMatrix,
-    /// Positions or speeds have grown beyond all numbers.
+    /// Positions or velocities have grown beyond all numbers.
     #[error("the simulated robot's motion has grown beyond all numbers")]
     NotFinite,
     /// The adaptive integrator found no step that keeps its tolerance.
@@ -42,7 +42,7 @@ pub enum PlantFault {
     StepSize,
 }
 
-/// Time, positions and speeds.
+/// Time, positions and velocities.
 #[derive(Clone, Debug, PartialEq)]
 struct State {
     time_s: f64,
@@ -58,7 +58,7 @@ impl State {
 
 /// A simulated robot: rigid bodies, drives and friction, disturbances, locked joints.
 ///
-/// `M(q) q̈ + h(q, q̇) + laws = τ + d(t)`. Signs without smoothing (`CoulombShape::Sign`, its dead band ignored) are dry friction with stiction: a joint at rest stays at rest, exactly, until
+/// `M(q) q̈ + h(q, q̇) + terms = τ + d(t)`. Signs without smoothing (`CoulombShape::Sign`, its dead band ignored) are dry friction with stiction: a joint at rest stays at rest, exactly, until
 /// the other torques exceed its friction at rest (Coulomb and Stribeck together). A sign of a drive that turns with two joints holds that drive. Load-dependent friction takes the load of the
 /// evaluation before.
 ///
@@ -81,7 +81,7 @@ pub struct Plant {
     equations: Equations,
     stages: Stages,
     state: State,
-    laws: (Vec<Law>, Vec<f64>),
+    terms: (Vec<TorqueTerm>, Vec<f64>),
 }
 
 impl core::fmt::Debug for Plant {
@@ -94,18 +94,18 @@ impl core::fmt::Debug for Plant {
 }
 
 impl Plant {
-    /// The robot with the model's own inertial parameters and the laws with theirs, at rest at zero.
+    /// The robot with the model's own inertial parameters and the terms with theirs, at rest at zero.
     ///
     /// # Errors
-    /// Counts that differ, numbers that are not finite, friction or drive inertia below zero, laws of joints that do not exist, or a mass matrix that is not positive definite at position zero.
-    pub fn new(model: &Model, laws: &[Law], law_parameters: &[f64]) -> Result<Self, SimulationError> {
+    /// Counts that differ, numbers that are not finite, friction or drive inertia below zero, terms of joints that do not exist, or a mass matrix that is not positive definite at position zero.
+    pub fn new(model: &Model, terms: &[TorqueTerm], term_parameters: &[f64]) -> Result<Self, SimulationError> {
         let dof = model.dof();
-        let drives = Drives::new(model, laws, law_parameters)?;
+        let drives = Drives::new(model, terms, term_parameters)?;
         let mut plant = Self {
             equations: Equations::new(model.clone(), drives),
             stages: Stages::new(dof),
             state: State { time_s: 0.0, q: vec![0.0; dof], dq: vec![0.0; dof] },
-            laws: (laws.to_vec(), law_parameters.to_vec()),
+            terms: (terms.to_vec(), term_parameters.to_vec()),
         };
         let still = vec![0.0; dof];
         plant.set_state(0.0, &still, &still);
@@ -119,8 +119,10 @@ impl Plant {
     /// # Errors
     /// A joint that does not exist, a number that is not finite.
     pub fn with_disturbances(mut self, disturbances: &[Disturbance]) -> Result<Self, SimulationError> {
-        let placed =
-            disturbances.iter().map(|one| Placed::new(&self.equations.model, one)).collect::<Result<_, _>>()?;
+        let placed = disturbances
+            .iter()
+            .map(|one| JointDisturbance::new(&self.equations.model, one))
+            .collect::<Result<_, _>>()?;
         self.equations.disturbances = placed;
         Ok(self)
     }
@@ -148,14 +150,14 @@ impl Plant {
         self.state.q.len()
     }
 
-    /// The true machine.
+    /// The true robot.
     pub fn model(&self) -> &Model {
         &self.equations.model
     }
 
-    /// The true laws and their parameters.
-    pub fn laws(&self) -> (&[Law], &[f64]) {
-        (&self.laws.0, &self.laws.1)
+    /// The true terms and their parameters.
+    pub fn terms(&self) -> (&[TorqueTerm], &[f64]) {
+        (&self.terms.0, &self.terms.1)
     }
 
     /// Whether a joint is locked.
@@ -173,17 +175,17 @@ impl Plant {
         &self.state.q
     }
 
-    /// Speeds, rad/s or m/s.
+    /// Velocities, rad/s or m/s.
     pub fn dq(&self) -> &[f64] {
         &self.state.dq
     }
 
-    /// How many steps ended before the friction torques of several joints had settled to 1e-13 of the largest speed. Zero in all that was seen.
+    /// How many steps ended before the friction torques of several joints had settled to 1e-13 of the largest velocity. Zero in all that was seen.
     pub fn unsettled_steps(&self) -> usize {
         self.equations.unsettled
     }
 
-    /// Puts the robot somewhere: a new run begins. Springs of friction are undeflected; locked joints have no speed.
+    /// Puts the robot somewhere: a new run begins. Springs of friction are undeflected; locked joints have no velocity.
     ///
     /// # Panics
     /// If the vectors have not one entry per joint.
@@ -203,7 +205,7 @@ impl Plant {
         self.equations.unsettled = 0;
     }
 
-    /// Checks positions and speeds that somebody gives, for [`set_state`](Self::set_state).
+    /// Checks positions and velocities that somebody gives, for [`set_state`](Self::set_state).
     ///
     /// # Errors
     /// Another number of joints, a number that is not finite.
@@ -226,7 +228,7 @@ impl Plant {
     /// If the vectors have not one entry per joint.
     pub fn accelerations(&mut self, tau: &[f64], out: &mut [f64]) -> Result<(), PlantFault> {
         let State { time_s, q, dq } = &self.state;
-        let at = At { time_s: *time_s, q, dq, tau };
+        let at = StateView { time_s: *time_s, q, dq, tau };
         self.equations.decide(at)?;
         self.equations.in_modes(at)?;
         out.copy_from_slice(&self.equations.acceleration);

@@ -1,9 +1,9 @@
 //! The classical Runge-Kutta method of order 4, with stops where a joint comes to rest.
 //!
-//! During a step every friction unit slides one way or is held. Where a sliding unit's speed crosses zero, the step ends there (found by false position on the step's length), the unit is at rest exactly, and
+//! During a step every friction unit slides one way or is held. Where a sliding unit's velocity crosses zero, the step ends there (found by false position on the step's length), the unit is at rest exactly, and
 //! whether its friction holds it is decided anew. Whether a held unit breaks away is looked at where a step begins.
 
-use super::equations::{At, Equations, Mode};
+use super::equations::{Equations, Mode, StateView};
 use super::{PlantFault, State, euler};
 
 /// Stops in one step, after which the rest of it is done by the implicit step, which needs none.
@@ -44,7 +44,7 @@ pub(super) fn step(
 ) -> Result<(), PlantFault> {
     let mut rest = h;
     for _ in 0..STOPS {
-        let at = At { time_s: state.time_s, q: &state.q, dq: &state.dq, tau };
+        let at = StateView { time_s: state.time_s, q: &state.q, dq: &state.dq, tau };
         let may_stop = equations.decide(at)?;
         try_step(equations, stages, at, rest)?;
         if !may_stop || margin(equations, &stages.dq_next) >= 0.0 {
@@ -61,7 +61,7 @@ pub(super) fn step(
 }
 
 /// One step of length `h` with every unit in its mode, into the next state of `stages`.
-fn try_step(equations: &mut Equations, stages: &mut Stages, at: At<'_>, h: f64) -> Result<(), PlantFault> {
+fn try_step(equations: &mut Equations, stages: &mut Stages, at: StateView<'_>, h: f64) -> Result<(), PlantFault> {
     let Stages { q, dq, speeds, accelerations, q_next, dq_next } = stages;
     equations.in_modes(at)?;
     accelerations[0].copy_from_slice(&equations.acceleration);
@@ -71,7 +71,7 @@ fn try_step(equations: &mut Equations, stages: &mut Stages, at: At<'_>, h: f64) 
             q[joint] = at.q[joint] + share * h * before[joint];
             dq[joint] = at.dq[joint] + share * h * accelerations[stage][joint];
         }
-        equations.in_modes(At { time_s: at.time_s + share * h, q, dq, tau: at.tau })?;
+        equations.in_modes(StateView { time_s: at.time_s + share * h, q, dq, tau: at.tau })?;
         speeds[stage].copy_from_slice(dq);
         accelerations[stage + 1].copy_from_slice(&equations.acceleration);
     }
@@ -84,7 +84,7 @@ fn try_step(equations: &mut Equations, stages: &mut Stages, at: At<'_>, h: f64) 
     Ok(())
 }
 
-/// The least speed of a sliding unit in its own direction: negative when one has crossed zero.
+/// The least velocity of a sliding unit in its own direction: negative when one has crossed zero.
 pub(super) fn margin(equations: &Equations, dq: &[f64]) -> f64 {
     let units = equations.drives.units.iter().zip(&equations.modes).filter(|(unit, _)| unit.holds());
     units.fold(f64::INFINITY, |least, (unit, mode)| match mode {
@@ -95,13 +95,13 @@ pub(super) fn margin(equations: &Equations, dq: &[f64]) -> f64 {
 }
 
 /// Shortens the step to where the first sliding unit comes to rest, and puts that unit to rest. None if the units that cross zero began at rest: there is no such place.
-fn stop(equations: &mut Equations, stages: &mut Stages, at: At<'_>, h: f64) -> Result<Option<f64>, PlantFault> {
+fn stop(equations: &mut Equations, stages: &mut Stages, at: StateView<'_>, h: f64) -> Result<Option<f64>, PlantFault> {
     let (mut low, mut at_low) = (0.0, margin(equations, at.dq));
     let (mut high, mut at_high) = (h, margin(equations, &stages.dq_next));
     if at_low <= 0.0 {
         return Ok(None);
     }
-    // A speed that counts as none: rounding of those that the step began with.
+    // A velocity that counts as none: rounding of those that the step began with.
     let none = 1e-13 * at_low.max(-at_high);
     let mut last_side = 0;
     for _ in 0..60 {
@@ -128,7 +128,7 @@ fn stop(equations: &mut Equations, stages: &mut Stages, at: At<'_>, h: f64) -> R
     Ok(Some(low))
 }
 
-/// Puts units whose speed in their direction is at most `none` to rest.
+/// Puts units whose velocity in their direction is at most `none` to rest.
 pub(super) fn rest(equations: &mut Equations, dq: &mut [f64], none: f64) {
     for (unit, mode) in equations.drives.units.iter().zip(&mut equations.modes) {
         let speed = unit.speed(dq);

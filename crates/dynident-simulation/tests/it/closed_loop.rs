@@ -6,7 +6,7 @@ use dynident_model::{InertialParameters, Mat3, Vec3};
 use dynident_simulation::controllers::{JointPd, JointPdSettings, Measured, Target};
 use dynident_simulation::{
     Controller, Divergence, Integrator, LimitedQuantity, LoopSettings, Plant, Reference, Run, RunLimits, RunStatus,
-    SensorSettings, SpeedSource, Start, closed_loop,
+    SensorSettings, Start, VelocitySource, closed_loop,
 };
 
 fn plant() -> Plant {
@@ -192,7 +192,7 @@ fn encoders_quantise_and_noise_has_its_size() {
     assert_ne!(other.record(plant.model(), &run).unwrap().tau, record.tau);
 }
 
-/// Delays move channels, drift stretches time, jitter adds its speed's share.
+/// Delays move channels, drift stretches time, jitter adds its velocity's share.
 #[test]
 fn channels_come_late_and_clocks_drift() {
     let (plant, run, _) = sine_run(SensorSettings::default());
@@ -220,11 +220,13 @@ fn channels_come_late_and_clocks_drift() {
     assert!((error / (1e-3 * speed) - 1.0).abs() < 0.05, "{error} {speed}");
 }
 
-/// Speeds by differences lag by half a sample and the filter's `1/(2πf)`; feedback that comes late makes the loop softer.
+/// Velocities by differences lag by half a sample and the filter's `1/(2πf)`; feedback that comes late makes the loop softer.
 #[test]
 fn feedback_by_encoders_and_late() {
-    let (_, own, _) =
-        sine_run(SensorSettings { speed: SpeedSource::Differences { cutoff_hz: 50.0 }, ..SensorSettings::default() });
+    let (_, own, _) = sine_run(SensorSettings {
+        speed: VelocitySource::Differences { cutoff_hz: 50.0 },
+        ..SensorSettings::default()
+    });
     let lag_s = 0.5e-3 + 1.0 / (core::f64::consts::TAU * 50.0);
     let own_range = own.of(0);
     let (seen, truth) = (&own.measured_dq[own_range.clone()], &own.dq[own_range]);
@@ -272,7 +274,7 @@ fn bad_settings_are_named() {
         SensorSettings { torque_delay_s: vec![0.0].into(), ..SensorSettings::default() },
         SensorSettings { record_rate_hz: Some(-1.0), ..SensorSettings::default() },
         SensorSettings { feedback_delay_samples: 100_000, ..SensorSettings::default() },
-        SensorSettings { speed: SpeedSource::Differences { cutoff_hz: 0.0 }, ..SensorSettings::default() },
+        SensorSettings { speed: VelocitySource::Differences { cutoff_hz: 0.0 }, ..SensorSettings::default() },
     ];
     for sensors in bad {
         assert!(sensors.validate(2).is_err(), "{sensors:?}");

@@ -3,8 +3,8 @@
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, Workspace, inverse_dynamics, mass_matrix};
 use dynident_excitation::Motion;
 use dynident_excitation::families::{SplicedLogistic, SplicedLogisticSettings};
-use dynident_model::laws::{Coulomb, CoulombShape, DriveInertia, Law, Offset, Viscous};
 use dynident_model::sample::{Random, planar_2r, random_tree};
+use dynident_model::terms::{Coulomb, CoulombShape, DriveInertia, Offset, TorqueTerm, Viscous};
 use dynident_model::{InertialParameters, Mat3, Model, Vec3};
 use dynident_simulation::controllers::{
     ComputedTorqueSettings, FiniteTimeSettings, JointPdSettings, JointPidSettings, Measured, SlotineLi,
@@ -20,14 +20,14 @@ fn paper_arm() -> Model {
     planar_2r(1.0, point, point)
 }
 
-fn laws() -> (Vec<Law>, Vec<f64>) {
-    let joints = |law: fn(usize) -> Law| (0..2).map(law);
-    let laws: Vec<Law> = joints(|joint| Law::Viscous(Viscous { joint }))
-        .chain(joints(|joint| Law::DriveInertia(DriveInertia { joint })))
-        .chain(joints(|joint| Law::Offset(Offset { joint })))
-        .chain(joints(|joint| Law::Coulomb(Coulomb { joint, shape: CoulombShape::Smooth { width: 0.05 } })))
+fn terms() -> (Vec<TorqueTerm>, Vec<f64>) {
+    let joints = |term: fn(usize) -> TorqueTerm| (0..2).map(term);
+    let terms: Vec<TorqueTerm> = joints(|joint| TorqueTerm::Viscous(Viscous { joint }))
+        .chain(joints(|joint| TorqueTerm::DriveInertia(DriveInertia { joint })))
+        .chain(joints(|joint| TorqueTerm::Offset(Offset { joint })))
+        .chain(joints(|joint| TorqueTerm::Coulomb(Coulomb { joint, shape: CoulombShape::Smooth { width: 0.05 } })))
         .collect();
-    (laws, vec![0.5, 0.4, 0.3, 0.2, 0.1, -0.1, 0.6, 0.5])
+    (terms, vec![0.5, 0.4, 0.3, 0.2, 0.1, -0.1, 0.6, 0.5])
 }
 
 /// Sines of both joints, exactly.
@@ -57,9 +57,9 @@ fn run(plant: &mut Plant, controller: &mut dyn Controller, reference: &Reference
 /// λ dt/2 of e₀.
 #[test]
 fn computed_torque_is_linear_in_the_error() {
-    let (laws, values) = laws();
-    let mut plant = Plant::new(&paper_arm(), &laws, &values).unwrap();
-    let model = ControllerModel::new(&paper_arm(), &laws, &values).unwrap();
+    let (terms, values) = terms();
+    let mut plant = Plant::new(&paper_arm(), &terms, &values).unwrap();
+    let model = ControllerModel::new(&paper_arm(), &terms, &values).unwrap();
     let settings = ControllerSettings::ComputedTorque(ComputedTorqueSettings {
         kp: 100.0.into(),
         kd: 20.0.into(),
@@ -184,9 +184,9 @@ fn slotine_li_has_the_skew_matrix() {
 /// Adaptation learns: from no model at all, the error of the second half is a small part of that without adaptation.
 #[test]
 fn slotine_li_adapts() {
-    let (laws, values) = laws();
-    let mut plant = Plant::new(&paper_arm(), &laws, &values).unwrap();
-    let nothing = ControllerModel::from_parameters(&paper_arm(), &laws, &[0.0; 28]).unwrap();
+    let (terms, values) = terms();
+    let mut plant = Plant::new(&paper_arm(), &terms, &values).unwrap();
+    let nothing = ControllerModel::from_parameters(&paper_arm(), &terms, &[0.0; 28]).unwrap();
     let reference = sines(1000.0, 20.0);
     let mut late = |gamma: f64| {
         let settings =
@@ -199,7 +199,7 @@ fn slotine_li_adapts() {
     let (fixed, adapted) = (late(0.0), late(3.0));
     assert!(adapted < 0.1 * fixed, "{fixed} {adapted}");
     // With the true model from the start there is nothing to learn: what is left is the sampling.
-    let exact = ControllerModel::new(&paper_arm(), &laws, &values).unwrap();
+    let exact = ControllerModel::new(&paper_arm(), &terms, &values).unwrap();
     let settings =
         SlotineLiSettings { lambda: 5.0.into(), kd: 20.0.into(), gamma: 0.0, friction: FrictionCompensation::Measured };
     let mut controller = ControllerSettings::SlotineLi(settings).build(2, Some(&exact)).unwrap();
@@ -210,11 +210,11 @@ fn slotine_li_adapts() {
 /// Base parameters alone make the same controller as the whole model: torques are linear in them.
 #[test]
 fn base_parameters_are_enough() {
-    let (laws, values) = laws();
+    let (terms, values) = terms();
     let model = random_tree(4, 2);
-    let base = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
+    let base = BaseParameters::new(&model, &terms, &BaseParameterSettings::default());
     let all: Vec<f64> = model.parameter_vector().into_iter().chain(values.iter().copied()).collect();
-    let whole = ControllerModel::new(&model, &laws, &values).unwrap();
+    let whole = ControllerModel::new(&model, &terms, &values).unwrap();
     let few = ControllerModel::from_columns(&model, &base.base_columns(), &base.values(&all)).unwrap();
     for settings in [
         ControllerSettings::ComputedTorque(ComputedTorqueSettings {
@@ -244,7 +244,7 @@ fn base_parameters_are_enough() {
 }
 
 /// Reading notes, 2: joint 2 of the paper's arm with T = 40/ω, 100 Hz, g = 9.8, window ±2.46 s about the middle of each stroke. First under PD with K_p = 16, K_d = 8, then under the paper's law with what
-/// the run before told. The notes' own simulation gave largest tracking errors of 0.62, 0.12 and 0.001 rad (the paper's Fig. 12: 0.6, 0.15, 0) and θ4 = 0.369, 1.094, 0.996.
+/// the run before gave. The notes' own simulation gave largest tracking errors of 0.62, 0.12 and 0.001 rad (the paper's Fig. 12: 0.6, 0.15, 0) and θ4 = 0.369, 1.094, 0.996.
 #[test]
 fn the_papers_three_runs() {
     let (amplitude, omega) = (2.094, 0.996);
@@ -279,8 +279,8 @@ fn the_papers_three_runs() {
         let mut parameters = [0.0; 20];
         (parameters[19], parameters[11], parameters[12]) = (theta[0], theta[1], theta[2]);
         let model = ControllerModel::from_parameters(&paper_arm(), &[], &parameters).unwrap();
-        let law = ControllerSettings::FiniteTime(FiniteTimeSettings::with_gains(4.0, 4.0));
-        controller = law.build(2, Some(&model)).unwrap();
+        let term = ControllerSettings::FiniteTime(FiniteTimeSettings::with_gains(4.0, 4.0));
+        controller = term.build(2, Some(&model)).unwrap();
     }
 }
 

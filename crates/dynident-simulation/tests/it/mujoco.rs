@@ -1,8 +1,8 @@
 //! The simulated robot against MuJoCo 4.0: 10 s of the Panda arm under joint PD at matched steps of 1 ms.
 
 use dynident_excitation::Motion;
-use dynident_model::laws::{Coulomb, CoulombShape, Law, Stribeck, Viscous};
 use dynident_model::load_robot;
+use dynident_model::terms::{Coulomb, CoulombShape, Stribeck, TorqueTerm, Viscous};
 use dynident_simulation::controllers::{JointPd, JointPdSettings};
 use dynident_simulation::{Integrator, LoopSettings, Plant, Reference, closed_loop};
 use serde_json::Value;
@@ -45,15 +45,15 @@ fn ten_seconds_of_panda_agree() {
     let reference = sines(&golden, samples);
     let gains = JointPdSettings { kp: of("kp").into(), kd: of("kd").into() };
     let mut controller = JointPd::new(7, &gains).unwrap();
-    let viscous: Vec<Law> = (0..7).map(|joint| Law::Viscous(Viscous { joint })).collect();
+    let viscous: Vec<TorqueTerm> = (0..7).map(|joint| TorqueTerm::Viscous(Viscous { joint })).collect();
     let every = golden["every"].as_u64().unwrap() as usize;
-    for (run, integrator, laws) in [
+    for (run, integrator, terms) in [
         ("euler", Integrator::SemiImplicitEuler { steps_per_sample: 1 }, &viscous[..0]),
         ("euler_damped", Integrator::SemiImplicitEuler { steps_per_sample: 1 }, &viscous[..]),
         ("rk4", Integrator::Rk4 { steps_per_sample: 1 }, &viscous[..0]),
     ] {
-        let damping = if laws.is_empty() { Vec::new() } else { of("damping") };
-        let mut plant = Plant::new(&model, laws, &damping).unwrap();
+        let damping = if terms.is_empty() { Vec::new() } else { of("damping") };
+        let mut plant = Plant::new(&model, terms, &damping).unwrap();
         let settings = LoopSettings { integrator, ..LoopSettings::default() };
         let own = closed_loop(&mut plant, &mut controller, &reference, &settings).unwrap();
         assert!(own.status.is_done(), "{}", own.status);
@@ -95,7 +95,7 @@ fn the_free_panda_keeps_its_energy() {
 }
 
 /// Panda with dry friction in every joint, stick and slip at every reversal, by all three integrators: Euler and RK4 stay near the tight one, each to its order, and no step is left unsettled. Euler at 1 ms is
-/// off by about h times the speeds (2 rad/s); RK4 sees break-away at its steps only, up to 1 ms late.
+/// off by about h times the velocities (2 rad/s); RK4 sees break-away at its steps only, up to 1 ms late.
 #[test]
 fn panda_sticks_and_slips_the_same_by_all_integrators() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -103,12 +103,12 @@ fn panda_sticks_and_slips_the_same_by_all_integrators() {
         serde_json::from_str(&std::fs::read_to_string(root.join("golden/mujoco_closed_loop.json")).unwrap()).unwrap();
     let model = load_robot(root.join("robots/panda_arm7.urdf")).unwrap().model;
     let shape = CoulombShape::Sign { dead_band: 0.0 };
-    let laws: Vec<Law> = (0..7)
+    let terms: Vec<TorqueTerm> = (0..7)
         .flat_map(|joint| {
             [
-                Law::Coulomb(Coulomb { joint, shape }),
-                Law::Stribeck(Stribeck { joint, speed: 0.05, exponent: 2.0, shape }),
-                Law::Viscous(Viscous { joint }),
+                TorqueTerm::Coulomb(Coulomb { joint, shape }),
+                TorqueTerm::Stribeck(Stribeck { joint, speed: 0.05, exponent: 2.0, shape }),
+                TorqueTerm::Viscous(Viscous { joint }),
             ]
         })
         .collect();
@@ -117,7 +117,7 @@ fn panda_sticks_and_slips_the_same_by_all_integrators() {
     let reference = sines(&golden, 4001);
     let gains = JointPdSettings { kp: numbers(&golden["kp"]).into(), kd: numbers(&golden["kd"]).into() };
     let mut controller = JointPd::new(7, &gains).unwrap();
-    let mut plant = Plant::new(&model, &laws, &values).unwrap();
+    let mut plant = Plant::new(&model, &terms, &values).unwrap();
     let mut motion = |integrator| {
         let settings = LoopSettings { integrator, ..LoopSettings::default() };
         let run = closed_loop(&mut plant, &mut controller, &reference, &settings).unwrap();

@@ -1,11 +1,11 @@
 //! The simulated robot against mechanics: energy, analytic motions, the inverse dynamics, the reduced model.
 
 use dynident_dynamics::{Workspace, inverse_dynamics};
-use dynident_model::laws::{
-    Coulomb, CoulombShape, Coupling, CouplingEffect, Direction, DirectionalCoulomb, DirectionalViscous, DriveInertia,
-    JointMotion, Law, LoadFriction, MaxwellSlip, Offset, Power, PowerExponent, Sigmoid, Stribeck, Viscous,
-};
 use dynident_model::sample::{Random, planar_2r, random_tree};
+use dynident_model::terms::{
+    Coulomb, CoulombShape, Coupling, CouplingEffect, Direction, DirectionalCoulomb, DirectionalViscous, DriveInertia,
+    JointMotion, LoadFriction, MaxwellSlip, Offset, Power, PowerExponent, Sigmoid, Stribeck, TorqueTerm, Viscous,
+};
 use dynident_model::{InertialParameters, Mat3, Model, Vec3};
 use dynident_simulation::{Disturbance, Integrator, Plant, TimeCourse};
 
@@ -21,15 +21,16 @@ fn point(mass: f64) -> InertialParameters {
 }
 
 /// Unit inertia about joint 1 with joint 2 locked straight, no gravity: a flywheel.
-fn flywheel(laws: &[Law], parameters: &[f64]) -> Plant {
+fn flywheel(terms: &[TorqueTerm], parameters: &[f64]) -> Plant {
     let model = planar_2r(1.0, point(1.0), InertialParameters::ZERO).with_gravity(Vec3::ZERO).unwrap();
-    let laws: Vec<Law> = laws.iter().cloned().chain([Law::DriveInertia(DriveInertia { joint: 1 })]).collect();
+    let terms: Vec<TorqueTerm> =
+        terms.iter().cloned().chain([TorqueTerm::DriveInertia(DriveInertia { joint: 1 })]).collect();
     let parameters: Vec<f64> = parameters.iter().copied().chain([1.0]).collect();
-    Plant::new(&model, &laws, &parameters).unwrap()
+    Plant::new(&model, &terms, &parameters).unwrap()
 }
 
-fn coulomb(joint: usize) -> Law {
-    Law::Coulomb(Coulomb { joint, shape: SIGN })
+fn coulomb(joint: usize) -> TorqueTerm {
+    TorqueTerm::Coulomb(Coulomb { joint, shape: SIGN })
 }
 
 fn random_state(seed: u64, dof: usize) -> [Vec<f64>; 3] {
@@ -42,8 +43,8 @@ fn random_state(seed: u64, dof: usize) -> [Vec<f64>; 3] {
 fn free_trees_keep_their_energy() {
     for seed in 0..4 {
         let model = random_tree(seed, 5);
-        let laws = [Law::DriveInertia(DriveInertia { joint: 2 })];
-        let mut plant = Plant::new(&model, &laws, &[0.2]).unwrap();
+        let terms = [TorqueTerm::DriveInertia(DriveInertia { joint: 2 })];
+        let mut plant = Plant::new(&model, &terms, &[0.2]).unwrap();
         let [q, dq, _] = random_state(seed, 5);
         for (integrator, allowed) in [(TIGHT, 1e-8), (Integrator::Rk4 { steps_per_sample: 4 }, 1e-5)] {
             plant.set_state(0.0, &q, &dq);
@@ -62,7 +63,7 @@ fn free_trees_keep_their_energy() {
 fn methods_have_their_order() {
     let model = random_tree(2, 4);
     let [q, dq, tau] = random_state(5, 4);
-    let viscous: Vec<Law> = (0..4).map(|joint| Law::Viscous(Viscous { joint })).collect();
+    let viscous: Vec<TorqueTerm> = (0..4).map(|joint| TorqueTerm::Viscous(Viscous { joint })).collect();
     let mut plant = Plant::new(&model, &viscous, &[0.3; 4]).unwrap();
     let mut end = |integrator| {
         plant.set_state(0.0, &q, &dq);
@@ -81,7 +82,7 @@ fn methods_have_their_order() {
     }
 }
 
-/// Coulomb friction alone: a flywheel of inertia I at speed v stops after I v/F, having turned I v²/(2F), and then rests, exactly. Runge-Kutta methods find the stop to rounding, Euler within a step.
+/// Coulomb friction alone: a flywheel of inertia I at velocity v stops after I v/F, having turned I v²/(2F), and then rests, exactly. Runge-Kutta methods find the stop to rounding, Euler within a step.
 #[test]
 fn a_flywheel_runs_down_and_rests() {
     let mut plant = flywheel(&[coulomb(0)], &[0.7]);
@@ -115,7 +116,7 @@ fn a_flywheel_runs_down_and_rests() {
 /// Break-away torque is Coulomb and Stribeck together; once in motion the Stribeck part fades.
 #[test]
 fn stribeck_friction_breaks_away() {
-    let stribeck = Law::Stribeck(Stribeck { joint: 0, speed: 0.05, exponent: 2.0, shape: SIGN });
+    let stribeck = TorqueTerm::Stribeck(Stribeck { joint: 0, speed: 0.05, exponent: 2.0, shape: SIGN });
     let mut plant = flywheel(&[coulomb(0), stribeck], &[0.5, 0.4]);
     for integrator in [EULER, RK4, TIGHT] {
         plant.set_state(0.0, &[0.0, 0.0], &[0.0, 0.0]);
@@ -158,8 +159,9 @@ fn an_arm_is_held_by_its_friction() {
 #[test]
 fn methods_agree_on_stick_and_slip() {
     let model = planar_2r(1.0, point(1.0), point(1.0));
-    let laws = [coulomb(0), coulomb(1), Law::Viscous(Viscous { joint: 0 }), Law::Viscous(Viscous { joint: 1 })];
-    let mut plant = Plant::new(&model, &laws, &[3.0, 1.5, 1.0, 0.5]).unwrap();
+    let terms =
+        [coulomb(0), coulomb(1), TorqueTerm::Viscous(Viscous { joint: 0 }), TorqueTerm::Viscous(Viscous { joint: 1 })];
+    let mut plant = Plant::new(&model, &terms, &[3.0, 1.5, 1.0, 0.5]).unwrap();
     let mut end = |integrator, steps: i32| {
         plant.set_state(0.0, &[-1.0, 0.5], &[0.0, 0.0]);
         for step in 0..3 * steps {
@@ -184,15 +186,15 @@ fn methods_agree_on_stick_and_slip() {
 fn friction_creates_no_energy() {
     let weightless = random_tree(3, 4).with_gravity(Vec3::ZERO).unwrap();
     let steep = CoulombShape::Smooth { width: 1e-4 };
-    let laws = [
+    let terms = [
         coulomb(0),
-        Law::Coulomb(Coulomb { joint: 1, shape: CoulombShape::Smooth { width: 0.05 } }),
-        Law::Power(Power { joint: 2, exponent: PowerExponent::CubeRoot, rounding: 1e-3 }),
+        TorqueTerm::Coulomb(Coulomb { joint: 1, shape: CoulombShape::Smooth { width: 0.05 } }),
+        TorqueTerm::Power(Power { joint: 2, exponent: PowerExponent::CubeRoot, rounding: 1e-3 }),
         coulomb(3),
-        Law::Viscous(Viscous { joint: 2 }),
+        TorqueTerm::Viscous(Viscous { joint: 2 }),
     ];
     let [q, dq, _] = random_state(8, 4);
-    let mut plant = Plant::new(&weightless, &laws, &[0.4, 0.3, 0.1, 0.2, 0.1]).unwrap();
+    let mut plant = Plant::new(&weightless, &terms, &[0.4, 0.3, 0.1, 0.2, 0.1]).unwrap();
     plant.set_state(0.0, &q, &dq);
     let mut before = plant.energy_j();
     for _ in 0..1500 {
@@ -201,8 +203,8 @@ fn friction_creates_no_energy() {
         assert!(after <= before + 1e-9, "{before} {after}");
         before = after;
     }
-    let laws: Vec<Law> = (0..4).map(|joint| Law::Coulomb(Coulomb { joint, shape: steep })).collect();
-    let mut plant = Plant::new(&weightless, &laws, &[2.0; 4]).unwrap();
+    let terms: Vec<TorqueTerm> = (0..4).map(|joint| TorqueTerm::Coulomb(Coulomb { joint, shape: steep })).collect();
+    let mut plant = Plant::new(&weightless, &terms, &[2.0; 4]).unwrap();
     plant.set_state(0.0, &q, &dq);
     // The slowest joint has some 20 kg m² about it: 2 Nm stop it within ten seconds.
     for _ in 0..12_000 {
@@ -214,45 +216,50 @@ fn friction_creates_no_energy() {
 
 /// In motion, the accelerations under the torque of the inverse dynamics and all laws are those that the torque was made for. Rounding times the mass matrix's condition (below 1e4).
 #[test]
-fn forward_after_inverse_with_every_law() {
+fn forward_after_inverse_with_every_term() {
     let model = random_tree(6, 4);
     let couple = |name: &str, effect| {
-        Law::Coupling(Coupling { name: name.to_owned(), first: 1, second: 2, ratios: [1.0, -0.5], effect })
+        TorqueTerm::Coupling(Coupling { name: name.to_owned(), first: 1, second: 2, ratios: [1.0, -0.5], effect })
     };
-    let laws = vec![
-        Law::Viscous(Viscous { joint: 0 }),
+    let terms = vec![
+        TorqueTerm::Viscous(Viscous { joint: 0 }),
         coulomb(0),
-        Law::DirectionalViscous(DirectionalViscous { joint: 1, direction: Direction::Forward }),
-        Law::DirectionalCoulomb(DirectionalCoulomb { joint: 1, direction: Direction::Backward, shape: SIGN }),
-        Law::DirectionalCoulomb(DirectionalCoulomb {
+        TorqueTerm::DirectionalViscous(DirectionalViscous { joint: 1, direction: Direction::Forward }),
+        TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { joint: 1, direction: Direction::Backward, shape: SIGN }),
+        TorqueTerm::DirectionalCoulomb(DirectionalCoulomb {
             joint: 1,
             direction: Direction::Forward,
             shape: CoulombShape::Smooth { width: 0.1 },
         }),
-        Law::Stribeck(Stribeck { joint: 2, speed: 0.5, exponent: 1.5, shape: SIGN }),
-        Law::Stribeck(Stribeck { joint: 3, speed: 0.5, exponent: 1.5, shape: CoulombShape::Smooth { width: 0.2 } }),
-        Law::Sigmoid(Sigmoid { joint: 2, steepness: 3.0, offset_speed: 0.1 }),
-        Law::Power(Power { joint: 3, exponent: PowerExponent::Quadratic, rounding: 1e-3 }),
-        Law::Offset(Offset { joint: 3 }),
-        Law::DriveInertia(DriveInertia { joint: 1 }),
-        Law::DriveInertia(DriveInertia { joint: 2 }),
+        TorqueTerm::Stribeck(Stribeck { joint: 2, speed: 0.5, exponent: 1.5, shape: SIGN }),
+        TorqueTerm::Stribeck(Stribeck {
+            joint: 3,
+            speed: 0.5,
+            exponent: 1.5,
+            shape: CoulombShape::Smooth { width: 0.2 },
+        }),
+        TorqueTerm::Sigmoid(Sigmoid { joint: 2, steepness: 3.0, offset_speed: 0.1 }),
+        TorqueTerm::Power(Power { joint: 3, exponent: PowerExponent::Quadratic, rounding: 1e-3 }),
+        TorqueTerm::Offset(Offset { joint: 3 }),
+        TorqueTerm::DriveInertia(DriveInertia { joint: 1 }),
+        TorqueTerm::DriveInertia(DriveInertia { joint: 2 }),
         couple("a", CouplingEffect::Inertia),
         couple("b", CouplingEffect::Viscous),
         couple("c", CouplingEffect::Coulomb(SIGN)),
         couple("d", CouplingEffect::Coulomb(CoulombShape::Smooth { width: 0.3 })),
     ];
     let mut random = Random::new(2);
-    let parameters: Vec<f64> = laws.iter().map(|_| random.uniform(0.1, 1.0)).collect();
-    let mut plant = Plant::new(&model, &laws, &parameters).unwrap();
+    let parameters: Vec<f64> = terms.iter().map(|_| random.uniform(0.1, 1.0)).collect();
+    let mut plant = Plant::new(&model, &terms, &parameters).unwrap();
     let mut workspace = Workspace::new(&model);
     for seed in 0..20 {
         let [q, dq, ddq] = random_state(100 + seed, 4);
         let mut tau = inverse_dynamics(&model, &mut workspace, &q, &dq, &ddq).to_vec();
         let motion = JointMotion { samples: 1, q: &q, dq: &dq, ddq: &ddq };
-        for (law, value) in laws.iter().zip(&parameters) {
-            for joint in law.joints() {
+        for (term, value) in terms.iter().zip(&parameters) {
+            for joint in term.joints() {
                 let mut column = [0.0];
-                law.column(joint, &motion, &mut column);
+                term.column(joint, &motion, &mut column);
                 tau[joint] += value * column[0];
             }
         }
@@ -292,7 +299,7 @@ fn locked_joints_are_the_reduced_model() {
 #[test]
 fn a_shared_drive_sticks() {
     let model = planar_2r(1.0, point(1.0), point(1.0)).with_gravity(Vec3::ZERO).unwrap();
-    let drive = Law::Coupling(Coupling {
+    let drive = TorqueTerm::Coupling(Coupling {
         name: "wrist".to_owned(),
         first: 0,
         second: 1,
@@ -313,8 +320,8 @@ fn a_shared_drive_sticks() {
 /// A spring that slips pushes back to where it began as long as it does not yield, and yields at W.
 #[test]
 fn slipping_springs_remember() {
-    let slip = Law::MaxwellSlip(MaxwellSlip { joint: 0, yield_displacement: 0.01 });
-    let damper = Law::Viscous(Viscous { joint: 0 });
+    let slip = TorqueTerm::MaxwellSlip(MaxwellSlip { joint: 0, yield_displacement: 0.01 });
+    let damper = TorqueTerm::Viscous(Viscous { joint: 0 });
     for integrator in [EULER, RK4, TIGHT] {
         let mut plant = flywheel(&[slip.clone(), damper.clone()], &[1.0, 20.0]);
         plant.set_state(0.0, &[0.3, 0.0], &[0.0, 0.0]);
@@ -338,10 +345,10 @@ fn slipping_springs_remember() {
 /// Load-dependent friction holds a share of the load: an arm with k above 1 does not fall, with a small k it slides off with the share taken off.
 #[test]
 fn load_friction_follows_the_load() {
-    let law = Law::Load(LoadFriction { joint: 0, shape: SIGN });
+    let term = TorqueTerm::Load(LoadFriction { joint: 0, shape: SIGN });
     let model = planar_2r(1.0, point(1.0), InertialParameters::ZERO);
-    let laws = [law, Law::DriveInertia(DriveInertia { joint: 1 })];
-    let mut plant = Plant::new(&model, &laws, &[0.25, 1.0]).unwrap().with_locked(&["joint2".to_owned()]).unwrap();
+    let terms = [term, TorqueTerm::DriveInertia(DriveInertia { joint: 1 })];
+    let mut plant = Plant::new(&model, &terms, &[0.25, 1.0]).unwrap().with_locked(&["joint2".to_owned()]).unwrap();
     plant.set_state(0.0, &[0.0, 0.0], &[-1e-6, 0.0]);
     for _ in 0..5 {
         plant.advance(&[0.0, 0.0], 1e-4, EULER).unwrap();
@@ -349,7 +356,7 @@ fn load_friction_follows_the_load() {
     // τ_load = I q̈ + m g = -friction = ∓k |τ_load|: the load vanishes, and the arm falls freely.
     assert!(plant.dq()[0] < -0.9 * 9.8 * 5e-4);
     // Held by a torque it carries m g, and a push below k m g does not move it.
-    let mut plant = Plant::new(&model, &laws, &[0.25, 1.0]).unwrap().with_locked(&["joint2".to_owned()]).unwrap();
+    let mut plant = Plant::new(&model, &terms, &[0.25, 1.0]).unwrap().with_locked(&["joint2".to_owned()]).unwrap();
     plant.set_state(0.0, &[0.0, 0.0], &[0.0, 0.0]);
     for _ in 0..100 {
         plant.advance(&[9.8 + 2.0, 0.0], 1e-3, EULER).unwrap();

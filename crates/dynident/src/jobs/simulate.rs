@@ -34,17 +34,17 @@ pub fn simulate_study(
     let wrong = |part: &str, why: &dyn core::fmt::Display| Error::study(study_path, format!("[{part}]: {why}"));
     let simulation = study.simulation.clone().unwrap_or_default();
     let folders = Folders::new(study, study_path, options.data.as_deref());
-    let machine = StudyRobot::new(study, study_path, &folders)?;
-    let mut truth = simulation.truth(&machine).map_err(|why| wrong("simulation", &why))?;
+    let robot = StudyRobot::new(study, study_path, &folders)?;
+    let mut truth = simulation.truth(&robot).map_err(|why| wrong("simulation", &why))?;
     let controller = study
         .controller
         .clone()
         .unwrap_or_else(|| ControllerSettings::JointPd(JointPdSettings { kp: 100.0.into(), kd: 20.0.into() }));
-    controller.validate(machine.model().dof()).map_err(|why| wrong("controller", &why))?;
-    let trajectory = Trajectory::of_study(study, study_path, &machine, simulation.rate_hz, options, watch)?;
+    controller.validate(robot.model().dof()).map_err(|why| wrong("controller", &why))?;
+    let trajectory = Trajectory::of_study(study, study_path, &robot, simulation.rate_hz, options, watch)?;
     let reference = trajectory.reference().map_err(|why| wrong("iteration", &why))?;
-    let prior = machine.nominal().to_vec();
-    let model = ControllerModel::from_parameters(machine.model(), machine.laws(), &prior)
+    let prior = robot.nominal().to_vec();
+    let model = ControllerModel::from_parameters(robot.model(), robot.terms(), &prior)
         .map_err(|why| wrong("controller", &why))?;
     let request = RunRequest { run: 1, reference: &reference, controller: &controller, model: Some(&model) };
     let run = truth.robot.run(&request).map_err(|why| wrong("simulation", &why))?;
@@ -52,7 +52,7 @@ pub fn simulate_study(
         let named = expressions.into_iter().zip(units).zip(values);
         named.map(|((expression, unit), &value)| ParameterTruth { expression, value, unit: unit.to_owned() }).collect()
     };
-    let bodies = machine.model().bodies().iter().zip(truth.parameters.chunks_exact(10));
+    let bodies = robot.model().bodies().iter().zip(truth.parameters.chunks_exact(10));
     let (max_error, saturated) = run
         .truth
         .as_ref()
@@ -63,7 +63,7 @@ pub fn simulate_study(
         controller: controller.name().to_owned(),
         done: run.status.is_done(),
         status: run.status,
-        joints: machine.parametric.joint_names(),
+        joints: robot.parametric.joint_names(),
         samples: run.record.samples,
         rate_hz: run.record.rate_hz,
         max_tracking_error_rad: max_error,
@@ -71,15 +71,15 @@ pub fn simulate_study(
         bodies: bodies
             .map(|(body, own)| BodyTruth { name: body.name().to_owned(), parameters: own.to_vec() })
             .collect(),
-        laws: own(
-            &truth.parameters[10 * machine.model().dof()..],
-            machine.laws().iter().map(dynident_model::laws::Law::symbol).collect(),
-            machine.laws().iter().map(dynident_model::laws::Law::unit).collect(),
+        terms: own(
+            &truth.parameters[10 * robot.model().dof()..],
+            robot.terms().iter().map(dynident_model::terms::TorqueTerm::symbol).collect(),
+            robot.terms().iter().map(dynident_model::terms::TorqueTerm::unit).collect(),
         ),
         base_parameters: own(
             &truth.base_values,
-            machine.base().expressions(),
-            machine.layout().columns().iter().map(dynident_dynamics::Column::unit).collect(),
+            robot.base().expressions(),
+            robot.layout().columns().iter().map(dynident_dynamics::Column::unit).collect(),
         ),
     };
     Ok(Simulation { file, log: run.record.csv() })

@@ -5,14 +5,14 @@ use crate::jobs::log_summary::held_out_summary;
 use crate::jobs::options::{RunOptions, study_name};
 use crate::result::{ResultFile, VALIDATION_SCHEMA, ValidationFile};
 use crate::study::{Folders, Study, StudyRobot};
-use dynident_identification::examination::{TestedModel, examine_held_out};
+use dynident_identification::examination::{ModelUnderTest, examine_held_out};
 use dynident_identification::{Logs, Role};
 use std::path::Path;
 
 /// Tests the model of a `result.json` on the logs of a study that have the role `validate`, or on all its logs if none has.
 ///
 /// # Errors
-/// If the result does not belong to the study's machine, and everything that reading logs can give.
+/// If the result does not belong to the study's robot, and everything that reading logs can give.
 pub fn validate(
     result_path: &Path,
     study: &Study,
@@ -42,7 +42,8 @@ pub fn validate(
             let carried = recordings[index].payload.as_ref();
             let theta = payloads.base_values(carried, &theta);
             let physical = consistent.as_ref().map(|values| payloads.base_values(carried, values));
-            let tested = TestedModel { theta: &theta, physical: physical.as_deref(), uncertainty: None, traced: false };
+            let tested =
+                ModelUnderTest { theta: &theta, physical: physical.as_deref(), uncertainty: None, traced: false };
             examine_held_out(&logs, &model, index, &tested)
         };
         chosen.iter().map(one).collect::<Result<Vec<_>, _>>()

@@ -43,7 +43,7 @@ pub(crate) fn identification_report(r: &ResultFile, traces: &[LogTrace]) -> Resu
     page.add(Heading::new("Time"));
     let t = &r.timings_s;
     let steps = [
-        ("robot and base parameters", t.machine),
+        ("robot and base parameters", t.robot),
         ("logs to factors", t.logs),
         ("estimation", t.estimation),
         ("validation", t.validation),
@@ -87,7 +87,7 @@ fn figures(r: &ResultFile) -> KeyFigures {
             if excited == r.base_parameters.len() { Tone::Good } else { Tone::Warning },
         )
         .figure("condition number", short(r.method.condition_number_scaled, 3), "columns of unit length")
-        .judged("physically possible", physical.0, "", physical.1)
+        .judged("physically consistent", physical.0, "", physical.1)
         .figure("time", format!("{} s", short(r.timings_s.total, 3)), "")
 }
 
@@ -111,12 +111,12 @@ fn errors(r: &ResultFile) -> Table {
     table
 }
 
-/// One held-out log: the estimate, the possible set and the description.
+/// One held-out log: the estimate, the consistent set and the description.
 fn held_out(log: &LogValidation) -> Table {
     let sets = [
         ("base parameters", Some(&log.model)),
         ("base parameters, unfiltered torque", Some(&log.raw)),
-        ("possible set", log.physical.as_ref()),
+        ("consistent set", log.physical.as_ref()),
         ("the description's own", log.prior.as_ref()),
     ];
     let rows = sets.into_iter().filter_map(|(set, report)| {
@@ -191,7 +191,7 @@ fn parameters(page: &mut Report, r: &ResultFile) {
             Cell::from(unit(&p.unit)),
         ]
     };
-    let columns = ["expression", "value", "std", "std, %", "possible set", "description", "unit"];
+    let columns = ["expression", "value", "std", "std, %", "consistent set", "description", "unit"];
     page.add(Table::new("Base parameters", columns).rows(r.base_parameters.iter().map(row)));
     if !r.method.not_excited.is_empty() {
         let text = format!("Not excited by the logs: {}", r.method.not_excited.join(", "));
@@ -209,13 +209,13 @@ fn parameters(page: &mut Report, r: &ResultFile) {
 
 fn friction(page: &mut Report, r: &ResultFile) {
     let mut table = Table::new("", ["joint", "parameter", "value", "std", "unit"])
-        .note("of the possible set where there is one; a deviation where the parameter is identified on its own");
-    let owned = r.joints.iter().map(|joint| (joint.name.as_str(), &joint.laws[..]));
+        .note("of the consistent set where there is one; a deviation where the parameter is identified on its own");
+    let owned = r.joints.iter().map(|joint| (joint.name.as_str(), &joint.terms[..]));
     let coupled = [("coupling", &r.couplings[..])];
-    for (name, laws) in owned.chain(coupled) {
-        for law in laws {
-            let std = law.std.map_or_else(String::new, |std| short(std, 3));
-            table = table.row([name.to_owned(), law.symbol.clone(), short(law.value, 5), std, unit(&law.unit)]);
+    for (name, terms) in owned.chain(coupled) {
+        for term in terms {
+            let std = term.std.map_or_else(String::new, |std| short(std, 3));
+            table = table.row([name.to_owned(), term.symbol.clone(), short(term.value, 5), std, unit(&term.unit)]);
         }
     }
     page.add(table);
@@ -250,9 +250,9 @@ fn lags(page: &mut Report, r: &ResultFile) {
 fn bodies(page: &mut Report, r: &ResultFile) {
     let mut verdict = Text::new(format!("The verdict is {}.", r.physical.note));
     if r.physical.consistent {
-        verdict = verdict.point(Tone::Good, "every body, friction and drive is physically possible");
+        verdict = verdict.point(Tone::Good, "every body, friction and drive is physically consistent");
     }
-    let failure = r.physical.failure.iter().map(|reason| format!("no possible set: {reason}"));
+    let failure = r.physical.failure.iter().map(|reason| format!("no consistent set: {reason}"));
     for violation in r.physical.violations.iter().cloned().chain(failure) {
         verdict = verdict.point(Tone::Bad, violation);
     }
@@ -312,7 +312,7 @@ fn intervals(found: &[ParameterInterval]) -> Table {
             holder(interval.held_by[1]).into(),
         ]
     });
-    let note = "every value in an interval belongs to a possible machine that the data do not reject at 95 %; the ends are held by the data, by what is possible, or not at all";
+    let note = "every value in an interval belongs to a physically consistent set that the data do not reject at 95 %; the ends are held by the data, by what is physically consistent, or not at all";
     Table::new(
         "How far each parameter could go",
         ["parameter", "of", "unit", "best fit", "from", "to", "held below by", "held above by"],

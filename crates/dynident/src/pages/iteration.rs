@@ -12,7 +12,7 @@ use dynident_simulation::Reference;
 /// Half width of a 95 % error bar, in standard deviations.
 const HALF_WIDTH_95: f64 = 1.96;
 
-/// Curves of one plot: more cannot be told apart.
+/// Curves of one plot: more cannot be distinguished.
 const CURVES: usize = 6;
 
 /// Which trajectory of which run.
@@ -111,7 +111,7 @@ fn worst(run: &IterationRun) -> f64 {
     run.max_tracking_error_rad.iter().fold(0.0, |most, error| most.max(*error))
 }
 
-/// Largest and root mean square error of what a run tells, in units of its own error bars.
+/// Largest and root mean square error of what a run determines, in units of its own error bars.
 fn error_in_bars(run: &IterationRun) -> Option<f64> {
     let squares: Vec<f64> = run
         .parameters
@@ -246,7 +246,7 @@ fn unit(unit: &str) -> String {
 
 fn parameters(page: &mut Report, file: &IterationsFile) {
     let Some(last) = last_good(file) else {
-        page.add(Text::new("No run tells the parameters."));
+        page.add(Text::new("No run determines the parameters."));
         return;
     };
     let known = is_known(file);
@@ -327,9 +327,9 @@ fn by_run(
         .note("run by run, with 95 % error bars");
     for &place in places {
         let each: Vec<Option<&IterationParameter>> = file.runs.iter().map(|run| run.parameters.get(place)).collect();
-        let told = |parameter: &&IterationParameter| parameter.std.is_some();
+        let determined = |parameter: &&IterationParameter| parameter.std.is_some();
         let value = |parameter: Option<&IterationParameter>| {
-            parameter.filter(told).map_or(f64::NAN, |parameter| parameter.error.unwrap_or(parameter.value))
+            parameter.filter(determined).map_or(f64::NAN, |parameter| parameter.error.unwrap_or(parameter.value))
         };
         let bar = |parameter: Option<&IterationParameter>| {
             parameter.and_then(|parameter| parameter.std).map_or(f64::NAN, |std| HALF_WIDTH_95 * std)

@@ -59,17 +59,17 @@ fn payload_sections(page: &mut Report, payload: &PayloadResult) {
         vec![Cell::from(figure), of(|m| m.value), of(|m| m.std), of(|m| m.half_width_95), possible.into()]
     });
     let note = format!(
-        "in the frame of {}; inertia (kg m²) about the centre of mass; what the logs do not tell alone is –",
+        "in the frame of {}; inertia (kg m²) about the centre of mass; what the logs do not determine alone is –",
         payload.link
     );
-    let columns = ["", "estimate", "std", "95 %, ±", "possible body"];
+    let columns = ["", "estimate", "std", "95 %, ±", "consistent body"];
     page.add(Table::new(format!("Payload {}", payload.name), columns).note(note).rows(rows));
     let mut text = Text::new(format!("Carried in {}.", payload.logs.join(", ")));
     for words in &payload.not_identified {
         text = text.point(Tone::Warning, words.clone());
     }
     if let Some(reason) = &payload.failure {
-        text = text.point(Tone::Bad, format!("no possible body: {reason}"));
+        text = text.point(Tone::Bad, format!("no consistent body: {reason}"));
     }
     page.add(text);
 }

@@ -66,7 +66,7 @@ pub struct DesignFile {
     pub windowed: Option<WindowedFile>,
     /// Evaluations of criterion, limits and gradient.
     pub evaluations: usize,
-    /// Processor seconds, all threads together; none where the system does not tell.
+    /// Processor seconds, all threads together; none where the system does not say.
     pub cpu_s: Option<f64>,
     /// Seconds by the clock.
     pub seconds: f64,
@@ -177,7 +177,7 @@ impl WindowedFile {
             for limit in stroke.limits.iter().filter(|limit| !limit.kept) {
                 let what = match limit.quantity {
                     StrokeQuantity::Position => "reach (rad)",
-                    StrokeQuantity::Speed => "peak speed (rad/s)",
+                    StrokeQuantity::Speed => "peak velocity (rad/s)",
                     StrokeQuantity::Acceleration => "peak acceleration (rad/s\u{b2})",
                     StrokeQuantity::RestSpeed => "speed at rest (rad/s)",
                     StrokeQuantity::RestAcceleration => "acceleration at rest (rad/s\u{b2})",

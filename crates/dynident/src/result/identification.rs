@@ -6,7 +6,7 @@ use dynident_estimation::{CorrelatedPair, EssentialReport};
 use dynident_identification::Role;
 use dynident_identification::consistent::ParameterInterval;
 use dynident_identification::estimators::{GrossErrors, NoiseInRegressor, PeriodicFit, SeriesFit, SimulatedFit};
-use dynident_identification::examination::{LogValidation, PriorAgreement, SignEvidence, TorqueBand, TorqueLag};
+use dynident_identification::examination::{LogValidation, PriorAgreement, TorqueBand, TorqueLag, TorqueSignCheck};
 use dynident_identification::friction::FrictionCandidate;
 use dynident_identification::payload::{DriveGain, PayloadResult};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
@@ -22,7 +22,7 @@ pub struct ResultFile {
     pub schema: String,
     /// Name of the study.
     pub name: String,
-    /// The machine.
+    /// The robot.
     pub robot: RobotSummary,
     /// How the fit was made.
     pub method: MethodSummary,
@@ -48,9 +48,9 @@ pub struct ResultFile {
     pub base_parameter_covariance: Vec<Vec<f64>>,
     /// The bodies: one of the full sets that give these base parameters, the nearest to the prior.
     pub bodies: Vec<BodyResult>,
-    /// How far every parameter of a body or law could go in a possible machine that the data do not reject; none unless asked for.
+    /// How far every parameter of a body or term could go in a physically consistent set that the data do not reject; none unless asked for.
     pub possible_intervals: Option<Vec<ParameterInterval>>,
-    /// What was held at zero because the data hardly tell it; none unless asked for.
+    /// What was held at zero because the data hardly determine it; none unless asked for.
     pub essential: Option<EssentialReport>,
     /// The strongest correlations between estimates, strongest first.
     #[serde(default)]
@@ -70,7 +70,7 @@ pub struct ResultFile {
     pub drive_gains: Option<Vec<DriveGain>>,
     /// Drives that turn with two joints.
     #[serde(default)]
-    pub couplings: Vec<LawResult>,
+    pub couplings: Vec<TermResult>,
     /// The fit on the logs that it was made from.
     pub training: TrainingResult,
     /// The test on logs that were not used.
@@ -79,7 +79,7 @@ pub struct ResultFile {
     /// How well the 95 % band of the predicted torque holds on held-out logs.
     #[serde(default)]
     pub torque_band: Vec<TorqueBand>,
-    /// Whether the full set is physically possible.
+    /// Whether the full set is physically consistent.
     pub physical: PhysicalVerdict,
     /// What the importer found in each log.
     pub logs: Vec<LogSummary>,
@@ -89,14 +89,14 @@ pub struct ResultFile {
     pub timings_s: Timings,
 }
 
-/// The machine of a result.
+/// The robot of a result.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RobotSummary {
     /// Its name.
     pub name: String,
     /// The description.
     pub file: String,
-    /// Degrees of freedom.
+    /// Degrees of degrees_of_freedom.
     pub dof: usize,
     /// Joint names in the order of all vectors.
     pub joints: Vec<String>,
@@ -145,7 +145,7 @@ pub struct BaseParameterResult {
     pub symbol: String,
     /// What it sums: `Izz1 + 0.49 m2`.
     pub expression: String,
-    /// Its unit at a turning joint.
+    /// Its unit at a revolute joint.
     pub unit: String,
     /// The estimate.
     #[serde(deserialize_with = "number")]
@@ -163,7 +163,7 @@ pub struct BaseParameterResult {
     pub relative_std_percent: Option<f64>,
     /// By the description's own numbers.
     pub prior: Option<f64>,
-    /// Of the physically possible set in `bodies` and `joints`; none when that was not asked for.
+    /// Of the physically consistent set in `bodies` and `joints`; none when that was not asked for.
     #[serde(default)]
     pub physical: Option<f64>,
     /// False when the data do not excite it; value is then the prior's and std means nothing.
@@ -187,18 +187,18 @@ pub struct BodyResult {
     pub parameters: [f64; 10],
     /// The description's own ten; none when unknown.
     pub prior: Option<[f64; 10]>,
-    /// Smallest eigenvalue of the pseudo-inertia: positive for a possible body.
+    /// Smallest eigenvalue of the pseudo-inertia: positive for a consistent body.
     pub pseudo_inertia_min_eigenvalue: f64,
 }
 
-/// A parameter of a law.
+/// A parameter of a term.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct LawResult {
+pub struct TermResult {
     /// Its symbol.
     pub symbol: String,
-    /// Its unit at a turning joint.
+    /// Its unit at a revolute joint.
     pub unit: String,
-    /// Its value in the full set of `bodies`: the physically possible one unless `estimator.physical` is false.
+    /// Its value in the full set of `bodies`: the physically consistent one unless `estimator.physical` is false.
     pub value: f64,
     /// Standard deviation of the unconstrained estimate; none where it is not a base parameter by itself.
     pub std: Option<f64>,
@@ -211,14 +211,15 @@ pub struct LawResult {
 pub struct JointResult {
     /// The joint.
     pub name: String,
-    /// Its laws.
-    pub laws: Vec<LawResult>,
+    /// Its terms.
+    #[serde(rename = "laws")]
+    pub terms: Vec<TermResult>,
     /// Standard deviation of its filtered residual, Nm (N).
     #[serde(deserialize_with = "number")]
     pub residual_std_nm: f64,
     /// How strongly its residual is correlated in time: the lag-1 correlation that matters for the error bars.
     pub residual_correlation: Option<f64>,
-    /// Lag of its torque behind the motion by all training logs; none where they do not tell. The model itself is fitted to the torque as logged.
+    /// Lag of its torque behind the motion by all training logs; none where they do not determine. The model itself is fitted to the torque as logged.
     pub torque_lag: Option<TorqueLag>,
 }
 
@@ -260,7 +261,7 @@ pub struct TrainingJoint {
     pub relative_error_percent: Option<f64>,
 }
 
-/// Whether a full set is possible.
+/// Whether a full set is physically consistent.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PhysicalVerdict {
     /// All pseudo-inertias positive definite, no negative friction or drive inertia.
@@ -274,11 +275,11 @@ pub struct PhysicalVerdict {
     pub fit: Option<PhysicalFitResult>,
     /// Why it failed.
     pub failure: Option<String>,
-    /// Bodies whose description is no possible body, so that a rough one of ordinary mass stands in as their prior.
+    /// Bodies whose description is no consistent body, so that a rough one of ordinary mass stands in as their prior.
     #[serde(default)]
     pub impossible_priors: Vec<String>,
-    /// Which sign of the torque a possible machine explains; none without a possible machine for either.
-    pub sign: Option<SignEvidence>,
+    /// Which sign of the torque a physically consistent set explains; none without a physically consistent set for either.
+    pub sign: Option<TorqueSignCheck>,
 }
 
 /// A physically consistent fit.
@@ -306,14 +307,14 @@ pub struct PhysicalFitResult {
     pub bodies: Vec<PhysicalBodyResult>,
 }
 
-/// How possible a body is.
+/// Whether a body is physically consistent, and by what margin.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PhysicalBodyResult {
     /// Its name.
     pub name: String,
     /// Smallest eigenvalue of its pseudo-inertia in units of the description's body.
     pub margin: f64,
-    /// Whether the data want it outside of what is possible.
+    /// Whether the data want it outside of what is physically consistent.
     pub on_the_boundary: bool,
 }
 
@@ -336,7 +337,7 @@ pub struct LogSummary {
     pub filtered_rows: u64,
     /// The log against the description's own inertials.
     pub prior_agreement: Option<PriorAgreement>,
-    /// Lag of torque behind motion by joint, seconds, estimated together with the model from this log alone; none where the log does not tell.
+    /// Lag of torque behind motion by joint, seconds, estimated together with the model from this log alone; none where the log does not determine.
     #[serde(default)]
     pub torque_lag_s: Vec<Option<f64>>,
     /// Standard deviations of the lags.
@@ -354,7 +355,8 @@ pub struct LogSummary {
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Timings {
     /// Reading the robot, base parameters.
-    pub machine: f64,
+    #[serde(rename = "machine")]
+    pub robot: f64,
     /// Logs to triangular factors.
     pub logs: f64,
     /// Factors to estimates.

@@ -10,11 +10,11 @@ pub const INSPECTION_SCHEMA: &str = "dynident/inspection/1";
 pub struct Inspection {
     /// [`INSPECTION_SCHEMA`].
     pub schema: String,
-    /// The machine's name.
+    /// The robot's name.
     pub name: String,
     /// The file.
     pub file: String,
-    /// Degrees of freedom.
+    /// Degrees of degrees_of_freedom.
     pub dof: usize,
     /// Mass of the moving bodies with known inertials.
     pub moving_mass_kg: f64,
@@ -44,7 +44,7 @@ pub struct JointSummary {
     pub lower: Option<f64>,
     /// Highest position, rad or m.
     pub upper: Option<f64>,
-    /// Highest speed, rad/s or m/s.
+    /// Highest velocity, rad/s or m/s.
     pub velocity: Option<f64>,
     /// Highest torque, Nm or N.
     pub effort: Option<f64>,
@@ -72,7 +72,7 @@ pub struct BaseSummary {
     pub count: usize,
     /// What each sums.
     pub expressions: Vec<String>,
-    /// Parameters that no motion can tell.
+    /// Parameters that no motion can determine.
     pub unidentifiable: Vec<String>,
     /// Rank of the bodies' regressor at random states, by [`numerical_rank_by_body`](dynident_dynamics::numerical_rank_by_body): the cross-check.
     pub numerical_rank: usize,
@@ -90,6 +90,6 @@ pub struct AuditEntry {
     /// Which link or joint.
     #[serde(rename = "where")]
     pub place: String,
-    /// What, why it matters, and the mend.
+    /// What, why it matters, and the fix.
     pub what: String,
 }

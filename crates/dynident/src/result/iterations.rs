@@ -30,7 +30,7 @@ pub struct IterationsFile {
     pub error_over_bound: Option<f64>,
     /// The Cramér-Rao bound of every parameter for one run: white torque noise of the simulated sensors at every recorded sample, exact positions.
     pub bound: Option<Vec<f64>>,
-    /// All parameters of the last good possible machine: ten for each body, one for each law.
+    /// All parameters of the last good physically consistent set: ten for each body, one for each term.
     pub possible_parameters: Option<Vec<f64>>,
 }
 
@@ -45,7 +45,7 @@ pub struct IterationRun {
     pub controller: String,
     /// Whether it had a model.
     pub model_based: bool,
-    /// Of which run the possible machine (or the estimate) was its model; none for the description, a step between two runs' machines, or no model.
+    /// Of which run the physically consistent set (or the estimate) was its model; none for the description, a step between two runs' robots, or no model.
     pub model_of_run: Option<usize>,
     /// Share of the step from the last good parameters that was taken.
     pub damping: f64,
@@ -59,7 +59,7 @@ pub struct IterationRun {
     pub reason: Option<String>,
     /// For each joint the largest distance from the trajectory, rad (m).
     pub max_tracking_error_rad: Vec<f64>,
-    /// What it tells.
+    /// What it determines.
     pub parameters: Vec<IterationParameter>,
 }
 
@@ -74,7 +74,7 @@ pub struct IterationParameter {
     pub unit: String,
     /// Value.
     pub value: f64,
-    /// Standard deviation; none where the run does not tell it.
+    /// Standard deviation; none where the run does not determine it.
     pub std: Option<f64>,
     /// Value less the simulated robot's; none for a real one.
     pub error: Option<f64>,

@@ -13,9 +13,9 @@ pub use design::{
     DESIGN_SCHEMA, DesignFile, DirectionForecast, ParameterForecast, StrokeFile, StrokeLimitFile, WindowedFile,
 };
 pub use identification::{
-    BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LawResult, LogOffset, LogSummary, MethodSummary,
-    PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, Timings,
-    TrainingJoint, TrainingResult,
+    BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, LogSummary, MethodSummary,
+    PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, TermResult,
+    Timings, TrainingJoint, TrainingResult,
 };
 pub use inspection::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary};
 pub use iterations::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile};

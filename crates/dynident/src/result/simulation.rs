@@ -31,8 +31,9 @@ pub struct SimulationFile {
     pub saturated_samples: Vec<usize>,
     /// True bodies: ten parameters each.
     pub bodies: Vec<BodyTruth>,
-    /// True parameters of the laws.
-    pub laws: Vec<ParameterTruth>,
+    /// True parameters of the terms.
+    #[serde(rename = "laws")]
+    pub terms: Vec<ParameterTruth>,
     /// True base parameters.
     pub base_parameters: Vec<ParameterTruth>,
 }

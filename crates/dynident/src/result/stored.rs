@@ -42,8 +42,9 @@ impl ResultFile {
         let wrong = |message: String| Error::Result { path: path.to_owned(), message };
         let stored: Self = read_part(path)?;
         for joint in &stored.friction_choice {
-            let mut laws = joint.drive.iter().flat_map(|drive| drive.laws.iter().flatten());
-            laws.try_for_each(|law| law.validate(&format!("friction_choice of joint `{}`", joint.joint)))
+            let mut terms = joint.drive.iter().flat_map(|drive| drive.terms.iter().flatten());
+            terms
+                .try_for_each(|term| term.validate(&format!("friction_choice of joint `{}`", joint.joint)))
                 .map_err(wrong)?;
         }
         Ok(stored)
@@ -75,7 +76,7 @@ impl ResultFile {
         let expressions = model.base().expressions();
         if self.base_parameters.len() != expressions.len() {
             return Err(wrong(format!(
-                "{} base parameters, but the study's machine has {}: use the study that the result was made with",
+                "{} base parameters, but the study's robot has {}: use the study that the result was made with",
                 self.base_parameters.len(),
                 expressions.len()
             )));
@@ -84,7 +85,7 @@ impl ResultFile {
         for (stored, expression) in self.base_parameters.iter().zip(&expressions) {
             if stored.expression != *expression {
                 return Err(wrong(format!(
-                    "base parameter `{}` where the study's machine has `{expression}`: use the study that the result was made with",
+                    "base parameter `{}` where the study's robot has `{expression}`: use the study that the result was made with",
                     stored.expression
                 )));
             }

@@ -1,19 +1,19 @@
 //! `[drive]` and `[[coupling]]`: friction, offsets and drive inertia.
 
 use super::arrays::two;
-use super::friction::{FrictionChoice, FrictionLaw};
+use super::friction::{FrictionChoice, FrictionTerm};
 use super::numbers::{not_negative, positive};
 use dynident_identification::{GainChoice, OffsetChoice};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// How a Coulomb step looks near zero speed.
+/// How a Coulomb step looks near zero velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CoulombChoice {
     /// No Coulomb friction.
     None,
-    /// The sign of the speed.
+    /// The sign of the velocity.
     Sign,
     /// `tanh(speed / width)`.
     Smooth,
@@ -31,7 +31,7 @@ pub struct DriveSection {
     pub coulomb: CoulombChoice,
     /// Width of the smooth step, rad/s or m/s; 0.02 by default.
     pub coulomb_width: f64,
-    /// Speed below which the sign counts as zero, rad/s or m/s; 0 by default.
+    /// Velocity below which the sign counts as zero, rad/s or m/s; 0 by default.
     pub coulomb_dead_band: f64,
     /// A constant torque. On by default.
     pub offset: bool,
@@ -40,7 +40,8 @@ pub struct DriveSection {
     /// Who says what a unit of logged torque is worth. The format (`"stated"`) by default.
     pub gains: GainChoice,
     /// Further laws of friction. None by default.
-    pub laws: Vec<FrictionLaw>,
+    #[serde(rename = "laws")]
+    pub terms: Vec<FrictionTerm>,
     /// Whether the keys above say which friction there is (`"stated"`, the default), or the training logs (`"auto"`).
     pub friction: FrictionChoice,
     /// Exceptions, by joint name.
@@ -58,7 +59,7 @@ impl Default for DriveSection {
             offset: true,
             offsets: OffsetChoice::Shared,
             gains: GainChoice::Stated,
-            laws: Vec::new(),
+            terms: Vec::new(),
             friction: FrictionChoice::Stated,
             joints: BTreeMap::new(),
         }
@@ -82,12 +83,13 @@ pub struct JointDrive {
     /// In place of `drive.offset`.
     pub offset: Option<bool>,
     /// In place of `drive.laws`.
-    pub laws: Option<Vec<FrictionLaw>>,
+    #[serde(rename = "laws")]
+    pub terms: Option<Vec<FrictionTerm>>,
     /// In place of `drive.friction`.
     pub friction: Option<FrictionChoice>,
 }
 
-/// `[[coupling]]`: a drive whose speed is `ratios[0] · q̇_first + ratios[1] · q̇_second`.
+/// `[[coupling]]`: a drive whose velocity is `ratios[0] · q̇_first + ratios[1] · q̇_second`.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct CouplingSection {
@@ -96,7 +98,7 @@ pub struct CouplingSection {
     /// The two joints.
     #[serde(deserialize_with = "two")]
     pub joints: [String; 2],
-    /// Drive speed per joint speed; 1 and 1 by default.
+    /// Drive velocity per joint velocity; 1 and 1 by default.
     #[serde(default = "one_one", deserialize_with = "two")]
     pub ratios: [f64; 2],
     /// Cross inertia. On by default.
@@ -105,7 +107,7 @@ pub struct CouplingSection {
     /// Cross viscous friction. On by default.
     #[serde(default = "yes")]
     pub viscous: bool,
-    /// Coulomb friction on the drive's own speed; by default as `drive.coulomb`.
+    /// Coulomb friction on the drive's own velocity; by default as `drive.coulomb`.
     #[serde(default)]
     pub coulomb: Option<CoulombChoice>,
 }
@@ -114,12 +116,12 @@ impl DriveSection {
     pub(crate) fn validate(&self) -> Result<(), String> {
         positive(self.coulomb_width, "drive.coulomb_width")?;
         not_negative(self.coulomb_dead_band, "drive.coulomb_dead_band")?;
-        for (index, law) in self.laws.iter().enumerate() {
-            law.validate(&format!("drive.laws number {}", index + 1))?;
+        for (index, term) in self.terms.iter().enumerate() {
+            term.validate(&format!("drive.laws number {}", index + 1))?;
         }
         for (joint, drive) in &self.joints {
-            for (index, law) in drive.laws.iter().flatten().enumerate() {
-                law.validate(&format!("drive.joints.{joint}.laws number {}", index + 1))?;
+            for (index, term) in drive.terms.iter().flatten().enumerate() {
+                term.validate(&format!("drive.joints.{joint}.laws number {}", index + 1))?;
             }
             if let Some(width) = drive.coulomb_width {
                 positive(width, &format!("drive.joints.{joint}.coulomb_width"))?;

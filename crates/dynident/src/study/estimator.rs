@@ -70,16 +70,16 @@ pub struct EstimatorSection {
     pub method: EstimatorMethod,
     /// The covariance that error bars come from; `"jackknife"`, which accounts for coloured residuals and judges each time segment by the fit without it, by default.
     pub covariance: CovarianceMethod,
-    /// Whether the bodies, friction and drives written are those of a possible machine that fit the logs best (true by default), or the set nearest to the
+    /// Whether the bodies, friction and drives written are those of a physically consistent set that fit the logs best (true by default), or the set nearest to the
     /// description that has exactly the estimated base parameters. A table in place of `true` says what else is known of the bodies.
     pub physical: PhysicalChoice,
-    /// Intervals for every parameter of bodies and laws over all possible machines that the data do not reject; some thousand physical fits, so not by default. Needs `physical`.
+    /// Intervals for every parameter of bodies and laws over all physically consistent robots that the data do not reject; some thousand physical fits, so not by default. Needs `physical`.
     pub intervals: bool,
     /// When a column counts as excited.
     pub rank: RankSettings,
     /// How logs are cut into segments for the covariance.
     pub segments: SegmentSettings,
-    /// Hold parameters that the data hardly tell at zero; not by default.
+    /// Hold parameters that the data hardly determine at zero; not by default.
     pub essential: Option<EssentialSettings>,
     /// Instruments for `method = "instrumental"`. With another method they only test whether noise in the regressor biases it.
     pub instruments: Option<InstrumentSettings>,
@@ -163,7 +163,8 @@ impl EstimatorSection {
         self.simulated.validate().map_err(|error| format!("[estimator.simulated]: {error}"))?;
         self.physical.validate().map_err(|error| format!("[estimator.physical]: {error}"))?;
         if self.intervals && self.physical.settings().is_none() {
-            return Err("estimator.intervals = true needs the possible machine: take out physical = false".to_owned());
+            return Err("estimator.intervals = true needs physically consistent parameters: take out physical = false"
+                .to_owned());
         }
         self.segments.validate().map_err(|error| format!("[estimator.segments]: {error}"))?;
         if let Some(essential) = &self.essential {

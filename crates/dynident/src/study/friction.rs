@@ -1,8 +1,8 @@
 //! Friction in the study file: laws beyond viscous, Coulomb and offset, and whether the data choose them.
 
-use dynident_model::laws::{
-    CoulombShape, Direction, DirectionalCoulomb, DirectionalViscous, Law, LoadFriction, MaxwellSlip, Power,
-    PowerExponent, Sigmoid, Stribeck, TemperatureCoulomb, TemperatureViscous,
+use dynident_model::terms::{
+    CoulombShape, Direction, DirectionalCoulomb, DirectionalViscous, LoadFriction, MaxwellSlip, Power, PowerExponent,
+    Sigmoid, Stribeck, TemperatureCoulomb, TemperatureViscous, TorqueTerm,
 };
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +20,7 @@ pub enum FrictionChoice {
 /// A law of `drive.laws`, beside `viscous`, `coulomb` and `offset`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(tag = "law", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum FrictionLaw {
+pub enum FrictionTerm {
     /// Viscous friction by direction, in place of `viscous`.
     AsymmetricViscous {},
     /// Coulomb friction by direction, in place of `coulomb`; with a sign it says the same as `offset`, so switch one off.
@@ -43,9 +43,9 @@ pub enum FrictionLaw {
         #[serde(default)]
         offset_speed: f64,
     },
-    /// Torque by the cube root of the speed.
+    /// Torque by the cube root of the velocity.
     CubeRoot {},
-    /// Torque by the square of the speed.
+    /// Torque by the square of the velocity.
     Quadratic {},
     /// Torque in proportion to the load, against the motion.
     Load {
@@ -80,74 +80,84 @@ fn yes() -> bool {
     true
 }
 
-/// Speed below which a power of it is rounded, rad/s or m/s: below any speed that a differentiated encoder tells from rest.
+/// Velocity below which a power of it is rounded, rad/s or m/s: below any velocity that a differentiated encoder separates from rest.
 const ROUNDING: f64 = 1.0e-3;
 /// Elements of one joint: each is a column.
 const MOST_ELEMENTS: usize = 50;
 
-impl FrictionLaw {
+impl FrictionTerm {
     /// The parameters of this law at `joint`, whose Coulomb step is `step`.
-    pub(crate) fn laws(&self, joint: usize, step: CoulombShape) -> Vec<Law> {
+    pub(crate) fn terms(&self, joint: usize, step: CoulombShape) -> Vec<TorqueTerm> {
         let both = [Direction::Forward, Direction::Backward];
-        let power = |exponent| vec![Law::Power(Power { joint, exponent, rounding: ROUNDING })];
+        let power = |exponent| vec![TorqueTerm::Power(Power { joint, exponent, rounding: ROUNDING })];
         match self {
             Self::AsymmetricViscous {} => {
-                both.map(|direction| Law::DirectionalViscous(DirectionalViscous { joint, direction })).to_vec()
+                both.map(|direction| TorqueTerm::DirectionalViscous(DirectionalViscous { joint, direction })).to_vec()
             }
             Self::AsymmetricCoulomb {} => both
-                .map(|direction| Law::DirectionalCoulomb(DirectionalCoulomb { joint, direction, shape: step }))
+                .map(|direction| TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { joint, direction, shape: step }))
                 .to_vec(),
             &Self::Stribeck { speed, exponent, width } => {
                 let shape = width.map_or(step, |width| CoulombShape::Smooth { width });
-                vec![Law::Stribeck(Stribeck { joint, speed, exponent, shape })]
+                vec![TorqueTerm::Stribeck(Stribeck { joint, speed, exponent, shape })]
             }
             &Self::Sigmoid { steepness, offset_speed } => {
-                vec![Law::Sigmoid(Sigmoid { joint, steepness, offset_speed })]
+                vec![TorqueTerm::Sigmoid(Sigmoid { joint, steepness, offset_speed })]
             }
             Self::CubeRoot {} => power(PowerExponent::CubeRoot),
             Self::Quadratic {} => power(PowerExponent::Quadratic),
             &Self::Load { width } => {
                 let shape = width.map_or(step, |width| CoulombShape::Smooth { width });
-                vec![Law::Load(LoadFriction { joint, shape })]
+                vec![TorqueTerm::Load(LoadFriction { joint, shape })]
             }
             &Self::Temperature { reference_c, viscous, coulomb } => {
                 let changes = [
-                    viscous.then_some(Law::TemperatureViscous(TemperatureViscous { joint, reference_c })),
-                    coulomb.then_some(Law::TemperatureCoulomb(TemperatureCoulomb { joint, reference_c, shape: step })),
+                    viscous.then_some(TorqueTerm::TemperatureViscous(TemperatureViscous { joint, reference_c })),
+                    coulomb.then_some(TorqueTerm::TemperatureCoulomb(TemperatureCoulomb {
+                        joint,
+                        reference_c,
+                        shape: step,
+                    })),
                 ];
                 changes.into_iter().flatten().collect()
             }
             Self::MaxwellSlip { yield_displacements } => {
-                let element = |&yield_displacement| Law::MaxwellSlip(MaxwellSlip { joint, yield_displacement });
+                let element = |&yield_displacement| TorqueTerm::MaxwellSlip(MaxwellSlip { joint, yield_displacement });
                 yield_displacements.iter().map(element).collect()
             }
         }
     }
 
     /// The key that states `law`; none for what has keys of its own beside `laws`. One of several laws of a key gives the key with that law alone.
-    pub(crate) fn stating(law: &Law) -> Option<Self> {
+    pub(crate) fn stating(term: &TorqueTerm) -> Option<Self> {
         let width = |shape: CoulombShape| match shape {
             CoulombShape::Sign { .. } => None,
             CoulombShape::Smooth { width } => Some(width),
         };
-        match *law {
-            Law::Viscous(_) | Law::Coulomb(_) | Law::Offset(_) | Law::DriveInertia(_) | Law::Coupling(_) => None,
-            Law::DirectionalViscous(_) => Some(Self::AsymmetricViscous {}),
-            Law::DirectionalCoulomb(_) => Some(Self::AsymmetricCoulomb {}),
-            Law::Stribeck(Stribeck { speed, exponent, shape, .. }) => {
+        match *term {
+            TorqueTerm::Viscous(_)
+            | TorqueTerm::Coulomb(_)
+            | TorqueTerm::Offset(_)
+            | TorqueTerm::DriveInertia(_)
+            | TorqueTerm::Coupling(_) => None,
+            TorqueTerm::DirectionalViscous(_) => Some(Self::AsymmetricViscous {}),
+            TorqueTerm::DirectionalCoulomb(_) => Some(Self::AsymmetricCoulomb {}),
+            TorqueTerm::Stribeck(Stribeck { speed, exponent, shape, .. }) => {
                 Some(Self::Stribeck { speed, exponent, width: width(shape) })
             }
-            Law::Sigmoid(Sigmoid { steepness, offset_speed, .. }) => Some(Self::Sigmoid { steepness, offset_speed }),
-            Law::Power(Power { exponent: PowerExponent::CubeRoot, .. }) => Some(Self::CubeRoot {}),
-            Law::Power(Power { exponent: PowerExponent::Quadratic, .. }) => Some(Self::Quadratic {}),
-            Law::Load(LoadFriction { shape, .. }) => Some(Self::Load { width: width(shape) }),
-            Law::MaxwellSlip(MaxwellSlip { yield_displacement, .. }) => {
+            TorqueTerm::Sigmoid(Sigmoid { steepness, offset_speed, .. }) => {
+                Some(Self::Sigmoid { steepness, offset_speed })
+            }
+            TorqueTerm::Power(Power { exponent: PowerExponent::CubeRoot, .. }) => Some(Self::CubeRoot {}),
+            TorqueTerm::Power(Power { exponent: PowerExponent::Quadratic, .. }) => Some(Self::Quadratic {}),
+            TorqueTerm::Load(LoadFriction { shape, .. }) => Some(Self::Load { width: width(shape) }),
+            TorqueTerm::MaxwellSlip(MaxwellSlip { yield_displacement, .. }) => {
                 Some(Self::MaxwellSlip { yield_displacements: vec![yield_displacement] })
             }
-            Law::TemperatureViscous(TemperatureViscous { reference_c, .. }) => {
+            TorqueTerm::TemperatureViscous(TemperatureViscous { reference_c, .. }) => {
                 Some(Self::Temperature { reference_c, viscous: true, coulomb: false })
             }
-            Law::TemperatureCoulomb(TemperatureCoulomb { reference_c, .. }) => {
+            TorqueTerm::TemperatureCoulomb(TemperatureCoulomb { reference_c, .. }) => {
                 Some(Self::Temperature { reference_c, viscous: false, coulomb: true })
             }
         }

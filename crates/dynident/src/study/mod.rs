@@ -25,7 +25,7 @@ pub use design::{
 pub use drive::{CoulombChoice, CouplingSection, DriveSection, JointDrive};
 pub use estimator::{EstimatorMethod, EstimatorSection};
 pub use folders::Folders;
-pub use friction::{FrictionChoice, FrictionLaw};
+pub use friction::{FrictionChoice, FrictionTerm};
 pub use iteration::{IterationSection, LegOrder, LegSection, PriorChoice, RobotChoice};
 pub use log::LogSection;
 pub use payload::{ArmSection, PayloadSection};
@@ -81,7 +81,7 @@ pub struct Study {
     /// Folder of the recordings, relative to the study file, used unless the command line names one.
     #[serde(default)]
     pub data: Option<PathBuf>,
-    /// The machine.
+    /// The robot.
     pub robot: RobotSection,
     /// Friction, offsets and drive inertia.
     #[serde(default)]
@@ -230,8 +230,9 @@ impl Study {
 
     /// That friction which depends on the temperature is asked for where it can be had.
     fn check_temperature(&self) -> Result<(), String> {
-        let laws = self.drive.joints.values().filter_map(|own| own.laws.as_ref()).chain([&self.drive.laws]).flatten();
-        if !laws.into_iter().any(|law| matches!(law, FrictionLaw::Temperature { .. })) {
+        let terms =
+            self.drive.joints.values().filter_map(|own| own.terms.as_ref()).chain([&self.drive.terms]).flatten();
+        if !terms.into_iter().any(|term| matches!(term, FrictionTerm::Temperature { .. })) {
             return Ok(());
         }
         let own = self.drive.joints.values().filter_map(|own| own.friction);
@@ -257,7 +258,7 @@ impl Study {
         format
     }
 
-    /// What log number `index` is called: its name, or its file's, with its range so that two parts of one file can be told apart.
+    /// What log number `index` is called: its name, or its file's, with its range so that two parts of one file can be distinguished.
     ///
     /// # Panics
     /// If there is no such log.

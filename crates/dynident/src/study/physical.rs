@@ -1,4 +1,4 @@
-//! `[estimator.physical]`: whether the machine written is a possible one, and what is known of its bodies.
+//! `[estimator.physical]`: whether the robot written is a consistent one, and what is known of its bodies.
 
 use dynident_identification::consistent::ConsistencySettings;
 use serde::de::value::MapAccessDeserializer;
@@ -19,7 +19,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 pub enum PhysicalChoice {
     /// With the defaults, or not at all.
     Switch(bool),
-    /// With what is known of the machine.
+    /// With what is known of the robot.
     Known(Box<ConsistencySettings>),
 }
 

@@ -1,11 +1,11 @@
-//! `[robot]`: which machine, and how it stands.
+//! `[robot]`: which robot, and how it stands.
 
 use super::arrays::exactly;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// `[robot]`: which machine, and how it stands.
+/// `[robot]`: which robot, and how it stands.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct RobotSection {

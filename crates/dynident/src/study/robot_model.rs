@@ -3,7 +3,7 @@
 use super::{CoulombChoice, Folders, JointDrive, Study};
 use crate::error::Error;
 use dynident_dynamics::{BaseParameters, PanelLayout, ParametricModel};
-use dynident_model::laws::{CoulombShape, Coupling, CouplingEffect, DriveChoice, Law, laws_per_joint};
+use dynident_model::terms::{CoulombShape, Coupling, CouplingEffect, DriveChoice, TorqueTerm, terms_per_joint};
 use dynident_model::{Model, Robot, Vec3, load_robot};
 use std::path::Path;
 
@@ -67,12 +67,12 @@ impl StudyRobot {
         for joint in study.drive.joints.keys() {
             model.joint_index(joint).ok_or_else(|| unknown(joint))?;
         }
-        let mut laws = laws_per_joint(&model, |joint| drive_choice(study, &model.joints()[joint].name));
+        let mut terms = terms_per_joint(&model, |joint| drive_choice(study, &model.joints()[joint].name));
         for (joint, description) in model.joints().iter().enumerate() {
             let own = study.drive.joints.get(&description.name);
             let step = friction_step(study, &description.name);
-            let further = own.and_then(|own| own.laws.as_ref()).unwrap_or(&study.drive.laws);
-            laws.extend(further.iter().flat_map(|law| law.laws(joint, step)));
+            let further = own.and_then(|own| own.terms.as_ref()).unwrap_or(&study.drive.terms);
+            terms.extend(further.iter().flat_map(|term| term.terms(joint, step)));
         }
         for section in &study.coupling {
             let [first, second] = &section.joints;
@@ -85,12 +85,18 @@ impl StudyRobot {
                 coulomb.map(CouplingEffect::Coulomb),
             ];
             let couplings = effects.into_iter().flatten().map(|effect| {
-                Law::Coupling(Coupling { name: section.name.clone(), first, second, ratios: section.ratios, effect })
+                TorqueTerm::Coupling(Coupling {
+                    name: section.name.clone(),
+                    first,
+                    second,
+                    ratios: section.ratios,
+                    effect,
+                })
             });
-            laws.extend(couplings);
+            terms.extend(couplings);
         }
         let parametric =
-            ParametricModel::new(model, laws).map_err(|error| Error::study(study_path, error.to_string()))?;
+            ParametricModel::new(model, terms).map_err(|error| Error::study(study_path, error.to_string()))?;
         Ok(Self { robot, parametric, log_joints })
     }
 
@@ -100,8 +106,8 @@ impl StudyRobot {
     }
 
     /// Torque terms beside the rigid bodies.
-    pub fn laws(&self) -> &[Law] {
-        self.parametric.laws()
+    pub fn terms(&self) -> &[TorqueTerm] {
+        self.parametric.terms()
     }
 
     /// Base parameters of bodies and terms.

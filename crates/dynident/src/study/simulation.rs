@@ -2,8 +2,8 @@
 
 use super::StudyRobot;
 use dynident_iteration::SimulatedRobot;
-use dynident_model::laws::{JointProperty, Law, TermAction};
 use dynident_model::sample::Random;
+use dynident_model::terms::{JointProperty, TermAction, TorqueTerm};
 use dynident_model::{InertialParameters, Model};
 use dynident_simulation::{
     Integrator, LoopSettings, PerJoint, Plant, RunLimits, SensorSettings, SimulationError, Start, with_length_errors,
@@ -29,7 +29,7 @@ const SHAPE_SHARE: f64 = 1.0 / 3.0;
 pub struct SimulationSection {
     /// Samples a second of the controller; 1000 by default.
     pub rate_hz: f64,
-    /// By how many percent the bodies differ from the description: every mass is that much larger or smaller, and lengths within bodies by up to a third of it; always possible bodies. 0 by default.
+    /// By how many percent the bodies differ from the description: every mass is that much larger or smaller, and lengths within bodies by up to a third of it; always consistent bodies. 0 by default.
     pub off_percent: f64,
     /// Viscous friction of the joints, Nm s/rad (N s/m); 0 by default. It is there if `[drive]` has it, as are the following.
     pub viscous: PerJoint,
@@ -40,7 +40,8 @@ pub struct SimulationSection {
     /// Constant torques, Nm (N); 0 by default.
     pub offset: PerJoint,
     /// Parameters of laws by their symbols (`fs1 = 2.0`), in place of the above.
-    pub laws: BTreeMap<String, f64>,
+    #[serde(rename = "laws")]
+    pub terms: BTreeMap<String, f64>,
     /// Standard deviation of the joints' true places from the described ones, m; 0 by default.
     pub length_std_m: f64,
     /// The same of their axes, rad.
@@ -68,7 +69,7 @@ impl Default for SimulationSection {
             coulomb: 0.0.into(),
             drive_inertia: 0.0.into(),
             offset: 0.0.into(),
-            laws: BTreeMap::new(),
+            terms: BTreeMap::new(),
             length_std_m: 0.0,
             angle_std_rad: 0.0,
             integrator: Integrator::default(),
@@ -98,7 +99,7 @@ impl SimulationSection {
     /// Checks the numbers for so many joints.
     ///
     /// # Errors
-    /// In words, with the key and the mend.
+    /// In words, with the key and the fix.
     pub fn validate(&self, joints: usize) -> Result<(), String> {
         let said = |error: SimulationError| error.to_string();
         if !(1.0..=1e6).contains(&self.rate_hz) {
@@ -133,12 +134,12 @@ impl SimulationSection {
         }
     }
 
-    /// The robot that a machine's description becomes.
+    /// The robot that a robot's description becomes.
     ///
     /// # Errors
     /// In words: numbers that do not fit, bodies without inertials, laws without a parameter, a robot that cannot be simulated.
-    pub fn truth(&self, machine: &StudyRobot) -> Result<SimulatedTruth, String> {
-        let described = machine.model();
+    pub fn truth(&self, robot: &StudyRobot) -> Result<SimulatedTruth, String> {
+        let described = robot.model();
         self.validate(described.dof())?;
         let unknown = described.bodies_without_prior();
         if !unknown.is_empty() {
@@ -148,16 +149,16 @@ impl SimulationSection {
         let bodies = self.bodies(described);
         let model = described.with_inertials(&bodies).map_err(|error| error.to_string())?;
         let model = with_length_errors(&model, self.length_std_m, self.angle_std_rad, self.seed).map_err(said)?;
-        let symbols: Vec<String> = machine.laws().iter().map(Law::symbol).collect();
-        if let Some(other) = self.laws.keys().find(|symbol| !symbols.contains(symbol)) {
+        let symbols: Vec<String> = robot.terms().iter().map(TorqueTerm::symbol).collect();
+        if let Some(other) = self.terms.keys().find(|symbol| !symbols.contains(symbol)) {
             return Err(format!("laws.{other}: [drive] has no such law; it has {}", symbols.join(", ")));
         }
-        let law_parameters = machine
-            .laws()
+        let term_parameters = robot
+            .terms()
             .iter()
             .zip(&symbols)
-            .map(|(law, symbol)| {
-                let by_kind = law.own_joint().and_then(|joint| match (law.property(), law.action()) {
+            .map(|(term, symbol)| {
+                let by_kind = term.own_joint().and_then(|joint| match (term.property(), term.action()) {
                     (Some(JointProperty::Damping), _) => Some(self.viscous.of(joint)),
                     (Some(JointProperty::Friction), _) => Some(self.coulomb.of(joint)),
                     (None, TermAction::Inertia { .. }) => Some(self.drive_inertia.of(joint)),
@@ -170,16 +171,16 @@ impl SimulationSection {
                         | TermAction::Temperature,
                     ) => None,
                 });
-                let value = self.laws.get(symbol).copied().or(by_kind);
+                let value = self.terms.get(symbol).copied().or(by_kind);
                 value.ok_or_else(|| format!("laws: say what {symbol} is ({symbol} = ...)"))
             })
             .collect::<Result<Vec<f64>, _>>()?;
         let mut parameters = model.parameter_vector();
-        parameters.extend_from_slice(&law_parameters);
-        let plant = Plant::new(&model, machine.laws(), &law_parameters).map_err(said)?;
-        let robot = SimulatedRobot::new(plant, self.loop_settings(Some(described))).map_err(said)?;
-        let base_values = machine.base().values(&parameters);
-        Ok(SimulatedTruth { robot, model, parameters, base_values })
+        parameters.extend_from_slice(&term_parameters);
+        let plant = Plant::new(&model, robot.terms(), &term_parameters).map_err(said)?;
+        let simulated = SimulatedRobot::new(plant, self.loop_settings(Some(described))).map_err(said)?;
+        let base_values = robot.base().values(&parameters);
+        Ok(SimulatedTruth { robot: simulated, model, parameters, base_values })
     }
 
     /// The bodies as they truly are. The pseudo-inertia P becomes s D P D with a diagonal D: still a mass distribution.

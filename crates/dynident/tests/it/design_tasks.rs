@@ -81,8 +81,8 @@ fn a_result_is_a_prior_for_the_next_run() {
     let urdf = repository("robots/ur10.urdf");
     let log = "[motion]\ndifferentiator = { method = \"central-differences\", order = 8 }\n[format]\ntime = { column = \"t\" }\nposition = { columns = \"q{1..3}\" }\ntorque = { columns = \"tau{1..3}\" }\n[[log]]\nfile = \"run.csv\"\n";
     let first = job(folder.path(), "", log);
-    let machine = first.machine();
-    let model = machine.model().clone();
+    let robot = first.robot();
+    let model = robot.model().clone();
     let drive = vec![[0.0, 2.0, 1.5, 0.3]; 3];
     let truth = Truth { model, drive };
     assert!(urdf.exists());
@@ -101,7 +101,7 @@ fn a_result_is_a_prior_for_the_next_run() {
         std::fs::write(folder.path().join("result.json"), result.to_string()).unwrap();
     };
     write(&result);
-    // With noise of 1e6 Nm the motion tells nothing: what is known is the prior.
+    // With noise of 1e6 Nm the motion determines nothing: what is known is the prior.
     let deaf = job(folder.path(), "torque_std_nm = 1e6\nprior = { result = \"result.json\" }", "");
     let [_, known] = stds(&designed(&deaf));
     for (found, parameter) in known.iter().zip(&identified.result.base_parameters) {
@@ -160,7 +160,7 @@ fn a_result_is_a_prior_for_the_next_run() {
     }
 }
 
-/// The CAD prior by its definition, from the machine's own base map written out.
+/// The CAD prior by its definition, from the robot's own base map written out.
 #[test]
 fn the_description_is_a_prior() {
     let folder = tempfile::tempdir().unwrap();
@@ -169,9 +169,9 @@ fn the_description_is_a_prior() {
         "torque_std_nm = 1e7\nprior = { cad_std_percent = 20.0 }",
         "[drive]\nviscous = false\ncoulomb = \"none\"\noffset = false\n",
     );
-    let machine: StudyRobot = job.machine();
+    let robot: StudyRobot = job.robot();
     let [_, known] = stds(&designed(&job));
-    let bodies = machine.model().parameter_vector();
+    let bodies = robot.model().parameter_vector();
     let std: Vec<f64> = (0..bodies.len())
         .map(|index| {
             let (body, kind) = (
@@ -187,16 +187,16 @@ fn the_description_is_a_prior() {
         })
         .collect();
     for (place, found) in known.iter().enumerate() {
-        let mut variance = std[machine.base().independent()[place]].powi(2);
-        for (column, index) in machine.base().dependent().iter().enumerate() {
-            variance += (machine.base().regrouping()[(place, column)] * std[*index]).powi(2);
+        let mut variance = std[robot.base().independent()[place]].powi(2);
+        for (column, index) in robot.base().dependent().iter().enumerate() {
+            variance += (robot.base().regrouping()[(place, column)] * std[*index]).powi(2);
         }
         // Sums of squares, an inverse of moderate condition and back.
         assert!((found - variance.sqrt()).abs() < 1e-4 * found, "{place}: {found} {}", variance.sqrt());
     }
 }
 
-/// A trajectory that was designed, written and checked again has the design's own figures; way-points alone nearly so.
+/// A trajectory that was designed, written and checked again has the design's own figures; waypoints alone nearly so.
 #[test]
 fn a_written_trajectory_is_judged_as_the_design_was() {
     let folder = tempfile::tempdir().unwrap();
@@ -230,7 +230,7 @@ fn a_written_trajectory_is_judged_as_the_design_was() {
     std::fs::write(&path, waypoints_csv(&sampled).unwrap()).unwrap();
     let way = check_trajectory(&job.study, &job.path, &path, &Job::options(1)).unwrap().file;
     assert!(way.notes.iter().any(|note| note.contains("derived from the positions")), "{:?}", way.notes);
-    // The differentiator's low-pass and its ends change speeds a little: error bars within a tenth.
+    // The differentiator's low-pass and its ends change velocities a little: error bars within a tenth.
     for (a, b) in way.forecast.iter().zip(&own.forecast) {
         assert!((a.std.unwrap() / b.std.unwrap() - 1.0).abs() < 0.1, "{}", a.symbol);
     }

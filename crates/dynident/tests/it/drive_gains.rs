@@ -68,7 +68,7 @@ fn gains_of_six_joints_without_noise() {
     for (gain, truth) in found.result.drive_gains.as_ref().unwrap().iter().zip(gains) {
         assert!(gain.identified && (gain.gain / truth - 1.0).abs() < 1e-6, "{gain:?}");
     }
-    assert_recovered(&found, &truth.base_values(&job.machine()), 1e-5);
+    assert_recovered(&found, &truth.base_values(&job.robot()), 1e-5);
     // Held out, in newton metres: the joints' torque as it is.
     let held_out = &found.result.validation[0];
     assert!(held_out.model.relative_error_percent.unwrap() < 1e-3, "{:?}", held_out.model.relative_error_percent);
@@ -112,7 +112,7 @@ fn intervals_hold_the_gains() {
             intervals += 1;
         }
     }
-    // 80 intervals tell 95 % to 2.4 %, two of a run are correlated: three of these below.
+    // 80 intervals give 95 % to 2.4 %, two of a run are correlated: three of these below.
     let share = inside as f64 / intervals as f64;
     assert!((0.87..=1.0).contains(&share), "{share}");
     // Not drawn to zero: errors of 0.5 Nm on a weight's 50 Nm.

@@ -64,7 +64,7 @@ fn rows_count_by_the_noise_around_them() {
     let text = study("noise-weighted", further) + "noise_levels = { window_rows = 41, pooled_share = 1e-4 }";
     let job = Job::new(folder.path(), &text);
     let found = job.identify();
-    let values = truth.base_values(&job.machine());
+    let values = truth.base_values(&job.robot());
     let levels = found.result.noise_levels.as_ref().unwrap();
     assert!(levels.iter().all(|[least, most]| *least < 0.1 && *most > 1.0), "{levels:?}");
     assert!(plain.result.noise_levels.is_none());
@@ -95,14 +95,18 @@ fn periods_tell_the_noise_and_undo_its_bias() {
     let job =
         Job::new(folder.path(), &(study("maximum-likelihood", NOISY) + &format!("periods.period_s = {PERIOD_S}")));
     let found = job.identify();
-    let values = truth.base_values(&job.machine());
+    let values = truth.base_values(&job.robot());
     let fit = found.result.periodic.as_ref().unwrap();
     assert_eq!(fit.periods, [10]);
     // Noise of positions below 30 of 125 Hz: half its deviation.
     assert!(fit.motion_std.iter().all(|std| (2e-4..3.5e-4).contains(&std[0])), "{:?}", fit.motion_std);
-    // The cost is χ²: its deviation is √(2/freedom), below 5 % for 800 and more; four of them.
-    let freedom = fit.degrees_of_freedom as f64;
-    assert!((fit.cost / freedom - 1.0).abs() < 4.0 * (2.0 / freedom).sqrt() + 0.1, "{} and {freedom}", fit.cost);
+    // The cost is χ²: its deviation is √(2/n), below 5 % for 800 and more; four of them.
+    let degrees_of_freedom = fit.degrees_of_freedom as f64;
+    assert!(
+        (fit.cost / degrees_of_freedom - 1.0).abs() < 4.0 * (2.0 / degrees_of_freedom).sqrt() + 0.1,
+        "{} and {degrees_of_freedom}",
+        fit.cost
+    );
     let bars = &found.estimate.std;
     let (likely, weighted) = (score(&found, &values, bars), score(&plain, &values, bars));
     // Nine squares of mean one: below 1.8 by four deviations.
@@ -158,7 +162,7 @@ fn motion_and_parameters_together_find_the_truth_within_their_bars() {
     assert!(plain.result.series.is_none());
     let job = Job::new(folder.path(), &(two("simultaneous") + &format!("periods.period_s = {PERIOD_S}")));
     let found = job.identify();
-    let values = truth.base_values(&job.machine());
+    let values = truth.base_values(&job.robot());
     let series = found.result.series.as_ref().unwrap();
     assert_eq!((series.len(), series[0].torque_autoregression.len()), (2, 2));
     for log in series {
@@ -184,7 +188,7 @@ fn logs_without_a_series_are_refused_with_the_fix() {
     let unknown = message(&text);
     assert!(unknown.contains("period_s") && unknown.contains("log `log`"), "{unknown}");
     let another = message(&(text.clone() + "periods = { period_s = 5.0, harmonics = 5 }"));
-    assert!(another.contains("mend period_s") && another.contains("joint1"), "{another}");
+    assert!(another.contains("fix period_s") && another.contains("joint1"), "{another}");
     let short = message(&(text.clone() + "periods = { period_s = 7.69, skip_s = 12.0 }"));
     assert!(short.contains("less than one period"), "{short}");
     let none = Job::new_error(folder.path(), &(text.clone() + "periods.harmonics = 0"));
@@ -283,7 +287,7 @@ fn a_joint_that_does_not_move_leaves_its_parameters_named() {
         let found = outcome.unwrap_or_else(|error| panic!("{method}: {error}"));
         finite(&found);
         if ["didim", "clie", "cloe"].contains(&method) {
-            // The simulated joint gives way a little under the other's motion, so that its parameters are told after all, badly.
+            // The simulated joint gives way a little under the other's motion, so that its parameters are determined after all, badly.
             return;
         }
         assert_eq!(found.result.method.status, "not-all-excited", "{method}");

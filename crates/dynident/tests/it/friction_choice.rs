@@ -2,7 +2,7 @@
 use crate::common::{Job, Random};
 use dynident::dynamics::{Workspace, inverse_dynamics};
 use dynident::model::load_robot;
-use dynident::study::FrictionLaw;
+use dynident::study::FrictionTerm;
 use dynident::{IdentificationOutcome, validate};
 use std::fmt::Write;
 use std::path::Path;
@@ -17,7 +17,7 @@ const ARM: &str = r#"<robot name="arm"><link name="base"/>
 const NOISE: f64 = 0.02;
 const STEP: f64 = 0.02;
 
-/// A log of `rows` rows at 200 Hz; `moving` scales the elbow's motion, `stribeck` is its extra friction near rest at a speed of 0.08 rad/s.
+/// A log of `rows` rows at 200 Hz; `moving` scales the elbow's motion, `stribeck` is its extra friction near rest at a velocity of 0.08 rad/s.
 fn write_log(path: &Path, arm: &Path, rows: usize, moving: f64, stribeck: f64, seed: u64) {
     let model = load_robot(arm).unwrap().model;
     let (mut workspace, mut random) = (Workspace::new(&model), Random(seed));
@@ -73,11 +73,12 @@ fn the_friction_that_was_put_in_is_chosen_and_the_model_can_be_tested_again() {
     let [shoulder, elbow] = &found.result.friction_choice[..] else { panic!("two joints") };
     assert_eq!(shoulder.chosen, "viscous + coulomb", "{shoulder:?}");
     assert!(elbow.chosen.contains("stribeck"), "{elbow:?}");
-    let laws = elbow.drive.as_ref().unwrap().laws.clone().unwrap();
+    let terms = elbow.drive.as_ref().unwrap().terms.clone().unwrap();
     // 0.08 lies between 0.05 and 0.1 of the grid.
-    let near = |law: &FrictionLaw| matches!(law, FrictionLaw::Stribeck { speed, .. } if (0.05..=0.1).contains(speed));
-    assert!(laws.iter().any(near), "{laws:?}");
-    // The noise, and what a grid of speeds and widths leaves of friction forty times as large.
+    let near =
+        |term: &FrictionTerm| matches!(term, FrictionTerm::Stribeck { speed, .. } if (0.05..=0.1).contains(speed));
+    assert!(terms.iter().any(near), "{terms:?}");
+    // The noise, and what a grid of velocities and widths leaves of friction forty times as large.
     assert!(found.result.validation[0].model.rmse_nm < 2.0 * NOISE, "{:?}", found.result.validation[0].model);
     let plain = job_with_stated(folder.path()).identify();
     assert!(plain.result.validation[0].model.rmse_nm > 3.0 * NOISE);
@@ -113,18 +114,18 @@ fn a_joint_that_stands_and_a_log_that_is_short_are_named() {
 }
 
 #[test]
-fn stated_laws_are_fitted_and_bad_constants_refused() {
+fn stated_terms_are_fitted_and_bad_constants_refused() {
     let folder = tempfile::tempdir().unwrap();
     let arm = arm(folder.path());
     write_log(&folder.path().join("a.csv"), &arm, 3000, 1.0, 1.0, 1);
     write_log(&folder.path().join("b.csv"), &arm, 1000, 1.0, 1.0, 2);
-    let laws =
+    let terms =
         "laws = [{ law = \"stribeck\", speed = 0.08, exponent = 2.0 }, { law = \"load\" }, { law = \"quadratic\" },
         { law = \"maxwell-slip\", yield_displacements = [0.001, 0.01] }]";
-    let job = job(folder.path(), laws);
+    let job = job(folder.path(), terms);
     let found = job.identify();
-    let elbow = &found.result.joints[1].laws;
-    let value = |symbol: &str| elbow.iter().find(|law| law.symbol == symbol).unwrap().value;
+    let elbow = &found.result.joints[1].terms;
+    let value = |symbol: &str| elbow.iter().find(|term| term.symbol == symbol).unwrap().value;
     // Twenty standard deviations of a fit to 3000 rows, a tenth of which are near rest.
     assert!((value("fs2") - 1.0).abs() < 0.05 && (value("fc2") - 1.0).abs() < 0.05, "{elbow:?}");
     assert!(value("fl2").abs() < 0.05 && value("slip2_0.01").abs() < 0.05, "{elbow:?}");

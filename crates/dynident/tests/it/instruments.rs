@@ -50,7 +50,7 @@ fn a_simulated_motion_undoes_the_bias_of_noisy_positions() {
         format(6).replace("method = \"central-differences\", order = 8", "method = \"butterworth\", cutoff_hz = 30.0")
     );
     let job = Job::new(folder.path(), &text);
-    let values = truth.base_values(&job.machine());
+    let values = truth.base_values(&job.robot());
     let plain = job.identify();
     let mut source = TrueMotion { motion: Motion::new(6, 1), begun: 0 };
     let found = identify_with_instruments(&job.study, &job.path, &Job::options(1), &mut source).unwrap();

@@ -23,7 +23,7 @@ fn iterated(study: &Study, path: &Path, out: &Path) -> Result<IterationsFile, Er
 /// The strokes of the design, one leg each, put together by hand.
 fn by_library(study: &Study, path: &Path) -> Vec<Vec<RunRecord>> {
     let outcome = design_study(study, path, &options(), |_| ControlFlow::Continue(())).unwrap();
-    let model = outcome.machine.model().clone();
+    let model = outcome.robot.model().clone();
     let whole = Reference::of_family(outcome.family(), &outcome.file.parameters, RATE_HZ, None).unwrap();
     let section = study.iteration.clone().unwrap();
     let mut known: Vec<(usize, f64)> = Vec::new();
@@ -49,9 +49,9 @@ fn by_library(study: &Study, path: &Path) -> Vec<Vec<RunRecord>> {
             })
             .to_vec();
         start_s += stroke.period_s;
-        let machine = ParametricModel::new(model.clone(), Vec::new()).unwrap().with_nominal(vec![0.0; 20]).unwrap();
+        let robot = ParametricModel::new(model.clone(), Vec::new()).unwrap().with_nominal(vec![0.0; 20]).unwrap();
         let legs = vec![Leg::windowed(reference, windows).unwrap()];
-        let task = IterationTask { machine, legs, known: known.clone(), torque_limits: None };
+        let task = IterationTask { robot, legs, known: known.clone(), torque_limits: None };
         let mut settings = IterationSettings {
             model_free: section.model_free.clone(),
             controller: study.controller.clone().unwrap(),

@@ -15,7 +15,7 @@ fn write(folder: &Path, more: &str) {
     let mut table = String::from("t_s,q1,q2,dq1,dq2,ddq1,ddq2\n");
     for sample in 0..=800 {
         let t = f64::from(sample) * 0.01;
-        // A (1 - cos ωt): value, speed, acceleration.
+        // A (1 - cos ωt): value, velocity, acceleration.
         let rise = |a: f64, w: f64| [a * (1.0 - (w * t).cos()), a * w * (w * t).sin(), a * w * w * (w * t).cos()];
         let sum = |a: [f64; 3], b: [f64; 3]| [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
         let (one, two) = (sum(rise(0.4, 1.0), rise(0.2, 2.3)), sum(rise(-0.5, 1.4), rise(0.2, 3.1)));
@@ -73,7 +73,7 @@ fn every_run_and_joint_is_drawn_and_no_name_becomes_markup() {
         "[iteration]\ntrajectory = \"motion.csv\"\nmodel_free = { kind = \"joint-pd\", kp = 20.0, kd = 4.0 }",
     );
     assert!(file.converged, "{}", file.reason);
-    // The second run has the machine of the first.
+    // The second run has the robot of the first.
     assert_eq!(file.runs.iter().map(|run| run.model_of_run).collect::<Vec<_>>()[..2], [None, Some(1)]);
     for heading in ["Runs", "Tracking", "Parameters", "Time"] {
         assert!(page.contains(&format!(">{heading}</h2>")), "{heading}");
@@ -97,5 +97,5 @@ fn a_refused_iteration_says_why_run_by_run() {
     );
     assert_eq!(file.status, "refused");
     assert_eq!(page.matches("run 1: ").count(), 1);
-    assert!(page.contains("No run tells the parameters") && page.contains("rejected") && page.contains("stiffer"));
+    assert!(page.contains("No run determines the parameters") && page.contains("rejected") && page.contains("stiffer"));
 }

@@ -3,8 +3,11 @@
 
 mod book;
 mod common;
+mod consistent_intervals;
+mod consistent_parameters;
 mod design_messages;
 mod design_tasks;
+mod differentiators;
 mod drive_gains;
 mod estimators;
 mod friction_choice;
@@ -14,8 +17,6 @@ mod iteration_report;
 mod modules;
 mod mutated_studies;
 mod payload;
-mod possible_intervals;
-mod possible_machine;
 mod real_logs;
 mod report;
 mod result_files;
@@ -25,4 +26,3 @@ mod synthetic_truth;
 mod temperature;
 mod torque_lag;
 mod ur10_example;
-mod ways;

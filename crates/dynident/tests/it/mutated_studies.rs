@@ -51,7 +51,7 @@ fraction = [0.25, 1.0]
 role = "validate"
 "#;
 
-/// Reads the study and builds its machine; either may refuse, with a message that names the file.
+/// Reads the study and builds its robot; either may refuse, with a message that names the file.
 fn try_whole(text: &str) {
     let path = repository("study.toml");
     match Study::parse(text, &path) {
@@ -61,9 +61,9 @@ fn try_whole(text: &str) {
                 let _ = study.format_of(index).validate(&["a".to_owned()]);
             }
             let folders = Folders::new(&study, &path, None);
-            if let Ok(machine) = StudyRobot::new(&study, &path, &folders) {
-                assert!(machine.base().count() <= 10 * machine.model().dof() + machine.laws().len());
-                assert!(machine.nominal_base().is_none_or(|prior| prior.iter().all(|value| value.is_finite())));
+            if let Ok(robot) = StudyRobot::new(&study, &path, &folders) {
+                assert!(robot.base().count() <= 10 * robot.model().dof() + robot.terms().len());
+                assert!(robot.nominal_base().is_none_or(|prior| prior.iter().all(|value| value.is_finite())));
             }
         }
         Err(error) => assert!(error.to_string().contains("study.toml"), "{error}"),
@@ -73,9 +73,9 @@ fn try_whole(text: &str) {
 #[test]
 fn the_study_itself_is_good() {
     let study = Study::parse(STUDY, Path::new("study.toml")).unwrap();
-    let machine =
+    let robot =
         StudyRobot::new(&study, Path::new("study.toml"), &Folders::new(&study, &repository("study.toml"), None));
-    assert_eq!(machine.unwrap().model().dof(), 5);
+    assert_eq!(robot.unwrap().model().dof(), 5);
 }
 
 proptest! {

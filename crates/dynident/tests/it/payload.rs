@@ -1,4 +1,4 @@
-//! Payloads: beside a free arm, with a held arm, and what is said of what cannot be told.
+//! Payloads: beside a free arm, with a held arm, and what is said of what cannot be determined.
 use crate::common::{Job, Motion, Random, Truth, assert_recovered, format, header, plain, repository, write_log};
 use dynident::identification::payload::Measured;
 use dynident::model::{InertialParameters, Mat3, Vec3};
@@ -64,7 +64,7 @@ fn ur10() -> String {
 #[test]
 fn arm_and_payload_from_an_empty_and_a_loaded_log() {
     let folder = tempfile::tempdir().unwrap();
-    // The description's own bodies, which are possible.
+    // The description's own bodies, which are physically consistent.
     let truth = three_logs(folder.path(), 0.0);
     let text = format!(
         "robot.file = {:?}\n{BOX}\nparallel_filter.factor = 4\nlog = [{{ file = \"empty.csv\" }}, {{ file = \"box.csv\", payload = \"box\" }}, \
@@ -74,7 +74,7 @@ fn arm_and_payload_from_an_empty_and_a_loaded_log() {
     );
     let job = Job::new(folder.path(), &text);
     let found = job.identify();
-    assert_recovered(&found, &truth.base_values(&job.machine()), NOISE_FREE);
+    assert_recovered(&found, &truth.base_values(&job.robot()), NOISE_FREE);
     let payload = &found.result.payloads[0];
     assert_eq!((payload.parameters.len(), payload.not_identified.len(), payload.logs.len()), (10, 0, 1));
     assert_measured(payload.mass_kg, MASS_KG, NOISE_FREE * MASS_KG);
@@ -87,7 +87,7 @@ fn arm_and_payload_from_an_empty_and_a_loaded_log() {
     }
     let possible = payload.possible.as_ref().unwrap();
     assert!((possible.mass_kg - MASS_KG).abs() < 1e-2 && !possible.on_the_boundary, "{possible:?}");
-    // The held-out log carries the box too, and the possible arm beside it.
+    // The held-out log carries the box too, and the consistent arm beside it.
     let held_out = &found.result.validation[0];
     assert!(held_out.model.relative_error_percent.unwrap() < 1e-4, "{:?}", held_out.model.relative_error_percent);
     assert!(held_out.physical.as_ref().unwrap().relative_error_percent.unwrap() < 0.1);
@@ -113,7 +113,7 @@ fn a_known_payload_is_taken_off_and_a_second_one_found_with_the_arm_held() {
     );
     let job = Job::new(folder.path(), &text);
     let arm = job.identify();
-    assert_recovered(&arm, &truth.base_values(&job.machine()), NOISE_FREE);
+    assert_recovered(&arm, &truth.base_values(&job.robot()), NOISE_FREE);
     assert!(arm.result.payloads.is_empty());
     std::fs::write(folder.path().join("arm.json"), serde_json::to_string(&arm.result).unwrap()).unwrap();
     for refit in ["nothing", "offset", "friction"] {
@@ -179,7 +179,7 @@ fn intervals_hold_the_payload_with_the_arm_free_and_held() {
         let held = Job::new(folder.path(), &study(carrying, held)).identify();
         for (way, found) in [free, held].iter().enumerate() {
             let payload = &found.result.payloads[0];
-            // A planar arm tells mass, first moments in its plane and the inertia about its axis; axes of the paper's arm are parallel.
+            // A planar arm determines mass, first moments in its plane and the inertia about its axis; axes of the paper's arm are parallel.
             assert_eq!(payload.parameters.len(), 4, "{:?}", payload.parameters);
             assert_eq!(payload.not_identified.len(), 6);
             let expected = box_at_link().0;
@@ -218,7 +218,7 @@ fn offsets_differ_from_log_to_log() {
     let job = Job::new(folder.path(), &text);
     let found = job.identify();
     // The base parameters hold the mean.
-    assert_recovered(&found, &truth.base_values(&job.machine()), NOISE_FREE);
+    assert_recovered(&found, &truth.base_values(&job.robot()), NOISE_FREE);
     assert_eq!(found.result.offsets.len(), 18);
     for offsets in found.result.offsets.chunks(3) {
         for (offset, change) in offsets.iter().zip([0.9, -0.3, -0.6]) {
@@ -228,7 +228,7 @@ fn offsets_differ_from_log_to_log() {
 }
 
 #[test]
-fn what_does_not_go_together_is_refused_with_the_mend() {
+fn what_does_not_go_together_is_refused_with_the_fix() {
     let folder = tempfile::tempdir().unwrap();
     three_logs(folder.path(), 0.2);
     let refused = |more: &str, log: &str| {
@@ -259,10 +259,10 @@ fn what_does_not_go_together_is_refused_with_the_mend() {
         let said = refused(more, log);
         assert!(said.contains(words), "{said}");
     }
-    // A payload that is never off cannot be told from the arm; that is a verdict, not an error.
+    // A payload that is never off cannot be determined from the arm; that is a verdict, not an error.
     let text =
         format!("robot.file = {:?}\n{BOX}\nparallel_filter.factor = 4\nlog = [{carrying}]\n{}", ur10(), format(6));
     let result = Job::new(folder.path(), &text).identify().result;
     assert!(result.payloads[0].mass_kg.is_none());
-    assert!(result.payloads[0].not_identified.iter().all(|words| words.contains("do not tell it from the arm")));
+    assert!(result.payloads[0].not_identified.iter().all(|words| words.contains("do not separate it from the arm")));
 }

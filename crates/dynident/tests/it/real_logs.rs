@@ -14,7 +14,7 @@ fn example(name: &str) -> Option<IdentificationOutcome> {
     let data = recordings()?;
     let path = repository("examples").join(name);
     let found = run(&Study::load(&path).unwrap(), &path, &data);
-    // A possible machine explains the torque with the sign that the study gives it.
+    // A physically consistent set explains the torque with the sign that the study gives it.
     let sign = found.result.physical.sign.unwrap();
     assert!(!sign.is_reversed(), "{name}: {sign:?}");
     Some(found)
@@ -57,7 +57,7 @@ fn ur10_has_54_base_parameters() {
 #[test]
 fn tx40_has_61_base_parameters() {
     if let Some(found) = held_out("tx40.toml", 12.8) {
-        // Also joints with friction that differs by direction have a speed; half of the held-out rows stand still.
+        // Also joints with friction that differs by direction have a velocity; half of the held-out rows stand still.
         for joint in &found.result.validation[0].residuals {
             let regimes = joint.regimes.unwrap();
             assert_eq!(
@@ -116,7 +116,7 @@ fn tiago_reports_its_dead_channels_and_its_jitter() {
 fn the_double_pendulum_has_a_rotor_between_its_joints() {
     let Some(found) = example("dfki_pendulum.toml") else { return };
     let symbol = "Ia_rotor";
-    assert!(found.result.couplings.iter().any(|law| law.symbol == symbol));
+    assert!(found.result.couplings.iter().any(|term| term.symbol == symbol));
     assert!(found.result.base_parameters.iter().any(|p| p.expression.contains(symbol)));
     // Steps of up to 8 ms at 500 Hz.
     let longest = found.result.logs.iter().map(|log| log.import.steps.max_s).fold(0.0, f64::max);

@@ -50,22 +50,22 @@ fn the_number_of_threads_changes_no_bit() {
 fn the_written_urdf_gives_the_torques_of_the_base_parameters() {
     let folder = tempfile::tempdir().unwrap();
     let (job, _) = study(folder.path());
-    let (found, machine) = (job.identify(), job.machine());
+    let (found, robot) = (job.identify(), job.robot());
     let path = folder.path().join("identified.urdf");
     std::fs::write(&path, found.urdf.as_ref().unwrap()).unwrap();
     let written = load_robot(&path).unwrap().model;
     // All parameters with the dependent ones zero: another full set than the one in the URDF, of the same torques.
-    let mut parameters = vec![0.0; machine.base().all_columns().len()];
-    for (&column, parameter) in machine.base().independent().iter().zip(&found.result.base_parameters) {
+    let mut parameters = vec![0.0; robot.base().all_columns().len()];
+    for (&column, parameter) in robot.base().independent().iter().zip(&found.result.base_parameters) {
         parameters[column] = parameter.physical.unwrap();
     }
     let (mut workspace, mut random) = (Workspace::new(&written), Random(3));
-    let mut workspace_of_study = Workspace::new(machine.model());
+    let mut workspace_of_study = Workspace::new(robot.model());
     for _ in 0..20 {
         let mut vector = |scale: f64| -> Vec<f64> { (0..6).map(|_| scale * random.next()).collect() };
         let (q, dq, ddq) = (vector(3.0), vector(2.0), vector(5.0));
         let from_urdf = inverse_dynamics(&written, &mut workspace, &q, &dq, &ddq).to_vec();
-        let regressor = torque_regressor(machine.model(), &mut workspace_of_study, &q, &dq, &ddq);
+        let regressor = torque_regressor(robot.model(), &mut workspace_of_study, &q, &dq, &ddq);
         let largest = from_urdf.iter().fold(0.0_f64, |max, t| max.max(t.abs()));
         for row in 0..6 {
             let base: f64 = (0..60).map(|k| regressor[60 * row + k] * parameters[k]).sum();
@@ -74,7 +74,7 @@ fn the_written_urdf_gives_the_torques_of_the_base_parameters() {
         }
     }
     for (joint, result) in written.joints().iter().zip(&found.result.joints) {
-        let value = |symbol: &str| result.laws.iter().find(|law| law.symbol.starts_with(symbol)).unwrap().value;
+        let value = |symbol: &str| result.terms.iter().find(|term| term.symbol.starts_with(symbol)).unwrap().value;
         assert_eq!(joint.damping, Some(value("fv")));
         assert_eq!(joint.friction, Some(value("fc")));
     }

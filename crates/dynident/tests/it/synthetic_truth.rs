@@ -34,7 +34,7 @@ fn the_plain_case_and_the_parallel_filter() {
         let found = job.identify();
         assert_eq!(found.result.method.status, "complete");
         assert_eq!(found.result.base_parameters.len(), 54);
-        assert_recovered(&found, &truth.base_values(&job.machine()), NOISE_FREE);
+        assert_recovered(&found, &truth.base_values(&job.robot()), NOISE_FREE);
     }
 }
 
@@ -55,7 +55,7 @@ fn every_estimator_drive_inertia_and_the_butterworth_filter() {
         // The ends of the log, where the filter has to invent samples, are left out.
         let text = text.replace("[motion]", "[motion]\ntrim_s = 1.0");
         let job = Job::new(folder.path(), &text);
-        assert_recovered(&job.identify(), &truth.base_values(&job.machine()), NOISE_FREE);
+        assert_recovered(&job.identify(), &truth.base_values(&job.robot()), NOISE_FREE);
     }
 }
 
@@ -74,7 +74,7 @@ fn several_logs_and_a_held_out_one() {
     );
     let job = Job::new(folder.path(), &text);
     let found = job.identify();
-    assert_recovered(&found, &truth.base_values(&job.machine()), NOISE_FREE);
+    assert_recovered(&found, &truth.base_values(&job.robot()), NOISE_FREE);
     let held_out = &found.result.validation[0];
     // Perfect parameters leave what the differences leave.
     assert!(held_out.model.relative_error_percent.unwrap() < 1e-4, "{:?}", held_out.model.relative_error_percent);
@@ -97,7 +97,7 @@ fn joints_in_another_order() {
         format(6)
     );
     let job = Job::new(folder.path(), &text);
-    assert_recovered(&job.identify(), &truth.base_values(&job.machine()), NOISE_FREE);
+    assert_recovered(&job.identify(), &truth.base_values(&job.robot()), NOISE_FREE);
 }
 
 #[test]
@@ -130,7 +130,7 @@ fn locked_joints_and_a_tilted_base() {
     );
     let job = Job::new(folder.path(), &text);
     let found = job.identify();
-    assert_recovered(&found, &five.base_values(&job.machine()), NOISE_FREE);
+    assert_recovered(&found, &five.base_values(&job.robot()), NOISE_FREE);
     let urdf = found.urdf.unwrap();
     assert!(urdf.contains("holds with the joints locked behind which stand: wrist_3_link"), "{urdf}");
 }
@@ -149,7 +149,7 @@ fn a_denavit_hartenberg_table() {
     let job = Job::new(folder.path(), &text);
     let found = job.identify();
     assert_eq!(found.result.base_parameters.len(), 6 + 6);
-    assert_recovered(&found, &truth.base_values(&job.machine()), NOISE_FREE);
+    assert_recovered(&found, &truth.base_values(&job.robot()), NOISE_FREE);
     assert!(found.urdf.is_none() && found.result.no_urdf.unwrap().contains("no URDF"));
 }
 
@@ -157,7 +157,7 @@ fn a_denavit_hartenberg_table() {
 fn motor_side_in_degrees_with_gears_currents_and_a_coupled_wrist() {
     let (folder, truth) = (tempfile::tempdir().unwrap(), truth());
     let (gear, gain) = ([101.0, 101.0, 101.0, -54.0, 54.0, 54.0], [0.13, 0.12, 0.1, 0.09, 0.08, 0.07]);
-    // Motor speeds M q': the last motor also turns with joint 5. Power is the same on both sides: joint torques are Mᵀ times motor torques.
+    // Motor velocities M q': the last motor also turns with joint 5. Power is the same on both sides: joint torques are Mᵀ times motor torques.
     let motor_side = |q: &[f64], tau: &[f64]| -> Vec<f64> {
         let mut angle: Vec<f64> = (0..6).map(|j| gear[j] * q[j]).collect();
         angle[5] += 20.0 * q[4];
@@ -189,11 +189,11 @@ fn motor_side_in_degrees_with_gears_currents_and_a_coupled_wrist() {
             )
     );
     let job = Job::new(folder.path(), &text);
-    assert_recovered(&job.identify(), &truth.base_values(&job.machine()), NOISE_FREE);
+    assert_recovered(&job.identify(), &truth.base_values(&job.robot()), NOISE_FREE);
 }
 
 #[test]
-fn a_reversed_sign_is_seen_and_mended() {
+fn a_reversed_sign_is_found_and_fixed() {
     let folder = tempfile::tempdir().unwrap();
     let mut truth = Truth::near(&repository("robots/ur10.urdf"), 0.05, false);
     // Little friction, so that the description's own torque resembles the log's.
@@ -201,15 +201,15 @@ fn a_reversed_sign_is_seen_and_mended() {
     let reversed = |q: &[f64], tau: &[f64]| -> Vec<f64> { q.iter().copied().chain(tau.iter().map(|t| -t)).collect() };
     write_log(&folder.path().join("log.csv"), &truth, &Motion::new(6, 1), CLOCK, &header(6), reversed);
     let as_logged = format!("robot.file = {:?}\nlog = [{{ file = \"log.csv\" }}]\n{}", ur10(), format(6));
-    let mended = as_logged.replace("\"tau{1..6}\" }", "\"tau{1..6}\", sign = -1 }");
-    for (text, reversed) in [(&as_logged, true), (&mended, false)] {
+    let fixed = as_logged.replace("\"tau{1..6}\" }", "\"tau{1..6}\", sign = -1 }");
+    for (text, reversed) in [(&as_logged, true), (&fixed, false)] {
         let job = Job::new(folder.path(), text);
         let found = job.identify();
         let findings = &found.result.logs[0].model_findings;
         let seen = findings.iter().any(|f| f.message.contains("opposite sign") && f.message.contains("sign = -1"));
         assert_eq!(seen, reversed, "{findings:?}");
         if !reversed {
-            assert_recovered(&found, &truth.base_values(&job.machine()), NOISE_FREE);
+            assert_recovered(&found, &truth.base_values(&job.robot()), NOISE_FREE);
         }
     }
 }
@@ -234,15 +234,15 @@ fn noise_widens_the_error_bars_by_as_much_as_it_moves_the_values() {
     );
     let job = Job::new(folder.path(), &text);
     let found = job.identify();
-    let truth = truth.base_values(&job.machine());
+    let truth = truth.base_values(&job.robot());
     let scores: Vec<f64> =
         found.result.base_parameters.iter().zip(&truth).map(|(p, truth)| (p.value - truth) / p.std).collect();
-    // 54 scores from segments (a t distribution with tens of degrees of freedom): none beyond 6. Their mean square is one on average; its own deviation would be
+    // 54 scores from segments (a t distribution with tens of degrees of degrees_of_freedom): none beyond 6. Their mean square is one on average; its own deviation would be
     // sqrt(2/54) = 0.2 for independent scores and is larger for these, which are correlated: 0.4 to 2.
     let mean_square = scores.iter().map(|z| z * z).sum::<f64>() / scores.len() as f64;
     assert!(scores.iter().all(|z| z.abs() < 6.0), "{scores:?}");
     assert!((0.4..2.0).contains(&mean_square), "{mean_square} {scores:?}");
-    // The held-out residual is the noise: 4000 samples tell a deviation to 1.1 %; five of these.
+    // The held-out residual is the noise: 4000 samples give a deviation to 1.1 %; five of these.
     for (joint, sigma) in found.result.validation[0].model.joints.iter().zip(sigma) {
         assert!((joint.rmse_nm / sigma - 1.0).abs() < 0.055, "{} {} for {sigma}", joint.name, joint.rmse_nm);
     }
@@ -268,6 +268,6 @@ fn the_description_in_the_study_may_know_no_inertials() {
     );
     let job = Job::new(folder.path(), &text);
     let found = job.identify();
-    assert_recovered(&found, &truth.base_values(&job.machine()), NOISE_FREE);
+    assert_recovered(&found, &truth.base_values(&job.robot()), NOISE_FREE);
     assert!(found.result.base_parameters.iter().all(|p| p.prior.is_none()));
 }

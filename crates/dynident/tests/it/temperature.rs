@@ -55,9 +55,9 @@ fn changes_with_the_temperature_come_back() {
         let half = if channel.contains("scale") { 2.0 } else { 1.0 };
         for (joint, [viscous, coulomb]) in found.result.joints.iter().zip(CHANGES) {
             for (symbol, expected) in [("fvT", viscous), ("fcT", coulomb)] {
-                let law = joint.laws.iter().find(|law| law.symbol.starts_with(symbol)).unwrap();
+                let term = joint.terms.iter().find(|term| term.symbol.starts_with(symbol)).unwrap();
                 // Noise-free: as all other parameters, of order one hundredth here.
-                assert!((law.value - half * expected).abs() < 1e-6, "{law:?} {expected}");
+                assert!((term.value - half * expected).abs() < 1e-6, "{term:?} {expected}");
             }
         }
         let held_out = found.result.validation[0].model.relative_error_percent.unwrap();

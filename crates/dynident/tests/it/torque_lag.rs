@@ -75,7 +75,7 @@ fn intervals_hold_the_lag() {
             intervals += 1;
         }
     }
-    // 120 intervals tell 95 % to 2 %: three of these below; the jackknife is slightly cautious.
+    // 120 intervals give 95 % to 2 %: three of these below; the jackknife is slightly cautious.
     let share = inside as f64 / intervals as f64;
     assert!((0.89..=1.0).contains(&share), "{share}");
 }

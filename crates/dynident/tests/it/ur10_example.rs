@@ -10,8 +10,8 @@ mod simulate_ur10;
 
 use dynident::{RunOptions, Silent, Study, identify};
 use dynident_dynamics::{BaseParameterSettings, BaseParameters};
-use dynident_model::laws::{CoulombShape, DriveChoice, laws_per_joint};
 use dynident_model::read_urdf;
+use dynident_model::terms::{CoulombShape, DriveChoice, terms_per_joint};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -37,7 +37,7 @@ fn the_generator_makes_the_committed_logs() {
         for (row, (a, b)) in made.iter().zip(&committed).enumerate() {
             assert_eq!(a.len(), b.len(), "{name}, row {row}");
             for (column, (a, b)) in a.iter().zip(b).enumerate() {
-                // Sine, logarithm and the fused multiply-add differ in the last bit between machines, which may turn the last of
+                // Sine, logarithm and the fused multiply-add differ in the last bit between robots, which may turn the last of
                 // seven digits; an encoder value may then fall on the neighbouring step of 4.8e-5 rad.
                 let tolerance = 1e-6 * b.abs() + if (1..=6).contains(&column) { 4.9e-5 } else { 1e-9 };
                 assert!((a - b).abs() <= tolerance, "{name}, row {row}, column {column}: {a} and {b}");
@@ -73,7 +73,7 @@ fn the_motions_keep_the_robots_limits_and_start_and_end_at_rest() {
         assert_eq!(rows.len(), 2501);
         for (joint, limits) in model.joints().iter().map(|joint| joint.limits).enumerate() {
             let (q, tau) = (1 + joint, 7 + joint);
-            // Over ten samples the encoder's steps and noise (1e-4 rad) make an error of speed of 1e-3 rad/s.
+            // Over ten samples the encoder's steps and noise (1e-4 rad) make an error of velocity of 1e-3 rad/s.
             let speed = |from: usize| (rows[from + 10][q] - rows[from][q]).abs() * RATE_HZ / 10.0;
             for from in 0..rows.len() - 10 {
                 assert!(speed(from) < limits.velocity.unwrap());
@@ -119,13 +119,13 @@ fn identification_finds_the_truth_within_its_error_bars() {
     let result = identify(&study, &path, &RunOptions { data: None, threads: 1, progress: &Silent }).unwrap().result;
 
     let model = read_urdf(include_str!("../../../../robots/ur10.urdf")).unwrap().model;
-    let laws = laws_per_joint(&model, |_| DriveChoice {
+    let terms = terms_per_joint(&model, |_| DriveChoice {
         drive_inertia: true,
         viscous: true,
         coulomb: Some(CoulombShape::Smooth { width: 0.01 }),
         offset: true,
     });
-    let base = BaseParameters::new(&model, &laws, &BaseParameterSettings::default());
+    let base = BaseParameters::new(&model, &terms, &BaseParameterSettings::default());
     let truth: Value = serde_json::from_str(&committed("truth.json")).unwrap();
     let truth: Vec<f64> =
         truth["parameters"].as_array().unwrap().iter().map(|parameter| parameter["value"].as_f64().unwrap()).collect();
@@ -133,7 +133,7 @@ fn identification_finds_the_truth_within_its_error_bars() {
     let expressions: Vec<&String> = result.base_parameters.iter().map(|parameter| &parameter.expression).collect();
     assert_eq!(expressions, base.expressions().iter().collect::<Vec<_>>());
     for (parameter, truth) in result.base_parameters.iter().zip(&truth) {
-        // 64 segments for 58 parameters tell a standard deviation to a factor of 1.5 or so; beyond that, 3.3 of the true ones.
+        // 64 segments for 58 parameters give a standard deviation to a factor of 1.5 or so; beyond that, 3.3 of the true ones.
         let error = (parameter.value - truth).abs() / parameter.std;
         assert!(
             error < 5.0,

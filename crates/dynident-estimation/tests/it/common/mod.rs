@@ -1,7 +1,7 @@
 //! Shared by the tests: a small seeded generator.
 
 /// xorshift64* (Vigna, ACM Trans. Math. Softw. 42 (2016) 30) with Box-Muller normals: enough for tests, the same on
-/// every machine.
+/// every robot.
 pub(crate) struct Random(u64);
 
 impl Random {

@@ -10,7 +10,7 @@ fn below(random: &mut Random, count: usize) -> usize {
     (random.uniform(0.0, 1.0) * count as f64) as usize
 }
 
-/// A body of point masses: possible by construction, on the cone's boundary with three points or fewer.
+/// A body of point masses: consistent by construction, on the cone's boundary with three points or fewer.
 fn points(random: &mut Random, count: usize) -> [f64; 10] {
     let mut body = [0.0; 10];
     let size = 10_f64.powf(random.uniform(-1.5, 0.0));

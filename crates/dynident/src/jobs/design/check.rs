@@ -26,7 +26,7 @@ const MAX_DURATION_S: f64 = 3600.0;
 /// Most samples of a log.
 const MAX_SAMPLES: usize = 2_000_000;
 
-/// A speed at an end below this share of its peak is rest.
+/// A velocity at an end below this share of its peak is rest.
 const REST: f64 = 1e-3;
 
 /// Judges the trajectory in the table `trajectory` (`t_s`, `q1..` or the joints' names, and `dq1..`, `ddq1..` or
@@ -42,7 +42,7 @@ pub fn check_trajectory(
     options: &RunOptions<'_>,
 ) -> Result<DesignOutcome, Error> {
     let mut setup = DesignSetup::for_check(study, study_path, options)?;
-    let joints = setup.machine.parametric.joint_names();
+    let joints = setup.robot.parametric.joint_names();
     let table = table::trajectory(trajectory, &joints, &study.motion)?;
     let given = table.given;
     let duration_s = given.duration_s();
@@ -61,8 +61,8 @@ pub fn check_trajectory(
     Ok(DesignOutcome::new(setup, origin, MotionReview { duration_s, rate_hz, information, check }))
 }
 
-/// Judges a log of the study, by its name or its file: what the run that is over tells about each parameter. Positions
-/// go the same way to speeds and accelerations as they would to a fit; limits are looked at on the log's own samples,
+/// Judges a log of the study, by its name or its file: what the run that is over determines about each parameter. Positions
+/// go the same way to velocities and accelerations as they would to a fit; limits are looked at on the log's own samples,
 /// every one of which counts for the forecast.
 ///
 /// # Errors
@@ -78,14 +78,14 @@ pub fn check_log(
     let mut setup = DesignSetup::for_check(study, study_path, options)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let file = folders.find(&study.log[index].file, study.source.as_deref())?;
-    let (mut pieces, rate_hz) = pieces(study, study_path, (&setup.machine, &folders), index, &file)?;
+    let (mut pieces, rate_hz) = pieces(study, study_path, (&setup.robot, &folders), index, &file)?;
     let gaps = pieces.len().saturating_sub(1);
     if gaps > 0 {
         setup.notes.push(format!(
             "the log has {gaps} gap(s): its pieces are judged one by one and count together; pictures show the longest"
         ));
     }
-    let count = setup.machine.layout().columns().len();
+    let count = setup.robot.layout().columns().len();
     let [mut plain, mut weighted] = [(); 2].map(|()| DMatrix::zeros(count, count));
     let mut check = LimitCheck { reports: Vec::new(), rate_hz, of: SAMPLES, diagnosis: Vec::new() };
     let mut duration_s = 0.0;
@@ -125,18 +125,18 @@ fn log_called(study: &Study, name: &str) -> Result<usize, String> {
 fn pieces(
     study: &Study,
     study_path: &Path,
-    (machine, folders): (&StudyRobot, &Folders),
+    (robot, folders): (&StudyRobot, &Folders),
     index: usize,
     file: &Path,
 ) -> Result<(Vec<Given>, f64), Error> {
     let log = study.log_name(index);
     let failed = |source| Error::recording(&log, source);
     let in_study = |error| Error::identification(study_path, error);
-    let recording = study.recording(machine, folders, index, file)?;
+    let recording = study.recording(robot, folders, index, file)?;
     let mut settings = IdentificationSettings::default();
     settings.motion = study.motion.clone();
     let execution = Execution::default();
-    let (model, alone) = (machine.model(), core::slice::from_ref(&recording));
+    let (model, alone) = (robot.model(), core::slice::from_ref(&recording));
     let motion = Logs::new(model, alone, &settings, &[0], None, execution).map_err(in_study)?.motion;
     let places = recording.places(model).map_err(in_study)?;
     let Some(mut stream) = recording.open(model, &motion).map_err(in_study)? else {
@@ -146,7 +146,7 @@ fn pieces(
     // By piece: for q, dq, ddq and each joint of the model its samples.
     let mut found: Vec<Vec<Vec<f64>>> = Vec::new();
     let (mut segment, mut samples, mut block) = (None, 0, MotionBlock::default());
-    let dof = machine.model().dof();
+    let dof = robot.model().dof();
     while stream.next_block(&mut block).map_err(failed)? {
         if segment != Some(block.segment) {
             segment = Some(block.segment);

@@ -2,7 +2,7 @@
 
 use crate::result::{DirectionForecast, ParameterForecast};
 use crate::study::StudyRobot;
-use dynident_excitation::forecast;
+use dynident_excitation::predicted_covariance;
 use nalgebra::DMatrix;
 
 /// Worst directions shown, and the terms of each.
@@ -16,19 +16,19 @@ const NEGLIGIBLE: f64 = 1e-9;
 /// `with_prior` is the information that includes what was known before. Worst directions are those of all that is
 /// known.
 pub(super) fn named_forecast(
-    machine: &StudyRobot,
+    robot: &StudyRobot,
     information: &DMatrix<f64>,
     with_prior: Option<&DMatrix<f64>>,
 ) -> (Vec<ParameterForecast>, Vec<DirectionForecast>) {
-    let columns = machine.layout().columns();
-    let alone = forecast(information, DIRECTIONS);
-    let all = with_prior.map(|information| forecast(information, DIRECTIONS));
+    let columns = robot.layout().columns();
+    let alone = predicted_covariance(information, DIRECTIONS);
+    let all = with_prior.map(|information| predicted_covariance(information, DIRECTIONS));
     // A prior that is zero but for the rounding of the description's angles has no relative error.
     let largest =
-        machine.nominal_base().iter().copied().flatten().fold(0.0_f64, |largest, prior| largest.max(prior.abs()));
-    let expressions = machine.base().expressions();
+        robot.nominal_base().iter().copied().flatten().fold(0.0_f64, |largest, prior| largest.max(prior.abs()));
+    let expressions = robot.base().expressions();
     let parameters = expressions.into_iter().enumerate().map(|(index, expression)| {
-        let (std, prior) = (alone.std[index], machine.nominal_base().map(|prior| prior[index]));
+        let (std, prior) = (alone.std[index], robot.nominal_base().map(|prior| prior[index]));
         let size = prior.map(f64::abs).filter(|size| *size > NEGLIGIBLE * largest);
         let relative = std.zip(size).map(|(std, size)| 100.0 * std / size);
         let (symbol, unit) = (columns[index].symbol(), columns[index].unit().to_owned());

@@ -35,7 +35,7 @@ impl LimitCheck {
         of: &'static str,
         motion_at: &dyn Fn(&[f64], &mut Motion),
     ) -> Result<Self, Error> {
-        let reports = check_limits(&setup.limits, setup.machine.model(), duration_s, rate_hz, motion_at)
+        let reports = check_limits(&setup.limits, setup.robot.model(), duration_s, rate_hz, motion_at)
             .map_err(|why| Error::study(study_path, format!("[design.limits]: {why}")))?;
         let broken = reports.iter().any(|report| report.violated);
         let diagnosis = if broken { sentences(&setup.set, duration_s, &reports, motion_at) } else { Vec::new() };

@@ -32,7 +32,7 @@ use step_wise::step_wise;
 /// Designs the motion that a study's `[design]` asks for (its defaults where the section is absent). `watch` hears how
 /// far the search is and may end it: the best so far is the result.
 ///
-/// The laws are those of `[drive]`, with a smooth step for Coulomb friction. Limits are checked again at 10 kHz; a
+/// The terms are those of `[drive]`, with a smooth step for Coulomb friction. Limits are checked again at 10 kHz; a
 /// motion that breaks one is a result, with `feasible` false and a diagnosis.
 ///
 /// # Errors
@@ -50,7 +50,7 @@ pub fn design_study(
     // The best motion of the family.
     let found = match &setup.section.criterion {
         CriterionChoice::WindowedCondition(windowed) => {
-            let found = step_wise(&setup.section, windowed, &setup.machine, &setup.limits, watch)
+            let found = step_wise(&setup.section, windowed, &setup.robot, &setup.limits, watch)
                 .map_err(|why| wrong("design", &why))?;
             setup.notes.push(WINDOWED.to_owned());
             found
@@ -58,7 +58,7 @@ pub fn design_study(
         _ => search(&setup, &wrong, watch)?,
     };
 
-    // Its limits, by a check that shares nothing with the search, and what it tells.
+    // Its limits, by a check that shares nothing with the search, and what it determines.
     let duration_s = found.family.duration_s();
     let motion_at = |times: &[f64], out: &mut Motion| found.family.motion(&found.parameters, times, out);
     let mut check = LimitCheck::of(&setup, study_path, duration_s, CHECK_RATE_HZ, "the motion itself", &motion_at)?;
@@ -72,4 +72,4 @@ pub fn design_study(
 }
 
 /// What a windowed design leaves to the check.
-const WINDOWED: &str = "the strokes are chosen by position, speed and acceleration of their joints; limits of jerk, torque, power and place are checked on the whole motion afterwards";
+const WINDOWED: &str = "the strokes are chosen by position, velocity and acceleration of their joints; limits of jerk, torque, power and place are checked on the whole motion afterwards";

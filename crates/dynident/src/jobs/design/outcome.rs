@@ -102,7 +102,7 @@ pub(super) struct MotionReview {
     pub(super) duration_s: f64,
     /// Rate of the samples that count for the information, Hz.
     pub(super) rate_hz: f64,
-    /// What the motion tells.
+    /// What the motion determines.
     pub(super) information: MotionInformation,
     /// The limits.
     pub(super) check: LimitCheck,
@@ -113,8 +113,8 @@ pub(super) struct MotionReview {
 pub struct DesignOutcome {
     /// What `design.json` holds.
     pub file: DesignFile,
-    /// The machine.
-    pub machine: StudyRobot,
+    /// The robot.
+    pub robot: StudyRobot,
     /// The limits in force: the description's with the study's laid over them.
     pub limits: Limits,
     /// The search by generations, for optimisers that have them; empty for gradients.
@@ -129,11 +129,11 @@ impl DesignOutcome {
         let log_det = |information: &DMatrix<f64>| DOptimal.figure(information).map(|figure| -figure);
         let condition = |scaled| ConditionNumber { scaled, ..ConditionNumber::default() }.figure(plain);
         let all = setup.prior.as_ref().map(|prior| prior + weighted);
-        let (forecast, worst_directions) = named_forecast(&setup.machine, weighted, all.as_ref());
+        let (forecast, worst_directions) = named_forecast(&setup.robot, weighted, all.as_ref());
         let file = DesignFile {
             schema: DESIGN_SCHEMA.to_owned(),
             name: setup.name,
-            joints: setup.machine.parametric.joint_names(),
+            joints: setup.robot.parametric.joint_names(),
             family: origin.family,
             family_settings: origin.family_settings,
             given: origin.given,
@@ -146,7 +146,7 @@ impl DesignOutcome {
             condition_number_scaled: condition(true),
             log_det: log_det(plain),
             log_det_weighted: log_det(weighted),
-            base_columns: setup.machine.base().count(),
+            base_columns: setup.robot.base().count(),
             duration_s: review.duration_s,
             rate_hz: review.rate_hz,
             torque_std_nm: setup.torque_std_nm,
@@ -164,8 +164,8 @@ impl DesignOutcome {
             diagnosis: review.check.diagnosis,
             notes: setup.notes,
         };
-        let (machine, limits) = (setup.machine, setup.limits);
-        Self { file, machine, limits, history: origin.history, family: origin.motion }
+        let (robot, limits) = (setup.robot, setup.limits);
+        Self { file, robot, limits, history: origin.history, family: origin.motion }
     }
 
     /// The family of the motion; its parameters are the file's.
@@ -187,7 +187,7 @@ impl DesignOutcome {
     /// Torque along a motion by the prior inertial parameters, joint-major as the motion, Nm (N); `None` while a body's
     /// inertial is unknown.
     pub fn torque_nm(&self, motion: &Motion) -> Option<Vec<f64>> {
-        let model = self.machine.model();
+        let model = self.robot.model();
         if !model.bodies_without_prior().is_empty() {
             return None;
         }
@@ -222,7 +222,7 @@ impl DesignOutcome {
     /// # Errors
     /// A motion that cannot be drawn.
     pub fn path_svg(&self) -> Result<String, Error> {
-        pictures::path(&self.file, &self.limits, self.machine.model(), &self.sampled(PICTURES_HZ).1)
+        pictures::path(&self.file, &self.limits, self.robot.model(), &self.sampled(PICTURES_HZ).1)
     }
 
     /// `fitness.svg`: best and mean fitness by generation (the paper's Fig. 7); none for a search without generations.

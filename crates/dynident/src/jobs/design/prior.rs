@@ -20,15 +20,15 @@ struct EarlierEstimate {
 /// A value below this share of the largest of its kind in its body is known no better than one of this size.
 const FLOOR: f64 = 0.1;
 
-/// Standard deviation (SI) of a law's parameter that the description says nothing about: as good as unknown beside any
+/// Standard deviation (SI) of a term's parameter that the description says nothing about: as good as unknown beside any
 /// measurement.
 const UNKNOWN: f64 = 1e3;
 
-/// The information about the machine's base parameters, inverse covariance, and a sentence on each source. None if
+/// The information about the robot's base parameters, inverse covariance, and a sentence on each source. None if
 /// nothing is said.
 pub(super) fn information(
     section: &PriorSection,
-    machine: &StudyRobot,
+    robot: &StudyRobot,
     study_path: &Path,
     folders: &Folders,
     notes: &mut Vec<String>,
@@ -39,11 +39,11 @@ pub(super) fn information(
     };
     if let Some(result) = &section.result {
         let path = folders.find(result, None)?;
-        add(of_result(&path, machine)?);
+        add(of_result(&path, robot)?);
         notes.push(format!("prior: the covariance of {}", result.display()));
     }
     if let Some(percent) = section.cad_std_percent {
-        let unknown = machine.model().bodies_without_prior();
+        let unknown = robot.model().bodies_without_prior();
         if !unknown.is_empty() {
             let message = format!(
                 "[design.prior]: cad_std_percent, but the inertial parameters of {} are unknown: give them in the description, or leave cad_std_percent out",
@@ -51,7 +51,7 @@ pub(super) fn information(
             );
             return Err(Error::study(study_path, message));
         }
-        let covariance = cad_covariance(machine, percent / 100.0);
+        let covariance = cad_covariance(robot, percent / 100.0);
         add(inverse(&covariance)
             .ok_or_else(|| Error::study(study_path, "[design.prior]: cad_std_percent is too small".to_owned()))?);
         notes.push(format!("prior: the description's inertial parameters, good to {percent} % each"));
@@ -61,9 +61,9 @@ pub(super) fn information(
 
 /// `K diag(σ²) Kᵀ` of the base parameters: the independent ones with their own variance, and what is regrouped into
 /// them.
-fn cad_covariance(machine: &StudyRobot, share: f64) -> DMatrix<f64> {
-    let std = standard_deviations(machine, share);
-    let base = machine.base();
+fn cad_covariance(robot: &StudyRobot, share: f64) -> DMatrix<f64> {
+    let std = standard_deviations(robot, share);
+    let base = robot.base();
     let mut spread = base.regrouping().clone();
     for (mut column, index) in spread.column_iter_mut().zip(base.dependent()) {
         column *= std[*index];
@@ -75,12 +75,12 @@ fn cad_covariance(machine: &StudyRobot, share: f64) -> DMatrix<f64> {
     covariance
 }
 
-/// Standard deviation of every standard parameter: bodies, then laws.
-fn standard_deviations(machine: &StudyRobot, share: f64) -> Vec<f64> {
+/// Standard deviation of every standard parameter: bodies, then terms.
+fn standard_deviations(robot: &StudyRobot, share: f64) -> Vec<f64> {
     const KINDS: [core::ops::Range<usize>; 3] = [0..1, 1..4, 4..10];
-    let values = machine.nominal().to_vec();
+    let values = robot.nominal().to_vec();
     let largest = |values: &[f64]| values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
-    let (bodies, laws) = values.split_at(10 * machine.model().dof());
+    let (bodies, terms) = values.split_at(10 * robot.model().dof());
     let mut std = Vec::with_capacity(values.len());
     for body in bodies.chunks_exact(10) {
         for kind in KINDS {
@@ -91,7 +91,7 @@ fn standard_deviations(machine: &StudyRobot, share: f64) -> Vec<f64> {
             std.extend(body[kind].iter().map(|value| share * value.abs().max(FLOOR * scale)));
         }
     }
-    std.extend(machine.laws().iter().zip(laws).map(|(law, value)| match law.property() {
+    std.extend(robot.terms().iter().zip(terms).map(|(term, value)| match term.property() {
         Some(_) if *value != 0.0 => share * value.abs(),
         _ => UNKNOWN,
     }));
@@ -111,11 +111,11 @@ fn inverse(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     symmetric.iter().all(|x| x.is_finite()).then_some(symmetric)
 }
 
-/// Inverse covariance of an earlier result in the machine's columns; zero for those that it did not excite.
-fn of_result(path: &Path, machine: &StudyRobot) -> Result<DMatrix<f64>, Error> {
+/// Inverse covariance of an earlier result in the robot's columns; zero for those that it did not excite.
+fn of_result(path: &Path, robot: &StudyRobot) -> Result<DMatrix<f64>, Error> {
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     let stored: EarlierEstimate = read_part(path)?;
-    let place = places(&stored.base_parameters, machine).map_err(wrong)?;
+    let place = places(&stored.base_parameters, robot).map_err(wrong)?;
     let rows = &stored.base_parameter_covariance;
     if rows.is_empty() {
         let message = "no base_parameter_covariance: made by an earlier version, identify again with this one";
@@ -149,15 +149,15 @@ fn of_result(path: &Path, machine: &StudyRobot) -> Result<DMatrix<f64>, Error> {
 }
 
 /// Names shown of a list at most.
-const TOLD: usize = 6;
+const LISTED: usize = 6;
 
-/// For every stored parameter its column in the machine.
-fn places(stored: &[BaseParameterResult], machine: &StudyRobot) -> Result<Vec<usize>, String> {
-    let symbols: Vec<String> = machine.layout().columns().iter().map(Column::symbol).collect();
-    let expressions = machine.base().expressions();
+/// For every stored parameter its column in the robot.
+fn places(stored: &[BaseParameterResult], robot: &StudyRobot) -> Result<Vec<usize>, String> {
+    let symbols: Vec<String> = robot.layout().columns().iter().map(Column::symbol).collect();
+    let expressions = robot.base().expressions();
     let listed = |names: &[&str]| {
-        let more = if names.len() > TOLD { format!(" and {} more", names.len() - TOLD) } else { String::new() };
-        format!("{}{more}", names[..names.len().min(TOLD)].join(", "))
+        let more = if names.len() > LISTED { format!(" and {} more", names.len() - LISTED) } else { String::new() };
+        format!("{}{more}", names[..names.len().min(LISTED)].join(", "))
     };
     let strange: Vec<&str> =
         stored.iter().filter(|p| !symbols.contains(&p.symbol)).map(|p| p.symbol.as_str()).collect();
@@ -166,12 +166,12 @@ fn places(stored: &[BaseParameterResult], machine: &StudyRobot) -> Result<Vec<us
         .filter(|symbol| stored.iter().filter(|p| p.symbol == **symbol).count() != 1)
         .map(String::as_str)
         .collect();
-    let mend = "use a result of the same robot with the same [drive] and [robot]";
+    let fix = "use a result of the same robot with the same [drive] and [robot]";
     if !strange.is_empty() {
-        return Err(format!("its base parameters {} are none of the study's machine: {mend}", listed(&strange)));
+        return Err(format!("its base parameters {} are none of the study's robot: {fix}", listed(&strange)));
     }
     if !absent.is_empty() {
-        return Err(format!("it does not hold the machine's base parameters {} once each: {mend}", listed(&absent)));
+        return Err(format!("it does not hold the robot's base parameters {} once each: {fix}", listed(&absent)));
     }
     stored
         .iter()
@@ -181,7 +181,7 @@ fn places(stored: &[BaseParameterResult], machine: &StudyRobot) -> Result<Vec<us
                 Ok(place)
             } else {
                 Err(format!(
-                    "its base parameter `{}` sums `{}`, that of the study's machine `{}`: {mend}",
+                    "its base parameter `{}` sums `{}`, that of the study's robot `{}`: {fix}",
                     parameter.symbol, parameter.expression, expressions[place]
                 ))
             }

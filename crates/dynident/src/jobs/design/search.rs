@@ -38,8 +38,8 @@ pub(super) fn search(
     wrong: &dyn Fn(&str, &dyn core::fmt::Display) -> Error,
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
 ) -> Result<SearchResult, Error> {
-    let DesignSetup { section, machine, limits, set, .. } = setup;
-    let model = machine.model();
+    let DesignSetup { section, robot, limits, set, .. } = setup;
+    let model = robot.model();
     limits.check_duration(model, section.duration_s, LEAST_DISPLACEMENT).map_err(|why| wrong("design.limits", &why))?;
     let mut family =
         section.family.family(model.dof(), section.duration_s).map_err(|why| wrong("design.family", &why))?;
@@ -53,7 +53,7 @@ pub(super) fn search(
         family: &*family,
         criteria: &criteria,
         limits: set,
-        layout: machine.layout(),
+        layout: robot.layout(),
         torque_std_nm: setup.counted_std_nm(),
         prior: setup.prior.as_ref(),
     };

@@ -14,7 +14,7 @@ use std::path::Path;
 /// Samples whose regressor is held at once.
 const SAMPLES_AT_ONCE: usize = 4096;
 
-/// What a motion tells of the base parameters.
+/// What a motion says about the base parameters.
 pub(super) struct MotionInformation {
     /// `Σ WᵀW`: every torque noise 1 Nm (N).
     pub(super) plain: DMatrix<f64>,
@@ -26,7 +26,7 @@ pub(super) struct MotionInformation {
 pub(super) struct DesignSetup {
     pub(super) name: String,
     pub(super) section: DesignSection,
-    pub(super) machine: StudyRobot,
+    pub(super) robot: StudyRobot,
     pub(super) limits: Limits,
     pub(super) set: LimitSet,
     pub(super) criteria: Vec<Box<dyn Criterion>>,
@@ -38,16 +38,16 @@ pub(super) struct DesignSetup {
 }
 
 impl DesignSetup {
-    /// For a search: laws are smooth, and something bounds how fast each joint moves.
+    /// For a search: terms are smooth, and something bounds how fast each joint moves.
     pub(super) fn for_search(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Self, Error> {
         let mut notes = Vec::new();
         let setup = Self::new(&smooth(study, &mut notes), study_path, options, notes)?;
-        bounded(&setup.machine, &setup.limits)
+        bounded(&setup.robot, &setup.limits)
             .map_err(|why| Error::study(study_path, format!("[design.limits]: {why}")))?;
         Ok(setup)
     }
 
-    /// For a motion that is there already: laws as the study has them.
+    /// For a motion that is there already: terms as the study has them.
     pub(super) fn for_check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Self, Error> {
         Self::new(study, study_path, options, Vec::new())
     }
@@ -58,21 +58,21 @@ impl DesignSetup {
         let wrong = |part: &str, why: &dyn core::fmt::Display| Error::study(study_path, format!("[{part}]: {why}"));
         section.validate().map_err(|why| wrong("design", &why))?;
         let folders = Folders::new(study, study_path, options.data.as_deref());
-        let machine = StudyRobot::new(study, study_path, &folders)?;
-        let limits = Limits::from_model(machine.model()).overlaid(&section.limits);
-        let set = LimitSet::new(&limits, machine.model()).map_err(|why| wrong("design.limits", &why))?;
-        let torque_std_nm = torque_std(&section, &machine, &mut notes).map_err(|why| wrong("design", &why))?;
-        let prior = prior::information(&section.prior, &machine, study_path, &folders, &mut notes)?;
+        let robot = StudyRobot::new(study, study_path, &folders)?;
+        let limits = Limits::from_model(robot.model()).overlaid(&section.limits);
+        let set = LimitSet::new(&limits, robot.model()).map_err(|why| wrong("design.limits", &why))?;
+        let torque_std_nm = torque_std(&section, &robot, &mut notes).map_err(|why| wrong("design", &why))?;
+        let prior = prior::information(&section.prior, &robot, study_path, &folders, &mut notes)?;
         let criteria = match &section.criterion {
             CriterionChoice::Prediction { trajectory } => {
                 let path = folders.find(trajectory, None)?;
-                let task = table::trajectory(&path, &machine.parametric.joint_names(), &study.motion)?;
+                let task = table::trajectory(&path, &robot.parametric.joint_names(), &study.motion)?;
                 notes.extend(task.note.map(|note| format!("task: {note}")));
                 let samples = task.given.samples();
                 let motion_at = |times: &[f64], out: &mut Motion| task.given.motion(&[], times, out);
-                let sum = information(&machine, &torque_std_nm, task.given.times_s(), &motion_at);
+                let sum = information(&robot, &torque_std_nm, task.given.times_s(), &motion_at);
                 let criterion: Box<dyn Criterion> = Box::new(Prediction::new(sum / samples.samples as f64));
-                // From a motion that tells all parameters well to one that tells the task's: a better start than any
+                // From a motion that determines all parameters well to one that determines the task's: a better start than any
                 // random one.
                 vec![Box::new(DOptimal), criterion]
             }
@@ -80,9 +80,9 @@ impl DesignSetup {
         };
         Ok(Self {
             name: study_name(study, study_path),
-            ones: vec![1.0; machine.model().dof()],
+            ones: vec![1.0; robot.model().dof()],
             section,
-            machine,
+            robot,
             limits,
             set,
             criteria,
@@ -98,10 +98,10 @@ impl DesignSetup {
         if self.section.criterion.of_regressor() { &self.ones } else { &self.torque_std_nm }
     }
 
-    /// What a motion tells at `times`.
+    /// What a motion determines at `times`.
     pub(super) fn information(&self, times: &[f64], motion_at: &dyn Fn(&[f64], &mut Motion)) -> MotionInformation {
         let [plain, weighted] =
-            [&self.ones, &self.torque_std_nm].map(|std| information(&self.machine, std, times, motion_at));
+            [&self.ones, &self.torque_std_nm].map(|std| information(&self.robot, std, times, motion_at));
         MotionInformation { plain, weighted }
     }
 
@@ -123,13 +123,13 @@ impl DesignSetup {
 
 /// Information of a motion at `times`, a block at a time.
 fn information(
-    machine: &StudyRobot,
+    robot: &StudyRobot,
     torque_std_nm: &[f64],
     times: &[f64],
     motion_at: &dyn Fn(&[f64], &mut Motion),
 ) -> DMatrix<f64> {
-    let count = machine.layout().columns().len();
-    let mut gatherer = Information::new(machine.model(), machine.layout(), torque_std_nm, None);
+    let count = robot.layout().columns().len();
+    let mut gatherer = Information::new(robot.model(), robot.layout(), torque_std_nm, None);
     let (mut sum, mut motion) = (DMatrix::zeros(count, count), Motion::default());
     for times in times.chunks(SAMPLES_AT_ONCE) {
         motion_at(times, &mut motion);
@@ -158,8 +158,8 @@ fn smooth(study: &Study, notes: &mut Vec<String>) -> Study {
 }
 
 /// That something bounds how fast each joint moves: without it the best motion is infinitely fast.
-fn bounded(machine: &StudyRobot, limits: &Limits) -> Result<(), String> {
-    for joint in machine.model().joints() {
+fn bounded(robot: &StudyRobot, limits: &Limits) -> Result<(), String> {
+    for joint in robot.model().joints() {
         let free = limits.of(&joint.name).is_none_or(|limit| {
             let rates = [limit.speed, limit.acceleration, limit.jerk, limit.torque, limit.power_w];
             rates.iter().all(Option::is_none)
@@ -176,8 +176,8 @@ fn bounded(machine: &StudyRobot, limits: &Limits) -> Result<(), String> {
 }
 
 /// Torque noise of every joint.
-fn torque_std(section: &DesignSection, machine: &StudyRobot, notes: &mut Vec<String>) -> Result<Vec<f64>, String> {
-    let joints = machine.model().joints();
+fn torque_std(section: &DesignSection, robot: &StudyRobot, notes: &mut Vec<String>) -> Result<Vec<f64>, String> {
+    let joints = robot.model().joints();
     match &section.torque_std_nm {
         Some(TorqueNoise::Same(std)) => Ok(vec![*std; joints.len()]),
         Some(TorqueNoise::Each(stds)) if stds.len() == joints.len() => Ok(stds.clone()),

@@ -23,7 +23,7 @@ const FREE_RAD: f64 = 1e6;
 pub(crate) fn step_wise(
     section: &DesignSection,
     windowed: &WindowedCondition,
-    machine: &StudyRobot,
+    robot: &StudyRobot,
     limits: &Limits,
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
 ) -> Result<SearchResult, String> {
@@ -40,14 +40,14 @@ pub(crate) fn step_wise(
                 .to_owned(),
         );
     }
-    let dof = machine.model().dof();
+    let dof = robot.model().dof();
     settings.validate(dof, section.duration_s).map_err(|error| error.to_string())?;
     let offsets = settings.offsets.clone().unwrap_or_else(|| vec![0.0; dof]);
     let names: Vec<String> = match &windowed.joints {
         Some(joints) => joints.clone(),
-        None => machine.model().joints().iter().rev().map(|joint| joint.name.clone()).collect(),
+        None => robot.model().joints().iter().rev().map(|joint| joint.name.clone()).collect(),
     };
-    let problem = problem(section, windowed, machine, limits, settings, &offsets, &names)?;
+    let problem = problem(section, windowed, robot, limits, settings, &offsets, &names)?;
     problem.validate().map_err(|error| error.to_string())?;
 
     let seed = section.search.seed;
@@ -96,7 +96,7 @@ pub(crate) fn step_wise(
     };
 
     let strokes = problem.strokes(&x);
-    let files_of = |x: &[f64]| stroke_files(&problem, &problem.strokes(x), settings, &offsets, machine);
+    let files_of = |x: &[f64]| stroke_files(&problem, &problem.strokes(x), settings, &offsets, robot);
     let condition_sum = problem.condition_numbers(&strokes).iter().sum();
     let optimum_strokes = files_of(&optimum);
     let inside = optimum_strokes.iter().flat_map(|stroke| &stroke.limits).all(|limit| limit.kept);
@@ -139,13 +139,13 @@ pub(crate) fn step_wise(
 fn problem(
     section: &DesignSection,
     windowed: &WindowedCondition,
-    machine: &StudyRobot,
+    robot: &StudyRobot,
     limits: &Limits,
     settings: &SplicedLogisticSettings,
     offsets: &[f64],
     names: &[String],
 ) -> Result<StepWiseProblem, String> {
-    let model = machine.model();
+    let model = robot.model();
     let mut joints = Vec::with_capacity(names.len());
     for (place, name) in names.iter().enumerate() {
         let joint =
@@ -213,13 +213,13 @@ fn given(strokes: &[GivenStroke], names: &[String]) -> Result<Vec<f64>, String> 
     Ok(x)
 }
 
-/// Strokes as the file tells them.
+/// Strokes as the file lists them.
 fn stroke_files(
     problem: &StepWiseProblem,
     strokes: &[Stroke],
     settings: &SplicedLogisticSettings,
     offsets: &[f64],
-    machine: &StudyRobot,
+    robot: &StudyRobot,
 ) -> Vec<StrokeFile> {
     let conditions = problem.condition_numbers(strokes);
     let one = |place: usize| {
@@ -233,7 +233,7 @@ fn stroke_files(
             kept: limit.kept(),
         });
         StrokeFile {
-            joint: machine.model().joints()[joint].name.clone(),
+            joint: robot.model().joints()[joint].name.clone(),
             amplitude_rad: stroke.amplitude_rad,
             steepness_per_s: stroke.steepness_per_s,
             offset_rad: offsets[joint],

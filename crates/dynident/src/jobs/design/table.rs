@@ -9,21 +9,21 @@ use std::path::Path;
 /// Most rows.
 const MAX_ROWS: usize = 1_000_000;
 
-/// Steps of a table whose speeds are to be found may differ by this share.
+/// Steps of a table whose velocities are to be found may differ by this share.
 const UNEVEN: f64 = 1e-3;
 
-/// Speeds may disagree with positions by this share of the largest step, and by this much, rad (m).
+/// Velocities may disagree with positions by this share of the largest step, and by this much, rad (m).
 const DISAGREE: f64 = 0.05;
 const DISAGREE_LEAST: f64 = 1e-3;
 
 /// A table and how it was understood.
 pub(crate) struct Trajectory {
     pub(crate) given: Given,
-    /// Where speed and acceleration come from, if not from the table.
+    /// Where velocity and acceleration come from, if not from the table.
     pub(crate) note: Option<String>,
 }
 
-/// Reads `t_s`, `q1..` (or the joints' names) and `dq1..`, `ddq1..` where both are there; else speeds and accelerations
+/// Reads `t_s`, `q1..` (or the joints' names) and `dq1..`, `ddq1..` where both are there; else velocities and accelerations
 /// are the study's differentiator's.
 pub(crate) fn trajectory(path: &Path, joints: &[String], settings: &MotionSettings) -> Result<Trajectory, Error> {
     let wrong = |line: u64, message: String| Error::States { path: path.to_owned(), line, message };
@@ -129,7 +129,7 @@ fn number_of(column: &str, group: &str) -> Option<usize> {
     digits.bytes().all(|byte| byte.is_ascii_digit()).then(|| digits.parse().ok())?
 }
 
-/// Where positions do not move as speeds and accelerations say: the row, and what to do. `q₁ - q₀` is `h (q̇₀ + q̇₁) /
+/// Where positions do not move as velocities and accelerations say: the row, and what to do. `q₁ - q₀` is `h (q̇₀ + q̇₁) /
 /// 2 - h² (q̈₁ - q̈₀) / 12` but for `h⁵ q⁽⁵⁾ / 720`.
 fn disagreement(times_s: &[f64], groups: &[Vec<Vec<f64>>], joints: &[String]) -> Option<(usize, String)> {
     joints.iter().enumerate().find_map(|(joint, name)| {
@@ -152,7 +152,7 @@ fn disagreement(times_s: &[f64], groups: &[Vec<Vec<f64>>], joints: &[String]) ->
     })
 }
 
-/// Positions to speeds and accelerations, by the study's own differentiator.
+/// Positions to velocities and accelerations, by the study's own differentiator.
 fn derive(times_s: &[f64], groups: &mut Vec<Vec<Vec<f64>>>, settings: &MotionSettings) -> Result<String, String> {
     let step = (times_s[times_s.len() - 1] - times_s[0]) / (times_s.len() - 1) as f64;
     if let Some(pair) = times_s.windows(2).find(|pair| (pair[1] - pair[0] - step).abs() > UNEVEN * step) {
@@ -184,5 +184,5 @@ fn derive(times_s: &[f64], groups: &mut Vec<Vec<Vec<f64>>>, settings: &MotionSet
     } else {
         String::new()
     };
-    Ok(format!("speed and acceleration are derived from the positions ({}{cut})", differentiator.name()))
+    Ok(format!("velocity and acceleration are derived from the positions ({}{cut})", differentiator.name()))
 }

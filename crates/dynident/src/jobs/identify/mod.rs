@@ -17,14 +17,14 @@ use dynident_identification::{
 };
 use dynident_model::InertialParameters;
 use sections::{
-    base_parameters, bodies, friction_results, joint_results, law_results, method_summary, offset_results,
-    physical_fit_result, robot_summary, training_result, verdict,
+    base_parameters, bodies, friction_results, joint_results, method_summary, offset_results, physical_fit_result,
+    robot_summary, term_results, training_result, verdict,
 };
 use std::path::Path;
 use std::time::Instant;
 use urdf::written_urdf;
 
-/// Correlations that a result tells.
+/// Correlations that a result lists.
 const CORRELATIONS: usize = 10;
 
 /// A finished identification of a study.
@@ -95,7 +95,7 @@ fn identified(
     // Names first: no log is read for a study that is wrong.
     study.settings(study_path, &robot)?.check_names(&robot.parametric).map_err(in_study)?;
     let task = study.task(study_path, &robot, &folders)?;
-    let mut timings = Timings { machine: start.elapsed().as_secs_f64(), ..Timings::default() };
+    let mut timings = Timings { robot: start.elapsed().as_secs_f64(), ..Timings::default() };
 
     // The identification itself.
     let execution = options.execution();
@@ -150,9 +150,9 @@ fn physical_verdict(
         verdict.fit = Some(physical_fit_result(fit, &arm_estimate));
         let is_fitted_to_logs = task.settings.estimation.estimator.is_plain() && study.arm.is_none();
         verdict.note = String::from(if is_fitted_to_logs {
-            "of the possible set that fits the logs best; the base parameters above it are the unconstrained estimate"
+            "of the consistent set that fits the logs best; the base parameters above it are the unconstrained estimate"
         } else {
-            "of the possible set nearest to the estimate; the base parameters above it are that unconstrained estimate"
+            "of the consistent set nearest to the estimate; the base parameters above it are that unconstrained estimate"
         });
     }
     verdict.failure.clone_from(&consistent.failure);
@@ -241,7 +241,7 @@ fn result_file(
         payloads: found.payloads.clone(),
         offsets: offset_results(found, &task.recordings),
         drive_gains: found.training.gains.as_ref().map(|(_, gains)| gains.clone()),
-        couplings: law_results(model, estimate, parameters, |law| law.own_joint().is_none()),
+        couplings: term_results(model, estimate, parameters, |term| term.own_joint().is_none()),
         training: parts.training,
         torque_band: bands.collect(),
         validation: held_out.map(|log| log.validation.clone()).collect(),

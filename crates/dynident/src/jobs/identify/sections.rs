@@ -1,8 +1,8 @@
 //! From an estimate to the sections of `result.json`.
 
 use crate::result::{
-    BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LawResult, LogOffset, MethodSummary,
-    PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RobotSummary, TrainingJoint, TrainingResult,
+    BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, MethodSummary, PhysicalBodyResult,
+    PhysicalFitResult, PhysicalVerdict, RobotSummary, TermResult, TrainingJoint, TrainingResult,
 };
 use crate::study::{JointDrive, StudyRobot};
 use dynident_estimation::consistent::{PhysicalFit, PhysicalStatus};
@@ -10,7 +10,7 @@ use dynident_estimation::{Estimate, EstimateStatus};
 use dynident_identification::examination::TorqueLag;
 use dynident_identification::friction::JointFriction;
 use dynident_identification::{Identification, Recording, RegressorModel};
-use dynident_model::laws::Law;
+use dynident_model::terms::TorqueTerm;
 use dynident_model::{INERTIAL_NAMES, InertialParameters};
 
 pub(super) fn robot_summary(robot: &StudyRobot) -> RobotSummary {
@@ -45,7 +45,7 @@ pub(super) fn method_summary(identification: &Identification, estimator: &str) -
         motion: motion.clone(),
         condition_number: estimate.condition_number_raw,
         condition_number_scaled: estimate.condition_number_scaled,
-        base_columns: "from the machine's structure: columns from base to tip, bodies then laws; a column that depends on earlier ones is regrouped into them"
+        base_columns: "from the robot's structure: columns from base to tip, bodies then laws; a column that depends on earlier ones is regrouped into them"
             .to_owned(),
         base_gap: [weakest, strongest],
         not_excited: estimate.rank.fixed.iter().map(|fixed| fixed.name.clone()).collect(),
@@ -96,33 +96,33 @@ pub(super) fn bodies(model: &RegressorModel, inertials: &[InertialParameters]) -
         .collect()
 }
 
-pub(super) fn law_results(
+pub(super) fn term_results(
     model: &RegressorModel,
     estimate: &Estimate,
     parameters: &[f64],
-    wanted: impl Fn(&Law) -> bool,
-) -> Vec<LawResult> {
-    let first_law = 10 * model.model().dof();
+    wanted: impl Fn(&TorqueTerm) -> bool,
+) -> Vec<TermResult> {
+    let first_term = 10 * model.model().dof();
     let expressions = model.base().expressions();
-    let of_law = |(x, law): (usize, &Law)| {
-        let column = first_law + x;
+    let of_term = |(x, term): (usize, &TorqueTerm)| {
+        let column = first_term + x;
         let place = model.base().independent().iter().position(|&index| index == column);
-        // A law that other parameters were regrouped into has no value of its own either.
-        let alone = place.filter(|&place| expressions[place] == law.symbol());
+        // A term that other parameters were regrouped into has no value of its own either.
+        let alone = place.filter(|&place| expressions[place] == term.symbol());
         let home = place.or_else(|| {
             let d = model.base().dependent().iter().position(|&index| index == column)?;
             let column = model.base().regrouping().column(d);
             (0..column.len()).find(|&b| column[b].abs() > 1e-9)
         });
-        LawResult {
-            symbol: law.symbol(),
-            unit: law.unit().to_owned(),
+        TermResult {
+            symbol: term.symbol(),
+            unit: term.unit().to_owned(),
             value: parameters[column],
             std: alone.map(|place| estimate.std[place]),
             base_parameter: home.map(|place| expressions[place].clone()),
         }
     };
-    model.laws().iter().enumerate().filter(|(_, law)| wanted(law)).map(of_law).collect()
+    model.terms().iter().enumerate().filter(|(_, term)| wanted(term)).map(of_term).collect()
 }
 
 /// Deviations of single logs' offsets from their mean; the last log's is what the others leave.
@@ -167,7 +167,7 @@ pub(super) fn joint_results(
         .enumerate()
         .map(|(index, joint)| JointResult {
             name: joint.name.clone(),
-            laws: law_results(model, estimate, parameters, |law| law.own_joint() == Some(index)),
+            terms: term_results(model, estimate, parameters, |term| term.own_joint() == Some(index)),
             residual_std_nm: estimate.joint_sigma[index],
             residual_correlation: estimate.effective_lag1.get(index).copied().filter(|rho| rho.is_finite()),
             torque_lag: lags[index],
@@ -219,9 +219,9 @@ pub(super) fn verdict(model: &RegressorModel, inertials: &[InertialParameters], 
                 .push(format!("{}: pseudo-inertia not positive definite (least eigenvalue {least:.2e})", body.name()));
         }
     }
-    for (law, value) in model.laws().iter().zip(&parameters[10 * model.model().dof()..]) {
-        if *value < 0.0 && law.is_nonnegative() {
-            violations.push(format!("{} = {value:.4} {}", law.symbol(), law.unit()));
+    for (term, value) in model.terms().iter().zip(&parameters[10 * model.model().dof()..]) {
+        if *value < 0.0 && term.is_nonnegative() {
+            violations.push(format!("{} = {value:.4} {}", term.symbol(), term.unit()));
         }
     }
     PhysicalVerdict {

@@ -2,7 +2,7 @@
 
 use crate::study::StudyRobot;
 use dynident_dynamics::ParametricModel;
-use dynident_model::laws::JointProperty;
+use dynident_model::terms::JointProperty;
 use dynident_model::{DescriptionFormat, InertialParameters, JointChange, LinkChange, link_changes, rewrite_urdf};
 
 /// The user's URDF with the new values; joints that were locked keep theirs. Otherwise the reason why there is none.
@@ -18,9 +18,9 @@ pub(super) fn written_urdf(
     let mut links = link_changes(model.model(), inertials).map_err(|error| error.to_string())?;
     note_locked(robot, &mut links);
     let mut joints: Vec<JointChange> = Vec::new();
-    let laws = model.laws().iter().zip(&parameters[10 * model.model().dof()..]);
-    for (law, &value) in laws {
-        let (Some(joint), Some(property)) = (law.own_joint(), law.property()) else { continue };
+    let terms = model.terms().iter().zip(&parameters[10 * model.model().dof()..]);
+    for (term, &value) in terms {
+        let (Some(joint), Some(property)) = (term.own_joint(), term.property()) else { continue };
         let (damping, friction) = match property {
             JointProperty::Damping => (Some(value), None),
             JointProperty::Friction => (None, Some(value)),

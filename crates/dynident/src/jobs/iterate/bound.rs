@@ -12,27 +12,27 @@ const SAMPLES_AT_ONCE: usize = 4096;
 
 /// The Cramér-Rao bound of every base parameter: `√ diag (Σ Wᵀ Σ_τ⁻¹ W)⁻¹` over the recorded samples along the trajectories that count, for white torque noise and exact positions; none without torque noise,
 /// with correlated noise, or where a parameter is not excited.
-pub(super) fn cramer_rao(machine: &StudyRobot, legs: &[Leg], sensors: &SensorSettings) -> Option<Vec<f64>> {
-    let dof = machine.model().dof();
+pub(super) fn cramer_rao(robot: &StudyRobot, legs: &[Leg], sensors: &SensorSettings) -> Option<Vec<f64>> {
+    let dof = robot.model().dof();
     let std: Vec<f64> = (0..dof).map(|joint| sensors.torque_std.of(joint)).collect();
     if sensors.torque_correlation != 0.0 || std.iter().any(|std| *std <= 0.0) {
         return None;
     }
-    let columns = machine.layout().columns().len();
+    let columns = robot.layout().columns().len();
     let mut sum = DMatrix::zeros(columns, columns);
     for leg in legs {
         let (whole, rate_hz) = (leg.reference().motion(), leg.reference().rate_hz());
         let mut own = DMatrix::zeros(columns, columns);
         if leg.windows().is_none() {
-            own += information(machine, whole, &std, &(0..whole.samples).collect::<Vec<usize>>());
+            own += information(robot, whole, &std, &(0..whole.samples).collect::<Vec<usize>>());
         } else {
             for joint in 0..dof {
                 let inside = |sample: &usize| leg.counts(joint, *sample as f64 / rate_hz);
                 let samples: Vec<usize> = (0..whole.samples).filter(inside).collect();
-                // The others' torque tells nothing there.
+                // The others' torque determines nothing there.
                 let mut alone = vec![f64::INFINITY; dof];
                 alone[joint] = std[joint];
-                own += information(machine, whole, &alone, &samples);
+                own += information(robot, whole, &alone, &samples);
             }
         }
         // Samples a second that are recorded, of those that are controlled.
@@ -49,10 +49,10 @@ pub(super) fn cramer_rao(machine: &StudyRobot, legs: &[Leg], sensors: &SensorSet
 }
 
 /// `Σ Wᵀ Σ_τ⁻¹ W` over some samples of a motion.
-fn information(machine: &StudyRobot, whole: &Motion, std: &[f64], samples: &[usize]) -> DMatrix<f64> {
-    let dof = machine.model().dof();
-    let mut gatherer = Information::new(machine.model(), machine.layout(), std, None);
-    let count = machine.layout().columns().len();
+fn information(robot: &StudyRobot, whole: &Motion, std: &[f64], samples: &[usize]) -> DMatrix<f64> {
+    let dof = robot.model().dof();
+    let mut gatherer = Information::new(robot.model(), robot.layout(), std, None);
+    let count = robot.layout().columns().len();
     let mut sum = DMatrix::zeros(count, count);
     for some in samples.chunks(SAMPLES_AT_ONCE) {
         let mut part = Motion::default();

@@ -18,12 +18,12 @@ const SEED_OF_LEG: u64 = 0xd1b5_4a32_d192_ed03;
 pub(super) fn trajectories(
     study: &Study,
     study_path: &Path,
-    machine: &StudyRobot,
+    robot: &StudyRobot,
     rate_hz: f64,
     options: &RunOptions<'_>,
     watch: &(dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
 ) -> Result<Vec<Trajectory>, Error> {
-    let of = |study: &Study| Trajectory::of_study(study, study_path, machine, rate_hz, options, watch);
+    let of = |study: &Study| Trajectory::of_study(study, study_path, robot, rate_hz, options, watch);
     let section = study.iteration.clone().unwrap_or_default();
     if section.leg.is_empty() {
         return Ok(vec![of(study)?]);
@@ -58,8 +58,8 @@ impl IterationSection {
     }
 
     /// Checks names and numbers of the legs.
-    pub(super) fn check_legs(&self, machine: &StudyRobot) -> Result<(), String> {
-        let names = machine.parametric.joint_names();
+    pub(super) fn check_legs(&self, robot: &StudyRobot) -> Result<(), String> {
+        let names = robot.parametric.joint_names();
         for (number, leg) in (1..).zip(&self.leg) {
             let at = |what: &str| format!("leg {number}: {what}");
             if leg.trajectory.is_some() && leg.design.is_some() {
@@ -82,8 +82,8 @@ impl IterationSection {
     }
 
     /// What is run, with held joints at rest and the times that count.
-    pub(super) fn legs(&self, trajectories: &[Trajectory], machine: &StudyRobot) -> Result<Vec<Leg>, String> {
-        let names = machine.parametric.joint_names();
+    pub(super) fn legs(&self, trajectories: &[Trajectory], robot: &StudyRobot) -> Result<Vec<Leg>, String> {
+        let names = robot.parametric.joint_names();
         let free = [LegSection::default()];
         let sections = if self.leg.is_empty() { &free[..] } else { &self.leg[..] };
         if sections.len() != trajectories.len() {
@@ -124,11 +124,11 @@ impl IterationSection {
     pub(super) fn robots(
         &self,
         simulation: &SimulationSection,
-        machine: &StudyRobot,
+        robot: &StudyRobot,
         stage: usize,
         members: &[usize],
     ) -> Result<Vec<Box<dyn Robot>>, String> {
-        let joints = machine.parametric.joint_names();
+        let joints = robot.parametric.joint_names();
         let said = |error: dynident_simulation::SimulationError| error.to_string();
         Ok(match &self.robot {
             RobotChoice::Process(settings) => {
@@ -147,7 +147,7 @@ impl IterationSection {
                 simulation.sensors.seed ^= (stage as u64).wrapping_mul(SEED_OF_LEG);
                 let mut robots: Vec<Box<dyn Robot>> = Vec::new();
                 for &member in members {
-                    let robot = simulation.truth(machine)?.robot;
+                    let robot = simulation.truth(robot)?.robot;
                     let section = self.leg.get(member).filter(|leg| leg.locked && !leg.hold.is_empty());
                     robots.push(Box::new(match section {
                         Some(leg) => {

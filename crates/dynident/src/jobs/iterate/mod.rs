@@ -2,7 +2,7 @@
 
 mod bound;
 mod legs;
-mod told;
+mod report;
 mod trajectory;
 
 pub(super) use trajectory::Trajectory;
@@ -20,10 +20,10 @@ use dynident_iteration::{
 };
 use dynident_iteration::{Robot, RobotRun};
 use fnv::FnvHasher;
+use report::{IterationReport, Stage, joined};
 use std::hash::Hasher;
 use std::path::Path;
 use std::time::Instant;
-use told::{Stage, Told, joined};
 
 /// What hears of an iteration's progress.
 pub struct IterationWatch<'a> {
@@ -57,15 +57,15 @@ pub fn iterate_study(
     let section = study.iteration.clone().unwrap_or_default();
     let simulation = study.simulation.clone().unwrap_or_default();
     let folders = Folders::new(study, study_path, options.data.as_deref());
-    let machine = StudyRobot::new(study, study_path, &folders)?;
-    let identification = study.settings(study_path, &machine)?;
+    let robot = StudyRobot::new(study, study_path, &folders)?;
+    let identification = study.settings(study_path, &robot)?;
     let settings = section.settings(study, identification).map_err(|why| Error::study(study_path, why))?;
     let truth = match section.robot {
-        RobotChoice::Simulation => Some(simulation.truth(&machine).map_err(|why| wrong("simulation", &why))?),
+        RobotChoice::Simulation => Some(simulation.truth(&robot).map_err(|why| wrong("simulation", &why))?),
         _ => None,
     };
-    section.check_legs(&machine).map_err(|why| wrong("iteration", &why))?;
-    let fingerprint = fingerprint(study, &machine, options);
+    section.check_legs(&robot).map_err(|why| wrong("iteration", &why))?;
+    let fingerprint = fingerprint(study, &robot, options);
     let stages = section.stages();
     let one = stages.len() == 1;
     let folder = |stage: usize| if one { out.to_owned() } else { out.join(format!("leg_{}", stage + 1)) };
@@ -75,43 +75,43 @@ pub fn iterate_study(
         .collect::<Result<Vec<_>, _>>()
         .map_err(in_iteration)?;
     let rate_hz = simulation.rate_hz;
-    let make = || legs::trajectories(study, study_path, &machine, rate_hz, options, watch.design);
+    let make = || legs::trajectories(study, study_path, &robot, rate_hz, options, watch.design);
     let trajectories = kept(&out.join("trajectory.json"), &fingerprint, resume, make)?;
     let iterated = match section.prior {
-        PriorChoice::Description => machine.parametric.clone(),
+        PriorChoice::Description => robot.parametric.clone(),
         PriorChoice::None => {
-            let zeros = vec![0.0; machine.nominal().len()];
-            machine.parametric.clone().with_nominal(zeros).map_err(|why| wrong("iteration", &why))?
+            let zeros = vec![0.0; robot.nominal().len()];
+            robot.parametric.clone().with_nominal(zeros).map_err(|why| wrong("iteration", &why))?
         }
     };
-    let legs = section.legs(&trajectories, &machine).map_err(|why| wrong("iteration", &why))?;
-    let efforts = machine.model().joints().iter().map(|joint| joint.limits.effort.unwrap_or(f64::INFINITY)).collect();
+    let legs = section.legs(&trajectories, &robot).map_err(|why| wrong("iteration", &why))?;
+    let efforts = robot.model().joints().iter().map(|joint| joint.limits.effort.unwrap_or(f64::INFINITY)).collect();
     let torque_limits: Option<Vec<f64>> = simulation.effort_limits.then_some(efforts);
     let simulated = truth.is_some();
-    let told = Told {
+    let report = IterationReport {
         study,
         study_path,
-        machine: &machine,
+        robot: &robot,
         duration_s: legs.iter().map(|leg| leg.reference().duration_s()).sum(),
         truth: truth.map(|truth| truth.base_values),
-        bound: if one && simulated { bound::cramer_rao(&machine, &legs, &simulation.sensors) } else { None },
+        bound: if one && simulated { bound::cramer_rao(&robot, &legs, &simulation.sensors) } else { None },
     };
     let target = out.join("iterations.json");
     let before_runs_s = begin.elapsed().as_secs_f64();
-    let mut known_std: Vec<Option<f64>> = vec![None; machine.layout().columns().len()];
+    let mut known_std: Vec<Option<f64>> = vec![None; robot.layout().columns().len()];
     let mut known: Vec<(usize, f64)> = Vec::new();
     let (mut files, mut traces, mut made) = (Vec::new(), Vec::new(), 0);
     for (number, members) in stages.iter().enumerate() {
         let own: Vec<_> = members.iter().map(|&leg| legs[leg].clone()).collect();
         let task = IterationTask {
-            machine: iterated.clone(),
+            robot: iterated.clone(),
             legs: own,
             known: known.clone(),
             torque_limits: torque_limits.clone(),
         };
         let iteration = Iteration::new(task, settings.clone()).map_err(|why| wrong("iteration", &why))?;
         let mut robots =
-            section.robots(&simulation, &machine, number, members).map_err(|why| wrong("iteration", &why))?;
+            section.robots(&simulation, &robot, number, members).map_err(|why| wrong("iteration", &why))?;
         let mut robots: Vec<&mut dyn Robot> = robots.iter_mut().map(|robot| &mut **robot as &mut dyn Robot).collect();
         let leg = (!one).then_some(number + 1);
         let mut so_far = stores[number].records().map_err(in_iteration)?;
@@ -121,7 +121,7 @@ pub fn iterate_study(
         let outcome = iterate(&iteration, &mut robots, Some(&stores[number]), &mut |record, runs| {
             so_far.push(record.clone());
             let status = IterationStatus::Waiting { reason: "for the next run".to_owned() };
-            let now = told.file(&Stage {
+            let now = report.file(&Stage {
                 leg,
                 robot: &iteration.robot(&so_far),
                 records: &so_far,
@@ -138,12 +138,12 @@ pub fn iterate_study(
         }
         made += outcome.runs.len() - runs_before;
         let (records, status) = (&outcome.runs[..], &outcome.status);
-        let robot = &iteration.robot(records);
-        files.push(told.file(&Stage { leg, robot, records, status, known_std: &known_std }));
+        let in_force = &iteration.robot(records);
+        files.push(report.file(&Stage { leg, robot: in_force, records, status, known_std: &known_std }));
         for record in records {
             for (place, own) in iteration.task().legs.iter().enumerate() {
                 let name = RunName { run: record.run, leg: leg.or((members.len() > 1).then_some(place + 1)), place };
-                traces.push(RunTrace::new(name, &stores[number], own.reference(), &machine.parametric.joint_names()));
+                traces.push(RunTrace::new(name, &stores[number], own.reference(), &robot.parametric.joint_names()));
             }
         }
         let last = records.iter().rev().find(|record| record.accepted).and_then(|record| record.estimate.as_ref());
@@ -151,8 +151,8 @@ pub fn iterate_study(
             break;
         }
         let Some(last) = last else { break };
-        let told = known_std.len().min(last.values.len());
-        for column in (0..told).filter(|column| !last.fixed.contains(column)) {
+        let determined = known_std.len().min(last.values.len());
+        for column in (0..determined).filter(|column| !last.fixed.contains(column)) {
             if known_std[column].is_none() {
                 known_std[column] = Some(last.std[column]);
                 known.push((column, last.values[column]));
@@ -174,8 +174,8 @@ fn write_file(path: &Path, file: &IterationsFile) -> Result<(), Error> {
 }
 
 /// Everything that runs depend on, in one number: study, robot, and the version of the program (FNV-1a, 64 bits).
-fn fingerprint(study: &Study, machine: &StudyRobot, options: &RunOptions<'_>) -> String {
-    let text = format!("{study:?} {:?} {:?} {}", machine.model(), options.data, env!("CARGO_PKG_VERSION"));
+fn fingerprint(study: &Study, robot: &StudyRobot, options: &RunOptions<'_>) -> String {
+    let text = format!("{study:?} {:?} {:?} {}", robot.model(), options.data, env!("CARGO_PKG_VERSION"));
     let mut hasher = FnvHasher::default();
     hasher.write(text.as_bytes());
     format!("{:016x}", hasher.finish())
@@ -189,14 +189,14 @@ fn kept(
     make: impl FnOnce() -> Result<Vec<Trajectory>, Error>,
 ) -> Result<Vec<Trajectory>, Error> {
     #[derive(serde::Serialize, serde::Deserialize)]
-    struct Kept {
+    struct TrajectoryFile {
         fingerprint: String,
         trajectories: Vec<Trajectory>,
     }
     let wrong = |message: String| Error::Result { path: path.to_owned(), message };
     if resume && path.is_file() {
         let text = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
-        let kept: Kept = serde_json::from_slice(&text)
+        let kept: TrajectoryFile = serde_json::from_slice(&text)
             .map_err(|error| wrong(format!("is no trajectory of an iteration ({error}): remove it")))?;
         if kept.fingerprint == fingerprint {
             return Ok(kept.trajectories);
@@ -205,7 +205,7 @@ fn kept(
             "belongs to an iteration with other settings: take --fresh, or give another --out".to_owned(),
         ));
     }
-    let kept = Kept { fingerprint: fingerprint.to_owned(), trajectories: make()? };
+    let kept = TrajectoryFile { fingerprint: fingerprint.to_owned(), trajectories: make()? };
     let bytes = serde_json::to_vec(&kept).map_err(|error| wrong(error.to_string()))?;
     write_whole(path, &bytes)?;
     Ok(kept.trajectories)

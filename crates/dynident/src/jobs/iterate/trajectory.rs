@@ -21,7 +21,7 @@ pub(crate) struct Trajectory {
     pub(crate) samples: usize,
     /// Positions, joint by joint.
     pub(crate) q: Vec<f64>,
-    /// Speeds.
+    /// Velocities.
     pub(crate) dq: Vec<f64>,
     /// Accelerations.
     pub(crate) ddq: Vec<f64>,
@@ -48,7 +48,7 @@ impl Trajectory {
     pub(crate) fn of_study(
         study: &Study,
         study_path: &Path,
-        machine: &StudyRobot,
+        robot: &StudyRobot,
         rate_hz: f64,
         options: &RunOptions<'_>,
         watch: &(dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
@@ -58,7 +58,7 @@ impl Trajectory {
         if let Some(file) = file {
             let folders = Folders::new(study, study_path, options.data.as_deref());
             let path = folders.find(file, None)?;
-            let table = trajectory_table(&path, &machine.parametric.joint_names(), &study.motion)?;
+            let table = trajectory_table(&path, &robot.parametric.joint_names(), &study.motion)?;
             let reference = Reference::of_family(&table.given, &[], rate_hz, None).map_err(|error| wrong(&error))?;
             return Ok(Self::new(&reference, None));
         }
@@ -68,10 +68,10 @@ impl Trajectory {
         let outcome = design_study(study, study_path, options, watch)?;
         let mut strokes = Vec::new();
         let windows = outcome.file.windowed.as_ref().map(|windowed| {
-            let mut windows = vec![Vec::new(); machine.model().dof()];
+            let mut windows = vec![Vec::new(); robot.model().dof()];
             let mut start_s = 0.0;
             for stroke in &windowed.strokes {
-                let Some(joint) = machine.model().joint_index(&stroke.joint) else { continue };
+                let Some(joint) = robot.model().joint_index(&stroke.joint) else { continue };
                 for middle in [0.25, 0.75] {
                     let centre = start_s + middle * stroke.period_s;
                     windows[joint].push([centre - stroke.window_s, centre + stroke.window_s]);

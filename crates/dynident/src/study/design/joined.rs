@@ -1,7 +1,7 @@
 //! `family = { kind = "joined", .. }`: families one after another within the duration.
 
 use super::FamilyChoice;
-use dynident_excitation::families::{FamilyError, Joined, JoinedSettings};
+use dynident_excitation::families::{FamilyError, JoinedFamily, JoinedSettings};
 use serde::{Deserialize, Serialize};
 
 const NAME: &str = "joined";
@@ -36,8 +36,8 @@ impl JoinedChoice {
     ///
     /// # Errors
     /// If a setting of it or of a part has no meaning, or the moves leave no time.
-    pub fn family(&self, joints: usize, duration_s: f64) -> Result<Joined, FamilyError> {
-        let setting = |setting, value, mend| FamilyError::Setting { family: NAME, setting, value, mend };
+    pub fn family(&self, joints: usize, duration_s: f64) -> Result<JoinedFamily, FamilyError> {
+        let setting = |setting, value, fix| FamilyError::Setting { family: NAME, setting, value, fix };
         let count = self.parts.len();
         let shares = self.shares.clone().unwrap_or_else(|| vec![1.0; count]);
         if shares.len() != count {
@@ -62,6 +62,6 @@ impl JoinedChoice {
         let all: f64 = shares.iter().sum();
         let members = self.parts.iter().zip(&shares).map(|(part, share)| part.family(joints, left_s * share / all));
         let settings = JoinedSettings { move_s: self.move_s, start: self.start.clone(), end: self.end.clone() };
-        Joined::new(members.collect::<Result<_, _>>()?, &settings)
+        JoinedFamily::new(members.collect::<Result<_, _>>()?, &settings)
     }
 }

@@ -104,7 +104,7 @@ pub enum FamilyChoice {
     Fourier(FourierSettings),
     /// Splines of degree 5.
     BSpline(BSplineSettings),
-    /// Quintic polynomials through way-points.
+    /// Quintic polynomials through waypoints.
     Quintic(QuinticSettings),
     /// Sines with Schroeder phases.
     Multisine(MultisineSettings),
@@ -112,7 +112,7 @@ pub enum FamilyChoice {
     LogisticStrokes(LogisticStrokesSettings),
     /// The paper's spliced logistic function.
     SplicedLogistic(SplicedLogisticSettings),
-    /// Sweeps at constant speeds, for friction.
+    /// Sweeps at constant velocity, for friction.
     FrictionLadder(FrictionLadderSettings),
     /// Postures held one after another, for gravity.
     StaticPostures(StaticPosturesSettings),

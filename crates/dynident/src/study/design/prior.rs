@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PriorSection {
-    /// `result.json` of an earlier identification of the same machine: its covariance says how well each base parameter
+    /// `result.json` of an earlier identification of the same robot: its covariance says how well each base parameter
     /// is known. Found as the study's logs are.
     pub result: Option<PathBuf>,
     /// The description's own inertial parameters, good to so many percent each (one standard deviation, independent of

@@ -22,7 +22,7 @@ pub struct WindowedCondition {
     pub joints: Option<Vec<String>>,
     /// ε: what a broken limit adds to the fitness. Default 1000.
     pub penalty: f64,
-    /// Bound of speed and acceleration at rest (equation 17), rad/s and rad/s². Default 1e-4.
+    /// Bound of velocity and acceleration at rest (equation 17), rad/s and rad/s². Default 1e-4.
     pub rest_limit: f64,
     /// Range of A, rad. Default 0.1 to π.
     pub amplitude_range: [f64; 2],

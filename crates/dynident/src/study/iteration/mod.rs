@@ -74,9 +74,9 @@ pub struct IterationSection {
     pub scheme: Scheme,
     /// Every sample of every joint counts, also where a windowed design names windows; false by default.
     pub every_sample: bool,
-    /// The paper's scheme as it stands: no possible machine is asked for and nothing is rejected. False by default.
+    /// The paper's scheme as it stands: no physically consistent set is asked for and nothing is rejected. False by default.
     pub literal: bool,
-    /// From positions to speeds and accelerations; `deviation` from the trajectory by default.
+    /// From positions to velocities and accelerations; `deviation` from the trajectory by default.
     pub differentiator: DifferentiatorSettings,
     /// Low-pass and decimation of torque and regressor alike; none by default.
     pub parallel_filter: Option<DecimationSettings>,
@@ -159,7 +159,7 @@ impl IterationSection {
         let in_turn =
             self.scheme == Scheme::StepByStep || self.order == LegOrder::OneAfterAnother && self.leg.len() > 1;
         if in_turn && !friction.is_empty() {
-            return Err("[drive] friction = \"auto\": only runs that tell of all joints at once can choose; state the friction, or take out scheme and order of [iteration]".to_owned());
+            return Err("[drive] friction = \"auto\": only runs that hold information about all joints at once can choose; state the friction, or take out scheme and order of [iteration]".to_owned());
         }
         // A run's estimate is made, not tested.
         (estimation.exogeneity_test, estimation.essential) = (None, None);

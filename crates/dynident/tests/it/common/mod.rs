@@ -64,18 +64,18 @@ impl Truth {
         bodies.iter().zip(drives).map(|(body, drive)| body + drive).collect()
     }
 
-    /// What a perfect fit finds: the truth in the machine's base parameters.
-    pub(crate) fn base_values(&self, machine: &StudyRobot) -> Vec<f64> {
-        use dynident::model::laws::Law;
+    /// What a perfect fit finds: the truth in the robot's base parameters.
+    pub(crate) fn base_values(&self, robot: &StudyRobot) -> Vec<f64> {
+        use dynident::model::terms::TorqueTerm;
         let mut all = self.model.parameter_vector();
-        all.extend(machine.laws().iter().map(|law| match law {
-            Law::DriveInertia(law) => self.drive[law.joint][0],
-            Law::Viscous(law) => self.drive[law.joint][1],
-            Law::Coulomb(law) => self.drive[law.joint][2],
-            Law::Offset(law) => self.drive[law.joint][3],
+        all.extend(robot.terms().iter().map(|term| match term {
+            TorqueTerm::DriveInertia(term) => self.drive[term.joint][0],
+            TorqueTerm::Viscous(term) => self.drive[term.joint][1],
+            TorqueTerm::Coulomb(term) => self.drive[term.joint][2],
+            TorqueTerm::Offset(term) => self.drive[term.joint][3],
             _ => 0.0,
         }));
-        machine.base().values(&all)
+        robot.base().values(&all)
     }
 }
 
@@ -193,7 +193,7 @@ impl Job {
         found
     }
 
-    pub(crate) fn machine(&self) -> StudyRobot {
+    pub(crate) fn robot(&self) -> StudyRobot {
         let folders = dynident::Folders::new(&self.study, &self.path, None);
         StudyRobot::new(&self.study, &self.path, &folders).unwrap()
     }

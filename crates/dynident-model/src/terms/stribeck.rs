@@ -3,8 +3,8 @@
 //! Beside Coulomb friction `F_c`, `F_s` is what static friction has more. Linear in `F_s` at given `v_s` and `δ`. Source: Armstrong-Hélouvry, Dupont and Canudas de Wit,
 //! Automatica 30 (1994) 1083.
 
-use super::kind::{SpeedFriction, SpeedFunction, TermAction, TermConstant, TermJoints, TermKind};
-use super::{CoulombShape, JointMotion, LawInput};
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind, VelocityFriction, VelocityFunction};
+use super::{CoulombShape, JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
 /// Extra friction of one joint near rest, Nm (N).
@@ -12,15 +12,15 @@ use serde::{Deserialize, Serialize};
 pub struct Stribeck {
     /// The joint.
     pub joint: usize,
-    /// The speed `v_s` at which a share of 1/e is left, rad/s or m/s, positive.
+    /// The velocity `v_s` at which a share of 1/e is left, rad/s or m/s, positive.
     pub speed: f64,
     /// The exponent `δ`, positive; 1 to 2.8 are usual.
     pub exponent: f64,
-    /// The step near zero speed.
+    /// The step near zero velocity.
     pub shape: CoulombShape,
 }
 
-impl SpeedFunction for Stribeck {
+impl VelocityFunction for Stribeck {
     fn value(&self, dq: f64) -> f64 {
         (-(dq / self.speed).abs().powf(self.exponent)).exp() * self.shape.step(dq)
     }
@@ -28,7 +28,7 @@ impl SpeedFunction for Stribeck {
     fn slope(&self, dq: f64) -> f64 {
         let x = (dq / self.speed).abs();
         let share = (-x.powf(self.exponent)).exp();
-        // At zero speed the step is zero and goes to zero faster than x^(δ-1) grows.
+        // At zero velocity the step is zero and goes to zero faster than x^(δ-1) grows.
         let falling = if x > 0.0 {
             self.exponent * x.powf(self.exponent - 1.0) / self.speed * dq.signum() * self.shape.step(dq)
         } else {
@@ -61,9 +61,9 @@ impl TermKind for Stribeck {
     }
 
     fn action(&self) -> TermAction<'_> {
-        TermAction::Friction(SpeedFriction {
+        TermAction::Friction(VelocityFriction {
             fading: Some([self.speed, self.exponent]),
-            ..SpeedFriction::of(self.shape.curve())
+            ..VelocityFriction::of(self.shape.curve())
         })
     }
 
@@ -75,11 +75,11 @@ impl TermKind for Stribeck {
         ]
     }
 
-    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
+    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
         self.fill(self.joint, motion, out);
     }
 
-    fn pull_back(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
+    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
         self.add_slopes(self.joint, motion, weights, by_dq);
     }
 }

@@ -1,13 +1,13 @@
-//! A drive that turns with two joints, as in a coupled wrist: its speed is `w = k_1 q̇_1 + k_2 q̇_2`.
+//! A drive that turns with two joints, as in a coupled wrist: its velocity is `w = k_1 q̇_1 + k_2 q̇_2`.
 //!
-//! Its own joint's laws already hold the part that only one joint feels, so a coupling holds the cross terms
+//! Its own joint's terms already hold the part that only one joint feels, so a coupling holds the cross terms
 //! (Stäubli TX and RX wrists: Gautier, Janot, Vandanjon 2013; the DFKI pendulum's rotor seen through two joints):
 //! * inertia: `τ_1 += k_1 k_2 I q̈_2`, `τ_2 += k_1 k_2 I q̈_1`,
 //! * viscous friction: `τ_1 += k_1 k_2 F q̇_2`, `τ_2 += k_1 k_2 F q̇_1`,
 //! * Coulomb friction: `τ_1 += k_1 F s(w)`, `τ_2 += k_2 F s(w)`.
 
-use super::kind::{MotionFunction, SpeedFriction, TermAction, TermConstant, TermJoints, TermKind};
-use super::{CoulombShape, JointMotion, LawInput};
+use super::kind::{MotionFunction, TermAction, TermConstant, TermJoints, TermKind, VelocityFriction};
+use super::{CoulombShape, JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
 /// What the shared drive adds.
@@ -18,7 +18,7 @@ pub enum CouplingEffect {
     Inertia,
     /// Cross viscous friction, Nm s/rad.
     Viscous,
-    /// Coulomb friction on the drive's own speed, Nm.
+    /// Coulomb friction on the drive's own velocity, Nm.
     Coulomb(CoulombShape),
 }
 
@@ -31,7 +31,7 @@ pub struct Coupling {
     pub first: usize,
     /// The other joint.
     pub second: usize,
-    /// Drive speed per speed of the first and of the second joint.
+    /// Drive velocity per velocity of the first and of the second joint.
     pub ratios: [f64; 2],
     /// The effect.
     pub effect: CouplingEffect,
@@ -74,7 +74,7 @@ impl TermKind for Coupling {
             CouplingEffect::Inertia => TermAction::Inertia { factor },
             CouplingEffect::Viscous => TermAction::Damping { factor },
             CouplingEffect::Coulomb(shape) => {
-                TermAction::Friction(SpeedFriction { ratios: self.ratios, ..SpeedFriction::of(shape.curve()) })
+                TermAction::Friction(VelocityFriction { ratios: self.ratios, ..VelocityFriction::of(shape.curve()) })
             }
         }
     }
@@ -88,7 +88,7 @@ impl TermKind for Coupling {
         vec![("effect", TermConstant::Word(effect)), ("ratios", TermConstant::Numbers(self.ratios)), ("shape", shape)]
     }
 
-    fn column(&self, row: usize, motion: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
+    fn column(&self, row: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
         let (other, own_ratio) =
             if row == self.first { (self.second, self.ratios[0]) } else { (self.first, self.ratios[1]) };
         let cross = self.ratios[0] * self.ratios[1];
@@ -112,7 +112,14 @@ impl TermKind for Coupling {
         }
     }
 
-    fn pull_back(&self, row: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], by_ddq: &mut [f64]) {
+    fn apply_adjoint(
+        &self,
+        row: usize,
+        motion: &JointMotion<'_>,
+        weights: &[f64],
+        by_dq: &mut [f64],
+        by_ddq: &mut [f64],
+    ) {
         let (other, own_ratio) =
             if row == self.first { (self.second, self.ratios[0]) } else { (self.first, self.ratios[1]) };
         let cross = self.ratios[0] * self.ratios[1];

@@ -2,21 +2,21 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Below this speed a joint counts as at rest, rad/s (m/s).
+/// Below this velocity a joint counts as at rest, rad/s (m/s).
 const STATIC: f64 = 0.005;
-/// Below this speed it counts as reversing, rad/s (m/s): friction's regime.
+/// Below this velocity it counts as reversing, rad/s (m/s): friction's regime.
 const REVERSAL: f64 = 0.1;
 
-/// Sums of squared residuals by the joint's own speed: static (|q̇| < 0.005), reversal (up to 0.1), fast (from 0.1
+/// Sums of squared residuals by the joint's own velocity: static (|q̇| < 0.005), reversal (up to 0.1), fast (from 0.1
 /// rad/s on).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Regimes {
+pub struct SpeedRanges {
     sums: [(usize, f64); 3],
 }
 
 /// Residuals of one regime.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct RegimeFigures {
+pub struct SpeedRangeFigures {
     /// Samples.
     pub samples: usize,
     /// Their root mean square residual, Nm (N); none without samples.
@@ -25,17 +25,17 @@ pub struct RegimeFigures {
 
 /// Residuals by regime.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct RegimesReport {
+pub struct SpeedRangesReport {
     /// |q̇| below 0.005 rad/s (m/s).
-    pub at_rest: RegimeFigures,
+    pub at_rest: SpeedRangeFigures,
     /// |q̇| from there to 0.1 rad/s (m/s).
-    pub reversal: RegimeFigures,
+    pub reversal: SpeedRangeFigures,
     /// |q̇| from 0.1 rad/s (m/s) on.
-    pub fast: RegimeFigures,
+    pub fast: SpeedRangeFigures,
 }
 
-impl Regimes {
-    /// A residual at a speed.
+impl SpeedRanges {
+    /// A residual at a velocity.
     pub fn add(&mut self, speed: f64, residual: f64) {
         let speed = speed.abs();
         let place = usize::from(speed >= STATIC) + usize::from(speed >= REVERSAL);
@@ -44,12 +44,12 @@ impl Regimes {
     }
 
     /// The figures so far.
-    pub fn report(&self) -> RegimesReport {
-        let [at_rest, reversal, fast] = self.sums.map(|(samples, square)| RegimeFigures {
+    pub fn report(&self) -> SpeedRangesReport {
+        let [at_rest, reversal, fast] = self.sums.map(|(samples, square)| SpeedRangeFigures {
             samples,
             rmse_nm: (samples > 0).then(|| (square / samples as f64).sqrt()),
         });
-        RegimesReport { at_rest, reversal, fast }
+        SpeedRangesReport { at_rest, reversal, fast }
     }
 }
 
@@ -59,7 +59,7 @@ mod tests {
 
     #[test]
     fn every_speed_has_its_regime() {
-        let mut regimes = Regimes::default();
+        let mut regimes = SpeedRanges::default();
         for (speed, residual) in [(0.0, 1.0), (-0.05, 3.0), (0.05, 4.0), (-2.0, 5.0)] {
             regimes.add(speed, residual);
         }

@@ -21,7 +21,7 @@ pub(crate) struct Row<'a> {
 pub(crate) type Arrays<'a> = [&'a mut Vec<f64>; 5];
 
 #[derive(Debug)]
-pub(crate) struct Tape {
+pub(crate) struct MotionBuffer {
     joints: usize,
     rows: Vec<f64>,
     filled: usize,
@@ -29,7 +29,7 @@ pub(crate) struct Tape {
     first: usize,
 }
 
-impl Tape {
+impl MotionBuffer {
     pub(crate) fn new(joints: usize) -> Self {
         Self { joints, rows: vec![0.0; 5 * joints * BLOCK], filled: 0, first: 0 }
     }
@@ -67,13 +67,13 @@ impl Tape {
 
 /// A reference, read block by block.
 #[derive(Debug)]
-pub(crate) struct ReferenceTape<'a> {
+pub(crate) struct ReferenceBuffer<'a> {
     reference: &'a Reference,
     rows: Vec<f64>,
     at: usize,
 }
 
-impl<'a> ReferenceTape<'a> {
+impl<'a> ReferenceBuffer<'a> {
     pub(crate) fn new(reference: &'a Reference) -> Self {
         Self { reference, rows: vec![0.0; 3 * reference.joints() * BLOCK], at: 0 }
     }

@@ -1,11 +1,11 @@
 //! The project's order of torque terms.
 
-use super::{JointProperty, Law, TermAction};
+use super::{JointProperty, TermAction, TorqueTerm};
 
 /// Sorts terms into the project's order: joint by joint drive inertia, viscous, Coulomb and offset; then, joint by
 /// joint, further friction as it stands; then couplings.
-pub fn sort_terms(laws: &mut [Law]) {
-    laws.sort_by_key(|law| match (law.own_joint(), law.property(), law.action()) {
+pub fn sort_terms(terms: &mut [TorqueTerm]) {
+    terms.sort_by_key(|term| match (term.own_joint(), term.property(), term.action()) {
         (None, _, _) => (2, 0, 0),
         (Some(joint), _, TermAction::Inertia { .. }) => (0, joint, 0),
         (Some(joint), Some(JointProperty::Damping), _) => (0, joint, 1),

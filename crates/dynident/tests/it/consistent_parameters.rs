@@ -1,4 +1,4 @@
-//! Possible machines through a study: what is known of the bodies, contradictions by name, the torque's sign by physics alone; essential parameters and the torque's band.
+//! Possible robots through a study: what is known of the bodies, contradictions by name, the torque's sign by physics alone; essential parameters and the torque's band.
 use crate::common::{Job, Motion, Random, Truth, format, header, plain, recordings, repository, write_log};
 use dynident::model::load_robot;
 use dynident::recording::Level;
@@ -45,7 +45,7 @@ fn what_is_known_of_bodies_holds() {
         assert!((4.5 - 1e-9..=5.0 + 1e-9).contains(&total), "{prior}: {total}");
         let com = known.result.bodies[1].com_m.unwrap();
         assert!((0.05 - 1e-9..=0.3 + 1e-9).contains(&com[0]), "{prior}: {com:?}");
-        // What the data tell is as before: noise-free torque, so the fit's own floor of 1e-4 of the torque is all that may be given up.
+        // What the data determine is as before: noise-free torque, so the fit's own floor of 1e-4 of the torque is all that may be given up.
         let (a, b) = (&known.result.base_parameters, &free.result.base_parameters);
         for (a, b) in a.iter().zip(b) {
             let (a, b) = (a.physical.unwrap(), b.physical.unwrap());
@@ -54,7 +54,7 @@ fn what_is_known_of_bodies_holds() {
         assert!(known.urdf.is_some());
     }
     let held = found("[estimator.physical.laws]\nfv1 = [3.5, 4.0]");
-    let viscous = held.result.joints[0].laws.iter().find(|law| law.symbol == "fv1").unwrap();
+    let viscous = held.result.joints[0].terms.iter().find(|term| term.symbol == "fv1").unwrap();
     assert!((3.5 - 1e-9..=4.0 + 1e-9).contains(&viscous.value), "{viscous:?}");
     assert!(held.result.physical.fit.as_ref().unwrap().active.iter().any(|name| name.contains("fv1")));
 }
@@ -82,7 +82,7 @@ fn contradictions_name_link_and_constraint() {
     assert!(reason.contains("link2: mass") && reason.contains("3 to 2"), "{reason}");
     let reason =
         failure("[estimator.physical.bodies.link2]\nprior = [1.0, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.1, 0.0, 0.9]");
-    assert!(reason.contains("body link2: its prior is no possible body"), "{reason}");
+    assert!(reason.contains("body link2: its prior is no consistent body"), "{reason}");
     let reason =
         failure("[estimator.physical.bodies.link1]\nknown = [1.0, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.1, 0.0, 0.9]");
     assert!(reason.contains("body link1") && reason.contains("known"), "{reason}");
@@ -142,12 +142,13 @@ fn bare(path: &Path) -> String {
     bare + rest
 }
 
-/// Whether the logs of a result are called reversed by what machines are possible.
+/// Whether the logs of a result are called reversed by physical consistency.
 fn called_reversed(found: &IdentificationOutcome) -> bool {
     let sign = found.result.physical.sign.unwrap();
     let said = found.result.logs.iter().filter(|log| log.role.name() == "identify").all(|log| {
         log.model_findings.iter().any(|finding| {
-            finding.level == Level::Problem && finding.message.contains("opposite sign of any possible machine")
+            finding.level == Level::Problem
+                && finding.message.contains("opposite sign of any physically consistent set")
         })
     });
     assert_eq!(said, sign.is_reversed(), "{sign:?}");

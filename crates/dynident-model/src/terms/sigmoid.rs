@@ -3,8 +3,8 @@
 //! It is a Coulomb step of height `φ₁` whose middle lies at `-φ₃`; linear in `φ₁` at given `φ₂` and `φ₃`. With `φ₃ = 0` it is half a smooth Coulomb step of width `2/φ₂`. Source: Gaz,
 //! Cognetti, Oliva, Robuffo Giordano and De Luca, IEEE RA-L 4 (2019) 4147.
 
-use super::kind::{SpeedCurve, SpeedFriction, SpeedFunction, TermAction, TermConstant, TermJoints, TermKind};
-use super::{JointMotion, LawInput};
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind, VelocityCurve, VelocityFriction, VelocityFunction};
+use super::{JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
 /// The step of one joint, Nm (N).
@@ -14,7 +14,7 @@ pub struct Sigmoid {
     pub joint: usize,
     /// Steepness `φ₂`, s/rad or s/m, positive.
     pub steepness: f64,
-    /// Offset of the speed `φ₃`, rad/s or m/s.
+    /// Offset of the velocity `φ₃`, rad/s or m/s.
     pub offset_speed: f64,
 }
 
@@ -23,7 +23,7 @@ fn logistic(x: f64) -> f64 {
     0.5 * (1.0 + (0.5 * x).tanh())
 }
 
-impl SpeedFunction for Sigmoid {
+impl VelocityFunction for Sigmoid {
     fn value(&self, dq: f64) -> f64 {
         logistic(self.steepness * (dq + self.offset_speed)) - logistic(self.steepness * self.offset_speed)
     }
@@ -56,7 +56,7 @@ impl TermKind for Sigmoid {
     }
 
     fn action(&self) -> TermAction<'_> {
-        TermAction::Friction(SpeedFriction::of(SpeedCurve::Smooth(self)))
+        TermAction::Friction(VelocityFriction::of(VelocityCurve::Smooth(self)))
     }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
@@ -66,11 +66,11 @@ impl TermKind for Sigmoid {
         ]
     }
 
-    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
+    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
         self.fill(self.joint, motion, out);
     }
 
-    fn pull_back(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
+    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
         self.add_slopes(self.joint, motion, weights, by_dq);
     }
 }

@@ -1,13 +1,13 @@
 //! Coulomb friction: `τ = F_c s(q̇)` with a sign or a smooth step `s`.
 
 use super::kind::{
-    JointProperty, MotionFunction, SpeedCurve, SpeedFriction, SpeedFunction, TermAction, TermConstant, TermJoints,
-    TermKind, halves,
+    JointProperty, MotionFunction, TermAction, TermConstant, TermJoints, TermKind, VelocityCurve, VelocityFriction,
+    VelocityFunction, halves,
 };
-use super::{JointMotion, LawInput};
+use super::{JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
-/// The step near zero speed.
+/// The step near zero velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CoulombShape {
@@ -16,15 +16,15 @@ pub enum CoulombShape {
         /// Half width of the band without friction torque.
         dead_band: f64,
     },
-    /// `tanh(q̇ / width)`: no chatter of the sign of a noisy speed near rest.
+    /// `tanh(q̇ / width)`: no chatter of the sign of a noisy velocity near rest.
     Smooth {
-        /// Speed at which 76 % of the step is reached, rad/s or m/s, positive.
+        /// Velocity at which 76 % of the step is reached, rad/s or m/s, positive.
         width: f64,
     },
 }
 
 impl CoulombShape {
-    /// The step at speed `dq`.
+    /// The step at velocity `dq`.
     #[inline]
     pub fn step(self, dq: f64) -> f64 {
         match self {
@@ -34,7 +34,7 @@ impl CoulombShape {
         }
     }
 
-    /// The step's derivative by the speed; zero for the sign, which has none at the step.
+    /// The step's derivative by the velocity; zero for the sign, which has none at the step.
     #[inline]
     pub fn slope(self, dq: f64) -> f64 {
         match self {
@@ -46,16 +46,16 @@ impl CoulombShape {
         }
     }
 
-    /// As friction of a robot. The dead band of a sign is a device for noisy speeds of a log: a robot has none.
-    pub(super) fn curve(&self) -> SpeedCurve<'_> {
+    /// As friction of a robot. The dead band of a sign is a device for noisy velocities of a log: a robot has none.
+    pub(super) fn curve(&self) -> VelocityCurve<'_> {
         match self {
-            Self::Sign { .. } => SpeedCurve::Step { forward: true, backward: true },
-            Self::Smooth { .. } => SpeedCurve::Smooth(self),
+            Self::Sign { .. } => VelocityCurve::Step { forward: true, backward: true },
+            Self::Smooth { .. } => VelocityCurve::Smooth(self),
         }
     }
 }
 
-impl SpeedFunction for CoulombShape {
+impl VelocityFunction for CoulombShape {
     fn value(&self, dq: f64) -> f64 {
         self.step(dq)
     }
@@ -70,7 +70,7 @@ impl SpeedFunction for CoulombShape {
 pub struct Coulomb {
     /// The joint.
     pub joint: usize,
-    /// The step near zero speed.
+    /// The step near zero velocity.
     pub shape: CoulombShape,
 }
 
@@ -96,18 +96,18 @@ impl TermKind for Coulomb {
     }
 
     fn action(&self) -> TermAction<'_> {
-        TermAction::Friction(SpeedFriction::of(self.shape.curve()))
+        TermAction::Friction(VelocityFriction::of(self.shape.curve()))
     }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         vec![("shape", TermConstant::Step(self.shape))]
     }
 
-    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
+    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
         self.shape.fill(self.joint, motion, out);
     }
 
-    fn pull_back(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
+    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
         self.shape.add_slopes(self.joint, motion, weights, by_dq);
     }
 

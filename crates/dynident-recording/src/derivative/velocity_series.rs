@@ -1,4 +1,4 @@
-//! A Fourier series fitted to the filtered speed.
+//! A Fourier series fitted to the filtered velocity.
 
 use super::butterworth::ButterworthZeroPhase;
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
@@ -14,14 +14,14 @@ use crate::error::FilterError;
 /// about the noise of [`FourierFit`](super::FourierFit).
 /// Source: Feng et al., as cited in the paper behind this project.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SpeedSeries {
+pub struct VelocitySeries {
     base_hz: f64,
     harmonics: usize,
     filter: ButterworthZeroPhase,
 }
 
-impl SpeedSeries {
-    /// A series of `harmonics` harmonics of `base_hz` for speeds filtered at `cutoff_hz`.
+impl VelocitySeries {
+    /// A series of `harmonics` harmonics of `base_hz` for velocities filtered at `cutoff_hz`.
     ///
     /// # Errors
     /// If a frequency is not positive or the harmonics are not 1 to 200.
@@ -31,7 +31,7 @@ impl SpeedSeries {
     }
 }
 
-impl Differentiator for SpeedSeries {
+impl Differentiator for VelocitySeries {
     fn name(&self) -> &'static str {
         "speed-series"
     }
@@ -72,7 +72,7 @@ mod tests {
                 x.sin() + 0.3 * (3.0 * x).cos()
             })
             .collect();
-        let out = differentiated(&SpeedSeries::new(base, 3, cutoff).unwrap(), rate, &q);
+        let out = differentiated(&VelocitySeries::new(base, 3, cutoff).unwrap(), rate, &q);
         let warp = |f: f64| (core::f64::consts::PI * f / rate).tan();
         let gain = |f: f64| 1.0 / (1.0 + (warp(f) / warp(cutoff)).powi(8));
         let w = TAU * base;
@@ -81,19 +81,19 @@ mod tests {
             let dq = w * (gain(base) * x.cos() - 0.9 * gain(3.0 * base) * (3.0 * x).sin());
             let ddq = -w * w * (gain(base) * x.sin() + 2.7 * gain(3.0 * base) * (3.0 * x).cos());
             // The filter's transients at the two ends (some tenths of a second of twenty) reach the fit with at most a
-            // thousandth of the speed.
+            // thousandth of the velocity.
             assert!((out[1][i] - dq).abs() < 2e-3 * w && (out[2][i] - ddq).abs() < 6e-3 * w * w, "{i}");
         }
     }
 
     #[test]
     fn bad_settings_are_refused() {
-        assert!(SpeedSeries::new(0.0, 3, 1.0).is_err());
-        assert!(SpeedSeries::new(1.0, 0, 1.0).is_err());
-        assert!(SpeedSeries::new(1.0, 3, -1.0).is_err());
-        let way = SpeedSeries::new(1.0, 20, 1.0).unwrap();
+        assert!(VelocitySeries::new(0.0, 3, 1.0).is_err());
+        assert!(VelocitySeries::new(1.0, 0, 1.0).is_err());
+        assert!(VelocitySeries::new(1.0, 3, -1.0).is_err());
+        let differentiator = VelocitySeries::new(1.0, 20, 1.0).unwrap();
         let mut out = [vec![0.0; 30], vec![0.0; 30], vec![0.0; 30]];
         let [y, dy, ddy] = &mut out;
-        assert!(way.differentiate(10.0, &[0.0; 30], Derivatives { q: y, dq: dy, ddq: ddy }).is_err());
+        assert!(differentiator.differentiate(10.0, &[0.0; 30], Derivatives { q: y, dq: dy, ddq: ddy }).is_err());
     }
 }

@@ -1,14 +1,14 @@
-//! A law in a file, for programs that are not this one.
+//! A term in a file, for programs that are not this one.
 
 use dynident_model::Model;
-use dynident_model::laws::{CoulombShape, Law, TermConstant};
+use dynident_model::terms::{CoulombShape, TermConstant, TorqueTerm};
 use serde_json::{Value, json};
 
-/// The law with its joints by name, its shape in numbers, and its parameter.
-pub(super) fn describe(model: &Model, law: &Law, value: f64) -> Value {
+/// The term with its joints by name, its shape in numbers, and its parameter.
+pub(super) fn describe(model: &Model, term: &TorqueTerm, value: f64) -> Value {
     let name = |joint: usize| &model.joints()[joint].name;
-    let mut out = json!({ "kind": law.kind_name() });
-    for (key, constant) in law.constants() {
+    let mut out = json!({ "kind": term.kind_name() });
+    for (key, constant) in term.constants() {
         out[key] = match constant {
             TermConstant::Number(number) => json!(number),
             TermConstant::Numbers(numbers) => json!(numbers),
@@ -17,9 +17,9 @@ pub(super) fn describe(model: &Model, law: &Law, value: f64) -> Value {
             TermConstant::Nothing => Value::Null,
         };
     }
-    out["joints"] = law.joints().into_iter().map(|joint| json!(name(joint))).collect();
-    out["symbol"] = json!(law.symbol());
-    out["unit"] = json!(law.unit());
+    out["joints"] = term.joints().into_iter().map(|joint| json!(name(joint))).collect();
+    out["symbol"] = json!(term.symbol());
+    out["unit"] = json!(term.unit());
     out["value"] = json!(value);
     out
 }

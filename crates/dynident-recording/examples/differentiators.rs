@@ -1,6 +1,6 @@
-//! Bias and noise of every way from q to dq and ddq, against noise level and tracking error. Prints the tables of the book's page on differentiators.
+//! Bias and noise of every differentiator, against noise level and tracking error. Prints the tables of the book's page on differentiators.
 //!
-//! `cargo run --release -p dynident-recording --example ways`
+//! `cargo run --release -p dynident-recording --example differentiators`
 
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "printing tables is what this program is for")]
 
@@ -16,7 +16,7 @@ const DURATION_S: f64 = 40.0;
 /// Left out at both ends.
 const TRIM_S: f64 = 1.0;
 
-/// How the joint differs from what it was told.
+/// How the joint differs from what it was commanded.
 const TRACKING: [(&str, Tracking); 6] = [
     ("none", Tracking { delay_s: 0.0, shape: 0.0, vibration: 0.0 }),
     ("10 ms late", Tracking { delay_s: 0.01, shape: 0.0, vibration: 0.0 }),
@@ -26,7 +26,7 @@ const TRACKING: [(&str, Tracking); 6] = [
     ("vibration", Tracking { delay_s: 0.0, shape: 0.0, vibration: 1e-4 }),
 ];
 
-const WAYS: [(&str, &str); 16] = [
+const DIFFERENTIATORS: [(&str, &str); 16] = [
     ("low-pass", ""),
     ("butterworth", ""),
     ("central-differences", "order = 2"),
@@ -54,16 +54,16 @@ struct Tracking {
     vibration: f64,
 }
 
-/// What the joint is told, and what it does.
+/// What the joint is commanded to do, and what it does.
 #[derive(Clone, Copy)]
-enum Told {
+enum CommandKind {
     /// The paper's joint 2 (Table 3), there and back.
     Stroke,
     /// Five harmonics of 0.1 Hz, four periods.
     Series,
 }
 
-impl Told {
+impl CommandKind {
     fn name(self) -> &'static str {
         match self {
             Self::Stroke => "The paper's stroke (A = 2.094 rad, ω = 0.996 1/s, T = 40/ω)",
@@ -121,28 +121,29 @@ struct Figures {
     bias: [f64; 2],
     deviation: [f64; 2],
     total: [f64; 2],
-    /// Share of samples at which the way does not apply.
+    /// Share of samples at which the differentiator does not apply.
     refused: f64,
 }
 
 fn main() {
-    for told in [Told::Stroke, Told::Series] {
+    for command in [CommandKind::Stroke, CommandKind::Series] {
         let n = (DURATION_S * RATE_HZ) as usize;
         let none = TRACKING[0].1;
         let times: Vec<f64> = (0..n + 200).map(|i| i as f64 / RATE_HZ).collect();
-        let columns = [0, 1, 2].map(|order| times.iter().map(|t| told.at(*t, none)[order]).collect());
+        let columns = [0, 1, 2].map(|order| times.iter().map(|t| command.at(*t, none)[order]).collect());
         let reference = Arc::new(Reference::sampled(&times, &[columns]).unwrap());
-        // By way, noise, tracking.
-        let figures: Vec<Vec<Vec<Figures>>> = WAYS
+        // By differentiator, noise, tracking.
+        let figures: Vec<Vec<Vec<Figures>>> = DIFFERENTIATORS
             .iter()
             .map(|(method, settings)| {
-                let settings = settings.replace("SERIES", told.series());
-                let way: DifferentiatorSettings = toml::from_str(&format!("method = {method:?}\n{settings}")).unwrap();
-                let cell = |noise, tracking: Tracking| measured(told, &way, &reference, noise, tracking);
+                let settings = settings.replace("SERIES", command.series());
+                let differentiator: DifferentiatorSettings =
+                    toml::from_str(&format!("method = {method:?}\n{settings}")).unwrap();
+                let cell = |noise, tracking: Tracking| measured(command, &differentiator, &reference, noise, tracking);
                 NOISE_DEG.iter().map(|noise| TRACKING.iter().map(|(_, t)| cell(*noise, *t)).collect()).collect()
             })
             .collect();
-        println!("## {}\n", told.name());
+        println!("## {}\n", command.name());
         for (order, quantity) in ["q̇, rad/s", "q̈, rad/s²"].into_iter().enumerate() {
             table(&figures, order, quantity);
             winners(&figures, order, quantity);
@@ -150,9 +151,9 @@ fn main() {
     }
 }
 
-fn label(way: usize) -> String {
-    let (method, settings) = WAYS[way];
-    let short = match way {
+fn label(differentiator: usize) -> String {
+    let (method, settings) = DIFFERENTIATORS[differentiator];
+    let short = match differentiator {
         2 | 3 => settings.replace("order = ", "order "),
         14 => "of Butterworth, cut-off from the data".to_owned(),
         15 => "of Butterworth at 0.5 Hz, behind the lag".to_owned(),
@@ -169,9 +170,9 @@ fn table(figures: &[Vec<Vec<Figures>>], order: usize, quantity: &str) {
     let deviations: Vec<String> = NOISE_DEG[1..].iter().map(|noise| format!("std: {noise:.0e}°")).collect();
     println!("| {quantity} | {} | {} |", biases.join(" | "), deviations.join(" | "));
     println!("| --- |{}", " --- |".repeat(biases.len() + deviations.len()));
-    for (way, figures) in figures.iter().enumerate() {
+    for (differentiator, figures) in figures.iter().enumerate() {
         if figures[2].iter().all(|cell| cell.refused > 0.99) {
-            println!("| {} |{}", label(way), " refused |".repeat(biases.len() + deviations.len()));
+            println!("| {} |{}", label(differentiator), " refused |".repeat(biases.len() + deviations.len()));
             continue;
         }
         let bias = figures[2].iter().map(|cell| {
@@ -180,19 +181,20 @@ fn table(figures: &[Vec<Vec<Figures>>], order: usize, quantity: &str) {
             format!("{:.1e}{refused}", cell.bias[order])
         });
         let deviation = figures[1..].iter().map(|by_noise| format!("{:.1e}", by_noise[0].deviation[order]));
-        println!("| {} | {} |", label(way), bias.chain(deviation).collect::<Vec<_>>().join(" | "));
+        println!("| {} | {} |", label(differentiator), bias.chain(deviation).collect::<Vec<_>>().join(" | "));
     }
     println!();
 }
 
-/// The way with the least root mean square error, of those that apply to nearly all samples.
+/// The differentiator with the least root mean square error, of those that apply to nearly all samples.
 fn winners(figures: &[Vec<Vec<Figures>>], order: usize, quantity: &str) {
     let names: Vec<&str> = TRACKING.iter().map(|(name, _)| *name).collect();
     println!("| least error of {quantity} | {} |\n| --- |{}", names.join(" | "), " --- |".repeat(names.len()));
     for (noise, level) in NOISE_DEG.iter().enumerate() {
         let cells = (0..TRACKING.len()).map(|tracking| {
-            let error = |way: &usize| figures[*way][noise][tracking].total[order];
-            let applies = (0..WAYS.len()).filter(|way| figures[*way][noise][tracking].refused < 0.005);
+            let error = |differentiator: &usize| figures[*differentiator][noise][tracking].total[order];
+            let applies = (0..DIFFERENTIATORS.len())
+                .filter(|differentiator| figures[*differentiator][noise][tracking].refused < 0.005);
             let best = applies.min_by(|a, b| error(a).total_cmp(&error(b))).unwrap_or(0);
             format!("{} ({:.1e})", label(best), error(&best))
         });
@@ -202,20 +204,20 @@ fn winners(figures: &[Vec<Vec<Figures>>], order: usize, quantity: &str) {
 }
 
 fn measured(
-    told: Told,
-    way: &DifferentiatorSettings,
+    command: CommandKind,
+    differentiator: &DifferentiatorSettings,
     reference: &Arc<Reference>,
     noise_deg: f64,
     tracking: Tracking,
 ) -> Figures {
     let n = (DURATION_S * RATE_HZ) as usize;
-    let exact: Vec<[f64; 3]> = (0..n).map(|i| told.at(i as f64 / RATE_HZ, tracking)).collect();
+    let exact: Vec<[f64; 3]> = (0..n).map(|i| command.at(i as f64 / RATE_HZ, tracking)).collect();
     let clean: Vec<f64> = exact.iter().map(|x| x[0]).collect();
     let run = |q: &[f64], cutoff_hz: f64| {
         let mut out = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
         let [y, dq, ddq] = &mut out;
         let place = Place { rate_hz: RATE_HZ, joint: 0, first_time_s: 0.0 };
-        let built = way.build_following(cutoff_hz, Some(reference)).unwrap();
+        let built = differentiator.build_following(cutoff_hz, Some(reference)).unwrap();
         let marked = built.differentiate_at(place, q, Derivatives { q: y, dq, ddq }).unwrap();
         let mut kept = vec![true; n];
         for range in marked {

@@ -1,5 +1,5 @@
-//! Laws beyond rigid bodies: friction, drive inertia, offsets, couplings. Each law is one parameter and one regressor column per
-//! joint that feels it; each kind is one file here, which says all that there is to say of it, a variant of [`Law`] and a line in its `kind`.
+//! Terms beyond rigid bodies: friction, drive inertia, offsets, couplings. Each term is one parameter and one regressor column per
+//! joint that feels it; each kind is one file here, which says all that there is to say of it, a variant of [`TorqueTerm`] and a line in its `kind`.
 
 mod coulomb;
 mod coupling;
@@ -21,14 +21,15 @@ pub use coupling::{Coupling, CouplingEffect};
 pub use directional::{Direction, DirectionalCoulomb, DirectionalViscous};
 pub use drive_inertia::DriveInertia;
 pub use kind::{
-    JointProperty, MotionFunction, SpeedCurve, SpeedFriction, SpeedFunction, TermAction, TermConstant, TermJoints,
+    JointProperty, MotionFunction, TermAction, TermConstant, TermJoints, VelocityCurve, VelocityFriction,
+    VelocityFunction,
 };
 pub use load::LoadFriction;
 pub use offset::Offset;
 pub use order::sort_terms;
 pub use power::{Power, PowerExponent};
 pub use sigmoid::Sigmoid;
-pub use slip::{LawMemory, MaxwellSlip};
+pub use slip::{HysteresisState, MaxwellSlip};
 pub use stribeck::Stribeck;
 pub use temperature::{TemperatureCoulomb, TemperatureViscous};
 pub use viscous::Viscous;
@@ -50,15 +51,15 @@ pub struct JointMotion<'a> {
     pub ddq: &'a [f64],
 }
 
-/// What a law is given beside the motion of a block.
+/// What a term is given beside the motion of a block.
 #[derive(Debug)]
-pub struct LawInput<'a> {
-    /// The load of the law's joint sample by sample, Nm (N), where it is known.
+pub struct TermInput<'a> {
+    /// The load of the term's joint sample by sample, Nm (N), where it is known.
     pub load: Option<&'a [f64]>,
-    /// The temperature of the law's joint sample by sample, °C, where it was measured.
+    /// The temperature of the term's joint sample by sample, °C, where it was measured.
     pub temperature_c: Option<&'a [f64]>,
-    /// What the law remembers of earlier samples; afterwards, of this block as well.
-    pub memory: &'a mut LawMemory,
+    /// What the term remembers of earlier samples; afterwards, of this block as well.
+    pub memory: &'a mut HysteresisState,
 }
 
 impl<'a> JointMotion<'a> {
@@ -82,20 +83,20 @@ impl<'a> JointMotion<'a> {
 #[doc(alias("friction", "torque term", "actuator"))]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Law {
-    /// Torque in proportion to speed.
+pub enum TorqueTerm {
+    /// Torque in proportion to velocity.
     Viscous(Viscous),
-    /// Torque by the sign of the speed.
+    /// Torque by the sign of the velocity.
     Coulomb(Coulomb),
-    /// Torque in proportion to speed, in one direction.
+    /// Torque in proportion to velocity, in one direction.
     DirectionalViscous(DirectionalViscous),
-    /// Torque by the sign of the speed, in one direction.
+    /// Torque by the sign of the velocity, in one direction.
     DirectionalCoulomb(DirectionalCoulomb),
     /// More torque near rest.
     Stribeck(Stribeck),
     /// A shifted smooth step.
     Sigmoid(Sigmoid),
-    /// Torque by a power of the speed.
+    /// Torque by a power of the velocity.
     Power(Power),
     /// Torque in proportion to the load, against the motion.
     Load(LoadFriction),
@@ -113,7 +114,7 @@ pub enum Law {
     Coupling(Coupling),
 }
 
-impl Law {
+impl TorqueTerm {
     /// The one place that knows all kinds.
     fn kind(&self) -> &dyn TermKind {
         match self {
@@ -144,7 +145,7 @@ impl Law {
         self.kind().symbol()
     }
 
-    /// Unit of the parameter at a turning joint.
+    /// Unit of the parameter at a revolute joint.
     pub fn unit(&self) -> &'static str {
         self.kind().unit()
     }
@@ -154,7 +155,7 @@ impl Law {
         self.kind().constants()
     }
 
-    /// The joints that feel this law.
+    /// The joints that feel this term.
     pub fn joints(&self) -> Vec<usize> {
         match self.kind().joints() {
             TermJoints::One(joint) => vec![joint],
@@ -162,7 +163,7 @@ impl Law {
         }
     }
 
-    /// The one joint that the law belongs to; none for a drive that turns with two.
+    /// The one joint that the term belongs to; none for a drive that turns with two.
     pub fn own_joint(&self) -> Option<usize> {
         match self.kind().joints() {
             TermJoints::One(joint) => Some(joint),
@@ -170,7 +171,7 @@ impl Law {
         }
     }
 
-    /// True when joint `joint` feels this law. Allocates nothing, unlike [`joints`](Law::joints).
+    /// True when joint `joint` feels this term. Allocates nothing, unlike [`joints`](TorqueTerm::joints).
     pub fn acts_on(&self, joint: usize) -> bool {
         match self.kind().joints() {
             TermJoints::One(own) => own == joint,
@@ -205,7 +206,7 @@ impl Law {
         }
     }
 
-    /// True when a negative parameter is not possible: friction takes power from the motion at every speed, inertia is positive. An offset may have either sign, and so may a change with temperature; a coupling's
+    /// True when a negative parameter is not possible: friction takes power from the motion at every velocity, inertia is positive. An offset may have either sign, and so may a change with temperature; a coupling's
     /// cross terms are judged with their drive.
     pub fn is_nonnegative(&self) -> bool {
         self.kind().is_nonnegative()
@@ -279,32 +280,32 @@ impl Law {
     }
 
     /// The regressor column of this parameter in the row of joint `row`: `out[s] = ∂τ_row/∂parameter` at sample `s`. The block counts as a recording of its own, without known
-    /// load or temperature: see [`column_following`](Law::column_following).
+    /// load or temperature: see [`column_following`](TorqueTerm::column_following).
     ///
     /// # Panics
-    /// If `row` is not one of [`joints`](Law::joints) or `out` is not one value per sample.
+    /// If `row` is not one of [`joints`](TorqueTerm::joints) or `out` is not one value per sample.
     pub fn column(&self, row: usize, motion: &JointMotion<'_>, out: &mut [f64]) {
-        let mut input = LawInput { load: None, temperature_c: None, memory: &mut LawMemory::default() };
+        let mut input = TermInput { load: None, temperature_c: None, memory: &mut HysteresisState::default() };
         self.column_following(row, motion, &mut input, out);
     }
 
-    /// The regressor column as [`column`](Law::column), of a block that follows others: with one sample a block, what a simulation needs.
+    /// The regressor column as [`column`](TorqueTerm::column), of a block that follows others: with one sample a block, what a simulation needs.
     ///
     /// # Panics
-    /// If `row` is not one of [`joints`](Law::joints), or `out`, the load or the temperature are not one value per sample.
-    pub fn column_following(&self, row: usize, motion: &JointMotion<'_>, input: &mut LawInput<'_>, out: &mut [f64]) {
+    /// If `row` is not one of [`joints`](TorqueTerm::joints), or `out`, the load or the temperature are not one value per sample.
+    pub fn column_following(&self, row: usize, motion: &JointMotion<'_>, input: &mut TermInput<'_>, out: &mut [f64]) {
         assert_eq!(out.len(), motion.samples);
         assert!(self.acts_on(row), "joint {row} does not feel {}", self.symbol());
         assert!(input.temperature_c.is_none_or(|t| t.len() == motion.samples), "one temperature per sample");
         self.kind().column(row, motion, input, out);
     }
 
-    /// Adds to `by_dq` and `by_ddq` (joint-major) the derivatives of `Σ weights[s] · column[s]` by the speeds and accelerations, where `column` is that of
-    /// [`column`](Law::column) in the row of joint `row`. The sign step counts as constant, and so does the deflection of a Maxwell-slip element, which follows positions.
+    /// Adds to `by_dq` and `by_ddq` (joint-major) the derivatives of `Σ weights[s] · column[s]` by the velocities and accelerations, where `column` is that of
+    /// [`column`](TorqueTerm::column) in the row of joint `row`. The sign step counts as constant, and so does the deflection of a Maxwell-slip element, which follows positions.
     ///
     /// # Panics
     /// If lengths differ.
-    pub fn pull_back(
+    pub fn apply_adjoint(
         &self,
         row: usize,
         motion: &JointMotion<'_>,
@@ -313,7 +314,7 @@ impl Law {
         by_ddq: &mut [f64],
     ) {
         assert_eq!(weights.len(), motion.samples);
-        self.kind().pull_back(row, motion, weights, by_dq, by_ddq);
+        self.kind().apply_adjoint(row, motion, weights, by_dq, by_ddq);
     }
 
     /// What this parameter adds to entry (`row`, `column`) of the mass matrix: a constant, zero for friction.
@@ -338,35 +339,35 @@ impl Law {
     }
 }
 
-/// The laws of joint after joint in the project's order: drive inertia, viscous, Coulomb, offset, as far as `choose` wants them.
-pub fn laws_per_joint(model: &Model, mut choose: impl FnMut(usize) -> DriveChoice) -> Vec<Law> {
-    let mut laws = Vec::new();
+/// The terms of joint after joint in the project's order: drive inertia, viscous, Coulomb, offset, as far as `choose` wants them.
+pub fn terms_per_joint(model: &Model, mut choose: impl FnMut(usize) -> DriveChoice) -> Vec<TorqueTerm> {
+    let mut terms = Vec::new();
     for joint in 0..model.dof() {
         let choice = choose(joint);
         if choice.drive_inertia {
-            laws.push(Law::DriveInertia(DriveInertia { joint }));
+            terms.push(TorqueTerm::DriveInertia(DriveInertia { joint }));
         }
         if choice.viscous {
-            laws.push(Law::Viscous(Viscous { joint }));
+            terms.push(TorqueTerm::Viscous(Viscous { joint }));
         }
         if let Some(shape) = choice.coulomb {
-            laws.push(Law::Coulomb(Coulomb { joint, shape }));
+            terms.push(TorqueTerm::Coulomb(Coulomb { joint, shape }));
         }
         if choice.offset {
-            laws.push(Law::Offset(Offset { joint }));
+            terms.push(TorqueTerm::Offset(Offset { joint }));
         }
     }
-    laws
+    terms
 }
 
-/// Which laws a joint has.
+/// Which terms a joint has.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DriveChoice {
     /// Inertia of the drive, reflected to the joint.
     pub drive_inertia: bool,
     /// Viscous friction.
     pub viscous: bool,
-    /// Coulomb friction and its shape near zero speed.
+    /// Coulomb friction and its shape near zero velocity.
     pub coulomb: Option<CoulombShape>,
     /// Constant offset.
     pub offset: bool,

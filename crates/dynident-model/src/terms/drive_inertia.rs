@@ -1,7 +1,7 @@
 //! Inertia of rotor and gear, reflected to the joint: `τ = I_a q̈`.
 
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind};
-use super::{JointMotion, LawInput};
+use super::{JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
 /// Reflected drive inertia of one joint, kg m² (kg).
@@ -41,11 +41,11 @@ impl TermKind for DriveInertia {
         Vec::new()
     }
 
-    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
+    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
         out.copy_from_slice(motion.ddq_of(self.joint));
     }
 
-    fn pull_back(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], _: &mut [f64], by_ddq: &mut [f64]) {
+    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], _: &mut [f64], by_ddq: &mut [f64]) {
         let range = self.joint * motion.samples..(self.joint + 1) * motion.samples;
         by_ddq[range].iter_mut().zip(weights).for_each(|(to, w)| *to += w);
     }

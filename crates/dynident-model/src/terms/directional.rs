@@ -4,18 +4,19 @@
 //! positive where friction takes power. With a step that is a sign, the two Coulomb columns and an offset say the same: keep two of the three.
 
 use super::kind::{
-    MotionFunction, SpeedCurve, SpeedFriction, SpeedFunction, TermAction, TermConstant, TermJoints, TermKind, halves,
+    MotionFunction, TermAction, TermConstant, TermJoints, TermKind, VelocityCurve, VelocityFriction, VelocityFunction,
+    halves,
 };
-use super::{CoulombShape, JointMotion, LawInput};
+use super::{CoulombShape, JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
 /// Sense of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Direction {
-    /// Positive speed.
+    /// Positive velocity.
     Forward,
-    /// Negative speed.
+    /// Negative velocity.
     Backward,
 }
 
@@ -70,7 +71,7 @@ pub struct DirectionalViscous {
     pub direction: Direction,
 }
 
-impl SpeedFunction for DirectionalViscous {
+impl VelocityFunction for DirectionalViscous {
     fn value(&self, dq: f64) -> f64 {
         self.direction.part(dq)
     }
@@ -102,18 +103,18 @@ impl TermKind for DirectionalViscous {
     }
 
     fn action(&self) -> TermAction<'_> {
-        TermAction::Friction(SpeedFriction::of(SpeedCurve::Smooth(self)))
+        TermAction::Friction(VelocityFriction::of(VelocityCurve::Smooth(self)))
     }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         vec![("direction", self.direction.constant())]
     }
 
-    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
+    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
         self.fill(self.joint, motion, out);
     }
 
-    fn pull_back(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
+    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
         self.add_slopes(self.joint, motion, weights, by_dq);
     }
 
@@ -129,11 +130,11 @@ pub struct DirectionalCoulomb {
     pub joint: usize,
     /// The direction in which it is felt.
     pub direction: Direction,
-    /// The step near zero speed.
+    /// The step near zero velocity.
     pub shape: CoulombShape,
 }
 
-impl SpeedFunction for DirectionalCoulomb {
+impl VelocityFunction for DirectionalCoulomb {
     fn value(&self, dq: f64) -> f64 {
         self.direction.part(self.shape.step(dq))
     }
@@ -167,21 +168,21 @@ impl TermKind for DirectionalCoulomb {
     fn action(&self) -> TermAction<'_> {
         let forward = self.direction == Direction::Forward;
         let curve = match self.shape {
-            CoulombShape::Sign { .. } => SpeedCurve::Step { forward, backward: !forward },
-            CoulombShape::Smooth { .. } => SpeedCurve::Smooth(self),
+            CoulombShape::Sign { .. } => VelocityCurve::Step { forward, backward: !forward },
+            CoulombShape::Smooth { .. } => VelocityCurve::Smooth(self),
         };
-        TermAction::Friction(SpeedFriction::of(curve))
+        TermAction::Friction(VelocityFriction::of(curve))
     }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         vec![("direction", self.direction.constant()), ("shape", TermConstant::Step(self.shape))]
     }
 
-    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
+    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
         self.fill(self.joint, motion, out);
     }
 
-    fn pull_back(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
+    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
         self.add_slopes(self.joint, motion, weights, by_dq);
     }
 

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 /// What an experiment with this information will say.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Forecast {
+pub struct PredictedCovariance {
     /// Standard deviation of every parameter's estimate, `√(D⁻¹)_kk`; none for a parameter that the motion does not
     /// tell.
     pub std: Vec<Option<f64>>,
@@ -21,13 +21,13 @@ pub struct Direction {
     pub shares: Vec<f64>,
 }
 
-/// Forecast of weighted least squares from the information `D = Σ_j W_jᵀ W_j / σ_j²` of a motion: the estimate's
+/// PredictedCovariance of weighted least squares from the information `D = Σ_j W_jᵀ W_j / σ_j²` of a motion: the estimate's
 /// covariance is `D⁻¹` when the torque errors are independent with the assumed σ_j (Swevers et al., IEEE Trans.
 /// Robotics and Automation 13(5), 1997). Residuals that are correlated in time make the real error bars larger, by 1.3
 /// to 9 times on known arms.
 ///
 /// Directions are eigenvectors of `D` with its columns scaled to one, the `directions` worst of them.
-pub fn forecast(information: &DMatrix<f64>, directions: usize) -> Forecast {
+pub fn predicted_covariance(information: &DMatrix<f64>, directions: usize) -> PredictedCovariance {
     let count = information.nrows();
     let scale: Vec<f64> =
         information.diagonal().iter().map(|d| if *d > 0.0 { d.sqrt().recip() } else { 0.0 }).collect();
@@ -53,5 +53,8 @@ pub fn forecast(information: &DMatrix<f64>, directions: usize) -> Forecast {
         inflation: eigen.eigenvalues[k].max(least).sqrt().recip(),
         shares: eigen.eigenvectors.column(k).iter().copied().collect(),
     };
-    Forecast { std: (0..count).map(std).collect(), worst: order.iter().take(directions).map(direction).collect() }
+    PredictedCovariance {
+        std: (0..count).map(std).collect(),
+        worst: order.iter().take(directions).map(direction).collect(),
+    }
 }

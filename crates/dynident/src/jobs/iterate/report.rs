@@ -7,21 +7,21 @@ use dynident_dynamics::ParametricModel;
 use dynident_iteration::{IterationStatus, RunEstimate, RunRecord};
 use std::path::Path;
 
-/// The newest run before `record` whose machine its controller had.
+/// The newest run before `record` whose robot its controller had.
 fn model_of_run(record: &RunRecord, records: &[RunRecord]) -> Option<usize> {
     let model = record.controller.model.as_ref()?;
-    let told = |before: &&RunRecord| {
+    let with_model = |before: &&RunRecord| {
         before.run < record.run
             && before.estimate.as_ref().and_then(RunEstimate::for_controller).as_ref() == Some(model)
     };
-    records.iter().rfind(told).map(|before| before.run)
+    records.iter().rfind(with_model).map(|before| before.run)
 }
 
 /// What the file is made from.
-pub(super) struct Told<'a> {
+pub(super) struct IterationReport<'a> {
     pub(super) study: &'a Study,
     pub(super) study_path: &'a Path,
-    pub(super) machine: &'a StudyRobot,
+    pub(super) robot: &'a StudyRobot,
     /// Length of a run with all its legs, s.
     pub(super) duration_s: f64,
     /// True base parameters, where they are known.
@@ -38,15 +38,15 @@ pub(super) struct Stage<'a> {
     pub(super) robot: &'a ParametricModel,
     pub(super) records: &'a [RunRecord],
     pub(super) status: &'a IterationStatus,
-    /// For each base parameter the error bar by an earlier leg, if that told it.
+    /// For each base parameter the error bar by an earlier leg, if that determined it.
     pub(super) known_std: &'a [Option<f64>],
 }
 
-impl Told<'_> {
+impl IterationReport<'_> {
     pub(super) fn file(&self, stage: &Stage<'_>) -> IterationsFile {
         let Stage { leg, robot, records, status, known_std } = *stage;
         // The truth of a simulated robot is one of the stated terms.
-        let stated = robot.laws() == self.machine.laws();
+        let stated = robot.terms() == self.robot.terms();
         let (bound, truth) = (self.bound.as_deref().filter(|_| stated), self.truth.as_ref().filter(|_| stated));
         let columns = robot.layout().columns();
         let expressions = robot.base().expressions();
@@ -108,7 +108,7 @@ impl Told<'_> {
             }
             .to_owned(),
             reason: status.to_string(),
-            joints: self.machine.parametric.joint_names(),
+            joints: self.robot.parametric.joint_names(),
             duration_s: self.duration_s,
             runs,
             tracking_improvement,

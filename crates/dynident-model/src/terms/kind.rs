@@ -1,7 +1,7 @@
-//! What every kind of torque term says of itself. A kind is one type in one file that implements [`TermKind`]; [`Law`](super::Law) hands every question on to it, so
+//! What every kind of torque term says of itself. A kind is one type in one file that implements [`TermKind`]; [`TorqueTerm`](super::TorqueTerm) hands every question on to it, so
 //! that nobody else has to know which kinds there are.
 
-use super::{CoulombShape, JointMotion, LawInput};
+use super::{CoulombShape, JointMotion, TermInput};
 use core::fmt::Debug;
 
 /// The joints that feel a term.
@@ -28,54 +28,54 @@ pub enum TermAction<'a> {
     },
     /// The same torque always.
     Constant,
-    /// Friction that follows one speed.
-    Friction(SpeedFriction<'a>),
+    /// Friction that follows one velocity.
+    Friction(VelocityFriction<'a>),
     /// Friction that follows positions and remembers them.
     Hysteresis,
     /// Friction's change with the temperature: nothing at its reference.
     Temperature,
 }
 
-/// Friction that follows one speed `w = Σ ratio q̇`; the torque of each joint is `ratio f(w)`.
+/// Friction that follows one velocity `w = Σ ratio q̇`; the torque of each joint is `ratio f(w)`.
 #[derive(Clone, Copy, Debug)]
-pub struct SpeedFriction<'a> {
+pub struct VelocityFriction<'a> {
     /// Of its joints; the second counts where there are two.
     pub ratios: [f64; 2],
-    /// The speed's function, before load and fading.
-    pub curve: SpeedCurve<'a>,
+    /// The velocity's function, before load and fading.
+    pub curve: VelocityCurve<'a>,
     /// Times the absolute value of the load.
     pub by_load: bool,
     /// Times `e^{-|w/v|^δ}`, with `v` and `δ`.
     pub fading: Option<[f64; 2]>,
 }
 
-impl<'a> SpeedFriction<'a> {
+impl<'a> VelocityFriction<'a> {
     /// Friction of one joint by `curve` alone.
-    pub(super) fn of(curve: SpeedCurve<'a>) -> Self {
+    pub(super) fn of(curve: VelocityCurve<'a>) -> Self {
         Self { ratios: [1.0, 0.0], curve, by_load: false, fading: None }
     }
 }
 
-/// How friction follows a speed.
+/// How friction follows a velocity.
 #[derive(Clone, Copy, Debug)]
-pub enum SpeedCurve<'a> {
+pub enum VelocityCurve<'a> {
     /// A sign: at rest, anything up to one. In which directions it is felt.
     Step {
-        /// At positive speed.
+        /// At positive velocity.
         forward: bool,
-        /// At negative speed.
+        /// At negative velocity.
         backward: bool,
     },
     /// Without a jump.
-    Smooth(&'a dyn SpeedFunction),
+    Smooth(&'a dyn VelocityFunction),
 }
 
-/// A function of a speed and its slope, per unit of the parameter.
-pub trait SpeedFunction: Debug {
-    /// Its value at speed `dq`.
+/// A function of a velocity and its slope, per unit of the parameter.
+pub trait VelocityFunction: Debug {
+    /// Its value at velocity `dq`.
     fn value(&self, dq: f64) -> f64;
 
-    /// Its derivative by the speed; a sign counts as constant.
+    /// Its derivative by the velocity; a sign counts as constant.
     fn slope(&self, dq: f64) -> f64;
 
     /// Its values in the motion of joint `joint`.
@@ -94,7 +94,7 @@ pub trait SpeedFunction: Debug {
     }
 }
 
-/// A function of the motion that a friction term adds to a joint's torque. Terms that add the same function to the same joints cannot be told apart.
+/// A function of the motion that a friction term adds to a joint's torque. Terms that add the same function to the same joints cannot be distinguished.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotionFunction {
     /// The joint.
@@ -114,7 +114,7 @@ pub enum JointProperty {
     Friction,
 }
 
-/// A constant of a term, such as a speed or an exponent, for programs that are not this one.
+/// A constant of a term, such as a velocity or an exponent, for programs that are not this one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TermConstant {
     /// A number.
@@ -123,7 +123,7 @@ pub enum TermConstant {
     Numbers([f64; 2]),
     /// One of a few words.
     Word(&'static str),
-    /// A step near zero speed.
+    /// A step near zero velocity.
     Step(CoulombShape),
     /// Not there for this term.
     Nothing,
@@ -137,13 +137,13 @@ pub(super) trait TermKind: Debug {
     /// Symbol of the parameter with the joint's number from 1.
     fn symbol(&self) -> String;
 
-    /// Unit of the parameter at a turning joint.
+    /// Unit of the parameter at a revolute joint.
     fn unit(&self) -> &'static str;
 
     /// The joints that feel it.
     fn joints(&self) -> TermJoints;
 
-    /// Whether a negative parameter is impossible.
+    /// Whether a negative parameter is unphysical.
     fn is_nonnegative(&self) -> bool;
 
     /// Where it enters the equation of motion.
@@ -153,10 +153,17 @@ pub(super) trait TermKind: Debug {
     fn constants(&self) -> Vec<(&'static str, TermConstant)>;
 
     /// The regressor column in the row of joint `row`.
-    fn column(&self, row: usize, motion: &JointMotion<'_>, input: &mut LawInput<'_>, out: &mut [f64]);
+    fn column(&self, row: usize, motion: &JointMotion<'_>, input: &mut TermInput<'_>, out: &mut [f64]);
 
-    /// Adds what `Σ weights · column` in the row of joint `row` changes with speeds and accelerations.
-    fn pull_back(&self, row: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], by_ddq: &mut [f64]);
+    /// Adds what `Σ weights · column` in the row of joint `row` changes with velocities and accelerations.
+    fn apply_adjoint(
+        &self,
+        row: usize,
+        motion: &JointMotion<'_>,
+        weights: &[f64],
+        by_dq: &mut [f64],
+        by_ddq: &mut [f64],
+    );
 
     /// The functions of the motion that friction adds. What shares no function with another kind is one of its own.
     fn functions(&self) -> Vec<MotionFunction> {
@@ -173,7 +180,7 @@ pub(super) trait TermKind: Debug {
     }
 }
 
-/// Both halves of a function that [`MotionFunction`]s by direction share: for positive and for negative speed.
+/// Both halves of a function that [`MotionFunction`]s by direction share: for positive and for negative velocity.
 pub(super) fn halves(row: usize, function: &str) -> [MotionFunction; 2] {
     ['+', '-'].map(|sign| MotionFunction { row, function: format!("{function} {sign}"), factor: 1.0 })
 }

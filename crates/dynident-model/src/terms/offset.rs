@@ -1,7 +1,7 @@
 //! A constant torque: sensor bias, unmodelled spring, asymmetric friction. `τ = τ_0`.
 
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind};
-use super::{JointMotion, LawInput};
+use super::{JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
 /// Constant torque of one joint, Nm (N).
@@ -40,11 +40,11 @@ impl TermKind for Offset {
         Vec::new()
     }
 
-    fn column(&self, _: usize, _: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
+    fn column(&self, _: usize, _: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
         out.fill(1.0);
     }
 
-    fn pull_back(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: &mut [f64], _: &mut [f64]) {
+    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: &mut [f64], _: &mut [f64]) {
         // It does not change.
     }
 }

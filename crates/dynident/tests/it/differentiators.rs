@@ -1,4 +1,4 @@
-//! `identify` by every way from q to dq and ddq: noise-free logs of a known robot give the truth back where the way is exact for the motion, and nearly where it is not.
+//! `identify` by every differentiator: noise-free logs of a known robot give the truth back where the differentiator is exact for the motion, and nearly where it is not.
 use crate::common::{Job, Motion, Truth, assert_recovered, header, plain, repository, write_log};
 use dynident::dynamics::Workspace;
 use dynident::recording::LogisticPath;
@@ -6,7 +6,7 @@ use dynident::{Error, identify};
 use std::fmt::Write;
 use std::path::Path;
 
-/// At 100 Hz and 25 s: whole multiples of nothing, so that no way is exact by accident.
+/// At 100 Hz and 25 s: whole multiples of nothing, so that no differentiator is exact by accident.
 const CLOCK: (f64, f64) = (100.0, 25.0);
 
 fn ur10() -> String {
@@ -31,7 +31,7 @@ fn write_reference(path: &Path, motion: &Motion, lead_s: f64) {
     std::fs::write(path, text + "\n").unwrap();
 }
 
-/// A study with one log of the UR10 by the given way.
+/// A study with one log of the UR10 by the given differentiator.
 fn study(differentiator: &str, further: &str) -> String {
     format!(
         r#"
@@ -74,7 +74,7 @@ fn ways_that_are_exact_for_the_motion_give_the_truth_back() {
         let job = Job::new(folder.path(), &study(differentiator, ""));
         let found = job.identify();
         assert_eq!(found.result.method.status, "complete", "{differentiator}");
-        assert_recovered(&found, &truth.base_values(&job.machine()), tolerance);
+        assert_recovered(&found, &truth.base_values(&job.robot()), tolerance);
     }
 }
 
@@ -83,7 +83,7 @@ fn ways_that_filter_come_near() {
     let (folder, truth) = (tempfile::tempdir().unwrap(), truth());
     write_log(&folder.path().join("log.csv"), &truth, &Motion::new(6, 1), CLOCK, &header(6), plain);
     for (differentiator, percent) in [
-        // What a way takes from motions up to 0.65 Hz: a delay of 2.6/(2π 20) s, so ωδ up to 8 %, of torques of which most is gravity; a cut-off from the data for the others.
+        // What a differentiator takes from motions up to 0.65 Hz: a delay of 2.6/(2π 20) s, so ωδ up to 8 %, of torques of which most is gravity; a cut-off from the data for the others.
         ("method = \"low-pass\", cutoff_hz = 20.0", 5.0),
         ("method = \"frequency-domain\"", 1.0),
         ("method = \"smoothed-differences\", window = 11", 1.0),
@@ -151,7 +151,7 @@ fn a_log_has_its_own_reference_and_joints_their_own_order() {
     );
     let job = Job::new(folder.path(), &text);
     let found = job.identify();
-    assert_recovered(&found, &truth.base_values(&job.machine()), 1e-4);
+    assert_recovered(&found, &truth.base_values(&job.robot()), 1e-4);
     // Errors of 1e-4 of the parameters at most.
     assert!(found.result.validation[0].model.relative_error_percent.unwrap() < 0.01);
 
@@ -224,6 +224,6 @@ fn the_papers_map_identifies_the_planar_arm_through_a_lag() {
     );
     let job = Job::new(folder.path(), &text);
     let found = job.identify();
-    // Outside the strokes the speed is the reference's, wrong by up to 1e-3 of its peak beside the splices; friction is a step of 0.02 rad/s wide.
-    assert_recovered(&found, &truth.base_values(&job.machine()), 1e-2);
+    // Outside the strokes the velocity is the reference's, wrong by up to 1e-3 of its peak beside the splices; friction is a step of 0.02 rad/s wide.
+    assert_recovered(&found, &truth.base_values(&job.robot()), 1e-2);
 }

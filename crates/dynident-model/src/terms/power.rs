@@ -1,24 +1,24 @@
-//! Friction by a power of the speed, rounded at rest: `τ = F q̇ (q̇² + ε²)^{(p-1)/2}`, which is `F |q̇|^p sign(q̇)` for speeds well above `ε`.
+//! Friction by a power of the velocity, rounded at rest: `τ = F q̇ (q̇² + ε²)^{(p-1)/2}`, which is `F |q̇|^p sign(q̇)` for velocities well above `ε`.
 //!
 //! `p = 1/3`: the sub-linear losses of harmonic drives. `p = 2`: churning lubricant. The rounding keeps the slope finite at rest, where that of a cube root is not.
 
-use super::kind::{SpeedCurve, SpeedFriction, SpeedFunction, TermAction, TermConstant, TermJoints, TermKind};
-use super::{JointMotion, LawInput};
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind, VelocityCurve, VelocityFriction, VelocityFunction};
+use super::{JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
-/// Friction of one joint by a power of its speed, Nm (s/rad)^p.
+/// Friction of one joint by a power of its velocity, Nm (s/rad)^p.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Power {
     /// The joint.
     pub joint: usize,
     /// Which power.
     pub exponent: PowerExponent,
-    /// Speed `ε` of the rounding, rad/s or m/s, positive.
+    /// Velocity `ε` of the rounding, rad/s or m/s, positive.
     pub rounding: f64,
 }
 
 impl Power {
-    /// The rounding that is usual: below any velocity that a differentiated encoder tells from rest, rad/s or m/s.
+    /// The rounding that is usual: below any velocity that a differentiated encoder separates from rest, rad/s or m/s.
     pub const ROUNDING: f64 = 1.0e-3;
 }
 
@@ -41,7 +41,7 @@ impl PowerExponent {
     }
 }
 
-impl SpeedFunction for Power {
+impl VelocityFunction for Power {
     fn value(&self, dq: f64) -> f64 {
         dq * dq.hypot(self.rounding).powf(self.exponent.value() - 1.0)
     }
@@ -81,7 +81,7 @@ impl TermKind for Power {
     }
 
     fn action(&self) -> TermAction<'_> {
-        TermAction::Friction(SpeedFriction::of(SpeedCurve::Smooth(self)))
+        TermAction::Friction(VelocityFriction::of(VelocityCurve::Smooth(self)))
     }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
@@ -91,11 +91,11 @@ impl TermKind for Power {
         ]
     }
 
-    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
+    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
         self.fill(self.joint, motion, out);
     }
 
-    fn pull_back(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
+    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
         self.add_slopes(self.joint, motion, weights, by_dq);
     }
 }

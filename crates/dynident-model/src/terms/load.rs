@@ -1,10 +1,10 @@
 //! Friction that grows with the load: `τ = k |τ_load| s(q̇)` with a step `s`.
 //!
-//! `τ_load` is what the gear carries: the torque of the rigid bodies, by an earlier estimate. A law knows motions only, so the load comes with them (see
-//! [`LawInput`](super::LawInput)); without one the column is zero. Source: Hamon, Gautier and Garrec, IROS 2010, 6187.
+//! `τ_load` is what the gear carries: the torque of the rigid bodies, by an earlier estimate. A term knows motions only, so the load comes with them (see
+//! [`TermInput`](super::TermInput)); without one the column is zero. Source: Hamon, Gautier and Garrec, IROS 2010, 6187.
 
-use super::kind::{SpeedFriction, TermAction, TermConstant, TermJoints, TermKind};
-use super::{CoulombShape, JointMotion, LawInput};
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind, VelocityFriction};
+use super::{CoulombShape, JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
 /// Share of the load that one joint loses to friction; no unit.
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 pub struct LoadFriction {
     /// The joint.
     pub joint: usize,
-    /// The step near zero speed.
+    /// The step near zero velocity.
     pub shape: CoulombShape,
 }
 
@@ -38,14 +38,14 @@ impl TermKind for LoadFriction {
     }
 
     fn action(&self) -> TermAction<'_> {
-        TermAction::Friction(SpeedFriction { by_load: true, ..SpeedFriction::of(self.shape.curve()) })
+        TermAction::Friction(VelocityFriction { by_load: true, ..VelocityFriction::of(self.shape.curve()) })
     }
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         vec![("shape", TermConstant::Step(self.shape))]
     }
 
-    fn column(&self, _: usize, motion: &JointMotion<'_>, input: &mut LawInput<'_>, out: &mut [f64]) {
+    fn column(&self, _: usize, motion: &JointMotion<'_>, input: &mut TermInput<'_>, out: &mut [f64]) {
         let Some(load) = input.load else { return out.fill(0.0) };
         assert_eq!(load.len(), motion.samples, "one load per sample");
         for ((to, &dq), load) in out.iter_mut().zip(motion.dq_of(self.joint)).zip(load) {
@@ -53,7 +53,7 @@ impl TermKind for LoadFriction {
         }
     }
 
-    fn pull_back(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: &mut [f64], _: &mut [f64]) {
+    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: &mut [f64], _: &mut [f64]) {
         // Without a load the column is zero.
     }
 }

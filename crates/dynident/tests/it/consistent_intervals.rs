@@ -1,4 +1,4 @@
-//! Intervals over all possible machines hold the truth of a simulated arm, and never what is impossible.
+//! Intervals over all physically consistent robots hold the truth of a simulated arm, and nothing inconsistent.
 use crate::common::repository;
 use dynident::estimation::consistent::IntervalEnd;
 use dynident::{RunOptions, Silent, Study, identify};
@@ -12,7 +12,7 @@ fn truth() -> BTreeMap<String, f64> {
 }
 
 #[test]
-fn they_hold_the_truth_and_nothing_impossible() {
+fn they_hold_the_truth_and_nothing_inconsistent() {
     let path = repository("examples/ur10_simulated.toml");
     let mut study = Study::load(&path).unwrap();
     study.estimator.intervals = true;
@@ -42,10 +42,10 @@ fn they_hold_the_truth_and_nothing_impossible() {
     }
     // 84 parameters, of which a twentieth is expected outside: more than ten would be a chance of one in a thousand if they were independent.
     assert!(missed.len() <= 10, "{missed:?}");
-    // What turns about a vertical axis only tells nothing of the first link's mass.
+    // What turns about a vertical axis only says nothing of the first link's mass.
     let first_mass = intervals.iter().find(|interval| interval.symbol == "m1").unwrap();
     assert_eq!(first_mass.held_by[1], IntervalEnd::Open, "{first_mass:?}");
-    // What is possible can only narrow the interval of a base parameter.
+    // Physical consistency can only narrow the interval of a base parameter.
     let friction = intervals.iter().find(|interval| interval.symbol == "fv3").unwrap();
     let usual = found.base_parameters.iter().find(|parameter| parameter.symbol == "fv3").unwrap();
     let width = friction.upper.unwrap() - friction.lower.unwrap();

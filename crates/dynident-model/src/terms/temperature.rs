@@ -1,12 +1,12 @@
 //! Friction that changes with the temperature: `τ = F_vT (T − T₀) q̇` and `τ = F_cT (T − T₀) s(q̇)` with a step `s`.
 //!
 //! Beside viscous and Coulomb friction, which then are those at T₀: coefficients linear in the temperature, `F_v(T) = F_v + F_vT (T − T₀)`. Grease thins as it warms, so F_vT is
-//! usually negative; neither sign is impossible. A law knows motions only, so the temperature comes with them (see [`LawInput`](super::LawInput)); without one the joint counts as being at T₀ and the
+//! usually negative; either sign is physical. A term knows motions only, so the temperature comes with them (see [`TermInput`](super::TermInput)); without one the joint counts as being at T₀ and the
 //! column is zero. Linear in a range of some 20 K; beyond, the viscous part falls exponentially. Source: Bittencourt and Axelsson, IEEE/ASME Trans. Mechatronics 19 (2014) 1484; Simoni et al., IFAC
 //! PapersOnLine 48 (2015) 183.
 
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind};
-use super::{CoulombShape, JointMotion, LawInput};
+use super::{CoulombShape, JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
 /// Change of viscous friction with temperature, Nm s/(rad K) (N s/(m K)).
@@ -25,17 +25,17 @@ pub struct TemperatureCoulomb {
     pub joint: usize,
     /// T₀, °C.
     pub reference_c: f64,
-    /// The step near zero speed.
+    /// The step near zero velocity.
     pub shape: CoulombShape,
 }
 
 impl TemperatureViscous {
-    /// `(T − T₀) q̇`: torque per unit of the parameter at the temperature `temperature_c` (°C) and speed `dq`.
+    /// `(T − T₀) q̇`: torque per unit of the parameter at the temperature `temperature_c` (°C) and velocity `dq`.
     pub fn value(self, temperature_c: f64, dq: f64) -> f64 {
         (temperature_c - self.reference_c) * dq
     }
 
-    /// Its derivative by the speed.
+    /// Its derivative by the velocity.
     pub fn slope(self, temperature_c: f64) -> f64 {
         temperature_c - self.reference_c
     }
@@ -47,7 +47,7 @@ impl TemperatureCoulomb {
         (temperature_c - self.reference_c) * self.shape.step(dq)
     }
 
-    /// Its derivative by the speed; zero for the sign.
+    /// Its derivative by the velocity; zero for the sign.
     pub fn slope(self, temperature_c: f64, dq: f64) -> f64 {
         (temperature_c - self.reference_c) * self.shape.slope(dq)
     }
@@ -82,11 +82,11 @@ impl TermKind for TemperatureViscous {
         vec![("reference_c", TermConstant::Number(self.reference_c))]
     }
 
-    fn column(&self, _: usize, motion: &JointMotion<'_>, input: &mut LawInput<'_>, out: &mut [f64]) {
+    fn column(&self, _: usize, motion: &JointMotion<'_>, input: &mut TermInput<'_>, out: &mut [f64]) {
         by_temperature(self.joint, motion, input.temperature_c, out, |t, dq| self.value(t, dq));
     }
 
-    fn pull_back(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: &mut [f64], _: &mut [f64]) {
+    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: &mut [f64], _: &mut [f64]) {
         // Without a temperature the column is zero.
     }
 }
@@ -120,16 +120,16 @@ impl TermKind for TemperatureCoulomb {
         vec![("reference_c", TermConstant::Number(self.reference_c)), ("shape", TermConstant::Step(self.shape))]
     }
 
-    fn column(&self, _: usize, motion: &JointMotion<'_>, input: &mut LawInput<'_>, out: &mut [f64]) {
+    fn column(&self, _: usize, motion: &JointMotion<'_>, input: &mut TermInput<'_>, out: &mut [f64]) {
         by_temperature(self.joint, motion, input.temperature_c, out, |t, dq| self.value(t, dq));
     }
 
-    fn pull_back(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: &mut [f64], _: &mut [f64]) {
+    fn apply_adjoint(&self, _: usize, _: &JointMotion<'_>, _: &[f64], _: &mut [f64], _: &mut [f64]) {
         // Without a temperature the column is zero.
     }
 }
 
-/// A column from temperature and speed, sample by sample; zero without a temperature.
+/// A column from temperature and velocity, sample by sample; zero without a temperature.
 fn by_temperature(
     joint: usize,
     motion: &JointMotion<'_>,

@@ -1,9 +1,9 @@
 //! Viscous friction: `τ = F_v q̇`.
 
 use super::kind::{
-    JointProperty, MotionFunction, SpeedFunction, TermAction, TermConstant, TermJoints, TermKind, halves,
+    JointProperty, MotionFunction, TermAction, TermConstant, TermJoints, TermKind, VelocityFunction, halves,
 };
-use super::{JointMotion, LawInput};
+use super::{JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
 /// Viscous friction of one joint, Nm s/rad (N s/m).
@@ -13,7 +13,7 @@ pub struct Viscous {
     pub joint: usize,
 }
 
-impl SpeedFunction for Viscous {
+impl VelocityFunction for Viscous {
     fn value(&self, dq: f64) -> f64 {
         dq
     }
@@ -52,11 +52,11 @@ impl TermKind for Viscous {
         Vec::new()
     }
 
-    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut LawInput<'_>, out: &mut [f64]) {
+    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
         self.fill(self.joint, motion, out);
     }
 
-    fn pull_back(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
+    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
         self.add_slopes(self.joint, motion, weights, by_dq);
     }
 
