@@ -1,5 +1,6 @@
-//! Times Dynident's dynamics, its way from samples to triangular factors, a step of an excitation design and one of the closed loop, and prints one JSON line a figure: the same lines, states and method as
-//! the programs in `benchmarks/`, which `benchmarks/compare.sh` sets side by side.
+//! Times Dynident's dynamics, its way from samples to triangular factors, a step of an excitation design and one of the
+//! closed loop, and prints one JSON line a figure: the same lines, states and method as the programs in `benchmarks/`,
+//! which `benchmarks/compare.sh` sets side by side.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing figures is what this program is for")]
 
@@ -21,7 +22,8 @@ struct Options {
     /// Only this processor level (portable, AVX2, AVX-512); all that this processor has unless given.
     #[arg(long)]
     level: Option<String>,
-    /// Samples in a batch. Best is an odd multiple of eight: the columns of a panel then do not fall on the same few cache sets.
+    /// Samples in a batch. Best is an odd multiple of eight: the columns of a panel then do not fall on the same few
+    /// cache sets.
     #[arg(long, default_value_t = 72, value_parser = clap::value_parser!(u16).range(1..=512))]
     block: u16,
     /// Only these quantities.

@@ -27,8 +27,9 @@ fn the_same_for_any_number_of_threads() -> Result<(), Box<dyn std::error::Error>
     Ok(())
 }
 
-/// No unbiased estimator beats the bound: with the true motion, 12 runs and 12 or more parameters the root mean square over the bound has a sampling error of about 1/√(2·12·12) = 6 % if
-/// errors were independent; three of these, below. Above, decimation to the motion's band costs no more than half.
+/// No unbiased estimator beats the bound: with the true motion, 12 runs and 12 or more parameters the root mean square
+/// over the bound has a sampling error of about 1/√(2·12·12) = 6 % if errors were independent; three of these, below.
+/// Above, decimation to the motion's band costs no more than half.
 #[test]
 fn the_bound_is_a_bound_and_nearly_reached() -> Result<(), Box<dyn std::error::Error>> {
     let file = made(2)?;
@@ -39,8 +40,9 @@ fn the_bound_is_a_bound_and_nearly_reached() -> Result<(), Box<dyn std::error::E
     Ok(())
 }
 
-/// With the motion unknown as well the simultaneous fit is at its own bound, which lies above that of the motion known. Chance as above; of its 12 · 16 intervals 95 % hold the truth, with a standard deviation of 1.6 %
-/// if parameters erred on their own, and twice that here; three of these.
+/// With the motion unknown as well the simultaneous fit is at its own bound, which lies above that of the motion known.
+/// Chance as above; of its 12 · 16 intervals 95 % hold the truth, with a standard deviation of 1.6 % if parameters
+/// erred on their own, and twice that here; three of these.
 #[test]
 fn the_simultaneous_fit_reaches_the_bound_with_the_motion_unknown() -> Result<(), Box<dyn std::error::Error>> {
     let file = made(2)?;

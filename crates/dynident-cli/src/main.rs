@@ -1,4 +1,5 @@
-//! The `dynident` command. One file per subcommand under `commands/`; this file reads the command line and turns the outcome into an exit status.
+//! The `dynident` command. One file per subcommand under `commands/`; this file reads the command line and turns the
+//! outcome into an exit status.
 
 mod commands;
 mod progress;
@@ -63,7 +64,8 @@ enum Command {
     Iterate(commands::iterate::Options),
     /// Reproduce the paper behind this program: every table and figure, as a page to look at.
     Reproduce(commands::reproduce::Options),
-    /// Compare estimators on simulated recordings with known truth: error over the Cramér-Rao bound, coverage of error bars.
+    /// Compare estimators on simulated recordings with known truth: error over the Cramér-Rao bound, coverage of error
+    /// bars.
     Benchmark(commands::benchmark::Options),
 }
 

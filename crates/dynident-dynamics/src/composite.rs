@@ -39,7 +39,8 @@ impl<T: Scalar> Composite<T> {
             let row = &rows.0[a];
             row[2].mul_add(r[b][2], row[1].mul_add(r[b][1], row[0] * r[b][0]))
         };
-        // Parallel axes about the new origin: I += 2 (t·h) 1 - t hᵀ - h tᵀ + m (t·t 1 - t tᵀ), with g = h + m t/2 folded in.
+        // Parallel axes about the new origin: I += 2 (t·h) 1 - t hᵀ - h tᵀ + m (t·t 1 - t tᵀ), with g = h + m t/2
+        // folded in.
         let g = t.scale_add(child.mass * T::splat(0.5), h);
         let diagonal = t.dot(g) + t.dot(g);
         let shift = |a: usize, b: usize| t[a].mul_add(g[b], g[a] * t[b]);

@@ -17,12 +17,13 @@ pub struct InverseDynamicsDerivatives<'w> {
     pub by_acceleration: &'w [f64],
 }
 
-/// Derivatives of [`inverse_dynamics`](crate::inverse_dynamics()) by position, velocity and acceleration, without differences.
+/// Derivatives of [`inverse_dynamics`](crate::inverse_dynamics()) by position, velocity and acceleration, without
+/// differences.
 ///
-/// Tangent recursion: for every joint the variation of the Newton-Euler recursion runs over the joint's own subtree outward and over
-/// the path to the base inward (Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms*, RSS 2018, in body
-/// frames). A variation of `q_j` turns or slides frame `j` against its parent; its whole effect on the subtree is the change of the motion that
-/// arrives there. Allocation-free.
+/// Tangent recursion: for every joint the variation of the Newton-Euler recursion runs over the joint's own subtree
+/// outward and over the path to the base inward (Carpentier and Mansard, *Analytical derivatives of rigid body dynamics
+/// algorithms*, RSS 2018, in body frames). A variation of `q_j` turns or slides frame `j` against its parent; its whole
+/// effect on the subtree is the change of the motion that arrives there. Allocation-free.
 ///
 /// # Panics
 /// If a vector's length is not the number of joints, or the workspace was made for another size.

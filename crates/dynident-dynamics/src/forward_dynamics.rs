@@ -7,9 +7,9 @@ use dynident_model::{Mat3, Model, Transform, Vec3};
 
 /// Joint accelerations `q̈ = M(q)⁻¹ (τ - C(q, q̇) q̇ - g(q))` of the rigid bodies, rad/s² (m/s²).
 ///
-/// Articulated-body algorithm: Featherstone (2008), section 7.3, with the velocity terms taken from the outward recursion of the inverse
-/// dynamics. Allocation-free. Where a joint moves no inertia at all (massless tip), its acceleration is undefined and comes out infinite
-/// or not a number: check [`Model::bodies_without_prior`] first.
+/// Articulated-body algorithm: Featherstone (2008), section 7.3, with the velocity terms taken from the outward
+/// recursion of the inverse dynamics. Allocation-free. Where a joint moves no inertia at all (massless tip), its
+/// acceleration is undefined and comes out infinite or not a number: check [`Model::bodies_without_prior`] first.
 ///
 /// # Panics
 /// If a vector's length is not the number of joints, or the workspace was made for another size.
@@ -91,8 +91,8 @@ fn rotated<T: Scalar>(r: &Mat3<T>, s: &[T; 6]) -> [T; 6] {
 pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     let maps = model.maps();
     scratch.place(maps);
-    // With q̈ = 0 the outward recursion gives every body's velocity-dependent and gravity acceleration; the wrench that goes with it is the
-    // bias. What is left is linear in the joint accelerations alone.
+    // With q̈ = 0 the outward recursion gives every body's velocity-dependent and gravity acceleration; the wrench that
+    // goes with it is the bias. What is left is linear in the joint accelerations alone.
     scratch.ddq.fill(T::ZERO);
     outward(model, scratch);
     for ((body, articulated), inertial) in
@@ -120,8 +120,9 @@ pub(crate) fn articulated_bodies<T: Scalar>(model: &Model, scratch: &mut CoreScr
         own.inverse_inertia = along(column.0, column.1).recip();
         own.rest_torque = scratch.tau[index] - along(body.moment, body.force);
         let Some(parent) = map.parent else { continue };
-        // The parent feels the whole inertia and bias, less what the joint gives way. Both are moved to the parent's frame before the one is
-        // taken from the other, so that the division above has time: one body's chain of dependent steps is what limits this algorithm.
+        // The parent feels the whole inertia and bias, less what the joint gives way. Both are moved to the parent's
+        // frame before the one is taken from the other, so that the division above has time: one body's chain of
+        // dependent steps is what limits this algorithm.
         let Transform { rotation: r, translation: t } = &body.parent_from_body;
         let t = *t;
         let column_force = r.mul_vec(column.1);

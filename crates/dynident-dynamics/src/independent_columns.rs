@@ -24,14 +24,14 @@ pub struct IndependentColumns {
     pub strongest_dependent: f64,
 }
 
-/// Splits the columns of `matrix` from left to right: a column is dependent when the part of it that is orthogonal to all
-/// independent columns before it is at most `tolerance` times its own norm, or when the whole column is rounding noise beside the
-/// largest column: below 1e-12 or the square of `tolerance` of it.
+/// Splits the columns of `matrix` from left to right: a column is dependent when the part of it that is orthogonal to
+/// all independent columns before it is at most `tolerance` times its own norm, or when the whole column is rounding
+/// noise beside the largest column: below 1e-12 or the square of `tolerance` of it.
 ///
-/// Householder reflections that **skip a dependent column without spending a row**: the textbook rule
-/// "dependent ⇔ small diagonal entry of R" leans on rounding noise in the spent row and calls whole tails of columns
-/// dependent (or not) by accident. Deterministic; the result does not depend on the rows' order beyond rounding. Zeros at the end of columns cost
-/// nothing, so a matrix in stairs is split in far less than the cube of its size.
+/// Householder reflections that **skip a dependent column without spending a row**: the textbook rule "dependent ⇔
+/// small diagonal entry of R" leans on rounding noise in the spent row and calls whole tails of columns dependent (or
+/// not) by accident. Deterministic; the result does not depend on the rows' order beyond rounding. Zeros at the end of
+/// columns cost nothing, so a matrix in stairs is split in far less than the cube of its size.
 pub fn independent_columns(matrix: &DMatrix<f64>, tolerance: f64) -> IndependentColumns {
     split_columns(matrix, tolerance)
 }
@@ -58,8 +58,9 @@ impl Columns for DMatrix<f64> {
     }
 }
 
-/// [`independent_columns`] of columns as they come. One column is in work at a time: all earlier reflections, then its own. What is kept are the reflections
-/// without their zeros, the triangle of the independent columns, and what the dependent ones have in its rows.
+/// [`independent_columns`] of columns as they come. One column is in work at a time: all earlier reflections, then its
+/// own. What is kept are the reflections without their zeros, the triangle of the independent columns, and what the
+/// dependent ones have in its rows.
 pub(crate) fn split_columns(columns: &impl Columns, tolerance: f64) -> IndependentColumns {
     let rows = columns.rows();
     let mut column = Column { entries: DVector::zeros(rows), end: 0 };
@@ -129,8 +130,8 @@ impl Column {
         self.end = entries.len();
     }
 
-    /// The rows from `row` on without the zeros at the end, but full eights of them as long as there are rows: sums are taken in eights, and so come out to
-    /// the last bit as over all rows.
+    /// The rows from `row` on without the zeros at the end, but full eights of them as long as there are rows: sums are
+    /// taken in eights, and so come out to the last bit as over all rows.
     fn from(&self, row: usize) -> DVectorView<'_, f64> {
         let length = self.end.saturating_sub(row).next_multiple_of(8).min(self.entries.len() - row);
         DVectorView::from_slice(&self.entries.as_slice()[row..], length)
@@ -150,8 +151,9 @@ const SIDE_BY_SIDE: usize = 32;
 /// Products from which on further threads are worth their start: some milliseconds of work.
 const WORTH_THREADS: usize = 20_000_000;
 
-/// Back-substitution with the independent columns' triangle gives the regrouping. Each dependent column has entries for the independent ones before it. Groups of columns are independent, so
-/// the result does not depend on the threads that share them.
+/// Back-substitution with the independent columns' triangle gives the regrouping. Each dependent column has entries for
+/// the independent ones before it. Groups of columns are independent, so the result does not depend on the threads that
+/// share them.
 fn solved(triangle: &[Vec<f64>], dependent: &[Vec<f64>]) -> DMatrix<f64> {
     let (level, rank) = (Level::detect(), triangle.len());
     let mut regrouping = DMatrix::zeros(rank, dependent.len());
@@ -192,7 +194,8 @@ struct BackSubstitution<'a> {
 impl Kernel for BackSubstitution<'_> {
     type Output = Vec<[f64; SIDE_BY_SIDE]>;
 
-    /// The loops over the columns side by side become vector instructions of the processor level; each column's own sums keep their order.
+    /// The loops over the columns side by side become vector instructions of the processor level; each column's own
+    /// sums keep their order.
     #[inline(always)]
     fn run<T: Lane>(self) -> Self::Output {
         let rank = self.columns.iter().map(Vec::len).max().unwrap_or(0);

@@ -6,11 +6,11 @@ use dynident_lanes::{Kernel, Lane, Scalar, dispatch, dispatch_single};
 use dynident_model::terms::JointMotion;
 use dynident_model::{InertialParameters, JointMap, Mat3, Model, Transform, Vec3};
 
-/// Joint torques `τ = M(q) q̈ + C(q, q̇) q̇ + g(q)` of the rigid bodies with the model's inertial parameters, without friction and
-/// drives. One entry per joint: Nm for revolute joints, N for sliding ones.
+/// Joint torques `τ = M(q) q̈ + C(q, q̇) q̇ + g(q)` of the rigid bodies with the model's inertial parameters, without
+/// friction and drives. One entry per joint: Nm for revolute joints, N for sliding ones.
 ///
-/// Recursive Newton-Euler: Luh, Walker and Paul (1980); Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 5.3.
-/// Allocation-free. Bodies without a prior count as massless: see [`Model::bodies_without_prior`].
+/// Recursive Newton-Euler: Luh, Walker and Paul (1980); Featherstone, *Rigid Body Dynamics Algorithms* (2008), section
+/// 5.3. Allocation-free. Bodies without a prior count as massless: see [`Model::bodies_without_prior`].
 ///
 /// ```
 /// # use dynident_model::{Body, Joint, JointKind, JointLimits, InertialParameters, Link, Mat3, Model, Transform, Vec3};
@@ -141,8 +141,8 @@ pub(crate) fn newton_euler_placed<T: Scalar>(model: &Model, scratch: &mut CoreSc
     }
 }
 
-/// Outward recursion: angular velocity, angular acceleration and acceleration minus gravity of every body from `dq`, `ddq` and the
-/// transforms.
+/// Outward recursion: angular velocity, angular acceleration and acceleration minus gravity of every body from `dq`,
+/// `ddq` and the transforms.
 #[inline(always)]
 pub(crate) fn outward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     let gravity = -model.gravity();
@@ -153,7 +153,8 @@ pub(crate) fn outward<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
     }
 }
 
-/// One step outward: the motion of a body from its parent's, at the transform that stands in `body`. `gravity` is the base's acceleration against gravity.
+/// One step outward: the motion of a body from its parent's, at the transform that stands in `body`. `gravity` is the
+/// base's acceleration against gravity.
 #[inline(always)]
 pub(crate) fn moved<T: Scalar>(
     map: &JointMap,

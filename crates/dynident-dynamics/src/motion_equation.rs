@@ -6,9 +6,11 @@ use crate::workspace::{AnyScratch, Workspace, take};
 use dynident_lanes::{Kernel, Lane, dispatch_single};
 use dynident_model::Model;
 
-/// Mass matrix `M(q)` (row-major, dof × dof) and bias `C(q, q̇) q̇ + g(q)` (Nm, N) of the rigid bodies: `M q̈ + bias = τ`.
+/// Mass matrix `M(q)` (row-major, dof × dof) and bias `C(q, q̇) q̇ + g(q)` (Nm, N) of the rigid bodies: `M q̈ + bias =
+/// τ`.
 ///
-/// The same numbers as [`mass_matrix`](crate::mass_matrix()) and [`inverse_dynamics`](crate::inverse_dynamics()) without acceleration, with the transforms of the joints made once. Allocation-free.
+/// The same numbers as [`mass_matrix`](crate::mass_matrix()) and [`inverse_dynamics`](crate::inverse_dynamics())
+/// without acceleration, with the transforms of the joints made once. Allocation-free.
 ///
 /// # Panics
 /// If a vector's length is not the number of joints, or the workspace was made for another size.

@@ -34,10 +34,12 @@ pub enum ParametricModelError {
     },
 }
 
-/// A model with torque terms beside its rigid bodies (friction, drives, offsets), its base parameters, the layout of its regressor, and the nominal values of all parameters.
+/// A model with torque terms beside its rigid bodies (friction, drives, offsets), its base parameters, the layout of
+/// its regressor, and the nominal values of all parameters.
 ///
-/// The torque is linear in the parameters, `τ = Y(q, q̇, q̈) π = W(q, q̇, q̈) θ`, with `π` ten inertial parameters for each body (base to tip) and one value
-/// for each term, and `θ = B π` the base parameters ([`BaseParameters`]). Made once for a robot and used by everything that needs rows, values or symbols.
+/// The torque is linear in the parameters, `τ = Y(q, q̇, q̈) π = W(q, q̇, q̈) θ`, with `π` ten inertial parameters for
+/// each body (base to tip) and one value for each term, and `θ = B π` the base parameters ([`BaseParameters`]). Made
+/// once for a robot and used by everything that needs rows, values or symbols.
 ///
 /// ```
 /// use dynident_dynamics::ParametricModel;
@@ -65,7 +67,8 @@ pub struct ParametricModel {
 }
 
 impl ParametricModel {
-    /// The parametric model of a robot. Nominal values are those of its description: inertial parameters, viscous and Coulomb friction where it has them, zero for all other terms.
+    /// The parametric model of a robot. Nominal values are those of its description: inertial parameters, viscous and
+    /// Coulomb friction where it has them, zero for all other terms.
     ///
     /// # Errors
     /// A term of a joint that the model does not have.
@@ -115,7 +118,8 @@ impl ParametricModel {
         Ok(other)
     }
 
-    /// The same with further terms behind the base columns of the layout, whether they depend on these or not: one set of rows for choosing among them. Base parameters and terms stay as they are.
+    /// The same with further terms behind the base columns of the layout, whether they depend on these or not: one set
+    /// of rows for choosing among them. Base parameters and terms stay as they are.
     #[must_use]
     pub fn with_further_columns(&self, further: impl IntoIterator<Item = TorqueTerm>) -> Self {
         let mut columns = self.base.base_columns();
@@ -148,7 +152,8 @@ impl ParametricModel {
         &self.layout
     }
 
-    /// Nominal values of all parameters: ten for each body (zeros where the description has none), then one for each term.
+    /// Nominal values of all parameters: ten for each body (zeros where the description has none), then one for each
+    /// term.
     pub fn nominal(&self) -> &[f64] {
         &self.nominal
     }

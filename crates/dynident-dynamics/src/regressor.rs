@@ -1,9 +1,10 @@
 //! The torque regressor of the bodies: joint torques as a linear function of the inertial parameters.
 //!
 //! Row `j`, block of body `i` (a body that joint `j` moves): virtual work of the body's wrench on the joint's axis,
-//! `Y_ji = e_jᵀ N_i + l_jᵀ F_i`, where `(e_j, l_j)` is the axis as a twist at the frame of body `i` and `N_i`, `F_i` (3 × 10) are moment and force
-//! of the body as functions of its ten parameters. Axes travel outward from frame to frame with the bodies (Atkeson, An and Hollerbach 1986 in
-//! the form of Featherstone's spatial vectors), so a serial arm costs one small rotation and one 6 × 10 product per pair.
+//! `Y_ji = e_jᵀ N_i + l_jᵀ F_i`, where `(e_j, l_j)` is the axis as a twist at the frame of body `i` and `N_i`, `F_i` (3
+//! × 10) are moment and force of the body as functions of its ten parameters. Axes travel outward from frame to frame
+//! with the bodies (Atkeson, An and Hollerbach 1986 in the form of Featherstone's spatial vectors), so a serial arm
+//! costs one small rotation and one 6 × 10 product per pair.
 
 use crate::inverse_dynamics::outward;
 use crate::states::AxisScratch;
@@ -11,8 +12,9 @@ use crate::workspace::{AnyScratch, CoreScratch, Workspace, take};
 use dynident_lanes::{Kernel, Lane, dispatch_single};
 use dynident_model::{Mat3, Model, Transform, Vec3};
 
-/// The regressor `Y(q, q̇, q̈)` with `Y π = τ`, row-major, dof rows × 10·dof columns: column `10 i + k` is parameter `k` of body `i` in the order of
-/// [`INERTIAL_NAMES`](dynident_model::INERTIAL_NAMES). Nm (N) per unit of the parameter. Does not depend on the model's own inertial parameters.
+/// The regressor `Y(q, q̇, q̈)` with `Y π = τ`, row-major, dof rows × 10·dof columns: column `10 i + k` is parameter
+/// `k` of body `i` in the order of [`INERTIAL_NAMES`](dynident_model::INERTIAL_NAMES). Nm (N) per unit of the
+/// parameter. Does not depend on the model's own inertial parameters.
 ///
 /// Allocation-free.
 ///
@@ -56,8 +58,8 @@ impl Kernel for Single<'_> {
     }
 }
 
-/// Where the blocks of the regressor go. A trait and not a closure, because only a method can be determined to be inlined into the code of each
-/// processor level.
+/// Where the blocks of the regressor go. A trait and not a closure, because only a method can be determined to be
+/// inlined into the code of each processor level.
 pub(crate) trait BlockSink<T: Lane> {
     /// Takes the ten entries of body `body` for the joints `path[bundle * PER_BUNDLE..]`, one joint to each lane group.
     fn put<const TURNING: bool>(

@@ -1,8 +1,11 @@
-//! The reverse sweep of the torque regressor: from derivatives of a cost by every regressor entry to its derivatives by the motion.
+//! The reverse sweep of the torque regressor: from derivatives of a cost by every regressor entry to its derivatives by
+//! the motion.
 //!
-//! With `V` the cost's derivatives by the entries of `Y`, the cost varies as `Σ V_ji · Y_ji`, and `Y_ji = e_jᵀ N_i + l_jᵀ F_i` for each body `i` and each joint `j` that moves it (see
-//! `regressor.rs`). Backwards through that: every pair gives its share to the axis `(e_j, l_j)` and to the body's motion `(ω, α, a)`; shares then travel inward from frame
-//! to frame, and what each joint's revolute or prismatic changes on the way is the derivative by its position. One sweep gives all derivatives, at about twice the cost of the regressor.
+//! With `V` the cost's derivatives by the entries of `Y`, the cost varies as `Σ V_ji · Y_ji`, and `Y_ji = e_jᵀ N_i +
+//! l_jᵀ F_i` for each body `i` and each joint `j` that moves it (see `regressor.rs`). Backwards through that: every
+//! pair gives its share to the axis `(e_j, l_j)` and to the body's motion `(ω, α, a)`; shares then travel inward from
+//! frame to frame, and what each joint's revolute or prismatic changes on the way is the derivative by its position.
+//! One sweep gives all derivatives, at about twice the cost of the regressor.
 
 use crate::inverse_dynamics::outward;
 use crate::regressor_panels::{Column, PanelLayout, Panels};
@@ -23,13 +26,15 @@ pub struct MotionGradient<'a> {
     pub by_ddq: &'a mut [f64],
 }
 
-/// Adds to `gradient` the derivatives of a cost by the motion, given its derivatives by every regressor entry: `adjoint` holds them in the shape that
-/// [`regressor_panels`](crate::regressor_panels()) fills (its torque columns are not read). Exact; terms included.
+/// Adds to `gradient` the derivatives of a cost by the motion, given its derivatives by every regressor entry:
+/// `adjoint` holds them in the shape that [`regressor_panels`](crate::regressor_panels()) fills (its torque columns are
+/// not read). Exact; terms included.
 ///
 /// Allocation-free.
 ///
 /// # Panics
-/// If an array's length is not joints × samples, the panels have another shape, or layout or workspace belong to a model with another tree.
+/// If an array's length is not joints × samples, the panels have another shape, or layout or workspace belong to a
+/// model with another tree.
 pub fn regressor_panels_adjoint(
     model: &Model,
     workspace: &mut BatchWorkspace,
@@ -110,7 +115,8 @@ struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// Derivatives by the ten entries of body `body` in the row of the `k`-th joint on its path; zero for columns that the layout leaves out and for lanes past the end.
+    /// Derivatives by the ten entries of body `body` in the row of the `k`-th joint on its path; zero for columns that
+    /// the layout leaves out and for lanes past the end.
     #[inline(always)]
     fn block<T: Lane>(&self, body: usize, k: usize, joint: usize) -> [T; 10] {
         let samples = self.adjoint.samples();
@@ -244,7 +250,8 @@ fn reverse_sweep<T: Lane>(
     }
 }
 
-/// One body and one axis: with the weights as a body's ten parameters, the axis gets their wrench, and the body's motion gets what the wrench's work on the axis varies by.
+/// One body and one axis: with the weights as a body's ten parameters, the axis gets their wrench, and the body's
+/// motion gets what the wrench's work on the axis varies by.
 #[inline(always)]
 fn pair_share<T: Scalar>(
     weights: &[T; 10],
@@ -277,7 +284,8 @@ mod tests {
     use dynident_model::InertialParameters;
     use dynident_model::sample::{Random, random_tree};
 
-    /// The cost `Σ V_j · Y_j` of one sample is `Σ τ_j` with the weights of row `j` as inertial parameters: dual numbers through the inverse dynamics are the oracle.
+    /// The cost `Σ V_j · Y_j` of one sample is `Σ τ_j` with the weights of row `j` as inertial parameters: dual numbers
+    /// through the inverse dynamics are the oracle.
     fn oracle(model: &Model, weights: &[Vec<f64>], state: [&[f64]; 3], which: usize, variable: usize) -> f64 {
         let mut scratch = CoreScratch::<Dual>::new(model.dof());
         let mut sum = 0.0;

@@ -1,7 +1,7 @@
 //! The regressor of blocks of samples, joint by joint: what the triangular factors take in.
 //!
-//! A joint's row has entries only for the bodies that it moves and for the terms that it feels, so each joint has its own narrow panel: columns
-//! after one another, each with one value per sample. The whole regressor is never stored.
+//! A joint's row has entries only for the bodies that it moves and for the terms that it feels, so each joint has its
+//! own narrow panel: columns after one another, each with one value per sample. The whole regressor is never stored.
 
 use crate::regressor::{BlockSink, Work, regressor_blocks};
 use crate::term_history::TermHistory;
@@ -57,7 +57,8 @@ pub struct PanelLayout {
     joints: Vec<JointPanel>,
     /// For each body, bit `k` says whether the layout has its parameter `k`.
     parameters: Vec<u16>,
-    /// For each body, each joint on its path: the place of the body's first column in that joint's panel. Its others follow.
+    /// For each body, each joint on its path: the place of the body's first column in that joint's panel. Its others
+    /// follow.
     places: Vec<usize>,
     /// Where each body's places start.
     place_start: Vec<usize>,
@@ -77,7 +78,8 @@ impl PanelLayout {
     /// The layout for the given columns (any subset of [`all_columns`], in its order).
     ///
     /// # Panics
-    /// If a column names a body or joint that the model does not have, or the bodies' columns are not in ascending order.
+    /// If a column names a body or joint that the model does not have, or the bodies' columns are not in ascending
+    /// order.
     pub fn new(model: &Model, columns: Vec<Column>) -> Self {
         let dof = model.dof();
         let mut joints: Vec<JointPanel> =
@@ -93,7 +95,8 @@ impl PanelLayout {
         for (global, column) in columns.iter().enumerate() {
             match column {
                 Column::Body { body, parameter } => {
-                    // A body's columns then stand together in every panel, and the hot loop needs to know only where they begin.
+                    // A body's columns then stand together in every panel, and the hot loop needs to know only where
+                    // they begin.
                     assert!(last < Some((*body, *parameter)), "the columns of bodies ascend");
                     last = Some((*body, *parameter));
                     for (k, &joint) in paths[*body].iter().enumerate() {
@@ -135,15 +138,16 @@ impl PanelLayout {
         assert!(same_tree(&self.tree, model), "the panel layout was made for a model with another tree");
     }
 
-    /// Which of the ten parameters of `body` have columns, as bits, and where these begin in the panel of the `k`-th joint on the way to it; they follow one another.
+    /// Which of the ten parameters of `body` have columns, as bits, and where these begin in the panel of the `k`-th
+    /// joint on the way to it; they follow one another.
     #[inline(always)]
     pub(crate) fn body_columns(&self, body: usize, k: usize) -> (u16, usize) {
         (self.parameters[body], self.places[self.place_start[body] + k])
     }
 }
 
-/// The panels of one block of samples. Joint `j` has `joint_columns(j).len() + 1` columns of `samples` values, one column after the other; the last
-/// one is for the joint's torque and is left as it was.
+/// The panels of one block of samples. Joint `j` has `joint_columns(j).len() + 1` columns of `samples` values, one
+/// column after the other; the last one is for the joint's torque and is left as it was.
 #[derive(Debug, Default)]
 pub struct Panels {
     samples: usize,
@@ -183,7 +187,8 @@ impl Panels {
     }
 }
 
-/// Fills the regressor columns of all panels from the motion of a block of samples (joint-major). The torque columns are left alone.
+/// Fills the regressor columns of all panels from the motion of a block of samples (joint-major). The torque columns
+/// are left alone.
 ///
 /// Allocation-free once `panels` has grown to the block's size.
 ///
@@ -200,10 +205,12 @@ pub fn regressor_panels(
     regressor_panels_following(model, workspace, layout, motion, &mut TermHistory::default(), panels);
 }
 
-/// [`regressor_panels`](regressor_panels()) of a block that follows others of the same recording: terms with memory go on where `history` left them, load-dependent ones know their load, and others their temperature.
+/// [`regressor_panels`](regressor_panels()) of a block that follows others of the same recording: terms with memory go
+/// on where `history` left them, load-dependent ones know their load, and others their temperature.
 ///
 /// # Panics
-/// As [`regressor_panels`](regressor_panels()), or if the history has load parameters of another number than the layout's columns. Temperatures of another number than joints × samples count as none.
+/// As [`regressor_panels`](regressor_panels()), or if the history has load parameters of another number than the
+/// layout's columns. Temperatures of another number than joints × samples count as none.
 pub fn regressor_panels_following(
     model: &Model,
     workspace: &mut BatchWorkspace,
@@ -280,7 +287,8 @@ impl Kernel for Fill<'_> {
         let scratch = scratch.of::<T>();
         let samples = motion.samples;
         for group in (0..samples).step_by(T::LANES) {
-            // The last group of a block reaches back over samples that are done: they come out the same again, and all groups are full.
+            // The last group of a block reaches back over samples that are done: they come out the same again, and all
+            // groups are full.
             let at = group.min(samples.saturating_sub(T::LANES));
             take_lanes(&mut scratch.core.q, motion.q, samples, at);
             take_lanes(&mut scratch.core.dq, motion.dq, samples, at);

@@ -1,4 +1,5 @@
-//! What each algorithm keeps for each body while it runs: plain numbers, no rules. The rules are in the algorithms' own files.
+//! What each algorithm keeps for each body while it runs: plain numbers, no rules. The rules are in the algorithms' own
+//! files.
 
 use dynident_lanes::{Lane, Scalar};
 use dynident_model::{Mat3, Model, Transform, Vec3};
@@ -31,8 +32,8 @@ impl<T: Scalar> BodyState<T> {
     };
 }
 
-/// Articulated-body inertia of a subtree about its root's frame: `moment = rotation α + coupling a`, `force = couplingᵀ α + mass a`; and what
-/// its joint needs of it.
+/// Articulated-body inertia of a subtree about its root's frame: `moment = rotation α + coupling a`, `force = couplingᵀ
+/// α + mass a`; and what its joint needs of it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ArticulatedInertia<T> {
     /// Symmetric; upper triangle by rows.

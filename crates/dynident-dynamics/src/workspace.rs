@@ -121,7 +121,8 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// A workspace for models of this model's size (for the torque regressor: of its tree), at the best level of this processor.
+    /// A workspace for models of this model's size (for the torque regressor: of its tree), at the best level of this
+    /// processor.
     pub fn new(model: &Model) -> Self {
         Self::with_level(model, Level::detect())
     }
@@ -174,7 +175,8 @@ pub struct BatchWorkspace {
 }
 
 impl BatchWorkspace {
-    /// A workspace for models of this model's size (for the torque regressor: of its tree), at the best level of this processor.
+    /// A workspace for models of this model's size (for the torque regressor: of its tree), at the best level of this
+    /// processor.
     pub fn new(model: &Model) -> Self {
         Self::with_level(model, Level::detect())
     }

@@ -1,9 +1,9 @@
 //! **What do the measurements say?** From rows `[W | τ]` of numbers to parameters with error bars.
 //!
 //! This crate never knows where samples came from: it sees columns, joints and numbers. Rows of each joint in each log
-//! go into a [`SegmentedFactor`] and are forgotten; the factors make a [`LinearProblem`] over named columns; an estimator
-//! makes an [`Estimate`] of it: values, a covariance that accounts for residuals correlated in time, the noise of every
-//! joint, and what was decided about columns that the data do not excite.
+//! go into a [`SegmentedFactor`] and are forgotten; the factors make a [`LinearProblem`] over named columns; an
+//! estimator makes an [`Estimate`] of it: values, a covariance that accounts for residuals correlated in time, the
+//! noise of every joint, and what was decided about columns that the data do not excite.
 //!
 //! ```
 //! use dynident_estimation::*;
@@ -39,8 +39,9 @@
 //! | what the residuals look like | [`Whiteness`], [`Normality`], [`SpeedRanges`] |
 //!
 //! The modules, from the bottom up: [`factor`] (rows to triangles, problems, rank), [`uncertainty`] (the estimate and
-//! its covariance), [`linear`] and [`nonlinear`] estimators, [`consistent`] (bodies that can be real) and [`diagnostics`].
-//! Types that are only part of a result live there; what an identification needs is at the root as well.
+//! its covariance), [`linear`] and [`nonlinear`] estimators, [`consistent`] (bodies that can be real) and
+//! [`diagnostics`]. Types that are only part of a result live there; what an identification needs is at the root as
+//! well.
 
 #![forbid(unsafe_code)]
 

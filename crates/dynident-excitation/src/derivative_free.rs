@@ -234,8 +234,8 @@ mod tests {
             assert!(designed.violation <= 0.0, "{optimiser:?}: {}", designed.violation);
             assert!(history.len() >= generations);
             assert!(history.windows(2).all(|w| w[1].best_so_far <= w[0].best_so_far));
-            // The median random start is inside position and velocity limits; a search must beat it by more than a factor
-            // e in the determinant.
+            // The median random start is inside position and velocity limits; a search must beat it by more than a
+            // factor e in the determinant.
             let (positions, speeds) = ranges(&set);
             let logged = grid(6.0, 601);
             let mut figures: Vec<f64> = (0..21)

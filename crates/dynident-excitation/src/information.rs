@@ -52,8 +52,8 @@ impl<'a> Information<'a> {
         }
     }
 
-    /// `D` of the motion; its regressor stays for [`apply_adjoint`](Information::apply_adjoint). `weight` counts every sample
-    /// so many times.
+    /// `D` of the motion; its regressor stays for [`apply_adjoint`](Information::apply_adjoint). `weight` counts every
+    /// sample so many times.
     pub fn of(&mut self, motion: &Motion, weight: f64) -> DMatrix<f64> {
         let count = self.layout.columns().len();
         regressor_panels(self.model, &mut self.workspace, self.layout, &motion.view(), &mut self.panels);

@@ -12,8 +12,8 @@
 //! | move one joint after another | [`step_wise`]: strokes over windows, as in the paper |
 //! | hand the motion to a robot | [`export`]: CSV, ROS 2, URScript |
 //!
-//! A [`Motion`] is plain arrays: q, q̇, q̈ and jerk, joint after joint. All searches are deterministic by their seed, on
-//! any number of threads. A family, a criterion or a limit of one's own is a type with the trait: [`design()`] takes
+//! A [`Motion`] is plain arrays: q, q̇, q̈ and jerk, joint after joint. All searches are deterministic by their seed,
+//! on any number of threads. A family, a criterion or a limit of one's own is a type with the trait: [`design()`] takes
 //! references to traits.
 //!
 //! A motion for a robot from memory, its limits checked, its error bars predicted:

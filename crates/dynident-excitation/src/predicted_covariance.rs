@@ -21,10 +21,10 @@ pub struct Direction {
     pub shares: Vec<f64>,
 }
 
-/// PredictedCovariance of weighted least squares from the information `D = Σ_j W_jᵀ W_j / σ_j²` of a motion: the estimate's
-/// covariance is `D⁻¹` when the torque errors are independent with the assumed σ_j (Swevers et al., IEEE Trans.
-/// Robotics and Automation 13(5), 1997). Residuals that are correlated in time make the real error bars larger, by 1.3
-/// to 9 times on known arms.
+/// PredictedCovariance of weighted least squares from the information `D = Σ_j W_jᵀ W_j / σ_j²` of a motion: the
+/// estimate's covariance is `D⁻¹` when the torque errors are independent with the assumed σ_j (Swevers et al., IEEE
+/// Trans. Robotics and Automation 13(5), 1997). Residuals that are correlated in time make the real error bars larger,
+/// by 1.3 to 9 times on known arms.
 ///
 /// Directions are eigenvectors of `D` with its columns scaled to one, the `directions` worst of them.
 pub fn predicted_covariance(information: &DMatrix<f64>, directions: usize) -> PredictedCovariance {

@@ -26,7 +26,8 @@ impl core::fmt::Debug for Execution<'_> {
 }
 
 impl Execution<'_> {
-    /// Runs `work` where parallel iterators have just [`threads`](Self::threads) threads. Where no pool can be made, the caller's serves.
+    /// Runs `work` where parallel iterators have just [`threads`](Self::threads) threads. Where no pool can be made,
+    /// the caller's serves.
     pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         if rayon::current_num_threads() == self.threads {
             return work();

@@ -42,7 +42,8 @@ pub struct ConsistentParameters {
     pub fit: Option<PhysicalFit>,
     /// Why there is none although it was asked for.
     pub failure: Option<String>,
-    /// All parameters, ten for each body and one for each term: the consistent set's, or else the set nearest to the nominal one that has the estimated base parameters.
+    /// All parameters, ten for each body and one for each term: the consistent set's, or else the set nearest to the
+    /// nominal one that has the estimated base parameters.
     pub parameters: Vec<f64>,
     /// Intervals of all parameters over all consistent sets that the data do not reject, if asked for.
     pub intervals: Option<Vec<ParameterInterval>>,
@@ -114,8 +115,10 @@ impl Identification {
     }
 }
 
-/// Fits a robot's model to its recordings with the role [`Identify`](Role::Identify) and tests it on the others: rows and factors, estimate, consistent parameters, examination, held-out
-/// examination. Each of these stages can be called alone: [`Logs::new`], [`training_rows`], [`estimate`](crate::estimators::estimate()), [`consistent_stage`], [`examine_training`], [`examine_held_out`].
+/// Fits a robot's model to its recordings with the role [`Identify`](Role::Identify) and tests it on the others: rows
+/// and factors, estimate, consistent parameters, examination, held-out examination. Each of these stages can be called
+/// alone: [`Logs::new`], [`training_rows`], [`estimate`](crate::estimators::estimate()), [`consistent_stage`],
+/// [`examine_training`], [`examine_held_out`].
 ///
 /// # Errors
 /// [`IdentificationError`]: recordings, settings that do not go together. A poor fit is not an error.
@@ -123,8 +126,10 @@ pub fn identify(task: &IdentificationTask, execution: Execution<'_>) -> Result<I
     execution.install(|| identified(task, execution, &mut Job::Model(None)))
 }
 
-/// As [`identify()`] with instruments from `source`: the closed loop simulated with the model so far (IDIM-IV: call again with a new simulation until the parameters settle), or a repeated run.
-/// With [`Estimator::Instrumental`](crate::estimators::Estimator::Instrumental) they make the estimate, with another estimator they test it.
+/// As [`identify()`] with instruments from `source`: the closed loop simulated with the model so far (IDIM-IV: call
+/// again with a new simulation until the parameters settle), or a repeated run. With
+/// [`Estimator::Instrumental`](crate::estimators::Estimator::Instrumental) they make the estimate, with another
+/// estimator they test it.
 ///
 /// # Errors
 /// As [`identify()`], and what `source` returns.
@@ -136,7 +141,8 @@ pub fn identify_with_instruments(
     execution.install(|| identified(task, execution, &mut Job::Model(Some(source))))
 }
 
-/// Payloads on an arm that is known already, with the arm's error bars in theirs. The task's robot has the arm's terms; bodies of the arm are not looked for.
+/// Payloads on an arm that is known already, with the arm's error bars in theirs. The task's robot has the arm's terms;
+/// bodies of the arm are not looked for.
 ///
 /// # Errors
 /// As [`identify()`].
@@ -236,7 +242,8 @@ fn identified(
     })
 }
 
-/// The arm's bodies are those of the earlier result; what the estimate of payloads says of them is the set nearest to the nominal one.
+/// The arm's bodies are those of the earlier result; what the estimate of payloads says of them is the set nearest to
+/// the nominal one.
 fn held_arm(task: &IdentificationTask, training: &Training, estimate: &Estimate) -> ConsistentParameters {
     let robot = &training.model.parametric;
     let settings = task.settings.consistency.as_ref();
@@ -252,7 +259,8 @@ fn held_arm(task: &IdentificationTask, training: &Training, estimate: &Estimate)
 /// Consistent parameters for an estimate over the columns of `training`: the best set, and its intervals if asked for.
 ///
 /// # Errors
-/// Factors that do not belong to the estimate, intervals that cannot be had. That there is no consistent set is part of the result.
+/// Factors that do not belong to the estimate, intervals that cannot be had. That there is no consistent set is part of
+/// the result.
 pub fn consistent_stage(
     logs: &Logs<'_>,
     training: &Training,
@@ -291,7 +299,8 @@ pub fn consistent_stage(
     })
 }
 
-/// The problem and the estimate without the columns of payloads and offsets of single logs; `None` where the problem has none.
+/// The problem and the estimate without the columns of payloads and offsets of single logs; `None` where the problem
+/// has none.
 fn arm_alone(
     training: &Training,
     estimate: &Estimate,

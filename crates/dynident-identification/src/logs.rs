@@ -10,7 +10,8 @@ use dynident_model::Model;
 use dynident_recording::MotionSettings;
 use std::sync::OnceLock;
 
-/// The recordings of a task, its settings, and the filters in force. A log that fits into memory is read and differentiated once, however many passes there are.
+/// The recordings of a task, its settings, and the filters in force. A log that fits into memory is read and
+/// differentiated once, however many passes there are.
 #[derive(Debug)]
 pub struct Logs<'a> {
     /// All recordings, whatever their role.
@@ -25,8 +26,8 @@ pub struct Logs<'a> {
 }
 
 impl<'a> Logs<'a> {
-    /// Decides on one cut-off for all logs: the settings' own; or the one that a finished model was made with; or the highest that any of the logs `deciding` asks for. A model and its test must not
-    /// differ in their filters.
+    /// Decides on one cut-off for all logs: the settings' own; or the one that a finished model was made with; or the
+    /// highest that any of the logs `deciding` asks for. A model and its test must not differ in their filters.
     ///
     /// # Errors
     /// Logs that cannot be read.

@@ -31,7 +31,8 @@ impl Role {
 /// Where the motion of a recording comes from.
 #[derive(Clone, Debug)]
 pub enum Samples {
-    /// Raw samples of a file, a stream or of arrays: clock, filters and derivatives are made here. Joints are found by name.
+    /// Raw samples of a file, a stream or of arrays: clock, filters and derivatives are made here. Joints are found by
+    /// name.
     Log(Box<Log>),
     /// A motion that is made already, joints in the model's order.
     Motion(Box<MotionRecord>),
@@ -129,8 +130,8 @@ impl Recording {
         }
     }
 
-    /// Its log on the way to a motion, with these settings; the commanded motion goes along where the differentiator needs it. `None` for a motion that is made already
-    /// and whose raw samples are not at hand.
+    /// Its log on the way to a motion, with these settings; the commanded motion goes along where the differentiator
+    /// needs it. `None` for a motion that is made already and whose raw samples are not at hand.
     ///
     /// # Errors
     /// What opening it can give.

@@ -4,12 +4,14 @@ use dynident_dynamics::{BaseParameters, Column, PanelLayout, ParametricModel};
 use dynident_model::Model;
 use dynident_model::terms::TorqueTerm;
 
-/// A parametric model, and what estimates have added to it: the load behind load-dependent friction, the gains of logged torque.
+/// A parametric model, and what estimates have added to it: the load behind load-dependent friction, the gains of
+/// logged torque.
 #[derive(Clone, Debug)]
 pub struct RegressorModel {
     /// Model, torque terms, base parameters, layout.
     pub parametric: ParametricModel,
-    /// For load-dependent friction: the bodies by an earlier estimate, one value per column of the layout. Without it such friction has a column of zeros.
+    /// For load-dependent friction: the bodies by an earlier estimate, one value per column of the layout. Without it
+    /// such friction has a column of zeros.
     pub load_parameters: Option<Vec<f64>>,
     /// What logged torque is multiplied by, joint by joint, where gains were found and not stated; empty otherwise.
     pub torque_gains: Vec<f64>,
@@ -52,7 +54,8 @@ impl RegressorModel {
         self.parametric.joint_names()
     }
 
-    /// The same with further terms behind its base columns, dependent or not: for choosing among them from one set of factors.
+    /// The same with further terms behind its base columns, dependent or not: for choosing among them from one set of
+    /// factors.
     #[must_use]
     pub fn with_further_columns(&self, further: impl IntoIterator<Item = TorqueTerm>) -> Self {
         let mut wide = self.clone();

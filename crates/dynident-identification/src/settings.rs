@@ -19,7 +19,8 @@ pub enum OffsetChoice {
     /// One offset for each joint.
     #[default]
     Shared,
-    /// Each training log has its own; base parameters and joints hold their mean. Zeros of torque sensors drift from day to day.
+    /// Each training log has its own; base parameters and joints hold their mean. Zeros of torque sensors drift from
+    /// day to day.
     PerLog,
 }
 
@@ -71,7 +72,8 @@ impl EstimationSettings {
     }
 }
 
-/// Everything that [`identify`](crate::identify()) can be given beside robot and recordings; the default is weighted least squares with consistent parameters.
+/// Everything that [`identify`](crate::identify()) can be given beside robot and recordings; the default is weighted
+/// least squares with consistent parameters.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct IdentificationSettings {
@@ -83,7 +85,8 @@ pub struct IdentificationSettings {
     pub estimation: EstimationSettings,
     /// What is known of the bodies; `None` leaves parameters as they are estimated, consistent or not.
     pub consistency: Option<ConsistencySettings>,
-    /// Intervals for every parameter over all consistent sets that the data do not reject; some thousand fits, so not by default.
+    /// Intervals for every parameter over all consistent sets that the data do not reject; some thousand fits, so not
+    /// by default.
     pub intervals: bool,
     /// Joints whose friction the training logs choose; none by default.
     pub friction: Vec<FrictionSearch>,

@@ -54,8 +54,8 @@ pub struct Training {
     pub timings_s: [f64; 2],
 }
 
-/// Makes the factors of the recordings `training`; where friction is to be chosen or depends on the load, once more with what the first fit says. `known_arm` where
-/// the arm is held, with what of it is fitted again.
+/// Makes the factors of the recordings `training`; where friction is to be chosen or depends on the load, once more
+/// with what the first fit says. `known_arm` where the arm is held, with what of it is fitted again.
 ///
 /// # Errors
 /// Recordings that cannot be read, payloads and gains that do not go together, rows that do not carry an estimate.

@@ -1,4 +1,5 @@
-//! The basin of the iteration: random planar arms, random first controllers, random torque limits; from how many starts does it find the arm? The paper's literal scheme beside ours.
+//! The basin of the iteration: random planar arms, random first controllers, random torque limits; from how many starts
+//! does it find the arm? The paper's literal scheme beside ours.
 //!
 //! ```text
 //! cargo run --release -p dynident-iteration --example basin [ARMS] [FIRST_SEED]

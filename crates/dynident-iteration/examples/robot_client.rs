@@ -1,8 +1,10 @@
-//! A robot program behind the line protocol, `docs/src/robot-protocol.md`: the simulator, served on standard input and output. What a program for a real robot looks like, and what the tests speak to.
+//! A robot program behind the line protocol, `docs/src/robot-protocol.md`: the simulator, served on standard input and
+//! output. What a program for a real robot looks like, and what the tests speak to.
 //!
 //!     robot_client ROBOT.urdf [--fault KIND] [--at SAMPLE]
 //!
-//! With `--fault` it misbehaves at the given sample (default 50): die, hang, garbage, nan, null, joints, backwards, flood, megabyte, stop, short, turn; or at its hello: deaf, protocol, names, modes.
+//! With `--fault` it misbehaves at the given sample (default 50): die, hang, garbage, nan, null, joints, backwards,
+//! flood, megabyte, stop, short, turn; or at its hello: deaf, protocol, names, modes.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "speaking is what this program is for")]
 

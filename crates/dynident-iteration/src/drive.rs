@@ -223,14 +223,17 @@ impl Iteration {
     }
 }
 
-/// Runs, identifies and runs again until all has settled: the first run by a controller without a model or by the prior, then by the model-based controller with the newest estimate. A run that got
-/// worse (its tracking, a broken limit, divergence) is rejected: the step from the last good parameters to the new ones is halved, and if that does not help the controller without a model comes
-/// back, stiffer.
+/// Runs, identifies and runs again until all has settled: the first run by a controller without a model or by the
+/// prior, then by the model-based controller with the newest estimate. A run that got worse (its tracking, a broken
+/// limit, divergence) is rejected: the step from the last good parameters to the new ones is halved, and if that does
+/// not help the controller without a model comes back, stiffer.
 ///
-/// `robots` holds one robot for all legs, or one for each. With a `store`, runs that it holds are not made again, and each new one is kept before the next begins. `watch` hears of every new run.
+/// `robots` holds one robot for all legs, or one for each. With a `store`, runs that it holds are not made again, and
+/// each new one is kept before the next begins. `watch` hears of every new run.
 ///
 /// # Errors
-/// Settings that do not fit, files that cannot be written. What the robot does wrong is in the records and in the status.
+/// Settings that do not fit, files that cannot be written. What the robot does wrong is in the records and in the
+/// status.
 pub fn iterate(
     iteration: &Iteration,
     robots: &mut [&mut dyn Robot],

@@ -1,4 +1,5 @@
-//! What can be wrong with an iteration. How it went is its status, not an error: see [`IterationStatus`](super::IterationStatus).
+//! What can be wrong with an iteration. How it went is its status, not an error: see
+//! [`IterationStatus`](super::IterationStatus).
 
 use dynident_dynamics::ParametricModelError;
 use dynident_estimation::EstimationError;

@@ -35,20 +35,23 @@ pub struct RunEstimate {
     pub joint_sigma: Vec<f64>,
     /// Base parameters that the data do not determine: they have the prior's values.
     pub fixed: Vec<usize>,
-    /// All parameters of the physically consistent set that fits best, ten for each body and one for each term, if it was asked for.
+    /// All parameters of the physically consistent set that fits best, ten for each body and one for each term, if it
+    /// was asked for.
     pub possible: Option<Vec<f64>>,
     /// Why there is none although it was asked for.
     pub impossible: Option<String>,
     /// The friction that this run chose, for itself and the runs after it; empty where it was stated or chosen before.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub friction: Vec<JointFriction>,
-    /// By how much each joint's torque comes after the motion, where the run determines; empty where windows leave rows out.
+    /// By how much each joint's torque comes after the motion, where the run determines; empty where windows leave rows
+    /// out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub torque_lags: Vec<Option<TorqueLag>>,
 }
 
 impl RunEstimate {
-    /// What a controller gets: the physically consistent set if it was asked for, else the estimate as it is. None where the physically consistent set was asked for and does not exist.
+    /// What a controller gets: the physically consistent set if it was asked for, else the estimate as it is. None
+    /// where the physically consistent set was asked for and does not exist.
     pub fn for_controller(&self) -> Option<ModelParameters> {
         match (&self.possible, &self.impossible) {
             (Some(parameters), _) => Some(ModelParameters::All(parameters.clone())),
@@ -57,7 +60,8 @@ impl RunEstimate {
         }
     }
 
-    /// How many times wider its error bars are than another's: the geometric mean over the parameters that both determine; 1 where there is none.
+    /// How many times wider its error bars are than another's: the geometric mean over the parameters that both
+    /// determine; 1 where there is none.
     pub(crate) fn wider_than(&self, other: &Self) -> f64 {
         let pairs = self.std.iter().zip(&other.std).filter(|(own, other)| **own > 0.0 && **other > 0.0);
         let (sum, count) =

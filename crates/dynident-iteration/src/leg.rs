@@ -6,7 +6,8 @@ use dynident_simulation::Reference;
 use dynident_simulation::{SimulationError, require, require_length};
 use std::sync::Arc;
 
-/// One trajectory of every run. The paper moves joint 2 and then joint 1: one leg in which the joints take turns, or two legs.
+/// One trajectory of every run. The paper moves joint 2 and then joint 1: one leg in which the joints take turns, or
+/// two legs.
 #[derive(Clone, Debug)]
 pub struct Leg {
     reference: Reference,
@@ -25,7 +26,8 @@ impl Leg {
         Self::new(reference, None)
     }
 
-    /// A trajectory of which joint j's torque counts at the times `windows[j]` only (from, to; s): the paper's ±δ about mid-strokes, while the joint moves alone.
+    /// A trajectory of which joint j's torque counts at the times `windows[j]` only (from, to; s): the paper's ±δ about
+    /// mid-strokes, while the joint moves alone.
     ///
     /// # Errors
     /// A reference of one sample only.
@@ -43,7 +45,8 @@ impl Leg {
         Ok(Self { reference, commanded, windows, differentiator: None, payload: None })
     }
 
-    /// The same with the commanded motion as differentiators are to know it: strokes in closed form in place of samples.
+    /// The same with the commanded motion as differentiators are to know it: strokes in closed form in place of
+    /// samples.
     #[must_use]
     pub fn with_commanded(mut self, commanded: dynident_recording::Reference) -> Self {
         self.commanded = Arc::new(commanded);
@@ -103,9 +106,11 @@ pub struct IterationTask {
     pub robot: ParametricModel,
     /// The trajectories of every run, in order.
     pub legs: Vec<Leg>,
-    /// Base columns whose values are given: (place among the base columns, value). Of the paper's joint 1: what joint 2 has shown.
+    /// Base columns whose values are given: (place among the base columns, value). Of the paper's joint 1: what joint 2
+    /// has shown.
     pub known: Vec<(usize, f64)>,
-    /// The largest torque of each joint, Nm (N); infinite where there is none. A trajectory that asks for more by the model found is refused in the end: tracking it is not a matter of the model.
+    /// The largest torque of each joint, Nm (N); infinite where there is none. A trajectory that asks for more by the
+    /// model found is refused in the end: tracking it is not a matter of the model.
     pub torque_limits: Option<Vec<f64>>,
 }
 
@@ -121,7 +126,8 @@ impl IterationTask {
     /// Checks that legs and known columns belong to the robot.
     ///
     /// # Errors
-    /// No legs, other numbers of joints, windows that are no intervals, columns that do not exist, values that are not finite.
+    /// No legs, other numbers of joints, windows that are no intervals, columns that do not exist, values that are not
+    /// finite.
     pub fn validate(&self) -> Result<(), SimulationError> {
         let dof = self.robot.dof();
         require(!self.legs.is_empty(), "legs", 0.0, "give one or more")?;

@@ -13,11 +13,14 @@ use std::sync::Arc;
 /// Times of a record count as uniform up to this share of their step.
 const UNIFORM: f64 = 1e-6;
 
-/// Differentiates a record along `leg`. Where the record's times are not uniform, positions and torques are taken between samples by straight lines. Torques held from a sample to the next count at a
-/// sample's instant as the mean of the values before and after, less a twelfth of its second difference (the acceleration jumps there, and positions see both steps).
+/// Differentiates a record along `leg`. Where the record's times are not uniform, positions and torques are taken
+/// between samples by straight lines. Torques held from a sample to the next count at a sample's instant as the mean of
+/// the values before and after, less a twelfth of its second difference (the acceleration jumps there, and positions
+/// see both steps).
 ///
 /// # Errors
-/// A record of other joints or of too few samples, a differentiator that does not exist at its rate or lacks what it needs.
+/// A record of other joints or of too few samples, a differentiator that does not exist at its rate or lacks what it
+/// needs.
 pub fn measured_motion(
     record: &Record,
     leg: &Leg,
@@ -124,10 +127,12 @@ fn raw_samples(
     JointSamples::at_times(times, joints(q), joints(tau)).into_log("record", &record.joints).map_err(wrong)
 }
 
-/// The torque at a sample's instant of which the smooth curve through the positions is the motion, where torques u are held from each sample to the next.
+/// The torque at a sample's instant of which the smooth curve through the positions is the motion, where torques u are
+/// held from each sample to the next.
 ///
-/// With I q̈ + G(q) = u, second differences of the positions see the mean `ū` of the two values and G over the triangle of both steps:
-/// `I δ²q/h² + G + h² G''/12 = ū`. With `δ²q/h² = q̈ + h² q⁗/12` that is `ū - h²/12 (I q⁗ + G'') = ū - δ²ū/12`, exact to h⁴: without it the paper's arm at 1 kHz is 2e-6 off.
+/// With I q̈ + G(q) = u, second differences of the positions see the mean `ū` of the two values and G over the triangle
+/// of both steps: `I δ²q/h² + G + h² G''/12 = ū`. With `δ²q/h² = q̈ + h² q⁗/12` that is `ū - h²/12 (I q⁗ + G'') = ū -
+/// δ²ū/12`, exact to h⁴: without it the paper's arm at 1 kHz is 2e-6 off.
 fn held_torque(u: &[f64], sample: usize) -> f64 {
     (13.0 * (u[sample - 1] + u[sample]) - u[sample - 2] - u[sample + 1]) / 24.0
 }

@@ -108,8 +108,10 @@ fn model_of(record: &RunRecord) -> Option<ModelParameters> {
     record.estimate.as_ref().and_then(RunEstimate::for_controller)
 }
 
-/// The run whose estimate is worth most: the newest good one, unless its error bars are far wider than those of an earlier run; and a rejected one where its error bars are clearly narrower. Bad tracking
-/// says that the model which the run was made with is bad, not that the run determines little: a joint that is thrown about may determine more than one that hardly moves.
+/// The run whose estimate is worth most: the newest good one, unless its error bars are far wider than those of an
+/// earlier run; and a rejected one where its error bars are clearly narrower. Bad tracking says that the model which
+/// the run was made with is bad, not that the run determines little: a joint that is thrown about may determine more
+/// than one that hardly moves.
 fn most_trusted(records: &[RunRecord]) -> Option<&RunRecord> {
     records.iter().filter(|record| model_of(record).is_some()).reduce(|best, record| {
         let most = if record.accepted { FAR_WIDER } else { CLEARLY_NARROWER };

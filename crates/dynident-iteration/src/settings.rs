@@ -17,11 +17,13 @@ pub enum Scheme {
     /// All joints at once.
     #[default]
     AllJoints,
-    /// Joint by joint from tip to base, as in the paper (Eqs. 9, 10): the rows of one joint alone, columns that are known already subtracted.
+    /// Joint by joint from tip to base, as in the paper (Eqs. 9, 10): the rows of one joint alone, columns that are
+    /// known already subtracted.
     StepByStep,
 }
 
-/// How one run is identified: the motion as it follows from a record, then all that an identification can be determined.
+/// How one run is identified: the motion as it follows from a record, then all that an identification can be
+/// determined.
 #[derive(Clone, Debug)]
 pub struct RunIdentificationSettings {
     /// All joints at once (the default), or step by step.
@@ -75,9 +77,9 @@ pub enum StartWith {
     Prior,
 }
 
-/// When an iteration has settled. A run of the model-based controller must follow an accepted run, with
-/// `|θ_k - θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance · max|θ|` and `s ≤ most_uncertain · max|θ|` for every parameter, and a tracking error that is below
-/// `tracking_tolerance` or fell by less than `tracking_ratio`.
+/// When an iteration has settled. A run of the model-based controller must follow an accepted run, with `|θ_k -
+/// θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance · max|θ|` and `s ≤ most_uncertain · max|θ|`
+/// for every parameter, and a tracking error that is below `tracking_tolerance` or fell by less than `tracking_ratio`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SettledSettings {
@@ -85,7 +87,8 @@ pub struct SettledSettings {
     pub parameter_sigmas: f64,
     /// Share of the largest parameter within which a change counts as none. Default 1e-6.
     pub parameter_tolerance: f64,
-    /// Widest error bar (one standard deviation) as a share of the largest parameter: what is known worse than that cannot be said to stand still. Default 0.1.
+    /// Widest error bar (one standard deviation) as a share of the largest parameter: what is known worse than that
+    /// cannot be said to stand still. Default 0.1.
     pub most_uncertain: f64,
     /// Tracking error that is good enough, rad (m). Default 1e-4.
     pub tracking_tolerance: f64,
@@ -112,15 +115,18 @@ pub struct IterationSettings {
     pub identification: RunIdentificationSettings,
     /// What controls the first run; default a controller without a model.
     pub start: StartWith,
-    /// The controller of the first run where that has the prior as its model: a poor model asks for less trust than a good one. Default [`controller`](Self::controller).
+    /// The controller of the first run where that has the prior as its model: a poor model asks for less trust than a
+    /// good one. Default [`controller`](Self::controller).
     pub first: Option<ControllerSettings>,
     /// The controller without a model: joint PD (16 and 8) by default. It is also what a bad model falls back to.
     pub model_free: ControllerSettings,
-    /// The controller with the model so far: the paper's finite-time law with its gains of joint 2 (4 and 4) by default.
+    /// The controller with the model so far: the paper's finite-time law with its gains of joint 2 (4 and 4) by
+    /// default.
     pub controller: ControllerSettings,
     /// Whether a run that got worse is rejected and its step halved; true by default.
     pub reject: bool,
-    /// A run is worse when its tracking error (mean over the joints of the largest) is above this many times that of the last good run, and above `settled.tracking_tolerance`. Default 1.5.
+    /// A run is worse when its tracking error (mean over the joints of the largest) is above this many times that of
+    /// the last good run, and above `settled.tracking_tolerance`. Default 1.5.
     pub worse_factor: f64,
     /// How often a step is halved before the controller without a model comes back. Default 3.
     pub most_halvings: usize,
@@ -154,8 +160,9 @@ impl Default for IterationSettings {
 }
 
 impl IterationSettings {
-    /// The paper's scheme as it stands: velocities and accelerations by the map from position (Eqs. 15, 16) with the lag of at most `max_lag_s` estimated, step by step, every estimate straight into the
-    /// controller, nothing rejected.
+    /// The paper's scheme as it stands: velocities and accelerations by the map from position (Eqs. 15, 16) with the
+    /// lag of at most `max_lag_s` estimated, step by step, every estimate straight into the controller, nothing
+    /// rejected.
     pub fn literal(max_lag_s: f64) -> Self {
         Self {
             identification: RunIdentificationSettings {

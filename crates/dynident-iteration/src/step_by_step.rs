@@ -1,4 +1,5 @@
-//! The paper's order: the tip joint first, then each joint towards the base with what is known already taken off its torque.
+//! The paper's order: the tip joint first, then each joint towards the base with what is known already taken off its
+//! torque.
 
 use crate::error::IterationError;
 use crate::leg::IterationTask;
@@ -21,8 +22,8 @@ pub(crate) struct Steps {
     pub(crate) rows: usize,
 }
 
-/// Step by step: θ_k by least squares on `τ_k - B θ_known = A θ_k`, the rows of joint k alone (Eqs. 9, 10). What was estimated before enters with its covariance,
-/// `∂θ_k/∂θ_known = -A⁺ B`.
+/// Step by step: θ_k by least squares on `τ_k - B θ_known = A θ_k`, the rows of joint k alone (Eqs. 9, 10). What was
+/// estimated before enters with its covariance, `∂θ_k/∂θ_known = -A⁺ B`.
 pub(crate) fn step_by_step(
     task: &IterationTask,
     logs: &Logs<'_>,

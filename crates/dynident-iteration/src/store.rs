@@ -14,8 +14,9 @@ const UNFINISHED: &str = ".unfinished-";
 /// Schema of `runs/run_k/run.json`.
 const RUN_SCHEMA: &str = "dynident/run/1";
 
-/// The folder of an iteration: `runs/run_k/run.json` and the records beside it. A run appears in one step (rename of a finished folder, everything on the disk before), so that whoever is killed at
-/// any moment finds all runs up to one of them, and goes on with the next.
+/// The folder of an iteration: `runs/run_k/run.json` and the records beside it. A run appears in one step (rename of a
+/// finished folder, everything on the disk before), so that whoever is killed at any moment finds all runs up to one of
+/// them, and goes on with the next.
 #[derive(Debug)]
 pub struct IterationStore {
     runs: PathBuf,
@@ -31,7 +32,8 @@ struct RunFile {
 }
 
 impl IterationStore {
-    /// Opens or makes the folder. `fingerprint` stands for everything that the runs depend on; runs with another one are another iteration's. Without `resume`, runs that are there are removed.
+    /// Opens or makes the folder. `fingerprint` stands for everything that the runs depend on; runs with another one
+    /// are another iteration's. Without `resume`, runs that are there are removed.
     ///
     /// # Errors
     /// A folder that cannot be written; runs of another iteration.

@@ -1,7 +1,7 @@
 //! A buffer whose first value starts a cache line.
 
-/// A growing buffer of `f64` that starts at a multiple of 64 bytes, so that a store of eight lanes never straddles two cache lines (measured:
-/// such stores cost the torque regressor a third of its speed).
+/// A growing buffer of `f64` that starts at a multiple of 64 bytes, so that a store of eight lanes never straddles two
+/// cache lines (measured: such stores cost the torque regressor a third of its speed).
 #[derive(Debug, Default)]
 pub struct AlignedBuffer {
     data: Vec<f64>,

@@ -25,14 +25,14 @@ enum Instructions {
     Avx512(HasAvx512),
 }
 
-/// What this processor can do. A value of this type is the proof that the instructions it names exist: it can only be had from
-/// [`Level::detect`], [`Level::available`] and [`Level::portable`].
+/// What this processor can do. A value of this type is the proof that the instructions it names exist: it can only be
+/// had from [`Level::detect`], [`Level::available`] and [`Level::portable`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Level(Instructions);
 
 impl Level {
-    /// The best level of this processor; a lower one if the environment variable `DYNIDENT_INSTRUCTIONS` (`portable`, `avx2` or `avx512`) says so, for tests and comparisons. Any
-    /// other value of the variable counts as none.
+    /// The best level of this processor; a lower one if the environment variable `DYNIDENT_INSTRUCTIONS` (`portable`,
+    /// `avx2` or `avx512`) says so, for tests and comparisons. Any other value of the variable counts as none.
     pub fn detect() -> Self {
         static CHOSEN: OnceLock<Level> = OnceLock::new();
         *CHOSEN.get_or_init(|| {
@@ -43,7 +43,8 @@ impl Level {
         })
     }
 
-    /// The level that every processor of the build target has. On 64-bit ARM that includes NEON and the fused multiply-add.
+    /// The level that every processor of the build target has. On 64-bit ARM that includes NEON and the fused
+    /// multiply-add.
     pub fn portable() -> Self {
         Self(Instructions::Portable)
     }

@@ -3,7 +3,8 @@
 use crate::scalar::Scalar;
 use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-/// `value + derivative·ε` with `ε² = 0`: carries the exact directional derivative through any algorithm over [`Scalar`].
+/// `value + derivative·ε` with `ε² = 0`: carries the exact directional derivative through any algorithm over
+/// [`Scalar`].
 ///
 /// ```
 /// use dynident_lanes::{Dual, Scalar};

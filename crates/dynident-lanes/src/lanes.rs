@@ -43,8 +43,8 @@ pub trait Lane: Scalar {
         lanes[..Self::LANES].iter().sum()
     }
 
-    /// The lane type that holds several values of this one side by side: several joints of a single sample, or just one value where the
-    /// lanes are samples already. What vectorises *inside* one sample is written over bundles.
+    /// The lane type that holds several values of this one side by side: several joints of a single sample, or just one
+    /// value where the lanes are samples already. What vectorises *inside* one sample is written over bundles.
     type Bundle: Lane;
 
     /// How many values of this type one [`Bundle`](Lane::Bundle) holds: more than one only where a value is one sample.

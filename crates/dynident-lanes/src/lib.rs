@@ -3,8 +3,8 @@
 //!
 //! Every algorithm of the dynamics core is written once over [`Scalar`] and runs
 //! * on one sample ([`dispatch_single`]),
-//! * on four or eight samples side by side ([`dispatch()`]: AVX2, AVX-512 or the build target's own instructions, chosen at run time, so that
-//!   one portable binary is fast everywhere),
+//! * on four or eight samples side by side ([`dispatch()`]: AVX2, AVX-512 or the build target's own instructions,
+//!   chosen at run time, so that one portable binary is fast everywhere),
 //! * on dual numbers ([`Dual`]: exact derivatives, and the oracle for hand-written ones).
 //!
 //! This is the only crate of the core that contains `unsafe`, in one file: `x86.rs`.

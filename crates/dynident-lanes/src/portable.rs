@@ -2,8 +2,8 @@
 
 use crate::register::Register;
 
-/// `N` numbers without any instruction beyond the build target's; `FUSED` allows the fused multiply-add, which must only be asked for where
-/// the processor has it: elsewhere it is a slow library call.
+/// `N` numbers without any instruction beyond the build target's; `FUSED` allows the fused multiply-add, which must
+/// only be asked for where the processor has it: elsewhere it is a slow library call.
 #[derive(Clone, Copy, Debug)]
 #[repr(transparent)]
 pub(crate) struct Portable<const N: usize, const FUSED: bool>([f64; N]);

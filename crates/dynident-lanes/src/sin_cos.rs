@@ -1,8 +1,9 @@
 //! Sine and cosine of all lanes at once.
 //!
-//! Reduction to [-π/4, π/4] by a three-part π/2 (Cody and Waite 1980), then the minimax polynomials of the same interval
-//! that the standard mathematical libraries use (fdlibm's `__kernel_sin`, `__kernel_cos`: degrees 13 and 14, error below 2^-58).
-//! Branch-free but for the rare angle beyond [`LARGEST_ANGLE`], where the standard library takes over.
+//! Reduction to [-π/4, π/4] by a three-part π/2 (Cody and Waite 1980), then the minimax polynomials of the same
+//! interval that the standard mathematical libraries use (fdlibm's `__kernel_sin`, `__kernel_cos`: degrees 13 and 14,
+//! error below 2^-58). Branch-free but for the rare angle beyond [`LARGEST_ANGLE`], where the standard library takes
+//! over.
 
 use crate::register::Register;
 

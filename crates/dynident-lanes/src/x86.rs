@@ -1,11 +1,12 @@
 //! AVX2 and AVX-512: registers by name, and the way in. **All `unsafe` of Dynident's core is in this file.**
 //!
-//! Why it is sound: every intrinsic here needs a processor feature. The register types are private to this crate, so code can only meet them as the
-//! type parameter of [`Kernel::run`], and that is called with them by [`enter_avx2`] and [`enter_avx512`] alone, which demand a proof that the
-//! run-time check succeeded: [`HasAvx2`] and [`HasAvx512`] cannot be made without it. Loads and stores check lengths first.
+//! Why it is sound: every intrinsic here needs a processor feature. The register types are private to this crate, so
+//! code can only meet them as the type parameter of [`Kernel::run`], and that is called with them by [`enter_avx2`] and
+//! [`enter_avx512`] alone, which demand a proof that the run-time check succeeded: [`HasAvx2`] and [`HasAvx512`] cannot
+//! be made without it. Loads and stores check lengths first.
 //!
-//! Why intrinsics at all: the compiler does not turn arrays of eight `f64` into AVX-512 code reliably (measured: ten times slower; see
-//! `docs/decisions/0003-lanes.md`).
+//! Why intrinsics at all: the compiler does not turn arrays of eight `f64` into AVX-512 code reliably (measured: ten
+//! times slower; see `docs/decisions/0003-lanes.md`).
 
 #![allow(unsafe_code, reason = "SIMD intrinsics; see the module documentation for why it is sound")]
 

@@ -7,8 +7,8 @@ use nalgebra::{Matrix3, Matrix4};
 pub const INERTIAL_NAMES: [&str; 10] = ["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
 
 /// `[m, m r_x, m r_y, m r_z, I_xx, I_xy, I_xz, I_yy, I_yz, I_zz]` of one rigid body: mass in kg, first moment in kg m,
-/// inertia **about the origin of the body frame** in kg m², all in the axes of the body frame. `r` is the centre of mass and
-/// the products of inertia are entries of the inertia matrix: `I_xy = -∫ x y dm`.
+/// inertia **about the origin of the body frame** in kg m², all in the axes of the body frame. `r` is the centre of
+/// mass and the products of inertia are entries of the inertia matrix: `I_xy = -∫ x y dm`.
 #[doc(alias("barycentric parameters", "standard parameters", "inertia tensor"))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InertialParameters(pub [f64; 10]);
@@ -77,8 +77,8 @@ impl InertialParameters {
         Self(core::array::from_fn(|k| self.0[k] + other.0[k]))
     }
 
-    /// The pseudo-inertia `P = [Σ h; hᵀ m]` with `Σ = ½ tr(I) 1 - I` and `h = m r`: the body is physically consistent exactly when
-    /// `P` is positive (semi-)definite (Traversaro et al. 2016; Wensing, Kim and Slotine 2018).
+    /// The pseudo-inertia `P = [Σ h; hᵀ m]` with `Σ = ½ tr(I) 1 - I` and `h = m r`: the body is physically consistent
+    /// exactly when `P` is positive (semi-)definite (Traversaro et al. 2016; Wensing, Kim and Slotine 2018).
     pub fn pseudo_inertia(&self) -> Matrix4<f64> {
         let i = self.inertia_at_origin().0;
         let half_trace = 0.5 * (i[0][0] + i[1][1] + i[2][2]);

@@ -48,8 +48,8 @@ pub struct Mimic {
     pub offset: f64,
 }
 
-/// A joint of the tree. Its child body's frame is the joint frame: at position zero it stands at `placement` in the parent body's
-/// frame, and it moves by `q` about (along) `axis`.
+/// A joint of the tree. Its child body's frame is the joint frame: at position zero it stands at `placement` in the
+/// parent body's frame, and it moves by `q` about (along) `axis`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     /// Unique name.

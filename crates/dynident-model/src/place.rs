@@ -22,7 +22,8 @@ impl<F: Error> Located<F> {
     }
 }
 
-/// Line and column (from 1, in characters) of byte `offset`; an offset beyond the text or inside a character counts as the place before.
+/// Line and column (from 1, in characters) of byte `offset`; an offset beyond the text or inside a character counts as
+/// the place before.
 pub fn line_and_column(text: &str, offset: usize) -> (u32, u32) {
     let mut end = offset.min(text.len());
     while !text.is_char_boundary(end) {

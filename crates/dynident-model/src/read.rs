@@ -90,10 +90,12 @@ pub enum ReadError {
     },
 }
 
-/// Reads a robot description: `.urdf` and `.xml` as URDF, `.toml` as D-H table, any other name by whether the text begins with `<`.
+/// Reads a robot description: `.urdf` and `.xml` as URDF, `.toml` as D-H table, any other name by whether the text
+/// begins with `<`.
 ///
 /// # Errors
-/// If the file cannot be read, is too large, empty, or no UTF-8, or if its content is faulty; every message names the file.
+/// If the file cannot be read, is too large, empty, or no UTF-8, or if its content is faulty; every message names the
+/// file.
 #[doc(alias("urdf", "denavit-hartenberg"))]
 pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
     let path = path.as_ref();

@@ -40,7 +40,8 @@ impl Random {
         v.scale(1.0 / v.norm())
     }
 
-    /// A physically consistent body: three positive principal moments that keep the triangle inequality, about a centre of mass within 0.3 m.
+    /// A physically consistent body: three positive principal moments that keep the triangle inequality, about a centre
+    /// of mass within 0.3 m.
     pub fn body(&mut self) -> InertialParameters {
         let mass = self.uniform(0.2, 5.0);
         let second: [f64; 3] = core::array::from_fn(|_| mass * self.uniform(0.001, 0.04));
@@ -75,8 +76,8 @@ fn plain_body(name: String, inertial: Option<InertialParameters>) -> Body {
     Body { links: vec![Link { name, placement: Transform::IDENTITY, inertial }] }
 }
 
-/// A random tree of `dof` joints: turning and sliding (one in four), general axes and placements, branches, sometimes several trees on the base;
-/// physically consistent bodies; gravity in a general direction.
+/// A random tree of `dof` joints: turning and sliding (one in four), general axes and placements, branches, sometimes
+/// several trees on the base; physically consistent bodies; gravity in a general direction.
 ///
 /// # Panics
 /// Never: every part is valid by construction.
@@ -105,8 +106,8 @@ pub fn random_tree(seed: u64, dof: usize) -> Model {
         .expect("a random tree is valid by construction")
 }
 
-/// The paper's planar arm: two revolute joints with parallel axes along z, first link of length `a1_m`, gravity along -y
-/// (*Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*, Fig. 1 and Table 1).
+/// The paper's planar arm: two revolute joints with parallel axes along z, first link of length `a1_m`, gravity along
+/// -y (*Iterative Identification of Robot Dynamic Parameters Based on Logistic Function*, Fig. 1 and Table 1).
 ///
 /// # Panics
 /// Never: every part is valid by construction.

@@ -117,7 +117,8 @@ impl<T> IndexMut<usize> for Vec3<T> {
     }
 }
 
-/// All nine entries written out: the compiler keeps them in registers, which it does not with `array::from_fn` on wide lanes.
+/// All nine entries written out: the compiler keeps them in registers, which it does not with `array::from_fn` on wide
+/// lanes.
 macro_rules! by_entry {
     ($entry:expr) => {{
         let entry = $entry;
@@ -232,7 +233,8 @@ impl Mat3<f64> {
     }
 }
 
-/// A rigid transform `parent_from_child`: a point `p` of the child frame lies at `rotation · p + translation` in the parent.
+/// A rigid transform `parent_from_child`: a point `p` of the child frame lies at `rotation · p + translation` in the
+/// parent.
 #[doc(alias("se3", "placement"))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transform<T = f64> {

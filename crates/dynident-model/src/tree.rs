@@ -32,7 +32,8 @@ impl Body {
         &self.links[0].name
     }
 
-    /// Prior inertial parameters in the body frame: the sum over its links that have any. `None` when none has: unknown.
+    /// Prior inertial parameters in the body frame: the sum over its links that have any. `None` when none has:
+    /// unknown.
     pub fn prior(&self) -> Option<InertialParameters> {
         self.links
             .iter()
@@ -41,8 +42,8 @@ impl Body {
     }
 }
 
-/// A robot on a fixed base: joints and bodies in an order where parents come before children. Body `i` moves with joint `i`;
-/// positions, velocities and torques are vectors in this order.
+/// A robot on a fixed base: joints and bodies in an order where parents come before children. Body `i` moves with joint
+/// `i`; positions, velocities and torques are vectors in this order.
 #[doc(alias("robot", "kinematic tree", "multibody"))]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
@@ -59,8 +60,8 @@ impl Model {
     /// A model from its parts. `base` holds the links that do not move.
     ///
     /// # Errors
-    /// If counts differ, a name stands twice, a parent does not come before its child, an axis is not a unit vector, or a number is
-    /// not finite.
+    /// If counts differ, a name stands twice, a parent does not come before its child, an axis is not a unit vector, or
+    /// a number is not finite.
     pub fn new(name: &str, base: Body, joints: Vec<Joint>, bodies: Vec<Body>) -> Result<Self, ModelError> {
         if joints.len() != bodies.len() {
             return Err(ModelError::Counts { joints: joints.len(), bodies: bodies.len() });
@@ -132,7 +133,8 @@ impl Model {
         self.gravity
     }
 
-    /// Inertial parameters of the bodies in their frames, zero where [`Body::prior`] is unknown: what the dynamics compute with.
+    /// Inertial parameters of the bodies in their frames, zero where [`Body::prior`] is unknown: what the dynamics
+    /// compute with.
     pub fn inertials(&self) -> &[InertialParameters] {
         &self.inertials
     }
@@ -186,8 +188,8 @@ impl Model {
         Ok(self)
     }
 
-    /// The same robot mounted with its base turned by roll, pitch, yaw (radians, fixed axes) against the world: gravity turns the other
-    /// way in the base frame.
+    /// The same robot mounted with its base turned by roll, pitch, yaw (radians, fixed axes) against the world: gravity
+    /// turns the other way in the base frame.
     ///
     /// # Errors
     /// If an angle is not finite.

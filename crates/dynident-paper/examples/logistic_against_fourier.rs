@@ -1,4 +1,5 @@
-//! Logistic strokes against Fourier series: the same arm, limits, time, controller and noise, and the error of the parameters over many noisy runs.
+//! Logistic strokes against Fourier series: the same arm, limits, time, controller and noise, and the error of the
+//! parameters over many noisy runs.
 //!
 //! ```text
 //! cargo run --release -p dynident-paper --example logistic_against_fourier [SEEDS]
@@ -49,7 +50,8 @@ fn main() -> Result<(), Box<dyn Error>> {
                     let reference = first.get_or_insert_with(|| errors.clone());
                     let logs: Vec<f64> = errors.iter().zip(&*reference).map(|(a, b)| (a / b).ln()).collect();
                     let mean = logs.iter().sum::<f64>() / logs.len() as f64;
-                    // Each root mean square of n runs is known to 1/√(2n), a quotient of two to 1/√n; parameters of one run are not independent, so this is not divided further.
+                    // Each root mean square of n runs is known to 1/√(2n), a quotient of two to 1/√n; parameters of one
+                    // run are not independent, so this is not divided further.
                     let bar = mean.exp() / (seeds as f64).sqrt();
                     println!("| {arm} | {name} | {log_det:.1} | {:.2} ± {bar:.2} | {tracking:.1e} |", mean.exp());
                 }

@@ -179,8 +179,8 @@ fn iteration_settings(protocol: &Protocol) -> IterationSettings {
     settings
 }
 
-/// What is believed before the first run. The paper begins with zeros; a physically consistent set needs a mass: half a kilogram
-/// half way along each link.
+/// What is believed before the first run. The paper begins with zeros; a physically consistent set needs a mass: half a
+/// kilogram half way along each link.
 pub(crate) fn prior(literal: bool) -> Vec<f64> {
     let link = if literal { [0.0; 10] } else { [0.5, 0.25, 0.0, 0.0, 0.02, 0.0, 0.0, 0.2, 0.0, 0.2] };
     [link, link].concat()

@@ -31,7 +31,8 @@ impl Differentiator for LiteralMap {
     }
 }
 
-/// Velocity and acceleration at any position, outside the stroke as well. A joint that stands still (A = 0) has neither.
+/// Velocity and acceleration at any position, outside the stroke as well. A joint that stands still (A = 0) has
+/// neither.
 fn rates_as_written(path: &LogisticPath, q: f64, time_s: f64) -> [f64; 2] {
     let LogisticPath { amplitude, omega, offset, .. } = *path;
     if amplitude == 0.0 {

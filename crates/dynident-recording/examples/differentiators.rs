@@ -1,4 +1,5 @@
-//! Bias and noise of every differentiator, against noise level and tracking error. Prints the tables of the book's page on differentiators.
+//! Bias and noise of every differentiator, against noise level and tracking error. Prints the tables of the book's page
+//! on differentiators.
 //!
 //! `cargo run --release -p dynident-recording --example differentiators`
 

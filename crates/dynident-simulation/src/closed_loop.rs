@@ -55,7 +55,8 @@ pub struct RunLimits {
 }
 
 impl RunLimits {
-    /// Position, velocity and torque limits of the description; where it has none, the largest number there is (infinity has no place in JSON).
+    /// Position, velocity and torque limits of the description; where it has none, the largest number there is
+    /// (infinity has no place in JSON).
     pub fn of_model(model: &Model) -> Self {
         let each = |of: fn(&dynident_model::JointLimits) -> Option<f64>, none: f64| {
             Some(PerJoint::Each(model.joints().iter().map(|joint| of(&joint.limits).unwrap_or(none)).collect()))
@@ -72,7 +73,8 @@ impl RunLimits {
     /// Checks the numbers for so many joints.
     ///
     /// # Errors
-    /// Lists of another length, numbers that are not numbers, limits of torque, velocity or error that are not positive.
+    /// Lists of another length, numbers that are not numbers, limits of torque, velocity or error that are not
+    /// positive.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         self.values(joints).map(|_| ())
     }
@@ -132,8 +134,9 @@ struct Limits {
     error: Vec<f64>,
 }
 
-/// Runs the controller on the robot along the reference: at every sample it is read, the controller asks for torques, which are cut to their limits and hold until the next sample. The controller is reset
-/// first. Steps allocate nothing (but those of the adaptive integrator).
+/// Runs the controller on the robot along the reference: at every sample it is read, the controller asks for torques,
+/// which are cut to their limits and hold until the next sample. The controller is reset first. Steps allocate nothing
+/// (but those of the adaptive integrator).
 ///
 /// ```
 /// use dynident_simulation::{ControllerSettings, LoopSettings, Plant, Reference, closed_loop};

@@ -1,4 +1,5 @@
-//! What can be wrong before a run begins. What happens during a run is its verdict, not an error: see [`RunStatus`](crate::RunStatus).
+//! What can be wrong before a run begins. What happens during a run is its verdict, not an error: see
+//! [`RunStatus`](crate::RunStatus).
 
 use dynident_excitation::families::FamilyError;
 use dynident_model::ModelError;

@@ -1,5 +1,6 @@
-//! Blocks of samples between the loop, which goes from sample to sample, and arrays that are joint-major. Written straight, every sample would touch a page for each joint of each array, more than a
-//! processor keeps addresses of; in blocks it is one page in 32 samples.
+//! Blocks of samples between the loop, which goes from sample to sample, and arrays that are joint-major. Written
+//! straight, every sample would touch a page for each joint of each array, more than a processor keeps addresses of; in
+//! blocks it is one page in 32 samples.
 
 use crate::controllers::Target;
 use crate::reference::Reference;

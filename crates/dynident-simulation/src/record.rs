@@ -59,8 +59,10 @@ impl Record {
 impl SensorSettings {
     /// What these sensors record of a run of a robot.
     ///
-    /// Positions between the controller's samples are those of the cubic polynomial that takes over position and velocity of both (error below `h⁴/384` of the fourth derivative); torques are constant
-    /// between samples. Where the record takes its positions at the controller's own instants (same rate, no jitter, drift or delay), they are the readings that the controller saw, with the same noise.
+    /// Positions between the controller's samples are those of the cubic polynomial that takes over position and
+    /// velocity of both (error below `h⁴/384` of the fourth derivative); torques are constant between samples. Where
+    /// the record takes its positions at the controller's own instants (same rate, no jitter, drift or delay), they are
+    /// the readings that the controller saw, with the same noise.
     ///
     /// # Errors
     /// As [`validate`](Self::validate).

@@ -40,7 +40,8 @@ impl Reference {
     /// A trajectory of a family over its whole duration, or over `duration_s` of it.
     ///
     /// # Errors
-    /// Parameters of another length, a rate or duration that is not positive or gives too many samples, a motion that is not finite.
+    /// Parameters of another length, a rate or duration that is not positive or gives too many samples, a motion that
+    /// is not finite.
     pub fn of_family(
         family: &dyn Family,
         parameters: &[f64],

@@ -113,8 +113,8 @@ impl core::fmt::Display for RunStatus {
     }
 }
 
-/// A run: what truly was at every sample of the controller up to its end, what the controller saw, and how it went. Arrays are joint-major: joint `j`, sample `s` at `j * samples + s`. All numbers are
-/// finite, whatever happened.
+/// A run: what truly was at every sample of the controller up to its end, what the controller saw, and how it went.
+/// Arrays are joint-major: joint `j`, sample `s` at `j * samples + s`. All numbers are finite, whatever happened.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
     /// Names of the joints.

@@ -19,7 +19,8 @@ pub enum VelocitySource {
     },
 }
 
-/// Sensors of a robot and of its log. The default is perfect: no noise, no quantisation, no delay, recorded at the controller's rate.
+/// Sensors of a robot and of its log. The default is perfect: no noise, no quantisation, no delay, recorded at the
+/// controller's rate.
 ///
 /// ```
 /// use dynident_simulation::SensorSettings;
@@ -56,7 +57,8 @@ pub struct SensorSettings {
     pub position_delay_s: PerJoint,
     /// How late recorded torques are, s. Default 0.
     pub torque_delay_s: PerJoint,
-    /// By how many millionths the record's clock runs slow: its sample `k` is taken at `k/rate · (1 + 1e-6 · drift)`. Default 0.
+    /// By how many millionths the record's clock runs slow: its sample `k` is taken at `k/rate · (1 + 1e-6 · drift)`.
+    /// Default 0.
     pub clock_drift_ppm: f64,
     /// Seed of all noise. Default 1.
     pub seed: u64,
@@ -83,7 +85,8 @@ impl Default for SensorSettings {
 }
 
 impl SensorSettings {
-    /// The standard noise of BIRDy's protocol: positions 1e-3 degrees, torques 0.05 Nm, recorded at 1 kHz (Leboutet et al., Applied Sciences 11 (2021) 4303).
+    /// The standard noise of BIRDy's protocol: positions 1e-3 degrees, torques 0.05 Nm, recorded at 1 kHz (Leboutet et
+    /// al., Applied Sciences 11 (2021) 4303).
     pub fn birdy_standard(seed: u64) -> Self {
         Self {
             position_std: 1e-3_f64.to_radians().into(),
@@ -97,7 +100,8 @@ impl SensorSettings {
     /// Checks the numbers for so many joints.
     ///
     /// # Errors
-    /// Numbers that are negative or not finite, lists of another length, steps that are not positive, a correlation outside [0, 1), delays above 10 s or 1000 samples, a drift of more than 10 %.
+    /// Numbers that are negative or not finite, lists of another length, steps that are not positive, a correlation
+    /// outside [0, 1), delays above 10 s or 1000 samples, a drift of more than 10 %.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         let none_or_more = "give zero or a finite positive number";
         for (what, values) in [("position_std", &self.position_std), ("torque_std", &self.torque_std)] {

@@ -1,4 +1,5 @@
-//! What the tests of several crates share: where files are, and how often an experiment is repeated. It knows no other crate.
+//! What the tests of several crates share: where files are, and how often an experiment is repeated. It knows no other
+//! crate.
 
 #![forbid(unsafe_code)]
 
@@ -23,8 +24,8 @@ pub fn recordings() -> Option<PathBuf> {
     None
 }
 
-/// How often a random experiment is repeated: `daily`, and `long` where `DYNIDENT_LONG` is 1. The long run goes on where
-/// the daily one ends, with the same seed.
+/// How often a random experiment is repeated: `daily`, and `long` where `DYNIDENT_LONG` is 1. The long run goes on
+/// where the daily one ends, with the same seed.
 ///
 /// # Panics
 /// Where `DYNIDENT_LONG` is set to anything but 0 or 1: a long run that quietly is none would prove nothing.

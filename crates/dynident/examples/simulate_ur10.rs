@@ -4,9 +4,10 @@
 //! cargo run --release -p dynident --example simulate_ur10 -- examples/ur10_simulated
 //! ```
 //!
-//! The true robot is `robots/ur10.urdf` with masses, centres of mass and inertias changed by 10 to 15 %, and with drive inertia,
-//! viscous and Coulomb friction and a torque offset in every joint. `train.csv` and `test.csv` hold 20 s at 125 Hz each: what an encoder
-//! says of the position, and the torque with slightly coloured noise. `truth.json` holds the parameters. Same seed, same files.
+//! The true robot is `robots/ur10.urdf` with masses, centres of mass and inertias changed by 10 to 15 %, and with drive
+//! inertia, viscous and Coulomb friction and a torque offset in every joint. `train.csv` and `test.csv` hold 20 s at
+//! 125 Hz each: what an encoder says of the position, and the torque with slightly coloured noise. `truth.json` holds
+//! the parameters. Same seed, same files.
 
 use dynident_dynamics::{BatchWorkspace, all_columns, inverse_dynamics_batch};
 use dynident_model::sample::Random;
@@ -124,8 +125,8 @@ fn csv(truth: &Model, terms: &[TorqueTerm], drives: &[f64], random: &mut Random)
     text
 }
 
-/// Positions, velocities and accelerations, joint-major: a finite Fourier series about the home position, faded in and out, as large as
-/// reach and limit of velocity allow.
+/// Positions, velocities and accelerations, joint-major: a finite Fourier series about the home position, faded in and
+/// out, as large as reach and limit of velocity allow.
 fn motion(model: &Model, samples: usize, random: &mut Random) -> [Vec<f64>; 3] {
     let mut out: [Vec<f64>; 3] = Default::default();
     for (joint, home) in HOME_RAD.iter().enumerate() {
@@ -144,7 +145,8 @@ fn motion(model: &Model, samples: usize, random: &mut Random) -> [Vec<f64>; 3] {
     out
 }
 
-/// Value, first and second derivative of `e(t) Σ a_k sin(k ω t) + b_k cos(k ω t)`, with two periods of `ω` in the duration.
+/// Value, first and second derivative of `e(t) Σ a_k sin(k ω t) + b_k cos(k ω t)`, with two periods of `ω` in the
+/// duration.
 fn faded_series(coefficients: &[[f64; 2]], t: f64) -> [f64; 3] {
     let mut f = [0.0; 3];
     for (k, [a, b]) in coefficients.iter().enumerate() {

@@ -4,8 +4,8 @@ use crate::error::Error;
 use std::io::Write;
 use std::path::Path;
 
-/// Writes `contents` to `path` by way of a temporary file in the same folder: a reader sees the old file or the new one, never a half of one, and an error
-/// leaves what was there.
+/// Writes `contents` to `path` by way of a temporary file in the same folder: a reader sees the old file or the new
+/// one, never a half of one, and an error leaves what was there.
 ///
 /// # Errors
 /// [`Error::Output`] with the system's reason.
@@ -26,7 +26,8 @@ pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Finds out before a long job whether [`write_whole`] will be able to write into `folder`, which need not exist yet. Leaves nothing behind.
+/// Finds out before a long job whether [`write_whole`] will be able to write into `folder`, which need not exist yet.
+/// Leaves nothing behind.
 ///
 /// # Errors
 /// [`Error::Output`] with the system's reason.

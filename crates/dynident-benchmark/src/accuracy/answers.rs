@@ -35,7 +35,8 @@ pub(super) fn wide(trial: &Trial<'_>) -> Result<Answer, IdentificationError> {
     weighted(&filtered(trial, &motion, cutoff_hz)?, CovarianceMethod::Jackknife)
 }
 
-/// The fit with the regressor of the true motion: an oracle that separates what differentiation costs from what decimation costs.
+/// The fit with the regressor of the true motion: an oracle that separates what differentiation costs from what
+/// decimation costs.
 pub(super) fn true_motion(trial: &Trial<'_>) -> Result<Answer, IdentificationError> {
     let rows = filtered(trial, &with_motion(trial, &trial.scenario.motion), trial.cutoff_hz)?;
     weighted(&rows, CovarianceMethod::Jackknife)
@@ -66,7 +67,8 @@ pub(super) fn instrumental(trial: &Trial<'_>) -> Result<Answer, IdentificationEr
     Ok(answer(instrumental_variables(&problem, &InstrumentalSettings::default())?.estimate))
 }
 
-/// The physically consistent parameters that fit all rows of the Fourier series' motion best. They come without error bars.
+/// The physically consistent parameters that fit all rows of the Fourier series' motion best. They come without error
+/// bars.
 pub(super) fn physical(trial: &Trial<'_>) -> Result<Answer, IdentificationError> {
     let rows = trial.shared.periodic(trial)?;
     let sigma = rows.estimate(Estimator::Weighted, CovarianceMethod::White)?.joint_sigma;

@@ -22,7 +22,8 @@ impl<'a> BoundWithMotion<'a> {
         Ok(Self { names, motion: motion.len(), joints: scenario.model.dof(), rows })
     }
 
-    /// The bound on every base parameter's standard deviation: the motion is a Fourier series of the excitation's frequencies with unknown coefficients.
+    /// The bound on every base parameter's standard deviation: the motion is a Fourier series of the excitation's
+    /// frequencies with unknown coefficients.
     pub(super) fn of(&self, level: &NoiseLevel) -> Result<Vec<f64>, EstimationError> {
         let rho = level.torque_correlation;
         let position = ChannelNoise { std: level.position_std_rad(), autoregression: Vec::new() };

@@ -12,7 +12,8 @@ use dynident_recording::MotionBlock;
 /// One simulated experiment, as estimators see it.
 #[derive(Debug)]
 pub struct Trial<'a> {
-    /// The robot and its excitation. Estimators may use the model's structure and the reference motion; its true parameters are for the judge.
+    /// The robot and its excitation. Estimators may use the model's structure and the reference motion; its true
+    /// parameters are for the judge.
     pub scenario: &'a Scenario,
     /// What encoders and torque sensors said.
     pub record: &'a Record,
@@ -24,7 +25,8 @@ pub struct Trial<'a> {
     pub rows: &'a Rows<'a>,
     /// Where an iterative estimator starts: the true base parameters with 15 % Gaussian error.
     pub start: &'a [f64],
-    /// A drawing office's idea of the robot: every body's ten true parameters times a common factor with 15 % Gaussian error, no friction and no drives.
+    /// A drawing office's idea of the robot: every body's ten true parameters times a common factor with 15 % Gaussian
+    /// error, no friction and no drives.
     pub prior: &'a [f64],
     /// What several estimators need, made once.
     pub(super) shared: &'a TrialData<'a>,

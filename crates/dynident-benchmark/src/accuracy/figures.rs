@@ -12,7 +12,8 @@ pub struct ParameterFigures {
     pub truth: f64,
     /// The Cramér-Rao bound on its standard deviation.
     pub bound: f64,
-    /// The same bound when the motion is unknown as well, and only positions as noisy as these hold information about it.
+    /// The same bound when the motion is unknown as well, and only positions as noisy as these hold information about
+    /// it.
     pub bound_with_motion: f64,
     /// Mean error of the runs that did not fail.
     pub bias: f64,
@@ -39,7 +40,8 @@ pub struct CellFigures {
     pub bias_over_bound: Option<f64>,
     /// `√(mean over parameters of (RMSE/bound)²)`: 1 is the best that any unbiased estimator can do.
     pub rmse_over_bound: Option<f64>,
-    /// `√(mean over parameters of (RMSE/bound_with_motion)²)`: 1 is the best that any unbiased estimator can do that is not given the motion.
+    /// `√(mean over parameters of (RMSE/bound_with_motion)²)`: 1 is the best that any unbiased estimator can do that is
+    /// not given the motion.
     pub rmse_over_bound_with_motion: Option<f64>,
     /// The parameter that is worst by RMSE over bound.
     pub worst_parameter: Option<String>,
@@ -47,7 +49,8 @@ pub struct CellFigures {
     pub worst_rmse_over_bound: Option<f64>,
     /// Share of all 95 % intervals that hold the true value, in percent.
     pub coverage_percent: Option<f64>,
-    /// Mean processor time of one estimate, without the rows that several share, milliseconds. The only figure that differs from run to run.
+    /// Mean processor time of one estimate, without the rows that several share, milliseconds. The only figure that
+    /// differs from run to run.
     pub time_ms: f64,
     /// Every base parameter.
     pub parameters: Vec<ParameterFigures>,
@@ -56,7 +59,8 @@ pub struct CellFigures {
 /// Divergence by BIRDy's rule: an error so many times that of the start.
 const DIVERGED: f64 = 50.0;
 
-/// Whether an answer is usable: converged, finite, and not further from the truth than 50 times the start (norms over parameters in units of their bounds).
+/// Whether an answer is usable: converged, finite, and not further from the truth than 50 times the start (norms over
+/// parameters in units of their bounds).
 pub(super) fn usable(answer: &Answer, truth: &[f64], start: &[f64], bound: &[f64]) -> bool {
     let distance = |values: &[f64]| -> f64 {
         values.iter().zip(truth).zip(bound).map(|((x, t), b)| ((x - t) / b).powi(2)).sum::<f64>().sqrt()
@@ -163,7 +167,8 @@ mod tests {
         Answer { values: vec![value], half_width_95: Some(vec![bar]), converged: true }
     }
 
-    /// Errors +1, -3 and a failure on a parameter with a bound of 2: bias -1, RMSE √5; one of two intervals holds the truth.
+    /// Errors +1, -3 and a failure on a parameter with a bound of 2: bias -1, RMSE √5; one of two intervals holds the
+    /// truth.
     #[test]
     fn figures_by_hand() {
         let symbols = ["m1".to_owned()];

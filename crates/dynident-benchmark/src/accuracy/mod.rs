@@ -1,4 +1,5 @@
-//! How accurate estimators are: estimators × noise levels × robots, Monte Carlo after the protocol of BIRDy (Leboutet et al., Applied Sciences 11 (2021) 4303).
+//! How accurate estimators are: estimators × noise levels × robots, Monte Carlo after the protocol of BIRDy (Leboutet
+//! et al., Applied Sciences 11 (2021) 4303).
 //!
 //! The registries are [`ESTIMATORS`], [`NOISE_LEVELS`] and [`ROBOTS`]: one line each adds to the benchmark.
 

@@ -41,7 +41,8 @@ const fn white(name: &'static str, position_std_deg: f64, torque_std_nm: f64) ->
     }
 }
 
-/// The registry: one line for each level. The first five are BIRDy's (Leboutet et al., Applied Sciences 11 (2021) 4303).
+/// The registry: one line for each level. The first five are BIRDy's (Leboutet et al., Applied Sciences 11 (2021)
+/// 4303).
 pub const NOISE_LEVELS: &[NoiseLevel] = &[
     white("standard", 1e-3, 0.05),
     white("low-position", 1e-4, 0.05),

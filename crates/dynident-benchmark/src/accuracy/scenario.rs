@@ -1,7 +1,8 @@
 //! A robot with true parameters and an excitation, and what a recording of it looks like.
 //!
-//! The motion is given, not simulated: the excitation trajectory followed with the small smooth error that a speed-proportional lag leaves, `q = q_d - ε q̇_d`. Torque is exact inverse dynamics
-//! with friction plus noise. There is no controller, so torque noise does not feed back into the motion.
+//! The motion is given, not simulated: the excitation trajectory followed with the small smooth error that a
+//! speed-proportional lag leaves, `q = q_d - ε q̇_d`. Torque is exact inverse dynamics with friction plus noise. There
+//! is no controller, so torque noise does not feed back into the motion.
 
 use super::BenchmarkError;
 use super::noise::NoiseLevel;
@@ -134,8 +135,10 @@ impl Scenario {
         prior
     }
 
-    /// The Cramér-Rao bound on every base parameter's standard deviation: the diagonal of `(Σ_j Y_jᵀ Ω⁻¹ Y_j)^(-1/2)` for the motion known exactly and torque noise of covariance Ω (AR(1), whitened
-    /// by `y_t - ρ y_{t-1}`). What position noise hides is not in it, so it is a bound for every estimator, and one that cannot quite be reached. Outliers do not count: they are there to be set aside.
+    /// The Cramér-Rao bound on every base parameter's standard deviation: the diagonal of `(Σ_j Y_jᵀ Ω⁻¹ Y_j)^(-1/2)`
+    /// for the motion known exactly and torque noise of covariance Ω (AR(1), whitened by `y_t - ρ y_{t-1}`). What
+    /// position noise hides is not in it, so it is a bound for every estimator, and one that cannot quite be reached.
+    /// Outliers do not count: they are there to be set aside.
     pub(super) fn bound(&self, noise: &NoiseLevel) -> Option<Vec<f64>> {
         let (count, samples) = (self.truth.len(), self.motion.samples);
         let mut panels = Panels::default();
@@ -171,7 +174,8 @@ impl Scenario {
     }
 }
 
-/// Drives in proportion to what the bodies ask of the joint: viscous and Coulomb friction of 15 % each, drive inertia of 20 %, an offset of 3 % of the root mean square torque of inertia and gravity.
+/// Drives in proportion to what the bodies ask of the joint: viscous and Coulomb friction of 15 % each, drive inertia
+/// of 20 %, an offset of 3 % of the root mean square torque of inertia and gravity.
 fn drive_value(term: &TorqueTerm, motion: &Motion, bodies: &[f64], joint: usize) -> f64 {
     let rms = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();
     // A joint that the bodies hardly load (a last link about its own axis) has friction all the same.
@@ -211,7 +215,8 @@ fn followed(reference: &Motion) -> Motion {
     Motion { samples: reference.samples, joints: reference.joints, q, dq, ddq, dddq: reference.dddq.clone() }
 }
 
-/// The random Fourier series with the largest `log det` of its information among a few: no design, but nothing that a user would not do better.
+/// The random Fourier series with the largest `log det` of its information among a few: no design, but nothing that a
+/// user would not do better.
 fn excitation(
     robot: &BenchmarkRobot,
     model: &Model,

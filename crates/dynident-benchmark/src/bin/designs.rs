@@ -1,7 +1,8 @@
-//! Families and criteria of excitation design side by side: the same limits, the same processor time. Prints the table of the book's page on designs.
+//! Families and criteria of excitation design side by side: the same limits, the same processor time. Prints the table
+//! of the book's page on designs.
 //!
-//! Time is that of this process on one core, so that what else the robot does counts little: designs of a modest budget follow one another, each with the next seed, until the time is used
-//! up, and the best stands in the table.
+//! Time is that of this process on one core, so that what else the robot does counts little: designs of a modest budget
+//! follow one another, each with the next seed, until the time is used up, and the best stands in the table.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing a table is what this program is for")]
 

@@ -1,10 +1,12 @@
-//! What the iteration reaches under noise: every example's robot over many seeds, the error of its parameters in units of the Cramér-Rao bound, tracking, and runs.
+//! What the iteration reaches under noise: every example's robot over many seeds, the error of its parameters in units
+//! of the Cramér-Rao bound, tracking, and runs.
 //!
 //! ```text
 //! cargo run --release -p dynident-benchmark --bin iterations -- [SEEDS] [STUDY.toml ..]
 //! ```
 //!
-//! The trajectory is looked for once. Every seed has its own noise and, where the robot differs from its description, its own robot.
+//! The trajectory is looked for once. Every seed has its own noise and, where the robot differs from its description,
+//! its own robot.
 
 #![allow(clippy::print_stdout, reason = "printing a table is what this program is for")]
 

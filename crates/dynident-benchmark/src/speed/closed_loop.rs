@@ -18,7 +18,8 @@ const SAMPLES: usize = 5000;
 const EULER: Integrator = Integrator::SemiImplicitEuler { steps_per_sample: 1 };
 const RK4: Integrator = Integrator::Rk4 { steps_per_sample: 1 };
 
-/// Times one step of 1 ms under joint PD towards zero (gains 100 and 20 times the mass matrix' diagonal at zero) by both fixed-step integrators, the same with dry friction, and 10 s of the paper's controller at 1 kHz along sines.
+/// Times one step of 1 ms under joint PD towards zero (gains 100 and 20 times the mass matrix' diagonal at zero) by
+/// both fixed-step integrators, the same with dry friction, and 10 s of the paper's controller at 1 kHz along sines.
 /// Always at this processor's best level.
 pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), SimulationError> {
     let dof = model.dof();
@@ -40,7 +41,8 @@ pub(crate) fn time_all(model: &Model, report: &Report<'_>) -> Result<(), Simulat
             let _ = black_box(closed_loop(&mut plant, controller.as_mut(), &reference, &settings));
         });
     }
-    // Dry friction in every joint, as many Nm as the mass matrix' diagonal at zero has kg m²: some joints stick, some slide.
+    // Dry friction in every joint, as many Nm as the mass matrix' diagonal at zero has kg m²: some joints stick, some
+    // slide.
     let shape = CoulombShape::Sign { dead_band: 0.0 };
     let terms: Vec<TorqueTerm> = (0..dof).map(|joint| TorqueTerm::Coulomb(Coulomb { joint, shape })).collect();
     let mut rough = Plant::new(model, &terms, &scaled(1.0))?;

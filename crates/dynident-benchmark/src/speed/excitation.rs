@@ -12,8 +12,8 @@ use std::hint::black_box;
 
 const SAMPLES: usize = 256;
 
-/// Times the D-criterion of a random Fourier trajectory (5 harmonics, 10 s, base columns) with position, speed and torque limits, and its gradient by the trajectory's parameters. Always
-/// at this processor's best level.
+/// Times the D-criterion of a random Fourier trajectory (5 harmonics, 10 s, base columns) with position, speed and
+/// torque limits, and its gradient by the trajectory's parameters. Always at this processor's best level.
 pub(crate) fn time_all(model: &Model, report: &Report<'_>) {
     let settings = FourierSettings::default();
     let (Ok(family), Ok(limits)) =

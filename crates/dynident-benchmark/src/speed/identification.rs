@@ -13,7 +13,8 @@ use std::hint::black_box;
 
 const SAMPLES: usize = 10_000;
 
-/// Samples in a block: some hundred kilobytes of panels stay in the second-level cache, and a column is an odd number of cache lines.
+/// Samples in a block: some hundred kilobytes of panels stay in the second-level cache, and a column is an odd number
+/// of cache lines.
 const BLOCK: usize = 248;
 
 /// Times both for 10,000 samples of a smooth motion; torques are made beforehand, as in the Python program.

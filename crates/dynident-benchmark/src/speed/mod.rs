@@ -1,4 +1,5 @@
-//! Times of dynamics, of the way from samples to triangular factors, of a step of an excitation design and of one of the closed loop, as JSON lines.
+//! Times of dynamics, of the way from samples to triangular factors, of a step of an excitation design and of one of
+//! the closed loop, as JSON lines.
 
 mod batch;
 mod clock;
@@ -19,7 +20,8 @@ const DYNAMICS_ONLY: &str = "talos_reduced";
 /// The robot whose way to factors is timed.
 const FACTORS_OF: &str = "panda_arm7";
 
-/// Times everything of one robot on these processor levels, `block` samples in a batch; only quantities of `only`, unless it is empty.
+/// Times everything of one robot on these processor levels, `block` samples in a batch; only quantities of `only`,
+/// unless it is empty.
 ///
 /// # Errors
 /// In words, if a quantity cannot be computed.

@@ -21,10 +21,12 @@ pub(crate) struct Options {
     /// Folder for design.json, trajectory.csv, preview.svg and path.svg.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Do not search: judge this trajectory (t_s, q1.., dq1.., ddq1.. or positions alone) against the study's limits, with a forecast.
+    /// Do not search: judge this trajectory (t_s, q1.., dq1.., ddq1.. or positions alone) against the study's limits,
+    /// with a forecast.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["check_log", "seed"])]
     check: Option<PathBuf>,
-    /// Do not search: judge a log of the study, by its name or file: what the finished run determines about each parameter.
+    /// Do not search: judge a log of the study, by its name or file: what the finished run determines about each
+    /// parameter.
     #[arg(long, value_name = "NAME", conflicts_with = "seed")]
     check_log: Option<String>,
     /// Seed of the random starts, in place of the study's.
@@ -33,7 +35,8 @@ pub(crate) struct Options {
     /// Also write what a robot takes; may be given several times.
     #[arg(long, value_enum, value_name = "FORMAT")]
     to: Vec<Format>,
-    /// Rate of trajectory.csv and of the robot's files, Hz; by default the study's search.rate_hz, and 125 for URScript.
+    /// Rate of trajectory.csv and of the robot's files, Hz; by default the study's search.rate_hz, and 125 for
+    /// URScript.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate_hz: Option<f64>,
     /// Folder of the robot description, in place of the study's own.

@@ -90,7 +90,8 @@ pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
     verdict
 }
 
-/// The message of an error that a study led to. Where it speaks of another file, the study that names that file is named as well.
+/// The message of an error that a study led to. Where it speaks of another file, the study that names that file is
+/// named as well.
 pub(crate) fn known_in(study: &Path) -> impl Fn(dynident::Error) -> String {
     use dynident::Error::{Filter, Missing, NothingLeft, Recording, Robot};
     move |error| match error {

@@ -16,7 +16,8 @@ pub(crate) struct Search {
 }
 
 impl Search {
-    /// Shows a line to people who watch; the first Ctrl-C ends the search and keeps the best, the second ends the program.
+    /// Shows a line to people who watch; the first Ctrl-C ends the search and keeps the best, the second ends the
+    /// program.
     pub(crate) fn new(context: &Context) -> Self {
         // Without a handler Ctrl-C ends the program as ever.
         let _ = ctrlc::set_handler(|| {

@@ -5,7 +5,8 @@ use dynident::ResultFile;
 use dynident::estimation::HausmanVerdict;
 use dynident::identification::estimators::NoiseInRegressor;
 
-/// Whether noise in the regressor shows, how many rows a robust estimator gave little weight, and what the study's estimator alone can determine; empty when that is nothing.
+/// Whether noise in the regressor shows, how many rows a robust estimator gave little weight, and what the study's
+/// estimator alone can determine; empty when that is nothing.
 pub(crate) fn noise(r: &ResultFile) -> String {
     let mut text = String::new();
     if let Some(noise) = &r.noise_in_regressor {

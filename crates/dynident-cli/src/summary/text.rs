@@ -8,8 +8,8 @@ pub(super) const WIDTH: usize = 80;
 /// Longest name of a joint or body in a table.
 const NAME: usize = 24;
 
-/// `words` in lines of at most [`WIDTH`] columns; all lines but the first begin with `indent` blanks. A longer word stays whole, and so
-/// does what a no-break space holds together, which becomes a plain one.
+/// `words` in lines of at most [`WIDTH`] columns; all lines but the first begin with `indent` blanks. A longer word
+/// stays whole, and so does what a no-break space holds together, which becomes a plain one.
 pub(super) fn wrapped(words: &str, indent: usize) -> String {
     let (mut text, mut column) = (String::new(), 0);
     let lead = words.len() - words.trim_start().len();

@@ -68,7 +68,8 @@ pub(super) fn residuals(log: &LogValidation) -> String {
 /// Share of the squared error from which on a joint at rest is worth a line.
 const WORTH_TELLING: f64 = 0.3;
 
-/// Says so when one joint at rest makes up much of the error: there stiction holds a share of the torque that positions do not determine.
+/// Says so when one joint at rest makes up much of the error: there stiction holds a share of the torque that positions
+/// do not determine.
 fn at_rest(log: &LogValidation) -> String {
     let all: f64 = log.model.joints.iter().map(|joint| joint.samples as f64 * joint.rmse_nm.powi(2)).sum();
     let most = log

@@ -1,4 +1,5 @@
-//! The command `design`: feasible motions, the contract's keys, the same result on any number of threads, refusals and diagnoses.
+//! The command `design`: feasible motions, the contract's keys, the same result on any number of threads, refusals and
+//! diagnoses.
 use crate::common::{CommandOutcome, repository, run_in};
 use serde_json::Value;
 use std::path::Path;

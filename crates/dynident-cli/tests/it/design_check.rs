@@ -24,7 +24,8 @@ fn study(folder: &Path, name: &str, acceleration: f64) {
     std::fs::write(folder.join(name), text).unwrap();
 }
 
-/// The designed motion as a table is the same motion: the same figures, to what its splines and 100 Hz allow, and under tighter limits the verdict names what it breaks.
+/// The designed motion as a table is the same motion: the same figures, to what its splines and 100 Hz allow, and under
+/// tighter limits the verdict names what it breaks.
 #[test]
 fn a_designed_motion_given_as_a_file_has_the_figures_of_its_design() {
     let folder = tempfile::tempdir().unwrap();

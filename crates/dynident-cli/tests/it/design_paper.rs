@@ -1,4 +1,5 @@
-//! The paper's design through the command: its optimum, the genetic algorithm's distance from it, Table 3 against the paper's own limits, and other optimisers for the ordinary problem.
+//! The paper's design through the command: its optimum, the genetic algorithm's distance from it, Table 3 against the
+//! paper's own limits, and other optimisers for the ordinary problem.
 use crate::common::{CommandOutcome, repository, run_in};
 use serde_json::Value;
 use std::path::Path;
@@ -22,7 +23,8 @@ const GENETIC: &str = "optimiser = { kind = \"genetic\", bits = 20, population =
 
 #[test]
 fn each_optimiser_tells_its_distance_from_the_optimum() {
-    // From an independent program: 161.3, 176 to 217 over six seeds for the genetic algorithm (with room for other seeds); the project asks the others for 0.1 %.
+    // From an independent program: 161.3, 176 to 217 over six seeds for the genetic algorithm (with room for other
+    // seeds); the project asks the others for 0.1 %.
     for (optimiser, band) in [
         (GENETIC, 165.0..260.0),
         ("optimiser = \"gradient\"", 161.15..161.46),

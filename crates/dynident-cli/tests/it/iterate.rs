@@ -17,7 +17,8 @@ fn json(file: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap()
 }
 
-/// The paper's arm through the command: inside the limits (18), every parameter within 0.007 after three runs at most, and what the contract promises.
+/// The paper's arm through the command: inside the limits (18), every parameter within 0.007 after three runs at most,
+/// and what the contract promises.
 #[test]
 fn the_papers_example_converges_and_resumes() {
     let out = tempfile::tempdir().unwrap();

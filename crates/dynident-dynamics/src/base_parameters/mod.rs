@@ -1,8 +1,9 @@
 //! Base parameters: the combinations of parameters that joint torques can distinguish.
 //!
-//! One choice for one robot: the columns of the regressor from base to tip in the order of [`all_columns`](crate::all_columns); a column
-//! that depends on earlier ones is regrouped into them (Gautier and Khalil 1990; Gautier 1991). The dependencies come from the robot's
-//! structure ([`structural`]); the rank of regressors at random states ([`numerical_rank`], [`numerical_rank_by_body`]) is the cross-check.
+//! One choice for one robot: the columns of the regressor from base to tip in the order of
+//! [`all_columns`](crate::all_columns); a column that depends on earlier ones is regrouped into them (Gautier and
+//! Khalil 1990; Gautier 1991). The dependencies come from the robot's structure ([`structural`]); the rank of
+//! regressors at random states ([`numerical_rank`], [`numerical_rank_by_body`]) is the cross-check.
 
 mod expression;
 mod numerical;
@@ -21,8 +22,9 @@ use nalgebra::DMatrix;
 /// How finely dependence is separated from independence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BaseParameterSettings {
-    /// A direction counts as dependent below this share of its size. The default, 2e-5, lies above what rounded angles of a description do
-    /// (`1.5708` for π/2 leaves 4e-6) and below what an offset of a tenth of a millimetre does (1e-4).
+    /// A direction counts as dependent below this share of its size. The default, 2e-5, lies above what rounded angles
+    /// of a description do (`1.5708` for π/2 leaves 4e-6) and below what an offset of a tenth of a millimetre does
+    /// (1e-4).
     pub tolerance: f64,
 }
 
@@ -69,7 +71,8 @@ impl BaseParameters {
         &self.split.dependent
     }
 
-    /// `K` of `W[dependent] = W[independent] K`, so that `θ = π[independent] + K π[dependent]`. Shape (independent, dependent).
+    /// `K` of `W[dependent] = W[independent] K`, so that `θ = π[independent] + K π[dependent]`. Shape (independent,
+    /// dependent).
     pub fn regrouping(&self) -> &DMatrix<f64> {
         &self.split.regrouping
     }
@@ -106,8 +109,8 @@ impl BaseParameters {
         expression::expressions(&self.columns, &self.split)
     }
 
-    /// How clear the split was: the smallest share that still counted as independent, and the largest that counted as dependent. A wide gap
-    /// means that no tolerance in between would change the choice.
+    /// How clear the split was: the smallest share that still counted as independent, and the largest that counted as
+    /// dependent. A wide gap means that no tolerance in between would change the choice.
     pub fn gap(&self) -> (f64, f64) {
         (self.split.weakest_independent, self.split.strongest_dependent)
     }

@@ -19,8 +19,8 @@ pub struct NumericalRank {
     pub strongest_dependent: f64,
 }
 
-/// Stacks regressors of `2 · columns / dof + 10` random states (positions within ±π rad or ±1 m, velocities within ±2, accelerations within ±5) and splits their columns
-/// at `tolerance`. Deterministic in `seed`.
+/// Stacks regressors of `2 · columns / dof + 10` random states (positions within ±π rad or ±1 m, velocities within ±2,
+/// accelerations within ±5) and splits their columns at `tolerance`. Deterministic in `seed`.
 pub fn numerical_rank(model: &Model, terms: &[TorqueTerm], seed: u64, tolerance: f64) -> NumericalRank {
     let columns = all_columns(model, terms);
     let (dof, count) = (model.dof(), columns.len());

@@ -1,8 +1,9 @@
 //! The rank of the bodies' regressor from motions that differ in one joint: the cross-check for robots of any length.
 //!
-//! Two states that differ in joint `j` alone (its position, velocity and acceleration) give the joints further in torques whose **difference** depends on body `j` and the bodies
-//! further out alone; so do the torques of joint `j` themselves. The rows of all joints, base to tip, make an upper block triangle, whose rank
-//! is at least the sum of the ranks of its diagonal blocks. One block has ten columns, so the cost grows with the square of a chain's length (its
+//! Two states that differ in joint `j` alone (its position, velocity and acceleration) give the joints further in
+//! torques whose **difference** depends on body `j` and the bodies further out alone; so do the torques of joint `j`
+//! themselves. The rows of all joints, base to tip, make an upper block triangle, whose rank is at least the sum of the
+//! ranks of its diagonal blocks. One block has ten columns, so the cost grows with the square of a chain's length (its
 //! fourth power for [`numerical_rank`](super::numerical_rank)).
 
 use super::NumericalRank;
@@ -14,13 +15,16 @@ use dynident_model::sample::Random;
 use dynident_model::{InertialParameters, JointMap, Model, Transform, Vec3};
 use nalgebra::DMatrix;
 
-/// Pairs of states for one joint: enough at the base, where a pair gives two rows, and more than the two that fix ten columns anywhere.
+/// Pairs of states for one joint: enough at the base, where a pair gives two rows, and more than the two that fix ten
+/// columns anywhere.
 fn pairs(joints_on_path: usize) -> usize {
     5 + 20 / joints_on_path
 }
 
-/// A lower bound of the rank of the bodies' columns, body by body: which of the ten columns of each the torques can separate from those of the bodies before it, at states as those of
-/// [`numerical_rank`](super::numerical_rank) that differ in one joint. Where the structure says that a column is independent, it must be among these. Deterministic in `seed`.
+/// A lower bound of the rank of the bodies' columns, body by body: which of the ten columns of each the torques can
+/// separate from those of the bodies before it, at states as those of [`numerical_rank`](super::numerical_rank) that
+/// differ in one joint. Where the structure says that a column is independent, it must be among these. Deterministic in
+/// `seed`.
 pub fn numerical_rank_by_body(model: &Model, seed: u64, tolerance: f64) -> NumericalRank {
     let maps = model.maps();
     let mut random = Random::new(seed);

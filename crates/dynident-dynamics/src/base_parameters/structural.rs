@@ -1,17 +1,21 @@
 //! Which parameters a robot's torques depend on, from its structure alone.
 //!
-//! Torques vanish for all motions exactly when every entry `M_jk(q)` of the mass matrix and every gravity torque vanishes for all `q` (velocity torques follow from the mass
-//! matrix). With `C_j(q)` the composite inertia that hangs on joint `j` and `w` a twist at its frame,
-//! `M_jk = Φ_jᵀ C_j w` for `w = X Φ_k`, and the gravity torque is the same with `w = X a_g`. Both are linear in the parameters. Three facts make this finite:
+//! Torques vanish for all motions exactly when every entry `M_jk(q)` of the mass matrix and every gravity torque
+//! vanishes for all `q` (velocity torques follow from the mass matrix). With `C_j(q)` the composite inertia that hangs
+//! on joint `j` and `w` a twist at its frame, `M_jk = Φ_jᵀ C_j w` for `w = X Φ_k`, and the gravity torque is the same
+//! with `w = X a_g`. Both are linear in the parameters. Three facts make this finite:
 //!
 //! 1. The twists `w` that can arrive at a joint span a space that one outward recursion builds: each joint turns it by
 //!    `X(q) = X_0 + X_1 cos q + X_2 sin q` (sliding: `X_0 + X_1 q`), and `cos`, `sin` and 1 are independent functions.
-//! 2. Ten parameters move from a child's frame to its parent's by a 10 × 10 matrix `T(q)` with harmonics up to `2 q` (sliding: up to `q²`). A condition on a composite splits into one on the
-//!    constant part, shared with everything outward, and one for every other harmonic, on the child alone.
-//! 3. So each body has a small space of functionals of its ten composite parameters, and each functional is one row of conditions on all parameters.
+//! 2. Ten parameters move from a child's frame to its parent's by a 10 × 10 matrix `T(q)` with harmonics up to `2 q`
+//!    (sliding: up to `q²`). A condition on a composite splits into one on the constant part, shared with everything
+//!    outward, and one for every other harmonic, on the child alone.
+//! 3. So each body has a small space of functionals of its ten composite parameters, and each functional is one row of
+//!    conditions on all parameters.
 //!
-//! The rows span what is identifiable. The idea of following such spaces outward is that of Wensing, Niemeyer and Slotine, *A geometric characterization of observability in
-//! inertial parameter identification* (2024); drive inertias, couplings and offsets join as constants in single entries.
+//! The rows span what is identifiable. The idea of following such spaces outward is that of Wensing, Niemeyer and
+//! Slotine, *A geometric characterization of observability in inertial parameter identification* (2024); drive
+//! inertias, couplings and offsets join as constants in single entries.
 
 use crate::independent_columns::Columns;
 use crate::inverse_dynamics::inertial_wrench;
@@ -23,8 +27,9 @@ use std::collections::HashMap;
 type Matrix10 = SMatrix<f64, 10, 10>;
 type Vector10 = SVector<f64, 10>;
 
-/// Rows over all columns (bodies, then terms) whose span is what torques depend on: those that each body gives, base to tip, then those of friction. A body's rows
-/// have entries for it, for the bodies further out and for the terms; they are kept where they arise and carried outward column by column.
+/// Rows over all columns (bodies, then terms) whose span is what torques depend on: those that each body gives, base to
+/// tip, then those of friction. A body's rows have entries for it, for the bodies further out and for the terms; they
+/// are kept where they arise and carried outward column by column.
 pub(super) struct IdentifiableDirections<'a> {
     model: &'a Model,
     terms: usize,
@@ -120,7 +125,8 @@ impl Columns for IdentifiableDirections<'_> {
 /// Joints back to which a twist's source is known at least: in longer robots only couplings ask further.
 const SOURCES: usize = 48;
 
-/// Slots for the sources of twists: joint `k` has slot `k` modulo their number, so that a source is known as long as a coupling may ask for it.
+/// Slots for the sources of twists: joint `k` has slot `k` modulo their number, so that a source is known as long as a
+/// coupling may ask for it.
 fn source_slots(model: &Model, terms: &[TorqueTerm]) -> usize {
     let reach = terms.iter().map(|term| {
         let joints = term.joints();
@@ -270,8 +276,8 @@ fn term_constants(terms: &[TorqueTerm], j: usize, w: &ArrivingTwist, slots: usiz
     })
 }
 
-/// Friction depends on velocities alone, so it mixes with nothing above. Each distinct function of the motion in each joint's row is one condition; terms that say the same
-/// twice share it.
+/// Friction depends on velocities alone, so it mixes with nothing above. Each distinct function of the motion in each
+/// joint's row is one condition; terms that say the same twice share it.
 fn friction_conditions(terms: &[TorqueTerm]) -> Vec<DVector<f64>> {
     let mut places: HashMap<(usize, String), usize> = HashMap::new();
     let mut conditions: Vec<DVector<f64>> = Vec::new();
@@ -287,8 +293,9 @@ fn friction_conditions(terms: &[TorqueTerm]) -> Vec<DVector<f64>> {
     conditions
 }
 
-/// An orthonormal basis of the span, without directions below `tolerance` times the longest vector: Gram and Schmidt with pivoting, each vector
-/// cleaned twice. (An SVD would do; the one at hand returned 5e-5 for an exact zero on a matrix of rank three.)
+/// An orthonormal basis of the span, without directions below `tolerance` times the longest vector: Gram and Schmidt
+/// with pivoting, each vector cleaned twice. (An SVD would do; the one at hand returned 5e-5 for an exact zero on a
+/// matrix of rank three.)
 fn basis(vectors: &[DVector<f64>], tolerance: f64) -> Vec<DVector<f64>> {
     let longest = vectors.iter().map(DVector::norm).fold(0.0, f64::max);
     let mut rest = vectors.to_vec();

@@ -20,7 +20,8 @@ fn all_terms(model: &Model) -> Vec<TorqueTerm> {
 #[test]
 fn the_planar_arm_has_exactly_the_papers_table_2() {
     let mut random = Random::new(1);
-    // a1 = 0.7, so that a1 and its square can be determined from 1: θ1 = Izz1 + a1² m2, θ2 = m1 r1x + a1 m2, θ3 = m1 r1y, θ4..6 = Izz2, m2 r2x, m2 r2y.
+    // a1 = 0.7, so that a1 and its square can be determined from 1: θ1 = Izz1 + a1² m2, θ2 = m1 r1x + a1 m2, θ3 = m1
+    // r1y, θ4..6 = Izz2, m2 r2x, m2 r2y.
     let model = planar_2r(0.7, random.body(), random.body());
     let base = BaseParameters::new(&model, &[], &BaseParameterSettings::default());
     let mut expressions = base.expressions();
@@ -36,7 +37,8 @@ fn structure_and_random_states_choose_the_same_columns() {
         let model = random_tree(seed, 1 + seed as usize % 7);
         for terms in [Vec::new(), all_terms(&model)] {
             let base = BaseParameters::new(&model, &terms, &BaseParameterSettings::default());
-            // Random geometry leaves no column closer than 1e-6 to dependence unless it is dependent (then rounding, about 1e-13).
+            // Random geometry leaves no column closer than 1e-6 to dependence unless it is dependent (then rounding,
+            // about 1e-13).
             let numerical = numerical_rank(&model, &terms, 77, 1e-8);
             assert_eq!(base.independent(), numerical.independent, "seed {seed}, {} laws", terms.len());
         }
@@ -108,7 +110,8 @@ fn drives_regroup_where_structure_says_so() {
     let model = planar_2r(1.0, random.body(), random.body());
     let terms = all_terms(&model);
     let base = BaseParameters::new(&model, &terms, &BaseParameterSettings::default());
-    // Joint 1's drive turns with link 1 alone: one more parameter for joint 2's drive only, and three of friction and offset a joint.
+    // Joint 1's drive turns with link 1 alone: one more parameter for joint 2's drive only, and three of friction and
+    // offset a joint.
     assert_eq!(base.count(), 6 + 1 + 6);
     assert!(base.expressions().iter().any(|e| e == "Izz1 + m2 + Ia1"), "{:?}", base.expressions());
     assert_eq!(base.independent(), numerical_rank(&model, &terms, 5, 1e-8).independent);

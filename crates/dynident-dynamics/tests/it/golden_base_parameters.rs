@@ -1,4 +1,5 @@
-//! Base parameters of real robots: against Pinocchio's regressors, against random states, and against a published study.
+//! Base parameters of real robots: against Pinocchio's regressors, against random states, and against a published
+//! study.
 
 use crate::golden::{ARMS, Golden, ROBOTS, robot, text};
 use dynident_dynamics::{
@@ -78,7 +79,8 @@ fn counts_columns_and_combinations_agree_with_pinocchio() {
                 .collect();
             assert_eq!(combination.remove(symbol), Some(1.0));
             for (d, &column) in ours.dependent().iter().enumerate() {
-                // The file's coefficients are least-squares solutions, which the condition of some hundred leaves at 1e-12; it drops those below 1e-9.
+                // The file's coefficients are least-squares solutions, which the condition of some hundred leaves at
+                // 1e-12; it drops those below 1e-9.
                 let theirs = combination.remove(names[column].as_str()).unwrap_or(0.0);
                 let factor = ours.regrouping()[(b, d)];
                 assert!(
@@ -98,7 +100,8 @@ fn counts_columns_and_combinations_agree_with_pinocchio() {
 fn structure_agrees_with_random_states_and_the_split_is_clear() {
     for name in ROBOTS {
         let model = robot(name);
-        // Random states of a humanoid with its drives are some thousand rows and columns: the bodies alone are the harder part.
+        // Random states of a humanoid with its drives are some thousand rows and columns: the bodies alone are the
+        // harder part.
         let cases =
             if model.dof() > 9 { vec![Vec::new()] } else { vec![Vec::new(), drive_inertia_and_friction(&model)] };
         for terms in cases {
@@ -202,7 +205,8 @@ fn published_sum(expression: &str) -> BTreeMap<String, f64> {
     sum
 }
 
-/// Stäubli TX40 with drive inertias, friction, offsets and the coupled wrist: 61 base parameters, as figaroh-plus counts.
+/// Stäubli TX40 with drive inertias, friction, offsets and the coupled wrist: 61 base parameters, as figaroh-plus
+/// counts.
 #[test]
 fn the_tx40_has_the_published_base_parameters() {
     let Some(folder) = recordings().map(|folder| folder.join("staubli_tx40")).filter(|folder| folder.is_dir()) else {

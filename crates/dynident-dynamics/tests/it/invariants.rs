@@ -1,4 +1,5 @@
-//! Invariants of rigid-body dynamics on random trees. Each has an oracle of its own: another algorithm, or a law of physics.
+//! Invariants of rigid-body dynamics on random trees. Each has an oracle of its own: another algorithm, or a law of
+//! physics.
 
 use dynident_dynamics::{
     BatchWorkspace, PanelLayout, Panels, Workspace, all_columns, body_placements, forward_dynamics, gravity_torque,
@@ -98,8 +99,9 @@ fn mass_matrix_is_symmetric_and_positive_definite() {
 
 #[test]
 fn mass_rate_minus_twice_coriolis_is_skew() {
-    // dM/dt - 2 C is skew for the C of Christoffel symbols. Equivalent and free of a choice of C: q̇ᵀ (dM/dt) q̇ = 2 q̇ᵀ C q̇, where dM/dt comes from
-    // the mass matrix alone (Richardson-extrapolated differences along q̇) and C q̇ from the inverse dynamics alone.
+    // dM/dt - 2 C is skew for the C of Christoffel symbols. Equivalent and free of a choice of C: q̇ᵀ (dM/dt) q̇ = 2
+    // q̇ᵀ C q̇, where dM/dt comes from the mass matrix alone (Richardson-extrapolated differences along q̇) and C q̇
+    // from the inverse dynamics alone.
     for Case { model, q, dq, .. } in cases() {
         let dof = model.dof();
         let mut ws = Workspace::new(&model);
@@ -121,7 +123,8 @@ fn mass_rate_minus_twice_coriolis_is_skew() {
 
 #[test]
 fn coriolis_matrix_of_christoffel_symbols_makes_the_difference_skew() {
-    // C_ij = Σ_k ½ (∂_k M_ij + ∂_j M_ik - ∂_i M_jk) q̇_k must give the inverse dynamics' velocity torque and dM/dt - 2 C skew.
+    // C_ij = Σ_k ½ (∂_k M_ij + ∂_j M_ik - ∂_i M_jk) q̇_k must give the inverse dynamics' velocity torque and dM/dt - 2
+    // C skew.
     for Case { model, q, dq, .. } in cases().filter(|case| case.model.dof() <= 6) {
         let dof = model.dof();
         let mut ws = Workspace::new(&model);

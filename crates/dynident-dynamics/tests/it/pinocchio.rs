@@ -1,7 +1,8 @@
 //! Dynident against Pinocchio 4.1 and MuJoCo 4.0 on every robot of `robots/`, at every processor level.
 //!
-//! Deviations count against the largest entry of an array. The project promises 1e-10. What two careful programs in double precision leave is
-//! less: some hundred roundings of 1e-16 along a chain of at most twenty joints, so 1e-13, and ten times that where larger terms cancel.
+//! Deviations count against the largest entry of an array. The project promises 1e-10. What two careful programs in
+//! double precision leave is less: some hundred roundings of 1e-16 along a chain of at most twenty joints, so 1e-13,
+//! and ten times that where larger terms cancel.
 
 use crate::golden::{ARMS, Golden, ROBOTS, assert_close, numbers, text};
 use dynident_dynamics::{
@@ -18,8 +19,8 @@ use serde_json::Value;
 const CHAIN: f64 = 1e-12;
 /// Single products of rotations and lengths, without sums over bodies.
 const GEOMETRY: f64 = 1e-13;
-/// The promise itself. Forward dynamics solve with a mass matrix whose condition on a humanoid with fingers is above 1e6, so that accelerations of the
-/// joints with the least inertia carry rounding a million times over.
+/// The promise itself. Forward dynamics solve with a mass matrix whose condition on a humanoid with fingers is above
+/// 1e6, so that accelerations of the joints with the least inertia carry rounding a million times over.
 const PROMISE: f64 = 1e-10;
 
 struct State {

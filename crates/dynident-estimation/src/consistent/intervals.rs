@@ -1,5 +1,5 @@
-//! Intervals of standard parameters that respect what is physically consistent: how far can a mass, a moment of inertia, a friction
-//! go before the data object, every body and term staying physically consistent?
+//! Intervals of standard parameters that respect what is physically consistent: how far can a mass, a moment of
+//! inertia, a friction go before the data object, every body and term staying physically consistent?
 
 use super::description::{BaseMap, PhysicalProblem, expect, finite};
 use super::fit::{PhysicalFit, physical_fit};
@@ -59,8 +59,8 @@ impl IntervalSettings {
 pub enum IntervalEnd {
     /// Beyond it the data are fitted too badly.
     Data,
-    /// Beyond it nothing is physically consistent that the data allow: the body's cone or a limit stops it before the data's cost
-    /// reaches its threshold.
+    /// Beyond it nothing is physically consistent that the data allow: the body's cone or a limit stops it before the
+    /// data's cost reaches its threshold.
     Constraint,
     /// Neither holds it: the value can be as large as one likes.
     Open,
@@ -87,12 +87,12 @@ pub struct ConsistentInterval {
 ///     { p : min over consistent π with π_i = p of ½‖R₁ B π − ρ₁‖²  ≤  C_min + ½ t² κ_i }
 /// ```
 ///
-/// C_min belongs to the best consistent set, t is Student's quantile, and κ_i is how much larger than for white residuals
-/// the variance of what the data say in the direction of π_i is, `κ_i = gᵀΣg / gᵀ(R₁ᵀR₁)⁻¹g`, from the covariance Σ of
-/// the base parameters that is thought honest. Without active constraints this is the usual interval `π̂_i ± t σ_i`; an
-/// end that only physics holds is said to be so, and one that nothing holds is open. Profile likelihood: Venzon and
-/// Moolgavkar, Applied Statistics 37 (1988) 87; here every profile is a convex problem, solved by pulling the parameter
-/// with a spring and moving the spring's other end.
+/// C_min belongs to the best consistent set, t is Student's quantile, and κ_i is how much larger than for white
+/// residuals the variance of what the data say in the direction of π_i is, `κ_i = gᵀΣg / gᵀ(R₁ᵀR₁)⁻¹g`, from the
+/// covariance Σ of the base parameters that is thought honest. Without active constraints this is the usual interval
+/// `π̂_i ± t σ_i`; an end that only physics holds is said to be so, and one that nothing holds is open. Profile
+/// likelihood: Venzon and Moolgavkar, Applied Statistics 37 (1988) 87; here every profile is a convex problem, solved
+/// by pulling the parameter with a spring and moving the spring's other end.
 #[derive(Clone, Debug)]
 pub struct ConsistentIntervals {
     problem: PhysicalProblem,
@@ -108,8 +108,8 @@ pub struct ConsistentIntervals {
 }
 
 impl ConsistentIntervals {
-    /// The best consistent set, from which intervals are then measured. `covariance` of the base parameters, shape (base,
-    /// base), replaces that of white residuals; `degrees_of_freedom` are those of Student's distribution.
+    /// The best consistent set, from which intervals are then measured. `covariance` of the base parameters, shape
+    /// (base, base), replaces that of white residuals; `degrees_of_freedom` are those of Student's distribution.
     ///
     /// # Errors
     /// [`PhysicalError::Setting`], [`PhysicalError::Mismatch`], [`PhysicalError::NotFinite`], and those of

@@ -338,7 +338,8 @@ impl Kernel for Residuals<'_> {
     }
 }
 
-/// The sums of products of a triangle's row, whose entries begin at column `row`, with the parameters of the common columns `range` and of those at `places`.
+/// The sums of products of a triangle's row, whose entries begin at column `row`, with the parameters of the common
+/// columns `range` and of those at `places`.
 #[inline(always)]
 fn products(entries: &[f64], row: usize, range: core::ops::Range<usize>, places: &[usize], theta: &[Side]) -> Side {
     let mut sum = [0.0; SIDE_BY_SIDE];

@@ -1,4 +1,5 @@
-//! Essential parameters: which base parameters do the data really determine, and what does the fit lose without the others?
+//! Essential parameters: which base parameters do the data really determine, and what does the fit lose without the
+//! others?
 
 use crate::error::EstimationError;
 use crate::uncertainty::{Estimate, f_tail, student_half_width};

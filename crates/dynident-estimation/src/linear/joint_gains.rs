@@ -1,4 +1,5 @@
-//! Torque in a unit that nobody knows: one gain for each joint beside the parameters, determined by a load that is known.
+//! Torque in a unit that nobody knows: one gain for each joint beside the parameters, determined by a load that is
+//! known.
 
 use super::ordinary::{OrdinarySettings, ordinary_least_squares};
 use super::weighted::{WeightedSettings, weighted_least_squares};

@@ -85,11 +85,11 @@ pub struct NoiseWeightedEstimate {
 /// solution before determine.
 ///
 /// Feng's reading of iteratively reweighted least squares, where weights are the reciprocal noise: torque noise of a
-/// drive is larger at velocity, friction is modelled worse at reversals, and one σ for the whole joint lets the worst part
-/// decide. Unlike Huber's and Tukey's weights a row is not judged by its own residual but by its neighbourhood's, so
-/// that normal noise loses nothing but what the level's own uncertainty costs. After Han et al., "An iterative approach
-/// for accurate dynamic model identification", IEEE Trans. Ind. Electron. (2020); for estimated weights in general
-/// Carroll and Ruppert, Transformation and Weighting in Regression (1988), 2.3 and 3.
+/// drive is larger at velocity, friction is modelled worse at reversals, and one σ for the whole joint lets the worst
+/// part decide. Unlike Huber's and Tukey's weights a row is not judged by its own residual but by its neighbourhood's,
+/// so that normal noise loses nothing but what the level's own uncertainty costs. After Han et al., "An iterative
+/// approach for accurate dynamic model identification", IEEE Trans. Ind. Electron. (2020); for estimated weights in
+/// general Carroll and Ruppert, Transformation and Weighting in Regression (1988), 2.3 and 3.
 ///
 /// `pass` hands every row that `problem` was made of to its visitor, as often as it is called; residuals are kept, one
 /// number for each row, regressors are not. The covariance is that of [`weighted_least_squares`] on the reweighted

@@ -125,8 +125,8 @@ const FAR: f64 = 1.0;
 /// Least squares on a measured motion takes that motion for exact. What noise in the positions does to the torque of
 /// heavy links is then part of the residual: coloured, correlated across joints, and as strong as the torque's own
 /// noise where it matters most. Here the motion (the coefficients of a Fourier series, say) is unknown too; positions
-/// and torques both hold information about it, each by its precision. Its unknowns must be few against the rows: then the σ_c are
-/// consistent, which they are not when every instant has unknowns of its own (see
+/// and torques both hold information about it, each by its precision. Its unknowns must be few against the rows: then
+/// the σ_c are consistent, which they are not when every instant has unknowns of its own (see
 /// [`maximum_likelihood`](crate::maximum_likelihood()) for that case, with known covariances).
 ///
 /// Gauss and Newton's steps; a step that raises the sum is halved. After the first one rows are linearised again, and
@@ -142,9 +142,9 @@ const FAR: f64 = 1.0;
 ///
 /// # Errors
 /// [`EstimationError::Setting`], [`EstimationError::Mismatch`] for other shapes, [`EstimationError::Empty`],
-/// [`EstimationError::TooFewRows`], [`EstimationError::Undetermined`] when the rows do not separate an unknown from those
-/// before it, the errors of the covariance, and whatever the model returns. Reaching `max_iterations` is a status, not
-/// an error.
+/// [`EstimationError::TooFewRows`], [`EstimationError::Undetermined`] when the rows do not separate an unknown from
+/// those before it, the errors of the covariance, and whatever the model returns. Reaching `max_iterations` is a
+/// status, not an error.
 #[doc(alias("joint estimation", "bundle adjustment"))]
 pub fn simultaneous_least_squares<M: SimultaneousModel>(
     problem: &SimultaneousProblem,
@@ -332,8 +332,8 @@ mod tests {
         // The tolerance of the steps, 1e-9 of error bars of 0.1.
         assert!((theta - ts / qs).abs() < 1e-9 && (c - qs / ss).abs() < 1e-9, "{theta} {c}");
         let [sigma_q, sigma_tau] = [found.noise[0].std, found.noise[1].std];
-        // Each of the two unknowns takes one degree of degrees_of_freedom, half from each channel or all from one: σ is known to a
-        // per cent of its own error.
+        // Each of the two unknowns takes one degree of degrees_of_freedom, half from each channel or all from one: σ is
+        // known to a per cent of its own error.
         assert!((sigma_q / 0.3 - 1.0).abs() < 0.2 && (sigma_tau / 0.5 - 1.0).abs() < 0.2);
         let std = ((sigma_tau.powi(2) + (theta * sigma_q).powi(2)) / (c * c * ss)).sqrt();
         assert!((found.estimate.std[0] / std - 1.0).abs() < 1e-6, "{} {std}", found.estimate.std[0]);

@@ -40,8 +40,8 @@ pub struct Estimate {
     pub clusters: usize,
     /// Square roots of the diagonal of `covariance`.
     pub std: Vec<f64>,
-    /// How many independent squares the variance of each value was found from (Satterthwaite's degrees of degrees_of_freedom; N −
-    /// p for white errors). With few, an interval is wider than 1.96 std.
+    /// How many independent squares the variance of each value was found from (Satterthwaite's degrees of
+    /// degrees_of_freedom; N − p for white errors). With few, an interval is wider than 1.96 std.
     pub std_degrees_of_freedom: Vec<f64>,
     /// Half the width of the 95 % interval: `t₀.₉₇₅(std_degrees_of_freedom) · std`; zero for fixed columns.
     pub half_width_95: Vec<f64>,
@@ -155,8 +155,8 @@ impl PointEstimate {
     }
 }
 
-/// Checks that all rows together and each joint's share leave degrees_of_freedom for the noise, and gives `N_j − p/n` for every
-/// joint.
+/// Checks that all rows together and each joint's share leave degrees_of_freedom for the noise, and gives `N_j − p/n`
+/// for every joint.
 pub(crate) fn joint_degrees_of_freedom(stacked: &StackedProblem<'_>, free: usize) -> Result<Vec<f64>, EstimationError> {
     let problem = stacked.problem;
     let rows = problem.joint_rows();

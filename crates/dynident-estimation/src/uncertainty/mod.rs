@@ -1,8 +1,8 @@
 //! **How far may it be off?** The [`Estimate`] that every linear estimator returns, and where its error bars come from.
 //!
 //! Residuals of robot torque are correlated in time, so the textbook covariance is too small. A [`CovarianceMethod`]
-//! names another: the default leaves out one time segment after the other (delete-one jackknife). Degrees of degrees_of_freedom
-//! by Satterthwaite turn a standard deviation into a half-width of 95 % by [`student_half_width`].
+//! names another: the default leaves out one time segment after the other (delete-one jackknife). Degrees of
+//! degrees_of_freedom by Satterthwaite turn a standard deviation into a half-width of 95 % by [`student_half_width`].
 
 mod bootstrap;
 mod covariance;

@@ -106,8 +106,8 @@ impl<'a> Scores<'a> {
         })
     }
 
-    /// Degrees of degrees_of_freedom of every column's variance, `independent` times those of its clusters under white noise;
-    /// infinite for fixed columns.
+    /// Degrees of degrees_of_freedom of every column's variance, `independent` times those of its clusters under white
+    /// noise; infinite for fixed columns.
     pub(super) fn degrees_of_freedom(&self, independent: f64) -> Vec<f64> {
         // What share of each estimate's variance comes from each cluster.
         let shares: Vec<Vec<f64>> = self.joints.iter().flat_map(|joint| joint.shares(self.inverse)).collect();

@@ -61,12 +61,13 @@ fn coverage(weighted: bool) -> (f64, f64, f64) {
     (share(segments), share(white), lag1 / runs as f64)
 }
 
-/// With ρ = 0.9 and slow columns the white standard deviation is too small by up to √(1.9/0.1) = 4.4: its "95 %" interval holds
-/// P(|z| < 1.96/4.4) = 34 %, more for the faster columns; 75 % is far above that and far below 95 %. The interval from segments is
-/// asymptotically right; with some 50 segments a joint, normal instead of t quantiles and sums of neighbours that still correlate a
-/// little at the border it may fall a few percent short: 90 % is the least that deserves the name. 99 % would mean error bars a third
-/// too long. Sampling error of a share: √(0.95·0.05/400) = 1.1 % from the 400 intervals of every day, 0.6 % from the 1,600 of the
-/// long run; 95 % itself lies four of the first above the lower limit and inside of the upper.
+/// With ρ = 0.9 and slow columns the white standard deviation is too small by up to √(1.9/0.1) = 4.4: its "95 %"
+/// interval holds P(|z| < 1.96/4.4) = 34 %, more for the faster columns; 75 % is far above that and far below 95 %. The
+/// interval from segments is asymptotically right; with some 50 segments a joint, normal instead of t quantiles and
+/// sums of neighbours that still correlate a little at the border it may fall a few percent short: 90 % is the least
+/// that deserves the name. 99 % would mean error bars a third too long. Sampling error of a share: √(0.95·0.05/400) =
+/// 1.1 % from the 400 intervals of every day, 0.6 % from the 1,600 of the long run; 95 % itself lies four of the first
+/// above the lower limit and inside of the upper.
 fn assert_coverage(weighted: bool) {
     let (segments, white, lag1) = coverage(weighted);
     assert!((0.90..=0.99).contains(&segments), "segments {segments}");

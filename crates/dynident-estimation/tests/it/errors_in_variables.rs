@@ -164,7 +164,8 @@ fn too_few_rows_and_joints_at_rest_are_refused_or_survived() {
     factor.absorb(&[x, tau, noise].concat(), 64).unwrap();
     problem.add("run", factor).unwrap();
     let found = generalized_least_squares(&problem, &WeightedSettings::default()).unwrap();
-    // The second joint determines the first one's error, down to the limit on correlation of 1 − 1e-9: √2e-9 of it is left.
+    // The second joint determines the first one's error, down to the limit on correlation of 1 − 1e-9: √2e-9 of it is
+    // left.
     assert!((found.estimate.values[0] - 3.0).abs() < 1.0e-4, "{}", found.estimate.values[0]);
     assert!(found.estimate.covariance.iter().all(|v| v.is_finite()));
 }

@@ -55,9 +55,9 @@ fn equals_fits_that_leave_one_segment_out() {
 #[test]
 fn intervals_hold_where_segments_are_few() {
     // Three segments a parameter. 600 intervals every day, 2,400 in the long run: a coverage of 95 % scatters by
-    // √(0.95·0.05/600) = 0.9 % (0.5 %), three of which lead to 0.92. The t distribution with some ten degrees of degrees_of_freedom would
-    // need wider intervals than 1.96, and the jackknife's caution pays for that. The fit's own residuals (CR1) must do worse,
-    // or the jackknife is not needed.
+    // √(0.95·0.05/600) = 0.9 % (0.5 %), three of which lead to 0.92. The t distribution with some ten degrees of
+    // degrees_of_freedom would need wider intervals than 1.96, and the jackknife's caution pays for that. The fit's own
+    // residuals (CR1) must do worse, or the jackknife is not needed.
     let mut random = Random::new(21);
     let (mut inside, mut inside_own, mut count) = (0, 0, 0);
     for _ in 0..dynident_testing::count(100, 400) {

@@ -104,8 +104,8 @@ fn both_routes_find_the_same_optimum_of_small_problems() {
     check(&run((0..count(40, 150) as u64).map(|seed| (seed, size(seed)))));
 }
 
-/// What is asked for are 1,000: in the long run, a quarter of an hour in the release profile. The first 29 have each size
-/// from 2 to 30 bodies once; every day only those of up to nine are solved.
+/// What is asked for are 1,000: in the long run, a quarter of an hour in the release profile. The first 29 have each
+/// size from 2 to 30 bodies once; every day only those of up to nine are solved.
 #[test]
 fn both_routes_find_the_same_optimum_of_problems_of_up_to_30_bodies() {
     let (problems, bodies) = (count(29, 1000) as u64, count(9, 30));

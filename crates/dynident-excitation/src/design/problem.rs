@@ -9,8 +9,8 @@ use crate::motion::Motion;
 use crate::optimisers::{ConstrainedProblem, Known};
 use nalgebra::DMatrix;
 
-/// A place that is broken weighs so much more than a velocity: a search may wander outside a joint's limits and come back,
-/// but not to the other side of an obstacle.
+/// A place that is broken weighs so much more than a velocity: a search may wander outside a joint's limits and come
+/// back, but not to the other side of an obstacle.
 const PLACE_SCALE: f64 = 5.0;
 
 /// No step leads deeper into an obstacle than this share of its limit (metres for a floor): penalties alone do not keep

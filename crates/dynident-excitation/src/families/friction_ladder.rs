@@ -71,12 +71,13 @@ impl FrictionLadderSettings {
     }
 }
 
-/// Sweeps there and back at constant velocity, one pair for each rung of a ladder of velocities, joined by smooth ramps.
+/// Sweeps there and back at constant velocity, one pair for each rung of a ladder of velocities, joined by smooth
+/// ramps.
 ///
 /// q(t) = q_mid + V g(t): the shape g is fixed by the settings, so a joint has two free numbers: the middle of its
 /// longest sweep in rad (m) and the fastest velocity V in rad/s (m/s; negative begins the other way). During each sweep
-/// q̈ = 0 exactly, so torque is gravity and friction; the velocity ramps up by a polynomial with continuous q̈ and jerk.
-/// Both ends are at rest and equal.
+/// q̈ = 0 exactly, so torque is gravity and friction; the velocity ramps up by a polynomial with continuous q̈ and
+/// jerk. Both ends are at rest and equal.
 ///
 /// # Source
 /// Constant-velocity friction identification as in Armstrong-Hélouvry, Control of Machines with Friction (1991).
@@ -152,7 +153,8 @@ impl FrictionLadderBasis {
         sweeps
     }
 
-    /// Way gone in a sweep at unit velocity, with derivatives: a ramp up, constant velocity, and the same ramp subtracted.
+    /// Way gone in a sweep at unit velocity, with derivatives: a ramp up, constant velocity, and the same ramp
+    /// subtracted.
     fn sweep(&self, time_s: f64, cruise_s: f64) -> [f64; 4] {
         let scales = [self.ramp_s, 1.0, 1.0 / self.ramp_s, self.ramp_s.powi(-2)];
         let up = smooth_ramp(time_s / self.ramp_s);

@@ -148,8 +148,8 @@ mod tests {
         let (mut found, mut expected) = (Motion::default(), Motion::default());
         given.motion(&[], &between, &mut found);
         series.motion(&parameters, &between, &mut expected);
-        // Fastest harmonic 5 · 2π/8 = 3.93 rad/s, velocities below 4 rad/s in all: q⁽⁶⁾ below 4 · 3.93⁵ = 3.8e3; h at most
-        // 0.07.
+        // Fastest harmonic 5 · 2π/8 = 3.93 rad/s, velocities below 4 rad/s in all: q⁽⁶⁾ below 4 · 3.93⁵ = 3.8e3; h at
+        // most 0.07.
         let worst = found.q.iter().zip(&expected.q).fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
         assert!(worst < 0.07_f64.powi(6) * 3.8e3 / (720.0 * 64.0), "{worst}");
     }

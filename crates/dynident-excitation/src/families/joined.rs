@@ -30,9 +30,9 @@ impl Default for JoinedSettings {
 
 /// Members one after another, with a move between each two, and from and to given postures.
 ///
-/// A move is the quintic polynomial that takes over position, velocity and acceleration of both ends (so a plain periodic
-/// series can be joined too); between members at rest it is the minimum-jerk move. Velocity and acceleration are
-/// continuous everywhere if they are within the members.
+/// A move is the quintic polynomial that takes over position, velocity and acceleration of both ends (so a plain
+/// periodic series can be joined too); between members at rest it is the minimum-jerk move. Velocity and acceleration
+/// are continuous everywhere if they are within the members.
 ///
 /// Free numbers: those of the first member (all its joints), of the second, and so on.
 #[derive(Debug)]
@@ -49,8 +49,8 @@ enum Piece {
     MoveTo(usize),
 }
 
-/// Position, velocity and acceleration of all joints at both ends of one member: `[joint][order][end]` as a [`Motion`] of
-/// two samples.
+/// Position, velocity and acceleration of all joints at both ends of one member: `[joint][order][end]` as a [`Motion`]
+/// of two samples.
 fn ends_of(member: &dyn Family, parameters: &[f64]) -> Motion {
     let mut ends = Motion::default();
     member.motion(parameters, &[0.0, member.duration_s()], &mut ends);

@@ -48,9 +48,9 @@ impl MultisineSettings {
 
 /// q_j(t) = q0_j + A_j w(t) m(t + jP/n), m' = √(2/N) Σ_k cos(kωt + φ_k), with Schroeder's phases φ_k = -π k (k - 1)/N,
 ///
-/// ω = 2π/P, P the period between the ramps, n joints. The velocity has a flat spectrum and a low crest factor; A_j is its
-/// rms in rad/s (m/s). Joints are shifted in time against each other, since equal motions of two joints would not distinguish
-/// their parameters apart.
+/// ω = 2π/P, P the period between the ramps, n joints. The velocity has a flat spectrum and a low crest factor; A_j is
+/// its rms in rad/s (m/s). Joints are shifted in time against each other, since equal motions of two joints would not
+/// distinguish their parameters apart.
 ///
 /// w fades in and out over the ramps with three vanishing derivatives, so that both ends are exactly at rest; between
 /// the ramps whole periods pass unchanged, for averaging. Free numbers a joint: q0, A.
@@ -153,8 +153,8 @@ mod tests {
     use crate::family::Family;
     use proptest::prelude::*;
 
-    /// The rms of the velocity over a period is A, and its crest factor is Schroeder's: below 2 where N equal phases would
-    /// give √(2N) = 6.3.
+    /// The rms of the velocity over a period is A, and its crest factor is Schroeder's: below 2 where N equal phases
+    /// would give √(2N) = 6.3.
     #[test]
     fn rms_and_crest() {
         let settings = MultisineSettings { harmonics: 20, periods: 1, ramp_s: 0.0 };

@@ -35,7 +35,8 @@ pub(crate) fn smooth_ramp(x: f64) -> [f64; 4] {
 /// q, q̇, q̈ at the start, then of q, q̇, q̈ at the end.
 ///
 /// # Source
-/// The quintic that takes position, velocity and acceleration at both ends; Craig, Introduction to Robotics, section 7.3.
+/// The quintic that takes position, velocity and acceleration at both ends; Craig, Introduction to Robotics, section
+/// 7.3.
 pub(crate) fn quintic_hermite(time_s: f64, span_s: f64) -> [[f64; 4]; 6] {
     // Coefficients of 1, x, .. x⁵ for a unit span.
     const START: [[f64; 6]; 3] =

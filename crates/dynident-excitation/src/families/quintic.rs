@@ -14,8 +14,8 @@ const NAME: &str = "quintic";
 pub struct QuinticSettings {
     /// Number of waypoints, ends included, equally spaced in time. Default 6.
     pub way_points: usize,
-    /// Velocity and acceleration at the inner waypoints are free numbers too. Default false: the motion comes to rest at
-    /// every waypoint.
+    /// Velocity and acceleration at the inner waypoints are free numbers too. Default false: the motion comes to rest
+    /// at every waypoint.
     pub free_rates: bool,
     /// The last waypoint is the first one. Default true.
     pub returns: bool,
@@ -44,7 +44,8 @@ impl QuinticSettings {
     }
 }
 
-/// Quintic polynomials between waypoints at equal times, with continuous velocity and acceleration, at rest at both ends.
+/// Quintic polynomials between waypoints at equal times, with continuous velocity and acceleration, at rest at both
+/// ends.
 ///
 /// Free numbers a joint: positions of the waypoints (the last one left out if the motion returns), then, with free
 /// rates, q̇ of the inner waypoints in rad/s and q̈ in rad/s². The jerk may jump at waypoints.

@@ -72,8 +72,8 @@ impl SplicedLogisticSettings {
 /// Aω²/(6√3).
 ///
 /// At the splices the joint is at rest only nearly: it is A/(1 + e^(ωT/4)) away from its asymptote (4.5e-5 A for
-/// ωT = 40) with a velocity of about that times ω, which changes sign there. [`LogisticStrokes`](super::LogisticStrokes)
-/// are exactly at rest.
+/// ωT = 40) with a velocity of about that times ω, which changes sign there.
+/// [`LogisticStrokes`](super::LogisticStrokes) are exactly at rest.
 ///
 /// Position determines velocity and acceleration.
 #[derive(Clone, Debug)]

@@ -22,8 +22,8 @@ pub struct Step {
 /// order of the steps.
 ///
 /// Before and after its turn a joint stands where its function starts, A/(1 + e^(ωT/4)) from its offset; a joint
-/// without a turn stands at its offset. Velocity and acceleration jump by what the splice leaves (Eq. 17 of the paper asks
-/// for less than 1e-4).
+/// without a turn stands at its offset. Velocity and acceleration jump by what the splice leaves (Eq. 17 of the paper
+/// asks for less than 1e-4).
 #[derive(Clone, Debug)]
 pub struct StepWiseLogistic {
     offsets: Vec<f64>,

@@ -13,8 +13,8 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// the smallest sum of relative changes, `s - 1 + Σ c_i(s)`.
 ///
 /// `c` is the constraint's value: the share of the limit that is missing, for the floor metres. A slower run fixes
-/// velocity, acceleration, jerk and the part of torque that gravity does not ask for, so the sum falls before it rises; it
-/// is looked at on a grid up to where s - 1 alone costs more than limits alone, then by golden section. `None` if a
+/// velocity, acceleration, jerk and the part of torque that gravity does not ask for, so the sum falls before it rises;
+/// it is looked at on a grid up to where s - 1 alone costs more than limits alone, then by golden section. `None` if a
 /// motion is not finite.
 pub(super) fn smallest_combination(set: &LimitSet, times_s: &[f64], motion: &Motion) -> Option<Relaxation> {
     let mut workspace = set.workspace();

@@ -65,8 +65,8 @@ pub struct Diagnosis {
 
 /// Looks at a motion on a dense grid of times (1 kHz or so) that includes both ends.
 ///
-/// Running the same path slower by a factor s divides velocity by s, acceleration by s² and jerk by s³, and leaves of the
-/// torque gravity as it is; the smallest s is found by bisection on the constraint values themselves. Gravity alone
+/// Running the same path slower by a factor s divides velocity by s, acceleration by s² and jerk by s³, and leaves of
+/// the torque gravity as it is; the smallest s is found by bisection on the constraint values themselves. Gravity alone
 /// above a torque limit, or a broken position, place or distance, cannot be fixed so.
 ///
 /// # Panics

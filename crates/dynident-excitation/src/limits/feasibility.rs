@@ -77,7 +77,8 @@ fn shortest_duration_s(displacement: f64, speed: Option<f64>, acceleration: Opti
     if d <= 0.0 {
         return 0.0;
     }
-    // Time at the top velocity, were there no ramps, and the times to reach v from rest and back by acceleration and jerk.
+    // Time at the top velocity, were there no ramps, and the times to reach v from rest and back by acceleration and
+    // jerk.
     let ramp = |v: f64| match (acceleration, jerk) {
         (Some(a), Some(j)) if v * j >= a * a => a / j + v / a,
         (_, Some(j)) => 2.0 * (v / j).sqrt(),

@@ -55,8 +55,8 @@ fn array(motion: &Motion, kind: LimitKind) -> &[f64] {
     }
 }
 
-/// One row of a [`LimitSet`](super::LimitSet) that bounds a single joint's position (order 0), velocity, acceleration or
-/// jerk (3): `c = |x - middle| / half - 1`.
+/// One row of a [`LimitSet`](super::LimitSet) that bounds a single joint's position (order 0), velocity, acceleration
+/// or jerk (3): `c = |x - middle| / half - 1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct JointBand {
     /// The row.

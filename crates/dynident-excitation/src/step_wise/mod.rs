@@ -109,8 +109,8 @@ impl StepWiseProblem {
         self.joints.iter().zip(strokes).map(|(joint, stroke)| joint.constants.condition_number(stroke)).collect()
     }
 
-    /// Position, velocity, acceleration and rest of one stroke. What limits the arm's place is for the check of the whole
-    /// motion.
+    /// Position, velocity, acceleration and rest of one stroke. What limits the arm's place is for the check of the
+    /// whole motion.
     pub fn limits(&self, place: usize, stroke: &Stroke) -> [StrokeLimit; 5] {
         self.joints[place].constants.limits(stroke)
     }

@@ -172,8 +172,8 @@ fn the_optimum_lies_on_the_kink_of_the_condition_number() {
     assert_eq!(best.status, AugmentedLagrangianStatus::Converged);
     let mut c = vec![0.0; smooth.constraints()];
     smooth.values(&best.best, &mut c);
-    // Both pairs of singular values and the acceleration limit bind, the velocity limit does not. Tolerance of a converged
-    // solution; the gap of the velocity is 0.6 %.
+    // Both pairs of singular values and the acceleration limit bind, the velocity limit does not. Tolerance of a
+    // converged solution; the gap of the velocity is 0.6 %.
     assert!(c[0].abs() < 1e-6 && c[1].abs() < 1e-6 && c[4].abs() < 1e-6, "{c:?}");
     assert!(c[3] < -0.003, "{c:?}");
 }

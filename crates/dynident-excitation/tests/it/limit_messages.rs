@@ -194,8 +194,8 @@ fn a_stretch_leaves_gravity() {
         panic!("neither a slower run nor one kind of limit alone fixes both: {diagnosis:?}")
     };
     assert!(diagnosis.sentences().last().unwrap().starts_with("No single change"), "{:?}", diagnosis.sentences());
-    // The position needs half a range of 0.2 rad at any velocity. Whatever the factor, the relaxed limits must hold by the
-    // independent check ...
+    // The position needs half a range of 0.2 rad at any velocity. Whatever the factor, the relaxed limits must hold by
+    // the independent check ...
     let relaxed = |scale: f64| {
         let needed = |wanted| changes.iter().find(|(kind, _)| *kind == wanted).unwrap().1.2 * scale;
         let (half, torque) = (needed(LimitKind::Position), needed(LimitKind::Torque));

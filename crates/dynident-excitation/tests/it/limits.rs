@@ -78,7 +78,8 @@ fn the_adjoint_equals_central_differences() {
     }
 }
 
-/// Half a turn in one step, straight over the column: both samples stand outside, and only the way between them determines.
+/// Half a turn in one step, straight over the column: both samples stand outside, and only the way between them
+/// determines.
 #[test]
 fn a_column_is_seen_between_two_samples() {
     let model = ur10();

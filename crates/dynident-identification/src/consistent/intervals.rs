@@ -10,7 +10,8 @@ use dynident_estimation::{Estimate, LinearProblem};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// The 95 % interval of one parameter of a body or term, over all physically consistent robots that the data do not reject.
+/// The 95 % interval of one parameter of a body or term, over all physically consistent robots that the data do not
+/// reject.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ParameterInterval {
     /// Symbol of the parameter: `m3`, `mx3`, `Ixx3` (about the body frame's origin), `fv3`.
@@ -29,7 +30,8 @@ pub struct ParameterInterval {
     pub held_by: [IntervalEnd; 2],
 }
 
-/// The 95 % intervals of all parameters, over all consistent sets that the data do not reject; `plain` if the estimate is least squares on these very rows.
+/// The 95 % intervals of all parameters, over all consistent sets that the data do not reject; `plain` if the estimate
+/// is least squares on these very rows.
 ///
 /// # Errors
 /// Numbers that are not finite, bodies whose limits exclude each other.
@@ -45,7 +47,8 @@ pub fn consistent_intervals(
     }
     let own = IntervalSettings::default();
     let physical = PhysicalSettings { prior_weight: own.physical.prior_weight, ..settings.fit() };
-    // Each base parameter's variance has its own degrees of degrees_of_freedom; a sum of several has about the middle one's.
+    // Each base parameter's variance has its own degrees of degrees_of_freedom; a sum of several has about the middle
+    // one's.
     let mut degrees_of_freedom: Vec<f64> = estimate
         .std_degrees_of_freedom
         .iter()

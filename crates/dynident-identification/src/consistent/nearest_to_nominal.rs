@@ -5,11 +5,12 @@ use dynident_dynamics::{Column, ParametricModel};
 use dynident_model::{InertialParameters, Model};
 use nalgebra::{DMatrix, DVector};
 
-/// All parameters `π` with `B π = θ` (B takes parameters to base parameters) whose weighted distance to `prior` is least:
-/// `π = π₀ + S Bᵀ (B S Bᵀ)⁻¹ (θ - B π₀)`.
+/// All parameters `π` with `B π = θ` (B takes parameters to base parameters) whose weighted distance to `prior` is
+/// least: `π = π₀ + S Bᵀ (B S Bᵀ)⁻¹ (θ - B π₀)`.
 ///
-/// The weights S say how far each parameter may move: masses by kilograms, first moments and inertias by what such a mass does at the robot's size.
-/// Torques depend on θ alone, so every choice predicts the same; masses and inertias of single bodies are **not** measured values.
+/// The weights S say how far each parameter may move: masses by kilograms, first moments and inertias by what such a
+/// mass does at the robot's size. Torques depend on θ alone, so every choice predicts the same; masses and inertias of
+/// single bodies are **not** measured values.
 pub fn nearest_to_nominal(robot: &ParametricModel, theta: &[f64]) -> Vec<f64> {
     let (model, base, prior) = (robot.model(), robot.base(), robot.nominal());
     let columns = base.all_columns();

@@ -7,8 +7,9 @@ use dynident_dynamics::ParametricModel;
 use dynident_estimation::consistent::PhysicalFit;
 use dynident_estimation::{Estimate, LinearProblem};
 
-/// The consistent parameters that fit the logs best, from the factors that the estimate was made from; or, where it is not the least squares of these factors (`plain` is false), those nearest to the
-/// estimate in the metric of the factors.
+/// The consistent parameters that fit the logs best, from the factors that the estimate was made from; or, where it is
+/// not the least squares of these factors (`plain` is false), those nearest to the estimate in the metric of the
+/// factors.
 ///
 /// # Errors
 /// As [`consistent_parameters`].

@@ -9,18 +9,20 @@ use dynident_estimation::consistent::{
 };
 use dynident_model::{InertialParameters, Model};
 
-/// A joint's noise counts as at least this share of its torque's root mean square: no model is better, and with noise-free (simulated) torque the prior would
-/// otherwise vanish beside the data in double precision.
+/// A joint's noise counts as at least this share of its torque's root mean square: no model is better, and with
+/// noise-free (simulated) torque the prior would otherwise vanish beside the data in double precision.
 const LEAST_RELATIVE_SIGMA: f64 = 1.0e-4;
 
-/// Share of a rough body that is mixed into a description's: bodies drawn as rods or plates have no extent at all in some direction.
+/// Share of a rough body that is mixed into a description's: bodies drawn as rods or plates have no extent at all in
+/// some direction.
 const ROUGH_SHARE: f64 = 1.0e-2;
 
-/// The consistent set of parameters that fits the data best, from the factors that an estimate was made from and the noise of its joints (standard deviations, Nm); otherwise the reason why there is
-/// none. See [`physical_fit`].
+/// The consistent set of parameters that fits the data best, from the factors that an estimate was made from and the
+/// noise of its joints (standard deviations, Nm); otherwise the reason why there is none. See [`physical_fit`].
 ///
 /// # Errors
-/// In words: limits that exclude each other, a prior that is no consistent body, names that are not there, numbers that are not finite.
+/// In words: limits that exclude each other, a prior that is no consistent body, names that are not there, numbers that
+/// are not finite.
 pub fn consistent_parameters(
     robot: &ParametricModel,
     problem: &LinearProblem,
@@ -31,7 +33,8 @@ pub fn consistent_parameters(
     Ok(physical_fit(&problem, &settings.fit())?)
 }
 
-/// The consistent set of parameters whose base parameters are nearest to `theta` in the data's own metric: for estimates that are not those of least squares on the same factors.
+/// The consistent set of parameters whose base parameters are nearest to `theta` in the data's own metric: for
+/// estimates that are not those of least squares on the same factors.
 ///
 /// # Errors
 /// As [`consistent_parameters`].
@@ -47,7 +50,8 @@ pub fn nearest_consistent_parameters(
     Ok(physical_fit(&around, &settings.fit())?)
 }
 
-/// Bodies that the description says are impossible: a rough body stands in for each as a prior unless the settings name another. Names with the least eigenvalue of the pseudo-inertia, kg m².
+/// Bodies that the description says are impossible: a rough body stands in for each as a prior unless the settings name
+/// another. Names with the least eigenvalue of the pseudo-inertia, kg m².
 pub fn inconsistent_nominal_bodies(robot: &ParametricModel, settings: &ConsistencySettings) -> Vec<(String, f64)> {
     let bodies = robot.model().bodies().iter().enumerate();
     let stated = bodies.filter(|(_, body)| {
@@ -62,7 +66,8 @@ pub fn inconsistent_nominal_bodies(robot: &ParametricModel, settings: &Consisten
         .collect()
 }
 
-/// Whether ten parameters are those of a consistent body, or of one that is as thin as a plate; and the least eigenvalue of their pseudo-inertia.
+/// Whether ten parameters are those of a consistent body, or of one that is as thin as a plate; and the least
+/// eigenvalue of their pseudo-inertia.
 fn consistent_body(own: &[f64]) -> (bool, f64) {
     let stated = InertialParameters(core::array::from_fn(|k| own[k]));
     let least = stated.pseudo_inertia().symmetric_eigenvalues().min();

@@ -1,4 +1,5 @@
-//! What is known of a robot's bodies and terms before the data: settings of the physically consistent set that fits best.
+//! What is known of a robot's bodies and terms before the data: settings of the physically consistent set that fits
+//! best.
 
 use super::error::ConsistencyError;
 use dynident_estimation::consistent::{PhysicalError, PhysicalPrior, PhysicalRoute, PhysicalSettings};
@@ -31,7 +32,8 @@ pub struct BodyKnowledge {
     pub com_box_m: Option<[[f64; 3]; 2]>,
     /// An ellipsoid that holds all of the mass.
     pub inside: Option<EllipsoidSettings>,
-    /// The prior body in place of the description's: m, m·rx, m·ry, m·rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the link frame's origin.
+    /// The prior body in place of the description's: m, m·rx, m·ry, m·rz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the link
+    /// frame's origin.
     #[serde(deserialize_with = "perhaps")]
     pub prior: Option<[f64; 10]>,
     /// The same ten, if they are known and not to be fitted.
@@ -70,7 +72,8 @@ pub struct ConsistencySettings {
     pub total_mass_kg: Option<[f64; 2]>,
     /// What is known of single bodies, by the name of their link.
     pub bodies: BTreeMap<String, BodyKnowledge>,
-    /// Least and greatest parameter of a term, by its symbol (`fv1 = [0.0, 5.0]`); friction and drive inertia stay at zero or more.
+    /// Least and greatest parameter of a term, by its symbol (`fv1 = [0.0, 5.0]`); friction and drive inertia stay at
+    /// zero or more.
     #[serde(deserialize_with = "intervals")]
     #[serde(rename = "laws")]
     pub terms: BTreeMap<String, [f64; 2]>,

@@ -1,4 +1,5 @@
-//! A log's rows with their instruments, `[Z | W | τ]`: two motions through the same regressor and the same parallel filter.
+//! A log's rows with their instruments, `[Z | W | τ]`: two motions through the same regressor and the same parallel
+//! filter.
 
 use super::TrainingRows;
 use super::instruments::InstrumentSource;

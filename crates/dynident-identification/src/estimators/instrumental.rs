@@ -13,12 +13,13 @@ use serde::{Deserialize, Serialize};
 
 /// Instruments from the motion of the log itself, smoothed far more strongly than for the regressor.
 ///
-/// Noise above this cut-off is not in the instruments; what lies below it is, and is small where the motion is slow against the noise.
+/// Noise above this cut-off is not in the instruments; what lies below it is, and is small where the motion is slow
+/// against the noise.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct InstrumentSettings {
-    /// Cut-off of the zero-phase Butterworth filter of fourth order; by default a quarter of what the log suggests for its motion, which is half of the highest frequency
-    /// that stands out of the noise.
+    /// Cut-off of the zero-phase Butterworth filter of fourth order; by default a quarter of what the log suggests for
+    /// its motion, which is half of the highest frequency that stands out of the noise.
     pub cutoff_hz: Option<f64>,
     /// First-stage F below which instruments are called weak; 10 by default.
     pub weak_below: Option<f64>,

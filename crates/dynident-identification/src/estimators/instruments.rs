@@ -1,4 +1,5 @@
-//! Instruments for a log: a second account of the same motion, sample by sample, that is free of the noise in the first.
+//! Instruments for a log: a second account of the same motion, sample by sample, that is free of the noise in the
+//! first.
 
 use super::instrumental::InstrumentSettings;
 use crate::error::IdentificationError;
@@ -6,8 +7,8 @@ use crate::logs::Logs;
 use dynident_model::Model;
 use dynident_recording::{DifferentiatorSettings, MotionBlock, MotionSettings, MotionStream};
 
-/// Where the motion behind the instruments comes from: [`SmoothedMotion`] of the same log, or a simulation of the closed loop with the current model, which a
-/// crate above this one can plug in.
+/// Where the motion behind the instruments comes from: [`SmoothedMotion`] of the same log, or a simulation of the
+/// closed loop with the current model, which a crate above this one can plug in.
 pub trait InstrumentSource: Send {
     /// A new pass over recording number `log` of the task begins.
     ///
@@ -15,8 +16,9 @@ pub trait InstrumentSource: Send {
     /// If there is no motion for this log.
     fn begin(&mut self, log: usize) -> Result<(), IdentificationError>;
 
-    /// Writes `q`, `dq` and `ddq` (joint-major, `joint * rows + row`, the log's order of joints, SI units) for the samples of `measured`, which come in the order of
-    /// time: same rows, same piece of the log. Nothing else of `instruments` is read.
+    /// Writes `q`, `dq` and `ddq` (joint-major, `joint * rows + row`, the log's order of joints, SI units) for the
+    /// samples of `measured`, which come in the order of time: same rows, same piece of the log. Nothing else of
+    /// `instruments` is read.
     ///
     /// # Errors
     /// If the motion does not cover these samples.

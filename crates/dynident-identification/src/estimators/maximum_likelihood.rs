@@ -33,7 +33,8 @@ pub struct PeriodSettings {
     pub period_s: Option<f64>,
     /// Seconds at the start of every log that are left out, until the motion repeats; 0 by default.
     pub skip_s: f64,
-    /// Harmonics of the motion's Fourier series, for the simultaneous fit alone; by default those that stand out of the noise.
+    /// Harmonics of the motion's Fourier series, for the simultaneous fit alone; by default those that stand out of the
+    /// noise.
     pub harmonics: Option<usize>,
 }
 
@@ -67,17 +68,20 @@ pub struct PeriodicFit {
     pub periods: Vec<usize>,
     /// Instants of all mean periods that were fitted to.
     pub instants: usize,
-    /// For each joint the standard deviation of a single sample's smoothed position, velocity and acceleration, rad, rad/s, rad/s² (m).
+    /// For each joint the standard deviation of a single sample's smoothed position, velocity and acceleration, rad,
+    /// rad/s, rad/s² (m).
     pub motion_std: Vec<[f64; 3]>,
     /// For each joint the standard deviation of a single sample's smoothed torque, Nm (N).
     pub torque_std: Vec<f64>,
     /// The likelihood's cost.
     pub cost: f64,
-    /// What it would be if model and noise were right. Where the cost is larger, the model leaves something out, and the error bars were widened by the root of the ratio.
+    /// What it would be if model and noise were right. Where the cost is larger, the model leaves something out, and
+    /// the error bars were widened by the root of the ratio.
     pub degrees_of_freedom: usize,
 }
 
-/// The mean period of one log, joints in the model's order: for each joint position, velocity, acceleration, then the torques of all.
+/// The mean period of one log, joints in the model's order: for each joint position, velocity, acceleration, then the
+/// torques of all.
 struct MeanPeriod {
     averaged: AveragedPeriods,
     samples: usize,
@@ -87,7 +91,8 @@ struct MeanPeriod {
 
 /// The estimate, and what the periods give.
 ///
-/// Torque passes the differentiator's smoothing as the positions do, so that both have the same noise band, and of the mean period as many instants count as that band distinguishes.
+/// Torque passes the differentiator's smoothing as the positions do, so that both have the same noise band, and of the
+/// mean period as many instants count as that band distinguishes.
 pub(super) fn periodic(
     rows: &TrainingRows<'_>,
     periods: &PeriodSettings,
@@ -247,7 +252,8 @@ fn mean_period(
     Ok(MeanPeriod { averaged, samples, stride })
 }
 
-/// Channels from `from` on at steps of `step` samples, so that a period is a whole number of them: cubic interpolation where these lie between samples.
+/// Channels from `from` on at steps of `step` samples, so that a period is a whole number of them: cubic interpolation
+/// where these lie between samples.
 fn at_phases(channels: &[Vec<f64>], from: f64, step: f64) -> Vec<Vec<f64>> {
     let length = channels.first().map_or(0, Vec::len);
     let on_samples = (step - 1.0).abs() * (length as f64) < 1e-3;
@@ -281,7 +287,8 @@ impl<'a> Instants<'a> {
         Self { model, workspace: BatchWorkspace::new(model.model()), panels: Panels::default() }
     }
 
-    /// Hands the instants of a mean period to `visit`. Rows of a mean over more periods count more; `weight` is the root of how much.
+    /// Hands the instants of a mean period to `visit`. Rows of a mean over more periods count more; `weight` is the
+    /// root of how much.
     fn of(&mut self, mean: &MeanPeriod, weight: f64, visit: &mut InstantVisitor<'_>) -> Result<(), Stop> {
         let (model, layout) = (self.model.model(), self.model.layout());
         let (dof, columns) = (model.dof(), layout.columns().len());

@@ -1,7 +1,9 @@
-//! From the rows of the training logs to base parameters: every estimator that is offered, with its settings and its findings.
+//! From the rows of the training logs to base parameters: every estimator that is offered, with its settings and its
+//! findings.
 //!
-//! **To add an estimator**, three files: one here with its settings and a function from [`TrainingRows`] to an [`Estimate`]; a variant of [`Estimator`], which the compiler
-//! then asks for here; and its name in the study file (`study/estimator.rs` of `dynident`), where the compiler asks for the rest.
+//! **To add an estimator**, three files: one here with its settings and a function from [`TrainingRows`] to an
+//! [`Estimate`]; a variant of [`Estimator`], which the compiler then asks for here; and its name in the study file
+//! (`study/estimator.rs` of `dynident`), where the compiler asks for the rest.
 
 mod generalized;
 mod instrument_rows;
@@ -54,7 +56,8 @@ pub enum Estimator {
     Instrumental(InstrumentSettings),
     /// Maximum likelihood for a motion that repeats: noise of motion and torque from how the periods differ.
     MaximumLikelihood(PeriodSettings),
-    /// Motion and parameters together, for a motion that is a Fourier series: noise of positions and torques weighed against each other.
+    /// Motion and parameters together, for a motion that is a Fourier series: noise of positions and torques weighed
+    /// against each other.
     Simultaneous(PeriodSettings),
     /// Regression on the motion of the simulated closed loop: no measured position enters the regressor.
     Didim(Box<SimulatedLoopSettings>),
@@ -101,7 +104,8 @@ impl Estimator {
     }
 }
 
-/// What an estimator alone can determine, beside its estimate. Exhaustive, so that whoever writes results is asked for a new kind.
+/// What an estimator alone can determine, beside its estimate. Exhaustive, so that whoever writes results is asked for
+/// a new kind.
 #[derive(Clone, Debug, Default)]
 pub enum Findings {
     /// Nothing.
@@ -158,7 +162,8 @@ impl TrainingRows<'_> {
     }
 }
 
-/// The estimate that the task's settings ask for, and the test of least squares if there are instruments: those of `source`, or the settings' own.
+/// The estimate that the task's settings ask for, and the test of least squares if there are instruments: those of
+/// `source`, or the settings' own.
 ///
 /// # Errors
 /// Rows that do not carry an estimate, and what the estimator chosen needs and does not find.

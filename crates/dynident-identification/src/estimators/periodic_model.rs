@@ -1,4 +1,5 @@
-//! Unknown motion and unknown parameters of a record whose motion is a Fourier series: what the simultaneous fit asks of a robot.
+//! Unknown motion and unknown parameters of a record whose motion is a Fourier series: what the simultaneous fit asks
+//! of a robot.
 
 use crate::regressor_model::RegressorModel;
 use core::f64::consts::TAU;
@@ -34,16 +35,18 @@ pub struct FourierSeries {
 }
 
 impl FourierSeries {
-    /// How many successive samples may count as one row: at least sixty rows remain in a period of the highest harmonic.
+    /// How many successive samples may count as one row: at least sixty rows remain in a period of the highest
+    /// harmonic.
     pub fn samples_of_row(&self, rate_hz: f64) -> usize {
         (rate_hz * self.period_s / (ROWS_OF_HARMONIC * self.harmonics as f64)).floor().max(1.0) as usize
     }
 }
 
-/// Positions and torques of one record over joints' Fourier coefficients (constant, then sine and cosine of every harmonic) and base parameters.
+/// Positions and torques of one record over joints' Fourier coefficients (constant, then sine and cosine of every
+/// harmonic) and base parameters.
 ///
-/// A row is the mean of `mean_of` successive samples: below the rate of rows nothing is lost, and there are fewer. Channels are the joints' positions, then their torques.
-/// Torque terms must depend on the motion of one instant alone.
+/// A row is the mean of `mean_of` successive samples: below the rate of rows nothing is lost, and there are fewer.
+/// Channels are the joints' positions, then their torques. Torque terms must depend on the motion of one instant alone.
 #[derive(Debug)]
 pub struct PeriodicModel<'a> {
     model: &'a RegressorModel,
@@ -99,7 +102,8 @@ impl<'a> PeriodicModel<'a> {
         self.model.dof()
     }
 
-    /// Coefficients of the series that fit the positions best, joint by joint; `None` where the record does not distinguish them.
+    /// Coefficients of the series that fit the positions best, joint by joint; `None` where the record does not
+    /// distinguish them.
     pub fn fitted_motion(&self) -> Option<Vec<f64>> {
         let normal = self.row_basis.tr_mul(&self.row_basis).cholesky()?;
         Some(normal.solve(&self.row_basis.tr_mul(&self.row_q)).as_slice().to_vec())
@@ -233,7 +237,8 @@ impl SimultaneousModel for PeriodicModel<'_> {
 }
 
 impl PeriodicModel<'_> {
-    /// Derivatives of one torque by the coefficients of all joints. Over a row's few samples the series hardly changes: the mean of slope times function is the product of their means.
+    /// Derivatives of one torque by the coefficients of all joints. Over a row's few samples the series hardly changes:
+    /// the mean of slope times function is the product of their means.
     fn by_coefficients(&self, slopes: &DMatrix<f64>) -> DMatrix<f64> {
         let (joints, own) = (self.joints(), self.own());
         let mut out = DMatrix::zeros(slopes.nrows(), joints * own);
@@ -253,7 +258,8 @@ impl PeriodicModel<'_> {
     }
 }
 
-/// Several records, each with a motion of its own, and one set of parameters. Channels and unknowns follow one another record by record.
+/// Several records, each with a motion of its own, and one set of parameters. Channels and unknowns follow one another
+/// record by record.
 pub(super) struct PeriodicRecords<'a>(pub(super) Vec<PeriodicModel<'a>>);
 
 impl SimultaneousModel for PeriodicRecords<'_> {
@@ -297,7 +303,8 @@ mod tests {
     use dynident_model::sample::Random;
     use dynident_model::terms::{CoulombShape, DriveChoice, terms_per_joint};
 
-    /// Against differences of the residuals, which know nothing of slopes: their error is rounding over the step, 1e-7 to 1e-6 of entries that are of order one to a hundred.
+    /// Against differences of the residuals, which know nothing of slopes: their error is rounding over the step, 1e-7
+    /// to 1e-6 of entries that are of order one to a hundred.
     #[test]
     fn derivatives_are_those_of_the_residuals() {
         let robot = read_urdf(include_str!("../../../../robots/planar2r.urdf")).unwrap().model;
@@ -346,7 +353,8 @@ mod tests {
                     let differences = DVector::from_iterator(above[place].len(), differences);
                     let scale = differences.amax().max(1.0);
                     let found = column.map_or_else(|| DVector::zeros(differences.len()), nalgebra::Matrix::into_owned);
-                    // Means of products against products of means: the series turns by ωΔt = 0.04 rad over three samples.
+                    // Means of products against products of means: the series turns by ωΔt = 0.04 rad over three
+                    // samples.
                     let tolerance = if mean_of == 1 { 1e-5 } else { 2e-2 };
                     let error = (&found - &differences).amax();
                     assert!(error <= tolerance * scale, "unknown {unknown}, channel {place}: {error}");

@@ -13,7 +13,8 @@ use dynident_simulation::{ControllerModel, ControllerSettings, LoopSettings, Run
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
-/// Noise of the compared signal counts as at least this share of the signal's root mean square, so that noise-free data have weights.
+/// Noise of the compared signal counts as at least this share of the signal's root mean square, so that noise-free data
+/// have weights.
 const LEAST_RELATIVE_SIGMA: f64 = 1e-4;
 /// Rows times columns that are held in memory, of 8 bytes each.
 const MOST_ENTRIES: usize = 100_000_000;
@@ -90,20 +91,24 @@ pub struct SimulatedFit {
     pub rate_hz: f64,
     /// What was compared: `torque` or `position`.
     pub compared: String,
-    /// Where the iteration began: at the `estimate` (the physically consistent set that fits the measured rows best) or the `description`.
+    /// Where the iteration began: at the `estimate` (the physically consistent set that fits the measured rows best) or
+    /// the `description`.
     pub start: String,
     /// Steps.
     pub iterations: usize,
     /// Simulations of all logs.
     pub simulations: usize,
-    /// For each joint the standard deviation of what the simulation leaves, Nm (N), or rad (m) where positions are compared.
+    /// For each joint the standard deviation of what the simulation leaves, Nm (N), or rad (m) where positions are
+    /// compared.
     pub residual_std: Vec<f64>,
 }
 
 /// The estimate, and how it came about.
 ///
-/// The simulation has the study's controller (its model, if it needs one, is the description) and the log's commanded motion, and no noise; its motion is taken at the log's instants, and what it gives
-/// passes the same parallel filter as what was measured. Error bars are those of weighted least squares on the last linearised rows, so that coloured residuals count as everywhere.
+/// The simulation has the study's controller (its model, if it needs one, is the description) and the log's commanded
+/// motion, and no noise; its motion is taken at the log's instants, and what it gives passes the same parallel filter
+/// as what was measured. Error bars are those of weighted least squares on the last linearised rows, so that coloured
+/// residuals count as everywhere.
 pub(super) fn simulated(
     rows: &TrainingRows<'_>,
     experiment: &SimulatedLoopSettings,

@@ -1,4 +1,5 @@
-//! The closed loop of an experiment behind the estimators' seam: the same controller, reference, instants and filters as the logs, other parameters.
+//! The closed loop of an experiment behind the estimators' seam: the same controller, reference, instants and filters
+//! as the logs, other parameters.
 
 use super::TrainingRows;
 use super::row_pass::Stop;
@@ -28,7 +29,8 @@ pub(super) struct LoopLog {
     pieces: Vec<Piece>,
     filter: Option<DecimationSettings>,
     reference: Reference,
-    /// When the simulation begins, in seconds after the log's first row: with the commanded motion, or with the log if that began later.
+    /// When the simulation begins, in seconds after the log's first row: with the commanded motion, or with the log if
+    /// that began later.
     begins_s: f64,
     /// For each joint its filtered rows.
     pub(super) rows: Vec<usize>,
@@ -132,7 +134,8 @@ impl SimulatedLoop<'_> {
         self.logs.iter().flat_map(|log| &log.rows).sum()
     }
 
-    /// The robot with base parameters θ: its torques, and so its mass matrix, are those of every full set that has these base parameters.
+    /// The robot with base parameters θ: its torques, and so its mass matrix, are those of every full set that has
+    /// these base parameters.
     fn plant(&self, theta: &[f64]) -> Result<Plant, String> {
         let model = ControllerModel::from_columns(self.model.model(), self.model.layout().columns(), theta)
             .map_err(|error| error.to_string())?;
@@ -293,7 +296,8 @@ impl RowConsumer for PanelRows {
     }
 }
 
-/// The motion of a run at any time of the log's clock: between the controller's samples the quintic that has both ends' position, velocity and acceleration.
+/// The motion of a run at any time of the log's clock: between the controller's samples the quintic that has both ends'
+/// position, velocity and acceleration.
 fn sampled(run: &Run, begins_s: f64) -> Result<dynident_recording::Reference, FilterError> {
     let times: Vec<f64> = (0..run.samples).map(|sample| begins_s + run.time_s(sample)).collect();
     let joints: Vec<[Vec<f64>; 3]> = (0..run.joints.len())

@@ -1,4 +1,5 @@
-//! Motion and parameters from one likelihood: logs whose motion is a Fourier series, raw positions and torques, noise of both.
+//! Motion and parameters from one likelihood: logs whose motion is a Fourier series, raw positions and torques, noise
+//! of both.
 
 use super::periodic_model::{FourierSeries, PeriodicModel, PeriodicRecord, PeriodicRecords};
 use super::simulated::torque_sigma;
@@ -129,7 +130,8 @@ pub(super) fn simultaneous(
     Ok((estimate, Findings::Series(fits)))
 }
 
-/// Log number `index` as it was recorded, and the series of its motion: the harmonics that stand out of the noise, unless their number is given.
+/// Log number `index` as it was recorded, and the series of its motion: the harmonics that stand out of the noise,
+/// unless their number is given.
 fn read(
     rows: &TrainingRows<'_>,
     index: usize,

@@ -1,4 +1,5 @@
-//! Rows for estimating a lag: regressor, slope of the predicted torque, and the torque at six neighbouring samples, from which it is known at any time between.
+//! Rows for estimating a lag: regressor, slope of the predicted torque, and the torque at six neighbouring samples,
+//! from which it is known at any time between.
 
 use dynident_estimation::{EstimationError, SegmentSettings, SegmentedFactor};
 use dynident_recording::{DecimationSettings, Decimator};
@@ -28,7 +29,8 @@ impl Piece {
     }
 }
 
-/// One joint's rows `[Y | −∂(Yθ)/∂t | τ at the six nodes]`, filtered alike; the last node stands where a factor has its torque.
+/// One joint's rows `[Y | −∂(Yθ)/∂t | τ at the six nodes]`, filtered alike; the last node stands where a factor has its
+/// torque.
 pub(crate) struct DelayRows {
     pub(crate) factor: SegmentedFactor,
     /// The same rows as one segment.

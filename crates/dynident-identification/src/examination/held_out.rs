@@ -120,7 +120,8 @@ pub struct ModelUnderTest<'a> {
     pub traced: bool,
 }
 
-/// Tests base parameters on recording number `index`, those of the consistent set beside them; with their uncertainty also the band of the predicted torque, and the torque over time if asked for.
+/// Tests base parameters on recording number `index`, those of the consistent set beside them; with their uncertainty
+/// also the band of the predicted torque, and the torque over time if asked for.
 ///
 /// # Errors
 /// What reading it can give.

@@ -1,4 +1,5 @@
-//! What the logs say of an estimate: delays of the torque, its sign, residuals, and how well it predicts what it was not fitted to.
+//! What the logs say of an estimate: delays of the torque, its sign, residuals, and how well it predicts what it was
+//! not fitted to.
 
 mod delay_rows;
 mod held_out;

@@ -18,9 +18,11 @@ pub struct JointResiduals {
     pub whiteness: Option<WhitenessReport>,
     /// Jarque and Bera's test; none for a short log.
     pub normality: Option<NormalityReport>,
-    /// Residual by velocity; none where the velocity is not among the model's columns (no viscous friction, nor both directions of it).
+    /// Residual by velocity; none where the velocity is not among the model's columns (no viscous friction, nor both
+    /// directions of it).
     pub regimes: Option<SpeedRangesReport>,
-    /// The predicted torque's 95 % band; none where the covariance is not at hand. Written as `torque_band` of a result, for a finished model's test has none.
+    /// The predicted torque's 95 % band; none where the covariance is not at hand. Written as `torque_band` of a
+    /// result, for a finished model's test has none.
     #[serde(skip)]
     pub band: Option<TorqueBand>,
 }
@@ -63,7 +65,8 @@ pub(crate) struct JointWatch {
     /// The joint's columns among all.
     own: DMatrix<f64>,
     sigma: Option<(f64, f64)>,
-    /// Places among the panel's columns whose sum is the velocity: viscous friction, or its two directions. None where there are no such columns.
+    /// Places among the panel's columns whose sum is the velocity: viscous friction, or its two directions. None where
+    /// there are no such columns.
     speed: Vec<usize>,
     whiteness: Whiteness,
     normality: Normality,
@@ -86,7 +89,8 @@ impl JointWatch {
         let viscous = places(&|term| matches!(term, TorqueTerm::Viscous(term) if term.joint == joint));
         let directions = places(&|term| matches!(term, TorqueTerm::DirectionalViscous(term) if term.joint == joint));
         let speed = if viscous.is_empty() && directions.len() == 2 { directions } else { viscous };
-        // V = L Lᵀ of the joint's columns: the variance of a prediction w is ‖Lᵀ w‖². Covariances from few segments are singular, so by eigenvalues.
+        // V = L Lᵀ of the joint's columns: the variance of a prediction w is ‖Lᵀ w‖². Covariances from few segments are
+        // singular, so by eigenvalues.
         let own = uncertainty.map_or_else(
             || DMatrix::zeros(0, columns.len()),
             |uncertainty| {

@@ -1,8 +1,10 @@
 //! Does the torque come late? The delay between motion and torque, joint by joint, with its error bar.
 //!
-//! A model that was fitted to late torque has absorbed a part of the lag (the inertia's column a quarter period on is the viscous one), and what a prior's wrong inertias leave looks like a lag of many
-//! milliseconds. So lag and parameters are estimated together, from one log at a time: `τ(t + d) = Y(t) θ − (δ − d) ∂(Yθ)/∂t` with the torque taken `d` later, until `d` is the lag `δ` itself.
-//! The last step's covariance, from time segments, is the lag's. What the model cannot say (backlash, elasticity) is in it as far as it differs from segment to segment.
+//! A model that was fitted to late torque has absorbed a part of the lag (the inertia's column a quarter period on is
+//! the viscous one), and what a prior's wrong inertias leave looks like a lag of many milliseconds. So lag and
+//! parameters are estimated together, from one log at a time: `τ(t + d) = Y(t) θ − (δ − d) ∂(Yθ)/∂t` with the torque
+//! taken `d` later, until `d` is the lag `δ` itself. The last step's covariance, from time segments, is the lag's. What
+//! the model cannot say (backlash, elasticity) is in it as far as it differs from segment to segment.
 
 use crate::examination::delay_rows::{DelayRows, NODES, Piece, lagrange};
 use crate::regressor_model::RegressorModel;
@@ -226,7 +228,8 @@ impl<'a> DelayCheck<'a> {
     }
 }
 
-/// One lag from those of several logs: the mean weighted by their variances. Where logs differ by more than their error bars say, the bar grows to what they differ by (Birge, Phys. Rev. 40 (1932) 207).
+/// One lag from those of several logs: the mean weighted by their variances. Where logs differ by more than their error
+/// bars say, the bar grows to what they differ by (Birge, Phys. Rev. 40 (1932) 207).
 pub fn pooled_delay(lags: &[TorqueLag]) -> Option<TorqueLag> {
     let weight = |lag: &TorqueLag| lag.std_s.max(ROUNDING_S).powi(-2);
     let total: f64 = lags.iter().map(weight).sum();

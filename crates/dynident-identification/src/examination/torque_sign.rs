@@ -1,6 +1,7 @@
 //! Which sign of the torque can a robot have at all?
 //!
-//! Least squares fits either sign equally well: all parameters change sign. A physically consistent set has positive masses and inertias and friction that takes energy out, so it fits one of the two only.
+//! Least squares fits either sign equally well: all parameters change sign. A physically consistent set has positive
+//! masses and inertias and friction that takes energy out, so it fits one of the two only.
 
 use crate::consistent::{ConsistencySettings, nearest_consistent_parameters};
 use dynident_dynamics::ParametricModel;
@@ -8,7 +9,8 @@ use dynident_estimation::{Estimate, LinearProblem};
 use dynident_recording::{Finding, Level};
 use serde::{Deserialize, Serialize};
 
-/// The other sign counts as right when a physically consistent set leaves less than this share of what it leaves with the given sign.
+/// The other sign counts as right when a physically consistent set leaves less than this share of what it leaves with
+/// the given sign.
 const CLEARLY_BETTER: f64 = 0.5;
 
 /// How well physically consistent robots explain the torque with either sign, by no prior knowledge of the bodies.
@@ -27,7 +29,8 @@ impl TorqueSignCheck {
     }
 }
 
-/// Fits a physically consistent set to the torque and to its negative. The description's own inertials are not looked at: rough bodies of 1 kg are the prior, and no friction. None where a fit fails.
+/// Fits a physically consistent set to the torque and to its negative. The description's own inertials are not looked
+/// at: rough bodies of 1 kg are the prior, and no friction. None where a fit fails.
 pub fn sign_evidence(
     nominal: &ParametricModel,
     problem: &LinearProblem,

@@ -1,4 +1,5 @@
-//! The friction that a joint may have when the data choose: terms, and for each term a grid of its constants, every one a column.
+//! The friction that a joint may have when the data choose: terms, and for each term a grid of its constants, every one
+//! a column.
 
 use dynident_model::terms::{
     Coulomb, CoulombShape, Direction, DirectionalViscous, LoadFriction, MaxwellSlip, Power, PowerExponent, Sigmoid,

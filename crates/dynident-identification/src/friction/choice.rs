@@ -1,9 +1,11 @@
 //! Friction by cross-validation inside the training logs, joint by joint.
 //!
-//! All columns that a joint may have are in the factors already, so a candidate model is a selection of them (see [`CrossValidation`]). Terms are added one at a time to
-//! viscous friction with a Coulomb step or a sigmoid, the one that lowers the error most first; of all candidates met, the simplest counts whose mean square error is within one
-//! standard error of the least (Hastie, Tibshirani and Friedman, *The Elements of Statistical Learning*, 7.10; the standard error is that of the difference, block by block,
-//! because blocks differ among themselves far more than candidates do).
+//! All columns that a joint may have are in the factors already, so a candidate model is a selection of them (see
+//! [`CrossValidation`]). Terms are added one at a time to viscous friction with a Coulomb step or a sigmoid, the one
+//! that lowers the error most first; of all candidates met, the simplest counts whose mean square error is within one
+//! standard error of the least (Hastie, Tibshirani and Friedman, *The Elements of Statistical Learning*, 7.10; the
+//! standard error is that of the difference, block by block, because blocks differ among themselves far more than
+//! candidates do).
 
 use super::candidates::{CandidateColumn, FrictionKind};
 use crate::regressor_model::RegressorModel;
@@ -19,7 +21,8 @@ const FOLDS: [usize; 2] = [10, 5];
 const MOST_ADDED: usize = 3;
 /// Rounds over all joints: from the second on, the others have the friction that was chosen for them.
 const ROUNDS: usize = 2;
-/// Root mean square velocity below which a joint does not move, rad/s or m/s: what the position noise of a standing joint looks like.
+/// Root mean square velocity below which a joint does not move, rad/s or m/s: what the position noise of a standing
+/// joint looks like.
 const MOVING: f64 = 1.0e-3;
 
 /// How the friction of one joint was chosen.
@@ -84,7 +87,8 @@ pub fn chosen_model(
     robot.with_terms(terms)
 }
 
-/// Chooses friction for joints whose `candidates` are among the columns of `wide_problem`; `plain` is the fit with the stated terms, in which joints count alike if `equal_weights`.
+/// Chooses friction for joints whose `candidates` are among the columns of `wide_problem`; `plain` is the fit with the
+/// stated terms, in which joints count alike if `equal_weights`.
 pub(crate) fn choose_friction(
     model: &RegressorModel,
     wide: &RegressorModel,
@@ -133,7 +137,8 @@ pub(crate) fn choose_friction(
         if speed < MOVING {
             return Ok((refused(joint, "the joint does not move in the training logs"), Vec::new()));
         }
-        // The stated model, as far as the data excite it, without this joint's friction, and with that of others as chosen before.
+        // The stated model, as far as the data excite it, without this joint's friction, and with that of others as
+        // chosen before.
         let chosen_before = |other: usize| choose.iter().position(|&c| c == other).and_then(|c| before[c].as_ref());
         let kept = |index: &usize| match &model.layout().columns()[*index] {
             Column::Term(term) if term.is_joint_friction() => {
@@ -206,7 +211,8 @@ impl ScoredCandidate {
     }
 }
 
-/// The best constants of a model with the given terms. Constants of `before` are kept, but for those of the step, which shares its velocities with the new term.
+/// The best constants of a model with the given terms. Constants of `before` are kept, but for those of the step, which
+/// shares its velocities with the new term.
 fn tuned(
     folds: &JointFolds,
     columns: &[CandidateColumn],

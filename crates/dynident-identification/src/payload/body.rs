@@ -1,4 +1,5 @@
-//! From what the logs hold information about a payload to a body with mass, centre of mass and inertia, and to a consistent one.
+//! From what the logs hold information about a payload to a body with mass, centre of mass and inertia, and to a
+//! consistent one.
 
 use super::columns::PayloadColumns;
 use dynident_estimation::consistent::{
@@ -7,11 +8,13 @@ use dynident_estimation::consistent::{
 use dynident_estimation::{Estimate, TriangularFactor};
 use nalgebra::{DMatrix, DVector};
 
-/// What data leave open is taken from a body of the payload's mass with this radius of gyration about the link's origin, metres.
+/// What data leave open is taken from a body of the payload's mass with this radius of gyration about the link's
+/// origin, metres.
 const LENGTH_M: f64 = 0.1;
 /// Least mass of that body, kg.
 const LEAST_MASS_KG: f64 = 0.01;
-/// Error bars count as at least this share of what a body of that size has: noise-free logs would leave nothing for the prior in double precision.
+/// Error bars count as at least this share of what a body of that size has: noise-free logs would leave nothing for the
+/// prior in double precision.
 const LEAST_RELATIVE_STD: f64 = 1.0e-5;
 
 /// Mass, centre of mass (3) and inertia about it (6: xx, xy, xz, yy, yz, zz), from ten parameters in a frame.

@@ -1,7 +1,9 @@
 //! The parameters of a task beside the arm's: payloads and offsets of single logs, and what each log sees of them.
 //!
-//! A payload with parameters π in the frame of its link adds `A π` to the ten parameters of the body that it is fixed to, and so `M π` with `M = B_body A` to the base parameters
-//! (`θ = B π_all`). No log needs other columns than the arm's: log ℓ is explained by the base vector `θ_ℓ = T_ℓ x + c_ℓ`, with x all that is to be estimated and c a known payload.
+//! A payload with parameters π in the frame of its link adds `A π` to the ten parameters of the body that it is fixed
+//! to, and so `M π` with `M = B_body A` to the base parameters (`θ = B π_all`). No log needs other columns than the
+//! arm's: log ℓ is explained by the base vector `θ_ℓ = T_ℓ x + c_ℓ`, with x all that is to be estimated and c a known
+//! payload.
 
 use super::error::PayloadError;
 use super::known_arm::Refit;
@@ -15,7 +17,8 @@ use dynident_model::terms::{Offset, TorqueTerm};
 use dynident_model::{INERTIAL_NAMES, InertialParameters};
 use nalgebra::{DMatrix, DVector};
 
-/// A payload's parameter is a sum of earlier ones when the part of its change that they do not make is below this share: the structure is known to 1e-9 or so.
+/// A payload's parameter is a sum of earlier ones when the part of its change that they do not make is below this
+/// share: the structure is known to 1e-9 or so.
 const DEPENDENT: f64 = 1.0e-6;
 /// Share of a dropped parameter below which it does not stand in a sum.
 const IN_SUM: f64 = 1.0e-9;
@@ -62,7 +65,8 @@ pub struct LoadColumns {
 }
 
 impl LoadColumns {
-    /// The columns of a task, in terms of the columns of the model's layout; `known_arm` where the arm is held, with what of it is fitted again.
+    /// The columns of a task, in terms of the columns of the model's layout; `known_arm` where the arm is held, with
+    /// what of it is fitted again.
     ///
     /// # Errors
     /// If a payload or its link is not there, or something is asked for that does not go together with payloads.
@@ -225,7 +229,8 @@ impl LoadColumns {
         known
     }
 
-    /// Adds one joint's rows of a log to a problem over all columns; the known payload's torque is taken off unless the gain of the joint is not known yet.
+    /// Adds one joint's rows of a log to a problem over all columns; the known payload's torque is taken off unless the
+    /// gain of the joint is not known yet.
     pub(crate) fn add(
         &self,
         problem: &mut LinearProblem,

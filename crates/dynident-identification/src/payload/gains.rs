@@ -16,7 +16,8 @@ const WIDEST: f64 = 0.5;
 pub struct DriveGain {
     /// The joint.
     pub joint: String,
-    /// Torque per unit of what is logged, Nm (N): a factor for `torque.scale` of the format. Where it is not identified, what it was held at.
+    /// Torque per unit of what is logged, Nm (N): a factor for `torque.scale` of the format. Where it is not
+    /// identified, what it was held at.
     pub gain: f64,
     /// Its standard deviation.
     pub std: f64,
@@ -37,7 +38,8 @@ pub(crate) struct Gains {
     pub(crate) problem: LinearProblem,
 }
 
-/// Gains and parameters together; `rows` has the torque as logged and the known payloads still in it, log by log in the order of `training`.
+/// Gains and parameters together; `rows` has the torque as logged and the known payloads still in it, log by log in the
+/// order of `training`.
 pub(crate) fn drive_gains(
     settings: &EstimationSettings,
     columns: &LoadColumns,

@@ -36,7 +36,8 @@ pub struct PayloadParameter {
     pub excited: bool,
 }
 
-/// The physically consistent payload nearest to the estimate in the metric of its covariance. What the logs leave open is no measured value.
+/// The physically consistent payload nearest to the estimate in the metric of its covariance. What the logs leave open
+/// is no measured value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ConsistentPayload {
     /// Mass.
@@ -66,7 +67,8 @@ pub struct PayloadResult {
     pub mass_kg: Option<Measured>,
     /// Centre of mass in the link's frame, m; none for coordinates that are not determined alone.
     pub com_m: [Option<Measured>; 3],
-    /// Inertia about the centre of mass, axes of the link's frame, kg m²: xx, xy, xz, yy, yz, zz; none where it is not determined alone.
+    /// Inertia about the centre of mass, axes of the link's frame, kg m²: xx, xy, xz, yy, yz, zz; none where it is not
+    /// determined alone.
     pub inertia_at_com_kgm2: [Option<Measured>; 6],
     /// What the logs cannot determine, in words.
     pub not_identified: Vec<String>,

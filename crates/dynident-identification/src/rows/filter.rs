@@ -3,7 +3,8 @@
 use dynident_recording::{DecimationSettings, MotionSettings};
 use serde::{Deserialize, Serialize};
 
-/// The parallel filter: torque and every regressor column pass the same zero-phase low-pass, then every n-th row is kept.
+/// The parallel filter: torque and every regressor column pass the same zero-phase low-pass, then every n-th row is
+/// kept.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ParallelFilterSettings {
@@ -49,13 +50,15 @@ impl ParallelFilterSettings {
         Ok(())
     }
 
-    /// The filter in force at this rate for a motion that lies below `motion_cutoff_hz`; `None` where every sample counts.
+    /// The filter in force at this rate for a motion that lies below `motion_cutoff_hz`; `None` where every sample
+    /// counts.
     pub fn decimation(&self, rate_hz: f64, motion_cutoff_hz: Option<f64>) -> Option<DecimationSettings> {
         if !self.enabled {
             return None;
         }
-        // The motion's cut-off is twice the motion's highest frequency; with seven eighths of it per Nyquist band the filter's gain of one half lies
-        // at 0.7 of the cut-off, above all motion. It takes the same from torque and regressor, so it costs no bias.
+        // The motion's cut-off is twice the motion's highest frequency; with seven eighths of it per Nyquist band the
+        // filter's gain of one half lies at 0.7 of the cut-off, above all motion. It takes the same from torque and
+        // regressor, so it costs no bias.
         let automatic =
             motion_cutoff_hz.map_or(1, |cutoff| (rate_hz / (1.75 * cutoff)).floor().clamp(1.0, 1000.0) as usize);
         let factor = self.factor.unwrap_or(automatic);
@@ -68,7 +71,8 @@ impl ParallelFilterSettings {
     }
 }
 
-/// The frequency below which the whole motion lies; unknown for differentiators without a cut-off, and where only the deviation from a reference has one.
+/// The frequency below which the whole motion lies; unknown for differentiators without a cut-off, and where only the
+/// deviation from a reference has one.
 pub fn motion_band_hz(motion: &MotionSettings) -> Option<f64> {
     let differentiator = &motion.differentiator;
     differentiator.cutoff_hz().filter(|_| differentiator.reference().is_none())

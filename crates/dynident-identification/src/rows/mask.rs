@@ -28,7 +28,8 @@ impl MotionRecord {
         whole.then(|| Self { usable: Vec::new(), ..self.clone() })
     }
 
-    /// The mask of its rows behind a filter that reaches `half` samples to either side and keeps every `factor`-th row; `None` where all count.
+    /// The mask of its rows behind a filter that reaches `half` samples to either side and keeps every `factor`-th row;
+    /// `None` where all count.
     pub(crate) fn mask(&self, half: usize, factor: usize) -> Option<RowMask<'_>> {
         if self.usable.is_empty() && self.windows.is_none() {
             return None;

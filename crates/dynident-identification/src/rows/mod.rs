@@ -1,7 +1,7 @@
 //! From samples to rows of regressor and torque, filtered alike: what every estimator and every examination reads.
 //!
-//! Samples flow in blocks: positions to motion, motion to regressor blocks, regressor and torque through the same low-pass and decimation, then to a
-//! [`RowConsumer`]. The whole regressor is never stored.
+//! Samples flow in blocks: positions to motion, motion to regressor blocks, regressor and torque through the same
+//! low-pass and decimation, then to a [`RowConsumer`]. The whole regressor is never stored.
 
 mod builder;
 mod filter;
@@ -18,7 +18,8 @@ pub use pass::{KeptLog, LogPass, LogStatistics};
 use crate::error::IdentificationError;
 use dynident_dynamics::Panels;
 
-/// Samples that are made into regressor blocks at a time: small enough for the cache, large enough to spread the filter's overhead.
+/// Samples that are made into regressor blocks at a time: small enough for the cache, large enough to spread the
+/// filter's overhead.
 pub(crate) const PANEL_SAMPLES: usize = 256;
 
 /// Filtered rows of one joint.
@@ -45,7 +46,8 @@ pub struct RawSamples<'a> {
 
 /// What is done with a log's rows.
 pub trait RowConsumer {
-    /// Takes rows as they leave the parallel filter. Joints of the same instants come in their order, with as many rows each unless windows leave some out.
+    /// Takes rows as they leave the parallel filter. Joints of the same instants come in their order, with as many rows
+    /// each unless windows leave some out.
     ///
     /// # Errors
     /// What stops the pass.
@@ -61,7 +63,8 @@ pub trait RowConsumer {
     }
 }
 
-/// `panel · θ` of one joint: the torque that base parameters `theta` predict for its rows; `columns` are the joint's columns of the layout.
+/// `panel · θ` of one joint: the torque that base parameters `theta` predict for its rows; `columns` are the joint's
+/// columns of the layout.
 pub fn predicted_torque(panel: &[f64], rows: usize, columns: &[usize], theta: &[f64], out: &mut Vec<f64>) {
     out.clear();
     out.resize(rows, 0.0);

@@ -75,7 +75,8 @@ impl LogPass<'_> {
     /// Sends the recording's rows to `consumer`.
     ///
     /// # Errors
-    /// A recording that cannot be read, lacks a temperature that friction needs, or leaves no rows behind the filter; and what the consumer returns.
+    /// A recording that cannot be read, lacks a temperature that friction needs, or leaves no rows behind the filter;
+    /// and what the consumer returns.
     pub fn run(&self, consumer: &mut dyn RowConsumer) -> Result<LogStatistics, IdentificationError> {
         let Recording { name, samples, .. } = self.recording;
         if let Some(joint) = self.model.joint_that_needs_temperature().filter(|_| !self.recording.has_temperature()) {
@@ -155,7 +156,8 @@ impl LogPass<'_> {
         self.most_samples.is_some_and(|most| builder.samples() >= most)
     }
 
-    /// Reads a log to its end, or to as many samples as are asked for; returns its blocks if it was read whole and they fit.
+    /// Reads a log to its end, or to as many samples as are asked for; returns its blocks if it was read whole and they
+    /// fit.
     fn stream(
         &self,
         stream: &mut MotionStream,

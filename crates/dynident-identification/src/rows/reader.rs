@@ -22,7 +22,8 @@ impl Side {
     }
 }
 
-/// Reads on a thread of its own, at most so many blocks ahead that memory is bounded; `take` returns blocks that it does not keep. The order of work is the same as without the thread.
+/// Reads on a thread of its own, at most so many blocks ahead that memory is bounded; `take` returns blocks that it
+/// does not keep. The order of work is the same as without the thread.
 pub(crate) fn read_beside(
     stream: &mut MotionStream,
     mut take: impl FnMut(MotionBlock) -> Result<Option<MotionBlock>, IdentificationError>,

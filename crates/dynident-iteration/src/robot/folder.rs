@@ -18,10 +18,11 @@ pub struct FolderSettings {
     pub wait_s: f64,
 }
 
-/// A folder in which a person finds `run_k/trajectory.csv` and `run_k/controller.json`, and drops `run_k/log.csv` (`t_s, q1.., tau1..`). Where the robot was stopped early, `run_k/stopped.txt` says
-/// why, and the log may be short.
+/// A folder in which a person finds `run_k/trajectory.csv` and `run_k/controller.json`, and drops `run_k/log.csv`
+/// (`t_s, q1.., tau1..`). Where the robot was stopped early, `run_k/stopped.txt` says why, and the log may be short.
 ///
-/// A log is taken once it is complete: its last line ends, and it reaches the trajectory's end. Files that are there are not written again unless they differ, so that a second pass disturbs nobody; where they differ and a log is
+/// A log is taken once it is complete: its last line ends, and it reaches the trajectory's end. Files that are there
+/// are not written again unless they differ, so that a second pass disturbs nobody; where they differ and a log is
 /// there, that log belongs to another run, and is refused.
 #[derive(Debug)]
 pub struct FolderRobot {

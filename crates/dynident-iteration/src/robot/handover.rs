@@ -1,4 +1,5 @@
-//! The files that a robot outside is handed: the trajectory with the model's torques, and the controller with its model.
+//! The files that a robot outside is handed: the trajectory with the model's torques, and the controller with its
+//! model.
 
 use super::term_description::describe;
 use super::{RobotFault, RunRequest};
@@ -13,7 +14,8 @@ use std::path::{Path, PathBuf};
 /// Name and version of the schema of `controller.json`.
 pub const CONTROLLER_SCHEMA: &str = "dynident/controller/1";
 
-/// The reference as a table `t_s, q1.., dq1.., ddq1..`, with the torques `tau1..` that the model expects along it, if there is one: a feed-forward for controllers that have no model of their own.
+/// The reference as a table `t_s, q1.., dq1.., ddq1..`, with the torques `tau1..` that the model expects along it, if
+/// there is one: a feed-forward for controllers that have no model of their own.
 pub fn trajectory_csv(reference: &Reference, model: Option<&ControllerModel>) -> String {
     let joints = reference.joints();
     let mut model = model.cloned();
@@ -47,7 +49,8 @@ pub fn trajectory_csv(reference: &Reference, model: Option<&ControllerModel>) ->
     text
 }
 
-/// The controller's settings, the joints' order, and the model in numbers: enough to compute every torque of the controller elsewhere.
+/// The controller's settings, the joints' order, and the model in numbers: enough to compute every torque of the
+/// controller elsewhere.
 pub fn controller_json(request: &RunRequest<'_>, joints: &[String]) -> Value {
     json!({
         "schema": CONTROLLER_SCHEMA,

@@ -60,7 +60,8 @@ pub enum LogTableError {
     },
 }
 
-/// Reads a log of the joints: columns `t_s`, `q1..`, `tau1..` by name, in any order, others ignored; seconds, rad (m), Nm (N).
+/// Reads a log of the joints: columns `t_s`, `q1..`, `tau1..` by name, in any order, others ignored; seconds, rad (m),
+/// Nm (N).
 ///
 /// # Errors
 /// [`LogTableError`] with the line; [`LogTableError::Incomplete`] if the last line does not end.

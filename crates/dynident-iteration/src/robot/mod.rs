@@ -1,4 +1,5 @@
-//! The robot as an experiment sees it: something that runs a trajectory under a controller and gives a record back. The built-in simulator, another process, or a person with a folder.
+//! The robot as an experiment sees it: something that runs a trajectory under a controller and gives a record back. The
+//! built-in simulator, another process, or a person with a folder.
 
 mod conversation;
 mod folder;
@@ -68,7 +69,8 @@ pub struct RobotRun {
 }
 
 impl RobotRun {
-    /// Per joint: largest distance of the recorded positions from the reference at the record's times, rad (m); the reference between its samples by straight lines.
+    /// Per joint: largest distance of the recorded positions from the reference at the record's times, rad (m); the
+    /// reference between its samples by straight lines.
     pub fn max_error(&self, reference: &Reference) -> Vec<f64> {
         let samples = reference.samples();
         (0..self.record.joints.len())

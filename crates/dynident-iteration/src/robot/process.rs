@@ -34,7 +34,8 @@ pub enum ProcessMode {
 pub struct ProcessLimits {
     /// From its start to its hello, s. Default 30.
     pub hello_s: f64,
-    /// From one message to the next, s; in the mode `run` the first sample may also take the way to the start. Default 60.
+    /// From one message to the next, s; in the mode `run` the first sample may also take the way to the start.
+    /// Default 60.
     pub message_s: f64,
     /// A whole run, s. Default none.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -61,7 +62,8 @@ pub struct ProcessSettings {
     /// How long it may take.
     #[serde(default)]
     pub limits: ProcessLimits,
-    /// Folder for the files that are handed over, `run_k/trajectory.csv` and `run_k/controller.json`. Default a temporary folder, deleted with the robot.
+    /// Folder for the files that are handed over, `run_k/trajectory.csv` and `run_k/controller.json`. Default a
+    /// temporary folder, deleted with the robot.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub folder: Option<PathBuf>,
 }
@@ -82,7 +84,8 @@ impl ProcessSettings {
     }
 }
 
-/// A robot behind a program's standard input and output. The program is started with the first run and kept for the next; after a failure it is killed, and the next run starts it anew.
+/// A robot behind a program's standard input and output. The program is started with the first run and kept for the
+/// next; after a failure it is killed, and the next run starts it anew.
 #[derive(Debug)]
 pub struct ProcessRobot {
     settings: ProcessSettings,
@@ -332,7 +335,8 @@ fn read_last_words(mut errors: impl Read, words: &Mutex<Vec<u8>>) {
     }
 }
 
-/// A message. JSON has no NaN and no infinity, but many programs write them: they are read as missing numbers, so that the verdict can name the sample.
+/// A message. JSON has no NaN and no infinity, but many programs write them: they are read as missing numbers, so that
+/// the verdict can name the sample.
 fn message(line: &str) -> Result<ToHost, serde_json::Error> {
     serde_json::from_str(line).or_else(|error| {
         let fixed = line.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null");

@@ -1,4 +1,5 @@
-//! The messages between an experiment (the host) and a robot program (the client): one JSON object a line. The book's page `robot-protocol.md` describes them with examples.
+//! The messages between an experiment (the host) and a robot program (the client): one JSON object a line. The book's
+//! page `robot-protocol.md` describes them with examples.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +10,8 @@ pub const PROTOCOL: &str = "dynident-robot/1";
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]
 pub enum ToClient {
-    /// Run the trajectory of a file under the controller of a file, by yourself; then the client sends samples and an end.
+    /// Run the trajectory of a file under the controller of a file, by yourself; then the client sends samples and an
+    /// end.
     Run {
         /// Number of the run.
         run: usize,

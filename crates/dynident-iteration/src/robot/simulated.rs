@@ -5,7 +5,8 @@ use dynident_simulation::Plant;
 use dynident_simulation::SimulationError;
 use dynident_simulation::{LoopSettings, closed_loop};
 
-/// A [`Plant`] with its sensors and limits, for [`Robot`]. The seed of the noise is that of the settings and the run's number: runs differ, and the same run is the same again.
+/// A [`Plant`] with its sensors and limits, for [`Robot`]. The seed of the noise is that of the settings and the run's
+/// number: runs differ, and the same run is the same again.
 #[derive(Debug)]
 pub struct SimulatedRobot {
     plant: Plant,

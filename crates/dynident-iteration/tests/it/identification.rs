@@ -114,7 +114,8 @@ fn every_estimator_that_needs_no_more_than_a_log_identifies_a_run() {
         let name = estimator.name();
         let found = identify_run(&task, std::slice::from_ref(&record), &settings(estimator)).unwrap();
         for ([found, std], truth) in friction_of(&task, &found).into_iter().zip([0.8, 1.5, 0.5, 1.0]) {
-            // Five bars; or a twentieth of the Coulomb friction, of whose step the smoothing of the motion blurs a share.
+            // Five bars; or a twentieth of the Coulomb friction, of whose step the smoothing of the motion blurs a
+            // share.
             assert!((found - truth).abs() < (5.0 * std).max(0.05) && std < 0.3, "{name}: {found} +- {std} for {truth}");
         }
         assert!(found.possible.is_some(), "{name}: {:?}", found.impossible);
@@ -177,7 +178,8 @@ fn a_payload_that_is_known_is_taken_off() {
     let found = identify_run(&task, std::slice::from_ref(&record), &settings).unwrap();
     let truth = task.robot.nominal_base().unwrap();
     for (k, truth) in truth.iter().enumerate().filter(|(_, truth)| **truth != 0.0) {
-        // Bodies only: friction is no nominal value. Without the payload taken off, first moments would be 1 and 2 too large.
+        // Bodies only: friction is no nominal value. Without the payload taken off, first moments would be 1 and 2 too
+        // large.
         let (value, std) = (found.values[k], found.std[k]);
         assert!((value - truth).abs() < 5.0 * std && std < 0.2, "{k}: {value} +- {std} for {truth}");
     }

@@ -19,7 +19,8 @@ fn paper_arm() -> Model {
     planar_2r(1.0, tip, tip)
 }
 
-/// Base parameters of the arm in the order of the base columns: m r_x, m r_y and I_zz of each link with what is carried.
+/// Base parameters of the arm in the order of the base columns: m r_x, m r_y and I_zz of each link with what is
+/// carried.
 const TRUTH: [f64; 6] = [2.0, 0.0, 2.0, 1.0, 0.0, 1.0];
 
 /// The best single stroke inside the paper's limits (18): reading-notes 4.
@@ -105,8 +106,9 @@ fn the_papers_arm_is_found_in_both_orders_of_work() {
     }
 }
 
-/// The paper's own way: joint 2 alone with joint 1 locked, then the other way round; the map of Eqs. 15, 16 (branch by the estimated lag); every estimate straight into the controller. The map is
-/// biased while the joint lags, and the iteration takes the bias away: 0.02 after three runs at 100 Hz, where the paper has 0.009 on a faster trajectory.
+/// The paper's own way: joint 2 alone with joint 1 locked, then the other way round; the map of Eqs. 15, 16 (branch by
+/// the estimated lag); every estimate straight into the controller. The map is biased while the joint lags, and the
+/// iteration takes the bias away: 0.02 after three runs at 100 Hz, where the paper has 0.009 on a faster trajectory.
 #[test]
 fn the_literal_scheme_converges_from_the_papers_start() {
     let legs = [1, 0].map(|joint| {

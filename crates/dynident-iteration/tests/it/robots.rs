@@ -1,4 +1,5 @@
-//! The seam: the same run by the simulator, by a program in either mode, and by a folder; and a verdict in time for everything that programs and people do wrong.
+//! The seam: the same run by the simulator, by a program in either mode, and by a folder; and a verdict in time for
+//! everything that programs and people do wrong.
 
 use dynident_excitation::Motion;
 use dynident_iteration::robot::{
@@ -64,7 +65,8 @@ fn fault(mode: ProcessMode, name: &str) -> (RobotFault, RobotRun) {
     (fault, run)
 }
 
-/// A program that serves the simulator gives what the simulator gives, bit for bit, whoever runs the loop, though its joints stand in another order; and again in a second run of the same program.
+/// A program that serves the simulator gives what the simulator gives, bit for bit, whoever runs the loop, though its
+/// joints stand in another order; and again in a second run of the same program.
 #[test]
 fn programs_give_what_the_simulator_gives() {
     let plant = Plant::new(&model(), &[], &[]).unwrap();
@@ -214,7 +216,8 @@ fn the_book_tells_the_protocol() {
     assert!(read >= 7 && own.iter().all(|line| page.contains(line)), "{read}");
 }
 
-/// What is handed over holds the controller's torque: the table's is the model's inverse dynamics, the file's numbers are the model's.
+/// What is handed over holds the controller's torque: the table's is the model's inverse dynamics, the file's numbers
+/// are the model's.
 #[test]
 fn what_is_handed_over_is_enough() {
     let model = model();
@@ -245,7 +248,8 @@ fn what_is_handed_over_is_enough() {
     assert!(robot.run(&RunRequest { model: None, ..request }).is_err());
 }
 
-/// MuJoCo behind the example program, in both modes and under four controllers, against the built-in simulator. Needs Python with MuJoCo: DYNIDENT_PYTHON names the interpreter.
+/// MuJoCo behind the example program, in both modes and under four controllers, against the built-in simulator. Needs
+/// Python with MuJoCo: DYNIDENT_PYTHON names the interpreter.
 #[test]
 #[ignore = "needs Python with MuJoCo in DYNIDENT_PYTHON"]
 fn mujoco_is_a_robot() {

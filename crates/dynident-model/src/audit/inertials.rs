@@ -9,17 +9,21 @@ use nalgebra::Matrix3;
 
 /// Heavier single links are found on no common arm, kg.
 const LARGEST_MASS_KG: f64 = 1000.0;
-/// The densest metal, kg/m³: of all bodies with one mass, a ball of osmium has nearly the least inertia that matter allows.
+/// The densest metal, kg/m³: of all bodies with one mass, a ball of osmium has nearly the least inertia that matter
+/// allows.
 const OSMIUM_DENSITY_KG_M3: f64 = 22590.0;
-/// A violation of a physical inequality by less than this share of the largest moment is rounding in the file: 3 digits are usual there.
+/// A violation of a physical inequality by less than this share of the largest moment is rounding in the file: 3 digits
+/// are usual there.
 const ROUNDING: f64 = 1e-2;
-/// Rounding in the last digit of a binary double and of the eigenvalues, relative to the inertia about the frame's origin.
+/// Rounding in the last digit of a binary double and of the eigenvalues, relative to the inertia about the frame's
+/// origin.
 const NUMERICAL: f64 = 1e-9;
-/// How many body lengths the centre of mass may lie from the frame before it is doubtful, and before it must be a unit slip.
+/// How many body lengths the centre of mass may lie from the frame before it is doubtful, and before it must be a unit
+/// slip.
 const FAR: f64 = 3.0;
 const ABSURDLY_FAR: f64 = 50.0;
-/// A uniform rod about its end has three quarters of its inertia from the parallel-axis term; bodies given rightly rarely look as if
-/// more than this came from it.
+/// A uniform rod about its end has three quarters of its inertia from the parallel-axis term; bodies given rightly
+/// rarely look as if more than this came from it.
 const MOSTLY_SHIFT: f64 = 0.7;
 
 pub(super) fn check(model: &Model, lengths: &Lengths, findings: &mut Findings) {
@@ -146,8 +150,8 @@ fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &m
     }
 }
 
-/// An inertia that was computed about the link's origin but written as if about the centre of mass: without the parallel-axis term
-/// a consistent body remains, and that term is most of the inertia given.
+/// An inertia that was computed about the link's origin but written as if about the centre of mass: without the
+/// parallel-axis term a consistent body remains, and that term is most of the inertia given.
 fn about_origin(link: &str, inertial: &InertialParameters, com: Vec3, inertia: &Mat3, findings: &mut Findings) {
     let mass = inertial.mass_kg();
     let shift = (Mat3::IDENTITY.scale(com.dot(com)) - Mat3::outer(com, com)).scale(mass);

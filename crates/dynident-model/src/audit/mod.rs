@@ -1,7 +1,7 @@
 //! Audit of a model's physics: what a description says that no robot can be, or that is likely a slip.
 //!
-//! The limits below were chosen so that the published descriptions of common arms pass. A finding is advice: the identification itself does
-//! not use the prior inertials unless asked to.
+//! The limits below were chosen so that the published descriptions of common arms pass. A finding is advice: the
+//! identification itself does not use the prior inertials unless asked to.
 
 mod inertials;
 mod joints;
@@ -43,13 +43,13 @@ pub struct AuditFinding {
     pub message: String,
 }
 
-/// Audits a model: the inertials of its moving links, its joints' limits, lengths and units. Findings stand in the order of the tree; the
-/// first sums the model up.
+/// Audits a model: the inertials of its moving links, its joints' limits, lengths and units. Findings stand in the
+/// order of the tree; the first sums the model up.
 ///
-/// Checks (`check` of the findings): `summary`, `mass-not-positive`, `mass-absurd`, `inertia-not-positive`, `triangle-inequality`,
-/// `centre-of-mass-outside`, `inertia-too-large`, `inertia-too-small`, `inertia-at-origin`, `placeholder`, `equal-inertials`,
-/// `inertial-unknown`, `massless-subtree`, `length-unit`, `limit-missing`, `limit-order`, `limit-range`, `limit-unit`, `velocity-limit`,
-/// `effort-limit`, `friction-negative`, `mimic`.
+/// Checks (`check` of the findings): `summary`, `mass-not-positive`, `mass-absurd`, `inertia-not-positive`,
+/// `triangle-inequality`, `centre-of-mass-outside`, `inertia-too-large`, `inertia-too-small`, `inertia-at-origin`,
+/// `placeholder`, `equal-inertials`, `inertial-unknown`, `massless-subtree`, `length-unit`, `limit-missing`,
+/// `limit-order`, `limit-range`, `limit-unit`, `velocity-limit`, `effort-limit`, `friction-negative`, `mimic`.
 pub fn audit(model: &Model) -> Vec<AuditFinding> {
     let mass: f64 = model.inertials().iter().map(crate::InertialParameters::mass_kg).sum();
     let lengths = Lengths::of(model);
@@ -77,8 +77,8 @@ impl Findings {
 struct Lengths {
     /// Largest sum of joint offsets from the base to a joint, m.
     reach: f64,
-    /// Of each body: the largest distance between its frame and a joint or link on it, or its parent joint; at least a tenth of a
-    /// metre (a wrist or a finger often has all its joints in one point).
+    /// Of each body: the largest distance between its frame and a joint or link on it, or its parent joint; at least a
+    /// tenth of a metre (a wrist or a finger often has all its joints in one point).
     bodies: Vec<f64>,
 }
 

@@ -240,7 +240,8 @@ impl Source<'_> {
     }
 }
 
-/// Sine and cosine of degrees, exact at multiples of 90: right angles are the rule in D-H tables, and structural zeros hang on them.
+/// Sine and cosine of degrees, exact at multiples of 90: right angles are the rule in D-H tables, and structural zeros
+/// hang on them.
 fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
     match degrees.rem_euclid(360.0) {
         0.0 => (0.0, 1.0),

@@ -41,14 +41,14 @@
 //! | `modified` (Craig 1986; Khalil and Kleinfinger 1986) | `Rx(α) Tx(a) Rz(θ) Tz(d)` | those before joint i: `a_{i-1}`, `α_{i-1}` |
 //! | `standard` (Denavit and Hartenberg 1955; Paul 1981) | `Rz(θ) Tz(d) Tx(a) Rx(α)` | those after joint i: `a_i`, `α_i` |
 //!
-//! **Frames.** In the modified convention the model's body frame i is D-H frame i: its z axis is the joint's axis. In the standard
-//! convention the axis of joint i is z of frame i-1, so that D-H frame i does not lie on it: there the body frame is frame i-1 turned by
-//! `Rz(θ)` (slid along z by `s q`), and D-H frame i stands in it at `Tz(d) Tx(a) Rx(α)`. Inertials in the table are always given in D-H
-//! frame i; the reader carries them into the body frame.
+//! **Frames.** In the modified convention the model's body frame i is D-H frame i: its z axis is the joint's axis. In
+//! the standard convention the axis of joint i is z of frame i-1, so that D-H frame i does not lie on it: there the
+//! body frame is frame i-1 turned by `Rz(θ)` (slid along z by `s q`), and D-H frame i stands in it at `Tz(d) Tx(a)
+//! Rx(α)`. Inertials in the table are always given in D-H frame i; the reader carries them into the body frame.
 //!
 //! **Inertials**, where known (otherwise the body is unknown, never zero), are one of
-//! - `mass_kg`, `com_m` and `inertia_at_com` (kg m², about the centre of mass) or `inertia_at_origin` (about the origin of D-H frame i),
-//!   both as `[Ixx, Ixy, Ixz, Iyy, Iyz, Izz]`;
+//! - `mass_kg`, `com_m` and `inertia_at_com` (kg m², about the centre of mass) or `inertia_at_origin` (about the origin
+//!   of D-H frame i), both as `[Ixx, Ixy, Ixz, Iyy, Iyz, Izz]`;
 //! - `parameters`, all ten in the order [`INERTIAL_NAMES`](crate::INERTIAL_NAMES).
 
 mod build;

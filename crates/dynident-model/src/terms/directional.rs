@@ -1,7 +1,8 @@
 //! Friction that differs by direction: one parameter for motion forward, one for motion backward.
 //!
-//! Viscous: `τ = F_v⁺ max(q̇, 0) + F_v⁻ min(q̇, 0)`. Coulomb: `τ = F_c⁺ max(s(q̇), 0) + F_c⁻ min(s(q̇), 0)` with a step `s`. All four parameters are
-//! positive where friction takes power. With a step that is a sign, the two Coulomb columns and an offset say the same: keep two of the three.
+//! Viscous: `τ = F_v⁺ max(q̇, 0) + F_v⁻ min(q̇, 0)`. Coulomb: `τ = F_c⁺ max(s(q̇), 0) + F_c⁻ min(s(q̇), 0)` with a step
+//! `s`. All four parameters are positive where friction takes power. With a step that is a sign, the two Coulomb
+//! columns and an offset say the same: keep two of the three.
 
 use super::kind::{
     MotionFunction, TermAction, TermConstant, TermJoints, TermKind, VelocityCurve, VelocityFriction, VelocityFunction,

@@ -1,5 +1,6 @@
-//! What every kind of torque term says of itself. A kind is one type in one file that implements [`TermKind`]; [`TorqueTerm`](super::TorqueTerm) hands every question on to it, so
-//! that nobody else has to know which kinds there are.
+//! What every kind of torque term says of itself. A kind is one type in one file that implements [`TermKind`];
+//! [`TorqueTerm`](super::TorqueTerm) hands every question on to it, so that nobody else has to know which kinds there
+//! are.
 
 use super::{CoulombShape, JointMotion, TermInput};
 use core::fmt::Debug;
@@ -94,7 +95,8 @@ pub trait VelocityFunction: Debug {
     }
 }
 
-/// A function of the motion that a friction term adds to a joint's torque. Terms that add the same function to the same joints cannot be distinguished.
+/// A function of the motion that a friction term adds to a joint's torque. Terms that add the same function to the same
+/// joints cannot be distinguished.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotionFunction {
     /// The joint.

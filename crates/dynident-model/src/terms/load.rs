@@ -1,7 +1,8 @@
 //! Friction that grows with the load: `τ = k |τ_load| s(q̇)` with a step `s`.
 //!
-//! `τ_load` is what the gear carries: the torque of the rigid bodies, by an earlier estimate. A term knows motions only, so the load comes with them (see
-//! [`TermInput`](super::TermInput)); without one the column is zero. Source: Hamon, Gautier and Garrec, IROS 2010, 6187.
+//! `τ_load` is what the gear carries: the torque of the rigid bodies, by an earlier estimate. A term knows motions
+//! only, so the load comes with them (see [`TermInput`](super::TermInput)); without one the column is zero. Source:
+//! Hamon, Gautier and Garrec, IROS 2010, 6187.
 
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, VelocityFriction};
 use super::{CoulombShape, JointMotion, TermInput};

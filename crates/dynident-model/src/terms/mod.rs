@@ -1,5 +1,6 @@
-//! Terms beyond rigid bodies: friction, drive inertia, offsets, couplings. Each term is one parameter and one regressor column per
-//! joint that feels it; each kind is one file here, which says all that there is to say of it, a variant of [`TorqueTerm`] and a line in its `kind`.
+//! Terms beyond rigid bodies: friction, drive inertia, offsets, couplings. Each term is one parameter and one regressor
+//! column per joint that feels it; each kind is one file here, which says all that there is to say of it, a variant of
+//! [`TorqueTerm`] and a line in its `kind`.
 
 mod coulomb;
 mod coupling;
@@ -206,8 +207,9 @@ impl TorqueTerm {
         }
     }
 
-    /// True when a negative parameter is not possible: friction takes power from the motion at every velocity, inertia is positive. An offset may have either sign, and so may a change with temperature; a coupling's
-    /// cross terms are judged with their drive.
+    /// True when a negative parameter is not possible: friction takes power from the motion at every velocity, inertia
+    /// is positive. An offset may have either sign, and so may a change with temperature; a coupling's cross terms are
+    /// judged with their drive.
     pub fn is_nonnegative(&self) -> bool {
         self.kind().is_nonnegative()
     }
@@ -279,8 +281,9 @@ impl TorqueTerm {
         }
     }
 
-    /// The regressor column of this parameter in the row of joint `row`: `out[s] = ∂τ_row/∂parameter` at sample `s`. The block counts as a recording of its own, without known
-    /// load or temperature: see [`column_following`](TorqueTerm::column_following).
+    /// The regressor column of this parameter in the row of joint `row`: `out[s] = ∂τ_row/∂parameter` at sample `s`.
+    /// The block counts as a recording of its own, without known load or temperature: see
+    /// [`column_following`](TorqueTerm::column_following).
     ///
     /// # Panics
     /// If `row` is not one of [`joints`](TorqueTerm::joints) or `out` is not one value per sample.
@@ -289,10 +292,12 @@ impl TorqueTerm {
         self.column_following(row, motion, &mut input, out);
     }
 
-    /// The regressor column as [`column`](TorqueTerm::column), of a block that follows others: with one sample a block, what a simulation needs.
+    /// The regressor column as [`column`](TorqueTerm::column), of a block that follows others: with one sample a block,
+    /// what a simulation needs.
     ///
     /// # Panics
-    /// If `row` is not one of [`joints`](TorqueTerm::joints), or `out`, the load or the temperature are not one value per sample.
+    /// If `row` is not one of [`joints`](TorqueTerm::joints), or `out`, the load or the temperature are not one value
+    /// per sample.
     pub fn column_following(&self, row: usize, motion: &JointMotion<'_>, input: &mut TermInput<'_>, out: &mut [f64]) {
         assert_eq!(out.len(), motion.samples);
         assert!(self.acts_on(row), "joint {row} does not feel {}", self.symbol());
@@ -300,8 +305,9 @@ impl TorqueTerm {
         self.kind().column(row, motion, input, out);
     }
 
-    /// Adds to `by_dq` and `by_ddq` (joint-major) the derivatives of `Σ weights[s] · column[s]` by the velocities and accelerations, where `column` is that of
-    /// [`column`](TorqueTerm::column) in the row of joint `row`. The sign step counts as constant, and so does the deflection of a Maxwell-slip element, which follows positions.
+    /// Adds to `by_dq` and `by_ddq` (joint-major) the derivatives of `Σ weights[s] · column[s]` by the velocities and
+    /// accelerations, where `column` is that of [`column`](TorqueTerm::column) in the row of joint `row`. The sign step
+    /// counts as constant, and so does the deflection of a Maxwell-slip element, which follows positions.
     ///
     /// # Panics
     /// If lengths differ.
@@ -339,7 +345,8 @@ impl TorqueTerm {
     }
 }
 
-/// The terms of joint after joint in the project's order: drive inertia, viscous, Coulomb, offset, as far as `choose` wants them.
+/// The terms of joint after joint in the project's order: drive inertia, viscous, Coulomb, offset, as far as `choose`
+/// wants them.
 pub fn terms_per_joint(model: &Model, mut choose: impl FnMut(usize) -> DriveChoice) -> Vec<TorqueTerm> {
     let mut terms = Vec::new();
     for joint in 0..model.dof() {

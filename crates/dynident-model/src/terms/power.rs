@@ -1,6 +1,8 @@
-//! Friction by a power of the velocity, rounded at rest: `τ = F q̇ (q̇² + ε²)^{(p-1)/2}`, which is `F |q̇|^p sign(q̇)` for velocities well above `ε`.
+//! Friction by a power of the velocity, rounded at rest: `τ = F q̇ (q̇² + ε²)^{(p-1)/2}`, which is `F |q̇|^p sign(q̇)`
+//! for velocities well above `ε`.
 //!
-//! `p = 1/3`: the sub-linear losses of harmonic drives. `p = 2`: churning lubricant. The rounding keeps the slope finite at rest, where that of a cube root is not.
+//! `p = 1/3`: the sub-linear losses of harmonic drives. `p = 2`: churning lubricant. The rounding keeps the slope
+//! finite at rest, where that of a cube root is not.
 
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, VelocityCurve, VelocityFriction, VelocityFunction};
 use super::{JointMotion, TermInput};

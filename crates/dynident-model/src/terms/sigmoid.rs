@@ -1,7 +1,8 @@
 //! Friction as one sigmoid: `τ = φ₁ [1/(1 + e^{-φ₂(q̇ + φ₃)}) - 1/(1 + e^{-φ₂ φ₃})]`.
 //!
-//! It is a Coulomb step of height `φ₁` whose middle lies at `-φ₃`; linear in `φ₁` at given `φ₂` and `φ₃`. With `φ₃ = 0` it is half a smooth Coulomb step of width `2/φ₂`. Source: Gaz,
-//! Cognetti, Oliva, Robuffo Giordano and De Luca, IEEE RA-L 4 (2019) 4147.
+//! It is a Coulomb step of height `φ₁` whose middle lies at `-φ₃`; linear in `φ₁` at given `φ₂` and `φ₃`. With `φ₃ = 0`
+//! it is half a smooth Coulomb step of width `2/φ₂`. Source: Gaz, Cognetti, Oliva, Robuffo Giordano and De Luca, IEEE
+//! RA-L 4 (2019) 4147.
 
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, VelocityCurve, VelocityFriction, VelocityFunction};
 use super::{JointMotion, TermInput};

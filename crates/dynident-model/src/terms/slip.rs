@@ -1,9 +1,11 @@
 //! One element of the generalised Maxwell-slip model: a spring in series with a Coulomb slider, `τ = W z/Δ`.
 //!
-//! The spring's deflection follows the joint and stops at the yield displacement: `z ← clamp(z + q_k - q_{k-1}, -Δ, Δ)`. Elements with a grid of `Δ` side by side give
-//! friction with hysteresis after reversals, linear in their yield torques `W`. The deflection is the one thing that a term remembers from sample to sample
-//! ([`HysteresisState`]); an uninterrupted recording starts undeflected, and the start is forgotten once the joint has moved by 2Δ in one direction. Source: Al-Bender, Lampaert and
-//! Swevers, IEEE Trans. Automatic Control 50 (2005) 1883 (without its sliding dynamics); Lampaert, Swevers and Al-Bender (2002).
+//! The spring's deflection follows the joint and stops at the yield displacement: `z ← clamp(z + q_k - q_{k-1}, -Δ,
+//! Δ)`. Elements with a grid of `Δ` side by side give friction with hysteresis after reversals, linear in their yield
+//! torques `W`. The deflection is the one thing that a term remembers from sample to sample ([`HysteresisState`]); an
+//! uninterrupted recording starts undeflected, and the start is forgotten once the joint has moved by 2Δ in one
+//! direction. Source: Al-Bender, Lampaert and Swevers, IEEE Trans. Automatic Control 50 (2005) 1883 (without its
+//! sliding dynamics); Lampaert, Swevers and Al-Bender (2002).
 
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind};
 use super::{JointMotion, TermInput};

@@ -1,7 +1,7 @@
 //! The Stribeck effect: more friction near rest than in fast motion, `τ = F_s e^{-|q̇/v_s|^δ} s(q̇)` with a step `s`.
 //!
-//! Beside Coulomb friction `F_c`, `F_s` is what static friction has more. Linear in `F_s` at given `v_s` and `δ`. Source: Armstrong-Hélouvry, Dupont and Canudas de Wit,
-//! Automatica 30 (1994) 1083.
+//! Beside Coulomb friction `F_c`, `F_s` is what static friction has more. Linear in `F_s` at given `v_s` and `δ`.
+//! Source: Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083.
 
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind, VelocityFriction, VelocityFunction};
 use super::{CoulombShape, JointMotion, TermInput};

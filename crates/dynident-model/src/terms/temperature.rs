@@ -1,9 +1,11 @@
 //! Friction that changes with the temperature: `τ = F_vT (T − T₀) q̇` and `τ = F_cT (T − T₀) s(q̇)` with a step `s`.
 //!
-//! Beside viscous and Coulomb friction, which then are those at T₀: coefficients linear in the temperature, `F_v(T) = F_v + F_vT (T − T₀)`. Grease thins as it warms, so F_vT is
-//! usually negative; either sign is physical. A term knows motions only, so the temperature comes with them (see [`TermInput`](super::TermInput)); without one the joint counts as being at T₀ and the
-//! column is zero. Linear in a range of some 20 K; beyond, the viscous part falls exponentially. Source: Bittencourt and Axelsson, IEEE/ASME Trans. Mechatronics 19 (2014) 1484; Simoni et al., IFAC
-//! PapersOnLine 48 (2015) 183.
+//! Beside viscous and Coulomb friction, which then are those at T₀: coefficients linear in the temperature, `F_v(T) =
+//! F_v + F_vT (T − T₀)`. Grease thins as it warms, so F_vT is usually negative; either sign is physical. A term knows
+//! motions only, so the temperature comes with them (see [`TermInput`](super::TermInput)); without one the joint counts
+//! as being at T₀ and the column is zero. Linear in a range of some 20 K; beyond, the viscous part falls exponentially.
+//! Source: Bittencourt and Axelsson, IEEE/ASME Trans. Mechatronics 19 (2014) 1484; Simoni et al., IFAC PapersOnLine 48
+//! (2015) 183.
 
 use super::kind::{TermAction, TermConstant, TermJoints, TermKind};
 use super::{CoulombShape, JointMotion, TermInput};

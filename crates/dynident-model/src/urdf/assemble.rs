@@ -62,8 +62,8 @@ pub(super) fn model(
     let (mut tree_joints, mut bodies) = (Vec::new(), Vec::<Body>::new());
     let mut reached = vec![false; links.len()];
     reached[root] = true;
-    // Joints still to visit, with the body that carries their parent link and that link's place in it. A stack, not recursion: a chain
-    // may be as long as the file.
+    // Joints still to visit, with the body that carries their parent link and that link's place in it. A stack, not
+    // recursion: a chain may be as long as the file.
     let mut ahead: Vec<(usize, Option<usize>, Transform)> = Vec::new();
     let visit_later = |ahead: &mut Vec<_>, link: usize, body: Option<usize>, placement: Transform| {
         ahead.extend(joints_under[link].iter().rev().map(|&joint| (joint, body, placement)));

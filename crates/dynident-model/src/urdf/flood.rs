@@ -1,12 +1,14 @@
-//! Guard against documents on which the XML parser's work or memory grows with the square of their length: very many attributes in one tag
-//! (each is compared with all others), and very many namespaces nested in each other (each element keeps all of them).
+//! Guard against documents on which the XML parser's work or memory grows with the square of their length: very many
+//! attributes in one tag (each is compared with all others), and very many namespaces nested in each other (each
+//! element keeps all of them).
 
 /// Most attributes in one tag; the richest tags of real descriptions have a dozen.
 const MAX_ATTRIBUTES: usize = 1000;
 /// Most namespace declarations in a document.
 const MAX_NAMESPACES: usize = 5000;
 
-/// The byte at which a document becomes a flood, if it does. One pass, no memory; malformed markup is left to the parser.
+/// The byte at which a document becomes a flood, if it does. One pass, no memory; malformed markup is left to the
+/// parser.
 pub(super) fn flood(text: &str) -> Option<usize> {
     if let Some((at, _)) = text.match_indices("xmlns").nth(MAX_NAMESPACES) {
         return Some(at);

@@ -1,8 +1,9 @@
 //! URDF, the Unified Robot Description Format: reading and writing back.
 //!
-//! Read are links with `<inertial>`, and joints of type revolute, continuous, prismatic and fixed on a fixed base. Fixed joints are
-//! lumped: [`Body::links`](crate::Body) keeps every link with its frame. A link without `<inertial>` is unknown, never zero. `mimic` is
-//! kept, and the joint counts as free. Joints stand depth first, in the order of the document under each link.
+//! Read are links with `<inertial>`, and joints of type revolute, continuous, prismatic and fixed on a fixed base.
+//! Fixed joints are lumped: [`Body::links`](crate::Body) keeps every link with its frame. A link without `<inertial>`
+//! is unknown, never zero. `mimic` is kept, and the joint counts as free. Joints stand depth first, in the order of the
+//! document under each link.
 //!
 //! ```
 //! let text = r#"<robot name="pendulum">
@@ -39,8 +40,8 @@ use thiserror::Error;
 /// Most moving joints that a description may have.
 pub const MAX_MOVING_JOINTS: usize = 1000;
 
-/// Largest length, angle, mass or inertia accepted in a description: beyond it a number is a slip of the pen, and products of such numbers
-/// would leave the range of `f64`.
+/// Largest length, angle, mass or inertia accepted in a description: beyond it a number is a slip of the pen, and
+/// products of such numbers would leave the range of `f64`.
 pub const MAX_MAGNITUDE: f64 = 1e9;
 
 /// Most elements, texts and comments in a document: a hundred times the largest known, and little memory.
@@ -51,8 +52,8 @@ const MAX_NODES: u32 = 2_000_000;
 pub struct UrdfRobot {
     /// The robot on a fixed base, gravity along -z.
     pub model: Model,
-    /// Elements inside links, inertials and joints that were not read, because URDF does not define them (often a misspelling) or
-    /// because they repeat an earlier one, which counts. At most [`UrdfRobot::MAX_UNREAD`] are kept.
+    /// Elements inside links, inertials and joints that were not read, because URDF does not define them (often a
+    /// misspelling) or because they repeat an earlier one, which counts. At most [`UrdfRobot::MAX_UNREAD`] are kept.
     pub unread: Vec<UnreadElement>,
 }
 

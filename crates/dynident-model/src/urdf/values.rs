@@ -4,7 +4,8 @@ use super::{MAX_MAGNITUDE, UrdfError, UrdfFault, fault_at};
 use crate::place::Located;
 use roxmltree::{Attribute, Node};
 
-/// The first child called `element`; further ones are listed as unread, as the reference parser of URDF passes over them.
+/// The first child called `element`; further ones are listed as unread, as the reference parser of URDF passes over
+/// them.
 pub(super) fn child<'a, 'input>(node: Node<'a, 'input>, element: &str) -> Option<Node<'a, 'input>> {
     node.children().find(|child| child.has_tag_name(element))
 }

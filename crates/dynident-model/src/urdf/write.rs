@@ -1,8 +1,9 @@
 //! Writing identified values back into the user's own URDF.
 //!
-//! Only `<inertial>` and the two friction values of `<dynamics>` change; every other byte stays, with its comments, order, spacing and
-//! line ends. A body is lumped from links that are fixed to each other, and a log cannot distinguish them: [`link_changes`] gives the
-//! whole body to the joint's own link, takes the `<inertial>` from the links fixed to it, and says so in a comment.
+//! Only `<inertial>` and the two friction values of `<dynamics>` change; every other byte stays, with its comments,
+//! order, spacing and line ends. A body is lumped from links that are fixed to each other, and a log cannot distinguish
+//! them: [`link_changes`] gives the whole body to the joint's own link, takes the `<inertial>` from the links fixed to
+//! it, and says so in a comment.
 
 use super::{UrdfError, parse};
 use crate::inertial::InertialParameters;
@@ -97,8 +98,9 @@ pub enum UrdfWriteError {
     },
 }
 
-/// The changes that give every moving body of `model` the parameters `inertials` (body frames, one per joint): the joint's own link gets
-/// them whole, the links fixed to it lose their `<inertial>`. Reading and lumping the result gives exactly the new parameters.
+/// The changes that give every moving body of `model` the parameters `inertials` (body frames, one per joint): the
+/// joint's own link gets them whole, the links fixed to it lose their `<inertial>`. Reading and lumping the result
+/// gives exactly the new parameters.
 ///
 /// # Errors
 /// If the count differs.
@@ -134,11 +136,12 @@ pub fn link_changes(model: &Model, inertials: &[InertialParameters]) -> Result<V
     Ok(changes)
 }
 
-/// `original` with the changes made and every other byte as it was. Inertia is written about the centre of mass in axes parallel to the
-/// link's (rpy = 0), every number in the shortest form that reads back to the same `f64`.
+/// `original` with the changes made and every other byte as it was. Inertia is written about the centre of mass in axes
+/// parallel to the link's (rpy = 0), every number in the shortest form that reads back to the same `f64`.
 ///
 /// # Errors
-/// If the original is no URDF, a link or joint is unknown or named twice, a value is not finite, or a link has moments without mass.
+/// If the original is no URDF, a link or joint is unknown or named twice, a value is not finite, or a link has moments
+/// without mass.
 pub fn rewrite_urdf(original: &str, links: &[LinkChange], joints: &[JointChange]) -> Result<String, UrdfWriteError> {
     let document = parse(original)?;
     let robot = document.root_element();

@@ -219,7 +219,8 @@ fn every_seeded_defect_is_found() {
 
 #[test]
 fn unknown_and_equal_inertials_are_found() {
-    // Without any inertial, all bodies are unknown and all joints move nothing; the tip of the clean arm is only a frame.
+    // Without any inertial, all bodies are unknown and all joints move nothing; the tip of the clean arm is only a
+    // frame.
     let is = |check: &'static str, level: AuditLevel| move |f: &&AuditFinding| f.check == check && f.level == level;
     let mut bare = ARM.to_owned();
     while let Some(start) = bare.find("<inertial>") {

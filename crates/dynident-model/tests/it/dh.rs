@@ -64,7 +64,8 @@ fn base_from_body(model: &Model, q: &[f64]) -> Vec<Transform> {
     frames
 }
 
-/// Compares the axis, centre of mass and inertia of every body, carried to the base frame, with what the textbook's matrices say.
+/// Compares the axis, centre of mass and inertia of every body, carried to the base frame, with what the textbook's
+/// matrices say.
 fn assert_like_textbook(convention: &str, rows: &[Row], q: &[f64]) {
     let model = read_dh(&table(convention, rows)).expect("a good table");
     let mut frame = shift(0.1, -0.2, 0.3) * rot_z(-0.6) * rot_y(0.5) * rot_x(0.4);

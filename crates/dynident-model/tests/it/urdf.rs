@@ -3,7 +3,8 @@
 use crate::common::{ARM, foreign_urdfs};
 use dynident_model::{JointKind, Vec3, audit, load_robot, read_urdf, rewrite_urdf};
 
-/// Degrees of degrees_of_freedom and mass of the moving bodies in kg, as Pinocchio 4.1.0 reads the same files (`robots/README.md`).
+/// Degrees of degrees_of_freedom and mass of the moving bodies in kg, as Pinocchio 4.1.0 reads the same files
+/// (`robots/README.md`).
 const TOTALS: [(&str, usize, f64); 8] = [
     ("planar2r", 2, 3.5),
     ("ur10", 6, 28.7),
@@ -67,8 +68,8 @@ fn the_arm_is_read_as_it_stands() {
 
 #[test]
 fn a_turned_inertial_is_that_of_a_rod_laid_along_the_turned_axis() {
-    // A slender rod along x of the inertial frame, turned by 0.7 about y: its direction is u = (cos, 0, -sin), and its inertia about the
-    // centre of mass is J (1 - u uᵀ).
+    // A slender rod along x of the inertial frame, turned by 0.7 about y: its direction is u = (cos, 0, -sin), and its
+    // inertia about the centre of mass is J (1 - u uᵀ).
     let text = r#"<robot name="r"><link name="b"/><joint name="j" type="continuous"><parent link="b"/><child link="l"/></joint>
         <link name="l"><inertial><origin rpy="0 0.7 0"/><mass value="2"/>
         <inertia ixx="0" ixy="0" ixz="0" iyy="0.3" iyz="0" izz="0.3"/></inertial></link></robot>"#;

@@ -24,7 +24,8 @@ fn bodies(seed: u64, count: usize) -> Vec<InertialParameters> {
         .collect()
 }
 
-/// 1e-12 relative to the largest of a body's ten parameters: moving the inertia to the centre of mass and back costs some ten roundings.
+/// 1e-12 relative to the largest of a body's ten parameters: moving the inertia to the centre of mass and back costs
+/// some ten roundings.
 fn assert_same_inertials(model: &Model, expected: &[InertialParameters]) {
     for (found, expected) in model.inertials().iter().zip(expected) {
         let scale = expected.0.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -34,8 +35,8 @@ fn assert_same_inertials(model: &Model, expected: &[InertialParameters]) {
     }
 }
 
-/// The text without `<inertial>...</inertial>`, `<dynamics .../>` and white space, with `<x></x>` as `<x/>`: what must not change. Written with plain
-/// string search, apart from the writer's XML tree.
+/// The text without `<inertial>...</inertial>`, `<dynamics .../>` and white space, with `<x></x>` as `<x/>`: what must
+/// not change. Written with plain string search, apart from the writer's XML tree.
 fn skeleton(text: &str) -> String {
     let mut rest = text.to_owned();
     for (open, close) in [("<inertial>", "</inertial>"), ("<inertial ", "</inertial>"), ("<dynamics ", "/>")] {

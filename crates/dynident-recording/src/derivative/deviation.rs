@@ -6,8 +6,8 @@ use crate::error::FilterError;
 use crate::reference::Reference;
 use std::sync::Arc;
 
-/// `q = q_d + e`: any other differentiator smooths and differentiates the deviation e alone, and the reference's own derivatives
-/// are added exactly:
+/// `q = q_d + e`: any other differentiator smooths and differentiates the deviation e alone, and the reference's own
+/// derivatives are added exactly:
 ///
 /// `dq = dq_d + S{e}'`, `ddq = ddq_d + S{e}''`
 ///

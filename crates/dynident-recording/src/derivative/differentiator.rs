@@ -50,12 +50,13 @@ pub(crate) fn add_sample(ranges: &mut SampleRanges, i: usize) {
 
 /// One differentiator: from uniformly sampled positions of one joint to filtered position, velocity and acceleration.
 ///
-/// A differentiator that states its [`context_samples`](Self::context_samples) works through a long log in pieces: a window with
-/// so many samples more on either side gives inside what the whole log would give. Ways that fit something to the whole
-/// piece, or estimate a lag over it, leave the default.
+/// A differentiator that states its [`context_samples`](Self::context_samples) works through a long log in pieces: a
+/// window with so many samples more on either side gives inside what the whole log would give. Ways that fit something
+/// to the whole piece, or estimate a lag over it, leave the default.
 ///
-/// Name, shortest signal and [`differentiate_at`](Self::differentiate_at) make a new differentiator. It need not be known to this
-/// crate: [`MotionStream::with_differentiator`](crate::MotionStream::with_differentiator) takes it as it is.
+/// Name, shortest signal and [`differentiate_at`](Self::differentiate_at) make a new differentiator. It need not be
+/// known to this crate: [`MotionStream::with_differentiator`](crate::MotionStream::with_differentiator) takes it as it
+/// is.
 ///
 /// ```
 /// use dynident_recording::{Derivatives, Differentiator, FilterError, Place, SampleRanges};
@@ -111,8 +112,8 @@ pub trait Differentiator: core::fmt::Debug + Send + Sync {
         None
     }
 
-    /// Fills `out` from the positions `q` at `place`; which joint it is, and when, matters only to differentiators that follow a
-    /// [`Reference`](crate::Reference).
+    /// Fills `out` from the positions `q` at `place`; which joint it is, and when, matters only to differentiators that
+    /// follow a [`Reference`](crate::Reference).
     ///
     /// Returns the samples at which this differentiator does not apply: velocity and acceleration there mean nothing.
     ///

@@ -5,8 +5,8 @@ use core::f64::consts::TAU;
 
 /// Rows that are gathered before the next reduction to a triangle.
 const BLOCK: usize = 512;
-/// A column whose new part is smaller than this share of it cannot be determined from the others: six digits of the fit would
-/// be left.
+/// A column whose new part is smaller than this share of it cannot be determined from the others: six digits of the fit
+/// would be left.
 const DEPENDENT: f64 = 1e-10;
 
 /// `x(t) = c + d s + Σ_k a_k sin(2π k f t) + b_k cos(2π k f t)`, k = 1 .. K, with s the time scaled to ±1 over the

@@ -1,14 +1,15 @@
 //! From q to dq and ddq.
 //!
-//! [`Differentiator`] is the interface, also for differentiators that this crate does not know; [`DifferentiatorSettings`] is the
-//! registry of those that it does. They come in three kinds:
+//! [`Differentiator`] is the interface, also for differentiators that this crate does not know;
+//! [`DifferentiatorSettings`] is the registry of those that it does. They come in three kinds:
 //!
 //! * filters and local fits, which work through a long log in pieces: [`ButterworthZeroPhase`] (the default),
 //!   [`LowPass`], [`CentralDifferences`], [`SmoothedDifferences`], [`SavitzkyGolay`], [`FivePointCubic`];
 //! * fits to a whole piece: [`FourierFit`], [`VelocitySeries`], [`FrequencyDomain`];
 //! * differentiators that use the commanded motion: [`PositionMap`], [`TimeWarp`], [`Deviation`].
 //!
-//! A further differentiator is a file here and its variant of [`DifferentiatorSettings`]; the compiler asks for the rest.
+//! A further differentiator is a file here and its variant of [`DifferentiatorSettings`]; the compiler asks for the
+//! rest.
 
 mod butterworth;
 mod central_differences;

@@ -266,7 +266,8 @@ impl DifferentiatorSettings {
     /// As [`build`](Self::build), with the commanded motion, which stands before what the settings name.
     ///
     /// # Errors
-    /// A [`FilterError`] that names the setting; [`FilterError::NoReference`] if this differentiator needs a motion and has none.
+    /// A [`FilterError`] that names the setting; [`FilterError::NoReference`] if this differentiator needs a motion and
+    /// has none.
     pub fn build_following(
         &self,
         chosen_cutoff_hz: f64,

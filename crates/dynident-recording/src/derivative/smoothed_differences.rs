@@ -5,8 +5,8 @@ use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use crate::error::FilterError;
 
 /// Central differences of the positions as logged, the acceleration then smoothed by a moving average of `window`
-/// samples; the torque is smoothed the same differentiator where `smooth_torque` asks for it. Position and velocity stay as they
-/// are.
+/// samples; the torque is smoothed the same differentiator where `smooth_torque` asks for it. Position and velocity
+/// stay as they are.
 ///
 /// White noise σ of the position leaves `σ rate/√2` in dq (order 2). In ddq the average of second differences
 /// telescopes to the difference of two slopes, so `2 σ rate²/W` for 2 <= W, where the differences alone have `√6 σ

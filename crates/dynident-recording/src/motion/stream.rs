@@ -94,10 +94,11 @@ impl MotionStream {
         Self::following(log, settings, None)
     }
 
-    /// As [`new`](Self::new), with the commanded motion for a differentiator that needs it, its joints in the order of the log's.
+    /// As [`new`](Self::new), with the commanded motion for a differentiator that needs it, its joints in the order of
+    /// the log's.
     ///
-    /// Where the differentiator does not apply to a joint, the samples of all joints are left out, the piece is cut there, and the
-    /// report says how many.
+    /// Where the differentiator does not apply to a joint, the samples of all joints are left out, the piece is cut
+    /// there, and the report says how many.
     ///
     /// # Errors
     /// As [`new`](Self::new).

@@ -118,8 +118,8 @@ impl LogisticPath {
         [0.25 * size, size * self.omega / (6.0 * 3.0_f64.sqrt())]
     }
 
-    /// Two strokes a period, none if A = 0. They move where the velocity is above 1e-3 of its peak: up to ln(4000)/ω from
-    /// the middle.
+    /// Two strokes a period, none if A = 0. They move where the velocity is above 1e-3 of its peak: up to ln(4000)/ω
+    /// from the middle.
     pub(crate) fn strokes(&self) -> Vec<Stroke> {
         if self.amplitude == 0.0 {
             return Vec::new();

@@ -18,10 +18,10 @@ pub struct Lag {
     pub at_limit: bool,
 }
 
-/// The lag of `b` behind `a`, searched up to `max_lag_samples` either differentiator: the shift `k` of largest `|corr(a[i], b[i +
-/// k])|` (Pearson's correlation, the same samples of `a` for every shift), refined by a parabola. `None` for signals
-/// that are constant, not finite, or not at least three times as long as the largest lag. Filter both signals alike
-/// before.
+/// The lag of `b` behind `a`, searched up to `max_lag_samples` either differentiator: the shift `k` of largest
+/// `|corr(a[i], b[i + k])|` (Pearson's correlation, the same samples of `a` for every shift), refined by a parabola.
+/// `None` for signals that are constant, not finite, or not at least three times as long as the largest lag. Filter
+/// both signals alike before.
 pub fn best_lag(a: &[f64], b: &[f64], max_lag_samples: usize, rate_hz: f64) -> Option<Lag> {
     let n = a.len().min(b.len());
     if n < 3 * max_lag_samples.max(1) || !(rate_hz.is_finite() && rate_hz > 0.0) {

@@ -44,7 +44,8 @@ fn butterworth_is_sosfiltfilt_and_its_central_differences() {
         let filter = ButterworthZeroPhase::new(order as usize, cutoff).unwrap();
         let [q, dq, ddq] = derivatives(&filter, rate, &x);
         let what = format!("order {order}, {cutoff} Hz");
-        // Rounding of the recursion (condition up to 1e3); the golden differences lose rate · 2e-16 and rate² · 2e-15 more.
+        // Rounding of the recursion (condition up to 1e3); the golden differences lose rate · 2e-16 and rate² · 2e-15
+        // more.
         agree(&q, &numbers(&case["q"]), 1e-12, &what);
         agree(&dq, &numbers(&case["dq"]), 1e-11, &what);
         agree(&ddq, &numbers(&case["ddq"]), 1e-9, &what);

@@ -100,7 +100,8 @@ fn gaps_split_the_log_and_trimming_cuts_both_ends() {
     assert_eq!((report.gap_count, report.gaps[0].row, report.segments), (1, 149, 2));
 }
 
-/// One joint on the paper's stroke with a lag, one that overshoots by a tenth: where the second is off its stroke, both are left out, and what remains are pieces of their own.
+/// One joint on the paper's stroke with a lag, one that overshoots by a tenth: where the second is off its stroke, both
+/// are left out, and what remains are pieces of their own.
 #[test]
 fn samples_off_the_stroke_are_cut_out_and_counted() {
     let path = LogisticPath { amplitude: 1.5, omega: 2.0, offset: 0.2, period_s: 20.0, repetitions: 1 };

@@ -31,7 +31,8 @@ impl ComputedTorqueSettings {
     }
 }
 
-/// `τ = M̂(q)(q̈_d + K_p e + K_d ė) + ĥ(q, q̇) + friction`: with an exact model every joint's error obeys `ë + K_d ė + K_p e = 0` (Luh, Walker and Paul 1980).
+/// `τ = M̂(q)(q̈_d + K_p e + K_d ė) + ĥ(q, q̇) + friction`: with an exact model every joint's error obeys `ë + K_d ė +
+/// K_p e = 0` (Luh, Walker and Paul 1980).
 #[derive(Clone, Debug)]
 pub struct ComputedTorque {
     model: ControllerModel,

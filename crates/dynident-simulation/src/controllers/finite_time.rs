@@ -58,7 +58,8 @@ impl FiniteTimeSettings {
     /// Checks the numbers for so many joints.
     ///
     /// # Errors
-    /// Gains that are negative or not finite, lists of another length, α₁ outside (0, 1], a blend that is negative or not finite.
+    /// Gains that are negative or not finite, lists of another length, α₁ outside (0, 1], a blend that is negative or
+    /// not finite.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         self.kp.gains("kp", joints)?;
         self.kd.gains("kd", joints)?;
@@ -72,11 +73,14 @@ impl FiniteTimeSettings {
 
 /// `τ = M̂(q)(q̈_d + K_p Sig(e)^α₁ + K_d Sig(ė)^α₂) + Ĉ q̇ + ĝ`, `Sig(x)^α = |x|^α sign(x)`, `e = q_d - q`.
 ///
-/// Eq. 23 of the paper with its two signs fixed (as printed, with `e = q_d - q`, the feedback is positive: [`literal`](Self::literal)) and `α₂ = 2 α₁/(1 + α₁)`, of which the paper's formula is a
-/// misprint. With an exact model in continuous time the errors vanish in finite time (Su and Zheng, RCIM 27 (2011) 550; Bhat and Bernstein 2000).
+/// Eq. 23 of the paper with its two signs fixed (as printed, with `e = q_d - q`, the feedback is positive:
+/// [`literal`](Self::literal)) and `α₂ = 2 α₁/(1 + α₁)`, of which the paper's formula is a misprint. With an exact
+/// model in continuous time the errors vanish in finite time (Su and Zheng, RCIM 27 (2011) 550; Bhat and Bernstein
+/// 2000).
 ///
-/// The gain `K_p |e|^(α-1)` is infinite at zero, so that a sampled law ends in a limit cycle of about `(K_p dt²)^(1/(1-α₁))`. Inside `|x| < ε` the power is therefore replaced by the straight line
-/// that meets it at ε, `ε^(α-1) x`: continuous, and as stiff there as the power at ε.
+/// The gain `K_p |e|^(α-1)` is infinite at zero, so that a sampled law ends in a limit cycle of about `(K_p
+/// dt²)^(1/(1-α₁))`. Inside `|x| < ε` the power is therefore replaced by the straight line that meets it at ε, `ε^(α-1)
+/// x`: continuous, and as stiff there as the power at ε.
 #[derive(Clone, Debug)]
 pub struct FiniteTime {
     model: ControllerModel,

@@ -39,7 +39,8 @@ pub struct Measured<'a> {
     pub dq: &'a [f64],
 }
 
-/// A controller of joint torques. It is called once a sample, in the order of time; torque limits are the loop's business.
+/// A controller of joint torques. It is called once a sample, in the order of time; torque limits are the loop's
+/// business.
 pub trait Controller: core::fmt::Debug + Send {
     /// Its name in study files and results.
     fn name(&self) -> &'static str;
@@ -89,7 +90,8 @@ pub enum ControllerSettings {
     ComputedTorque(ComputedTorqueSettings),
     /// [`FiniteTime`]: the paper's law, with its signs fixed.
     FiniteTime(FiniteTimeSettings),
-    /// [`FiniteTime`] with the signs as Eq. 23 prints them: it drives the joints away from the path, and is here to show that.
+    /// [`FiniteTime`] with the signs as Eq. 23 prints them: it drives the joints away from the path, and is here to
+    /// show that.
     FiniteTimeLiteral(FiniteTimeSettings),
     /// [`SlotineLi`]: passivity-based, adaptive if asked.
     SlotineLi(SlotineLiSettings),

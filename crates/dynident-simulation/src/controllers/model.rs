@@ -20,8 +20,9 @@ pub enum FrictionCompensation {
     Measured,
 }
 
-/// A robot model for control: bodies and terms with their parameters. Torques are linear in the parameters, so that a vector of base parameters alone is enough: see
-/// [`from_columns`](Self::from_columns). It need not be physically consistent.
+/// A robot model for control: bodies and terms with their parameters. Torques are linear in the parameters, so that a
+/// vector of base parameters alone is enough: see [`from_columns`](Self::from_columns). It need not be physically
+/// consistent.
 pub struct ControllerModel {
     model: Model,
     terms: Vec<(TorqueTerm, f64)>,
@@ -62,7 +63,8 @@ impl ControllerModel {
         Ok(Self::assembled(model.clone(), terms.iter().cloned().zip(term_parameters.iter().copied()).collect()))
     }
 
-    /// The model with a vector of parameters: ten for each body from base to tip, then one for each term. Links and lengths are `model`'s.
+    /// The model with a vector of parameters: ten for each body from base to tip, then one for each term. Links and
+    /// lengths are `model`'s.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -76,8 +78,9 @@ impl ControllerModel {
         Self::new(&model.with_inertials(&inertials)?, terms, &parameters[bodies..])
     }
 
-    /// The model with values of some columns of the regressor and zeros elsewhere, as an estimate of base parameters gives them
-    /// ([`BaseParameters::base_columns`](dynident_dynamics::BaseParameters::base_columns)): its torques are exactly `W θ`.
+    /// The model with values of some columns of the regressor and zeros elsewhere, as an estimate of base parameters
+    /// gives them ([`BaseParameters::base_columns`](dynident_dynamics::BaseParameters::base_columns)): its torques are
+    /// exactly `W θ`.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -145,7 +148,8 @@ impl ControllerModel {
         self.memories.iter_mut().for_each(HysteresisState::restart);
     }
 
-    /// `M̂(q) a + ĥ(q, q̇)` at the measured motion with the accelerations `a`, and the torques of the terms: inertia and offset always, friction as asked.
+    /// `M̂(q) a + ĥ(q, q̇)` at the measured motion with the accelerations `a`, and the torques of the terms: inertia
+    /// and offset always, friction as asked.
     pub fn torque(
         &mut self,
         measured: Measured<'_>,

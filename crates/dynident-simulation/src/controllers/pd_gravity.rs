@@ -5,7 +5,8 @@ use crate::error::SimulationError;
 
 pub(super) const NAME: &str = "pd-gravity";
 
-/// `τ = K_p e + K_d ė + ĝ(q)`: holds any posture without error where ĝ is right (Takegaki and Arimoto 1981). Constant torques of the model's terms belong to ĝ.
+/// `τ = K_p e + K_d ė + ĝ(q)`: holds any posture without error where ĝ is right (Takegaki and Arimoto 1981). Constant
+/// torques of the model's terms belong to ĝ.
 #[derive(Clone, Debug)]
 pub struct PdGravity {
     pd: JointPd,

@@ -43,11 +43,13 @@ impl SlotineLiSettings {
     }
 }
 
-/// `τ = Y(q, q̇, q̇_r, q̈_r) θ̂ + K_D s` with `s = ė + Λ e`, `q̇_r = q̇_d + Λ e`, `q̈_r = q̈_d + Λ ė`; adapted by `θ̂' = Γ Yᵀ s` (Slotine and Li, IJRR 6 (1987) 49).
+/// `τ = Y(q, q̇, q̇_r, q̈_r) θ̂ + K_D s` with `s = ė + Λ e`, `q̇_r = q̇_d + Λ e`, `q̈_r = q̈_d + Λ ė`; adapted by
+/// `θ̂' = Γ Yᵀ s` (Slotine and Li, IJRR 6 (1987) 49).
 ///
-/// `Y` holds `C(q, q̇) q̇_r` with Christoffel's C, so that `Ṁ - 2C` is skew. That product is the symmetric bilinear form of the centrifugal torques, `C(q, u) v = c((u + v)/2) - c((u - v)/2)` with
-/// `c(w) = C(q, w) w`, and so a difference of two ordinary regressors. Adapted parameters start from the model's at every run and are those of the bodies, then of the terms. Load-dependent
-/// friction is left out: its torque is not linear in the parameters.
+/// `Y` holds `C(q, q̇) q̇_r` with Christoffel's C, so that `Ṁ - 2C` is skew. That product is the symmetric bilinear
+/// form of the centrifugal torques, `C(q, u) v = c((u + v)/2) - c((u - v)/2)` with `c(w) = C(q, w) w`, and so a
+/// difference of two ordinary regressors. Adapted parameters start from the model's at every run and are those of the
+/// bodies, then of the terms. Load-dependent friction is left out: its torque is not linear in the parameters.
 #[derive(Debug)]
 pub struct SlotineLi {
     start: ControllerModel,

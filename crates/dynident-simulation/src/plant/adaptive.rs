@@ -1,6 +1,8 @@
-//! Tight integration between two controller samples: Dormand and Prince's method of order 8(5,3) with error control, by the crate `differential-equations`.
+//! Tight integration between two controller samples: Dormand and Prince's method of order 8(5,3) with error control, by
+//! the crate `differential-equations`.
 //!
-//! Friction as in the fixed Runge-Kutta method: the integration stops where a sliding unit comes to rest (found on the method's dense output) and starts anew there.
+//! Friction as in the fixed Runge-Kutta method: the integration stops where a sliding unit comes to rest (found on the
+//! method's dense output) and starts anew there.
 
 use super::equations::{Equations, StateView};
 use super::runge_kutta::{margin, rest};

@@ -100,7 +100,8 @@ impl JointDisturbance {
         Ok(Self { joint: index, disturbance: disturbance.clone() })
     }
 
-    /// Adds the joint torques (forces) of the disturbance at a time: for a force f at the point p, `axis · ((p - o) × f)` of every revolute joint on the way, `axis · f` of a sliding one.
+    /// Adds the joint torques (forces) of the disturbance at a time: for a force f at the point p, `axis · ((p - o) ×
+    /// f)` of every revolute joint on the way, `axis · f` of a sliding one.
     pub(super) fn add(&self, model: &Model, workspace: &mut Workspace, time_s: f64, q: &[f64], torque: &mut [f64]) {
         match &self.disturbance {
             Disturbance::Joint { torque: size, time, .. } => torque[self.joint] += size * time.at(time_s),
@@ -133,7 +134,8 @@ mod tests {
     use super::*;
     use dynident_model::sample::random_tree;
 
-    /// Virtual work: the joint torques of a force do the work of the force when the point moves. Central differences of 1e-6 leave 1e-9 or so of the force.
+    /// Virtual work: the joint torques of a force do the work of the force when the point moves. Central differences of
+    /// 1e-6 leave 1e-9 or so of the force.
     #[test]
     fn a_force_does_the_work_of_its_joint_torques() {
         for seed in 0..5 {

@@ -5,7 +5,8 @@ use crate::error::{SimulationError, require, require_length};
 use dynident_model::Model;
 use dynident_model::terms::{HysteresisState, JointMotion, TermAction, TermInput, TorqueTerm};
 
-/// Terms with their parameters: constants of the mass matrix and of the torque, linear damping, springs that slip, and friction that follows a velocity.
+/// Terms with their parameters: constants of the mass matrix and of the torque, linear damping, springs that slip, and
+/// friction that follows a velocity.
 #[derive(Clone, Debug)]
 pub(super) struct Drives {
     /// Entries (row, column, value) that drives add to the mass matrix.
@@ -88,7 +89,8 @@ impl Drives {
         Ok(drives)
     }
 
-    /// Takes the torques of slipping springs at positions `q` off `torque`. The deflection is that of the last [`follow`](Self::follow) moved on to `q`.
+    /// Takes the torques of slipping springs at positions `q` off `torque`. The deflection is that of the last
+    /// [`follow`](Self::follow) moved on to `q`.
     pub(super) fn subtract_slips(&self, q: &[f64], torque: &mut [f64]) {
         for slip in &self.slips {
             torque[slip.joint] -= slip.value * deflection(&slip.term, slip.joint, q, &mut slip.memory.clone());

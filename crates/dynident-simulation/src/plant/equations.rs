@@ -1,4 +1,5 @@
-//! The equation of motion of a simulated robot, put together at one state: `M q̈ = τ + d(t) - h(q, q̇) - τ₀ - springs - F_v q̇ - Cᵀ f`.
+//! The equation of motion of a simulated robot, put together at one state: `M q̈ = τ + d(t) - h(q, q̇) - τ₀ - springs -
+//! F_v q̇ - Cᵀ f`.
 
 use super::PlantFault;
 use super::disturbance::JointDisturbance;
@@ -186,7 +187,8 @@ impl Equations {
         }
     }
 
-    /// Friction of the chosen units so that `w = start + factor · acceleration` belongs to their maps; `start` gives a unit's velocity, or nothing. With `jumps` the maps' jumps alone count.
+    /// Friction of the chosen units so that `w = start + factor · acceleration` belongs to their maps; `start` gives a
+    /// unit's velocity, or nothing. With `jumps` the maps' jumps alone count.
     pub(super) fn rub(&mut self, start: Option<&[f64]>, factor: f64, jumps: bool) {
         let count = self.chosen.len();
         self.couple();
@@ -230,7 +232,8 @@ impl Equations {
         let count = self.choose(|_, mode| mode == Mode::Held);
         if count > 0 {
             self.couple();
-            // A joint and a drive that turns with it can be held at once, and then one of the two torques is free: the small diagonal shares it out.
+            // A joint and a drive that turns with it can be held at once, and then one of the two torques is free: the
+            // small diagonal shares it out.
             for place in 0..count {
                 self.compliance[place * count + place] *= 1.0 + 1e-13;
                 self.solver.torque[place] = self.drives.units[self.chosen[place]].speed(&self.acceleration);
@@ -248,7 +251,8 @@ impl Equations {
         Ok(())
     }
 
-    /// Decides at a state which units are held: those at rest (`w = 0`, or held until now) whose friction can. `true` if any unit can hold.
+    /// Decides at a state which units are held: those at rest (`w = 0`, or held until now) whose friction can. `true`
+    /// if any unit can hold.
     pub(super) fn decide(&mut self, at: StateView<'_>) -> Result<bool, PlantFault> {
         let mut at_rest = false;
         for (unit, mode) in self.drives.units.iter().zip(&mut self.modes) {

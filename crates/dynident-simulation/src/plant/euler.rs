@@ -1,7 +1,8 @@
 //! Semi-implicit Euler: the new velocities move the joints.
 //!
-//! `(M + h F_v)(q̇' - q̇)/h = τ - h(q, q̇) - F_v q̇ - Cᵀ f`, `q' = q + h q̇'`: viscous friction implicit as in MuJoCo's Euler integrator, and all other friction implicit as well, `f` in the
-//! map of the velocities after the step. Dry friction then neither chatters nor creates energy at any step.
+//! `(M + h F_v)(q̇' - q̇)/h = τ - h(q, q̇) - F_v q̇ - Cᵀ f`, `q' = q + h q̇'`: viscous friction implicit as in MuJoCo's
+//! Euler integrator, and all other friction implicit as well, `f` in the map of the velocities after the step. Dry
+//! friction then neither chatters nor creates energy at any step.
 
 use super::equations::{Equations, StateView};
 use super::{PlantFault, State};

@@ -1,6 +1,7 @@
 //! Factors of small symmetric positive definite matrices, row-major, without allocation.
 
-/// `A = L D Lᵀ` in the lower triangle of `a` (n × n); the diagonal holds 1/D_ii, the upper triangle is not used. False if `A` is not positive definite (or not a number).
+/// `A = L D Lᵀ` in the lower triangle of `a` (n × n); the diagonal holds 1/D_ii, the upper triangle is not used. False
+/// if `A` is not positive definite (or not a number).
 #[inline]
 pub(super) fn factor(a: &mut [f64], n: usize) -> bool {
     // Sizes known to the compiler: arms have six or seven joints, and loops that end there are unrolled.
@@ -107,7 +108,8 @@ fn solve_of<const N: usize>(l: &[f64], b: &mut [f64]) {
     }
 }
 
-/// Solves the general system `A x = b` by elimination with row pivots; `a` and `b` are used up, `b` holds x. False if a pivot is zero.
+/// Solves the general system `A x = b` by elimination with row pivots; `a` and `b` are used up, `b` holds x. False if a
+/// pivot is zero.
 pub(super) fn eliminate(a: &mut [f64], n: usize, b: &mut [f64]) -> bool {
     for k in 0..n {
         let Some(pivot) = (k..n).max_by(|&i, &j| a[i * n + k].abs().total_cmp(&a[j * n + k].abs())) else {

@@ -1,15 +1,19 @@
 //! The friction torques of all units at once.
 //!
-//! Velocities (or accelerations) after a step are `w = r - c A f` with the units' inverse inertia `A = C M⁻¹ Cᵀ`, and every torque belongs to its unit's map: `f_u ∈ f_u(w_u)`, a jump at rest
-//! (implicit time stepping of dry friction: Moreau 1988; Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008). `A` is positive (semi-)definite and the maps are monotone, so
-//! that velocities are unique, friction takes energy, and a unit that its friction can hold stays at rest exactly.
+//! Velocities (or accelerations) after a step are `w = r - c A f` with the units' inverse inertia `A = C M⁻¹ Cᵀ`, and
+//! every torque belongs to its unit's map: `f_u ∈ f_u(w_u)`, a jump at rest (implicit time stepping of dry friction:
+//! Moreau 1988; Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008). `A` is positive
+//! (semi-)definite and the maps are monotone, so that velocities are unique, friction takes energy, and a unit that its
+//! friction can hold stays at rest exactly.
 //!
-//! Newton's method on the pattern of units at rest, as long as it brings the torques nearer to their solution; Gauss-Seidel sweeps, which always do (they descend in a convex function), where it does not.
+//! Newton's method on the pattern of units at rest, as long as it brings the torques nearer to their solution;
+//! Gauss-Seidel sweeps, which always do (they descend in a convex function), where it does not.
 
 use super::factor::eliminate;
 use super::friction_unit::{FrictionParts, FrictionUnit};
 
-/// Sweeps after which the torques are taken as they are. Newton's method ends after two or three rounds in all that was seen.
+/// Sweeps after which the torques are taken as they are. Newton's method ends after two or three rounds in all that was
+/// seen.
 const ROUNDS: usize = 400;
 /// Share of the largest velocity below which a change counts as none.
 const SETTLED: f64 = 1e-13;
@@ -33,9 +37,11 @@ impl FrictionSolver {
         Self { torque: zeros(), speed: zeros(), trial: zeros(), matrix: vec![0.0; units * units] }
     }
 
-    /// Solves `w = r - c A f`, `f_u ∈ f_u(w_u)`. False if the torques had not settled; they are within their maps all the same.
+    /// Solves `w = r - c A f`, `f_u ∈ f_u(w_u)`. False if the torques had not settled; they are within their maps all
+    /// the same.
     ///
-    /// `chosen` are the places of the units in `units`; `a` and `r` follow `chosen`. With `jumps` only the jumps of the maps count.
+    /// `chosen` are the places of the units in `units`; `a` and `r` follow `chosen`. With `jumps` only the jumps of the
+    /// maps count.
     pub(super) fn solve(
         &mut self,
         units: &[FrictionUnit],
@@ -64,7 +70,8 @@ impl FrictionSolver {
         false
     }
 
-    /// One pass over the units, each solved exactly with the others' torques as they are. Returns the largest change, as a velocity.
+    /// One pass over the units, each solved exactly with the others' torques as they are. Returns the largest change,
+    /// as a velocity.
     fn sweep(&mut self, problem: &Problem<'_>) -> f64 {
         let mut change = 0.0_f64;
         for u in 0..problem.chosen.len() {
@@ -150,7 +157,8 @@ mod tests {
     use dynident_model::sample::Random;
     use dynident_model::terms::{Coulomb, CoulombShape, TorqueTerm};
 
-    /// Strongly coupled units of all kinds: every torque is in its map to rounding (1e-11 of the largest velocity), whatever the mixture of rest and motion.
+    /// Strongly coupled units of all kinds: every torque is in its map to rounding (1e-11 of the largest velocity),
+    /// whatever the mixture of rest and motion.
     #[test]
     fn torques_belong_to_their_speeds() {
         let mut random = Random::new(4);

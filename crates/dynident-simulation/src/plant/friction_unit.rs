@@ -16,7 +16,8 @@ struct Term {
     size: f64,
 }
 
-/// All friction that follows one velocity `w = Σ ratio q̇`: the map `w ↦ f(w)`, set-valued at rest. The torque of a joint is `ratio f`.
+/// All friction that follows one velocity `w = Σ ratio q̇`: the map `w ↦ f(w)`, set-valued at rest. The torque of a
+/// joint is `ratio f`.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FrictionUnit {
     /// The joints that make the velocity, and their ratios.
@@ -113,7 +114,8 @@ impl FrictionUnit {
         sum
     }
 
-    /// Friction torque at `speed` in motion forward (or backward): the map's branch, also where the velocity has just crossed zero.
+    /// Friction torque at `speed` in motion forward (or backward): the map's branch, also where the velocity has just
+    /// crossed zero.
     #[inline]
     pub(super) fn prismatic(&self, speed: f64, forward: bool) -> f64 {
         let jump = if forward { self.level[0] } else { -self.level[1] };
@@ -127,7 +129,8 @@ impl FrictionUnit {
         if !self.smooth || at_jump.slope.is_none() || !rest.is_finite() {
             return at_jump;
         }
-        // Between rest and `rest`: friction takes power, so that it brings the velocity nearer to zero. Newton from rest, kept inside the bracket.
+        // Between rest and `rest`: friction takes power, so that it brings the velocity nearer to zero. Newton from
+        // rest, kept inside the bracket.
         let (mut low, mut high) = if rest > 0.0 { (0.0, rest) } else { (rest, 0.0) };
         let mut speed = 0.0;
         let mut own = self.smooth(speed);

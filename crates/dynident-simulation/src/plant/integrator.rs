@@ -15,14 +15,16 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Integrator {
-    /// Semi-implicit Euler, friction implicit: order 1, never chatters. With viscous friction alone the same as MuJoCo's `Euler`.
+    /// Semi-implicit Euler, friction implicit: order 1, never chatters. With viscous friction alone the same as
+    /// MuJoCo's `Euler`.
     SemiImplicitEuler {
         /// Equal steps from sample to sample; default 1.
         #[serde(default = "one")]
         steps_per_sample: usize,
     },
-    /// Runge-Kutta of order 4, friction explicit with stops where a joint comes to rest: the same as MuJoCo's `RK4` where there is none. Steep smooth friction needs short steps: `h` times its slope
-    /// over the joint's inertia below 2.7.
+    /// Runge-Kutta of order 4, friction explicit with stops where a joint comes to rest: the same as MuJoCo's `RK4`
+    /// where there is none. Steep smooth friction needs short steps: `h` times its slope over the joint's inertia below
+    /// 2.7.
     Rk4 {
         /// Equal steps from sample to sample; default 1.
         #[serde(default = "one")]

@@ -22,7 +22,8 @@ pub fn with_placements(
     Ok(changed.with_gravity(model.gravity())?)
 }
 
-/// The robot as built: every joint's placement off by a normal error of `length_std_m` in each direction and of `angle_std_rad` about a random axis. The same seed gives the same robot.
+/// The robot as built: every joint's placement off by a normal error of `length_std_m` in each direction and of
+/// `angle_std_rad` about a random axis. The same seed gives the same robot.
 ///
 /// # Errors
 /// A standard deviation that is negative or not finite.

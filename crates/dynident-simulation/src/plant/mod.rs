@@ -27,7 +27,8 @@ use runge_kutta::Stages;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Why a simulated robot cannot go on. Its state is then that of the last moment which could be computed, or not a number.
+/// Why a simulated robot cannot go on. Its state is then that of the last moment which could be computed, or not a
+/// number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PlantFault {
@@ -58,9 +59,10 @@ impl State {
 
 /// A simulated robot: rigid bodies, drives and friction, disturbances, locked joints.
 ///
-/// `M(q) q̈ + h(q, q̇) + terms = τ + d(t)`. Signs without smoothing (`CoulombShape::Sign`, its dead band ignored) are dry friction with stiction: a joint at rest stays at rest, exactly, until
-/// the other torques exceed its friction at rest (Coulomb and Stribeck together). A sign of a drive that turns with two joints holds that drive. Load-dependent friction takes the load of the
-/// evaluation before.
+/// `M(q) q̈ + h(q, q̇) + terms = τ + d(t)`. Signs without smoothing (`CoulombShape::Sign`, its dead band ignored) are
+/// dry friction with stiction: a joint at rest stays at rest, exactly, until the other torques exceed its friction at
+/// rest (Coulomb and Stribeck together). A sign of a drive that turns with two joints holds that drive. Load-dependent
+/// friction takes the load of the evaluation before.
 ///
 /// ```
 /// use dynident_simulation::{Integrator, Plant};
@@ -97,7 +99,8 @@ impl Plant {
     /// The robot with the model's own inertial parameters and the terms with theirs, at rest at zero.
     ///
     /// # Errors
-    /// Counts that differ, numbers that are not finite, friction or drive inertia below zero, terms of joints that do not exist, or a mass matrix that is not positive definite at position zero.
+    /// Counts that differ, numbers that are not finite, friction or drive inertia below zero, terms of joints that do
+    /// not exist, or a mass matrix that is not positive definite at position zero.
     pub fn new(model: &Model, terms: &[TorqueTerm], term_parameters: &[f64]) -> Result<Self, SimulationError> {
         let dof = model.dof();
         let drives = Drives::new(model, terms, term_parameters)?;
@@ -127,7 +130,8 @@ impl Plant {
         Ok(self)
     }
 
-    /// The same robot with the named joints locked where they are when a run begins: they do not move whatever the torques. In place of any that were locked.
+    /// The same robot with the named joints locked where they are when a run begins: they do not move whatever the
+    /// torques. In place of any that were locked.
     ///
     /// # Errors
     /// A joint that does not exist.
@@ -180,7 +184,8 @@ impl Plant {
         &self.state.dq
     }
 
-    /// How many steps ended before the friction torques of several joints had settled to 1e-13 of the largest velocity. Zero in all that was seen.
+    /// How many steps ended before the friction torques of several joints had settled to 1e-13 of the largest velocity.
+    /// Zero in all that was seen.
     pub fn unsettled_steps(&self) -> usize {
         self.equations.unsettled
     }
@@ -219,7 +224,8 @@ impl Plant {
         Ok(())
     }
 
-    /// Accelerations under the drives' torques in the present state, with friction: at a joint at rest whatever holds it, as far as it can.
+    /// Accelerations under the drives' torques in the present state, with friction: at a joint at rest whatever holds
+    /// it, as far as it can.
     ///
     /// # Errors
     /// [`PlantFault`].

@@ -1,7 +1,8 @@
 //! The classical Runge-Kutta method of order 4, with stops where a joint comes to rest.
 //!
-//! During a step every friction unit slides one way or is held. Where a sliding unit's velocity crosses zero, the step ends there (found by false position on the step's length), the unit is at rest exactly, and
-//! whether its friction holds it is decided anew. Whether a held unit breaks away is looked at where a step begins.
+//! During a step every friction unit slides one way or is held. Where a sliding unit's velocity crosses zero, the step
+//! ends there (found by false position on the step's length), the unit is at rest exactly, and whether its friction
+//! holds it is decided anew. Whether a held unit breaks away is looked at where a step begins.
 
 use super::equations::{Equations, Mode, StateView};
 use super::{PlantFault, State, euler};
@@ -94,7 +95,8 @@ pub(super) fn margin(equations: &Equations, dq: &[f64]) -> f64 {
     })
 }
 
-/// Shortens the step to where the first sliding unit comes to rest, and puts that unit to rest. None if the units that cross zero began at rest: there is no such place.
+/// Shortens the step to where the first sliding unit comes to rest, and puts that unit to rest. None if the units that
+/// cross zero began at rest: there is no such place.
 fn stop(equations: &mut Equations, stages: &mut Stages, at: StateView<'_>, h: f64) -> Result<Option<f64>, PlantFault> {
     let (mut low, mut at_low) = (0.0, margin(equations, at.dq));
     let (mut high, mut at_high) = (h, margin(equations, &stages.dq_next));

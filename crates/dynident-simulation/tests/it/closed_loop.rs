@@ -109,7 +109,8 @@ fn accelerations_are_those_of_the_motion() {
     let own = run(&settings);
     for joint in 0..2 {
         let (dq, ddq) = (&own.dq[own.of(joint)], &own.ddq[own.of(joint)]);
-        // The mean of the interval against its start: half a step of the jerk, which is below 500 · 100 rad/s³ at the start and dies down.
+        // The mean of the interval against its start: half a step of the jerk, which is below 500 · 100 rad/s³ at the
+        // start and dies down.
         let worst = (1000..1999).map(|k| ((dq[k + 1] - dq[k]) * 1000.0 - ddq[k]).abs()).fold(0.0, f64::max);
         assert!(worst < 0.05, "{worst}");
     }
@@ -220,7 +221,8 @@ fn channels_come_late_and_clocks_drift() {
     assert!((error / (1e-3 * speed) - 1.0).abs() < 0.05, "{error} {speed}");
 }
 
-/// Velocities by differences lag by half a sample and the filter's `1/(2πf)`; feedback that comes late makes the loop softer.
+/// Velocities by differences lag by half a sample and the filter's `1/(2πf)`; feedback that comes late makes the loop
+/// softer.
 #[test]
 fn feedback_by_encoders_and_late() {
     let (_, own, _) = sine_run(SensorSettings {

@@ -53,8 +53,8 @@ fn run(plant: &mut Plant, controller: &mut dyn Controller, reference: &Reference
     closed_loop(plant, controller, reference, &settings).unwrap()
 }
 
-/// With an exact model the error obeys `ë + K_d ė + K_p e = 0`; critically damped from (e₀, 0): `e = e₀ (1 + λt) e^(-λt)`. The sampled loop delays by half a sample, so at 10 kHz the error may be off by some
-/// λ dt/2 of e₀.
+/// With an exact model the error obeys `ë + K_d ė + K_p e = 0`; critically damped from (e₀, 0): `e = e₀ (1 + λt)
+/// e^(-λt)`. The sampled loop delays by half a sample, so at 10 kHz the error may be off by some λ dt/2 of e₀.
 #[test]
 fn computed_torque_is_linear_in_the_error() {
     let (terms, values) = terms();
@@ -79,7 +79,8 @@ fn computed_torque_is_linear_in_the_error() {
     }
 }
 
-/// The finite-time law with an exact model brings the error to the blend's width in finite time; the literal one drives the joints away, and the loop says so with finite numbers.
+/// The finite-time law with an exact model brings the error to the blend's width in finite time; the literal one drives
+/// the joints away, and the loop says so with finite numbers.
 #[test]
 fn the_papers_law_converges_and_its_print_does_not() {
     let mut plant = Plant::new(&paper_arm(), &[], &[]).unwrap();
@@ -144,7 +145,8 @@ fn gravity_and_integrals_remove_the_sag() {
     assert!(last(&ControllerSettings::JointPid(pid)).abs() < 1e-4);
 }
 
-/// Slotine and Li's C: `C(q, q̇) q̇` is the centrifugal torque, `C(q, u) v = C(q, v) u`, and `vᵀ (Ṁ - 2C) v = 0`, with Ṁ by central differences of the mass matrix (1e-6 of step: 1e-8).
+/// Slotine and Li's C: `C(q, q̇) q̇` is the centrifugal torque, `C(q, u) v = C(q, v) u`, and `vᵀ (Ṁ - 2C) v = 0`, with
+/// Ṁ by central differences of the mass matrix (1e-6 of step: 1e-8).
 #[test]
 fn slotine_li_has_the_skew_matrix() {
     let dof = 5;
@@ -243,8 +245,10 @@ fn base_parameters_are_enough() {
     }
 }
 
-/// Reading notes, 2: joint 2 of the paper's arm with T = 40/ω, 100 Hz, g = 9.8, window ±2.46 s about the middle of each stroke. First under PD with K_p = 16, K_d = 8, then under the paper's law with what
-/// the run before gave. The notes' own simulation gave largest tracking errors of 0.62, 0.12 and 0.001 rad (the paper's Fig. 12: 0.6, 0.15, 0) and θ4 = 0.369, 1.094, 0.996.
+/// Reading notes, 2: joint 2 of the paper's arm with T = 40/ω, 100 Hz, g = 9.8, window ±2.46 s about the middle of each
+/// stroke. First under PD with K_p = 16, K_d = 8, then under the paper's law with what the run before gave. The notes'
+/// own simulation gave largest tracking errors of 0.62, 0.12 and 0.001 rad (the paper's Fig. 12: 0.6, 0.15, 0) and θ4 =
+/// 0.369, 1.094, 0.996.
 #[test]
 fn the_papers_three_runs() {
     let (amplitude, omega) = (2.094, 0.996);

@@ -8,7 +8,8 @@ use dynident_simulation::{Integrator, LoopSettings, Plant, Reference, closed_loo
 use serde_json::Value;
 use std::path::Path;
 
-/// The project's promise. Two programs with the same method differ by rounding alone, which a stable loop does not let grow: what is seen is far below.
+/// The project's promise. Two programs with the same method differ by rounding alone, which a stable loop does not let
+/// grow: what is seen is far below.
 const PROMISE: f64 = 1e-6;
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -71,8 +72,9 @@ fn ten_seconds_of_panda_agree() {
     }
 }
 
-/// The free frictionless Panda arm falls for 5 s and keeps its energy: within some thousand times the tight integrator's tolerance of 1e-10, and within RK4's error of order 4 (light wrist joints spin at
-/// tens of rad/s: with four steps a millisecond a thousandth of a joule).
+/// The free frictionless Panda arm falls for 5 s and keeps its energy: within some thousand times the tight
+/// integrator's tolerance of 1e-10, and within RK4's error of order 4 (light wrist joints spin at tens of rad/s: with
+/// four steps a millisecond a thousandth of a joule).
 #[test]
 fn the_free_panda_keeps_its_energy() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -94,8 +96,9 @@ fn the_free_panda_keeps_its_energy() {
     }
 }
 
-/// Panda with dry friction in every joint, stick and slip at every reversal, by all three integrators: Euler and RK4 stay near the tight one, each to its order, and no step is left unsettled. Euler at 1 ms is
-/// off by about h times the velocities (2 rad/s); RK4 sees break-away at its steps only, up to 1 ms late.
+/// Panda with dry friction in every joint, stick and slip at every reversal, by all three integrators: Euler and RK4
+/// stay near the tight one, each to its order, and no step is left unsettled. Euler at 1 ms is off by about h times the
+/// velocities (2 rad/s); RK4 sees break-away at its steps only, up to 1 ms late.
 #[test]
 fn panda_sticks_and_slips_the_same_by_all_integrators() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

@@ -38,7 +38,8 @@ fn random_state(seed: u64, dof: usize) -> [Vec<f64>; 3] {
     core::array::from_fn(|_| (0..dof).map(|_| random.uniform(-1.0, 1.0)).collect())
 }
 
-/// A free frictionless tree keeps its energy: the tight integrator to its tolerance times some thousand steps, RK4 to its order (fast joints of light tips leave 1e-6).
+/// A free frictionless tree keeps its energy: the tight integrator to its tolerance times some thousand steps, RK4 to
+/// its order (fast joints of light tips leave 1e-6).
 #[test]
 fn free_trees_keep_their_energy() {
     for seed in 0..4 {
@@ -58,7 +59,8 @@ fn free_trees_keep_their_energy() {
     }
 }
 
-/// Both methods have their order: against the tight one, halving the step divides the error by 2 and by 16, within a factor of 1.5.
+/// Both methods have their order: against the tight one, halving the step divides the error by 2 and by 16, within a
+/// factor of 1.5.
 #[test]
 fn methods_have_their_order() {
     let model = random_tree(2, 4);
@@ -82,7 +84,8 @@ fn methods_have_their_order() {
     }
 }
 
-/// Coulomb friction alone: a flywheel of inertia I at velocity v stops after I v/F, having turned I v²/(2F), and then rests, exactly. Runge-Kutta methods find the stop to rounding, Euler within a step.
+/// Coulomb friction alone: a flywheel of inertia I at velocity v stops after I v/F, having turned I v²/(2F), and then
+/// rests, exactly. Runge-Kutta methods find the stop to rounding, Euler within a step.
 #[test]
 fn a_flywheel_runs_down_and_rests() {
     let mut plant = flywheel(&[coulomb(0)], &[0.7]);
@@ -134,7 +137,8 @@ fn stribeck_friction_breaks_away() {
     }
 }
 
-/// An arm whose friction exceeds its weight hangs in the air, bit for bit, and one whose friction does not falls. Both joints at once, coupled.
+/// An arm whose friction exceeds its weight hangs in the air, bit for bit, and one whose friction does not falls. Both
+/// joints at once, coupled.
 #[test]
 fn an_arm_is_held_by_its_friction() {
     let model = planar_2r(1.0, point(1.0), point(1.0));
@@ -155,7 +159,8 @@ fn an_arm_is_held_by_its_friction() {
     }
 }
 
-/// The methods agree on an arm that sticks and slides: RK4 with the tight one to its local error at the stops, Euler to its order.
+/// The methods agree on an arm that sticks and slides: RK4 with the tight one to its local error at the stops, Euler to
+/// its order.
 #[test]
 fn methods_agree_on_stick_and_slip() {
     let model = planar_2r(1.0, point(1.0), point(1.0));
@@ -180,8 +185,8 @@ fn methods_agree_on_stick_and_slip() {
     assert!(coarse < 0.02 && fine < 0.4 * coarse, "Euler {coarse:e} and {fine:e}");
 }
 
-/// Friction of every kind takes energy. By the tight integrator it never grows by more than the tolerance; by Euler, with smooth friction a thousand times too steep for an explicit method, the arm
-/// comes to rest without chatter.
+/// Friction of every kind takes energy. By the tight integrator it never grows by more than the tolerance; by Euler,
+/// with smooth friction a thousand times too steep for an explicit method, the arm comes to rest without chatter.
 #[test]
 fn friction_creates_no_energy() {
     let weightless = random_tree(3, 4).with_gravity(Vec3::ZERO).unwrap();
@@ -214,7 +219,8 @@ fn friction_creates_no_energy() {
     assert_eq!(plant.unsettled_steps(), 0);
 }
 
-/// In motion, the accelerations under the torque of the inverse dynamics and all laws are those that the torque was made for. Rounding times the mass matrix's condition (below 1e4).
+/// In motion, the accelerations under the torque of the inverse dynamics and all laws are those that the torque was
+/// made for. Rounding times the mass matrix's condition (below 1e4).
 #[test]
 fn forward_after_inverse_with_every_term() {
     let model = random_tree(6, 4);
@@ -295,7 +301,8 @@ fn locked_joints_are_the_reduced_model() {
     assert!(without(whole.q()).iter().zip(less.q()).all(|(a, b)| (a - b).abs() < 1e-10));
 }
 
-/// A drive that turns with both joints and rubs at rest: what torques ask of the drive below its friction does not turn it, while the motion that leaves it still is free.
+/// A drive that turns with both joints and rubs at rest: what torques ask of the drive below its friction does not turn
+/// it, while the motion that leaves it still is free.
 #[test]
 fn a_shared_drive_sticks() {
     let model = planar_2r(1.0, point(1.0), point(1.0)).with_gravity(Vec3::ZERO).unwrap();
@@ -328,7 +335,8 @@ fn slipping_springs_remember() {
         for _ in 0..3000 {
             plant.advance(&[0.5, 0.0], 1e-3, integrator).unwrap();
         }
-        // Half of the yield torque: half of the yield displacement (spring 100 Nm/rad, damped with a time constant of 0.2 s).
+        // Half of the yield torque: half of the yield displacement (spring 100 Nm/rad, damped with a time constant of
+        // 0.2 s).
         assert!((plant.q()[0] - 0.305).abs() < 1e-6, "{}", plant.q()[0]);
         for _ in 0..3000 {
             plant.advance(&[0.0, 0.0], 1e-3, integrator).unwrap();
@@ -342,7 +350,8 @@ fn slipping_springs_remember() {
     }
 }
 
-/// Load-dependent friction holds a share of the load: an arm with k above 1 does not fall, with a small k it slides off with the share taken off.
+/// Load-dependent friction holds a share of the load: an arm with k above 1 does not fall, with a small k it slides off
+/// with the share taken off.
 #[test]
 fn load_friction_follows_the_load() {
     let term = TorqueTerm::Load(LoadFriction { joint: 0, shape: SIGN });

@@ -47,12 +47,13 @@ impl Quantity {
     }
 }
 
-/// Computes `quantity` for every row of the CSV table `states` (header `q1..`, `dq1..`, `ddq1..`, `tau1..` as far as needed, in any order, SI units) and writes CSV with 17
-/// significant digits to `out`. Returns the number of rows.
+/// Computes `quantity` for every row of the CSV table `states` (header `q1..`, `dq1..`, `ddq1..`, `tau1..` as far as
+/// needed, in any order, SI units) and writes CSV with 17 significant digits to `out`. Returns the number of rows.
 ///
 /// # Errors
-/// If the table cannot be read, lacks a column, or holds something that is not a finite number; if bodies without inertial make the quantity meaningless; or if `out` cannot be
-/// written. Rows before a faulty one have then been written to `out`.
+/// If the table cannot be read, lacks a column, or holds something that is not a finite number; if bodies without
+/// inertial make the quantity meaningless; or if `out` cannot be written. Rows before a faulty one have then been
+/// written to `out`.
 pub fn evaluate(model: &Model, states: &Path, quantity: Quantity, out: &mut dyn Write) -> Result<u64, Error> {
     let dof = model.dof();
     let unknown = model.bodies_without_prior();

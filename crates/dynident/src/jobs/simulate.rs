@@ -21,7 +21,8 @@ pub struct Simulation {
     pub log: String,
 }
 
-/// Runs a study's trajectory (`[iteration] trajectory`, or its `[design]`) on the robot of `[simulation]` under `[controller]` (joint PD by default), whose model is the description.
+/// Runs a study's trajectory (`[iteration] trajectory`, or its `[design]`) on the robot of `[simulation]` under
+/// `[controller]` (joint PD by default), whose model is the description.
 ///
 /// # Errors
 /// Files, study and settings. A run that stops early is a result.

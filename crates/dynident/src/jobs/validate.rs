@@ -9,7 +9,8 @@ use dynident_identification::examination::{ModelUnderTest, examine_held_out};
 use dynident_identification::{Logs, Role};
 use std::path::Path;
 
-/// Tests the model of a `result.json` on the logs of a study that have the role `validate`, or on all its logs if none has.
+/// Tests the model of a `result.json` on the logs of a study that have the role `validate`, or on all its logs if none
+/// has.
 ///
 /// # Errors
 /// If the result does not belong to the study's robot, and everything that reading logs can give.

@@ -36,7 +36,8 @@ pub(crate) struct RunTrace {
 }
 
 impl RunTrace {
-    /// From the log that was kept of the run. A log that cannot be read draws nothing: the page is to be written all the same.
+    /// From the log that was kept of the run. A log that cannot be read draws nothing: the page is to be written all
+    /// the same.
     pub(crate) fn new(name: RunName, store: &IterationStore, reference: &Reference, joints: &[String]) -> Self {
         let log = if name.place == 0 { "log.csv".to_owned() } else { format!("log_{}.csv", name.place + 1) };
         let (motion, rate_hz) = (reference.motion(), reference.rate_hz());

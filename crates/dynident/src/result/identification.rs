@@ -30,9 +30,11 @@ pub struct ResultFile {
     pub noise_in_regressor: Option<NoiseInRegressor>,
     /// Rows that a robust estimator gave little weight; none for other estimators.
     pub gross_errors: Option<GrossErrors>,
-    /// Correlations of the joints' errors at one instant, in the order of `robot.joints`; none unless the estimator is `generalized`.
+    /// Correlations of the joints' errors at one instant, in the order of `robot.joints`; none unless the estimator is
+    /// `generalized`.
     pub noise_correlation: Option<Vec<Vec<f64>>>,
-    /// For each joint the smallest and the largest noise level of its rows over its mean one; none unless the estimator is `noise-weighted`.
+    /// For each joint the smallest and the largest noise level of its rows over its mean one; none unless the estimator
+    /// is `noise-weighted`.
     pub noise_levels: Option<Vec<[f64; 2]>>,
     /// Periods and their noise; none unless the estimator is `maximum-likelihood`.
     pub periodic: Option<PeriodicFit>,
@@ -43,12 +45,14 @@ pub struct ResultFile {
     pub simulated: Option<SimulatedFit>,
     /// The base parameters, in the order of the tree.
     pub base_parameters: Vec<BaseParameterResult>,
-    /// Covariance of the base parameters by the method's own account, rows and columns in their order, symmetric; zero where a parameter is not excited.
+    /// Covariance of the base parameters by the method's own account, rows and columns in their order, symmetric; zero
+    /// where a parameter is not excited.
     #[serde(default, deserialize_with = "rows")]
     pub base_parameter_covariance: Vec<Vec<f64>>,
     /// The bodies: one of the full sets that give these base parameters, the nearest to the prior.
     pub bodies: Vec<BodyResult>,
-    /// How far every parameter of a body or term could go in a physically consistent set that the data do not reject; none unless asked for.
+    /// How far every parameter of a body or term could go in a physically consistent set that the data do not reject;
+    /// none unless asked for.
     pub possible_intervals: Option<Vec<ParameterInterval>>,
     /// What was held at zero because the data hardly determine it; none unless asked for.
     pub essential: Option<EssentialReport>,
@@ -219,7 +223,8 @@ pub struct JointResult {
     pub residual_std_nm: f64,
     /// How strongly its residual is correlated in time: the lag-1 correlation that matters for the error bars.
     pub residual_correlation: Option<f64>,
-    /// Lag of its torque behind the motion by all training logs; none where they do not determine. The model itself is fitted to the torque as logged.
+    /// Lag of its torque behind the motion by all training logs; none where they do not determine. The model itself is
+    /// fitted to the torque as logged.
     pub torque_lag: Option<TorqueLag>,
 }
 
@@ -278,7 +283,8 @@ pub struct PhysicalVerdict {
     /// Bodies whose description is no consistent body, so that a rough one of ordinary mass stands in as their prior.
     #[serde(default)]
     pub impossible_priors: Vec<String>,
-    /// Which sign of the torque a physically consistent set explains; none without a physically consistent set for either.
+    /// Which sign of the torque a physically consistent set explains; none without a physically consistent set for
+    /// either.
     pub sign: Option<TorqueSignCheck>,
 }
 
@@ -337,7 +343,8 @@ pub struct LogSummary {
     pub filtered_rows: u64,
     /// The log against the description's own inertials.
     pub prior_agreement: Option<PriorAgreement>,
-    /// Lag of torque behind motion by joint, seconds, estimated together with the model from this log alone; none where the log does not determine.
+    /// Lag of torque behind motion by joint, seconds, estimated together with the model from this log alone; none where
+    /// the log does not determine.
     #[serde(default)]
     pub torque_lag_s: Vec<Option<f64>>,
     /// Standard deviations of the lags.

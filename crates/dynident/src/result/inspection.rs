@@ -74,7 +74,8 @@ pub struct BaseSummary {
     pub expressions: Vec<String>,
     /// Parameters that no motion can determine.
     pub unidentifiable: Vec<String>,
-    /// Rank of the bodies' regressor at random states, by [`numerical_rank_by_body`](dynident_dynamics::numerical_rank_by_body): the cross-check.
+    /// Rank of the bodies' regressor at random states, by
+    /// [`numerical_rank_by_body`](dynident_dynamics::numerical_rank_by_body): the cross-check.
     pub numerical_rank: usize,
     /// Smallest share of a column that counted as independent, largest that counted as dependent.
     pub gap: [f64; 2],

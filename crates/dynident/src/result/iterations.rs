@@ -24,11 +24,14 @@ pub struct IterationsFile {
     pub duration_s: f64,
     /// The runs.
     pub runs: Vec<IterationRun>,
-    /// Largest tracking error (mean over the joints) of the first good run over that of the last; none before there are two.
+    /// Largest tracking error (mean over the joints) of the first good run over that of the last; none before there are
+    /// two.
     pub tracking_improvement: Option<f64>,
-    /// Root mean square over the parameters of the last good estimate's error in units of the Cramér-Rao bound; for simulated robots with torque noise.
+    /// Root mean square over the parameters of the last good estimate's error in units of the Cramér-Rao bound; for
+    /// simulated robots with torque noise.
     pub error_over_bound: Option<f64>,
-    /// The Cramér-Rao bound of every parameter for one run: white torque noise of the simulated sensors at every recorded sample, exact positions.
+    /// The Cramér-Rao bound of every parameter for one run: white torque noise of the simulated sensors at every
+    /// recorded sample, exact positions.
     pub bound: Option<Vec<f64>>,
     /// All parameters of the last good physically consistent set: ten for each body, one for each term.
     pub possible_parameters: Option<Vec<f64>>,
@@ -45,7 +48,8 @@ pub struct IterationRun {
     pub controller: String,
     /// Whether it had a model.
     pub model_based: bool,
-    /// Of which run the physically consistent set (or the estimate) was its model; none for the description, a step between two runs' robots, or no model.
+    /// Of which run the physically consistent set (or the estimate) was its model; none for the description, a step
+    /// between two runs' robots, or no model.
     pub model_of_run: Option<usize>,
     /// Share of the step from the last good parameters that was taken.
     pub damping: f64,

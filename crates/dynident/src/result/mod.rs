@@ -1,4 +1,5 @@
-//! **What jobs write**: one type for each file, read back as it was written. Keys are added, never renamed, within a version of a schema.
+//! **What jobs write**: one type for each file, read back as it was written. Keys are added, never renamed, within a
+//! version of a schema.
 
 mod design;
 mod identification;

@@ -23,7 +23,8 @@ pub enum CoulombChoice {
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DriveSection {
-    /// Inertia of rotor and gear as seen from the joint. Off by default: where torque is measured at the link it does not show.
+    /// Inertia of rotor and gear as seen from the joint. Off by default: where torque is measured at the link it does
+    /// not show.
     pub drive_inertia: bool,
     /// Viscous friction. On by default.
     pub viscous: bool,

@@ -32,7 +32,8 @@ pub enum EstimatorMethod {
     Instrumental,
     /// Maximum likelihood for a motion that repeats: noise of motion and torque from how the periods differ.
     MaximumLikelihood,
-    /// Motion and parameters together, for a motion that is a Fourier series: noise of positions and torques weighed against each other.
+    /// Motion and parameters together, for a motion that is a Fourier series: noise of positions and torques weighed
+    /// against each other.
     Simultaneous,
     /// Regression on the motion of the simulated closed loop: no measured position enters the regressor.
     Didim,
@@ -68,12 +69,15 @@ impl EstimatorMethod {
 pub struct EstimatorSection {
     /// The method; weighted by default.
     pub method: EstimatorMethod,
-    /// The covariance that error bars come from; `"jackknife"`, which accounts for coloured residuals and judges each time segment by the fit without it, by default.
+    /// The covariance that error bars come from; `"jackknife"`, which accounts for coloured residuals and judges each
+    /// time segment by the fit without it, by default.
     pub covariance: CovarianceMethod,
-    /// Whether the bodies, friction and drives written are those of a physically consistent set that fit the logs best (true by default), or the set nearest to the
-    /// description that has exactly the estimated base parameters. A table in place of `true` says what else is known of the bodies.
+    /// Whether the bodies, friction and drives written are those of a physically consistent set that fit the logs best
+    /// (true by default), or the set nearest to the description that has exactly the estimated base parameters. A table
+    /// in place of `true` says what else is known of the bodies.
     pub physical: PhysicalChoice,
-    /// Intervals for every parameter of bodies and laws over all physically consistent robots that the data do not reject; some thousand physical fits, so not by default. Needs `physical`.
+    /// Intervals for every parameter of bodies and laws over all physically consistent robots that the data do not
+    /// reject; some thousand physical fits, so not by default. Needs `physical`.
     pub intervals: bool,
     /// When a column counts as excited.
     pub rank: RankSettings,
@@ -81,7 +85,8 @@ pub struct EstimatorSection {
     pub segments: SegmentSettings,
     /// Hold parameters that the data hardly determine at zero; not by default.
     pub essential: Option<EssentialSettings>,
-    /// Instruments for `method = "instrumental"`. With another method they only test whether noise in the regressor biases it.
+    /// Instruments for `method = "instrumental"`. With another method they only test whether noise in the regressor
+    /// biases it.
     pub instruments: Option<InstrumentSettings>,
     /// How `method = "noise-weighted"` finds the noise around a row.
     pub noise_levels: NoiseLevels,
@@ -100,7 +105,8 @@ impl EstimatorSection {
         settings
     }
 
-    /// The estimator that `method` names, with its settings; `simulated` is asked for the closed loop where it needs one.
+    /// The estimator that `method` names, with its settings; `simulated` is asked for the closed loop where it needs
+    /// one.
     pub(crate) fn estimator(
         &self,
         simulated: impl FnOnce() -> Result<Box<SimulatedLoopSettings>, Error>,

@@ -13,7 +13,8 @@ pub enum FrictionChoice {
     /// The study's keys.
     #[default]
     Stated,
-    /// Cross-validation inside the training logs. The keys `offset` and `drive_inertia` stay in force; what else is stated is one of the candidates.
+    /// Cross-validation inside the training logs. The keys `offset` and `drive_inertia` stay in force; what else is
+    /// stated is one of the candidates.
     Auto,
 }
 
@@ -23,7 +24,8 @@ pub enum FrictionChoice {
 pub enum FrictionTerm {
     /// Viscous friction by direction, in place of `viscous`.
     AsymmetricViscous {},
-    /// Coulomb friction by direction, in place of `coulomb`; with a sign it says the same as `offset`, so switch one off.
+    /// Coulomb friction by direction, in place of `coulomb`; with a sign it says the same as `offset`, so switch one
+    /// off.
     AsymmetricCoulomb {},
     /// `e^{-|dq/speed|^exponent}` times the step.
     Stribeck {
@@ -53,7 +55,8 @@ pub enum FrictionTerm {
         #[serde(default)]
         width: Option<f64>,
     },
-    /// Viscous and Coulomb friction change with the joint's temperature, beside `viscous` and `coulomb`; logs need a `temperature`.
+    /// Viscous and Coulomb friction change with the joint's temperature, beside `viscous` and `coulomb`; logs need a
+    /// `temperature`.
     Temperature {
         /// The temperature at which friction is what `viscous` and `coulomb` say, °C; 25 by default.
         #[serde(default = "room_temperature")]
@@ -80,7 +83,8 @@ fn yes() -> bool {
     true
 }
 
-/// Velocity below which a power of it is rounded, rad/s or m/s: below any velocity that a differentiated encoder separates from rest.
+/// Velocity below which a power of it is rounded, rad/s or m/s: below any velocity that a differentiated encoder
+/// separates from rest.
 const ROUNDING: f64 = 1.0e-3;
 /// Elements of one joint: each is a column.
 const MOST_ELEMENTS: usize = 50;
@@ -128,7 +132,8 @@ impl FrictionTerm {
         }
     }
 
-    /// The key that states `law`; none for what has keys of its own beside `laws`. One of several laws of a key gives the key with that law alone.
+    /// The key that states `law`; none for what has keys of its own beside `laws`. One of several laws of a key gives
+    /// the key with that law alone.
     pub(crate) fn stating(term: &TorqueTerm) -> Option<Self> {
         let width = |shape: CoulombShape| match shape {
             CoulombShape::Sign { .. } => None,

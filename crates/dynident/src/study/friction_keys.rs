@@ -5,7 +5,8 @@ use super::{CoulombChoice, JointDrive};
 use dynident_model::terms::{Coulomb, CoulombShape, TorqueTerm};
 
 impl JointDrive {
-    /// The keys of `[drive.joints.NAME]` that state these terms of a joint's friction, and no others. Drive inertia and offset are left to the other keys.
+    /// The keys of `[drive.joints.NAME]` that state these terms of a joint's friction, and no others. Drive inertia and
+    /// offset are left to the other keys.
     pub fn stating(terms: &[TorqueTerm]) -> Self {
         let mut drive = Self {
             viscous: Some(false),

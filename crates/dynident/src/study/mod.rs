@@ -156,7 +156,8 @@ impl Study {
     /// Reads a study from its text; `path` is only named in messages.
     ///
     /// # Errors
-    /// If the text is no TOML, a key is unknown or of the wrong kind, or sections contradict each other; the message names file, line and column.
+    /// If the text is no TOML, a key is unknown or of the wrong kind, or sections contradict each other; the message
+    /// names file, line and column.
     pub fn parse(text: &str, path: &Path) -> Result<Self, Error> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         if text.trim().is_empty() {
@@ -258,7 +259,8 @@ impl Study {
         format
     }
 
-    /// What log number `index` is called: its name, or its file's, with its range so that two parts of one file can be distinguished.
+    /// What log number `index` is called: its name, or its file's, with its range so that two parts of one file can be
+    /// distinguished.
     ///
     /// # Panics
     /// If there is no such log.

@@ -6,7 +6,8 @@ use dynident_model::{InertialParameters, Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// `[[payload]]`: something that some logs were recorded with, at a link of the robot. A `[[log]]` carries it by its name. Without `mass_kg` it is estimated; with it, it is known.
+/// `[[payload]]`: something that some logs were recorded with, at a link of the robot. A `[[log]]` carries it by its
+/// name. Without `mass_kg` it is estimated; with it, it is known.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct PayloadSection {
@@ -20,12 +21,14 @@ pub struct PayloadSection {
     /// Its centre of mass in the link's frame, where it is known.
     #[serde(default, deserialize_with = "exactly")]
     pub com_m: Option<[f64; 3]>,
-    /// Its inertia about its centre of mass, axes of the link's frame: xx, xy, xz, yy, yz, zz. Zero by default, which is a point mass.
+    /// Its inertia about its centre of mass, axes of the link's frame: xx, xy, xz, yy, yz, zz. Zero by default, which
+    /// is a point mass.
     #[serde(default, deserialize_with = "exactly")]
     pub inertia_at_com_kgm2: Option<[f64; 6]>,
 }
 
-/// `[arm]`: the arm by an earlier identification. Only payloads are estimated then, and the arm's error bars go into theirs.
+/// `[arm]`: the arm by an earlier identification. Only payloads are estimated then, and the arm's error bars go into
+/// theirs.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct ArmSection {
@@ -36,7 +39,8 @@ pub struct ArmSection {
     pub refit: Refit,
 }
 
-/// A body's pseudo-inertia may be this much negative, beside its largest entry: rounding of a thin body's inertia in print.
+/// A body's pseudo-inertia may be this much negative, beside its largest entry: rounding of a thin body's inertia in
+/// print.
 const ROUNDING: f64 = 1.0e-6;
 
 impl PayloadSection {

@@ -11,8 +11,8 @@ use std::path::PathBuf;
 pub struct RobotSection {
     /// URDF, or D-H table in TOML.
     pub file: PathBuf,
-    /// The joints that the log holds, in the order of its columns; every other joint is locked. By default all joints of the description
-    /// that `lock` does not name, in the order of the tree.
+    /// The joints that the log holds, in the order of its columns; every other joint is locked. By default all joints
+    /// of the description that `lock` does not name, in the order of the tree.
     #[serde(default)]
     pub joints: Option<Vec<String>>,
     /// Joints that are held, and where (rad, m).

@@ -1,4 +1,5 @@
-//! The robot of a study: its description, and the parametric model with joints locked, gravity and torque terms in force.
+//! The robot of a study: its description, and the parametric model with joints locked, gravity and torque terms in
+//! force.
 
 use super::{CoulombChoice, Folders, JointDrive, Study};
 use crate::error::Error;
@@ -125,7 +126,8 @@ impl StudyRobot {
         self.parametric.nominal()
     }
 
-    /// Base parameters by the description's own inertials, damping and friction; `None` while a moving body's inertial is unknown.
+    /// Base parameters by the description's own inertials, damping and friction; `None` while a moving body's inertial
+    /// is unknown.
     pub fn nominal_base(&self) -> Option<&[f64]> {
         self.parametric.nominal_base()
     }

@@ -4,7 +4,8 @@ use dynident_estimation::SimulatedSettings;
 use dynident_identification::estimators::SimulationStart;
 use serde::{Deserialize, Serialize};
 
-/// `[estimator.simulated]`. Rate, integrator, velocities and delays of the feedback, start and torque limits of the loop are those of `[simulation]`; noise is not simulated.
+/// `[estimator.simulated]`. Rate, integrator, velocities and delays of the feedback, start and torque limits of the
+/// loop are those of `[simulation]`; noise is not simulated.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SimulatedSection {

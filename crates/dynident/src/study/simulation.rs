@@ -12,7 +12,8 @@ use nalgebra::Matrix4;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Spread of the lengths of a body whose mass is off by one: mass distributions differ in shape as well, by a third of that.
+/// Spread of the lengths of a body whose mass is off by one: mass distributions differ in shape as well, by a third of
+/// that.
 const SHAPE_SHARE: f64 = 1.0 / 3.0;
 
 /// `[simulation]`, all of it optional: a robot as described, without friction, with perfect sensors.
@@ -29,9 +30,11 @@ const SHAPE_SHARE: f64 = 1.0 / 3.0;
 pub struct SimulationSection {
     /// Samples a second of the controller; 1000 by default.
     pub rate_hz: f64,
-    /// By how many percent the bodies differ from the description: every mass is that much larger or smaller, and lengths within bodies by up to a third of it; always consistent bodies. 0 by default.
+    /// By how many percent the bodies differ from the description: every mass is that much larger or smaller, and
+    /// lengths within bodies by up to a third of it; always consistent bodies. 0 by default.
     pub off_percent: f64,
-    /// Viscous friction of the joints, Nm s/rad (N s/m); 0 by default. It is there if `[drive]` has it, as are the following.
+    /// Viscous friction of the joints, Nm s/rad (N s/m); 0 by default. It is there if `[drive]` has it, as are the
+    /// following.
     pub viscous: PerJoint,
     /// Coulomb friction, Nm (N); 0 by default.
     pub coulomb: PerJoint,
@@ -137,7 +140,8 @@ impl SimulationSection {
     /// The robot that a robot's description becomes.
     ///
     /// # Errors
-    /// In words: numbers that do not fit, bodies without inertials, laws without a parameter, a robot that cannot be simulated.
+    /// In words: numbers that do not fit, bodies without inertials, laws without a parameter, a robot that cannot be
+    /// simulated.
     pub fn truth(&self, robot: &StudyRobot) -> Result<SimulatedTruth, String> {
         let described = robot.model();
         self.validate(described.dof())?;

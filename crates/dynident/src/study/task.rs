@@ -1,4 +1,5 @@
-//! From a study to what is identified: the recordings with their files, the estimator with its settings, joints whose friction is chosen.
+//! From a study to what is identified: the recordings with their files, the estimator with its settings, joints whose
+//! friction is chosen.
 
 use super::friction::FrictionChoice;
 use super::robot_model::drive_choice;
@@ -69,7 +70,8 @@ impl Study {
         self.payload.iter().map(payload).collect()
     }
 
-    /// The motion that was commanded in log number `index`, its joints in the model's order: the log's own `reference`, or the differentiator's; `None` if neither is given.
+    /// The motion that was commanded in log number `index`, its joints in the model's order: the log's own `reference`,
+    /// or the differentiator's; `None` if neither is given.
     fn commanded(&self, robot: &StudyRobot, folders: &Folders, index: usize) -> Result<Option<Reference>, Error> {
         let own = self.log[index].reference.as_ref();
         let Some(settings) = own.or_else(|| self.motion.differentiator.reference()) else { return Ok(None) };
@@ -108,7 +110,8 @@ impl Study {
         Ok(settings)
     }
 
-    /// The experiment of estimators that simulate the closed loop: `[controller]`, `[simulation]` and `[estimator.simulated]`.
+    /// The experiment of estimators that simulate the closed loop: `[controller]`, `[simulation]` and
+    /// `[estimator.simulated]`.
     fn simulated_loop(&self, path: &Path, robot: &StudyRobot) -> Result<SimulatedLoopSettings, Error> {
         let method = self.estimator.method.name();
         let wrong = |message: String| Error::Method { path: path.to_owned(), method, message };

@@ -40,7 +40,8 @@ fn they_hold_the_truth_and_nothing_inconsistent() {
         }
         assert!(interval.held_by.iter().all(|end| *end != IntervalEnd::Unsettled), "{interval:?}");
     }
-    // 84 parameters, of which a twentieth is expected outside: more than ten would be a chance of one in a thousand if they were independent.
+    // 84 parameters, of which a twentieth is expected outside: more than ten would be a chance of one in a thousand if
+    // they were independent.
     assert!(missed.len() <= 10, "{missed:?}");
     // What turns about a vertical axis only says nothing of the first link's mass.
     let first_mass = intervals.iter().find(|interval| interval.symbol == "m1").unwrap();

@@ -1,4 +1,5 @@
-//! Possible robots through a study: what is known of the bodies, contradictions by name, the torque's sign by physics alone; essential parameters and the torque's band.
+//! Possible robots through a study: what is known of the bodies, contradictions by name, the torque's sign by physics
+//! alone; essential parameters and the torque's band.
 use crate::common::{Job, Motion, Random, Truth, format, header, plain, recordings, repository, write_log};
 use dynident::model::load_robot;
 use dynident::recording::Level;
@@ -45,7 +46,8 @@ fn what_is_known_of_bodies_holds() {
         assert!((4.5 - 1e-9..=5.0 + 1e-9).contains(&total), "{prior}: {total}");
         let com = known.result.bodies[1].com_m.unwrap();
         assert!((0.05 - 1e-9..=0.3 + 1e-9).contains(&com[0]), "{prior}: {com:?}");
-        // What the data determine is as before: noise-free torque, so the fit's own floor of 1e-4 of the torque is all that may be given up.
+        // What the data determine is as before: noise-free torque, so the fit's own floor of 1e-4 of the torque is all
+        // that may be given up.
         let (a, b) = (&known.result.base_parameters, &free.result.base_parameters);
         for (a, b) in a.iter().zip(b) {
             let (a, b) = (a.physical.unwrap(), b.physical.unwrap());
@@ -172,7 +174,8 @@ fn physics_alone_tells_the_sign_of_the_torque() {
     }
 }
 
-/// KUKA's FRI convention: the torque is that of the load on the drive. The log hardly excites the arm, and the description's inertials are thrown away.
+/// KUKA's FRI convention: the torque is that of the load on the drive. The log hardly excites the arm, and the
+/// description's inertials are thrown away.
 #[test]
 fn the_lbr_med_torque_is_reversed_by_physics_alone() {
     let Some(data) = recordings() else { return };
@@ -224,7 +227,8 @@ fn essential_parameters_and_the_torques_band_through_a_study() {
         let parameter = found.result.base_parameters.iter().find(|p| p.expression == entry.name).unwrap();
         assert!(parameter.value == 0.0 && parameter.std == 0.0, "{parameter:?}");
     }
-    // 6000 rows: the share inside 95 % has a deviation of 0.28 %; four of them, and what the noise's own uncertainty adds.
+    // 6000 rows: the share inside 95 % has a deviation of 0.28 %; four of them, and what the noise's own uncertainty
+    // adds.
     assert_eq!(found.result.torque_band.len(), 2);
     for (band, sigma) in found.result.torque_band.iter().zip(sigma) {
         assert!((band.coverage_percent - 95.0).abs() < 1.5, "{band:?}");

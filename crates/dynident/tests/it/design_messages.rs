@@ -1,4 +1,5 @@
-//! Every way in which a study can ask for a design that makes no sense has a message that names the place, before any search.
+//! Every way in which a study can ask for a design that makes no sense has a message that names the place, before any
+//! search.
 use crate::common::{Job, repository};
 use core::ops::ControlFlow;
 use dynident::{Study, check_log, check_trajectory, design_study};

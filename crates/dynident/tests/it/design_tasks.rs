@@ -74,7 +74,8 @@ fn ladders_postures_and_joined_families_are_designed() {
     assert_eq!((&settings["kind"], &settings["parts"][1]["kind"]), (&"joined".into(), &"friction-ladder".into()));
 }
 
-/// The prior of an earlier run: its standard deviations are never beaten by less knowledge, and the limits of much and of little data are right.
+/// The prior of an earlier run: its standard deviations are never beaten by less knowledge, and the limits of much and
+/// of little data are right.
 #[test]
 fn a_result_is_a_prior_for_the_next_run() {
     let folder = tempfile::tempdir().unwrap();
@@ -150,8 +151,8 @@ fn a_result_is_a_prior_for_the_next_run() {
         ("given", Some("run"), 0)
     );
     assert!((checked.file.check_rate_hz - 100.0).abs() < 1e-6 && (checked.file.duration_s - 29.99).abs() < 0.1);
-    // White noise of 1 Nm on every sample is what the fit saw: its white error bars are the forecast's with that noise, but for the estimated noise of 3,000 samples (a few percent) and the
-    // parallel filter, which leaves nearly all.
+    // White noise of 1 Nm on every sample is what the fit saw: its white error bars are the forecast's with that noise,
+    // but for the estimated noise of 3,000 samples (a few percent) and the parallel filter, which leaves nearly all.
     let white = job(folder.path(), "torque_std_nm = 1.0", log);
     let checked = check_log(&white.study, &white.path, "run", &Job::options(1)).unwrap();
     for (forecast, parameter) in checked.file.forecast.iter().zip(&identified.result.base_parameters) {
@@ -236,7 +237,8 @@ fn a_written_trajectory_is_judged_as_the_design_was() {
     }
 }
 
-/// The figure of V-optimality is the mean squared prediction error: for the task that is the motion itself, the number of parameters over the number of samples (tr D⁻¹D / N).
+/// The figure of V-optimality is the mean squared prediction error: for the task that is the motion itself, the number
+/// of parameters over the number of samples (tr D⁻¹D / N).
 #[test]
 fn prediction_on_a_task() {
     let folder = tempfile::tempdir().unwrap();
@@ -257,7 +259,8 @@ fn prediction_on_a_task() {
         "{:?} {expected}",
         checked.criterion_figure
     );
-    // Designed for the task, the motion predicts it better than the one that was designed for all parameters alike, at the same effort of search.
+    // Designed for the task, the motion predicts it better than the one that was designed for all parameters alike, at
+    // the same effort of search.
     let for_task = designed(&study);
     assert!(for_task.file.feasible, "{:?}", for_task.file.diagnosis);
     let (own, other) = (for_task.file.criterion_figure.unwrap(), checked.criterion_figure.unwrap());

@@ -1,4 +1,5 @@
-//! `identify` by every differentiator: noise-free logs of a known robot give the truth back where the differentiator is exact for the motion, and nearly where it is not.
+//! `identify` by every differentiator: noise-free logs of a known robot give the truth back where the differentiator is
+//! exact for the motion, and nearly where it is not.
 use crate::common::{Job, Motion, Truth, assert_recovered, header, plain, repository, write_log};
 use dynident::dynamics::Workspace;
 use dynident::recording::LogisticPath;
@@ -57,14 +58,16 @@ fn ways_that_are_exact_for_the_motion_give_the_truth_back() {
     write_reference(&folder.path().join("same.csv"), &motion, 0.0);
     write_reference(&folder.path().join("ahead.csv"), &motion, 0.04);
     for (differentiator, tolerance) in [
-        // The motion is five harmonics of 0.13 Hz: rounding and the condition number remain, as with differences of order eight.
+        // The motion is five harmonics of 0.13 Hz: rounding and the condition number remain, as with differences of
+        // order eight.
         ("method = \"fourier-fit\", base_hz = 0.13, harmonics = 5, trend = false", 1e-6),
         // Nothing deviates; quintics between samples are exact at the samples.
         (
             "method = \"deviation\", reference = \"same.csv\", smoother = { method = \"butterworth\", cutoff_hz = 0.3 }",
             1e-6,
         ),
-        // The lag lies between samples: quintics of a 0.65 Hz motion at 100 Hz err by (0.04)⁴/100 = 3e-8 of its acceleration, the lag by 1e-9 s.
+        // The lag lies between samples: quintics of a 0.65 Hz motion at 100 Hz err by (0.04)⁴/100 = 3e-8 of its
+        // acceleration, the lag by 1e-9 s.
         ("method = \"time-warp\", reference = \"ahead.csv\"", 1e-4),
         (
             "method = \"deviation\", max_lag_s = 0.2, reference = \"ahead.csv\", smoother = { method = \"butterworth\", cutoff_hz = 0.3 }",
@@ -83,7 +86,8 @@ fn ways_that_filter_come_near() {
     let (folder, truth) = (tempfile::tempdir().unwrap(), truth());
     write_log(&folder.path().join("log.csv"), &truth, &Motion::new(6, 1), CLOCK, &header(6), plain);
     for (differentiator, percent) in [
-        // What a differentiator takes from motions up to 0.65 Hz: a delay of 2.6/(2π 20) s, so ωδ up to 8 %, of torques of which most is gravity; a cut-off from the data for the others.
+        // What a differentiator takes from motions up to 0.65 Hz: a delay of 2.6/(2π 20) s, so ωδ up to 8 %, of torques
+        // of which most is gravity; a cut-off from the data for the others.
         ("method = \"low-pass\", cutoff_hz = 20.0", 5.0),
         ("method = \"frequency-domain\"", 1.0),
         ("method = \"smoothed-differences\", window = 11", 1.0),
@@ -97,7 +101,8 @@ fn ways_that_filter_come_near() {
     }
 }
 
-/// The torque through the same causal filter is as late as the motion: what remains is that friction and rigid bodies are not linear in the state.
+/// The torque through the same causal filter is as late as the motion: what remains is that friction and rigid bodies
+/// are not linear in the state.
 #[test]
 fn smoothing_the_torque_alike_takes_the_delay_out() {
     let (folder, truth) = (tempfile::tempdir().unwrap(), truth());
@@ -107,7 +112,8 @@ fn smoothing_the_torque_alike_takes_the_delay_out() {
         let job = Job::new(folder.path(), &study(differentiator, &format!("trim_s = 2.0\n{further}")));
         job.identify().result.training.relative_error_percent.unwrap()
     };
-    // 42 ms late at 10 Hz: ωδ is up to 0.17. In the second case the lag is nought, and the filter's gain at 0.65 Hz one to 1e-9; a lag of the nonlinear terms is of second order in (ωδ)².
+    // 42 ms late at 10 Hz: ωδ is up to 0.17. In the second case the lag is nought, and the filter's gain at 0.65 Hz one
+    // to 1e-9; a lag of the nonlinear terms is of second order in (ωδ)².
     let (late, alike) = (error("smooth_torque = false"), error("smooth_torque = true"));
     assert!(alike < 0.2 * late, "{late} % and {alike} %");
 }
@@ -224,6 +230,7 @@ fn the_papers_map_identifies_the_planar_arm_through_a_lag() {
     );
     let job = Job::new(folder.path(), &text);
     let found = job.identify();
-    // Outside the strokes the velocity is the reference's, wrong by up to 1e-3 of its peak beside the splices; friction is a step of 0.02 rad/s wide.
+    // Outside the strokes the velocity is the reference's, wrong by up to 1e-3 of its peak beside the splices; friction
+    // is a step of 0.02 rad/s wide.
     assert_recovered(&found, &truth.base_values(&job.robot()), 1e-2);
 }

@@ -1,4 +1,5 @@
-//! Estimators that come back to the logs: by the noise around each row, by the periods of a repeated motion; and what each of them says of logs that cannot carry a model.
+//! Estimators that come back to the logs: by the noise around each row, by the periods of a repeated motion; and what
+//! each of them says of logs that cannot carry a model.
 use crate::common::{Job, Motion, Random, Truth, header, repository, write_log};
 use dynident::{Error, IdentificationOutcome, identify};
 use std::fmt::Write;
@@ -68,7 +69,8 @@ fn rows_count_by_the_noise_around_them() {
     let levels = found.result.noise_levels.as_ref().unwrap();
     assert!(levels.iter().all(|[least, most]| *least < 0.1 && *most > 1.0), "{levels:?}");
     assert!(plain.result.noise_levels.is_none());
-    // Half the rows at 0.02 in place of all at a root mean square of 0.7: 0.02 · √2 / 0.7 = 4 % of the error; both are random.
+    // Half the rows at 0.02 in place of all at a root mean square of 0.7: 0.02 · √2 / 0.7 = 4 % of the error; both are
+    // random.
     let (reweighted, weighted) =
         (score(&found, &values, &plain.estimate.std), score(&plain, &values, &plain.estimate.std));
     assert!(reweighted < 0.2 * weighted, "{reweighted} and {weighted}");
@@ -143,7 +145,8 @@ fn the_period_may_come_from_the_commanded_motion() {
     assert!(backwards.contains("[estimator.periods]") && backwards.contains("-1"), "{backwards}");
 }
 
-/// Positions with noise of 2 mrad: at the motion's highest frequency, 0.65 Hz, that is 0.03 rad/s² of the motion's own few, and far more behind a filter that must let the motion through.
+/// Positions with noise of 2 mrad: at the motion's highest frequency, 0.65 Hz, that is 0.03 rad/s² of the motion's own
+/// few, and far more behind a filter that must let the motion through.
 fn write_noisy(folder: &Path, name: &str, truth: &Truth, seed: u64, seconds: f64) {
     let mut random = Random(seed);
     write_log(&folder.join(name), truth, &Motion::new(2, seed), (250.0, seconds), &header(2), |q, tau| {
@@ -287,7 +290,8 @@ fn a_joint_that_does_not_move_leaves_its_parameters_named() {
         let found = outcome.unwrap_or_else(|error| panic!("{method}: {error}"));
         finite(&found);
         if ["didim", "clie", "cloe"].contains(&method) {
-            // The simulated joint gives way a little under the other's motion, so that its parameters are determined after all, badly.
+            // The simulated joint gives way a little under the other's motion, so that its parameters are determined
+            // after all, badly.
             return;
         }
         assert_eq!(found.result.method.status, "not-all-excited", "{method}");

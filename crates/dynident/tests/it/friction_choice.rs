@@ -17,7 +17,8 @@ const ARM: &str = r#"<robot name="arm"><link name="base"/>
 const NOISE: f64 = 0.02;
 const STEP: f64 = 0.02;
 
-/// A log of `rows` rows at 200 Hz; `moving` scales the elbow's motion, `stribeck` is its extra friction near rest at a velocity of 0.08 rad/s.
+/// A log of `rows` rows at 200 Hz; `moving` scales the elbow's motion, `stribeck` is its extra friction near rest at a
+/// velocity of 0.08 rad/s.
 fn write_log(path: &Path, arm: &Path, rows: usize, moving: f64, stribeck: f64, seed: u64) {
     let model = load_robot(arm).unwrap().model;
     let (mut workspace, mut random) = (Workspace::new(&model), Random(seed));

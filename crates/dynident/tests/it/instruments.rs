@@ -58,15 +58,17 @@ fn a_simulated_motion_undoes_the_bias_of_noisy_positions() {
     let noise = found.result.noise_in_regressor.as_ref().unwrap();
     assert_eq!(noise.hausman.verdict, HausmanVerdict::RejectLeastSquares, "{:?}", noise.hausman);
     assert_eq!(noise.instrument_cutoff_hz, None);
-    // Errors in units of the instruments' own error bars, over all base parameters: about one where these are honest. Noise of 1e-3 rad at 30 Hz is some 7 rad/s² of acceleration,
-    // several times the motion's own: least squares loses most of the inertias.
+    // Errors in units of the instruments' own error bars, over all base parameters: about one where these are honest.
+    // Noise of 1e-3 rad at 30 Hz is some 7 rad/s² of acceleration, several times the motion's own: least squares loses
+    // most of the inertias.
     let error = |found: &dynident::IdentificationOutcome, bars: &[f64]| {
         let sum: f64 = (0..values.len()).map(|i| ((found.estimate.values[i] - values[i]) / bars[i]).powi(2)).sum();
         (sum / values.len() as f64).sqrt()
     };
     let bars = &found.estimate.std;
     let (by_instruments, by_least_squares) = (error(&found, bars), error(&plain, bars));
-    // 54 squares of mean one: their root mean square is within 0.6 to 1.4 by four deviations; the jackknife is cautious.
+    // 54 squares of mean one: their root mean square is within 0.6 to 1.4 by four deviations; the jackknife is
+    // cautious.
     assert!(by_instruments < 1.6, "{by_instruments}");
     assert!(by_least_squares > 3.0 * by_instruments, "{by_least_squares} and {by_instruments}");
 }

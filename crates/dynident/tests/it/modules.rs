@@ -1,4 +1,5 @@
-//! Arrows between modules run one way: no top-level module of a crate uses one that uses it, directly or by way of others.
+//! Arrows between modules run one way: no top-level module of a crate uses one that uses it, directly or by way of
+//! others.
 
 use super::common::repository;
 use std::collections::{BTreeMap, BTreeSet};

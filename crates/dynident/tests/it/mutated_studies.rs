@@ -1,4 +1,5 @@
-//! A good study with bytes changed at random: every one is read or refused with its place, and none brings anything down.
+//! A good study with bytes changed at random: every one is read or refused with its place, and none brings anything
+//! down.
 use crate::common::repository;
 use dynident::{Folders, Study, StudyRobot};
 use proptest::prelude::*;

@@ -179,7 +179,8 @@ fn intervals_hold_the_payload_with_the_arm_free_and_held() {
         let held = Job::new(folder.path(), &study(carrying, held)).identify();
         for (way, found) in [free, held].iter().enumerate() {
             let payload = &found.result.payloads[0];
-            // A planar arm determines mass, first moments in its plane and the inertia about its axis; axes of the paper's arm are parallel.
+            // A planar arm determines mass, first moments in its plane and the inertia about its axis; axes of the
+            // paper's arm are parallel.
             assert_eq!(payload.parameters.len(), 4, "{:?}", payload.parameters);
             assert_eq!(payload.not_identified.len(), 6);
             let expected = box_at_link().0;
@@ -189,7 +190,8 @@ fn intervals_hold_the_payload_with_the_arm_free_and_held() {
         }
         intervals += 4;
     }
-    // 160 intervals, of which four of a run are correlated: 95 % to 3 %, twice that below. With the arm held they are cautious.
+    // 160 intervals, of which four of a run are correlated: 95 % to 3 %, twice that below. With the arm held they are
+    // cautious.
     for inside in inside {
         let share = inside as f64 / intervals as f64;
         assert!((0.89..=1.0).contains(&share), "{share}");

@@ -29,7 +29,8 @@ fn with_stated_friction(name: &str) -> Option<IdentificationOutcome> {
     Some(run(&study, &path, &data))
 }
 
-/// The held-out error is no worse than the limit: the figure in README, and 5 % of it for what other processors round otherwise.
+/// The held-out error is no worse than the limit: the figure in README, and 5 % of it for what other processors round
+/// otherwise.
 fn held_out(name: &str, limit_percent: f64) -> Option<IdentificationOutcome> {
     let found = example(name)?;
     let error = found.result.validation[0].model.relative_error_percent.unwrap();
@@ -121,8 +122,9 @@ fn the_double_pendulum_has_a_rotor_between_its_joints() {
     // Steps of up to 8 ms at 500 Hz.
     let longest = found.result.logs.iter().map(|log| log.import.steps.max_s).fold(0.0, f64::max);
     assert!((0.006..0.009).contains(&longest), "{longest}");
-    // Published: m2 r2 = 0.56394 kg * 0.32127 m = 0.1812 kg m (axis y, hanging along -z). Least squares is biased towards zero here: 7 % at a cut-off of 6 Hz by
-    // the data set's own notes, 39 % at 12 Hz. Within 10 % the low cut-off does what it is there for.
+    // Published: m2 r2 = 0.56394 kg * 0.32127 m = 0.1812 kg m (axis y, hanging along -z). Least squares is biased
+    // towards zero here: 7 % at a cut-off of 6 Hz by the data set's own notes, 39 % at 12 Hz. Within 10 % the low
+    // cut-off does what it is there for.
     let gravity = found.result.base_parameters.iter().find(|p| p.expression == "mz2").unwrap();
     assert!((-gravity.value / 0.1812 - 1.0).abs() < 0.1, "{}", gravity.value);
 }
@@ -142,8 +144,8 @@ fn instruments_undo_the_bias_of_the_double_pendulum() {
     let Some(data) = recordings() else { return };
     let (text, path) = pendulum_with_instruments();
     let found = run(&Study::parse(&text, &path).unwrap(), &path, &data);
-    // The publishers' model 3.0 of design C.0: m2 r2 = 0.56394 * 0.32127, m1 r1 + 0.2 m2 = 0.64169 * 0.2 + 0.2 * 0.56394, I2 = 0.053878 less six times Ir = 9.937e-5.
-    // Limits: 3 % and 8 % are the project's goals for this set.
+    // The publishers' model 3.0 of design C.0: m2 r2 = 0.56394 * 0.32127, m1 r1 + 0.2 m2 = 0.64169 * 0.2 + 0.2 *
+    // 0.56394, I2 = 0.053878 less six times Ir = 9.937e-5. Limits: 3 % and 8 % are the project's goals for this set.
     assert!((-base_value(&found, "mz2") / 0.181_18 - 1.0).abs() < 0.03, "{}", base_value(&found, "mz2"));
     assert!((-base_value(&found, "mz1 - 0.2 m2") / 0.241_13 - 1.0).abs() < 0.08, "{}", base_value(&found, "mz1"));
     let inertia = base_value(&found, "Iyy2 - 6 Ia_rotor");
@@ -151,7 +153,8 @@ fn instruments_undo_the_bias_of_the_double_pendulum() {
     let noise = found.result.noise_in_regressor.as_ref().unwrap();
     assert_eq!(noise.hausman.verdict, dynident::estimation::HausmanVerdict::RejectLeastSquares);
     assert!(!noise.instruments.weak && noise.instruments.weakest_f.unwrap() > 10.0);
-    // With another method the instruments only test it; least squares on the same rows loses most of the second link's gravity.
+    // With another method the instruments only test it; least squares on the same rows loses most of the second link's
+    // gravity.
     let plain = text.replace("method = \"instrumental\"", "method = \"ordinary\"");
     assert_ne!(plain, text);
     let plain = run(&Study::parse(&plain, &path).unwrap(), &path, &data);
@@ -171,7 +174,8 @@ fn every_estimator_is_at_hand_on_a_real_log() {
         let found = run(&Study::parse(&text, &path).unwrap(), &path, &data);
         assert_eq!(found.result.method.estimator, method);
         assert_eq!(found.result.method.status, "complete");
-        // They weight the same rows differently: nothing moves by more than a few of the error bars, and those are of the same size.
+        // They weight the same rows differently: nothing moves by more than a few of the error bars, and those are of
+        // the same size.
         for (a, b) in found.result.base_parameters.iter().zip(&plain.result.base_parameters) {
             let bar = a.std.max(b.std);
             assert!((a.value - b.value).abs() < 10.0 * bar, "{method} {}: {} and {}", a.expression, a.value, b.value);

@@ -1,4 +1,5 @@
-//! DIDIM, CLIE and CLOE through a study: logs of a simulated closed loop with noise, and what is said when there is nothing to simulate.
+//! DIDIM, CLIE and CLOE through a study: logs of a simulated closed loop with noise, and what is said when there is
+//! nothing to simulate.
 use crate::common::{Job, Motion, assert_reads_back, repository};
 use core::ops::ControlFlow;
 use dynident::{Error, IdentificationOutcome, identify, simulate_study};
@@ -20,7 +21,8 @@ fn write_trajectory(path: &Path) {
     std::fs::write(path, text + "\n").unwrap();
 }
 
-/// A study that simulates and identifies the planar arm. Positions are read to 3e-4 rad, so that accelerations below 30 Hz are mostly noise.
+/// A study that simulates and identifies the planar arm. Positions are read to 3e-4 rad, so that accelerations below 30
+/// Hz are mostly noise.
 fn study(method: &str, controller: &str) -> String {
     format!(
         r#"
@@ -83,7 +85,8 @@ fn all_three_find_the_truth_where_least_squares_is_biased() {
         let bars = &found.estimate.std;
         let (simulated, least_squares) = (score(&found, &truth, bars), score(&plain, &truth, bars));
         assert_eq!((&found.result.method.estimator[..], &found.result.method.status[..]), (method, "complete"));
-        // Twelve squares of mean one: their root mean square is below 1.8 by four deviations; the jackknife is cautious.
+        // Twelve squares of mean one: their root mean square is below 1.8 by four deviations; the jackknife is
+        // cautious.
         assert!(simulated < 1.8, "{method}: {simulated}");
         assert!(least_squares > 3.0 * simulated, "{method}: {least_squares} and {simulated}");
     }

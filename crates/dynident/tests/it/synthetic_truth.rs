@@ -4,7 +4,8 @@ use dynident::model::load_robot;
 use std::fmt::Write;
 use std::path::Path;
 
-/// Differences of order eight at 400 Hz and 0.65 Hz leave 1e-15 of truncation and 1e-10 of rounding; the condition number of these motions is below a thousand.
+/// Differences of order eight at 400 Hz and 0.65 Hz leave 1e-15 of truncation and 1e-10 of rounding; the condition
+/// number of these motions is below a thousand.
 const NOISE_FREE: f64 = 1e-6;
 const CLOCK: (f64, f64) = (400.0, 12.0);
 
@@ -157,7 +158,8 @@ fn a_denavit_hartenberg_table() {
 fn motor_side_in_degrees_with_gears_currents_and_a_coupled_wrist() {
     let (folder, truth) = (tempfile::tempdir().unwrap(), truth());
     let (gear, gain) = ([101.0, 101.0, 101.0, -54.0, 54.0, 54.0], [0.13, 0.12, 0.1, 0.09, 0.08, 0.07]);
-    // Motor velocities M q': the last motor also turns with joint 5. Power is the same on both sides: joint torques are Mᵀ times motor torques.
+    // Motor velocities M q': the last motor also turns with joint 5. Power is the same on both sides: joint torques are
+    // Mᵀ times motor torques.
     let motor_side = |q: &[f64], tau: &[f64]| -> Vec<f64> {
         let mut angle: Vec<f64> = (0..6).map(|j| gear[j] * q[j]).collect();
         angle[5] += 20.0 * q[4];
@@ -237,8 +239,9 @@ fn noise_widens_the_error_bars_by_as_much_as_it_moves_the_values() {
     let truth = truth.base_values(&job.robot());
     let scores: Vec<f64> =
         found.result.base_parameters.iter().zip(&truth).map(|(p, truth)| (p.value - truth) / p.std).collect();
-    // 54 scores from segments (a t distribution with tens of degrees of degrees_of_freedom): none beyond 6. Their mean square is one on average; its own deviation would be
-    // sqrt(2/54) = 0.2 for independent scores and is larger for these, which are correlated: 0.4 to 2.
+    // 54 scores from segments (a t distribution with tens of degrees of degrees_of_freedom): none beyond 6. Their mean
+    // square is one on average; its own deviation would be sqrt(2/54) = 0.2 for independent scores and is larger for
+    // these, which are correlated: 0.4 to 2.
     let mean_square = scores.iter().map(|z| z * z).sum::<f64>() / scores.len() as f64;
     assert!(scores.iter().all(|z| z.abs() < 6.0), "{scores:?}");
     assert!((0.4..2.0).contains(&mean_square), "{mean_square} {scores:?}");

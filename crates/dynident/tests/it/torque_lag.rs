@@ -4,7 +4,8 @@ use dynident::dynamics::Workspace;
 use std::fmt::Write;
 use std::path::Path;
 
-/// Writes a log whose torque of joint j comes `lags_s[j]` late, with AR(1) noise of deviation `sigma` and lag-1 correlation 0.9.
+/// Writes a log whose torque of joint j comes `lags_s[j]` late, with AR(1) noise of deviation `sigma` and lag-1
+/// correlation 0.9.
 fn late_log(path: &Path, truth: &Truth, motion: &Motion, clock: (f64, f64), lags_s: &[f64], noise: (f64, &mut Random)) {
     let dof = lags_s.len();
     let mut workspace = Workspace::new(&truth.model);
@@ -48,7 +49,8 @@ fn without_noise_the_lag_is_exact_though_the_model_absorbed_it() {
         let result = job.identify().result;
         for (joint, lag) in result.joints.iter().zip(lags) {
             let found = joint.torque_lag.unwrap();
-            // Torque between samples by quintics: where Coulomb's step (0.02 rad/s wide, passed in some 10 ms) is sampled every 2.5 ms they err; a hundredth of a sample.
+            // Torque between samples by quintics: where Coulomb's step (0.02 rad/s wide, passed in some 10 ms) is
+            // sampled every 2.5 ms they err; a hundredth of a sample.
             assert!((found.lag_s - lag).abs() < 2.5e-5, "{}: {found:?} for {lag}, {filter}", joint.name);
         }
         assert_eq!(result.logs[0].torque_lag_s.len(), 6);

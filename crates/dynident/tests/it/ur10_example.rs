@@ -37,8 +37,8 @@ fn the_generator_makes_the_committed_logs() {
         for (row, (a, b)) in made.iter().zip(&committed).enumerate() {
             assert_eq!(a.len(), b.len(), "{name}, row {row}");
             for (column, (a, b)) in a.iter().zip(b).enumerate() {
-                // Sine, logarithm and the fused multiply-add differ in the last bit between robots, which may turn the last of
-                // seven digits; an encoder value may then fall on the neighbouring step of 4.8e-5 rad.
+                // Sine, logarithm and the fused multiply-add differ in the last bit between robots, which may turn the
+                // last of seven digits; an encoder value may then fall on the neighbouring step of 4.8e-5 rad.
                 let tolerance = 1e-6 * b.abs() + if (1..=6).contains(&column) { 4.9e-5 } else { 1e-9 };
                 assert!((a - b).abs() <= tolerance, "{name}, row {row}, column {column}: {a} and {b}");
             }
@@ -133,7 +133,8 @@ fn identification_finds_the_truth_within_its_error_bars() {
     let expressions: Vec<&String> = result.base_parameters.iter().map(|parameter| &parameter.expression).collect();
     assert_eq!(expressions, base.expressions().iter().collect::<Vec<_>>());
     for (parameter, truth) in result.base_parameters.iter().zip(&truth) {
-        // 64 segments for 58 parameters give a standard deviation to a factor of 1.5 or so; beyond that, 3.3 of the true ones.
+        // 64 segments for 58 parameters give a standard deviation to a factor of 1.5 or so; beyond that, 3.3 of the
+        // true ones.
         let error = (parameter.value - truth).abs() / parameter.std;
         assert!(
             error < 5.0,

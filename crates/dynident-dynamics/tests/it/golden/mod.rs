@@ -1,4 +1,5 @@
-//! The golden files of other people's programs, in the order of Dynident's model. `golden/README.md` says what every key means.
+//! The golden files of other people's programs, in the order of Dynident's model. `golden/README.md` says what every
+//! key means.
 
 use dynident_model::{Model, load_robot};
 use dynident_testing::repository;
@@ -84,7 +85,8 @@ pub(crate) fn text(value: &Value) -> &str {
     value.as_str().unwrap()
 }
 
-/// Asserts that every entry is within `tolerance` of the golden array's largest entry, and returns the largest deviation in that unit.
+/// Asserts that every entry is within `tolerance` of the golden array's largest entry, and returns the largest
+/// deviation in that unit.
 pub(crate) fn assert_close(ours: &[f64], golden: &[f64], tolerance: f64, what: &str) -> f64 {
     assert_eq!(ours.len(), golden.len(), "{what}: lengths");
     let scale = golden.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));

@@ -20,5 +20,6 @@ pub(crate) fn foreign_urdfs() -> Vec<PathBuf> {
     files
 }
 
-/// A clean arm of three joints (one prismatic), with a tool of two links fixed to the last, one of them without inertial.
+/// A clean arm of three joints (one prismatic), with a tool of two links fixed to the last, one of them without
+/// inertial.
 pub(crate) const ARM: &str = include_str!("arm.urdf");

@@ -61,9 +61,9 @@ pub fn check_trajectory(
     Ok(DesignOutcome::new(setup, origin, MotionReview { duration_s, rate_hz, information, check }))
 }
 
-/// Judges a log of the study, by its name or its file: what the run that is over determines about each parameter. Positions
-/// go the same way to velocities and accelerations as they would to a fit; limits are looked at on the log's own samples,
-/// every one of which counts for the forecast.
+/// Judges a log of the study, by its name or its file: what the run that is over determines about each parameter.
+/// Positions go the same way to velocities and accelerations as they would to a fit; limits are looked at on the log's
+/// own samples, every one of which counts for the forecast.
 ///
 /// # Errors
 /// If the study makes no sense, no log or more than one is called `name`, or the log cannot be read.

@@ -72,8 +72,8 @@ impl DesignSetup {
                 let motion_at = |times: &[f64], out: &mut Motion| task.given.motion(&[], times, out);
                 let sum = information(&robot, &torque_std_nm, task.given.times_s(), &motion_at);
                 let criterion: Box<dyn Criterion> = Box::new(Prediction::new(sum / samples.samples as f64));
-                // From a motion that determines all parameters well to one that determines the task's: a better start than any
-                // random one.
+                // From a motion that determines all parameters well to one that determines the task's: a better start
+                // than any random one.
                 vec![Box::new(DOptimal), criterion]
             }
             named => named.criteria().unwrap_or_default(),

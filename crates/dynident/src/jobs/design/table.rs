@@ -23,8 +23,8 @@ pub(crate) struct Trajectory {
     pub(crate) note: Option<String>,
 }
 
-/// Reads `t_s`, `q1..` (or the joints' names) and `dq1..`, `ddq1..` where both are there; else velocities and accelerations
-/// are the study's differentiator's.
+/// Reads `t_s`, `q1..` (or the joints' names) and `dq1..`, `ddq1..` where both are there; else velocities and
+/// accelerations are the study's differentiator's.
 pub(crate) fn trajectory(path: &Path, joints: &[String], settings: &MotionSettings) -> Result<Trajectory, Error> {
     let wrong = |line: u64, message: String| Error::States { path: path.to_owned(), line, message };
     let broken = |error: &csv::Error| wrong(error.position().map_or(1, csv::Position::line), error.to_string());
@@ -129,8 +129,8 @@ fn number_of(column: &str, group: &str) -> Option<usize> {
     digits.bytes().all(|byte| byte.is_ascii_digit()).then(|| digits.parse().ok())?
 }
 
-/// Where positions do not move as velocities and accelerations say: the row, and what to do. `q₁ - q₀` is `h (q̇₀ + q̇₁) /
-/// 2 - h² (q̈₁ - q̈₀) / 12` but for `h⁵ q⁽⁵⁾ / 720`.
+/// Where positions do not move as velocities and accelerations say: the row, and what to do. `q₁ - q₀` is `h (q̇₀ +
+/// q̇₁) / 2 - h² (q̈₁ - q̈₀) / 12` but for `h⁵ q⁽⁵⁾ / 720`.
 fn disagreement(times_s: &[f64], groups: &[Vec<Vec<f64>>], joints: &[String]) -> Option<(usize, String)> {
     joints.iter().enumerate().find_map(|(joint, name)| {
         let [q, dq, ddq] = [&groups[0][joint], &groups[1][joint], &groups[2][joint]];

@@ -38,12 +38,14 @@ pub struct IdentificationOutcome {
     pub inertials: Vec<InertialParameters>,
     /// The user's own URDF with the new values; without it, [`ResultFile::no_urdf`] says why.
     pub urdf: Option<String>,
-    /// Measured and predicted torque over time, training logs first: at most the first 20 000 samples of a log that was fitted to, the first 100 000 filtered rows of a held-out one.
+    /// Measured and predicted torque over time, training logs first: at most the first 20 000 samples of a log that was
+    /// fitted to, the first 100 000 filtered rows of a held-out one.
     pub traces: Vec<LogTrace>,
 }
 
 impl IdentificationOutcome {
-    /// The report as one self-contained HTML page: torque measured against predicted, residuals, parameters with error bars, friction, bodies, what was found in the logs, where the time went.
+    /// The report as one self-contained HTML page: torque measured against predicted, residuals, parameters with error
+    /// bars, friction, bodies, what was found in the logs, where the time went.
     ///
     /// # Errors
     /// [`Error::Report`], which would be a defect of this program.
@@ -60,8 +62,9 @@ pub fn identify(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> R
     identified(study, study_path, options, None)
 }
 
-/// As [`identify()`] with the method `"instrumental"`, whatever the study asks for, and instruments from `source`: the closed loop simulated with the model so far (IDIM-IV: call again with a new
-/// simulation until the parameters settle), or a repeated run.
+/// As [`identify()`] with the method `"instrumental"`, whatever the study asks for, and instruments from `source`: the
+/// closed loop simulated with the model so far (IDIM-IV: call again with a new simulation until the parameters settle),
+/// or a repeated run.
 ///
 /// # Errors
 /// As [`identify()`], and what `source` returns.

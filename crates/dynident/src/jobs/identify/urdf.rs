@@ -36,7 +36,8 @@ pub(super) fn written_urdf(
     rewrite_urdf(&robot.robot.text, &links, &joints).map_err(|error| error.to_string())
 }
 
-/// Says in a body's comment which of its links are not fixed but stood behind locked joints: its values hold while those stay where they were.
+/// Says in a body's comment which of its links are not fixed but stood behind locked joints: its values hold while
+/// those stay where they were.
 fn note_locked(robot: &StudyRobot, changes: &mut [LinkChange]) {
     for body in robot.model().bodies() {
         let own = robot.robot.model.bodies().iter().find(|original| original.name() == body.name());

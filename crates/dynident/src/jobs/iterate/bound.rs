@@ -10,8 +10,9 @@ use nalgebra::DMatrix;
 /// Samples whose regressor is held at once.
 const SAMPLES_AT_ONCE: usize = 4096;
 
-/// The Cramér-Rao bound of every base parameter: `√ diag (Σ Wᵀ Σ_τ⁻¹ W)⁻¹` over the recorded samples along the trajectories that count, for white torque noise and exact positions; none without torque noise,
-/// with correlated noise, or where a parameter is not excited.
+/// The Cramér-Rao bound of every base parameter: `√ diag (Σ Wᵀ Σ_τ⁻¹ W)⁻¹` over the recorded samples along the
+/// trajectories that count, for white torque noise and exact positions; none without torque noise, with correlated
+/// noise, or where a parameter is not excited.
 pub(super) fn cramer_rao(robot: &StudyRobot, legs: &[Leg], sensors: &SensorSettings) -> Option<Vec<f64>> {
     let dof = robot.model().dof();
     let std: Vec<f64> = (0..dof).map(|joint| sensors.torque_std.of(joint)).collect();

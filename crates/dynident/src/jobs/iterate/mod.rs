@@ -33,12 +33,14 @@ pub struct IterationWatch<'a> {
     pub run: &'a mut dyn FnMut(&RunRecord, &[RobotRun]),
 }
 
-/// Iterates a study's robot. What is found stands in `out`: `trajectory.json` (the trajectories at the controller's rate), `runs/run_k/` (each run whole or not at all; of legs one after another
-/// `leg_n/runs/run_k/`), `iterations.json` after every run and `report.html` in the end. With `resume`, runs that are there already are not made again: who is killed at any moment goes on to the
-/// same result.
+/// Iterates a study's robot. What is found stands in `out`: `trajectory.json` (the trajectories at the controller's
+/// rate), `runs/run_k/` (each run whole or not at all; of legs one after another `leg_n/runs/run_k/`),
+/// `iterations.json` after every run and `report.html` in the end. With `resume`, runs that are there already are not
+/// made again: who is killed at any moment goes on to the same result.
 ///
 /// # Errors
-/// Files, study, settings, and files of another study's iteration in `out`. How the robot and the iteration did is in the file.
+/// Files, study, settings, and files of another study's iteration in `out`. How the robot and the iteration did is in
+/// the file.
 pub fn iterate_study(
     study: &Study,
     study_path: &Path,

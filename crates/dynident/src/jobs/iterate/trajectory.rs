@@ -113,7 +113,8 @@ impl Trajectory {
         Reference::new(self.rate_hz, motion)
     }
 
-    /// The part in which the joints that are not held make their strokes, if it is made of strokes; everything otherwise.
+    /// The part in which the joints that are not held make their strokes, if it is made of strokes; everything
+    /// otherwise.
     pub(crate) fn without(&self, held: &[Option<f64>]) -> Result<Self, String> {
         if self.strokes.is_empty() || held.iter().all(Option::is_none) {
             return Ok(self.clone());

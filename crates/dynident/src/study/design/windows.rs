@@ -1,4 +1,5 @@
-//! `criterion = { kind = "windowed-condition", .. }`: the paper's criterion over windows, and the strokes that a study gives.
+//! `criterion = { kind = "windowed-condition", .. }`: the paper's criterion over windows, and the strokes that a study
+//! gives.
 
 use serde::{Deserialize, Serialize};
 

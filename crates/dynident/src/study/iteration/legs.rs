@@ -12,7 +12,8 @@ pub enum LegOrder {
     /// Every run has all of them, and is identified from all.
     #[default]
     Together,
-    /// Each has an iteration of its own, until that has settled or its runs are used up; what it has found is held in those after it. The paper's way: tip first.
+    /// Each has an iteration of its own, until that has settled or its runs are used up; what it has found is held in
+    /// those after it. The paper's way: tip first.
     OneAfterAnother,
 }
 
@@ -31,15 +32,18 @@ pub enum LegOrder {
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LegSection {
-    /// Joints that are held, and where, rad (m); none by default. Their torque does not count. Of a windowed design only the strokes of the other joints are run.
+    /// Joints that are held, and where, rad (m); none by default. Their torque does not count. Of a windowed design
+    /// only the strokes of the other joints are run.
     pub hold: BTreeMap<String, f64>,
-    /// Whether the simulator locks them (the default), or the controller has to hold them. A robot outside gets them as joints that are to rest.
+    /// Whether the simulator locks them (the default), or the controller has to hold them. A robot outside gets them as
+    /// joints that are to rest.
     pub locked: bool,
     /// Its trajectory, in place of the study's.
     pub trajectory: Option<PathBuf>,
     /// Its design, in place of the study's `[design]`.
     pub design: Option<DesignSection>,
-    /// For joints by name the times (from, to; s) that count; what the design says by default, or everything. Joints that are not named do not count then.
+    /// For joints by name the times (from, to; s) that count; what the design says by default, or everything. Joints
+    /// that are not named do not count then.
     pub windows: BTreeMap<String, Vec<[f64; 2]>>,
     /// The `[[payload]]` that the robot carries on it, by name; none by default.
     pub payload: Option<String>,

@@ -58,9 +58,11 @@ pub enum PriorChoice {
 pub struct IterationSection {
     /// A trajectory to run (`t_s, q1.., dq1.., ddq1..`), in place of the one that `[design]` leads to.
     pub trajectory: Option<PathBuf>,
-    /// Several trajectories, some with joints that are held, in place of one; each takes the study's trajectory or design unless it has its own.
+    /// Several trajectories, some with joints that are held, in place of one; each takes the study's trajectory or
+    /// design unless it has its own.
     pub leg: Vec<LegSection>,
-    /// Whether every run has all legs (`"together"`, the default), or each an iteration of its own, with what those before it have found held (`"one-after-another"`).
+    /// Whether every run has all legs (`"together"`, the default), or each an iteration of its own, with what those
+    /// before it have found held (`"one-after-another"`).
     pub order: LegOrder,
     /// Which robot runs it; the simulator by default.
     pub robot: RobotChoice,
@@ -74,7 +76,8 @@ pub struct IterationSection {
     pub scheme: Scheme,
     /// Every sample of every joint counts, also where a windowed design names windows; false by default.
     pub every_sample: bool,
-    /// The paper's scheme as it stands: no physically consistent set is asked for and nothing is rejected. False by default.
+    /// The paper's scheme as it stands: no physically consistent set is asked for and nothing is rejected. False by
+    /// default.
     pub literal: bool,
     /// From positions to velocities and accelerations; `deviation` from the trajectory by default.
     pub differentiator: DifferentiatorSettings,
@@ -139,7 +142,8 @@ impl Default for IterationSection {
 }
 
 impl IterationSection {
-    /// The settings of the iteration, with the study's `[controller]`; runs are identified as `identification` says, with the iteration's own differentiator and filter.
+    /// The settings of the iteration, with the study's `[controller]`; runs are identified as `identification` says,
+    /// with the iteration's own differentiator and filter.
     ///
     /// # Errors
     /// In words: what a run cannot be identified with.

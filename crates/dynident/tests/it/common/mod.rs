@@ -1,4 +1,5 @@
-//! A robot whose parameters are known, and logs of it: inverse dynamics of the bodies plus friction written out by hand.
+//! A robot whose parameters are known, and logs of it: inverse dynamics of the bodies plus friction written out by
+//! hand.
 use dynident::dynamics::{Workspace, inverse_dynamics};
 use dynident::model::{InertialParameters, Model, load_robot};
 use dynident::{IdentificationOutcome, RunOptions, Silent, Study, StudyRobot, identify};
