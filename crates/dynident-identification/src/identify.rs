@@ -5,7 +5,7 @@ use crate::consistent::{
     inertials, nearest_to_nominal,
 };
 use crate::error::IdentificationError;
-use crate::estimators::{Estimation, InstrumentSource, TrainingRows, estimate};
+use crate::estimators::{Estimation, InstrumentSource, estimate};
 use crate::examination::{
     HeldOutExamination, LogTrace, ModelUnderTest, TorqueLag, TorqueSignCheck, Uncertainty, examine_held_out,
     examine_training, pooled_delay, sign_evidence,
@@ -15,6 +15,7 @@ use crate::logs::{Logs, of_role};
 use crate::payload::{KnownArm, PayloadResult, payload_results};
 use crate::recording::Role;
 use crate::regressor_model::RegressorModel;
+use crate::settings::IdentificationSettings;
 use crate::task::IdentificationTask;
 use crate::training::{Training, training_rows};
 use dynident_estimation::consistent::PhysicalFit;
@@ -179,20 +180,20 @@ fn identified(
     if chosen.is_empty() {
         return Err(IdentificationError::NoTrainingLog);
     }
-    settings.check_names(robot)?;
+    settings.check_names(robot).map_err(IdentificationError::Consistency)?;
 
     // Rows and factors, with the filters in force and the friction that the logs choose.
     let cutoff_hz = job.arm().and_then(KnownArm::cutoff_hz);
-    let logs = Logs::new(robot.model(), recordings, settings, &chosen, cutoff_hz, execution)?;
+    let logs = Logs::new(robot.model(), recordings, settings.filters(), &chosen, cutoff_hz, execution)?;
     let refit = job.arm().map(KnownArm::refit);
-    let training = training_rows(&logs, robot.clone().into(), &chosen, payloads, refit)?;
+    let training = training_rows((&logs, settings), robot.clone().into(), &chosen, payloads, refit)?;
     let model = &training.model;
     let mut times =
         StageTimes { logs_s: training.timings_s[0], estimation_s: training.timings_s[1], examination_s: 0.0 };
 
     // The estimate.
     let started = Instant::now();
-    let rows = TrainingRows { logs: &logs, model, training: &chosen, problem: &training.problem };
+    let rows = training.rows((&logs, settings), &chosen);
     let mut estimation = match job {
         Job::Payload(arm) => {
             Estimation::plain(arm.estimate(model, &training.columns, &training.problem, &settings.estimation)?)
@@ -214,20 +215,20 @@ fn identified(
         let found = if held {
             (held_arm(task, &training, &estimation.estimate), None)
         } else {
-            let consistent = consistent_stage(&logs, &training, &estimation.estimate)?;
+            let consistent = consistent_stage((&logs, settings), &training, &estimation.estimate)?;
             (consistent, torque_sign(&training, &estimation.estimate)?)
         };
         Ok((found, started.elapsed().as_secs_f64()))
     };
     // Beside that, what training recordings say of the estimate; then what held-out ones do.
-    let examined = || examine_all_training(&logs, &training, &estimation.estimate);
+    let examined = || examine_all_training((&logs, settings), &training, &estimation.estimate);
     let (bodies, examined) = if execution.parallel() { rayon::join(bodies, examined) } else { (bodies(), examined()) };
     let ((consistent, sign), estimation_s) = bodies?;
     let mut examination = examined?;
     examination.sign = sign;
     times.estimation_s += estimation_s;
     let physical = consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
-    let held_out = examine_all_held_out(&logs, &training, &estimation.estimate, physical)?;
+    let held_out = examine_all_held_out((&logs, settings), &training, &estimation.estimate, physical)?;
     times.examination_s = started.elapsed().as_secs_f64() - estimation_s;
     Ok(Identification {
         payloads: payload_results((recordings, payloads), &chosen, &training.columns, &estimation.estimate),
@@ -262,11 +263,11 @@ fn held_arm(task: &IdentificationTask, training: &Training, estimate: &Estimate)
 /// Factors that do not belong to the estimate, intervals that cannot be had. That there is no consistent set is part of
 /// the result.
 pub fn consistent_stage(
-    logs: &Logs<'_>,
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
     training: &Training,
     estimate: &Estimate,
 ) -> Result<ConsistentParameters, IdentificationError> {
-    let (settings, robot) = (logs.settings, &training.model.parametric);
+    let robot = &training.model.parametric;
     let (alone, arm) = arm_alone(training, estimate)?;
     let problem = alone.as_ref().unwrap_or(&training.problem);
     let plain = settings.estimation.estimator.is_plain();
@@ -318,13 +319,13 @@ fn torque_sign(training: &Training, estimate: &Estimate) -> Result<Option<Torque
 
 /// [`examine_training`] of every training recording, side by side.
 fn examine_all_training(
-    logs: &Logs<'_>,
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
     training: &Training,
     estimate: &Estimate,
 ) -> Result<TrainingExamination, IdentificationError> {
     let one = |log: &crate::training::LogFactors| {
         let theta = training.columns.base_values(log.index, &estimate.values);
-        examine_training(logs, &training.model, log.index, &theta)
+        examine_training((logs, &settings.estimation), &training.model, log.index, &theta)
     };
     let found: Vec<_> = if logs.execution.parallel() {
         training.logs.par_iter().map(one).collect::<Result<_, _>>()?
@@ -339,7 +340,7 @@ fn examine_all_training(
 
 /// [`examine_held_out`] of every recording to test on.
 fn examine_all_held_out(
-    logs: &Logs<'_>,
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
     training: &Training,
     estimate: &Estimate,
     physical: Option<&[f64]>,
@@ -356,7 +357,7 @@ fn examine_all_held_out(
             uncertainty: Some(&uncertainty),
             traced: true,
         };
-        examine_held_out(logs, &training.model, index, &tested)
+        Ok(examine_held_out((logs, &settings.estimation), &training.model, index, &tested)?)
     };
     logs.of_role(Role::Validate).into_iter().map(one).collect()
 }

@@ -1,9 +1,9 @@
 //! Maximum likelihood for a motion that repeats: from logs to mean periods, their noise, and an estimate.
 
-use super::TrainingRows;
 use super::row_pass::Stop;
 use super::simulated::torque_sigma;
-use crate::error::IdentificationError;
+use super::{EstimatorError, TrainingRows};
+use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
 use crate::rows::motion_band_hz;
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
@@ -96,10 +96,10 @@ struct MeanPeriod {
 pub(super) fn periodic(
     rows: &TrainingRows<'_>,
     periods: &PeriodSettings,
-) -> Result<(Estimate, PeriodicFit), IdentificationError> {
+) -> Result<(Estimate, PeriodicFit), EstimatorError> {
     let TrainingRows { logs, model, problem, .. } = *rows;
     let method = "maximum-likelihood";
-    let wrong = |message: String| IdentificationError::Estimator { method, message };
+    let wrong = |message: String| EstimatorError::Requirement { method, message };
     if let Some(term) = model.terms().iter().find(|term| term.has_memory() || term.needs_load()) {
         return Err(wrong(format!(
             "{} depends on more than the motion of one instant: leave that law out, or take another method",
@@ -144,7 +144,7 @@ pub(super) fn periodic(
     let settings = MaximumLikelihoodSettings {
         motion_covariance,
         torque_covariance,
-        rank: logs.settings.estimation.rank,
+        rank: rows.settings.rank,
         tolerance: 1e-6,
         max_iterations: 50,
     };
@@ -188,19 +188,18 @@ fn mean_period(
     rows: &TrainingRows<'_>,
     index: usize,
     (period_s, skip_s): (f64, f64),
-    wrong: &dyn Fn(String) -> IdentificationError,
-) -> Result<MeanPeriod, IdentificationError> {
+    wrong: &dyn Fn(String) -> EstimatorError,
+) -> Result<MeanPeriod, EstimatorError> {
     let TrainingRows { logs, model, .. } = *rows;
     let (motion, recording) = (&logs.motion, &logs.recordings[index]);
     let places = recording.places(model.model())?;
     let alike = MotionSettings { smooth_torque: true, ..motion.clone() };
-    let failed = |source| IdentificationError::recording(&recording.name, source);
+    let failed = |source| LogError::recording(&recording.name, source);
     let Some(mut stream) = recording.open(model.model(), &alike)? else {
         return Err(wrong("a motion that is made already has no periods: give its raw samples".to_owned()));
     };
     let (rate_hz, dof) = (stream.rate_hz(), model.model().dof());
-    let stride =
-        logs.settings.parallel_filter.decimation(rate_hz, motion_band_hz(motion)).map_or(1, |settings| settings.factor);
+    let stride = logs.filter.decimation(rate_hz, motion_band_hz(motion)).map_or(1, |settings| settings.factor);
     let mut channels = vec![Vec::new(); 4 * dof];
     let (mut block, mut segment, mut begins_s) = (MotionBlock::default(), None, 0.0);
     while stream.next_block(&mut block).map_err(failed)? {

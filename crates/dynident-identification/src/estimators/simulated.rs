@@ -1,9 +1,8 @@
 //! DIDIM, CLIE and CLOE: from a controller and the commanded motion to an estimate.
 
-use super::TrainingRows;
 use super::simulated_loop::{LoopLog, SimulatedLoop};
+use super::{EstimatorError, TrainingRows};
 use crate::consistent::{ConsistencySettings, consistent_parameters};
-use crate::error::IdentificationError;
 use dynident_dynamics::Column;
 use dynident_estimation::{
     Estimate, EstimateStatus, EstimationError, LinearProblem, SegmentedFactor, SimulatedCriterion, SimulatedEstimate,
@@ -113,11 +112,11 @@ pub(super) fn simulated(
     rows: &TrainingRows<'_>,
     experiment: &SimulatedLoopSettings,
     compared: ComparedSignal,
-) -> Result<(Estimate, SimulatedFit), IdentificationError> {
-    let TrainingRows { logs, model, problem, training } = *rows;
-    let estimation = &logs.settings.estimation;
+) -> Result<(Estimate, SimulatedFit), EstimatorError> {
+    let TrainingRows { logs, model, problem, training, .. } = *rows;
+    let estimation = rows.settings;
     let method = compared.method();
-    let wrong = |message: String| IdentificationError::Estimator { method, message };
+    let wrong = |message: String| EstimatorError::Requirement { method, message };
     let SimulatedLoopSettings { controller, rate_hz, .. } = experiment;
     let mut settings = experiment.loop_settings.clone();
     settings.limits = RunLimits { torque: settings.limits.torque, ..RunLimits::default() };
@@ -261,10 +260,10 @@ fn settled(
     simulated: &mut SimulatedLoop<'_>,
     (start, experiment): (SimulatedStart, &SimulatedLoopSettings),
     (measured, std): (&DVector<f64>, &[f64]),
-) -> Result<StartOutcome, IdentificationError> {
+) -> Result<StartOutcome, EstimatorError> {
     let settings = SimulatedSettings {
         criterion: simulated.compared.criterion(),
-        rank: rows.logs.settings.estimation.rank,
+        rank: rows.settings.rank,
         tolerance: experiment.tolerance,
         max_iterations: experiment.max_iterations,
         difference: experiment.difference,
@@ -308,7 +307,7 @@ fn start_values(
     let mut why = Vec::new();
     if choice != SimulationStart::Description {
         let default = ConsistencySettings::default();
-        let settings = rows.logs.settings.consistency.as_ref().unwrap_or(&default);
+        let settings = rows.consistency.unwrap_or(&default);
         match consistent_parameters(&model.parametric, problem, &plain.joint_sigma, settings) {
             Ok(fit) => starts.push((fit.base_values, "estimate")),
             Err(reason) => why.push(format!("there is no physically consistent set to start from: {reason}")),
@@ -383,7 +382,7 @@ fn linearised(
     let mut at = 0;
     for (place, log) in simulated.logs.iter().enumerate() {
         for (joint, &count) in log.rows.iter().enumerate() {
-            let mut factor = SegmentedFactor::new(columns.len(), training.logs.settings.estimation.segments)?;
+            let mut factor = SegmentedFactor::new(columns.len(), training.settings.segments)?;
             let own = found.jacobian.rows(at, count);
             let panel: Vec<f64> = own.iter().copied().chain(target.rows(at, count).iter().copied()).collect();
             factor.absorb(&panel, count)?;

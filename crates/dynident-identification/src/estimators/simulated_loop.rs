@@ -1,10 +1,10 @@
 //! The closed loop of an experiment behind the estimators' seam: the same controller, reference, instants and filters
 //! as the logs, other parameters.
 
-use super::TrainingRows;
 use super::row_pass::Stop;
 use super::simulated::ComparedSignal;
-use crate::error::IdentificationError;
+use super::{EstimatorError, TrainingRows};
+use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
 use crate::rows::{JointRows, RowBuilder, RowConsumer, motion_band_hz};
 use dynident_estimation::{SimulatedMotion, SimulatedRows};
@@ -47,7 +47,7 @@ pub(super) struct SimulatedLoop<'a> {
     pub(super) compared: ComparedSignal,
     pub(super) logs: Vec<LoopLog>,
     /// Makes an error from what is wrong.
-    pub(super) wrong: &'a dyn Fn(String) -> IdentificationError,
+    pub(super) wrong: &'a dyn Fn(String) -> EstimatorError,
     /// Why the last simulation that did not get through did not.
     pub(super) failure: Option<String>,
 }
@@ -59,8 +59,8 @@ impl LoopLog {
         index: usize,
         compared: ComparedSignal,
         rate_hz: f64,
-        wrong: &dyn Fn(String) -> IdentificationError,
-    ) -> Result<Self, IdentificationError> {
+        wrong: &dyn Fn(String) -> EstimatorError,
+    ) -> Result<Self, EstimatorError> {
         let TrainingRows { logs, model, .. } = *training;
         let (recording, motion) = (&logs.recordings[index], &logs.motion);
         let name = recording.name.clone();
@@ -75,12 +75,12 @@ impl LoopLog {
             )));
         };
         let places = recording.places(model.model())?;
-        let filter = logs.settings.parallel_filter.decimation(stream.rate_hz(), motion_band_hz(motion));
-        let in_filter = |source| IdentificationError::Filter { log: name.clone(), source };
+        let filter = logs.filter.decimation(stream.rate_hz(), motion_band_hz(motion));
+        let in_filter = |source| LogError::Filter { log: name.clone(), source };
         let dof = model.dof();
         let mut outputs = Outputs::new(dof, filter.as_ref(), stream.rate_hz()).map_err(in_filter)?;
         let (mut block, mut pieces, mut samples) = (MotionBlock::default(), Vec::new(), 0);
-        while stream.next_block(&mut block).map_err(|source| IdentificationError::recording(&name, source))? {
+        while stream.next_block(&mut block).map_err(|source| LogError::recording(&name, source))? {
             let values = if compared == ComparedSignal::Position { &block.q } else { &block.tau };
             for (joint, &place) in places.iter().enumerate() {
                 outputs.take(joint, block.segment, block.joint(values, place));
@@ -91,7 +91,8 @@ impl LoopLog {
         }
         let log_rate_hz = stream.rate_hz();
         if outputs.rows.iter().any(Vec::is_empty) {
-            return Err(IdentificationError::NothingLeft { log: name, rows: samples as u64, needed: outputs.needed() });
+            let (rows, needed) = (samples as u64, outputs.needed());
+            return Err(LogError::NothingLeft { log: name, rows, needed }.into());
         }
         let begins_s = commanded.start_s().min(0.0);
         let ends_s =
@@ -144,13 +145,13 @@ impl SimulatedLoop<'_> {
     }
 
     /// One log's rows of a run.
-    fn rows_of(&self, log: &LoopLog, run: &Run, out: &mut Gathered) -> Result<(), IdentificationError> {
+    fn rows_of(&self, log: &LoopLog, run: &Run, out: &mut Gathered) -> Result<(), EstimatorError> {
         let dof = self.model.model().dof();
         let motion = (self.compared != ComparedSignal::Torque)
             .then(|| sampled(run, log.begins_s))
             .transpose()
-            .map_err(|source| IdentificationError::Filter { log: log.name.clone(), source })?;
-        let in_filter = |source| IdentificationError::Filter { log: log.name.clone(), source };
+            .map_err(|source| LogError::Filter { log: log.name.clone(), source })?;
+        let in_filter = |source| LogError::Filter { log: log.name.clone(), source };
         let mut outputs = Outputs::new(dof, log.filter.as_ref(), log.rate_hz).map_err(in_filter)?;
         let layout = self.model.layout();
         let places: Vec<usize> = (0..dof).collect();
@@ -290,7 +291,7 @@ struct PanelRows {
 }
 
 impl RowConsumer for PanelRows {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         self.joints[rows.joint].push((rows.rows, rows.panel.to_vec()));
         Ok(())
     }
