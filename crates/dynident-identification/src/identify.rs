@@ -7,8 +7,8 @@ use crate::consistent::{
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
 use crate::examination::{
-    HeldOutExamination, LogTrace, ModelUnderTest, TorqueLag, TorqueSignCheck, Uncertainty, examine_held_out,
-    examine_training, pooled_delay, sign_evidence,
+    HeldOutExamination, LogTrace, ModelUnderTest, TorqueLag, TorqueSignCheck, Uncertainty, examine_training,
+    pooled_delay, sign_evidence, tested_on,
 };
 use crate::execution::Execution;
 use crate::logs::{Logs, of_role};
@@ -209,26 +209,32 @@ fn identified(
         (estimation.estimate, dropped) = (rest, Some(report));
     }
 
-    // Bodies, friction and drives that a robot can have.
+    // Bodies, friction and drives that a robot can have; then what held-out recordings say of them.
     let held = job.arm().is_some();
     let bodies = || -> Result<_, IdentificationError> {
-        let found = if held {
-            (held_arm(task, &training, &estimation.estimate), None)
+        let consistent = if held {
+            held_arm(task, &training, &estimation.estimate)
         } else {
-            let consistent = consistent_stage((&logs, settings), &training, &estimation.estimate)?;
-            (consistent, torque_sign(&training, &estimation.estimate)?)
+            consistent_stage((&logs, settings), &training, &estimation.estimate)?
         };
-        Ok((found, started.elapsed().as_secs_f64()))
+        let estimation_s = started.elapsed().as_secs_f64();
+        let physical = consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
+        let held_out = examine_all_held_out((&logs, settings), &training, &estimation.estimate, physical);
+        Ok((consistent, estimation_s, held_out))
     };
-    // Beside that, what training recordings say of the estimate; then what held-out ones do.
+    // Beside that, what training recordings say of the estimate.
+    let sign = || if held { Ok(None) } else { torque_sign(&training, &estimation.estimate) };
     let examined = || examine_all_training((&logs, settings), &training, &estimation.estimate);
-    let (bodies, examined) = if execution.parallel() { rayon::join(bodies, examined) } else { (bodies(), examined()) };
-    let ((consistent, sign), estimation_s) = bodies?;
-    let mut examination = examined?;
-    examination.sign = sign;
+    let (bodies, (sign, examined)) = if execution.parallel() {
+        rayon::join(bodies, || rayon::join(sign, examined))
+    } else {
+        (bodies(), (sign(), examined()))
+    };
+    let (consistent, estimation_s, held_out) = bodies?;
+    let sign = sign?;
+    let examination = TrainingExamination { sign, ..examined? };
+    let held_out = held_out?;
     times.estimation_s += estimation_s;
-    let physical = consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
-    let held_out = examine_all_held_out((&logs, settings), &training, &estimation.estimate, physical)?;
     times.examination_s = started.elapsed().as_secs_f64() - estimation_s;
     Ok(Identification {
         payloads: payload_results((recordings, payloads), &chosen, &training.columns, &estimation.estimate),
@@ -338,7 +344,7 @@ fn examine_all_training(
     Ok(TrainingExamination { delays, traces, pooled_delays, sign: None })
 }
 
-/// [`examine_held_out`] of every recording to test on.
+/// [`examine_held_out`] of every recording to test on, side by side.
 fn examine_all_held_out(
     (logs, settings): (&Logs<'_>, &IdentificationSettings),
     training: &Training,
@@ -346,7 +352,8 @@ fn examine_all_held_out(
     physical: Option<&[f64]>,
 ) -> Result<Vec<HeldOutExamination>, IdentificationError> {
     let columns = &training.columns;
-    let one = |index: usize| {
+    let held_out = logs.of_role(Role::Validate);
+    let one = |&index: &usize| -> Result<_, IdentificationError> {
         let theta = columns.base_values(index, &estimate.values);
         let uncertainty = Uncertainty::of(estimate, columns.base_covariance(index, &estimate.covariance));
         let physical =
@@ -357,7 +364,18 @@ fn examine_all_held_out(
             uncertainty: Some(&uncertainty),
             traced: true,
         };
-        Ok(examine_held_out((logs, &settings.estimation), &training.model, index, &tested)?)
+        Ok(tested_on((logs, &settings.estimation), &training.model, index, &tested, held_out.len() == 1)?)
     };
-    logs.of_role(Role::Validate).into_iter().map(one).collect()
+    if held_out.is_empty() {
+        return Ok(Vec::new());
+    }
+    let names: Vec<&str> = held_out.iter().map(|&index| &logs.recordings[index].name[..]).collect();
+    logs.begin(&format!("testing on {}", names.join(", ")), &held_out);
+    let tested = if logs.execution.parallel() {
+        held_out.par_iter().map(one).collect()
+    } else {
+        held_out.iter().map(one).collect()
+    };
+    logs.end();
+    tested
 }

@@ -4,6 +4,7 @@ use super::segmented::SegmentedFactor;
 use super::triangular::{FactorWorkspace, TriangularFactor};
 use crate::error::{EstimationError, expect};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// The rows of one joint in one log.
 #[derive(Clone, Debug)]
@@ -184,7 +185,7 @@ impl LinearProblem {
 
     /// The totals of all equations, ready to be weighted again and again.
     pub(crate) fn stacked(&self) -> StackedProblem<'_> {
-        StackedProblem { problem: self, totals: self.equations.iter().map(|e| e.factor.total()).collect() }
+        StackedProblem { problem: self, totals: self.equations.par_iter().map(|e| e.factor.total()).collect() }
     }
 }
 

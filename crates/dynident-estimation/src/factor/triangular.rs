@@ -1,6 +1,6 @@
 //! The triangular factor of a stack of rows `[W | τ]`: all that linear estimation needs to remember of them.
 
-use super::reflect::{CHUNK_ROWS, Chunk, TriangleOnPanel, row_start};
+use super::reflect::{CHUNK_ROWS, Chunk, TriangleOnPanel, heights, row_start};
 use crate::error::EstimationError;
 use dynident_lanes::{Level, dispatch};
 use nalgebra::{DMatrix, DVector};
@@ -52,6 +52,7 @@ pub struct TriangularFactor {
 pub struct FactorWorkspace {
     level: Level,
     panel: Vec<Chunk>,
+    heights: Vec<usize>,
 }
 
 impl Default for FactorWorkspace {
@@ -63,7 +64,7 @@ impl Default for FactorWorkspace {
 impl FactorWorkspace {
     /// A workspace whose work runs at the given processor level; [`Default`] takes the best one.
     pub fn new(level: Level) -> Self {
-        Self { level, panel: Vec::new() }
+        Self { level, panel: Vec::new(), heights: Vec::new() }
     }
 
     /// Room for a block; what it holds is left over from earlier work.
@@ -204,8 +205,10 @@ impl TriangularFactor {
         if chunks == 0 {
             return;
         }
-        let panel = &mut workspace.panel[..size * chunks];
-        dispatch(workspace.level, TriangleOnPanel { triangle: &mut self.triangle, size, panel, chunks });
+        let FactorWorkspace { level, panel, heights: own } = workspace;
+        let panel = &mut panel[..size * chunks];
+        heights(panel, chunks, own);
+        dispatch(*level, TriangleOnPanel { triangle: &mut self.triangle, size, panel, chunks, heights: own });
     }
 
     /// Adds what `other` has seen: afterwards this is the factor of both stacks of rows.

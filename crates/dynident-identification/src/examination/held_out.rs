@@ -131,6 +131,20 @@ pub fn examine_held_out(
     index: usize,
     tested: &ModelUnderTest<'_>,
 ) -> Result<HeldOutExamination, LogError> {
+    logs.begin(&format!("testing on {}", logs.recordings[index].name), &[index]);
+    let found = tested_on((logs, settings), model, index, tested, true);
+    logs.end();
+    found
+}
+
+/// [`examine_held_out`] as a part of a stage; `alone` lets a second thread read.
+pub(crate) fn tested_on(
+    (logs, settings): (&Logs<'_>, &EstimationSettings),
+    model: &RegressorModel,
+    index: usize,
+    tested: &ModelUnderTest<'_>,
+    alone: bool,
+) -> Result<HeldOutExamination, LogError> {
     let ModelUnderTest { theta, physical, uncertainty, traced } = *tested;
     let (recording, joints) = (&logs.recordings[index], model.joint_names());
     let columns = (0..model.dof()).map(|joint| model.layout().joint_columns(joint)).collect();
@@ -149,11 +163,8 @@ pub fn examine_held_out(
         trace: traced.then(|| TraceConsumer::new(model, theta)),
         buffer: Vec::new(),
     };
-    logs.begin(&format!("testing on {}", recording.name), &[index]);
-    let pass = LogPass { reader_thread: logs.execution.parallel(), kept: None, ..logs.pass(model, index) };
-    let statistics = pass.run(&mut test);
-    logs.end();
-    let statistics = statistics?;
+    let reader_thread = alone && logs.execution.parallel();
+    let statistics = LogPass { reader_thread, kept: None, ..logs.pass(model, index) }.run(&mut test)?;
     let name = &recording.name;
     let residuals = test.watches.iter().zip(&joints).map(|(watch, joint)| watch.report(name, joint)).collect();
     Ok(HeldOutExamination {

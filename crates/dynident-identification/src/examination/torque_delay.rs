@@ -205,7 +205,7 @@ impl<'a> DelayCheck<'a> {
         &self,
         rows: &[DelayRows],
         shift: &[f64],
-        factor: impl Fn(&DelayRows) -> &SegmentedFactor,
+        factor: impl Fn(&DelayRows) -> &SegmentedFactor + Sync,
     ) -> Result<LinearProblem, EstimationError> {
         let layout = self.model.layout();
         let base = layout.columns().len();
@@ -214,7 +214,7 @@ impl<'a> DelayCheck<'a> {
         // What the log does not determine stays as it was fitted, for the slope was made with it.
         let fallback = self.theta.iter().copied().chain(vec![0.0; rows.len()]).collect();
         let mut problem = LinearProblem::new(names, joints).with_fallback(fallback)?;
-        for (joint, rows) in rows.iter().enumerate() {
+        let mapped = |(joint, rows): (usize, &DelayRows)| {
             let own = layout.joint_columns(joint);
             let mut map = DMatrix::zeros(own.len() + 1 + NODES, own.len() + 2);
             for column in 0..=own.len() {
@@ -223,8 +223,12 @@ impl<'a> DelayCheck<'a> {
             for (node, weight) in lagrange(shift[joint] - rows.centre as f64).into_iter().enumerate() {
                 map[(own.len() + 1 + node, own.len() + 1)] = weight;
             }
-            let columns = own.iter().copied().chain([base + joint]).collect();
-            problem.add("log", joint, columns, factor(rows).mapped(&map)?)?;
+            factor(rows).mapped(&map)
+        };
+        let mapped: Vec<_> = rows.par_iter().enumerate().map(mapped).collect::<Result<_, _>>()?;
+        for (joint, mapped) in mapped.into_iter().enumerate() {
+            let columns = layout.joint_columns(joint).iter().copied().chain([base + joint]).collect();
+            problem.add("log", joint, columns, mapped)?;
         }
         Ok(problem)
     }
