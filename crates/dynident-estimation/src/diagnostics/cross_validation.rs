@@ -173,17 +173,12 @@ impl<'a> CrossValidation<'a> {
                     place[column] = Some(local);
                 }
                 let mut absorb = |to: &mut TriangularFactor, from: &TriangularFactor, weight: f64, rows: usize| {
-                    to.absorb_entries(&mut workspace, rows, |row, column| {
-                        let local = order.get(column).map_or(Some(from.columns()), |&global| place[global]);
-                        weight * local.map_or(0.0, |local| from.entry(row, local))
-                    });
+                    let local = |column: usize| order.get(column).map_or(Some(from.columns()), |&global| place[global]);
+                    to.absorb_columns(&mut workspace, (from, rows, weight), local);
                     to.count(from.rows());
                 };
                 let weight = weights[equation.joint];
-                if !(weight.is_finite() && weight >= 0.0) {
-                    let fix = "give a finite weight that is not negative";
-                    return Err(EstimationError::Setting { setting: "weight", value: weight, fix });
-                }
+                crate::factor::check_weight(weight)?;
                 // Later rows have nothing but torque, and what the triangle cannot explain does not count.
                 let seen = order.iter().filter_map(|&global| place[global]).max().map_or(0, |local| local + 1);
                 absorb(&mut triangle, &others[fold], weight, seen);

@@ -21,5 +21,5 @@ pub use rank::{FixedColumn, RankReport, RankSettings};
 pub(crate) use rank::{Solution, Split, report, solve, solved_values, split};
 pub(crate) use reflect::{CHUNK_ROWS, Chunk, TriangleOnPanel, heights, row_start};
 pub use segmented::{SegmentSettings, SegmentedFactor};
-pub(crate) use triangular::check_columns;
 pub use triangular::{BLOCK_ROWS, FactorWorkspace, TriangularFactor};
+pub(crate) use triangular::{check_columns, check_weight};

@@ -1,7 +1,7 @@
 //! The linear problem that all estimators start from: which joint's rows see which columns, and what they hold.
 
 use super::segmented::SegmentedFactor;
-use super::triangular::{FactorWorkspace, TriangularFactor};
+use super::triangular::{FactorWorkspace, TriangularFactor, check_weight};
 use crate::error::{EstimationError, expect};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -204,15 +204,14 @@ impl StackedProblem<'_> {
         let mut workspace = FactorWorkspace::default();
         let mut combined = TriangularFactor::new(columns);
         for (equation, total) in problem.equations.iter().zip(&self.totals) {
-            let total = total.scaled(weights[equation.joint])?;
+            let weight = weights[equation.joint];
+            check_weight(weight)?;
             let mut place = vec![None; columns + 1];
             for (local, &column) in equation.columns.iter().enumerate() {
                 place[column] = Some(local);
             }
             place[columns] = Some(total.columns());
-            combined.absorb_entries(&mut workspace, total.columns() + 1, |row, column| {
-                place[column].map_or(0.0, |local| total.entry(row, local))
-            });
+            combined.absorb_columns(&mut workspace, (total, total.columns() + 1, weight), |column| place[column]);
             combined.count(total.rows());
         }
         if let Some(prior) = &problem.prior {

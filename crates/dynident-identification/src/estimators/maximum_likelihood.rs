@@ -15,6 +15,7 @@ use dynident_model::terms::JointMotion;
 use dynident_recording::{AveragedPeriods, MotionBlock, MotionSettings, averaged_periods};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 /// A motion whose periods differ by more than this share of its own size does not repeat.
 const MOST_DIFFERENCE: f64 = 0.1;
@@ -38,22 +39,44 @@ pub struct PeriodSettings {
     pub harmonics: Option<usize>,
 }
 
+/// Settings of a repeated motion that are impossible.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum PeriodError {
+    /// A period that is no time.
+    #[error("period_s = {period_s}: give the seconds after which the motion repeats")]
+    Period {
+        /// What was given.
+        period_s: f64,
+    },
+    /// A start that is no time.
+    #[error("skip_s = {skip_s}: give 0 or more seconds")]
+    Skip {
+        /// What was given.
+        skip_s: f64,
+    },
+    /// Too few or too many harmonics.
+    #[error("harmonics = {harmonics}: give 1 to 200")]
+    Harmonics {
+        /// What was given.
+        harmonics: usize,
+    },
+}
+
 impl PeriodSettings {
     /// Checks the numbers.
     ///
     /// # Errors
-    /// In words, with the key and the fix.
-    pub fn validate(&self) -> Result<(), String> {
-        if let Some(period) = self.period_s
-            && !(period > 0.0 && period.is_finite())
-        {
-            return Err(format!("period_s = {period}: give the seconds after which the motion repeats"));
+    /// The first number that is impossible.
+    pub fn validate(&self) -> Result<(), PeriodError> {
+        if let Some(period_s) = self.period_s.filter(|period| !(*period > 0.0 && period.is_finite())) {
+            return Err(PeriodError::Period { period_s });
         }
         if !(self.skip_s >= 0.0 && self.skip_s.is_finite()) {
-            return Err(format!("skip_s = {}: give 0 or more seconds", self.skip_s));
+            return Err(PeriodError::Skip { skip_s: self.skip_s });
         }
         if let Some(harmonics) = self.harmonics.filter(|harmonics| !(1..=200).contains(harmonics)) {
-            return Err(format!("harmonics = {harmonics}: give 1 to 200"));
+            return Err(PeriodError::Harmonics { harmonics });
         }
         Ok(())
     }

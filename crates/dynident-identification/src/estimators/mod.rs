@@ -23,7 +23,7 @@ mod simultaneous;
 pub use error::EstimatorError;
 pub use instrumental::{InstrumentSettings, NoiseInRegressor};
 pub use instruments::{InstrumentSource, SmoothedMotion};
-pub use maximum_likelihood::{PeriodSettings, PeriodicFit};
+pub use maximum_likelihood::{PeriodError, PeriodSettings, PeriodicFit};
 pub use noise_weighted::NoiseLevels;
 pub use periodic_model::{FourierSeries, PeriodicModel, PeriodicRecord};
 pub use robust::GrossErrors;

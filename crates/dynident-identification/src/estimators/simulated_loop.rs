@@ -11,7 +11,9 @@ use dynident_estimation::{SimulatedMotion, SimulatedRows};
 use dynident_excitation::Motion;
 use dynident_model::terms::TorqueTerm;
 use dynident_recording::{DecimationSettings, Decimator, FilterError, MotionBlock};
-use dynident_simulation::{ControllerModel, ControllerSettings, LoopSettings, Plant, Reference, Run, closed_loop};
+use dynident_simulation::{
+    ControllerModel, ControllerSettings, LoopSettings, Plant, Reference, Run, SimulationError, closed_loop,
+};
 use nalgebra::{DMatrix, DVector};
 
 /// Samples of a log without a gap.
@@ -137,11 +139,10 @@ impl SimulatedLoop<'_> {
 
     /// The robot with base parameters θ: its torques, and so its mass matrix, are those of every full set that has
     /// these base parameters.
-    fn plant(&self, theta: &[f64]) -> Result<Plant, String> {
-        let model = ControllerModel::from_columns(self.model.model(), self.model.layout().columns(), theta)
-            .map_err(|error| error.to_string())?;
+    fn plant(&self, theta: &[f64]) -> Result<Plant, SimulationError> {
+        let model = ControllerModel::from_columns(self.model.model(), self.model.layout().columns(), theta)?;
         let (terms, values): (Vec<TorqueTerm>, Vec<f64>) = model.terms().iter().cloned().unzip();
-        Plant::new(model.model(), &terms, &values).map_err(|error| error.to_string())
+        Plant::new(model.model(), &terms, &values)
     }
 
     /// One log's rows of a run.
@@ -218,7 +219,7 @@ impl SimulatedMotion for SimulatedLoop<'_> {
         let mut plant = match self.plant(parameters) {
             Ok(plant) => plant,
             Err(reason) => {
-                self.failure = Some(reason);
+                self.failure = Some(reason.to_string());
                 return Ok(None);
             }
         };
@@ -230,7 +231,7 @@ impl SimulatedMotion for SimulatedLoop<'_> {
             filled: 0,
         };
         for log in &self.logs {
-            let in_loop = |error: dynident_simulation::SimulationError| {
+            let in_loop = |error: SimulationError| {
                 Stop::Log((self.wrong)(format!("log `{}`: the closed loop cannot be simulated: {error}", log.name)))
             };
             let mut controller = self.controller.build(plant.dof(), self.controller_model.as_ref()).map_err(in_loop)?;

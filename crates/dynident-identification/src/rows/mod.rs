@@ -11,7 +11,7 @@ mod reader;
 
 pub use builder::RowBuilder;
 pub(crate) use builder::in_model_order;
-pub use filter::{ParallelFilterSettings, motion_band_hz};
+pub use filter::{ParallelFilterError, ParallelFilterSettings, motion_band_hz};
 pub use pass::{KeptLog, LogPass, LogStatistics};
 
 use crate::recording::LogError;
