@@ -211,9 +211,25 @@ impl Kernel for BackSubstitution<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::{IndependentColumns, ROUNDING, independent_columns};
+    use super::{IndependentColumns, ROUNDING, WORTH_THREADS, independent_columns, solved};
     use nalgebra::{DMatrix, DVector};
     use proptest::prelude::*;
+
+    #[test]
+    fn threads_of_the_pool_change_no_bit() {
+        let number = |a: usize, b: usize| (1.3 * a as f64 + 0.7 * (a * b) as f64).sin();
+        let rank = 400;
+        let triangle: Vec<Vec<f64>> = (0..rank)
+            .map(|row| (row..rank).map(|k| if k == row { 9.0 } else { 0.1 * number(row, k) }).collect())
+            .collect();
+        let dependent: Vec<Vec<f64>> = (0..260).map(|c| (0..rank).map(|row| number(c, row)).collect()).collect();
+        assert!(dependent.len() * rank * rank / 2 > WORTH_THREADS);
+        let of = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| solved(&triangle, &dependent))
+        };
+        assert_eq!(of(1), of(3));
+    }
 
     #[test]
     fn a_dependent_column_spends_no_row() {

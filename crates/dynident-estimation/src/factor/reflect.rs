@@ -351,3 +351,52 @@ fn halving_sum<T: Lane>(lanes: T) -> f64 {
     }
     values[0]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynident_lanes::{Level, dispatch};
+
+    /// A triangle and a panel of which column `c` ends after `ends(c)` rows.
+    fn stack(size: usize, chunks: usize, ends: impl Fn(usize) -> usize) -> (Vec<f64>, Vec<Chunk>) {
+        let number = |k: usize| (1.7 * k as f64 * k as f64 + 0.3).sin();
+        let mut triangle: Vec<f64> = (0..row_start(size, size)).map(number).collect();
+        for row in 0..size {
+            triangle[row_start(size, row)] = triangle[row_start(size, row)].abs();
+            // The last but one column is not seen by the first half.
+            if row + 2 < size && row < size / 2 {
+                triangle[row_start(size, row) + size - 2 - row] = 0.0;
+            }
+        }
+        let mut panel = vec![Chunk::ZERO; size * chunks];
+        for column in 0..size {
+            for row in 0..ends(column) {
+                panel[column * chunks + row / CHUNK_ROWS].0[row % CHUNK_ROWS] = number(7 * column + 31 * row);
+            }
+        }
+        (triangle, panel)
+    }
+
+    #[test]
+    fn zeros_that_are_left_out_change_no_bit() {
+        let (size, chunks) = (23, 4);
+        let triangular = |column: usize| column + 1;
+        let few = |column: usize| if column.is_multiple_of(3) || column == size - 2 { 0 } else { 13 };
+        let late = |column: usize| if column < 9 { 0 } else { 30 };
+        let shapes: [&dyn Fn(usize) -> usize; 3] = [&triangular, &few, &late];
+        for (level, ends) in Level::available().into_iter().flat_map(|level| shapes.map(|ends| (level, ends))) {
+            let absorbed = |whole: bool| {
+                let (mut triangle, mut panel) = stack(size, chunks, ends);
+                let mut filled = Vec::new();
+                heights(&panel, chunks, &mut filled);
+                if whole {
+                    filled.fill(chunks);
+                }
+                let (panel, heights) = (&mut panel[..], &mut filled[..]);
+                dispatch(level, TriangleOnPanel { triangle: &mut triangle, size, panel, chunks, heights });
+                triangle.into_iter().map(f64::to_bits).collect::<Vec<_>>()
+            };
+            assert_eq!(absorbed(false), absorbed(true), "{}", level.name());
+        }
+    }
+}
