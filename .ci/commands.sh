@@ -1,0 +1,48 @@
+#!/usr/bin/env bash
+# commands.sh SCRATCH: every command that README and the book name, once and short, with the program and the programs of measurement that
+# `cargo build --release --workspace --bins --examples` made. Outputs go to SCRATCH.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+out=$1
+dynident=target/release/dynident
+
+# run STATUS COMMAND...: says the command and how long it took; its output is shown only if the exit status is another one.
+run() {
+    local wanted=$1 status=0 start=$SECONDS
+    shift
+    "$@" >"$out/last" 2>&1 || status=$?
+    printf '%4s s  %s\n' "$((SECONDS - start))" "$*"
+    if [ "$status" -ne "$wanted" ]; then
+        cat "$out/last"
+        printf 'exit status %s in place of %s\n' "$status" "$wanted" >&2
+        exit 1
+    fi
+}
+
+# README and the first pages: the user's robot.
+run 0 "$dynident" inspect robots/ur10.urdf
+run 0 "$dynident" identify examples/ur10_simulated.toml --out "$out/result"
+run 0 "$dynident" validate "$out/result/result.json" --study examples/ur10_simulated.toml
+run 0 cargo run --release --locked --quiet -p dynident --example simulate_ur10 -- "$out/ur10_simulated"
+
+# A designed motion, looked at again, and its torques.
+run 0 "$dynident" design examples/design_ur10.toml --out "$out/motion" --to ros2
+run 0 "$dynident" design examples/design_ur10.toml --check "$out/motion/trajectory.csv" --out "$out/checked"
+run 0 "$dynident" design examples/ur10_simulated.toml --check-log train --out "$out/log_checked"
+run 0 "$dynident" evaluate robots/ur10.urdf --states "$out/motion/trajectory.csv" --quantity inverse-dynamics --out "$out/torques.csv"
+run 0 "$dynident" design examples/design_paper.toml --out "$out/paper_motion"
+
+# One run, the iteration, the paper.
+run 0 "$dynident" simulate examples/iterate_ur10.toml --out "$out/run"
+run 0 "$dynident" iterate examples/iterate_paper_2r.toml --out "$out/iteration"
+run 0 "$dynident" reproduce --out "$out/paper"
+
+# The programs behind the tables of the book, with the least work that they take.
+run 0 "$dynident" benchmark --runs 2 --seed 1 --robots planar2r --noise standard --out "$out/benchmark"
+run 0 cargo run --release --locked --quiet -p dynident-benchmark -- --only rnea
+run 0 cargo run --release --locked --quiet -p dynident-benchmark --bin designs -- --seconds 0.2 --criteria d-optimal
+run 0 cargo run --release --locked --quiet -p dynident-benchmark --bin iterations -- 1
+run 0 cargo run --release --locked --quiet -p dynident-iteration --example basin -- 2 601
+run 0 cargo run --release --locked --quiet -p dynident-paper --example logistic_against_fourier
+run 0 cargo run --release --locked --quiet -p dynident-recording --example differentiators
+run 0 python3 docs/summaries.py --check
