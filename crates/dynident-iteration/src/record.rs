@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// Parameters of a controller's model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "of", content = "values", rename_all = "kebab-case")]
 pub enum ModelParameters {
     /// Ten for each body, then one for each term.
@@ -34,6 +35,7 @@ impl ModelParameters {
 
 /// What controlled a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct UsedController {
     /// The controller's name.
     pub name: String,
@@ -47,6 +49,7 @@ pub struct UsedController {
 
 /// A run, as it is kept.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RunRecord {
     /// Its number, from 1.
     pub run: usize,

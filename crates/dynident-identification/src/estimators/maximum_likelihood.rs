@@ -27,6 +27,7 @@ const STEPS: [f64; 3] = [1e-5, 1e-5, 1.0];
 
 /// The repeated motion.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct PeriodSettings {
     /// After how many seconds the motion repeats; by default the length of the log's `reference`.
@@ -61,6 +62,7 @@ impl PeriodSettings {
 
 /// What the periods of a repeated motion give.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PeriodicFit {
     /// Their length, s.
     pub period_s: f64,

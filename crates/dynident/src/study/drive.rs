@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 
 /// How a Coulomb step looks near zero velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum CoulombChoice {
     /// No Coulomb friction.
@@ -21,6 +22,7 @@ pub enum CoulombChoice {
 
 /// `[drive]`: the laws of every joint, and exceptions by joint.
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct DriveSection {
     /// Inertia of rotor and gear as seen from the joint. Off by default: where torque is measured at the link it does
@@ -69,6 +71,7 @@ impl Default for DriveSection {
 
 /// What one joint has in place of `[drive]`.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct JointDrive {
     /// In place of `drive.drive_inertia`.
@@ -92,6 +95,7 @@ pub struct JointDrive {
 
 /// `[[coupling]]`: a drive whose velocity is `ratios[0] · q̇_first + ratios[1] · q̇_second`.
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct CouplingSection {
     /// Name of the drive in the parameters' symbols.

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 /// How base parameters are estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum EstimatorMethod {
     /// Ordinary least squares: every joint's newton metre counts alike.
@@ -65,6 +66,7 @@ impl EstimatorMethod {
 
 /// `[estimator]`.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct EstimatorSection {
     /// The method; weighted by default.

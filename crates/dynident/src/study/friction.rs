@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// Who says which friction a joint has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum FrictionChoice {
     /// The study's keys.
@@ -20,6 +21,7 @@ pub enum FrictionChoice {
 
 /// A law of `drive.laws`, beside `viscous`, `coulomb` and `offset`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "law", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum FrictionTerm {
     /// Viscous friction by direction, in place of `viscous`.

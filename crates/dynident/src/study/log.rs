@@ -8,6 +8,7 @@ use std::path::PathBuf;
 
 /// `[[log]]`: one recording, or a part of one.
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LogSection {
     /// The main file.

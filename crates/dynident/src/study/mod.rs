@@ -70,6 +70,7 @@ use std::path::{Path, PathBuf};
 /// assert_eq!(study.log.len(), 2);
 /// ```
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Study {
     /// What the study is called in reports; the file's name by default.

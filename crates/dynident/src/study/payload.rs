@@ -9,6 +9,7 @@ use std::path::PathBuf;
 /// `[[payload]]`: something that some logs were recorded with, at a link of the robot. A `[[log]]` carries it by its
 /// name. Without `mass_kg` it is estimated; with it, it is known.
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct PayloadSection {
     /// What logs call it.
@@ -30,6 +31,7 @@ pub struct PayloadSection {
 /// `[arm]`: the arm by an earlier identification. Only payloads are estimated then, and the arm's error bars go into
 /// theirs.
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ArmSection {
     /// The earlier `result.json`, of the same robot with the same drives.

@@ -15,6 +15,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 /// # Ok::<(), toml::de::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub enum PhysicalChoice {
     /// With the defaults, or not at all.

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 /// `[robot]`: which robot, and how it stands.
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct RobotSection {
     /// URDF, or D-H table in TOML.

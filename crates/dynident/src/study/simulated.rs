@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 /// `[estimator.simulated]`. Rate, integrator, velocities and delays of the feedback, start and torque limits of the
 /// loop are those of `[simulation]`; noise is not simulated.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SimulatedSection {
     /// Where the iteration begins; at what is nearer to the record by default.

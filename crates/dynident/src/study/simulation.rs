@@ -26,6 +26,7 @@ const SHAPE_SHARE: f64 = 1.0 / 3.0;
 /// # Ok::<(), toml::de::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SimulationSection {
     /// Samples a second of the controller; 1000 by default.

@@ -51,6 +51,7 @@ const MAX_COUNT: usize = 1_000_000;
 /// # Ok::<(), toml::de::Error>(())
 /// ```
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct DesignSection {
     /// The trajectory family and its settings; five Fourier harmonics with rest at both ends by default.
@@ -59,9 +60,11 @@ pub struct DesignSection {
     pub duration_s: f64,
     /// What makes a motion good; `"d-optimal"` by default. A name, or a table with a `kind` and its settings.
     #[serde(deserialize_with = "name_or_table")]
+    #[cfg_attr(feature = "schema", schemars(transform = name_or_table::schema))]
     pub criterion: CriterionChoice,
     /// What looks for it; `"gradient"` by default. A name, or a table with a `kind` and its settings.
     #[serde(deserialize_with = "name_or_table")]
+    #[cfg_attr(feature = "schema", schemars(transform = name_or_table::schema))]
     pub optimiser: OptimiserChoice,
     /// Strokes of a windowed design that are to be judged as they are, one a joint; nothing is searched then. Empty by
     /// default.
@@ -98,6 +101,7 @@ impl Default for DesignSection {
 
 /// A family by its `kind`, with that family's own settings beside it.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum FamilyChoice {
     /// Finite Fourier series.
@@ -157,6 +161,7 @@ impl FamilyChoice {
 
 /// What makes a motion good.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum CriterionChoice {
     /// The volume of the confidence ellipsoid: `-log det D`.
@@ -205,6 +210,7 @@ impl CriterionChoice {
 
 /// Torque noise: the same for all joints, or one by one.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged, expecting = "a standard deviation in Nm, or a list with one per joint")]
 pub enum TorqueNoise {
     /// For every joint.

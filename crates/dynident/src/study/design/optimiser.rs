@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// An optimiser by its `kind`, with its own settings beside it; the name alone stands for the defaults.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum OptimiserChoice {
     /// Many starts, exact gradients, augmented Lagrangian.

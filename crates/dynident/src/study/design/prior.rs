@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 /// `[design.prior]`. What several sources say adds up.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct PriorSection {
     /// `result.json` of an earlier identification of the same robot: its covariance says how well each base parameter

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 /// Position of joints at the start, rad (m): by name (what is not named stays free), or all joints in the model's
 /// order.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged, expecting = "positions by joint, { elbow = 1.5 }, or a list with one per joint (rad, m)")]
 pub enum StartPosture {
     /// By the joints' names.
