@@ -8,7 +8,7 @@ use crate::regressor_model::RegressorModel;
 use crate::rows::motion_band_hz;
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_estimation::{
-    CovarianceMethod, Estimate, InstantRows, InstantVisitor, LinearProblem, MaximumLikelihoodEstimate,
+    CovarianceMethod, Estimate, EstimationError, InstantRows, InstantVisitor, LinearProblem, MaximumLikelihoodEstimate,
     MaximumLikelihoodSettings, maximum_likelihood, student_half_width,
 };
 use dynident_model::terms::JointMotion;
@@ -43,18 +43,19 @@ impl PeriodSettings {
     /// Checks the numbers.
     ///
     /// # Errors
-    /// In words, with the key and the fix.
-    pub fn validate(&self) -> Result<(), String> {
+    /// [`EstimationError::Setting`] with the key and the fix.
+    pub fn validate(&self) -> Result<(), EstimationError> {
+        let wrong = |setting, value, fix| Err(EstimationError::Setting { setting, value, fix });
         if let Some(period) = self.period_s
             && !(period > 0.0 && period.is_finite())
         {
-            return Err(format!("period_s = {period}: give the seconds after which the motion repeats"));
+            return wrong("period_s", period, "give the seconds after which the motion repeats");
         }
         if !(self.skip_s >= 0.0 && self.skip_s.is_finite()) {
-            return Err(format!("skip_s = {}: give 0 or more seconds", self.skip_s));
+            return wrong("skip_s", self.skip_s, "give 0 or more seconds");
         }
         if let Some(harmonics) = self.harmonics.filter(|harmonics| !(1..=200).contains(harmonics)) {
-            return Err(format!("harmonics = {harmonics}: give 1 to 200"));
+            return wrong("harmonics", harmonics as f64, "give 1 to 200");
         }
         Ok(())
     }
@@ -332,10 +333,7 @@ impl<'a> Instants<'a> {
 }
 
 /// As the other estimators' result. Error bars grow with what the model leaves beyond the noise.
-fn estimate_of(
-    found: MaximumLikelihoodEstimate,
-    problem: &LinearProblem,
-) -> Result<Estimate, dynident_estimation::EstimationError> {
+fn estimate_of(found: MaximumLikelihoodEstimate, problem: &LinearProblem) -> Result<Estimate, EstimationError> {
     let joints = problem.joints().len();
     let degrees_of_freedom = found.degrees_of_freedom as f64;
     let widened = (found.cost / degrees_of_freedom).max(1.0);

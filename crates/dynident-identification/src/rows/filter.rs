@@ -1,5 +1,6 @@
 //! The low-pass and decimation that torque and regressor go through alike.
 
+use dynident_estimation::EstimationError;
 use dynident_recording::{DecimationSettings, MotionSettings};
 use serde::{Deserialize, Serialize};
 
@@ -43,10 +44,11 @@ impl ParallelFilterSettings {
     /// Checks the numbers.
     ///
     /// # Errors
-    /// In words, with the key and the fix.
-    pub fn validate(&self) -> Result<(), String> {
+    /// [`EstimationError::Setting`] with the key and the fix.
+    pub fn validate(&self) -> Result<(), EstimationError> {
         if self.factor == Some(0) {
-            return Err("parallel_filter.factor = 0: give 1 or more".to_owned());
+            let (setting, fix) = ("parallel_filter.factor", "give 1 or more");
+            return Err(EstimationError::Setting { setting, value: 0.0, fix });
         }
         Ok(())
     }

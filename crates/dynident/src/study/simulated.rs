@@ -1,6 +1,6 @@
 //! `[estimator.simulated]`: how the loop is simulated for `method = "didim"`, `"clie"` and `"cloe"`.
 
-use dynident_estimation::SimulatedSettings;
+use dynident_estimation::{EstimationError, SimulatedSettings};
 use dynident_identification::estimators::SimulationStart;
 use serde::{Deserialize, Serialize};
 
@@ -28,9 +28,9 @@ impl Default for SimulatedSection {
 }
 
 impl SimulatedSection {
-    pub(crate) fn validate(&self) -> Result<(), String> {
+    pub(crate) fn validate(&self) -> Result<(), EstimationError> {
         let SimulatedSection { tolerance, max_iterations, difference, .. } = *self;
         let settings = SimulatedSettings { tolerance, max_iterations, difference, ..SimulatedSettings::default() };
-        settings.validate().map_err(|error| error.to_string())
+        settings.validate()
     }
 }
