@@ -150,7 +150,7 @@ fn called_reversed(found: &IdentificationOutcome) -> bool {
     let said = found.result.logs.iter().filter(|log| log.role.name() == "identify").all(|log| {
         log.model_findings.iter().any(|finding| {
             finding.level == Level::Problem
-                && finding.message.contains("opposite sign of any physically consistent set")
+                && finding.message.contains("opposite sign of any physically consistent robot")
         })
     });
     assert_eq!(said, sign.is_reversed(), "{sign:?}");

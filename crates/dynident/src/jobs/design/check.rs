@@ -111,13 +111,11 @@ fn log_called(study: &Study, name: &str) -> Result<usize, StudyError> {
     if called.is_empty() {
         called = all.iter().copied().filter(|&index| study.log[index].file == Path::new(name)).collect();
     }
-    match called[..] {
-        [index] => Ok(index),
-        _ => {
-            let known = all.iter().map(|&index| study.log_name(index)).collect();
-            Err(StudyError::LogName { name: name.to_owned(), found: called.len(), known })
-        }
+    if let [index] = called[..] {
+        return Ok(index);
     }
+    let known = all.iter().map(|&index| study.log_name(index)).collect();
+    Err(StudyError::LogName { name: name.to_owned(), found: called.len(), known })
 }
 
 /// The uninterrupted pieces of a log as motions in the model's order of joints, and the log's rate.

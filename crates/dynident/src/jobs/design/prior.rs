@@ -47,7 +47,10 @@ pub(super) fn information(
         let unknown = robot.model().bodies_without_prior();
         if !unknown.is_empty() {
             let fix = "give them in the description, or leave cad_std_percent out";
-            return Err(wrong(StudyError::NoInertials { bodies: unknown.into_iter().map(str::to_owned).collect(), fix }));
+            return Err(wrong(StudyError::NoInertials {
+                bodies: unknown.into_iter().map(str::to_owned).collect(),
+                fix,
+            }));
         }
         let covariance = cad_covariance(robot, percent / 100.0);
         let too_small = || wrong(StudyError::conflict("cad_std_percent", "it is too small: give a larger one"));
