@@ -1,5 +1,5 @@
-//! What the tests of several crates share: where files are, how often an experiment is repeated, whether a file is as its
-//! schema says. It knows no other crate.
+//! What the tests of several crates share: where files are, how often an experiment is repeated, whether a file is
+//! as its schema says. It knows no other crate.
 
 #![forbid(unsafe_code)]
 
