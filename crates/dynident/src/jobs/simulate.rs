@@ -32,6 +32,7 @@ pub fn simulate_study(
     options: &RunOptions<'_>,
     watch: &(dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
 ) -> Result<Simulation, Error> {
+    // The robot, its controller, and the run.
     let simulation = study.simulation.clone().unwrap_or_default();
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let robot = StudyRobot::new(study, study_path, &folders)?;
@@ -48,6 +49,8 @@ pub fn simulate_study(
         .map_err(Error::section(study_path, "controller"))?;
     let request = RunRequest { run: 1, reference: &reference, controller: &controller, model: Some(&model) };
     let run = truth.robot.run(&request).map_err(Error::section(study_path, "simulation"))?;
+
+    // The truth beside it.
     let own = |values: &[f64], expressions: Vec<String>, units: Vec<&'static str>| {
         let named = expressions.into_iter().zip(units).zip(values);
         named.map(|((expression, unit), &value)| ParameterTruth { expression, value, unit: unit.to_owned() }).collect()

@@ -27,6 +27,8 @@ impl StudyRobot {
     pub fn new(study: &Study, study_path: &Path, folders: &Folders) -> Result<Self, Error> {
         let robot = load_robot(folders.find(&study.robot.file, study.source.as_deref())?)?;
         let in_study = Error::study::<ModelError>(study_path);
+
+        // How it stands in the world.
         let mut model = robot.model.clone();
         if let Some([x, y, z]) = study.robot.gravity_m_s2 {
             model = model.with_gravity(Vec3([x, y, z])).map_err(&in_study)?;
@@ -35,6 +37,8 @@ impl StudyRobot {
         if let Some([roll, pitch, yaw]) = radians {
             model = model.with_base_orientation(roll, pitch, yaw).map_err(&in_study)?;
         }
+
+        // Which joints move.
         let known: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
         let unknown =
             |joint: &str| in_study(ModelError::UnknownJoint { joint: joint.to_owned(), known: known.clone() });
@@ -72,6 +76,8 @@ impl StudyRobot {
         for joint in study.drive.joints.keys() {
             model.joint_index(joint).ok_or_else(|| unknown(joint))?;
         }
+
+        // Torque terms: of each joint, then of drives that turn with two.
         let mut terms = terms_per_joint(&model, |joint| drive_choice(study, &model.joints()[joint].name));
         for (joint, description) in model.joints().iter().enumerate() {
             let own = study.drive.joints.get(&description.name);

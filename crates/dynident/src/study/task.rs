@@ -19,11 +19,20 @@ impl Study {
     /// # Errors
     /// Files that are in none of the study's folders, a controller or a commanded motion that does not fit the robot.
     pub fn task(&self, path: &Path, robot: &StudyRobot, folders: &Folders) -> Result<IdentificationTask, Error> {
+        self.task_with(self.settings(path, robot)?, robot, folders)
+    }
+
+    /// The same with settings that are made already.
+    pub(crate) fn task_with(
+        &self,
+        settings: IdentificationSettings,
+        robot: &StudyRobot,
+        folders: &Folders,
+    ) -> Result<IdentificationTask, Error> {
         let files = self.log_files(folders)?;
         let recordings = self.recordings(robot, folders, &files)?;
         let mut task = IdentificationTask::new(robot.parametric.clone(), recordings);
-        task.payloads = self.payloads();
-        task.settings = self.settings(path, robot)?;
+        (task.payloads, task.settings) = (self.payloads(), settings);
         Ok(task)
     }
 

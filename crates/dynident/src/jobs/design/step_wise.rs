@@ -28,6 +28,7 @@ pub(crate) fn step_wise(
     limits: &Limits,
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
 ) -> Result<SearchResult, StudyError> {
+    // The problem: constants of every joint.
     let begun = Instant::now();
     let FamilyChoice::SplicedLogistic(settings) = &section.family else {
         let fix = "the criterion windowed-condition is for kind = \"spliced-logistic\", whose strokes have mid-points";
@@ -47,6 +48,7 @@ pub(crate) fn step_wise(
     let problem = problem(section, windowed, robot, limits, settings, &offsets, &names)?;
     problem.validate()?;
 
+    // What the study's optimiser finds, or the strokes that the study gives.
     let seed = section.search.seed;
     let late = || section.search.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > limit);
     let stop = |round: &'static str, progress: &Progress<'_>| {
@@ -92,6 +94,7 @@ pub(crate) fn step_wise(
         (given(&section.parameters, &names)?, 0, "given")
     };
 
+    // The motion, and the file's account of it.
     let strokes = problem.strokes(&x);
     let files_of = |x: &[f64]| stroke_files(&problem, &problem.strokes(x), settings, &offsets, robot);
     let condition_sum = problem.condition_numbers(&strokes).iter().sum();

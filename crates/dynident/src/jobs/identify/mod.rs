@@ -96,8 +96,9 @@ fn identified(
     let robot = StudyRobot::new(study, study_path, &folders)?;
     let in_study = Error::identification::<IdentificationError>(study_path);
     // Names first: no log is read for a study that is wrong.
-    study.settings(study_path, &robot)?.check_names(&robot.parametric).map_err(&in_study)?;
-    let task = study.task(study_path, &robot, &folders)?;
+    let settings = study.settings(study_path, &robot)?;
+    settings.check_names(&robot.parametric).map_err(&in_study)?;
+    let task = study.task_with(settings, &robot, &folders)?;
     let mut timings = Timings { robot: start.elapsed().as_secs_f64(), ..Timings::default() };
 
     // The identification itself.

@@ -55,6 +55,7 @@ pub fn iterate_study(
         IterationError::State { path, problem } => Error::Result { path, message: problem },
         other => in_section(other.into()),
     };
+    // The study's files and settings.
     let begin = Instant::now();
     let section = study.iteration.clone().unwrap_or_default();
     let simulation = study.simulation.clone().unwrap_or_default();
@@ -67,6 +68,8 @@ pub fn iterate_study(
         _ => None,
     };
     section.check_legs(&robot).map_err(in_section)?;
+
+    // What an earlier call has left in the folder.
     let fingerprint = fingerprint(study, &robot, options);
     let stages = section.stages();
     let one = stages.len() == 1;
@@ -79,6 +82,8 @@ pub fn iterate_study(
     let rate_hz = simulation.rate_hz;
     let make = || legs::trajectories(study, study_path, &robot, rate_hz, options, watch.design);
     let trajectories = kept(&out.join("trajectory.json"), &fingerprint, resume, make)?;
+
+    // What is believed of the robot, what it runs, and what the file says of it.
     let iterated = match section.prior {
         PriorChoice::Description => robot.parametric.clone(),
         PriorChoice::None => {
@@ -100,6 +105,8 @@ pub fn iterate_study(
     };
     let target = out.join("iterations.json");
     let before_runs_s = begin.elapsed().as_secs_f64();
+
+    // The stages, each with what those before it have found held.
     let mut known_std: Vec<Option<f64>> = vec![None; robot.layout().columns().len()];
     let mut known: Vec<(usize, f64)> = Vec::new();
     let (mut files, mut traces, mut made) = (Vec::new(), Vec::new(), 0);
@@ -119,6 +126,7 @@ pub fn iterate_study(
         let runs_before = so_far.len();
         let mut unwritten = None;
         let run = &mut *watch.run;
+        // The runs; the file is written after each.
         let outcome = iterate(&iteration, &mut robots, Some(&stores[number]), &mut |record, runs| {
             so_far.push(record.clone());
             let status = IterationStatus::Waiting { reason: "for the next run".to_owned() };
@@ -137,6 +145,7 @@ pub fn iterate_study(
         if let Some(error) = unwritten {
             return Err(error);
         }
+        // What the stage has found.
         made += outcome.runs.len() - runs_before;
         let (records, status) = (&outcome.runs[..], &outcome.status);
         let in_force = &iteration.robot(records);
@@ -147,6 +156,7 @@ pub fn iterate_study(
                 traces.push(RunTrace::new(name, &stores[number], own.reference(), &robot.parametric.joint_names()));
             }
         }
+        // What the next one holds.
         let last = records.iter().rev().find(|record| record.accepted).and_then(|record| record.estimate.as_ref());
         if matches!(status, IterationStatus::Refused { .. } | IterationStatus::Waiting { .. }) {
             break;
@@ -160,6 +170,8 @@ pub fn iterate_study(
             }
         }
     }
+
+    // All stages as one.
     let mut file = joined(files).ok_or_else(|| in_section(StudyError::missing("leg", "there is none")))?;
     file.converged &= file.runs.last().is_some_and(|run| run.leg.is_none_or(|leg| leg == stages.len()));
     write_file(&target, &file)?;
