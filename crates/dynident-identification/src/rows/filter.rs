@@ -1,8 +1,8 @@
 //! The low-pass and decimation that torque and regressor go through alike.
 
-use dynident_estimation::EstimationError;
 use dynident_recording::{DecimationSettings, MotionSettings};
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 /// The parallel filter: torque and every regressor column pass the same zero-phase low-pass, then every n-th row is
 /// kept.
@@ -40,15 +40,23 @@ impl From<Option<&DecimationSettings>> for ParallelFilterSettings {
     }
 }
 
+/// Settings of the parallel filter that are impossible.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum ParallelFilterError {
+    /// No sample would be kept.
+    #[error("parallel_filter.factor = 0: give 1 or more")]
+    ZeroFactor,
+}
+
 impl ParallelFilterSettings {
     /// Checks the numbers.
     ///
     /// # Errors
-    /// [`EstimationError::Setting`] with the key and the fix.
-    pub fn validate(&self) -> Result<(), EstimationError> {
+    /// A factor of zero.
+    pub fn validate(&self) -> Result<(), ParallelFilterError> {
         if self.factor == Some(0) {
-            let (setting, fix) = ("parallel_filter.factor", "give 1 or more");
-            return Err(EstimationError::Setting { setting, value: 0.0, fix });
+            return Err(ParallelFilterError::ZeroFactor);
         }
         Ok(())
     }

@@ -8,7 +8,9 @@ use dynident_excitation::families::FamilyError;
 use dynident_excitation::limits::LimitError;
 use dynident_excitation::optimisers::OptimiserError;
 use dynident_excitation::step_wise::StepWiseError;
+use dynident_identification::estimators::PeriodError;
 use dynident_identification::payload::PayloadError;
+use dynident_identification::rows::ParallelFilterError;
 use dynident_iteration::IterationError;
 use dynident_model::ModelError;
 use dynident_recording::FilterError;
@@ -187,6 +189,12 @@ pub enum StudyError {
     /// A filter, a differentiator or its reference.
     #[error(transparent)]
     Filter(#[from] FilterError),
+    /// The parallel filter.
+    #[error(transparent)]
+    ParallelFilter(#[from] ParallelFilterError),
+    /// The repeated motion of an estimator.
+    #[error(transparent)]
+    Periods(#[from] PeriodError),
     /// A setting of an estimator.
     #[error(transparent)]
     Estimation(#[from] EstimationError),

@@ -66,8 +66,8 @@ impl PayloadSection {
             (Some(_), Some(_), _) => {}
             _ => {
                 return Err(StudyError::conflict(
-                    "mass_kg, com_m",
-                    "a known payload has both (and inertia_at_com_kgm2 unless it is a point), one to estimate has none of them",
+                    "what is known of it",
+                    "a known payload has mass_kg and com_m (and inertia_at_com_kgm2 unless it is a point), one to estimate has none of them",
                 ));
             }
         }

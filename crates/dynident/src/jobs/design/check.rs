@@ -11,7 +11,7 @@ use crate::study::{Folders, Study, StudyRobot};
 use dynident_excitation::check::CHECK_RATE_HZ;
 use dynident_excitation::families::Given;
 use dynident_excitation::{Family, Motion, grid};
-use dynident_identification::{Execution, IdentificationError, IdentificationSettings, Logs};
+use dynident_identification::{Execution, IdentificationSettings, Logs};
 use dynident_recording::MotionBlock;
 use nalgebra::DMatrix;
 use std::path::Path;
@@ -128,15 +128,16 @@ fn pieces(
 ) -> Result<(Vec<Given>, f64), Error> {
     let log = study.log_name(index);
     let failed = |source| Error::recording(&log, source);
-    let in_study = Error::identification::<IdentificationError>(study_path);
     let recording = study.recording(robot, folders, index, file)?;
     let mut settings = IdentificationSettings::default();
     settings.motion = study.motion.clone();
     let execution = Execution::default();
     let (model, alone) = (robot.model(), core::slice::from_ref(&recording));
-    let motion = Logs::new(model, alone, &settings, &[0], None, execution).map_err(&in_study)?.motion;
-    let places = recording.places(model).map_err(&in_study)?;
-    let Some(mut stream) = recording.open(model, &motion).map_err(&in_study)? else {
+    let motion = Logs::new(model, alone, settings.filters(), &[0], None, execution)
+        .map_err(Error::identification(study_path))?
+        .motion;
+    let places = recording.places(model).map_err(Error::identification(study_path))?;
+    let Some(mut stream) = recording.open(model, &motion).map_err(Error::identification(study_path))? else {
         return Err(Error::study(study_path)(StudyError::missing(format!("log `{log}`"), "it has no samples")));
     };
     let rate_hz = stream.rate_hz();

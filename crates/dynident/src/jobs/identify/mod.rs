@@ -97,7 +97,7 @@ fn identified(
     let in_study = Error::identification::<IdentificationError>(study_path);
     // Names first: no log is read for a study that is wrong.
     let settings = study.settings(study_path, &robot)?;
-    settings.check_names(&robot.parametric).map_err(&in_study)?;
+    settings.check_names(&robot.parametric).map_err(|error| in_study(IdentificationError::Consistency(error)))?;
     let task = study.task_with(settings, &robot, &folders)?;
     let mut timings = Timings { robot: start.elapsed().as_secs_f64(), ..Timings::default() };
 
