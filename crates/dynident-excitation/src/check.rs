@@ -25,6 +25,7 @@ const BLOCK: usize = 1000;
 
 /// How near a motion comes to one limit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LimitReport {
     /// What is limited.
     pub kind: LimitKind,
@@ -33,6 +34,7 @@ pub struct LimitReport {
     /// 1 on the limit, above it in violation: `|x - middle| / half range`, `|x| / limit`; for distances `2 - distance /
     /// least`, for the floor 1 plus the metres below it. Infinite if the motion is not finite.
     #[serde(deserialize_with = "finite_or_infinite")]
+    #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub worst_ratio: f64,
     /// When the ratio is worst, s.
     pub at_s: f64,

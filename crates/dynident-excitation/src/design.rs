@@ -30,6 +30,7 @@ use std::time::Instant;
 
 /// How much is searched, and how finely.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct DesignSettings {
     /// Random starts of the first round. Default 8.

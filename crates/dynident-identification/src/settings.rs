@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// Whether logs share the constant torques of their joints.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum OffsetChoice {
     /// One offset for each joint.
@@ -22,6 +23,7 @@ pub enum OffsetChoice {
 
 /// Who says what a unit of logged torque is worth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum GainChoice {
     /// The format: torque columns are newton metres once their units and scales are in force.

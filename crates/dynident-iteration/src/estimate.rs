@@ -22,6 +22,7 @@ use std::sync::Arc;
 
 /// What a run says about the base parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RunEstimate {
     /// Base parameters.
     pub values: Vec<f64>,

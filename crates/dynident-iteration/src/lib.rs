@@ -83,4 +83,4 @@ pub use record::{RunRecord, UsedController};
 pub use robot::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, SimulatedRobot};
 pub use settings::{IterationSettings, RunIdentificationSettings, Scheme, SettledSettings, StartWith};
 pub use status::IterationStatus;
-pub use store::IterationStore;
+pub use store::{IterationStore, RUN_SCHEMA, RunFile};

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// Parameters of a controller's model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "of", content = "values", rename_all = "kebab-case")]
 pub enum ModelParameters {
     /// Ten for each body, then one for each term.

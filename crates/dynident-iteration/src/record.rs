@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// What controlled a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct UsedController {
     /// The controller's name.
     pub name: String,
@@ -19,6 +20,7 @@ pub struct UsedController {
 
 /// A run, as it is kept.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RunRecord {
     /// Its number, from 1.
     pub run: usize,

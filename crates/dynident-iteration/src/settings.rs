@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 /// Which parameters are looked for together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Scheme {
     /// All joints at once.
@@ -68,6 +69,7 @@ impl Default for RunIdentificationSettings {
 
 /// What controls the first run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum StartWith {
     /// A controller without a model.
@@ -81,6 +83,7 @@ pub enum StartWith {
 /// θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance · max|θ|` and `s ≤ most_uncertain · max|θ|`
 /// for every parameter, and a tracking error that is below `tracking_tolerance` or fell by less than `tracking_ratio`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SettledSettings {
     /// Error bars within which a change counts as none. Default 3.

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 const UNFINISHED: &str = ".unfinished-";
 
 /// Schema of `runs/run_k/run.json`.
-const RUN_SCHEMA: &str = "dynident/run/1";
+pub const RUN_SCHEMA: &str = "dynident/run/1";
 
 /// The folder of an iteration: `runs/run_k/run.json` and the records beside it. A run appears in one step (rename of a
 /// finished folder, everything on the disk before), so that whoever is killed at any moment finds all runs up to one of
@@ -23,12 +23,17 @@ pub struct IterationStore {
     fingerprint: String,
 }
 
-#[derive(Serialize, Deserialize)]
-struct RunFile {
-    schema: String,
-    fingerprint: String,
+/// What `runs/run_k/run.json` holds.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct RunFile {
+    /// [`RUN_SCHEMA`].
+    pub schema: String,
+    /// What the runs depend on, in one number.
+    pub fingerprint: String,
+    /// The run.
     #[serde(flatten)]
-    record: RunRecord,
+    pub record: RunRecord,
 }
 
 impl IterationStore {

@@ -69,7 +69,7 @@ pub(crate) fn fourier(arm: &Arm, out: &Path, seed: u64, options: &RunOptions<'_>
     study.design.get_or_insert_default().search.seed = seed;
     let outcome = design_study(&study, &path, options, |_| ControlFlow::Continue(()))?;
     let (times, motion) = outcome.sampled(RATE_HZ);
-    let values = identified(arm, &motion).map_err(|why| failed(&arm.description, &why))?;
+    let values = identified(arm, &motion).map_err(|why| failed(&arm.description, why))?;
     let note = if outcome.file.feasible { "inside (18), checked at 10 kHz" } else { "no series inside (18) was found" };
     let plot = LinePlot::new("Optimized Fourier series trajectories", "t, s", "q, rad", times)
         .line("joint 1", motion.q[motion.of(0)].to_vec())

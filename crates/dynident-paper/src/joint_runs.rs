@@ -69,10 +69,10 @@ pub(crate) fn joint_runs(arm: &Arm, optimum: &[Stroke; 2]) -> Result<JointRuns, 
     let paper = Protocol { rate_hz: 100.0, steps_per_sample: 10, runs: SHOWN, strokes: table_3(100.0), literal: true };
     let ours = Protocol { rate_hz: 1000.0, steps_per_sample: 1, runs: 6, strokes: *optimum, literal: false };
     let [as_paper, own] = [&paper, &ours].map(|protocol| -> Result<[Runs; 2], Error> {
-        let two = one_joint(arm, protocol, 1, &[]).map_err(|why| failed(&arm.description, &why))?;
+        let two = one_joint(arm, protocol, 1, &[]).map_err(|why| failed(&arm.description, why))?;
         let last = two.values.last().copied().unwrap_or_default();
         let known: Vec<(usize, f64)> = (3..).zip(last).map(|(place, value)| (COLUMNS[place], value)).collect();
-        let one = one_joint(arm, protocol, 0, &known).map_err(|why| failed(&arm.description, &why))?;
+        let one = one_joint(arm, protocol, 0, &known).map_err(|why| failed(&arm.description, why))?;
         Ok([one, two])
     });
     let (as_paper, own) = (as_paper?, own?);
@@ -93,8 +93,8 @@ pub(crate) fn joint_runs(arm: &Arm, optimum: &[Stroke; 2]) -> Result<JointRuns, 
     })
 }
 
-pub(crate) fn failed(path: &Path, why: &IterationError) -> Error {
-    Error::Study { path: path.to_owned(), message: why.to_string() }
+pub(crate) fn failed(path: &Path, why: IterationError) -> Error {
+    Error::Study { path: path.to_owned(), source: Box::new(why.into()) }
 }
 
 fn error(joint: usize, values: &[f64; 3]) -> f64 {

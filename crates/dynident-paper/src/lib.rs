@@ -34,6 +34,7 @@ pub const PAPER_SCHEMA: &str = "dynident/paper/1";
 
 /// What `reproduce` prints as JSON and writes as `paper.json`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PaperFile {
     /// [`PAPER_SCHEMA`].
     pub schema: String,
@@ -55,6 +56,7 @@ pub struct PaperFile {
 
 /// One goal.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct GoalFigures {
     /// What is measured.
     pub what: String,

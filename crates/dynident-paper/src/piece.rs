@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 
 /// What a cell of a table holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub enum PaperCell {
     /// A number.
@@ -44,6 +45,7 @@ impl From<&str> for PaperCell {
 
 /// A table of the paper, our values beside the paper's.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PaperTable {
     /// Its number in the paper.
     #[serde(skip)]
@@ -71,6 +73,7 @@ impl PaperTable {
 
 /// A figure of the paper.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PaperFigure {
     /// Its number in the paper.
     pub number: usize,
@@ -103,6 +106,7 @@ impl PaperFigure {
 
 /// Where this reproduction departs from the paper's text, and why.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Deviation {
     /// Where in the paper.
     pub place: String,

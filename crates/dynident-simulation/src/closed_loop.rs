@@ -17,6 +17,7 @@ const BEYOND: f64 = 1e4;
 
 /// Where a run starts.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Start {
     /// On the reference, with its velocity.
@@ -35,6 +36,7 @@ pub enum Start {
 
 /// What stops a run, and what cuts its torques. Nothing by default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct RunLimits {
     /// Largest torque, Nm (N): the loop cuts what the controller asks for, and counts.

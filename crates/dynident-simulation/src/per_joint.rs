@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 /// assert_eq!((all.gain.of(1), each.gain.of(0)), (16.0, 100.0));
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub enum PerJoint {
     /// The same for all joints.

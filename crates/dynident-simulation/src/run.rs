@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 /// How a run ended.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "status", rename_all = "kebab-case")]
 pub enum RunStatus {
     /// At the reference's end.
@@ -35,6 +36,7 @@ pub enum RunStatus {
 
 /// What a run may not exceed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum LimitedQuantity {
     /// Position.
@@ -57,6 +59,7 @@ impl LimitedQuantity {
 
 /// Why a run counts as diverged.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Divergence {
     /// The simulated robot cannot go on.

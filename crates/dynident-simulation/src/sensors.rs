@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// Where the controller's velocities come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum VelocitySource {
     /// A perfect tachometer.
@@ -30,6 +31,7 @@ pub enum VelocitySource {
 /// # Ok::<(), dynident_simulation::SimulationError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SensorSettings {
     /// Steps of the encoders in a turn of the joint (in a metre). Default none: not quantised.

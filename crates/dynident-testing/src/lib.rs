@@ -1,7 +1,9 @@
-//! What the tests of several crates share: where files are, and how often an experiment is repeated. It knows no other
-//! crate.
+//! What the tests of several crates share: where files are, how often an experiment is repeated, whether a file is
+//! as its schema says. It knows no other crate.
 
 #![forbid(unsafe_code)]
+
+pub mod schema;
 
 use std::path::{Path, PathBuf};
 

@@ -55,7 +55,7 @@ pub use dynident_recording as recording;
 pub use dynident_simulation as simulation;
 
 pub use dynident_identification::{Progress, Role, Silent};
-pub use error::Error;
+pub use error::{Error, Expected, StudyError};
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
 pub use jobs::evaluate::{Quantity, evaluate};
 pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instruments};

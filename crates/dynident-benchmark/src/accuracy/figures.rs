@@ -5,6 +5,7 @@ use serde::Serialize;
 
 /// One parameter in one cell.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ParameterFigures {
     /// Symbol of its column.
     pub symbol: String,
@@ -25,6 +26,7 @@ pub struct ParameterFigures {
 
 /// One estimator on one robot at one noise level.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CellFigures {
     /// The robot.
     pub robot: String,

@@ -105,6 +105,7 @@ impl From<IdentificationError> for BenchmarkError {
 
 /// What is compared.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BenchmarkSettings {
     /// Names of [`ROBOTS`].
     pub robots: Vec<String>,
@@ -132,6 +133,7 @@ impl Default for BenchmarkSettings {
 
 /// What `benchmark` writes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BenchmarkFile {
     /// [`BENCHMARK_SCHEMA`].
     pub schema: &'static str,

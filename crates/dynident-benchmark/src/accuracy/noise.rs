@@ -4,6 +4,7 @@ use serde::Serialize;
 
 /// Noise of a recording, the same for all joints.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct NoiseLevel {
     /// Its name on the command line.
     pub name: &'static str,

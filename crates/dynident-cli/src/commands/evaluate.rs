@@ -4,6 +4,7 @@ use super::{Context, json, message_of};
 use crate::{Verdict, terminal};
 use clap::ValueEnum;
 use dynident::Quantity;
+use dynident::result::{EVALUATION_SCHEMA, EvaluationFile};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -32,9 +33,6 @@ enum Chosen {
     Regressor,
 }
 
-/// Name and version of the schema of what `--json` prints.
-const SCHEMA: &str = "dynident/evaluation/1";
-
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     let quantity = match options.quantity {
         Chosen::InverseDynamics => Quantity::InverseDynamics,
@@ -53,7 +51,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         if context.json {
             let table = String::from_utf8_lossy(&table);
             let name = options.quantity.to_possible_value().map_or(String::new(), |value| value.get_name().to_owned());
-            terminal::print(&object(&name, robot.model.dof(), rows, options.out.as_deref(), &table)?);
+            terminal::print(&object(name, robot.model.dof(), rows, options.out.as_deref(), &table)?);
         }
         return Ok(Verdict::Good);
     }
@@ -69,17 +67,15 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     }
 }
 
-/// The table as a JSON object, its numbers digit by digit; without them if they went to a file.
-fn object(quantity: &str, dof: usize, rows: u64, out: Option<&Path>, table: &str) -> Result<String, String> {
+/// The table as a JSON object; without its numbers if they went to a file.
+fn object(quantity: String, dof: usize, rows: u64, out: Option<&Path>, table: &str) -> Result<String, String> {
     let mut lines = table.lines();
-    let columns: Vec<&str> = lines.next().unwrap_or("").split(',').collect();
-    let (columns, file) = (json(&columns)?, json(&out)?);
-    let head = format!(
-        r#"{{"schema":"{SCHEMA}","quantity":"{quantity}","dof":{dof},"rows":{rows},"columns":{columns},"file":{file}"#
-    );
-    if out.is_some() {
-        return Ok(format!("{head}}}"));
-    }
-    let values: Vec<String> = lines.map(|line| format!("[{line}]")).collect();
-    Ok(format!(r#"{head},"values":[{}]}}"#, values.join(",")))
+    let columns = lines.next().unwrap_or("").split(',').map(str::to_owned).collect();
+    let row = |line: &str| line.split(',').map(str::parse).collect::<Result<Vec<f64>, _>>();
+    let values = match out {
+        Some(_) => None,
+        None => Some(lines.map(row).collect::<Result<_, _>>().map_err(|error| error.to_string())?),
+    };
+    let file = out.map(|path| path.display().to_string());
+    json(&EvaluationFile { schema: EVALUATION_SCHEMA.to_owned(), quantity, dof, rows, columns, file, values })
 }

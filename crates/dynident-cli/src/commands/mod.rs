@@ -93,11 +93,9 @@ pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
 /// The message of an error that a study led to. Where it speaks of another file, the study that names that file is
 /// named as well.
 pub(crate) fn known_in(study: &Path) -> impl Fn(dynident::Error) -> String {
-    use dynident::Error::{Filter, Missing, NothingLeft, Recording, Robot};
+    use dynident::Error::{Missing, Recording, Robot};
     move |error| match error {
-        Recording { .. } | Filter { .. } | NothingLeft { .. } | Missing { .. } | Robot(_) => {
-            format!("{}: {error}", study.display())
-        }
+        Recording { .. } | Missing { .. } | Robot(_) => format!("{}: {error}", study.display()),
         _ => error.to_string(),
     }
 }

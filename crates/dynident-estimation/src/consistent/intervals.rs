@@ -55,6 +55,7 @@ impl IntervalSettings {
 
 /// What holds an end of an interval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum IntervalEnd {
     /// Beyond it the data are fitted too badly.

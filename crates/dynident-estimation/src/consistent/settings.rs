@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// How the convex problem is solved. Both routes end at the same optimum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum PhysicalRoute {
     /// Primal-dual interior point on the pseudo-inertias: fast, and as exact on the cone's boundary as inside. Where

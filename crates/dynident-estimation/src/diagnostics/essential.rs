@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// When parameters are dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct EssentialSettings {
     /// Dropping ends when the largest relative standard deviation is below so many times the smallest. Default 30, as
@@ -43,6 +44,7 @@ impl EssentialSettings {
 
 /// A parameter that was dropped, that is held at zero.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DroppedParameter {
     /// Its name.
     pub name: String,
@@ -60,6 +62,7 @@ pub struct DroppedParameter {
 
 /// Why dropping ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum EssentialEnd {
     /// All relative standard deviations are below the ratio.
@@ -72,6 +75,7 @@ pub enum EssentialEnd {
 
 /// What was dropped and why no more.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct EssentialReport {
     /// Parameters kept.
     pub kept: usize,
@@ -186,6 +190,7 @@ fn without(estimate: &Estimate, columns: &[usize]) -> (f64, Estimate) {
 
 /// Two parameters and the correlation of their estimates.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CorrelatedPair {
     /// The two names.
     pub parameters: [String; 2],

@@ -22,6 +22,7 @@ pub struct Normality {
 
 /// What the test says.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct NormalityReport {
     /// Mean residual, Nm (N).
     pub mean_nm: f64,

@@ -16,6 +16,7 @@ pub struct SpeedRanges {
 
 /// Residuals of one regime.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SpeedRangeFigures {
     /// Samples.
     pub samples: usize,
@@ -25,6 +26,7 @@ pub struct SpeedRangeFigures {
 
 /// Residuals by regime.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SpeedRangesReport {
     /// |q̇| below 0.005 rad/s (m/s).
     pub at_rest: SpeedRangeFigures,

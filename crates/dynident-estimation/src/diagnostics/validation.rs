@@ -34,6 +34,7 @@ pub struct Validation {
 
 /// Figures of one joint. Torque in N m (force in N for a prismatic joint).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct JointValidation {
     /// The joint.
     pub name: String,
@@ -51,6 +52,7 @@ pub struct JointValidation {
 
 /// Figures of all joints stacked into one vector (its own mean in R²), and of every joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ValidationReport {
     /// Samples of the joint that has most.
     pub samples: usize,

@@ -32,6 +32,7 @@ pub struct Whiteness {
 
 /// What the test says.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct WhitenessReport {
     /// Correlation of neighbouring residuals.
     pub lag1_correlation: f64,

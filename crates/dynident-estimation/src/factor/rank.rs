@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// When a column counts as excited.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct RankSettings {
     /// A column is dependent when the part of it that no earlier column explains is at most this share of its norm.

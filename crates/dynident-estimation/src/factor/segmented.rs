@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// How a log is cut into segments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SegmentSettings {
     /// Segments kept at most; memory is bounded by this many factors. Default 64: enough for a covariance from

@@ -46,6 +46,7 @@ impl HausmanSettings {
 
 /// What the test says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum HausmanVerdict {
     /// Noise in the regressor does not show: filtering was enough, least squares may be used.
@@ -58,6 +59,7 @@ pub enum HausmanVerdict {
 
 /// The test with its numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct HausmanTest {
     /// What follows.
     pub verdict: HausmanVerdict,
@@ -75,6 +77,7 @@ pub struct HausmanTest {
 
 /// One tested column.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct HausmanColumn {
     /// Its name.
     pub name: String,

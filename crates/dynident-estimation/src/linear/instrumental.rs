@@ -57,6 +57,7 @@ impl InstrumentalSettings {
 
 /// How well the instruments explain the regressor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct InstrumentReport {
     /// Independent instruments.
     pub instruments: usize,

@@ -26,6 +26,7 @@ use serde::{Deserialize, Serialize};
 
 /// Which covariance an estimate reports as its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum CovarianceMethod {
     /// Every time segment of every joint and log is a cluster, errors may be correlated within a segment, and each

@@ -9,6 +9,7 @@ const DEGREE: usize = 5;
 
 /// What a [`BSpline`] family is made of.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct BSplineSettings {
     /// Number of control points n, those at the ends included. Default 14.

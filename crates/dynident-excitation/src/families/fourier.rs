@@ -8,6 +8,7 @@ const NAME: &str = "fourier";
 
 /// What a [`Fourier`] family is made of.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct FourierSettings {
     /// Number of harmonics H. Default 5.

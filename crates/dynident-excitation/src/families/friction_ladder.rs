@@ -10,6 +10,7 @@ const NAME: &str = "friction_ladder";
 
 /// How the time is shared among the rungs of a [`FrictionLadder`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum LadderPace {
     /// Every sweep lasts as long: slow sweeps are short ways.
@@ -20,6 +21,7 @@ pub enum LadderPace {
 
 /// What a [`FrictionLadder`] family is made of.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct FrictionLadderSettings {
     /// Number of velocities. Default 6.

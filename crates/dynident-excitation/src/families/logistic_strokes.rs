@@ -19,6 +19,7 @@ const MOST_LOG_SLOT: f64 = 3.0;
 
 /// How the strokes of one joint lie in time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum StrokeOrder {
     /// A sum of strokes anywhere within the duration: more information, no map from position to velocity.
@@ -29,6 +30,7 @@ pub enum StrokeOrder {
 
 /// What a [`LogisticStrokes`] family is made of.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct LogisticStrokesSettings {
     /// Strokes a joint, K. Default 6.

@@ -11,6 +11,7 @@ const NAME: &str = "multisine";
 
 /// What a [`Multisine`] family is made of.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct MultisineSettings {
     /// Number of harmonics N. Default 20.

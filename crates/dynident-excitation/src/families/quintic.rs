@@ -10,6 +10,7 @@ const NAME: &str = "quintic";
 
 /// What a [`Quintic`] family is made of.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct QuinticSettings {
     /// Number of waypoints, ends included, equally spaced in time. Default 6.

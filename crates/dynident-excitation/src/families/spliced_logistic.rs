@@ -11,6 +11,7 @@ const NAME: &str = "spliced_logistic";
 
 /// What a [`SplicedLogistic`] family is made of.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SplicedLogisticSettings {
     /// ω T. Default 40 (the paper gives no T; |q̇(0)| < 1e-4 rad/s asks for about this). Where T is given, its least

@@ -9,6 +9,7 @@ const NAME: &str = "static_postures";
 
 /// What a [`StaticPostures`] family is made of.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct StaticPosturesSettings {
     /// Number of postures. Default 10.

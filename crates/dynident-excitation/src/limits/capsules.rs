@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// Distances between the arm's own links, which are taken as capsules.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SelfCollision {
     /// Radius of fitted capsules, m.
@@ -31,6 +32,7 @@ impl Default for SelfCollision {
 
 /// A capsule in a link's frame: all points within `radius_m` of the segment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LinkCapsule {
     /// Name of the link.

@@ -22,6 +22,7 @@ use serde::{Deserialize, Serialize};
 /// # Ok::<(), toml::de::Error>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Limits {
     /// Limits of single joints, at most one entry a joint.
@@ -38,6 +39,7 @@ pub struct Limits {
 
 /// Limits of one joint; rad (m), seconds, Nm (N), W. Rates and torques are largest magnitudes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct JointLimit {
     /// Name of the joint.
@@ -67,6 +69,7 @@ pub struct JointLimit {
 
 /// A sphere fixed to a link, in most cases of radius zero: the point whose place is limited.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LinkPoint {
     /// Name of the link.
@@ -81,6 +84,7 @@ pub struct LinkPoint {
 
 /// A box in the base frame that points (with their radius) must not leave.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct BoxLimit {
     /// Range along the base frame's x, m; absent: free.
@@ -99,6 +103,7 @@ pub struct BoxLimit {
 
 /// The plane `z = height_m` of the base frame that points (with their radius) must stay above.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct FloorLimit {
     /// Height of the floor in the base frame, m.
@@ -110,6 +115,7 @@ pub struct FloorLimit {
 
 /// An endless cylinder about a line parallel to the base frame's z that points (with their radius) must stay out of.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ColumnLimit {
     /// Radius of the cylinder, m.

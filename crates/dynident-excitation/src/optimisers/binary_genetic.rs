@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Settings of [`binary_genetic()`]; the defaults are the paper's (*Iterative Identification of Robot Dynamic
 /// Parameters Based on Logistic Function*, section 2.2).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct BinaryGeneticSettings {
     /// Binary digits of one variable, 1 to 52. Default 20.

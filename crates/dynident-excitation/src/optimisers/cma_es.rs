@@ -10,6 +10,7 @@ use std::collections::VecDeque;
 /// Settings of [`cma_es()`]. Strategy constants are the defaults of Hansen, *The CMA Evolution Strategy: A Tutorial*
 /// (2016), table 1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct CmaEsSettings {
     /// Candidates of a generation, at least 4; none: 4 + ⌊3 ln n⌋. Default none.

@@ -36,6 +36,7 @@ impl Stroke {
 
 /// What the limits of equations 17 and 18 bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum StrokeQuantity {
     /// Highest position, A/(1 + e^(-ωT/4)), in rad. The lowest is above zero for every stroke.

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 /// The 95 % interval of one parameter of a body or term, over all physically consistent robots that the data do not
 /// reject.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ParameterInterval {
     /// Symbol of the parameter: `m3`, `mx3`, `Ixx3` (about the body frame's origin), `fv3`.
     pub symbol: String,

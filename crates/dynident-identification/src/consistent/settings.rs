@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 
 /// An ellipsoid with its axes along those of the link frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct EllipsoidSettings {
     /// Centre in the link frame, m.
@@ -22,6 +23,7 @@ pub struct EllipsoidSettings {
 
 /// What is known of one body; nothing by default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct BodyKnowledge {
     /// Least and greatest mass, kg.
@@ -53,6 +55,7 @@ pub struct BodyKnowledge {
 /// # Ok::<(), toml::de::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct ConsistencySettings {
     /// Distance from the prior bodies; entropic by default.

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 /// Noise above this cut-off is not in the instruments; what lies below it is, and is small where the motion is slow
 /// against the noise.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct InstrumentSettings {
     /// Cut-off of the zero-phase Butterworth filter of fourth order; by default a quarter of what the log suggests for
@@ -50,6 +51,7 @@ impl InstrumentSettings {
 
 /// What was found out about noise in the regressor.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct NoiseInRegressor {
     /// Lowest and highest cut-off of the instruments over the logs, Hz; none when they do not come from a filter.
     pub instrument_cutoff_hz: Option<[f64; 2]>,

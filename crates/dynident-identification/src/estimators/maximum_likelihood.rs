@@ -8,7 +8,7 @@ use crate::regressor_model::RegressorModel;
 use crate::rows::motion_band_hz;
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_estimation::{
-    CovarianceMethod, Estimate, InstantRows, InstantVisitor, LinearProblem, MaximumLikelihoodEstimate,
+    CovarianceMethod, Estimate, EstimationError, InstantRows, InstantVisitor, LinearProblem, MaximumLikelihoodEstimate,
     MaximumLikelihoodSettings, maximum_likelihood, student_half_width,
 };
 use dynident_model::terms::JointMotion;
@@ -28,6 +28,7 @@ const STEPS: [f64; 3] = [1e-5, 1e-5, 1.0];
 
 /// The repeated motion.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct PeriodSettings {
     /// After how many seconds the motion repeats; by default the length of the log's `reference`.
@@ -84,6 +85,7 @@ impl PeriodSettings {
 
 /// What the periods of a repeated motion give.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PeriodicFit {
     /// Their length, s.
     pub period_s: f64,
@@ -352,10 +354,7 @@ impl<'a> Instants<'a> {
 }
 
 /// As the other estimators' result. Error bars grow with what the model leaves beyond the noise.
-fn estimate_of(
-    found: MaximumLikelihoodEstimate,
-    problem: &LinearProblem,
-) -> Result<Estimate, dynident_estimation::EstimationError> {
+fn estimate_of(found: MaximumLikelihoodEstimate, problem: &LinearProblem) -> Result<Estimate, EstimationError> {
     let joints = problem.joints().len();
     let degrees_of_freedom = found.degrees_of_freedom as f64;
     let widened = (found.cost / degrees_of_freedom).max(1.0);

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// How the noise around a row is found; see [`NoiseLevelSettings`].
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct NoiseLevels {
     /// Rows of one joint and log, centred on a row, whose residuals say how large the noise is there; 51 by default.

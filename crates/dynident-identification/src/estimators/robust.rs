@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// What a robust estimator thought of the rows, joint by joint.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct GrossErrors {
     /// Share of rows whose weight is below one half.
     pub share: Vec<f64>,

@@ -24,6 +24,7 @@ const SETTLED: f64 = 0.1;
 
 /// Where the iteration begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum SimulationStart {
     /// At the one of the two below whose simulation is nearer to the record; at the other if that leads nowhere.
@@ -84,6 +85,7 @@ impl ComparedSignal {
 
 /// How a fit to the simulated closed loop went.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SimulatedFit {
     /// The controller.
     pub controller: String,

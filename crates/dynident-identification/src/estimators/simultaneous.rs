@@ -21,6 +21,7 @@ const MOST_HARMONICS: usize = 60;
 
 /// What the simultaneous fit found of one log's motion and noise.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SeriesFit {
     /// Period of the first harmonic, s.
     pub period_s: f64,

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 /// Errors of the predicted torque on one held-out recording.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LogValidation {
     /// The log.
     pub log: String,

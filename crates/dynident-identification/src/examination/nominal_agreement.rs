@@ -11,6 +11,7 @@ const CLEARLY_BETTER: f64 = 0.5;
 
 /// How well the prior model explains the torque as given and with the opposite sign.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PriorAgreement {
     /// `100 ‖τ - τ_prior‖ / ‖τ‖`, all joints stacked.
     pub residual_percent: Option<f64>,

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 /// What the filtered residual of one joint looks like on a log.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct JointResiduals {
     /// The joint.
     pub name: String,
@@ -29,6 +30,7 @@ pub struct JointResiduals {
 
 /// How well the predicted 95 % band `τ̂ ± t √(w V wᵀ + σ²)` holds the torque of one joint on a held-out log.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TorqueBand {
     /// The log.
     pub log: String,

@@ -35,6 +35,7 @@ const ROUNDING_S: f64 = 1.0e-12;
 
 /// By how much one joint's torque comes after the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TorqueLag {
     /// Seconds; negative where the torque comes before.
     pub lag_s: f64,

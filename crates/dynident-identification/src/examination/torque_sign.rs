@@ -15,6 +15,7 @@ const CLEARLY_BETTER: f64 = 0.5;
 
 /// How well physically consistent robots explain the torque with either sign, by no prior knowledge of the bodies.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TorqueSignCheck {
     /// `100 ‖τ − W θ‖ / ‖τ‖` of the physically consistent set that fits best, rows in units of their joint's noise.
     pub residual_percent: f64,

@@ -27,6 +27,7 @@ const MOVING: f64 = 1.0e-3;
 
 /// How the friction of one joint was chosen.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct JointFriction {
     /// The joint.
     pub joint: String,
@@ -42,6 +43,7 @@ pub struct JointFriction {
 
 /// One model of a joint's friction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FrictionCandidate {
     /// Its terms.
     pub term: String,

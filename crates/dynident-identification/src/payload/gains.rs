@@ -12,6 +12,7 @@ const WIDEST: f64 = 0.5;
 
 /// The drive gain of one joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DriveGain {
     /// The joint.
     pub joint: String,

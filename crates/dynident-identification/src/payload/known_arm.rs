@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 /// What of a known arm is fitted again, beside the payload.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Refit {
     /// Nothing.

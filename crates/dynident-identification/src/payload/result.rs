@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// A value with its error bar.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Measured {
     /// The value.
     pub value: f64,
@@ -21,6 +22,7 @@ pub struct Measured {
 
 /// A parameter of a payload, or a sum of parameters, that the logs determine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PayloadParameter {
     /// What it sums, in the frame of the payload's link: `Ixx + Iyy`.
     pub expression: String,
@@ -39,6 +41,7 @@ pub struct PayloadParameter {
 /// The physically consistent payload nearest to the estimate in the metric of its covariance. What the logs leave open
 /// is no measured value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ConsistentPayload {
     /// Mass.
     pub mass_kg: f64,
@@ -54,6 +57,7 @@ pub struct ConsistentPayload {
 
 /// What was found of one payload.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PayloadResult {
     /// Its name.
     pub name: String,

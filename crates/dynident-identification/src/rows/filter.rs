@@ -7,6 +7,7 @@ use thiserror::Error;
 /// The parallel filter: torque and every regressor column pass the same zero-phase low-pass, then every n-th row is
 /// kept.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct ParallelFilterSettings {
     /// Off: every sample counts as it is. On by default.

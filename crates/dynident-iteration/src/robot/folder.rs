@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 /// Where, and for how long to look.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct FolderSettings {
     /// The folder of the experiment; every run has a folder `run_k` in it.

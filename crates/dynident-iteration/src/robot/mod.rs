@@ -91,6 +91,7 @@ impl RobotRun {
 
 /// How a robot's run ended.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "end", rename_all = "kebab-case")]
 pub enum RobotStatus {
     /// The whole trajectory was run.
@@ -140,6 +141,7 @@ impl core::fmt::Display for RobotStatus {
 
 /// How an exchange with a robot outside can fail.
 #[derive(Clone, Debug, PartialEq, Error, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum RobotFault {

@@ -20,6 +20,7 @@ const LAST_WORDS: usize = 2000;
 
 /// Who runs the control loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum ProcessMode {
     /// The client, at its own rate, from the files that it is handed.
@@ -31,6 +32,7 @@ pub enum ProcessMode {
 
 /// How long the client may take.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct ProcessLimits {
     /// From its start to its hello, s. Default 30.
@@ -53,6 +55,7 @@ impl Default for ProcessLimits {
 
 /// A robot program and how it is spoken to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ProcessSettings {
     /// Program and arguments.

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// The step near zero velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum CoulombShape {
     /// `sign(q̇)`, and zero while `|q̇|` is at most `dead_band` (rad/s or m/s; may be zero).
@@ -67,6 +68,7 @@ impl VelocityFunction for CoulombShape {
 
 /// Coulomb friction of one joint, Nm (N).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Coulomb {
     /// The joint.
     pub joint: usize,

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 /// What the shared drive adds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum CouplingEffect {
     /// Cross inertia, kg m².
@@ -24,6 +25,7 @@ pub enum CouplingEffect {
 
 /// One effect of one drive that turns with two joints.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Coupling {
     /// Name of the drive, used in the parameter's symbol.
     pub name: String,

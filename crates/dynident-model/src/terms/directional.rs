@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 /// Sense of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Direction {
     /// Positive velocity.
@@ -65,6 +66,7 @@ impl Direction {
 
 /// Viscous friction of one joint in one direction, Nm s/rad (N s/m).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DirectionalViscous {
     /// The joint.
     pub joint: usize,
@@ -126,6 +128,7 @@ impl TermKind for DirectionalViscous {
 
 /// Coulomb friction of one joint in one direction, Nm (N).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DirectionalCoulomb {
     /// The joint.
     pub joint: usize,

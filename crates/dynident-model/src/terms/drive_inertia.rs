@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Reflected drive inertia of one joint, kg m² (kg).
 #[doc(alias("rotor inertia", "armature"))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DriveInertia {
     /// The joint.
     pub joint: usize,

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// Share of the load that one joint loses to friction; no unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LoadFriction {
     /// The joint.
     pub joint: usize,

@@ -83,6 +83,7 @@ impl<'a> JointMotion<'a> {
 /// One parameter of the drives, linear in the joint torques.
 #[doc(alias("friction", "torque term", "actuator"))]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum TorqueTerm {
     /// Torque in proportion to velocity.

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Constant torque of one joint, Nm (N).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Offset {
     /// The joint.
     pub joint: usize,

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// Friction of one joint by a power of its velocity, Nm (s/rad)^p.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Power {
     /// The joint.
     pub joint: usize,
@@ -26,6 +27,7 @@ impl Power {
 
 /// The powers in use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum PowerExponent {
     /// `p = 1/3`.

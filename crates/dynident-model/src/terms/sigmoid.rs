@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// The step of one joint, Nm (N).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Sigmoid {
     /// The joint.
     pub joint: usize,

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 /// Yield torque of one element of one joint, Nm (N).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct MaxwellSlip {
     /// The joint.
     pub joint: usize,

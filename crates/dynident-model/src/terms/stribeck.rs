@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// Extra friction of one joint near rest, Nm (N).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Stribeck {
     /// The joint.
     pub joint: usize,

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 /// Change of viscous friction with temperature, Nm s/(rad K) (N s/(m K)).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TemperatureViscous {
     /// The joint.
     pub joint: usize,
@@ -22,6 +23,7 @@ pub struct TemperatureViscous {
 
 /// Change of Coulomb friction with temperature, Nm/K (N/K).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TemperatureCoulomb {
     /// The joint.
     pub joint: usize,

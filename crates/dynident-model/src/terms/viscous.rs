@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// Viscous friction of one joint, Nm s/rad (N s/m).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Viscous {
     /// The joint.
     pub joint: usize,

@@ -19,6 +19,7 @@ pub(crate) const SHORTEST_STEP: f64 = 0.1;
 
 /// What the first rows determine about the clock.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Clock {
     /// Samples per second on the uniform grid.
     pub rate_hz: f64,

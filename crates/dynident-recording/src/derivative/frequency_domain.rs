@@ -16,6 +16,7 @@ const TAPER: f64 = 2.0;
 
 /// What stands beyond the ends of a piece: the transform takes it to repeat.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Ends {

@@ -26,6 +26,7 @@ use std::sync::Arc;
 /// assert_eq!(settings, DifferentiatorSettings::Butterworth { order: 4, cutoff_hz: Some(8.0) });
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "method", rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum DifferentiatorSettings {

@@ -19,6 +19,7 @@ const HIGHEST: f64 = 0.4;
 
 /// A cut-off and why.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CutoffChoice {
     /// The cut-off for all joints.
     pub cutoff_hz: f64,

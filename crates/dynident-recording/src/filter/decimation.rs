@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// Settings of a [`Decimator`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct DecimationSettings {
     /// Every how many rows one is kept, 1 to 1000; 10 by default.

@@ -7,7 +7,9 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// Whether the first row names the columns.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(from = "WrittenHeader", into = "WrittenHeader")]
 #[non_exhaustive]
 pub enum Header {
     /// Yes, unless every field of the first row is a number.
@@ -19,39 +21,45 @@ pub enum Header {
     Absent,
 }
 
-impl<'de> Deserialize<'de> for Header {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        #[derive(Deserialize)]
-        #[serde(untagged, expecting = "header must be true, false or \"auto\"")]
-        enum Written {
-            Flag(bool),
-            Word(Word),
+/// [`Header`] as it is written: `true`, `false` or `"auto"`.
+#[derive(Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(untagged, expecting = "header must be true, false or \"auto\"")]
+enum WrittenHeader {
+    Flag(bool),
+    Word(HeaderWord),
+}
+
+#[derive(Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "lowercase")]
+enum HeaderWord {
+    Auto,
+}
+
+impl From<WrittenHeader> for Header {
+    fn from(written: WrittenHeader) -> Self {
+        match written {
+            WrittenHeader::Flag(true) => Self::Present,
+            WrittenHeader::Flag(false) => Self::Absent,
+            WrittenHeader::Word(HeaderWord::Auto) => Self::Auto,
         }
-        #[derive(Deserialize)]
-        #[serde(rename_all = "lowercase")]
-        enum Word {
-            Auto,
-        }
-        Ok(match Written::deserialize(deserializer)? {
-            Written::Flag(true) => Self::Present,
-            Written::Flag(false) => Self::Absent,
-            Written::Word(Word::Auto) => Self::Auto,
-        })
     }
 }
 
-impl Serialize for Header {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Auto => serializer.serialize_str("auto"),
-            Self::Present => serializer.serialize_bool(true),
-            Self::Absent => serializer.serialize_bool(false),
+impl From<Header> for WrittenHeader {
+    fn from(header: Header) -> Self {
+        match header {
+            Header::Auto => Self::Word(HeaderWord::Auto),
+            Header::Present => Self::Flag(true),
+            Header::Absent => Self::Flag(false),
         }
     }
 }
 
 /// One column: by name, or by 0-based index.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged, expecting = "a column is a name in quotes or a 0-based index")]
 pub enum ColumnRef {
     /// 0-based index.
@@ -62,6 +70,7 @@ pub enum ColumnRef {
 
 /// Columns in joint order: a list, or one text with a range such as `"q{1..7}_rad"`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(
     untagged,
     expecting = "columns must be a list of names or 0-based indices, or one pattern such as \"q{1..7}_rad\""
@@ -75,6 +84,8 @@ pub enum Columns {
 
 /// One value for all columns, or one for each.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "schema", schemars(rename = "OneOrMany_{T}"))]
 #[serde(untagged, expecting = "give one value for all columns, or a list with one for each")]
 pub enum OneOrMany<T> {
     /// The same for all.
@@ -124,6 +135,7 @@ impl<T: Clone> OneOrMany<T> {
 /// assert!(coupled_wrist.scale.is_none());
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ChannelGroup {
     /// Another file of the same log, relative to the main file's folder; its rows pair with the main file's.
@@ -153,6 +165,7 @@ pub struct ChannelGroup {
 
 /// Unit of time stamps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub enum TimeUnit {
     /// Seconds.
@@ -183,6 +196,7 @@ impl TimeUnit {
 
 /// The time column.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct TimeColumn {
     /// Name or 0-based index, in the main file.
@@ -208,6 +222,7 @@ impl TimeColumn {
 
 /// What to do with a row that has an empty, NaN or infinite field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Missing {
@@ -220,6 +235,7 @@ pub enum Missing {
 
 /// How time stamps are understood.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum ClockRule {
@@ -248,6 +264,7 @@ pub enum ClockRule {
 /// format.validate(&joints).unwrap();
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LogFormat {
     /// Whether the first row names the columns.

@@ -43,6 +43,7 @@ impl RawBlock {
 
 /// What the reader left out.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LinesDropped {
     /// Rows with an empty, NaN or infinite field, under `missing = "drop"`.
     pub missing: u64,

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// How a log becomes a motion.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct MotionSettings {
     /// From q to dq and ddq.

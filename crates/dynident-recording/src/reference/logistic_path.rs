@@ -21,6 +21,7 @@ use serde::{Deserialize, Serialize};
 /// assert_eq!(path.rates(2.6, true), None); // outside the stroke
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LogisticPath {
     /// Amplitude A, rad (m).

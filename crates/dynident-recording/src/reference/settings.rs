@@ -23,7 +23,9 @@ use std::path::PathBuf;
 /// assert!(closed.build(1.0).is_ok());
 /// assert!(table.validate().is_ok() && table.build(1.0).is_err()); // the table has still to be read
 /// ```
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(from = "WrittenReference")]
 pub struct ReferenceSettings {
     /// Table with columns `t_s, q1.., dq1.., ddq1..` (SI), the joints in the order of the robot's description.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -39,33 +41,36 @@ pub struct ReferenceSettings {
     pub start_s: f64,
 }
 
-impl<'de> Deserialize<'de> for ReferenceSettings {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        #[derive(Deserialize)]
-        #[serde(
-            untagged,
-            expecting = "reference is a file in quotes, or a table with file or joints, and start_s: { file = \"trajectory.csv\", start_s = 0.0 }"
-        )]
-        enum Written {
-            File(PathBuf),
-            Table(Table),
+/// [`ReferenceSettings`] as they are written: a file's name, or a table.
+#[derive(Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(
+    untagged,
+    expecting = "reference is a file in quotes, or a table with file or joints, and start_s: { file = \"trajectory.csv\", start_s = 0.0 }"
+)]
+enum WrittenReference {
+    File(PathBuf),
+    Table(ReferenceTable),
+}
+
+#[derive(Default, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
+struct ReferenceTable {
+    file: Option<PathBuf>,
+    joints: Vec<LogisticPath>,
+    strokes_s: Vec<f64>,
+    start_s: f64,
+}
+
+impl From<WrittenReference> for ReferenceSettings {
+    fn from(written: WrittenReference) -> Self {
+        match written {
+            WrittenReference::File(file) => Self { file: Some(file), ..Self::default() },
+            WrittenReference::Table(ReferenceTable { file, joints, strokes_s, start_s }) => {
+                Self { file, joints, strokes_s, start_s }
+            }
         }
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct Table {
-            #[serde(default)]
-            file: Option<PathBuf>,
-            #[serde(default)]
-            joints: Vec<LogisticPath>,
-            #[serde(default)]
-            strokes_s: Vec<f64>,
-            #[serde(default)]
-            start_s: f64,
-        }
-        Ok(match Written::deserialize(deserializer)? {
-            Written::File(file) => Self { file: Some(file), ..Self::default() },
-            Written::Table(Table { file, joints, strokes_s, start_s }) => Self { file, joints, strokes_s, start_s },
-        })
     }
 }
 

@@ -8,6 +8,7 @@ const SATURATED_RUN: u64 = 20;
 
 /// What was seen of one channel of one joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ChannelReport {
     /// What it measures.
     pub channel: Quantity,

@@ -8,6 +8,7 @@ const KEPT: usize = 1 << 13;
 
 /// How a logged velocity (or acceleration) relates to the derivative of the position, both filtered alike.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DerivativeComparison {
     /// The joint.
     pub joint: String,

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// The shift at which two signals match best.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Lag {
     /// Seconds by which the second signal comes after the first; negative if before.
     pub seconds: f64,

@@ -9,6 +9,7 @@ pub(super) const NAME: &str = "computed-torque";
 
 /// Gains of [`ComputedTorque`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ComputedTorqueSettings {
     /// K_p, 1/s².

@@ -10,6 +10,7 @@ pub(super) const LITERAL_NAME: &str = "finite-time-literal";
 
 /// Gains of [`FiniteTime`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct FiniteTimeSettings {
     /// K_p of the power α₁ of the position error. The paper: 2 and 4.

@@ -9,6 +9,7 @@ pub(super) const NAME: &str = "joint-pid";
 
 /// Gains of [`JointPid`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct JointPidSettings {
     /// K_p, Nm/rad (N/m).

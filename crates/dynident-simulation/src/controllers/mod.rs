@@ -78,6 +78,7 @@ pub trait Controller: core::fmt::Debug + Send {
 /// # Ok::<(), dynident_simulation::SimulationError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum ControllerSettings {
     /// [`JointPd`]: `τ = K_p e + K_d ė`.

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// At which velocity a controller takes the friction of its model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum FrictionCompensation {
     /// Not at all.

@@ -12,6 +12,7 @@ pub(super) const NAME: &str = "slotine-li";
 
 /// Gains of [`SlotineLi`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct SlotineLiSettings {
     /// Λ, 1/s.

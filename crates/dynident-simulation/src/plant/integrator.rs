@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 /// assert_eq!(settings.integrator, Integrator::Rk4 { steps_per_sample: 2 });
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Integrator {
     /// Semi-implicit Euler, friction implicit: order 1, never chatters. With viscous friction alone the same as

@@ -30,6 +30,7 @@ use thiserror::Error;
 /// Why a simulated robot cannot go on. Its state is then that of the last moment which could be computed, or not a
 /// number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum PlantFault {
     /// The mass matrix is not positive definite.

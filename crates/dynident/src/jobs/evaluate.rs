@@ -64,6 +64,8 @@ pub fn evaluate(model: &Model, states: &Path, quantity: Quantity, out: &mut dyn 
         );
         return Err(Error::States { path: states.to_owned(), line: 1, message });
     }
+
+    // Where the columns are.
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .flexible(true)
@@ -86,6 +88,8 @@ pub fn evaluate(model: &Model, states: &Path, quantity: Quantity, out: &mut dyn 
             places.push(place);
         }
     }
+
+    // Row by row.
     let cannot = |source| Error::Output { path: PathBuf::from("standard output"), source };
     writeln!(out, "{}", quantity.header(dof).join(",")).map_err(cannot)?;
     let mut workspace = Workspace::new(model);

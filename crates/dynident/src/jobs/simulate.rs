@@ -32,23 +32,25 @@ pub fn simulate_study(
     options: &RunOptions<'_>,
     watch: &(dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
 ) -> Result<Simulation, Error> {
-    let wrong = |part: &str, why: &dyn core::fmt::Display| Error::study(study_path, format!("[{part}]: {why}"));
+    // The robot, its controller, and the run.
     let simulation = study.simulation.clone().unwrap_or_default();
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let robot = StudyRobot::new(study, study_path, &folders)?;
-    let mut truth = simulation.truth(&robot).map_err(|why| wrong("simulation", &why))?;
+    let mut truth = simulation.truth(&robot).map_err(Error::section(study_path, "simulation"))?;
     let controller = study
         .controller
         .clone()
         .unwrap_or_else(|| ControllerSettings::JointPd(JointPdSettings { kp: 100.0.into(), kd: 20.0.into() }));
-    controller.validate(robot.model().dof()).map_err(|why| wrong("controller", &why))?;
+    controller.validate(robot.model().dof()).map_err(Error::section(study_path, "controller"))?;
     let trajectory = Trajectory::of_study(study, study_path, &robot, simulation.rate_hz, options, watch)?;
-    let reference = trajectory.reference().map_err(|why| wrong("iteration", &why))?;
+    let reference = trajectory.reference().map_err(Error::section(study_path, "iteration"))?;
     let prior = robot.nominal().to_vec();
     let model = ControllerModel::from_parameters(robot.model(), robot.terms(), &prior)
-        .map_err(|why| wrong("controller", &why))?;
+        .map_err(Error::section(study_path, "controller"))?;
     let request = RunRequest { run: 1, reference: &reference, controller: &controller, model: Some(&model) };
-    let run = truth.robot.run(&request).map_err(|why| wrong("simulation", &why))?;
+    let run = truth.robot.run(&request).map_err(Error::section(study_path, "simulation"))?;
+
+    // The truth beside it.
     let own = |values: &[f64], expressions: Vec<String>, units: Vec<&'static str>| {
         let named = expressions.into_iter().zip(units).zip(values);
         named.map(|((expression, unit), &value)| ParameterTruth { expression, value, unit: unit.to_owned() }).collect()

@@ -34,7 +34,6 @@ pub fn validate(
     if chosen.is_empty() {
         chosen = (0..study.log.len()).collect();
     }
-    let in_study = |error| Error::identification(study_path, error);
     let execution = options.execution();
     let (recordings, settings) = (&task.recordings, &task.settings);
     let tested = execution.install(|| {
@@ -49,7 +48,7 @@ pub fn validate(
         };
         chosen.iter().map(one).collect::<Result<Vec<_>, _>>()
     });
-    let tested = tested.map_err(in_study)?;
+    let tested = tested.map_err(Error::identification(study_path))?;
     let joints = model.joint_names();
     Ok(ValidationFile {
         schema: VALIDATION_SCHEMA.to_owned(),

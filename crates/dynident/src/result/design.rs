@@ -10,6 +10,7 @@ pub const DESIGN_SCHEMA: &str = "dynident/design/1";
 
 /// What `design` prints as JSON and writes as `design.json`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DesignFile {
     /// [`DESIGN_SCHEMA`].
     pub schema: String,
@@ -80,6 +81,7 @@ pub struct DesignFile {
 
 /// What will be known of one base parameter.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ParameterForecast {
     /// Symbol of its column.
     pub symbol: String,
@@ -99,6 +101,7 @@ pub struct ParameterForecast {
 
 /// A direction in the space of column-scaled parameters.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DirectionForecast {
     /// How many times less is known in it than of a column that stood alone: `1 / √λ` of the correlation-scaled
     /// information.
@@ -109,6 +112,7 @@ pub struct DirectionForecast {
 
 /// What `design.json` holds of a windowed design under `windowed`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct WindowedFile {
     /// Which joints move while others rest.
     pub problem: WindowedProblem,
@@ -130,6 +134,7 @@ pub struct WindowedFile {
 
 /// One joint's stroke.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct StrokeFile {
     /// The joint.
     pub joint: String,
@@ -151,6 +156,7 @@ pub struct StrokeFile {
 
 /// One limit of a stroke.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct StrokeLimitFile {
     /// What is bounded.
     pub quantity: StrokeQuantity,

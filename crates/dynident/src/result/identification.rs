@@ -17,6 +17,7 @@ pub const RESULT_SCHEMA: &str = "dynident/result/1";
 
 /// A finished identification.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ResultFile {
     /// [`RESULT_SCHEMA`].
     pub schema: String,
@@ -48,6 +49,7 @@ pub struct ResultFile {
     /// Covariance of the base parameters by the method's own account, rows and columns in their order, symmetric; zero
     /// where a parameter is not excited.
     #[serde(default, deserialize_with = "rows")]
+    #[cfg_attr(feature = "schema", schemars(with = "Vec<Vec<Option<f64>>>"))]
     pub base_parameter_covariance: Vec<Vec<f64>>,
     /// The bodies: one of the full sets that give these base parameters, the nearest to the prior.
     pub bodies: Vec<BodyResult>,
@@ -95,6 +97,7 @@ pub struct ResultFile {
 
 /// The robot of a result.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct RobotSummary {
     /// Its name.
     pub name: String,
@@ -112,6 +115,7 @@ pub struct RobotSummary {
 
 /// How a fit was made.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct MethodSummary {
     /// The study's `estimator.method`.
     pub estimator: String,
@@ -127,9 +131,11 @@ pub struct MethodSummary {
     pub motion: MotionSettings,
     /// Condition number of the weighted regressor's base columns.
     #[serde(deserialize_with = "number")]
+    #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub condition_number: f64,
     /// The same after each column was divided by its norm.
     #[serde(deserialize_with = "number")]
+    #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub condition_number_scaled: f64,
     /// How the base columns were chosen.
     pub base_columns: String,
@@ -144,6 +150,7 @@ pub struct MethodSummary {
 
 /// One base parameter.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BaseParameterResult {
     /// Symbol of its own column: `Izz1`.
     pub symbol: String,
@@ -153,15 +160,19 @@ pub struct BaseParameterResult {
     pub unit: String,
     /// The estimate.
     #[serde(deserialize_with = "number")]
+    #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub value: f64,
     /// Its standard deviation, by the method's covariance.
     #[serde(deserialize_with = "number")]
+    #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub std: f64,
     /// The same if residuals were white: what a naive tool would print.
     #[serde(deserialize_with = "number")]
+    #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub std_white: f64,
     /// Half the width of the 95 % interval.
     #[serde(default, deserialize_with = "number")]
+    #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub half_width_95: f64,
     /// `100 std / |value|`.
     pub relative_std_percent: Option<f64>,
@@ -176,6 +187,7 @@ pub struct BaseParameterResult {
 
 /// One body of the full set.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BodyResult {
     /// Name of its own link.
     pub name: String,
@@ -197,6 +209,7 @@ pub struct BodyResult {
 
 /// A parameter of a term.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TermResult {
     /// Its symbol.
     pub symbol: String,
@@ -212,6 +225,7 @@ pub struct TermResult {
 
 /// Friction and drive of one joint.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct JointResult {
     /// The joint.
     pub name: String,
@@ -220,6 +234,7 @@ pub struct JointResult {
     pub terms: Vec<TermResult>,
     /// Standard deviation of its filtered residual, Nm (N).
     #[serde(deserialize_with = "number")]
+    #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub residual_std_nm: f64,
     /// How strongly its residual is correlated in time: the lag-1 correlation that matters for the error bars.
     pub residual_correlation: Option<f64>,
@@ -230,6 +245,7 @@ pub struct JointResult {
 
 /// The offset of one joint in one log.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LogOffset {
     /// The log.
     pub log: String,
@@ -239,11 +255,13 @@ pub struct LogOffset {
     pub deviation_nm: f64,
     /// The deviation's standard deviation.
     #[serde(deserialize_with = "number")]
+    #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub std_nm: f64,
 }
 
 /// Figures of the fit on its own data.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TrainingResult {
     /// The logs.
     pub logs: Vec<String>,
@@ -257,6 +275,7 @@ pub struct TrainingResult {
 
 /// One joint of [`TrainingResult`].
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TrainingJoint {
     /// The joint.
     pub name: String,
@@ -268,6 +287,7 @@ pub struct TrainingJoint {
 
 /// Whether a full set is physically consistent.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PhysicalVerdict {
     /// All pseudo-inertias positive definite, no negative friction or drive inertia.
     pub consistent: bool,
@@ -290,6 +310,7 @@ pub struct PhysicalVerdict {
 
 /// A physically consistent fit.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PhysicalFitResult {
     /// `solved`, `stalled` or `iteration-limit`; all of them meet every constraint.
     pub status: String,
@@ -297,12 +318,15 @@ pub struct PhysicalFitResult {
     pub iterations: usize,
     /// Stationarity of its certificate, relative.
     #[serde(deserialize_with = "number")]
+    #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub stationarity: f64,
     /// Duality gap of its certificate, relative.
     #[serde(deserialize_with = "number")]
+    #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub duality_gap: f64,
     /// How far the base parameters moved from the estimate in all, in standard deviations of white residuals.
     #[serde(deserialize_with = "number")]
+    #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
     pub moved_sigma: f64,
     /// The largest move of a base parameter in units of its reported standard deviation.
     pub largest_move_std: Option<f64>,
@@ -315,6 +339,7 @@ pub struct PhysicalFitResult {
 
 /// Whether a body is physically consistent, and by what margin.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PhysicalBodyResult {
     /// Its name.
     pub name: String,
@@ -326,6 +351,7 @@ pub struct PhysicalBodyResult {
 
 /// What is known of a log.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LogSummary {
     /// Its name.
     pub log: String,
@@ -360,6 +386,7 @@ pub struct LogSummary {
 
 /// Where the time went, in seconds.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Timings {
     /// Reading the robot, base parameters.
     #[serde(rename = "machine")]
@@ -376,6 +403,7 @@ pub struct Timings {
 
 /// How the friction of one joint was chosen.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct JointFrictionResult {
     /// The joint.
     pub joint: String,

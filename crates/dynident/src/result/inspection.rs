@@ -7,6 +7,7 @@ pub const INSPECTION_SCHEMA: &str = "dynident/inspection/1";
 
 /// What `inspect` prints as JSON.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Inspection {
     /// [`INSPECTION_SCHEMA`].
     pub schema: String,
@@ -32,6 +33,7 @@ pub struct Inspection {
 
 /// One joint.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct JointSummary {
     /// Its name.
     pub name: String,
@@ -54,6 +56,7 @@ pub struct JointSummary {
 
 /// One body.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BodySummary {
     /// Name of its own link.
     pub name: String,
@@ -67,6 +70,7 @@ pub struct BodySummary {
 
 /// Base parameters.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BaseSummary {
     /// How many.
     pub count: usize,
@@ -83,6 +87,7 @@ pub struct BaseSummary {
 
 /// One finding.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct AuditEntry {
     /// `info`, `warning` or `problem`.
     pub level: String,

@@ -7,6 +7,7 @@ pub const ITERATIONS_SCHEMA: &str = "dynident/iterations/1";
 
 /// `iterations.json`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct IterationsFile {
     /// [`ITERATIONS_SCHEMA`].
     pub schema: String,
@@ -39,6 +40,7 @@ pub struct IterationsFile {
 
 /// One run.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct IterationRun {
     /// Its number, from 1.
     pub run: usize,
@@ -69,6 +71,7 @@ pub struct IterationRun {
 
 /// One base parameter by one run.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct IterationParameter {
     /// Symbol of its column.
     pub symbol: String,

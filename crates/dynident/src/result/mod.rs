@@ -2,6 +2,7 @@
 //! version of a schema.
 
 mod design;
+mod evaluation;
 mod identification;
 mod inspection;
 mod iterations;
@@ -13,6 +14,7 @@ mod validation;
 pub use design::{
     DESIGN_SCHEMA, DesignFile, DirectionForecast, ParameterForecast, StrokeFile, StrokeLimitFile, WindowedFile,
 };
+pub use evaluation::{EVALUATION_SCHEMA, EvaluationFile};
 pub use identification::{
     BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, LogSummary, MethodSummary,
     PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, TermResult,

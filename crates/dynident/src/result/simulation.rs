@@ -8,6 +8,7 @@ pub const SIMULATION_SCHEMA: &str = "dynident/simulation/1";
 
 /// What `truth.json` holds.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SimulationFile {
     /// [`SIMULATION_SCHEMA`].
     pub schema: String,
@@ -40,6 +41,7 @@ pub struct SimulationFile {
 
 /// A body as it truly is.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BodyTruth {
     /// Its name.
     pub name: String,
@@ -49,6 +51,7 @@ pub struct BodyTruth {
 
 /// A parameter as it truly is.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ParameterTruth {
     /// What it is.
     pub expression: String,

@@ -2,7 +2,7 @@
 
 use super::identification::{RESULT_SCHEMA, ResultFile};
 use crate::error::Error;
-use crate::study::{JointDrive, Study};
+use crate::study::{FrictionTerm, JointDrive, Study};
 use dynident_dynamics::ParametricModel;
 use dynident_identification::RegressorModel;
 use dynident_identification::payload::{KnownArm, Refit, known_payloads};
@@ -44,8 +44,8 @@ impl ResultFile {
         for joint in &stored.friction_choice {
             let mut terms = joint.drive.iter().flat_map(|drive| drive.terms.iter().flatten());
             terms
-                .try_for_each(|term| term.validate(&format!("friction_choice of joint `{}`", joint.joint)))
-                .map_err(wrong)?;
+                .try_for_each(FrictionTerm::validate)
+                .map_err(|error| wrong(format!("friction_choice of joint `{}`: {error}", joint.joint)))?;
         }
         Ok(stored)
     }
@@ -164,7 +164,7 @@ impl ResultFile {
         model: &RegressorModel,
     ) -> Result<StoredPayloads, Error> {
         let known = known_payloads(&study.payloads(), model);
-        let mut added = known.map_err(|error| Error::study(study_path, error.to_string()))?;
+        let mut added = known.map_err(Error::study(study_path))?;
         let wrong = |message: String| Error::Result { path: path.to_owned(), message };
         for payload in &self.payloads {
             let values = &payload.base_parameters_added;

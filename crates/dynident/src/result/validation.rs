@@ -9,6 +9,7 @@ pub const VALIDATION_SCHEMA: &str = "dynident/validation/1";
 
 /// What `validate` prints as JSON.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ValidationFile {
     /// [`VALIDATION_SCHEMA`].
     pub schema: String,

@@ -2,13 +2,14 @@
 
 use super::arrays::two;
 use super::friction::{FrictionChoice, FrictionTerm};
-use super::numbers::{not_negative, positive};
+use crate::error::{Expected, StudyError};
 use dynident_identification::{GainChoice, OffsetChoice};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// How a Coulomb step looks near zero velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum CoulombChoice {
     /// No Coulomb friction.
@@ -21,6 +22,7 @@ pub enum CoulombChoice {
 
 /// `[drive]`: the laws of every joint, and exceptions by joint.
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct DriveSection {
     /// Inertia of rotor and gear as seen from the joint. Off by default: where torque is measured at the link it does
@@ -69,6 +71,7 @@ impl Default for DriveSection {
 
 /// What one joint has in place of `[drive]`.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct JointDrive {
     /// In place of `drive.drive_inertia`.
@@ -92,6 +95,7 @@ pub struct JointDrive {
 
 /// `[[coupling]]`: a drive whose velocity is `ratios[0] · q̇_first + ratios[1] · q̇_second`.
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct CouplingSection {
     /// Name of the drive in the parameters' symbols.
@@ -114,21 +118,22 @@ pub struct CouplingSection {
 }
 
 impl DriveSection {
-    pub(crate) fn validate(&self) -> Result<(), String> {
-        positive(self.coulomb_width, "drive.coulomb_width")?;
-        not_negative(self.coulomb_dead_band, "drive.coulomb_dead_band")?;
+    pub(crate) fn validate(&self) -> Result<(), StudyError> {
+        Expected::Positive.check("drive.coulomb_width", self.coulomb_width)?;
+        Expected::NotNegative.check("drive.coulomb_dead_band", self.coulomb_dead_band)?;
         for (index, term) in self.terms.iter().enumerate() {
-            term.validate(&format!("drive.laws number {}", index + 1))?;
+            term.validate().map_err(StudyError::at(format!("drive.laws number {}", index + 1)))?;
         }
         for (joint, drive) in &self.joints {
             for (index, term) in drive.terms.iter().flatten().enumerate() {
-                term.validate(&format!("drive.joints.{joint}.laws number {}", index + 1))?;
+                let place = format!("drive.joints.{joint}.laws number {}", index + 1);
+                term.validate().map_err(StudyError::at(place))?;
             }
             if let Some(width) = drive.coulomb_width {
-                positive(width, &format!("drive.joints.{joint}.coulomb_width"))?;
+                Expected::Positive.check(format!("drive.joints.{joint}.coulomb_width"), width)?;
             }
             if let Some(band) = drive.coulomb_dead_band {
-                not_negative(band, &format!("drive.joints.{joint}.coulomb_dead_band"))?;
+                Expected::NotNegative.check(format!("drive.joints.{joint}.coulomb_dead_band"), band)?;
             }
         }
         Ok(())
@@ -136,12 +141,12 @@ impl DriveSection {
 }
 
 impl CouplingSection {
-    pub(crate) fn validate(&self) -> Result<(), String> {
+    pub(crate) fn validate(&self) -> Result<(), StudyError> {
         if self.ratios.iter().any(|ratio| !ratio.is_finite() || *ratio == 0.0) {
-            return Err(format!("coupling `{}`: ratios must be finite and not zero", self.name));
+            return Err(StudyError::conflict("ratios", "ratios must be finite and not zero"));
         }
         if self.joints[0] == self.joints[1] {
-            return Err(format!("coupling `{}`: name two different joints", self.name));
+            return Err(StudyError::conflict("joints", "name two different joints"));
         }
         Ok(())
     }

@@ -1,9 +1,8 @@
 //! `[estimator]`: how the parameters are estimated, and how far they are trusted.
 
-use super::numbers::positive;
 use super::physical::PhysicalChoice;
 use super::simulated::SimulatedSection;
-use crate::error::Error;
+use crate::error::{Error, Expected, StudyError};
 use dynident_estimation::{CovarianceMethod, EssentialSettings, RankSettings, SegmentSettings};
 use dynident_identification::EstimationSettings;
 use dynident_identification::estimators::{
@@ -13,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 /// How base parameters are estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum EstimatorMethod {
     /// Ordinary least squares: every joint's newton metre counts alike.
@@ -65,6 +65,7 @@ impl EstimatorMethod {
 
 /// `[estimator]`.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct EstimatorSection {
     /// The method; weighted by default.
@@ -142,40 +143,29 @@ impl EstimatorSection {
         }
     }
 
-    pub(crate) fn validate(&self) -> Result<(), String> {
-        self.rank.validate().map_err(|error| format!("[estimator.rank]: {error}"))?;
+    pub(crate) fn validate(&self) -> Result<(), StudyError> {
+        self.rank.validate().map_err(StudyError::at("[estimator.rank]"))?;
         let instruments = self.instruments.clone().unwrap_or_default();
         let estimation = self.common();
-        instruments
-            .instrumental(&estimation)
-            .validate()
-            .map_err(|error| format!("[estimator.instruments]: {error}"))?;
-        instruments
-            .hausman(&estimation)
-            .validate()
-            .map_err(|error| format!("[estimator.instruments], test_level: {error}"))?;
+        let (instrumental, hausman) = (instruments.instrumental(&estimation), instruments.hausman(&estimation));
+        instrumental.validate().map_err(StudyError::at("[estimator.instruments]"))?;
+        hausman.validate().map_err(StudyError::at("[estimator.instruments], test_level"))?;
         if let Some(cutoff) = instruments.cutoff_hz {
-            positive(cutoff, "estimator.instruments.cutoff_hz").map_err(|_| {
-                format!(
-                    "estimator.instruments.cutoff_hz = {cutoff}: give a positive frequency, below the motion's cut-off"
-                )
-            })?;
+            Expected::Positive.check("estimator.instruments.cutoff_hz", cutoff)?;
         }
-        self.noise_levels
-            .settings(&estimation)
-            .validate()
-            .map_err(|error| format!("[estimator.noise_levels]: {error}"))?;
-        self.periods.validate().map_err(|error| format!("[estimator.periods]: {error}"))?;
-        self.simulated.validate().map_err(|error| format!("[estimator.simulated]: {error}"))?;
-        self.physical.validate().map_err(|error| format!("[estimator.physical]: {error}"))?;
+        let noise_levels = self.noise_levels.settings(&estimation);
+        noise_levels.validate().map_err(StudyError::at("[estimator.noise_levels]"))?;
+        self.periods.validate().map_err(StudyError::at("[estimator.periods]"))?;
+        self.simulated.validate().map_err(StudyError::at("[estimator.simulated]"))?;
+        self.physical.validate().map_err(StudyError::at("[estimator.physical]"))?;
         if self.intervals && self.physical.settings().is_none() {
-            return Err("estimator.intervals = true needs physically consistent parameters: take out physical = false"
-                .to_owned());
+            let fix = "they are of physically consistent parameters: take out physical = false";
+            return Err(StudyError::conflict("estimator.intervals = true", fix));
         }
-        self.segments.validate().map_err(|error| format!("[estimator.segments]: {error}"))?;
-        if let Some(essential) = &self.essential {
-            essential.validate().map_err(|error| format!("[estimator.essential]: {error}"))?;
+        self.segments.validate().map_err(StudyError::at("[estimator.segments]"))?;
+        match &self.essential {
+            Some(essential) => essential.validate().map_err(StudyError::at("[estimator.essential]")),
+            None => Ok(()),
         }
-        Ok(())
     }
 }

@@ -1,5 +1,6 @@
 //! Friction in the study file: laws beyond viscous, Coulomb and offset, and whether the data choose them.
 
+use crate::error::{Expected, StudyError};
 use dynident_model::terms::{
     CoulombShape, Direction, DirectionalCoulomb, DirectionalViscous, LoadFriction, MaxwellSlip, Power, PowerExponent,
     Sigmoid, Stribeck, TemperatureCoulomb, TemperatureViscous, TorqueTerm,
@@ -8,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// Who says which friction a joint has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum FrictionChoice {
     /// The study's keys.
@@ -20,6 +22,7 @@ pub enum FrictionChoice {
 
 /// A law of `drive.laws`, beside `viscous`, `coulomb` and `offset`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "law", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum FrictionTerm {
     /// Viscous friction by direction, in place of `viscous`.
@@ -87,7 +90,7 @@ fn yes() -> bool {
 /// separates from rest.
 const ROUNDING: f64 = 1.0e-3;
 /// Elements of one joint: each is a column.
-const MOST_ELEMENTS: usize = 50;
+const MOST_ELEMENTS: f64 = 50.0;
 
 impl FrictionTerm {
     /// The parameters of this law at `joint`, whose Coulomb step is `step`.
@@ -168,15 +171,9 @@ impl FrictionTerm {
         }
     }
 
-    /// Checks its constants; `key` is where it stands.
-    pub(crate) fn validate(&self, key: &str) -> Result<(), String> {
-        let within = |name: &str, value: f64, from: f64, to: f64| {
-            if value >= from && value <= to {
-                Ok(())
-            } else {
-                Err(format!("{key}: {name} = {value}: give a number from {from} to {to}"))
-            }
-        };
+    /// Checks its constants.
+    pub(crate) fn validate(&self) -> Result<(), StudyError> {
+        let within = |name: &str, value: f64, from: f64, to: f64| Expected::Range(from, to).check(name, value);
         match self {
             Self::Stribeck { speed, exponent, width } => {
                 within("speed", *speed, 1.0e-6, 1.0e3)?;
@@ -189,19 +186,18 @@ impl FrictionTerm {
             }
             Self::Temperature { reference_c, viscous, coulomb } => {
                 if !viscous && !coulomb {
-                    return Err(format!("{key}: neither viscous nor coulomb changes: leave the law out"));
+                    return Err(StudyError::conflict("neither viscous nor coulomb changes", "leave the law out"));
                 }
                 within("reference_c", *reference_c, -273.15, 1.0e3)
             }
             Self::Load { width } => width.map_or(Ok(()), |width| within("width", width, 1.0e-6, 1.0e3)),
             Self::MaxwellSlip { yield_displacements } => {
-                if yield_displacements.is_empty() || yield_displacements.len() > MOST_ELEMENTS {
-                    return Err(format!("{key}: give 1 to {MOST_ELEMENTS} yield_displacements"));
-                }
+                within("number of yield_displacements", yield_displacements.len() as f64, 1.0, MOST_ELEMENTS)?;
                 for (place, value) in yield_displacements.iter().enumerate() {
                     within("yield_displacements", *value, 1.0e-7, 100.0)?;
                     if yield_displacements[..place].contains(value) {
-                        return Err(format!("{key}: yield_displacements: {value} stands twice"));
+                        let (what, name) = ("yield_displacements".to_owned(), value.to_string());
+                        return Err(StudyError::Twice { what, name, fix: "give it once" });
                     }
                 }
                 Ok(())

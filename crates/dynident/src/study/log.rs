@@ -1,6 +1,7 @@
 //! `[[log]]`: one recording, or a part of one.
 
 use super::arrays::exactly;
+use crate::error::StudyError;
 use dynident_identification::Role;
 use dynident_recording::{LogFormat, ReferenceSettings};
 use serde::{Deserialize, Serialize};
@@ -8,6 +9,7 @@ use std::path::PathBuf;
 
 /// `[[log]]`: one recording, or a part of one.
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LogSection {
     /// The main file.
@@ -39,14 +41,13 @@ pub struct LogSection {
 }
 
 impl LogSection {
-    pub(crate) fn validate(&self) -> Result<(), String> {
+    pub(crate) fn validate(&self) -> Result<(), StudyError> {
         if let Some(reference) = &self.reference {
-            reference.validate().map_err(|error| format!("reference: {error}"))?;
+            reference.validate().map_err(StudyError::at("reference"))?;
         }
-        let ranges = [self.rows.is_some(), self.fraction.is_some(), self.time_range_s.is_some()];
-        if ranges.into_iter().filter(|given| *given).count() > 1 {
-            return Err("give one of rows, fraction and time_range_s, not several".to_owned());
-        }
-        Ok(())
+        let ranges =
+            [self.rows.map(|_| "rows"), self.fraction.map(|_| "fraction"), self.time_range_s.map(|_| "time_range_s")];
+        let keys: Vec<&str> = ranges.into_iter().flatten().collect();
+        if keys.len() > 1 { Err(StudyError::Exclusive { keys }) } else { Ok(()) }
     }
 }

@@ -9,7 +9,6 @@ mod friction;
 mod friction_keys;
 mod iteration;
 mod log;
-mod numbers;
 mod payload;
 mod physical;
 mod robot;
@@ -35,7 +34,7 @@ pub use robot_model::StudyRobot;
 pub use simulated::SimulatedSection;
 pub use simulation::{SimulatedTruth, SimulationSection};
 
-use crate::error::Error;
+use crate::error::{Error, StudyError};
 use dynident_identification::Role;
 use dynident_identification::rows::ParallelFilterSettings;
 use dynident_model::line_and_column;
@@ -70,6 +69,7 @@ use std::path::{Path, PathBuf};
 /// assert_eq!(study.log.len(), 2);
 /// ```
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Study {
     /// What the study is called in reports; the file's name by default.
@@ -136,19 +136,14 @@ impl Study {
         let cannot = |source| Error::File { path: path.to_owned(), source };
         let size = std::fs::metadata(path).map_err(cannot)?.len();
         if size > MAX_STUDY_BYTES {
-            return Err(Error::study(path, format!("larger than {} MiB: name a study file", MAX_STUDY_BYTES >> 20)));
+            return Err(Error::study(path)(StudyError::TooLarge { most_bytes: MAX_STUDY_BYTES }));
         }
         let bytes = std::fs::read(path).map_err(cannot)?;
         let text = String::from_utf8(bytes).map_err(|error| {
             let good = error.utf8_error().valid_up_to();
             let before = String::from_utf8_lossy(&error.as_bytes()[..good]).into_owned();
             let (line, column) = line_and_column(&before, before.len());
-            Error::StudyAt {
-                path: path.to_owned(),
-                line,
-                column,
-                message: "not UTF-8 text: save the study as UTF-8".to_owned(),
-            }
+            Error::StudyAt { path: path.to_owned(), line, column, source: StudyError::NotUtf8 }
         })?;
         Self::parse(&text, path)
     }
@@ -161,24 +156,23 @@ impl Study {
     pub fn parse(text: &str, path: &Path) -> Result<Self, Error> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         if text.trim().is_empty() {
-            return Err(Error::study(
-                path,
-                "the file is empty: a study needs at least [robot] and, to identify, one [[log]]".to_owned(),
-            ));
+            let fix = "a study needs at least [robot] and, to identify, one [[log]]";
+            return Err(Error::study(path)(StudyError::missing("the file is empty", fix)));
         }
         let study: Self = toml::from_str(text).map_err(|error| {
             let (line, column) = error.span().map_or((1, 1), |span| line_and_column(text, span.start));
-            let message = format!("{}; docs/src/study.md lists every key", error.message().trim().replace('\n', " "));
-            Error::StudyAt { path: path.to_owned(), line, column, message }
+            let problem = error.message().trim().replace('\n', " ");
+            Error::StudyAt { path: path.to_owned(), line, column, source: StudyError::Toml { problem } }
         })?;
-        study.check().map_err(|message| Error::study(path, message))?;
+        study.check().map_err(Error::study(path))?;
         Ok(study)
     }
 
     /// That there is a log, as fitting and testing need; a study for `design` may have none.
     pub(crate) fn require_log(&self, path: &Path) -> Result<(), Error> {
         if self.log.is_empty() {
-            return Err(Error::study(path, "no [[log]]: name at least one log with `file = \"...\"`".to_owned()));
+            let fix = "name at least one log with `file = \"...\"`";
+            return Err(Error::study(path)(StudyError::missing("no [[log]]", fix)));
         }
         Ok(())
     }
@@ -187,8 +181,8 @@ impl Study {
     pub(crate) fn require_training_log(&self, path: &Path) -> Result<(), Error> {
         self.require_log(path)?;
         if !self.log.iter().any(|log| log.role == Role::Identify) {
-            let message = "no log has the role \"identify\": there is nothing to fit to".to_owned();
-            return Err(Error::study(path, message));
+            let what = "no log has the role \"identify\"";
+            return Err(Error::study(path)(StudyError::missing(what, "there is nothing to fit to")));
         }
         Ok(())
     }
@@ -198,39 +192,48 @@ impl Study {
         (0..self.log.len()).filter(|&index| self.log[index].role == role).collect()
     }
 
-    fn check(&self) -> Result<(), String> {
+    fn check(&self) -> Result<(), StudyError> {
         for (index, log) in self.log.iter().enumerate() {
+            let at = || StudyError::at(format!("[[log]] number {}", index + 1));
             if log.format.is_none() && self.format.is_none() {
-                return Err(format!("[[log]] number {}: neither the log nor the study has a [format]", index + 1));
+                let missing = StudyError::missing("neither the log nor the study has a [format]", "give one of them");
+                return Err(at()(missing));
             }
-            log.validate().map_err(|error| format!("[[log]] number {}: {error}", index + 1))?;
+            log.validate().map_err(at())?;
         }
         self.drive.validate()?;
         self.check_temperature()?;
         for (index, coupling) in self.coupling.iter().enumerate() {
             if self.coupling[..index].iter().any(|other| other.name == coupling.name) {
-                return Err(format!("coupling `{}` stands twice: give each drive a name of its own", coupling.name));
+                return Err(StudyError::Twice {
+                    what: "coupling".to_owned(),
+                    name: coupling.name.clone(),
+                    fix: "give each drive a name of its own",
+                });
             }
-            coupling.validate()?;
+            coupling.validate().map_err(StudyError::at(format!("coupling `{}`", coupling.name)))?;
         }
         for (index, payload) in self.payload.iter().enumerate() {
             if self.payload[..index].iter().any(|other| other.name == payload.name) {
-                return Err(format!("payload `{}` stands twice: give each a name of its own", payload.name));
+                return Err(StudyError::Twice {
+                    what: "payload".to_owned(),
+                    name: payload.name.clone(),
+                    fix: "give each a name of its own",
+                });
             }
-            payload.validate()?;
+            payload.validate().map_err(StudyError::at(format!("payload `{}`", payload.name)))?;
         }
         self.robot.validate()?;
-        self.parallel_filter.validate().map_err(|error| error.to_string())?;
+        self.parallel_filter.validate()?;
         if let Some(design) = &self.design {
-            design.validate().map_err(|error| format!("[design]: {error}"))?;
+            design.validate().map_err(StudyError::at("[design]"))?;
         }
-        self.motion.validate().map_err(|error| format!("[motion]: {error}"))?;
-        self.estimator.validate()?;
-        Ok(())
+        self.motion.validate().map_err(StudyError::at("[motion]"))?;
+        self.estimator.validate()
     }
 
     /// That friction which depends on the temperature is asked for where it can be had.
-    fn check_temperature(&self) -> Result<(), String> {
+    fn check_temperature(&self) -> Result<(), StudyError> {
         let terms =
             self.drive.joints.values().filter_map(|own| own.terms.as_ref()).chain([&self.drive.terms]).flatten();
         if !terms.into_iter().any(|term| matches!(term, FrictionTerm::Temperature { .. })) {
@@ -238,10 +241,16 @@ impl Study {
         }
         let own = self.drive.joints.values().filter_map(|own| own.friction);
         if own.chain([self.drive.friction]).any(|choice| choice == FrictionChoice::Auto) {
-            return Err("drive: friction = \"auto\" does not go with the law `temperature`: let the logs choose friction without it, then state what they chose beside it".to_owned());
+            return Err(StudyError::conflict(
+                "drive.friction = \"auto\" with the law `temperature`",
+                "let the logs choose friction without it, then state what they chose beside it",
+            ));
         }
         if self.estimator.method == EstimatorMethod::Instrumental || self.estimator.instruments.is_some() {
-            return Err("drive: the law `temperature` does not go with instruments: use another estimator.method and leave out estimator.instruments".to_owned());
+            return Err(StudyError::conflict(
+                "drive.laws: `temperature` does not go with instruments",
+                "use another estimator.method and leave out estimator.instruments",
+            ));
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! `[[payload]]` and `[arm]`: what the arm carries in which log, and an arm that is known already.
 
 use super::arrays::exactly;
+use crate::error::StudyError;
 use dynident_identification::payload::Refit;
 use dynident_model::{InertialParameters, Mat3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -9,6 +10,7 @@ use std::path::PathBuf;
 /// `[[payload]]`: something that some logs were recorded with, at a link of the robot. A `[[log]]` carries it by its
 /// name. Without `mass_kg` it is estimated; with it, it is known.
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct PayloadSection {
     /// What logs call it.
@@ -30,6 +32,7 @@ pub struct PayloadSection {
 /// `[arm]`: the arm by an earlier identification. Only payloads are estimated then, and the arm's error bars go into
 /// theirs.
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ArmSection {
     /// The earlier `result.json`, of the same robot with the same drives.
@@ -52,26 +55,28 @@ impl PayloadSection {
         self.mass_kg.map(|mass| InertialParameters::from_centre_of_mass(mass, com, &inertia))
     }
 
-    pub(crate) fn validate(&self) -> Result<(), String> {
-        let name = &self.name;
+    pub(crate) fn validate(&self) -> Result<(), StudyError> {
         let numbers = self.com_m.iter().flatten().chain(self.inertia_at_com_kgm2.iter().flatten());
-        if numbers.chain(&self.mass_kg).any(|value| !value.is_finite() || value.abs() > 1.0e6) {
-            return Err(format!("payload `{name}`: give finite numbers in kg, m and kg m^2"));
+        if let Some(value) = numbers.chain(&self.mass_kg).find(|value| !value.is_finite() || value.abs() > 1.0e6) {
+            let (key, expected) = ("a number".to_owned(), "finite numbers in kg, m and kg m^2");
+            return Err(StudyError::Numbers { key, values: vec![*value], expected });
         }
         match (self.mass_kg, self.com_m, self.inertia_at_com_kgm2) {
             (None, None, None) => return Ok(()),
             (Some(_), Some(_), _) => {}
             _ => {
-                return Err(format!(
-                    "payload `{name}`: a known payload has mass_kg and com_m (and inertia_at_com_kgm2 unless it is a point), one to estimate has none of them"
+                return Err(StudyError::conflict(
+                    "what is known of it",
+                    "a known payload has mass_kg and com_m (and inertia_at_com_kgm2 unless it is a point), one to estimate has none of them",
                 ));
             }
         }
         let Some(known) = self.known() else { return Ok(()) };
         let pseudo_inertia = known.pseudo_inertia();
         if known.mass_kg() <= 0.0 || pseudo_inertia.symmetric_eigenvalues().min() < -ROUNDING * pseudo_inertia.amax() {
-            return Err(format!(
-                "payload `{name}`: no body has this mass and inertia: the mass must be positive and no moment about the centre of mass larger than the sum of the other two"
+            return Err(StudyError::conflict(
+                "no body has this mass and inertia",
+                "the mass must be positive and no moment about the centre of mass larger than the sum of the other two",
             ));
         }
         Ok(())

@@ -1,5 +1,6 @@
 //! `[estimator.physical]`: whether the robot written is a consistent one, and what is known of its bodies.
 
+use dynident_estimation::consistent::PhysicalError;
 use dynident_identification::consistent::ConsistencySettings;
 use serde::de::value::MapAccessDeserializer;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -15,6 +16,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 /// # Ok::<(), toml::de::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub enum PhysicalChoice {
     /// With the defaults, or not at all.
@@ -39,8 +41,8 @@ impl PhysicalChoice {
         }
     }
 
-    pub(crate) fn validate(&self) -> Result<(), String> {
-        self.settings().map_or(Ok(()), |settings| settings.validate().map_err(|error| error.to_string()))
+    pub(crate) fn validate(&self) -> Result<(), PhysicalError> {
+        self.settings().map_or(Ok(()), |settings| settings.validate())
     }
 }
 

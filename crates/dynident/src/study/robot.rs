@@ -1,12 +1,14 @@
 //! `[robot]`: which robot, and how it stands.
 
 use super::arrays::exactly;
+use crate::error::StudyError;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// `[robot]`: which robot, and how it stands.
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct RobotSection {
     /// URDF, or D-H table in TOML.
@@ -33,16 +35,18 @@ pub struct RobotSection {
 const MAX_GRAVITY_M_S2: f64 = 1000.0;
 
 impl RobotSection {
-    pub(crate) fn validate(&self) -> Result<(), String> {
+    pub(crate) fn validate(&self) -> Result<(), StudyError> {
         if let Some(gravity) = self.gravity_m_s2
             && gravity.iter().any(|g| g.abs().is_nan() || g.abs() > MAX_GRAVITY_M_S2)
         {
-            return Err(format!(
-                "robot.gravity_m_s2 = {gravity:?}: give finite numbers in m/s^2, at most {MAX_GRAVITY_M_S2} in size"
-            ));
+            return Err(StudyError::Numbers {
+                key: "robot.gravity_m_s2".to_owned(),
+                values: gravity.to_vec(),
+                expected: "finite numbers in m/s^2, at most 1000 in size",
+            });
         }
         if self.base_rpy_rad.is_some() && self.base_rpy_deg.is_some() {
-            return Err("robot.base_rpy_rad and robot.base_rpy_deg are both given: keep one".to_owned());
+            return Err(StudyError::Exclusive { keys: vec!["robot.base_rpy_rad", "robot.base_rpy_deg"] });
         }
         Ok(())
     }

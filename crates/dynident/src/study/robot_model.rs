@@ -2,10 +2,10 @@
 //! force.
 
 use super::{CoulombChoice, Folders, JointDrive, Study};
-use crate::error::Error;
+use crate::error::{Error, StudyError};
 use dynident_dynamics::{BaseParameters, PanelLayout, ParametricModel};
 use dynident_model::terms::{CoulombShape, Coupling, CouplingEffect, DriveChoice, TorqueTerm, terms_per_joint};
-use dynident_model::{Model, Robot, Vec3, load_robot};
+use dynident_model::{Model, ModelError, Robot, Vec3, load_robot};
 use std::path::Path;
 
 /// A study's robot: its description, and what the study makes of it.
@@ -26,36 +26,44 @@ impl StudyRobot {
     /// If the description cannot be read, or names in the study are not in it.
     pub fn new(study: &Study, study_path: &Path, folders: &Folders) -> Result<Self, Error> {
         let robot = load_robot(folders.find(&study.robot.file, study.source.as_deref())?)?;
-        let in_study = |source| Error::Model { path: study_path.to_owned(), source };
+        let in_study = Error::study::<ModelError>(study_path);
+
+        // How it stands in the world.
         let mut model = robot.model.clone();
         if let Some([x, y, z]) = study.robot.gravity_m_s2 {
-            model = model.with_gravity(Vec3([x, y, z])).map_err(in_study)?;
+            model = model.with_gravity(Vec3([x, y, z])).map_err(&in_study)?;
         }
         let radians = study.robot.base_rpy_deg.map(|rpy| rpy.map(f64::to_radians)).or(study.robot.base_rpy_rad);
         if let Some([roll, pitch, yaw]) = radians {
-            model = model.with_base_orientation(roll, pitch, yaw).map_err(in_study)?;
+            model = model.with_base_orientation(roll, pitch, yaw).map_err(&in_study)?;
         }
+
+        // Which joints move.
         let known: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
-        let unknown = |joint: &str| {
-            in_study(dynident_model::ModelError::UnknownJoint { joint: joint.to_owned(), known: known.clone() })
-        };
+        let unknown =
+            |joint: &str| in_study(ModelError::UnknownJoint { joint: joint.to_owned(), known: known.clone() });
         let mut locked: Vec<(String, f64)> = study.robot.lock.iter().map(|(name, at)| (name.clone(), *at)).collect();
         if let Some(joints) = &study.robot.joints {
             for (index, joint) in joints.iter().enumerate() {
                 if !known.contains(joint) {
                     return Err(unknown(joint));
                 }
-                if joints[..index].contains(joint) || study.robot.lock.contains_key(joint) {
-                    let message = format!("robot.joints: `{joint}` stands twice, or is locked as well: name it once");
-                    return Err(Error::study(study_path, message));
+                if joints[..index].contains(joint) {
+                    let (what, name) = ("robot.joints:".to_owned(), joint.clone());
+                    return Err(Error::study(study_path)(StudyError::Twice { what, name, fix: "name it once" }));
+                }
+                if study.robot.lock.contains_key(joint) {
+                    let (key, other) = ("robot.joints", "robot.lock");
+                    let both = StudyError::JointInBoth { joint: joint.clone(), key, other, state: "locked" };
+                    return Err(Error::study(study_path)(both));
                 }
             }
             let rest = known.iter().filter(|name| !joints.contains(name) && !study.robot.lock.contains_key(*name));
             locked.extend(rest.map(|name| (name.clone(), 0.0)));
         }
-        model = model.locked(&locked).map_err(in_study)?;
+        model = model.locked(&locked).map_err(&in_study)?;
         if model.dof() == 0 {
-            return Err(Error::study(study_path, "no joint is left to move: unlock one".to_owned()));
+            return Err(Error::study(study_path)(StudyError::missing("no joint is left to move", "unlock one")));
         }
         let log_joints = study
             .robot
@@ -68,6 +76,8 @@ impl StudyRobot {
         for joint in study.drive.joints.keys() {
             model.joint_index(joint).ok_or_else(|| unknown(joint))?;
         }
+
+        // Torque terms: of each joint, then of drives that turn with two.
         let mut terms = terms_per_joint(&model, |joint| drive_choice(study, &model.joints()[joint].name));
         for (joint, description) in model.joints().iter().enumerate() {
             let own = study.drive.joints.get(&description.name);
@@ -96,8 +106,7 @@ impl StudyRobot {
             });
             terms.extend(couplings);
         }
-        let parametric =
-            ParametricModel::new(model, terms).map_err(|error| Error::study(study_path, error.to_string()))?;
+        let parametric = ParametricModel::new(model, terms).map_err(Error::study(study_path))?;
         Ok(Self { robot, parametric, log_joints })
     }
 

@@ -1,12 +1,13 @@
 //! `[estimator.simulated]`: how the loop is simulated for `method = "didim"`, `"clie"` and `"cloe"`.
 
-use dynident_estimation::SimulatedSettings;
+use dynident_estimation::{EstimationError, SimulatedSettings};
 use dynident_identification::estimators::SimulationStart;
 use serde::{Deserialize, Serialize};
 
 /// `[estimator.simulated]`. Rate, integrator, velocities and delays of the feedback, start and torque limits of the
 /// loop are those of `[simulation]`; noise is not simulated.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SimulatedSection {
     /// Where the iteration begins; at what is nearer to the record by default.
@@ -27,9 +28,9 @@ impl Default for SimulatedSection {
 }
 
 impl SimulatedSection {
-    pub(crate) fn validate(&self) -> Result<(), String> {
+    pub(crate) fn validate(&self) -> Result<(), EstimationError> {
         let SimulatedSection { tolerance, max_iterations, difference, .. } = *self;
         let settings = SimulatedSettings { tolerance, max_iterations, difference, ..SimulatedSettings::default() };
-        settings.validate().map_err(|error| error.to_string())
+        settings.validate()
     }
 }

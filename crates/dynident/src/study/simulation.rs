@@ -1,12 +1,13 @@
 //! `[simulation]`: the robot that is simulated, where it differs from its description, its sensors and limits.
 
 use super::StudyRobot;
+use crate::error::{Expected, StudyError};
 use dynident_iteration::SimulatedRobot;
 use dynident_model::sample::Random;
 use dynident_model::terms::{JointProperty, TermAction, TorqueTerm};
 use dynident_model::{InertialParameters, Model};
 use dynident_simulation::{
-    Integrator, LoopSettings, PerJoint, Plant, RunLimits, SensorSettings, SimulationError, Start, with_length_errors,
+    Integrator, LoopSettings, PerJoint, Plant, RunLimits, SensorSettings, Start, with_length_errors,
 };
 use nalgebra::Matrix4;
 use serde::{Deserialize, Serialize};
@@ -26,6 +27,7 @@ const SHAPE_SHARE: f64 = 1.0 / 3.0;
 /// # Ok::<(), toml::de::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SimulationSection {
     /// Samples a second of the controller; 1000 by default.
@@ -102,24 +104,17 @@ impl SimulationSection {
     /// Checks the numbers for so many joints.
     ///
     /// # Errors
-    /// In words, with the key and the fix.
-    pub fn validate(&self, joints: usize) -> Result<(), String> {
-        let said = |error: SimulationError| error.to_string();
-        if !(1.0..=1e6).contains(&self.rate_hz) {
-            return Err(format!("rate_hz = {}: give 1 to 1e6 samples a second", self.rate_hz));
-        }
-        if !(0.0..=90.0).contains(&self.off_percent) {
-            return Err(format!("off_percent = {}: give 0 to 90", self.off_percent));
-        }
+    /// The first key that is wrong, and what it may be.
+    pub fn validate(&self, joints: usize) -> Result<(), StudyError> {
+        Expected::Range(1.0, 1e6).check("rate_hz", self.rate_hz)?;
+        Expected::Range(0.0, 90.0).check("off_percent", self.off_percent)?;
         for (what, values) in
             [("viscous", &self.viscous), ("coulomb", &self.coulomb), ("drive_inertia", &self.drive_inertia)]
         {
-            values
-                .values(what, joints, "give zero or a finite positive number", |x| x >= 0.0 && x.is_finite())
-                .map_err(said)?;
+            values.values(what, joints, "give zero or a finite positive number", |x| x >= 0.0 && x.is_finite())?;
         }
-        self.offset.values("offset", joints, "give a finite number", f64::is_finite).map_err(said)?;
-        self.loop_settings(None).validate(joints).map_err(said)
+        self.offset.values("offset", joints, "give a finite number", f64::is_finite)?;
+        Ok(self.loop_settings(None).validate(joints)?)
     }
 
     /// How runs are made, with the effort limits of `model`.
@@ -140,22 +135,22 @@ impl SimulationSection {
     /// The robot that a robot's description becomes.
     ///
     /// # Errors
-    /// In words: numbers that do not fit, bodies without inertials, laws without a parameter, a robot that cannot be
+    /// Numbers that do not fit, bodies without inertials, laws without a parameter, a robot that cannot be
     /// simulated.
-    pub fn truth(&self, robot: &StudyRobot) -> Result<SimulatedTruth, String> {
+    pub fn truth(&self, robot: &StudyRobot) -> Result<SimulatedTruth, StudyError> {
         let described = robot.model();
         self.validate(described.dof())?;
         let unknown = described.bodies_without_prior();
         if !unknown.is_empty() {
-            return Err(format!("the description has no inertial of {}: a simulation needs them", unknown.join(", ")));
+            let fix = "a simulation needs them: give them in the description";
+            return Err(StudyError::NoInertials { bodies: unknown.into_iter().map(str::to_owned).collect(), fix });
         }
-        let said = |error: SimulationError| error.to_string();
         let bodies = self.bodies(described);
-        let model = described.with_inertials(&bodies).map_err(|error| error.to_string())?;
-        let model = with_length_errors(&model, self.length_std_m, self.angle_std_rad, self.seed).map_err(said)?;
+        let model = described.with_inertials(&bodies)?;
+        let model = with_length_errors(&model, self.length_std_m, self.angle_std_rad, self.seed)?;
         let symbols: Vec<String> = robot.terms().iter().map(TorqueTerm::symbol).collect();
         if let Some(other) = self.terms.keys().find(|symbol| !symbols.contains(symbol)) {
-            return Err(format!("laws.{other}: [drive] has no such law; it has {}", symbols.join(", ")));
+            return Err(StudyError::Unknown { key: "laws", what: "law", name: other.clone(), known: symbols });
         }
         let term_parameters = robot
             .terms()
@@ -176,13 +171,15 @@ impl SimulationSection {
                     ) => None,
                 });
                 let value = self.terms.get(symbol).copied().or(by_kind);
-                value.ok_or_else(|| format!("laws: say what {symbol} is ({symbol} = ...)"))
+                value.ok_or_else(|| {
+                    StudyError::missing(format!("laws.{symbol}"), format!("give its value, {symbol} = ..."))
+                })
             })
-            .collect::<Result<Vec<f64>, _>>()?;
+            .collect::<Result<Vec<f64>, StudyError>>()?;
         let mut parameters = model.parameter_vector();
         parameters.extend_from_slice(&term_parameters);
-        let plant = Plant::new(&model, robot.terms(), &term_parameters).map_err(said)?;
-        let simulated = SimulatedRobot::new(plant, self.loop_settings(Some(described))).map_err(said)?;
+        let plant = Plant::new(&model, robot.terms(), &term_parameters)?;
+        let simulated = SimulatedRobot::new(plant, self.loop_settings(Some(described)))?;
         let base_values = robot.base().values(&parameters);
         Ok(SimulatedTruth { robot: simulated, model, parameters, base_values })
     }

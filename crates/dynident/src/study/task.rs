@@ -4,7 +4,7 @@
 use super::friction::FrictionChoice;
 use super::robot_model::drive_choice;
 use super::{Folders, Study, StudyRobot};
-use crate::error::Error;
+use crate::error::{Error, StudyError};
 use dynident_identification::estimators::SimulatedLoopSettings;
 use dynident_identification::friction::FrictionSearch;
 use dynident_identification::payload::Payload;
@@ -19,11 +19,20 @@ impl Study {
     /// # Errors
     /// Files that are in none of the study's folders, a controller or a commanded motion that does not fit the robot.
     pub fn task(&self, path: &Path, robot: &StudyRobot, folders: &Folders) -> Result<IdentificationTask, Error> {
+        self.task_with(self.settings(path, robot)?, robot, folders)
+    }
+
+    /// The same with settings that are made already.
+    pub(crate) fn task_with(
+        &self,
+        settings: IdentificationSettings,
+        robot: &StudyRobot,
+        folders: &Folders,
+    ) -> Result<IdentificationTask, Error> {
         let files = self.log_files(folders)?;
         let recordings = self.recordings(robot, folders, &files)?;
         let mut task = IdentificationTask::new(robot.parametric.clone(), recordings);
-        task.payloads = self.payloads();
-        task.settings = self.settings(path, robot)?;
+        (task.payloads, task.settings) = (self.payloads(), settings);
         Ok(task)
     }
 
@@ -113,18 +122,21 @@ impl Study {
     /// The experiment of estimators that simulate the closed loop: `[controller]`, `[simulation]` and
     /// `[estimator.simulated]`.
     fn simulated_loop(&self, path: &Path, robot: &StudyRobot) -> Result<SimulatedLoopSettings, Error> {
-        let method = self.estimator.method.name();
-        let wrong = |message: String| Error::Method { path: path.to_owned(), method, message };
+        let method = format!("estimator.method = \"{}\"", self.estimator.method.name());
         let Some(controller) = &self.controller else {
-            return Err(wrong(
-                "say which controller drove the robot in [controller] (kind and gains); where it is not known, take method = \"instrumental\""
-                    .to_owned(),
-            ));
+            let fix = "it needs the controller that drove the robot, [controller] (kind and gains); where it is not known, take method = \"instrumental\"";
+            return Err(Error::study(path)(StudyError::conflict(method, fix)));
         };
         let dof = robot.model().dof();
-        controller.validate(dof).map_err(|error| wrong(format!("[controller]: {error}")))?;
+        controller
+            .validate(dof)
+            .map_err(StudyError::at(format!("{method}: [controller]")))
+            .map_err(Error::study(path))?;
         let simulation = self.simulation.clone().unwrap_or_default();
-        simulation.validate(dof).map_err(|error| wrong(format!("[simulation]: {error}")))?;
+        simulation
+            .validate(dof)
+            .map_err(StudyError::at(format!("{method}: [simulation]")))
+            .map_err(Error::study(path))?;
         let section = &self.estimator.simulated;
         Ok(SimulatedLoopSettings {
             controller: controller.clone(),

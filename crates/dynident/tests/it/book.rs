@@ -59,7 +59,12 @@ fn blocks(page: &str, text: &str) -> Vec<Block> {
 fn read(kind: &str, rest: &[&str], text: &str) -> Result<(), String> {
     let error = |error: &dyn std::fmt::Display| error.to_string();
     match kind {
-        "study" => Study::parse(text, Path::new("study.toml")).map(|_| ()).map_err(|e| error(&e)),
+        "study" => {
+            let value = toml::from_str(text).map_err(|e| error(&e))?;
+            let differences = dynident_testing::schema::differences("study", &value);
+            Study::parse(text, Path::new("study.toml")).map_err(|e| error(&e))?;
+            if differences.is_empty() { Ok(()) } else { Err(differences.join("; ")) }
+        }
         "dh" => dynident_model::read_dh(text).map(|_| ()).map_err(|e| error(&e)),
         "log-format" => {
             let count = rest.iter().find_map(|word| word.strip_prefix("joints-")).and_then(|n| n.parse().ok());

@@ -130,18 +130,18 @@ fn legs_that_make_no_sense_are_refused_with_the_place() {
     let text = std::fs::read_to_string(&path).unwrap();
     let out = tempfile::tempdir().unwrap();
     for (from, to, what) in [
-        ("hold = { joint1 = 0.0 }", "hold = { elbow = 0.0 }", "leg 1: there is no joint elbow"),
-        ("hold = { joint2 = 0.0 }", "hold = { joint1 = 0.0, joint2 = 0.0 }", "leg 2: all joints are held"),
+        ("hold = { joint1 = 0.0 }", "hold = { elbow = 0.0 }", "leg 1: hold: there is no joint `elbow`"),
+        ("hold = { joint2 = 0.0 }", "hold = { joint1 = 0.0, joint2 = 0.0 }", "leg 2: hold: all joints are held"),
         ("hold = { joint1 = 0.0 }", "hold = { joint1 = nan }", "leg 1: hold.joint1 = NaN"),
         (
             "hold = { joint1 = 0.0 }",
             "hold = { joint1 = 0.0 }\nwindows = { joint1 = [[0.0, 1.0]] }",
-            "leg 1: joint joint1 is held",
+            "leg 1: windows: joint `joint1` is held",
         ),
         (
             "hold = { joint1 = 0.0 }",
             "hold = { joint1 = 0.0 }\ntrajectory = \"a.csv\"\ndesign = {}",
-            "leg 1: give a trajectory or a design",
+            "leg 1: trajectory and design are both given",
         ),
     ] {
         let study: Study = toml::from_str(&text.replace(from, to)).unwrap();

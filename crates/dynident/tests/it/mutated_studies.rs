@@ -1,7 +1,7 @@
 //! A good study with bytes changed at random: every one is read or refused with its place, and none brings anything
 //! down.
 use crate::common::repository;
-use dynident::{Folders, Study, StudyRobot};
+use dynident::{Error, Expected, Folders, Study, StudyError, StudyRobot};
 use proptest::prelude::*;
 use std::path::Path;
 
@@ -119,4 +119,14 @@ proptest! {
         let (from, to) = places[which.index(places.len())];
         try_whole(&format!("{}{number}{}", &STUDY[..from], &STUDY[to..]));
     }
+}
+
+#[test]
+fn a_refused_number_is_there_as_data() {
+    let text = "[robot]\nfile = \"arm.urdf\"\n[drive]\nlaws = [{ law = \"stribeck\", speed = -1.0, exponent = 2.0 }]\n";
+    let Error::Study { source, .. } = Study::parse(text, Path::new("study.toml")).unwrap_err() else { panic!() };
+    let StudyError::At { place, source } = *source else { panic!() };
+    let StudyError::Number { key, value, expected: Expected::Range(least, greatest) } = *source else { panic!() };
+    assert_eq!((&place[..], &key[..], value), ("drive.laws number 1", "speed", -1.0));
+    assert!(least > 0.0 && greatest > least);
 }

@@ -1,10 +1,9 @@
-//! Files that jobs write: read back as they were written, older ones too, and no key renamed.
+//! Files that jobs write: read back as they were written, older ones too, and as their schemas say.
 
 use crate::common::{assert_reads_back, repository};
 use dynident::result::{LimitReport, RobotFault, RobotStatus};
 use dynident::{Error, ResultFile, RunOptions, Silent, Study, identify, inspect};
 use serde_json::Value;
-use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::LazyLock;
 
@@ -15,38 +14,6 @@ static EXAMPLE: LazyLock<ResultFile> = LazyLock::new(|| {
     let options = RunOptions { data: None, threads: 2, progress: &Silent };
     identify(&study, &path, &options).unwrap().result
 });
-
-/// Every path of keys, entries of a list alike.
-fn key_paths(value: &Value, path: &str, paths: &mut BTreeSet<String>) {
-    match value {
-        Value::Object(entries) => {
-            for (key, value) in entries {
-                let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
-                paths.insert(path.clone());
-                key_paths(value, &path, paths);
-            }
-        }
-        Value::Array(values) => values.iter().for_each(|value| key_paths(value, &format!("{path}[]"), paths)),
-        _ => {}
-    }
-}
-
-#[test]
-fn keys_of_a_result_are_those_of_the_list() {
-    let mut found = BTreeSet::new();
-    key_paths(&serde_json::to_value(&*EXAMPLE).unwrap(), "", &mut found);
-    let list = repository("crates/dynident/tests/it/result_keys.txt");
-    if std::env::var_os("DYNIDENT_WRITE_KEYS").is_some() {
-        let lines: Vec<&str> = found.iter().map(String::as_str).collect();
-        std::fs::write(&list, lines.join("\n") + "\n").unwrap();
-    }
-    let listed = std::fs::read_to_string(list).unwrap();
-    let listed: BTreeSet<&str> = listed.lines().collect();
-    let lost: Vec<&&str> = listed.iter().filter(|key| !found.contains(**key)).collect();
-    let new: Vec<&String> = found.iter().filter(|key| !listed.contains(key.as_str())).collect();
-    assert!(lost.is_empty(), "keys are added, never renamed, within a version; these are gone: {lost:?}");
-    assert!(new.is_empty(), "add to result_keys.txt (DYNIDENT_WRITE_KEYS=1 writes it): {new:?}");
-}
 
 #[test]
 fn a_result_and_an_inspection_read_back() {
@@ -64,6 +31,26 @@ fn a_robot_that_failed_and_a_motion_that_is_not_finite_read_back() {
     let read: LimitReport = serde_json::from_str(report).unwrap();
     assert!(read.worst_ratio == f64::INFINITY);
     assert_reads_back(&read);
+}
+
+#[test]
+fn another_key_and_another_type_differ_from_the_schema() {
+    let value = serde_json::to_value(&*EXAMPLE).unwrap();
+    let differences = |change: &dyn Fn(&mut Value)| {
+        let mut changed = value.clone();
+        change(&mut changed);
+        dynident_testing::schema::differences("result", &changed)
+    };
+    assert_eq!(differences(&|_| {}), [""; 0]);
+    let renamed = differences(&|value| {
+        let first = value["base_parameters"][0].as_object_mut().unwrap();
+        let std = first.remove("std").unwrap();
+        first.insert("sigma".to_owned(), std);
+    });
+    assert_eq!(renamed, [".base_parameters[0].std: missing", ".base_parameters[0].sigma: not in the schema"]);
+    assert_eq!(differences(&|value| value["training"]["samples"] = "many".into()).len(), 1);
+    assert_eq!(differences(&|value| value["robot"]["gravity_m_s2"] = vec![0.0, 9.81].into()).len(), 1);
+    assert_eq!(differences(&|value| value["timings_s"] = Value::Null).len(), 1);
 }
 
 fn read(value: &Value, folder: &Path) -> Result<ResultFile, Error> {

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 /// Which distance from the prior body counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum PhysicalPrior {
     /// `tr(P0⁻¹P) − ln det(P0⁻¹P) − 4`: the log-det Bregman divergence, four times the Kullback-Leibler divergence

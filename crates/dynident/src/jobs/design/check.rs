@@ -5,7 +5,7 @@ use super::limit_check::LimitCheck;
 use super::outcome::{MotionOrigin, MotionReview};
 use super::setup::{DesignSetup, MotionInformation};
 use super::{DesignOutcome, table};
-use crate::error::Error;
+use crate::error::{Error, StudyError};
 use crate::jobs::options::RunOptions;
 use crate::study::{Folders, Study, StudyRobot};
 use dynident_excitation::check::CHECK_RATE_HZ;
@@ -74,7 +74,7 @@ pub fn check_log(
     options: &RunOptions<'_>,
 ) -> Result<DesignOutcome, Error> {
     study.require_log(study_path)?;
-    let index = log_called(study, name).map_err(|message| Error::study(study_path, message))?;
+    let index = log_called(study, name).map_err(Error::study(study_path))?;
     let mut setup = DesignSetup::for_check(study, study_path, options)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let file = folders.find(&study.log[index].file, study.source.as_deref())?;
@@ -105,20 +105,17 @@ pub fn check_log(
 }
 
 /// Which log is meant: by its name in reports, or by its file.
-fn log_called(study: &Study, name: &str) -> Result<usize, String> {
+fn log_called(study: &Study, name: &str) -> Result<usize, StudyError> {
     let all: Vec<usize> = (0..study.log.len()).collect();
     let mut called: Vec<usize> = all.iter().copied().filter(|&index| study.log_name(index) == name).collect();
     if called.is_empty() {
         called = all.iter().copied().filter(|&index| study.log[index].file == Path::new(name)).collect();
     }
-    let names = || all.iter().map(|&index| format!("`{}`", study.log_name(index))).collect::<Vec<_>>().join(", ");
-    match called[..] {
-        [index] => Ok(index),
-        [] => Err(format!("no log is called `{name}`: the study's logs are {}", names())),
-        _ => {
-            Err(format!("{} logs are called `{name}`: give each a name of its own; they are {}", called.len(), names()))
-        }
+    if let [index] = called[..] {
+        return Ok(index);
     }
+    let known = all.iter().map(|&index| study.log_name(index)).collect();
+    Err(StudyError::LogName { name: name.to_owned(), found: called.len(), known })
 }
 
 /// The uninterrupted pieces of a log as motions in the model's order of joints, and the log's rate.
@@ -131,16 +128,17 @@ fn pieces(
 ) -> Result<(Vec<Given>, f64), Error> {
     let log = study.log_name(index);
     let failed = |source| Error::recording(&log, source);
-    let in_study = |error| Error::identification(study_path, error);
     let recording = study.recording(robot, folders, index, file)?;
     let mut settings = IdentificationSettings::default();
     settings.motion = study.motion.clone();
     let execution = Execution::default();
     let (model, alone) = (robot.model(), core::slice::from_ref(&recording));
-    let motion = Logs::new(model, alone, settings.filters(), &[0], None, execution).map_err(in_study)?.motion;
-    let places = recording.places(model).map_err(in_study)?;
-    let Some(mut stream) = recording.open(model, &motion).map_err(in_study)? else {
-        return Err(Error::study(study_path, format!("log `{log}` has no samples")));
+    let motion = Logs::new(model, alone, settings.filters(), &[0], None, execution)
+        .map_err(Error::identification(study_path))?
+        .motion;
+    let places = recording.places(model).map_err(Error::identification(study_path))?;
+    let Some(mut stream) = recording.open(model, &motion).map_err(Error::identification(study_path))? else {
+        return Err(Error::study(study_path)(StudyError::missing(format!("log `{log}`"), "it has no samples")));
     };
     let rate_hz = stream.rate_hz();
     // By piece: for q, dq, ddq and each joint of the model its samples.

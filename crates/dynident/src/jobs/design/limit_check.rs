@@ -36,7 +36,7 @@ impl LimitCheck {
         motion_at: &dyn Fn(&[f64], &mut Motion),
     ) -> Result<Self, Error> {
         let reports = check_limits(&setup.limits, setup.robot.model(), duration_s, rate_hz, motion_at)
-            .map_err(|why| Error::study(study_path, format!("[design.limits]: {why}")))?;
+            .map_err(Error::section(study_path, "design.limits"))?;
         let broken = reports.iter().any(|report| report.violated);
         let diagnosis = if broken { sentences(&setup.set, duration_s, &reports, motion_at) } else { Vec::new() };
         Ok(Self { reports, rate_hz, of, diagnosis })

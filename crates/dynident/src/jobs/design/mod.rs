@@ -44,18 +44,17 @@ pub fn design_study(
     options: &RunOptions<'_>,
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
 ) -> Result<DesignOutcome, Error> {
-    let wrong = |part: &str, why: &dyn core::fmt::Display| Error::study(study_path, format!("[{part}]: {why}"));
     let mut setup = DesignSetup::for_search(study, study_path, options)?;
 
     // The best motion of the family.
     let found = match &setup.section.criterion {
         CriterionChoice::WindowedCondition(windowed) => {
             let found = step_wise(&setup.section, windowed, &setup.robot, &setup.limits, watch)
-                .map_err(|why| wrong("design", &why))?;
+                .map_err(Error::section(study_path, "design"))?;
             setup.notes.push(WINDOWED.to_owned());
             found
         }
-        _ => search(&setup, &wrong, watch)?,
+        _ => search(&setup, study_path, watch)?,
     };
 
     // Its limits, by a check that shares nothing with the search, and what it determines.

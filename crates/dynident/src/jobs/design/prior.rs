@@ -1,6 +1,6 @@
 //! The information that `[design.prior]` stands for.
 
-use crate::error::Error;
+use crate::error::{Error, StudyError};
 use crate::result::BaseParameterResult;
 use crate::result::stored::read_part;
 use crate::study::{Folders, PriorSection, StudyRobot};
@@ -33,6 +33,7 @@ pub(super) fn information(
     folders: &Folders,
     notes: &mut Vec<String>,
 ) -> Result<Option<DMatrix<f64>>, Error> {
+    let wrong = Error::section(study_path, "design.prior");
     let mut total: Option<DMatrix<f64>> = None;
     let mut add = |information: DMatrix<f64>| {
         total = Some(total.take().map_or_else(|| information.clone(), |sum| sum + &information));
@@ -45,15 +46,15 @@ pub(super) fn information(
     if let Some(percent) = section.cad_std_percent {
         let unknown = robot.model().bodies_without_prior();
         if !unknown.is_empty() {
-            let message = format!(
-                "[design.prior]: cad_std_percent, but the inertial parameters of {} are unknown: give them in the description, or leave cad_std_percent out",
-                unknown.join(", ")
-            );
-            return Err(Error::study(study_path, message));
+            let fix = "give them in the description, or leave cad_std_percent out";
+            return Err(wrong(StudyError::NoInertials {
+                bodies: unknown.into_iter().map(str::to_owned).collect(),
+                fix,
+            }));
         }
         let covariance = cad_covariance(robot, percent / 100.0);
-        add(inverse(&covariance)
-            .ok_or_else(|| Error::study(study_path, "[design.prior]: cad_std_percent is too small".to_owned()))?);
+        let too_small = || wrong(StudyError::conflict("cad_std_percent", "it is too small: give a larger one"));
+        add(inverse(&covariance).ok_or_else(too_small)?);
         notes.push(format!("prior: the description's inertial parameters, good to {percent} % each"));
     }
     Ok(total)

@@ -1,13 +1,14 @@
 //! The search for the motion that a study asks for.
 
 use super::setup::DesignSetup;
-use crate::error::Error;
+use crate::error::{Error, StudyError};
 use crate::result::WindowedFile;
 use core::ops::ControlFlow;
 use dynident_excitation::criteria::Criterion;
 use dynident_excitation::families::StartingAt;
 use dynident_excitation::optimisers::{Generation, OptimiserError};
 use dynident_excitation::{DesignProgress, DesignTask, Family, design, design_without_gradients};
+use std::path::Path;
 
 /// The displacement, rad or m, that every joint must at least have the time for.
 const LEAST_DISPLACEMENT: f64 = 0.05;
@@ -35,18 +36,21 @@ pub(super) struct SearchResult {
 /// The search for the ordinary problem: all joints at once, by gradients or without.
 pub(super) fn search(
     setup: &DesignSetup,
-    wrong: &dyn Fn(&str, &dyn core::fmt::Display) -> Error,
+    study_path: &Path,
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
 ) -> Result<SearchResult, Error> {
     let DesignSetup { section, robot, limits, set, .. } = setup;
     let model = robot.model();
-    limits.check_duration(model, section.duration_s, LEAST_DISPLACEMENT).map_err(|why| wrong("design.limits", &why))?;
-    let mut family =
-        section.family.family(model.dof(), section.duration_s).map_err(|why| wrong("design.family", &why))?;
+    limits
+        .check_duration(model, section.duration_s, LEAST_DISPLACEMENT)
+        .map_err(Error::section(study_path, "design.limits"))?;
+    let family = section.family.family(model.dof(), section.duration_s);
+    let mut family = family.map_err(Error::section(study_path, "design.family"))?;
     let mut start_posture = Vec::new();
     if let Some(start) = &section.start_posture {
-        start_posture = start.of_joints(model, limits).map_err(|why| wrong("design", &why))?;
-        family = Box::new(StartingAt::new(family, start_posture.clone()).map_err(|why| wrong("design", &why))?);
+        start_posture = start.of_joints(model, limits).map_err(Error::section(study_path, "design"))?;
+        let starting = StartingAt::new(family, start_posture.clone());
+        family = Box::new(starting.map_err(Error::section(study_path, "design"))?);
     }
     let criteria: Vec<&dyn Criterion> = setup.criteria.iter().map(|criterion| &**criterion).collect();
     let task = DesignTask {
@@ -62,11 +66,11 @@ pub(super) fn search(
         None => design(&task, &section.search, watch).map(|best| (best, Vec::new())),
     }
     .map_err(|why| match why {
-        OptimiserError::Start => wrong(
-            "design.family",
-            &"no motion of this family excites every parameter, or none can be computed: take a richer family, join it with another, or give [design.prior]",
-        ),
-        why => wrong("design", &why),
+        OptimiserError::Start => Error::section(study_path, "design.family")(StudyError::missing(
+            "no motion of this family excites every parameter, or none can be computed",
+            "take a richer family, join it with another, or give [design.prior]",
+        )),
+        why => Error::section(study_path, "design")(why),
     })?;
     Ok(SearchResult {
         parameters: best.parameters,

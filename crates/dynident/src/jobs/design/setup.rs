@@ -2,7 +2,7 @@
 
 use super::outcome::Stopwatch;
 use super::{prior, table};
-use crate::error::Error;
+use crate::error::{Error, StudyError};
 use crate::jobs::options::{RunOptions, study_name};
 use crate::study::{CoulombChoice, CriterionChoice, DesignSection, Folders, Study, StudyRobot, TorqueNoise};
 use dynident_excitation::criteria::{Criterion, DOptimal, Prediction};
@@ -42,8 +42,7 @@ impl DesignSetup {
     pub(super) fn for_search(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Self, Error> {
         let mut notes = Vec::new();
         let setup = Self::new(&smooth(study, &mut notes), study_path, options, notes)?;
-        bounded(&setup.robot, &setup.limits)
-            .map_err(|why| Error::study(study_path, format!("[design.limits]: {why}")))?;
+        bounded(&setup.robot, &setup.limits).map_err(Error::section(study_path, "design.limits"))?;
         Ok(setup)
     }
 
@@ -55,13 +54,12 @@ impl DesignSetup {
     fn new(study: &Study, study_path: &Path, options: &RunOptions<'_>, mut notes: Vec<String>) -> Result<Self, Error> {
         let stopwatch = Stopwatch::start();
         let section = study.design.clone().unwrap_or_default();
-        let wrong = |part: &str, why: &dyn core::fmt::Display| Error::study(study_path, format!("[{part}]: {why}"));
-        section.validate().map_err(|why| wrong("design", &why))?;
+        section.validate().map_err(Error::section(study_path, "design"))?;
         let folders = Folders::new(study, study_path, options.data.as_deref());
         let robot = StudyRobot::new(study, study_path, &folders)?;
         let limits = Limits::from_model(robot.model()).overlaid(&section.limits);
-        let set = LimitSet::new(&limits, robot.model()).map_err(|why| wrong("design.limits", &why))?;
-        let torque_std_nm = torque_std(&section, &robot, &mut notes).map_err(|why| wrong("design", &why))?;
+        let set = LimitSet::new(&limits, robot.model()).map_err(Error::section(study_path, "design.limits"))?;
+        let torque_std_nm = torque_std(&section, &robot, &mut notes).map_err(Error::section(study_path, "design"))?;
         let prior = prior::information(&section.prior, &robot, study_path, &folders, &mut notes)?;
         let criteria = match &section.criterion {
             CriterionChoice::Prediction { trajectory } => {
@@ -158,31 +156,28 @@ fn smooth(study: &Study, notes: &mut Vec<String>) -> Study {
 }
 
 /// That something bounds how fast each joint moves: without it the best motion is infinitely fast.
-fn bounded(robot: &StudyRobot, limits: &Limits) -> Result<(), String> {
+fn bounded(robot: &StudyRobot, limits: &Limits) -> Result<(), StudyError> {
     for joint in robot.model().joints() {
         let free = limits.of(&joint.name).is_none_or(|limit| {
             let rates = [limit.speed, limit.acceleration, limit.jerk, limit.torque, limit.power_w];
             rates.iter().all(Option::is_none)
         });
         if free {
-            return Err(format!(
-                "joint `{0}` has no limit of speed, acceleration, jerk, torque or power, so that the best motion would be infinitely fast; \
-                 give one: joints = [{{ joint = \"{0}\", acceleration = ... }}]",
-                joint.name
-            ));
+            return Err(StudyError::Unbounded { joint: joint.name.clone() });
         }
     }
     Ok(())
 }
 
 /// Torque noise of every joint.
-fn torque_std(section: &DesignSection, robot: &StudyRobot, notes: &mut Vec<String>) -> Result<Vec<f64>, String> {
+fn torque_std(section: &DesignSection, robot: &StudyRobot, notes: &mut Vec<String>) -> Result<Vec<f64>, StudyError> {
     let joints = robot.model().joints();
     match &section.torque_std_nm {
         Some(TorqueNoise::Same(std)) => Ok(vec![*std; joints.len()]),
         Some(TorqueNoise::Each(stds)) if stds.len() == joints.len() => Ok(stds.clone()),
         Some(TorqueNoise::Each(stds)) => {
-            Err(format!("torque_std_nm has {} entries, the robot {} joints: give one each", stds.len(), joints.len()))
+            let (found, expected) = (stds.len(), joints.len());
+            Err(StudyError::Length { key: "torque_std_nm", found, expected })
         }
         None => {
             notes.push(

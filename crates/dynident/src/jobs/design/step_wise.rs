@@ -1,6 +1,7 @@
 //! The paper's criterion over windows as a study asks for it, solved by any optimiser, with the optimum beside it.
 
 use super::search::SearchResult;
+use crate::error::{Expected, StudyError};
 use crate::result::{StrokeFile, StrokeLimitFile, WindowedFile};
 use crate::study::{DesignSection, FamilyChoice, GivenStroke, OptimiserChoice, StudyRobot, WindowedCondition};
 use core::ops::ControlFlow;
@@ -26,30 +27,28 @@ pub(crate) fn step_wise(
     robot: &StudyRobot,
     limits: &Limits,
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
-) -> Result<SearchResult, String> {
+) -> Result<SearchResult, StudyError> {
+    // The problem: constants of every joint.
     let begun = Instant::now();
     let FamilyChoice::SplicedLogistic(settings) = &section.family else {
-        return Err(format!(
-            "criterion windowed-condition is for family = {{ kind = \"spliced-logistic\" }}, whose strokes have mid-points; this one is {}",
-            section.family.name()
-        ));
+        let fix = "the criterion windowed-condition is for kind = \"spliced-logistic\", whose strokes have mid-points";
+        return Err(StudyError::conflict(format!("family.kind = \"{}\"", section.family.name()), fix));
     };
     if settings.periods_s.is_some() {
-        return Err(
-            "family.periods_s: with windowed-condition each period follows from period_times_omega; leave it out"
-                .to_owned(),
-        );
+        let fix = "with windowed-condition each period follows from period_times_omega; leave it out";
+        return Err(StudyError::conflict("family.periods_s", fix));
     }
     let dof = robot.model().dof();
-    settings.validate(dof, section.duration_s).map_err(|error| error.to_string())?;
+    settings.validate(dof, section.duration_s)?;
     let offsets = settings.offsets.clone().unwrap_or_else(|| vec![0.0; dof]);
     let names: Vec<String> = match &windowed.joints {
         Some(joints) => joints.clone(),
         None => robot.model().joints().iter().rev().map(|joint| joint.name.clone()).collect(),
     };
     let problem = problem(section, windowed, robot, limits, settings, &offsets, &names)?;
-    problem.validate().map_err(|error| error.to_string())?;
+    problem.validate()?;
 
+    // What the study's optimiser finds, or the strokes that the study gives.
     let seed = section.search.seed;
     let late = || section.search.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > limit);
     let stop = |round: &'static str, progress: &Progress<'_>| {
@@ -63,7 +62,7 @@ pub(crate) fn step_wise(
     };
     // The optimum stands beside every design: it takes a tenth of a second.
     let optimum = problem.gradient_solution(seed, STARTS, |_| ControlFlow::Continue(()));
-    let (optimum, gradient_evaluations) = optimum.map_err(|error| error.to_string())?;
+    let (optimum, gradient_evaluations) = optimum?;
     let bounds = problem.bounds();
     let mut history = Vec::new();
     let (x, evaluations, optimiser) = if section.parameters.is_empty() {
@@ -73,7 +72,7 @@ pub(crate) fn step_wise(
                 let own = BinaryGeneticSettings { seed, ..own.clone() };
                 let mut hear = |progress: &Progress<'_>| stop("generations", progress);
                 let result = binary_genetic(|x| problem.fitness(x), &bounds, &own, &mut hear);
-                let result = result.map_err(|error| format!("optimiser: {error}"))?;
+                let result = result.map_err(StudyError::at("optimiser"))?;
                 history = result.history;
                 (result.best, result.evaluations, section.optimiser.name())
             }
@@ -87,7 +86,7 @@ pub(crate) fn step_wise(
                     stop("generations", progress)
                 };
                 let result = cma_es(|x| problem.graded_fitness(x), &start, &steps, &bounds, &own, &mut hear);
-                let result = result.map_err(|error| format!("optimiser: {error}"))?;
+                let result = result.map_err(StudyError::at("optimiser"))?;
                 (result.best, result.evaluations, section.optimiser.name())
             }
         }
@@ -95,6 +94,7 @@ pub(crate) fn step_wise(
         (given(&section.parameters, &names)?, 0, "given")
     };
 
+    // The motion, and the file's account of it.
     let strokes = problem.strokes(&x);
     let files_of = |x: &[f64]| stroke_files(&problem, &problem.strokes(x), settings, &offsets, robot);
     let condition_sum = problem.condition_numbers(&strokes).iter().sum();
@@ -110,7 +110,7 @@ pub(crate) fn step_wise(
             period_s: settings.period_times_omega / stroke.steepness_per_s,
         })
         .collect();
-    let family = StepWiseLogistic::new(&offsets, &steps, settings).map_err(|error| error.to_string())?;
+    let family = StepWiseLogistic::new(&offsets, &steps, settings)?;
     let parameters = strokes.iter().flat_map(|stroke| [stroke.amplitude_rad, stroke.steepness_per_s]).collect();
     let file = WindowedFile {
         problem: windowed.problem,
@@ -144,26 +144,28 @@ fn problem(
     settings: &SplicedLogisticSettings,
     offsets: &[f64],
     names: &[String],
-) -> Result<StepWiseProblem, String> {
+) -> Result<StepWiseProblem, StudyError> {
     let model = robot.model();
     let mut joints = Vec::with_capacity(names.len());
     for (place, name) in names.iter().enumerate() {
-        let joint =
-            model.joint_index(name).ok_or_else(|| format!("criterion.joints: the robot has no joint `{name}`"))?;
+        let joint = model.joint_index(name).ok_or_else(|| StudyError::Unknown {
+            key: "criterion.joints",
+            what: "joint",
+            name: name.clone(),
+            known: robot.parametric.joint_names(),
+        })?;
         if names[..place].contains(name) {
-            return Err(format!("criterion.joints: `{name}` stands twice: name it once"));
+            let what = "criterion.joints:".to_owned();
+            return Err(StudyError::Twice { what, name: name.clone(), fix: "name it once" });
         }
-        let gravity = gravity_across(model, joint, offsets).map_err(|error| format!("criterion.joints: {error}"))?;
-        let missing =
-            |what: &str| format!("joint `{name}` has no {what} limit, which a stroke needs: give one in limits.joints");
+        let gravity = gravity_across(model, joint, offsets).map_err(StudyError::at("criterion.joints"))?;
+        let missing = |limit| StudyError::NoStrokeLimit { joint: name.clone(), limit };
         let limit = limits.of(name).ok_or_else(|| missing("speed or acceleration"))?;
         let h = offsets[joint];
         let reach = match limit.position {
             Some([lower, upper]) if lower <= h && h < upper => upper - h,
-            Some([lower, upper]) => {
-                return Err(format!(
-                    "family.offsets: joint `{name}` starts its stroke at {h} rad, but may go from {lower} to {upper} only; the stroke goes up from its offset"
-                ));
+            Some(limits_rad) => {
+                return Err(StudyError::StrokeStart { joint: name.clone(), offset_rad: h, limits_rad });
             }
             None => FREE_RAD,
         };
@@ -183,30 +185,29 @@ fn problem(
         joints.push(StepWiseJoint { joint, constants });
     }
     if joints.is_empty() {
-        return Err("criterion.joints is empty: name the joints that move, or leave it out for all".to_owned());
+        return Err(StudyError::conflict("criterion.joints", "name the joints that move, or leave it out for all"));
     }
     Ok(StepWiseProblem { joints })
 }
 
 /// The vector of given strokes.
-fn given(strokes: &[GivenStroke], names: &[String]) -> Result<Vec<f64>, String> {
+fn given(strokes: &[GivenStroke], names: &[String]) -> Result<Vec<f64>, StudyError> {
     if let Some(stroke) = strokes.iter().find(|stroke| !names.contains(&stroke.joint)) {
-        return Err(format!("parameters: `{}` is not among the joints that move: {}", stroke.joint, names.join(", ")));
+        let (what, name, known) = ("joint that moves", stroke.joint.clone(), names.to_vec());
+        return Err(StudyError::Unknown { key: "parameters", what, name, known });
     }
     let mut x = Vec::with_capacity(3 * names.len());
     for name in names {
         let mut own = strokes.iter().filter(|stroke| stroke.joint == *name);
         let (Some(stroke), None) = (own.next(), own.next()) else {
-            return Err(format!("parameters: give one stroke for joint `{name}`"));
+            return Err(StudyError::missing("parameters", format!("give one stroke for joint `{name}`")));
         };
         for (key, value) in [
             ("amplitude_rad", stroke.amplitude_rad),
             ("steepness_per_s", stroke.steepness_per_s),
             ("window_s", stroke.window_s),
         ] {
-            if !(1e-3..=1e3).contains(&value) {
-                return Err(format!("parameters: {key} = {value} of joint `{name}`: give 0.001 to 1000"));
-            }
+            Expected::Range(1e-3, 1e3).check(format!("parameters of joint `{name}`: {key}"), value)?;
             x.push(value);
         }
     }

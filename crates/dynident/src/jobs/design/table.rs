@@ -32,6 +32,8 @@ pub(crate) fn trajectory(path: &Path, joints: &[String], settings: &MotionSettin
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(file);
     let header = reader.headers().map_err(|error| broken(&error))?.clone();
     let columns = Columns::of(&header, joints).map_err(|message| wrong(1, message))?;
+
+    // The rows, one list for each joint and order of derivative.
     let (mut lines, mut times_s) = (Vec::new(), Vec::new());
     let mut groups = vec![vec![Vec::new(); joints.len()]; columns.groups.len()];
     let mut record = csv::StringRecord::new();
@@ -60,6 +62,8 @@ pub(crate) fn trajectory(path: &Path, joints: &[String], settings: &MotionSettin
     if times_s.len() < 2 {
         return Err(wrong(1, format!("{} rows: a motion needs two or more", times_s.len())));
     }
+
+    // The motion: with the table's own derivatives, if they are those of its positions, or with the differentiator's.
     let mut motion = Motion { samples: times_s.len(), joints: joints.len(), ..Motion::default() };
     let note = if groups.len() == 3 {
         disagreement(&times_s, &groups, joints).map_or(Ok(()), |(row, message)| Err(wrong(lines[row], message)))?;

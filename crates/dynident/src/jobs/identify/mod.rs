@@ -9,11 +9,10 @@ use crate::jobs::options::{RunOptions, study_name};
 use crate::result::{LogSummary, PhysicalVerdict, RESULT_SCHEMA, ResultFile, Timings, TrainingResult};
 use crate::study::{ArmSection, EstimatorMethod, Folders, Study, StudyRobot};
 use dynident_estimation::{Estimate, strongest_correlations};
-use dynident_identification::IdentificationError;
 use dynident_identification::estimators::{Findings, InstrumentSource};
 use dynident_identification::examination::{LogTrace, sign_findings};
 use dynident_identification::{
-    Identification, IdentificationTask, identify as identify_task, identify_payload,
+    Identification, IdentificationError, IdentificationTask, identify as identify_task, identify_payload,
     identify_with_instruments as identify_task_with_instruments,
 };
 use dynident_model::InertialParameters;
@@ -95,14 +94,11 @@ fn identified(
     let with_arm = arm.as_ref().map(|(_, stored)| stored.friction_of(study));
     let study = with_arm.as_ref().unwrap_or(study);
     let robot = StudyRobot::new(study, study_path, &folders)?;
-    let in_study = |error| Error::identification(study_path, error);
+    let in_study = Error::identification::<IdentificationError>(study_path);
     // Names first: no log is read for a study that is wrong.
-    study
-        .settings(study_path, &robot)?
-        .check_names(&robot.parametric)
-        .map_err(IdentificationError::Consistency)
-        .map_err(in_study)?;
-    let task = study.task(study_path, &robot, &folders)?;
+    let settings = study.settings(study_path, &robot)?;
+    settings.check_names(&robot.parametric).map_err(|error| in_study(IdentificationError::Consistency(error)))?;
+    let task = study.task_with(settings, &robot, &folders)?;
     let mut timings = Timings { robot: start.elapsed().as_secs_f64(), ..Timings::default() };
 
     // The identification itself.
@@ -115,7 +111,7 @@ fn identified(
         (_, _, Some(source)) => identify_task_with_instruments(&task, source, execution),
         _ => identify_task(&task, execution),
     };
-    let found = found.map_err(in_study)?;
+    let found = found.map_err(&in_study)?;
     timings.logs = found.times.logs_s;
     timings.estimation = found.times.estimation_s;
     timings.validation = found.times.examination_s;
@@ -128,8 +124,7 @@ fn identified(
         Ok(urdf) => (Some(urdf), None),
         Err(reason) => (None, Some(reason)),
     };
-    let training = training_result(&found, &task.recordings)
-        .map_err(|source| Error::Estimation { path: study_path.to_owned(), source })?;
+    let training = training_result(&found, &task.recordings).map_err(|error| in_study(error.into()))?;
     let parts =
         Parts { name: study_name(study, study_path), timings, verdict, no_urdf, inertials: &inertials, training };
     let result = result_file(study, &robot, &task, &found, parts);

@@ -1,7 +1,7 @@
 //! The legs of an iteration: their trajectories, stages and robots.
 
 use super::trajectory::Trajectory;
-use crate::error::Error;
+use crate::error::{Error, Expected, StudyError};
 use crate::jobs::options::RunOptions;
 use crate::study::{IterationSection, LegOrder, LegSection, RobotChoice, SimulationSection, Study, StudyRobot};
 use core::ops::ControlFlow;
@@ -58,45 +58,30 @@ impl IterationSection {
     }
 
     /// Checks names and numbers of the legs.
-    pub(super) fn check_legs(&self, robot: &StudyRobot) -> Result<(), String> {
+    pub(super) fn check_legs(&self, robot: &StudyRobot) -> Result<(), StudyError> {
         let names = robot.parametric.joint_names();
         for (number, leg) in (1..).zip(&self.leg) {
-            let at = |what: &str| format!("leg {number}: {what}");
-            if leg.trajectory.is_some() && leg.design.is_some() {
-                return Err(at("give a trajectory or a design, not both"));
-            }
-            if let Some(other) = leg.hold.keys().chain(leg.windows.keys()).find(|name| !names.contains(name)) {
-                return Err(at(&format!("there is no joint {other}; the robot has {}", names.join(", "))));
-            }
-            if let Some(both) = leg.hold.keys().find(|name| leg.windows.contains_key(*name)) {
-                return Err(at(&format!("joint {both} is held: take it out of windows or of hold")));
-            }
-            if let Some((name, value)) = leg.hold.iter().find(|(_, value)| !value.is_finite()) {
-                return Err(at(&format!("hold.{name} = {value}: give a position")));
-            }
-            if leg.hold.len() == names.len() {
-                return Err(at("all joints are held: leave one that moves"));
-            }
+            leg.check(&names).map_err(StudyError::at(format!("leg {number}")))?;
         }
         Ok(())
     }
 
     /// What is run, with held joints at rest and the times that count.
-    pub(super) fn legs(&self, trajectories: &[Trajectory], robot: &StudyRobot) -> Result<Vec<Leg>, String> {
+    pub(super) fn legs(&self, trajectories: &[Trajectory], robot: &StudyRobot) -> Result<Vec<Leg>, StudyError> {
         let names = robot.parametric.joint_names();
         let free = [LegSection::default()];
         let sections = if self.leg.is_empty() { &free[..] } else { &self.leg[..] };
         if sections.len() != trajectories.len() {
-            return Err("trajectory.json has other legs: remove it".to_owned());
+            return Err(StudyError::conflict("trajectory.json", "it has other legs: remove it"));
         }
         let mut legs = Vec::new();
         for (section, trajectory) in sections.iter().zip(trajectories) {
             let held: Vec<Option<f64>> = names.iter().map(|name| section.hold.get(name).copied()).collect();
             let trajectory = trajectory.without(&held)?;
-            let mut reference = trajectory.reference().map_err(|error| error.to_string())?;
+            let mut reference = trajectory.reference()?;
             for (joint, held) in held.iter().enumerate() {
                 if let Some(position) = held {
-                    reference = reference.with_joint_held(joint, *position).map_err(|error| error.to_string())?;
+                    reference = reference.with_joint_held(joint, *position)?;
                 }
             }
             let everything = || vec![vec![[-1.0, reference.duration_s() + 1.0]]; names.len()];
@@ -114,8 +99,7 @@ impl IterationSection {
                 None => Leg::whole(reference),
                 Some(windows) => Leg::windowed(reference, windows),
             };
-            let leg = leg.map_err(|error| error.to_string())?;
-            legs.push(leg.with_payload(section.payload.clone()));
+            legs.push(leg?.with_payload(section.payload.clone()));
         }
         Ok(legs)
     }
@@ -127,19 +111,18 @@ impl IterationSection {
         robot: &StudyRobot,
         stage: usize,
         members: &[usize],
-    ) -> Result<Vec<Box<dyn Robot>>, String> {
+    ) -> Result<Vec<Box<dyn Robot>>, StudyError> {
         let joints = robot.parametric.joint_names();
-        let said = |error: dynident_simulation::SimulationError| error.to_string();
         Ok(match &self.robot {
             RobotChoice::Process(settings) => {
-                vec![Box::new(ProcessRobot::new(settings.clone(), joints).map_err(said)?)]
+                vec![Box::new(ProcessRobot::new(settings.clone(), joints)?)]
             }
             RobotChoice::Folder(settings) => {
                 let mut settings = settings.clone();
                 if stage > 0 {
                     settings.folder = settings.folder.join(format!("leg_{}", stage + 1));
                 }
-                vec![Box::new(FolderRobot::new(settings, joints).map_err(said)?)]
+                vec![Box::new(FolderRobot::new(settings, joints)?)]
             }
             RobotChoice::Simulation => {
                 let mut simulation = simulation.clone();
@@ -152,7 +135,7 @@ impl IterationSection {
                     robots.push(Box::new(match section {
                         Some(leg) => {
                             let held: Vec<String> = leg.hold.keys().cloned().collect();
-                            robot.with_locked(&held).map_err(said)?
+                            robot.with_locked(&held)?
                         }
                         None => robot,
                     }));
@@ -160,5 +143,34 @@ impl IterationSection {
                 robots
             }
         })
+    }
+}
+
+impl LegSection {
+    /// Checks names and numbers.
+    fn check(&self, names: &[String]) -> Result<(), StudyError> {
+        if self.trajectory.is_some() && self.design.is_some() {
+            return Err(StudyError::Exclusive { keys: vec!["trajectory", "design"] });
+        }
+        for (key, mut joints) in
+            [("hold", self.hold.keys().collect::<Vec<_>>()), ("windows", self.windows.keys().collect())]
+        {
+            joints.retain(|name| !names.contains(name));
+            if let Some(&name) = joints.first() {
+                let known = names.to_vec();
+                return Err(StudyError::Unknown { key, what: "joint", name: name.clone(), known });
+            }
+        }
+        if let Some(both) = self.hold.keys().find(|name| self.windows.contains_key(*name)) {
+            let (joint, key, other) = (both.clone(), "windows", "hold");
+            return Err(StudyError::JointInBoth { joint, key, other, state: "held" });
+        }
+        for (name, position) in &self.hold {
+            Expected::Finite.check(format!("hold.{name}"), *position)?;
+        }
+        if self.hold.len() == names.len() {
+            return Err(StudyError::conflict("hold", "all joints are held: leave one that moves"));
+        }
+        Ok(())
     }
 }

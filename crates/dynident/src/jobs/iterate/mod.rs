@@ -7,7 +7,7 @@ mod trajectory;
 
 pub(super) use trajectory::Trajectory;
 
-use crate::error::Error;
+use crate::error::{Error, StudyError};
 use crate::jobs::options::RunOptions;
 use crate::output::write_whole;
 use crate::pages::iteration::{RunName, RunTrace, TimeSpent, iteration_report};
@@ -49,24 +49,27 @@ pub fn iterate_study(
     options: &RunOptions<'_>,
     watch: &mut IterationWatch<'_>,
 ) -> Result<IterationsFile, Error> {
-    let wrong = |part: &str, why: &dyn core::fmt::Display| Error::study(study_path, format!("[{part}]: {why}"));
+    let in_section = |why: StudyError| Error::section(study_path, "iteration")(why);
     let in_iteration = |error: IterationError| match error {
         IterationError::File { path, source } => Error::Output { path, source },
         IterationError::State { path, problem } => Error::Result { path, message: problem },
-        other => wrong("iteration", &other),
+        other => in_section(other.into()),
     };
+    // The study's files and settings.
     let begin = Instant::now();
     let section = study.iteration.clone().unwrap_or_default();
     let simulation = study.simulation.clone().unwrap_or_default();
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let robot = StudyRobot::new(study, study_path, &folders)?;
     let identification = study.settings(study_path, &robot)?;
-    let settings = section.settings(study, identification).map_err(|why| Error::study(study_path, why))?;
+    let settings = section.settings(study, identification).map_err(Error::study(study_path))?;
     let truth = match section.robot {
-        RobotChoice::Simulation => Some(simulation.truth(&robot).map_err(|why| wrong("simulation", &why))?),
+        RobotChoice::Simulation => Some(simulation.truth(&robot).map_err(Error::section(study_path, "simulation"))?),
         _ => None,
     };
-    section.check_legs(&robot).map_err(|why| wrong("iteration", &why))?;
+    section.check_legs(&robot).map_err(in_section)?;
+
+    // What an earlier call has left in the folder.
     let fingerprint = fingerprint(study, &robot, options);
     let stages = section.stages();
     let one = stages.len() == 1;
@@ -79,14 +82,16 @@ pub fn iterate_study(
     let rate_hz = simulation.rate_hz;
     let make = || legs::trajectories(study, study_path, &robot, rate_hz, options, watch.design);
     let trajectories = kept(&out.join("trajectory.json"), &fingerprint, resume, make)?;
+
+    // What is believed of the robot, what it runs, and what the file says of it.
     let iterated = match section.prior {
         PriorChoice::Description => robot.parametric.clone(),
         PriorChoice::None => {
             let zeros = vec![0.0; robot.nominal().len()];
-            robot.parametric.clone().with_nominal(zeros).map_err(|why| wrong("iteration", &why))?
+            robot.parametric.clone().with_nominal(zeros).map_err(|why| in_section(why.into()))?
         }
     };
-    let legs = section.legs(&trajectories, &robot).map_err(|why| wrong("iteration", &why))?;
+    let legs = section.legs(&trajectories, &robot).map_err(in_section)?;
     let efforts = robot.model().joints().iter().map(|joint| joint.limits.effort.unwrap_or(f64::INFINITY)).collect();
     let torque_limits: Option<Vec<f64>> = simulation.effort_limits.then_some(efforts);
     let simulated = truth.is_some();
@@ -100,6 +105,8 @@ pub fn iterate_study(
     };
     let target = out.join("iterations.json");
     let before_runs_s = begin.elapsed().as_secs_f64();
+
+    // The stages, each with what those before it have found held.
     let mut known_std: Vec<Option<f64>> = vec![None; robot.layout().columns().len()];
     let mut known: Vec<(usize, f64)> = Vec::new();
     let (mut files, mut traces, mut made) = (Vec::new(), Vec::new(), 0);
@@ -111,15 +118,15 @@ pub fn iterate_study(
             known: known.clone(),
             torque_limits: torque_limits.clone(),
         };
-        let iteration = Iteration::new(task, settings.clone()).map_err(|why| wrong("iteration", &why))?;
-        let mut robots =
-            section.robots(&simulation, &robot, number, members).map_err(|why| wrong("iteration", &why))?;
+        let iteration = Iteration::new(task, settings.clone()).map_err(|why| in_section(why.into()))?;
+        let mut robots = section.robots(&simulation, &robot, number, members).map_err(in_section)?;
         let mut robots: Vec<&mut dyn Robot> = robots.iter_mut().map(|robot| &mut **robot as &mut dyn Robot).collect();
         let leg = (!one).then_some(number + 1);
         let mut so_far = stores[number].records().map_err(in_iteration)?;
         let runs_before = so_far.len();
         let mut unwritten = None;
         let run = &mut *watch.run;
+        // The runs; the file is written after each.
         let outcome = iterate(&iteration, &mut robots, Some(&stores[number]), &mut |record, runs| {
             so_far.push(record.clone());
             let status = IterationStatus::Waiting { reason: "for the next run".to_owned() };
@@ -138,6 +145,7 @@ pub fn iterate_study(
         if let Some(error) = unwritten {
             return Err(error);
         }
+        // What the stage has found.
         made += outcome.runs.len() - runs_before;
         let (records, status) = (&outcome.runs[..], &outcome.status);
         let in_force = &iteration.robot(records).map_err(in_iteration)?;
@@ -148,6 +156,7 @@ pub fn iterate_study(
                 traces.push(RunTrace::new(name, &stores[number], own.reference(), &robot.parametric.joint_names()));
             }
         }
+        // What the next one holds.
         let last = records.iter().rev().find(|record| record.accepted).and_then(|record| record.estimate.as_ref());
         if matches!(status, IterationStatus::Refused { .. } | IterationStatus::Waiting { .. }) {
             break;
@@ -161,7 +170,9 @@ pub fn iterate_study(
             }
         }
     }
-    let mut file = joined(files).ok_or_else(|| wrong("iteration", &"there is no leg"))?;
+
+    // All stages as one.
+    let mut file = joined(files).ok_or_else(|| in_section(StudyError::missing("leg", "there is none")))?;
     file.converged &= file.runs.last().is_some_and(|run| run.leg.is_none_or(|leg| leg == stages.len()));
     write_file(&target, &file)?;
     let time = TimeSpent { before_runs_s, all_s: begin.elapsed().as_secs_f64(), runs: made };

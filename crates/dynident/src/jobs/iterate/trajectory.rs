@@ -1,12 +1,12 @@
 //! The trajectory of every run: from a file, or designed first.
 
-use crate::error::Error;
+use crate::error::{Error, StudyError};
 use crate::jobs::design::{design_study, trajectory_table};
 use crate::jobs::options::RunOptions;
 use crate::study::{Folders, Study, StudyRobot};
 use core::ops::ControlFlow;
 use dynident_excitation::{DesignProgress, Motion};
-use dynident_simulation::Reference;
+use dynident_simulation::{Reference, SimulationError};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -53,17 +53,19 @@ impl Trajectory {
         options: &RunOptions<'_>,
         watch: &(dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
     ) -> Result<Self, Error> {
-        let wrong = |why: &dyn core::fmt::Display| Error::study(study_path, format!("[iteration]: {why}"));
+        let in_reference = Error::section::<SimulationError>(study_path, "iteration");
         let file = study.iteration.as_ref().and_then(|section| section.trajectory.as_ref());
         if let Some(file) = file {
             let folders = Folders::new(study, study_path, options.data.as_deref());
             let path = folders.find(file, None)?;
             let table = trajectory_table(&path, &robot.parametric.joint_names(), &study.motion)?;
-            let reference = Reference::of_family(&table.given, &[], rate_hz, None).map_err(|error| wrong(&error))?;
+            let reference = Reference::of_family(&table.given, &[], rate_hz, None).map_err(in_reference)?;
             return Ok(Self::new(&reference, None));
         }
         if study.design.is_none() {
-            return Err(wrong(&"no trajectory: name a file with trajectory = \"...\", or give a [design]"));
+            let missing =
+                StudyError::missing("no trajectory", "name a file with trajectory = \"...\", or give a [design]");
+            return Err(Error::section(study_path, "iteration")(missing));
         }
         let outcome = design_study(study, study_path, options, watch)?;
         let mut strokes = Vec::new();
@@ -81,8 +83,8 @@ impl Trajectory {
             }
             windows
         });
-        let reference = Reference::of_family(outcome.family(), &outcome.file.parameters, rate_hz, None)
-            .map_err(|error| wrong(&error))?;
+        let reference = Reference::of_family(outcome.family(), &outcome.file.parameters, rate_hz, None);
+        let reference = reference.map_err(in_reference)?;
         Ok(Self { strokes, ..Self::new(&reference, windows) })
     }
 
@@ -101,7 +103,7 @@ impl Trajectory {
     }
 
     /// As a reference for controllers.
-    pub(crate) fn reference(&self) -> Result<Reference, dynident_simulation::SimulationError> {
+    pub(crate) fn reference(&self) -> Result<Reference, SimulationError> {
         let motion = Motion {
             samples: self.samples,
             joints: self.joints,
@@ -115,7 +117,7 @@ impl Trajectory {
 
     /// The part in which the joints that are not held make their strokes, if it is made of strokes; everything
     /// otherwise.
-    pub(crate) fn without(&self, held: &[Option<f64>]) -> Result<Self, String> {
+    pub(crate) fn without(&self, held: &[Option<f64>]) -> Result<Self, StudyError> {
         if self.strokes.is_empty() || held.iter().all(Option::is_none) {
             return Ok(self.clone());
         }
@@ -123,7 +125,7 @@ impl Trajectory {
         let span = own.fold([f64::INFINITY, 0.0_f64], |[from, to], s| [from.min(s.from_s), to.max(s.to_s)]);
         let at = |time_s: f64| (time_s * self.rate_hz).round() as usize;
         if span[0] > span[1] || at(span[1]) <= at(span[0]) {
-            return Err("no joint that is not held has a stroke in the design".to_owned());
+            return Err(StudyError::conflict("hold", "no joint that moves has a stroke in the design"));
         }
         let (first, last) = (at(span[0]), at(span[1]).min(self.samples - 1));
         let samples = last + 1 - first;

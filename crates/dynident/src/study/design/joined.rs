@@ -9,6 +9,7 @@ const NAME: &str = "joined";
 /// Parts one after another with a move between each two: for instance a series, then a friction ladder, then static
 /// postures.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct JoinedChoice {
     /// The parts in their order, each with its own `kind` and settings; none of them joined itself.

@@ -13,6 +13,7 @@ pub use prior::PriorSection;
 pub use start_posture::StartPosture;
 pub use windows::{GivenStroke, WindowedCondition, WindowedProblem};
 
+use crate::error::{Expected, StudyError};
 use dynident_excitation::criteria::{AOptimal, ConditionNumber, Criterion, DOptimal, EOptimal};
 use dynident_excitation::families::{
     BSpline, BSplineSettings, FamilyError, Fourier, FourierSettings, FrictionLadder, FrictionLadderSettings,
@@ -51,6 +52,7 @@ const MAX_COUNT: usize = 1_000_000;
 /// # Ok::<(), toml::de::Error>(())
 /// ```
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct DesignSection {
     /// The trajectory family and its settings; five Fourier harmonics with rest at both ends by default.
@@ -59,9 +61,11 @@ pub struct DesignSection {
     pub duration_s: f64,
     /// What makes a motion good; `"d-optimal"` by default. A name, or a table with a `kind` and its settings.
     #[serde(deserialize_with = "name_or_table")]
+    #[cfg_attr(feature = "schema", schemars(transform = name_or_table::schema))]
     pub criterion: CriterionChoice,
     /// What looks for it; `"gradient"` by default. A name, or a table with a `kind` and its settings.
     #[serde(deserialize_with = "name_or_table")]
+    #[cfg_attr(feature = "schema", schemars(transform = name_or_table::schema))]
     pub optimiser: OptimiserChoice,
     /// Strokes of a windowed design that are to be judged as they are, one a joint; nothing is searched then. Empty by
     /// default.
@@ -98,6 +102,7 @@ impl Default for DesignSection {
 
 /// A family by its `kind`, with that family's own settings beside it.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum FamilyChoice {
     /// Finite Fourier series.
@@ -157,6 +162,7 @@ impl FamilyChoice {
 
 /// What makes a motion good.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum CriterionChoice {
     /// The volume of the confidence ellipsoid: `-log det D`.
@@ -205,6 +211,7 @@ impl CriterionChoice {
 
 /// Torque noise: the same for all joints, or one by one.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged, expecting = "a standard deviation in Nm, or a list with one per joint")]
 pub enum TorqueNoise {
     /// For every joint.
@@ -218,33 +225,21 @@ impl DesignSection {
     ///
     /// # Errors
     /// The first key whose value has no meaning, with what it may be.
-    pub fn validate(&self) -> Result<(), String> {
-        let within = |key: &str, value: f64, least: f64, most: f64| {
-            if value >= least && value <= most {
-                Ok(())
-            } else {
-                Err(format!("{key} = {value}: give {least} to {most}"))
-            }
-        };
+    pub fn validate(&self) -> Result<(), StudyError> {
+        let within = |key: &str, value: f64, least: f64, most: f64| Expected::Range(least, most).check(key, value);
         within("duration_s", self.duration_s, 0.1, MAX_DURATION_S)?;
         self.optimiser.validate()?;
         if !self.parameters.is_empty() && !matches!(self.criterion, CriterionChoice::WindowedCondition(_)) {
-            return Err(
-                "parameters are strokes of a windowed design: give criterion = { kind = \"windowed-condition\" }"
-                    .to_owned(),
-            );
+            let fix = "they are strokes of a windowed design: give criterion = { kind = \"windowed-condition\" }";
+            return Err(StudyError::conflict("parameters", fix));
         }
         if self.start_posture.is_some() && matches!(self.criterion, CriterionChoice::WindowedCondition(_)) {
-            return Err("start_posture: a windowed design starts at family.offsets; give the posture there".to_owned());
+            let fix = "a windowed design starts at family.offsets; give the posture there";
+            return Err(StudyError::conflict("start_posture", fix));
         }
         let search = &self.search;
         within("search.rate_hz", search.rate_hz, 1.0, 1e5)?;
-        let samples = self.duration_s * search.rate_hz;
-        if samples > MAX_SAMPLES {
-            return Err(format!(
-                "duration_s times search.rate_hz makes {samples:.0} samples: at most {MAX_SAMPLES} can be planned"
-            ));
-        }
+        within("duration_s times search.rate_hz", self.duration_s * search.rate_hz, 0.0, MAX_SAMPLES)?;
         for (key, value, least) in [
             ("search.starts", search.starts, 1),
             ("search.rounds", search.rounds, 0),
@@ -261,15 +256,13 @@ impl DesignSection {
         }
         self.prior.validate()?;
         if !self.prior.is_empty() && self.criterion.of_regressor() {
-            return Err(
-                "prior: a condition number is of the motion's regressor alone; choose the criterion \"d-optimal\", \"a-optimal\", \"e-optimal\" or prediction"
-                    .to_owned(),
-            );
+            let fix = "a condition number is of the motion's regressor alone; choose the criterion \"d-optimal\", \"a-optimal\", \"e-optimal\" or prediction";
+            return Err(StudyError::conflict("prior", fix));
         }
         if let (Some(_), FamilyChoice::Joined(joined)) = (&self.start_posture, &self.family)
             && (joined.start.is_some() || joined.end.is_some())
         {
-            return Err("start_posture and the joined family's own start or end: keep one".to_owned());
+            return Err(StudyError::Exclusive { keys: vec!["start_posture", "the joined family's own start or end"] });
         }
         let stds = match &self.torque_std_nm {
             None => &[][..],

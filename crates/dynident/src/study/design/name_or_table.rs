@@ -26,3 +26,11 @@ pub(crate) fn name_or_table<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from
     }
     from.deserialize_any(NameOrTable(PhantomData))
 }
+
+/// The schema of such a key: a name, or what it was before.
+#[cfg(feature = "schema")]
+pub(crate) fn schema(schema: &mut schemars::Schema) {
+    let table = core::mem::take(schema.ensure_object());
+    let name = schemars::json_schema!({ "type": "string" });
+    schema.insert("anyOf".to_owned(), vec![name.to_value(), table.into()].into());
+}

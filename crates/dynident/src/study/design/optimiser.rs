@@ -1,11 +1,13 @@
 //! `[design] optimiser`: what looks for the motion.
 
+use crate::error::StudyError;
 use dynident_excitation::DerivativeFree;
 use dynident_excitation::optimisers::{BinaryGeneticSettings, CmaEsSettings};
 use serde::{Deserialize, Serialize};
 
 /// An optimiser by its `kind`, with its own settings beside it; the name alone stands for the defaults.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum OptimiserChoice {
     /// Many starts, exact gradients, augmented Lagrangian.
@@ -31,15 +33,15 @@ impl OptimiserChoice {
     ///
     /// # Errors
     /// The first that is out of range, and a seed: the search has one already.
-    pub fn validate(&self) -> Result<(), String> {
+    pub fn validate(&self) -> Result<(), StudyError> {
         let (valid, seed) = match self {
             Self::Gradient => return Ok(()),
             Self::CmaEs(settings) => (settings.validate(), settings.seed),
             Self::Genetic(settings) => (settings.validate(), settings.seed),
         };
-        valid.map_err(|error| format!("optimiser: {error}"))?;
+        valid.map_err(StudyError::at("optimiser"))?;
         if seed != 0 {
-            return Err(format!("optimiser.seed = {seed}: give the seed as search.seed (or --seed)"));
+            return Err(StudyError::conflict("optimiser.seed", "give the seed as search.seed (or --seed)"));
         }
         Ok(())
     }

@@ -1,10 +1,12 @@
 //! `[design.prior]`: what is known before the motion, so that the next one looks for what is not.
 
+use crate::error::{Expected, StudyError};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// `[design.prior]`. What several sources say adds up.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct PriorSection {
     /// `result.json` of an earlier identification of the same robot: its covariance says how well each base parameter
@@ -23,12 +25,8 @@ impl PriorSection {
         self.result.is_none() && self.cad_std_percent.is_none()
     }
 
-    pub(super) fn validate(&self) -> Result<(), String> {
-        match self.cad_std_percent {
-            Some(percent) if !(1e-3..=1e6).contains(&percent) => {
-                Err(format!("prior.cad_std_percent = {percent}: give 0.001 to 1000000"))
-            }
-            _ => Ok(()),
-        }
+    pub(super) fn validate(&self) -> Result<(), StudyError> {
+        self.cad_std_percent
+            .map_or(Ok(()), |percent| Expected::Range(1e-3, 1e6).check("prior.cad_std_percent", percent))
     }
 }

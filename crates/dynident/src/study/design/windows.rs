@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// Which joints move while others rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum WindowedProblem {
     /// One joint after another makes its stroke, from the tip to the base, while all others rest at their offsets: the
@@ -15,6 +16,7 @@ pub enum WindowedProblem {
 
 /// The sum of condition numbers over windows around the mid-points of the strokes (the paper's equation 19 and Fig. 6).
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct WindowedCondition {
     /// Which joints move while others rest; `"step-wise"` is the one there is.
@@ -49,6 +51,7 @@ impl Default for WindowedCondition {
 
 /// A stroke that the study gives, so that nothing is searched.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct GivenStroke {
     /// The joint.

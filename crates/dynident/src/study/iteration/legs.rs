@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 /// What becomes of several legs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum LegOrder {
     /// Every run has all of them, and is identified from all.
@@ -30,6 +31,7 @@ pub enum LegOrder {
 /// # Ok::<(), toml::de::Error>(())
 /// ```
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct LegSection {
     /// Joints that are held, and where, rad (m); none by default. Their torque does not count. Of a windowed design

@@ -5,6 +5,7 @@ mod legs;
 pub use legs::{LegOrder, LegSection};
 
 use super::Study;
+use crate::error::StudyError;
 use dynident_identification::IdentificationSettings;
 use dynident_iteration::robot::{FolderSettings, ProcessSettings};
 use dynident_iteration::{IterationSettings, RunIdentificationSettings, Scheme, SettledSettings, StartWith};
@@ -15,6 +16,7 @@ use std::path::PathBuf;
 
 /// Which robot runs the trajectories.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum RobotChoice {
     /// The simulator, as `[simulation]` says.
@@ -28,6 +30,7 @@ pub enum RobotChoice {
 
 /// What is believed of the bodies before any run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum PriorChoice {
     /// What the description says.
@@ -54,6 +57,7 @@ pub enum PriorChoice {
 /// # Ok::<(), toml::de::Error>(())
 /// ```
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct IterationSection {
     /// A trajectory to run (`t_s, q1.., dq1.., ddq1..`), in place of the one that `[design]` leads to.
@@ -146,24 +150,23 @@ impl IterationSection {
     /// with the iteration's own differentiator and filter.
     ///
     /// # Errors
-    /// In words: what a run cannot be identified with.
+    /// What a run cannot be identified with.
     pub(crate) fn settings(
         &self,
         study: &Study,
         identification: IdentificationSettings,
-    ) -> Result<IterationSettings, String> {
-        self.differentiator.validate().map_err(|error| format!("[iteration] differentiator: {error}"))?;
+    ) -> Result<IterationSettings, StudyError> {
+        self.differentiator.validate().map_err(StudyError::at("iteration.differentiator"))?;
         let IdentificationSettings { mut estimation, consistency, friction, .. } = identification;
         if self.scheme == Scheme::StepByStep && !estimation.estimator.is_plain() {
-            return Err(format!(
-                "[estimator] method = \"{}\": scheme = \"step-by-step\" takes \"ordinary\" or \"weighted\"",
-                estimation.estimator.name()
-            ));
+            let key = format!("estimator.method = \"{}\"", estimation.estimator.name());
+            return Err(StudyError::conflict(key, "scheme = \"step-by-step\" takes \"ordinary\" or \"weighted\""));
         }
         let in_turn =
             self.scheme == Scheme::StepByStep || self.order == LegOrder::OneAfterAnother && self.leg.len() > 1;
         if in_turn && !friction.is_empty() {
-            return Err("[drive] friction = \"auto\": only runs that hold information about all joints at once can choose; state the friction, or take out scheme and order of [iteration]".to_owned());
+            let fix = "only runs that hold information about all joints at once can choose; state the friction, or take out scheme and order of [iteration]";
+            return Err(StudyError::conflict("drive.friction = \"auto\"", fix));
         }
         // A run's estimate is made, not tested.
         (estimation.exogeneity_test, estimation.essential) = (None, None);

@@ -200,8 +200,13 @@ impl Job {
     }
 }
 
-/// What is written is read, and written again byte for byte.
+/// What is written is read, and written again byte for byte; a file with a schema is as that says.
 pub(crate) fn assert_reads_back<T: Serialize + DeserializeOwned>(file: &T) {
+    let value = serde_json::to_value(file).unwrap();
+    if let Some(schema) = value["schema"].as_str() {
+        let differences = dynident_testing::schema::differences(schema.split('/').nth(1).unwrap(), &value);
+        assert!(differences.is_empty(), "{differences:#?}: CONTRIBUTING.md says how schemas are made again");
+    }
     let text = serde_json::to_string_pretty(file).unwrap();
     let read: T = serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error}\n{text}"));
     assert_eq!(serde_json::to_string_pretty(&read).unwrap(), text);
