@@ -63,7 +63,7 @@ pub struct HausmanTest {
     pub verdict: HausmanVerdict,
     /// The statistic; none when undecided.
     pub f: Option<f64>,
-    /// Degrees of degrees_of_freedom: tested columns; time segments (or rows, with white residuals) less those.
+    /// Degrees of freedom: tested columns; time segments (or rows, with white residuals) less those.
     pub degrees_of_freedom: [f64; 2],
     /// Probability of such an F where least squares is right.
     pub p_value: Option<f64>,

@@ -222,16 +222,7 @@ fn gathered<E: From<EstimationError>>(
         EstimationError::Mismatch { what, expected: equation.factor.rows(), found }
     };
     let mut visit = |block: &RowBlock<'_>| -> Result<(), EstimationError> {
-        let found = equations.iter().position(|e| e.log == block.log && e.joint == block.joint);
-        let Some(at) = found else {
-            let what = "a block's log and joint in the problem".to_owned();
-            return Err(EstimationError::Mismatch { what, expected: equations.len(), found: block.log });
-        };
-        let local = &locals[at];
-        let expected = (local.len() + 1) * block.rows;
-        if block.panel.len() != expected {
-            return Err(EstimationError::Shape { what: "a block of rows", expected, found: block.panel.len() });
-        }
+        let at = block.equation(equations)?;
         let first = residuals[at].len();
         if first + block.rows > equations[at].factor.rows() {
             return Err(mismatch(at, first + block.rows));
@@ -239,9 +230,7 @@ fn gathered<E: From<EstimationError>>(
         scaled.clear();
         scaled.extend_from_slice(block.panel);
         for row in 0..block.rows {
-            let at_column = |column: usize| block.panel[column * block.rows + row];
-            let predicted: f64 = local.iter().enumerate().map(|(column, value)| value * at_column(column)).sum();
-            residuals[at].push(at_column(local.len()) - predicted);
+            residuals[at].push(block.residual(row, &locals[at]));
             if let Some(levels) = levels {
                 let weight = 1.0 / levels.relative[at][first + row];
                 scaled.iter_mut().skip(row).step_by(block.rows).for_each(|value| *value *= weight);

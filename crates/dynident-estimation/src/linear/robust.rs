@@ -2,7 +2,7 @@
 
 use super::weighted::{WeightedSettings, weighted_least_squares};
 use crate::error::EstimationError;
-use crate::factor::{LinearProblem, RankSettings, SegmentedFactor, Split, solve, split};
+use crate::factor::{JointRows, LinearProblem, RankSettings, SegmentedFactor, Split, solve, split};
 use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -147,6 +147,28 @@ pub struct RowBlock<'a> {
     pub rows: usize,
     /// Column by column, torque last, as in [`TriangularFactor::absorb`](crate::TriangularFactor::absorb).
     pub panel: &'a [f64],
+}
+
+impl RowBlock<'_> {
+    /// Place of the block's equation, whose columns the panel must have.
+    pub(super) fn equation(&self, equations: &[JointRows]) -> Result<usize, EstimationError> {
+        let Some(at) = equations.iter().position(|e| e.log == self.log && e.joint == self.joint) else {
+            let what = "a block's log and joint in the problem".to_owned();
+            return Err(EstimationError::Mismatch { what, expected: equations.len(), found: self.log });
+        };
+        let expected = (equations[at].columns.len() + 1) * self.rows;
+        if self.panel.len() != expected {
+            return Err(EstimationError::Shape { what: "a block of rows", expected, found: self.panel.len() });
+        }
+        Ok(at)
+    }
+
+    /// `τ − w θ` of one row, θ of the equation's columns.
+    pub(super) fn residual(&self, row: usize, theta: &[f64]) -> f64 {
+        let at_column = |column: usize| self.panel[column * self.rows + row];
+        let predicted: f64 = theta.iter().enumerate().map(|(column, value)| value * at_column(column)).sum();
+        at_column(theta.len()) - predicted
+    }
 }
 
 /// What a pass hands every block of rows to.
@@ -300,33 +322,19 @@ fn gather<E: From<EstimationError>>(
     pass: &mut impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
 ) -> Result<Gathered, E> {
     let equations = problem.equations();
-    let mut factors = Vec::with_capacity(equations.len());
-    for equation in equations {
-        factors.push(equation.factor.emptied());
-    }
+    let mut factors: Vec<SegmentedFactor> = equations.iter().map(|equation| equation.factor.emptied()).collect();
     let locals: Vec<Vec<f64>> = equations.iter().map(|equation| equation.local(theta)).collect();
     let joints = problem.joints().len();
     let (mut residuals, mut tally) = (vec![Vec::new(); joints], vec![Tally::default(); joints]);
     let mut scaled = Vec::new();
     let mut visit = |block: &RowBlock<'_>| -> Result<(), EstimationError> {
-        let found = equations.iter().position(|e| e.log == block.log && e.joint == block.joint);
-        let Some(at) = found else {
-            let what = "a block's log and joint in the problem".to_owned();
-            return Err(EstimationError::Mismatch { what, expected: equations.len(), found: block.log });
-        };
-        let local = &locals[at];
-        let expected = (local.len() + 1) * block.rows;
-        if block.panel.len() != expected {
-            return Err(EstimationError::Shape { what: "a block of rows", expected, found: block.panel.len() });
-        }
+        let at = block.equation(equations)?;
         scaled.clear();
         scaled.extend_from_slice(block.panel);
         let scale = scales[block.joint];
         let tally = &mut tally[block.joint];
         for row in 0..block.rows {
-            let at_column = |column: usize| block.panel[column * block.rows + row];
-            let predicted: f64 = local.iter().enumerate().map(|(column, value)| value * at_column(column)).sum();
-            let residual = at_column(local.len()) - predicted;
+            let residual = block.residual(row, &locals[at]);
             residuals[block.joint].push(residual);
             let u = residual / scale;
             let w = weight.weight(u);

@@ -3,7 +3,7 @@
 
 use crate::error::{EstimationError, expect};
 use crate::factor::{FactorWorkspace, RankReport, RankSettings, TriangularFactor, report, solve, split};
-use crate::uncertainty::EstimateStatus;
+use crate::uncertainty::{EstimateStatus, covariance_of_all};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use serde::Serialize;
 
@@ -136,24 +136,8 @@ pub fn maximum_likelihood<E: From<EstimationError>>(
     }
     let solution = solve(&now.triangle, &choice, &settings.rank, &fallback);
     let small = &solution.inverse * solution.inverse.transpose();
-    let mut covariance = DMatrix::zeros(columns, columns);
-    for (a, &i) in choice.free.iter().enumerate() {
-        for (b, &j) in choice.free.iter().enumerate() {
-            covariance[(i, j)] = small[(a, b)];
-        }
-    }
-    let std: Vec<f64> = covariance.diagonal().iter().map(|variance: &f64| variance.sqrt()).collect();
-    if let Some(k) = (0..columns).find(|&k| !(theta[k].is_finite() && std[k].is_finite())) {
-        return Err(EstimationError::Overflow { name: names[k].clone() }.into());
-    }
+    let (covariance, std) = covariance_of_all(names, &theta, &choice.free, &small)?;
     let rank = report(&now.triangle, &choice, &settings.rank, names, &fallback);
-    let status = if !converged {
-        EstimateStatus::IterationLimit
-    } else if rank.fixed.is_empty() {
-        EstimateStatus::Complete
-    } else {
-        EstimateStatus::NotAllExcited
-    };
     Ok(MaximumLikelihoodEstimate {
         names: names.to_vec(),
         values: theta.iter().copied().collect(),
@@ -162,7 +146,7 @@ pub fn maximum_likelihood<E: From<EstimationError>>(
         cost: now.cost,
         degrees_of_freedom: rows - free,
         iterations,
-        status,
+        status: EstimateStatus::of(converged, &rank),
         rank,
     })
 }

@@ -2,7 +2,7 @@
 
 use crate::error::{EstimationError, expect};
 use crate::factor::{FactorWorkspace, RankReport, RankSettings, TriangularFactor, report, solve, split};
-use crate::uncertainty::EstimateStatus;
+use crate::uncertainty::{EstimateStatus, covariance_of_all};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -229,24 +229,8 @@ pub fn simulated_least_squares<S: SimulatedMotion>(
     let solution = solve(&triangle, &choice, &settings.rank, &vec![0.0; columns]);
     let variance = now.cost / (rows - choice.free.len()) as f64;
     let small = &solution.inverse * solution.inverse.transpose() * variance;
-    let mut covariance = DMatrix::zeros(columns, columns);
-    for (a, &i) in choice.free.iter().enumerate() {
-        for (b, &j) in choice.free.iter().enumerate() {
-            covariance[(i, j)] = small[(a, b)];
-        }
-    }
-    let std: Vec<f64> = covariance.diagonal().iter().map(|variance: &f64| variance.sqrt()).collect();
-    if let Some(k) = (0..columns).find(|&k| !(theta[k].is_finite() && std[k].is_finite())) {
-        return Err(EstimationError::Overflow { name: problem.names[k].clone() }.into());
-    }
+    let (covariance, std) = covariance_of_all(&problem.names, &theta, &choice.free, &small)?;
     let rank = report(&triangle, &choice, &settings.rank, &problem.names, &problem.start);
-    let status = if !converged {
-        EstimateStatus::IterationLimit
-    } else if rank.fixed.is_empty() {
-        EstimateStatus::Complete
-    } else {
-        EstimateStatus::NotAllExcited
-    };
     Ok(SimulatedEstimate {
         names: problem.names.clone(),
         values: theta.iter().copied().collect(),
@@ -255,7 +239,7 @@ pub fn simulated_least_squares<S: SimulatedMotion>(
         cost: now.cost,
         iterations,
         simulations,
-        status,
+        status: EstimateStatus::of(converged, &rank),
         rank,
         jacobian: last_jacobian,
         residual: last_residual,

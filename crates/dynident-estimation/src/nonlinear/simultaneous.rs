@@ -332,7 +332,7 @@ mod tests {
         // The tolerance of the steps, 1e-9 of error bars of 0.1.
         assert!((theta - ts / qs).abs() < 1e-9 && (c - qs / ss).abs() < 1e-9, "{theta} {c}");
         let [sigma_q, sigma_tau] = [found.noise[0].std, found.noise[1].std];
-        // Each of the two unknowns takes one degree of degrees_of_freedom, half from each channel or all from one: σ is
+        // Each of the two unknowns takes one degree of freedom, half from each channel or all from one: σ is
         // known to a per cent of its own error.
         assert!((sigma_q / 0.3 - 1.0).abs() < 0.2 && (sigma_tau / 0.5 - 1.0).abs() < 0.2);
         let std = ((sigma_tau.powi(2) + (theta * sigma_q).powi(2)) / (c * c * ss)).sqrt();

@@ -172,9 +172,9 @@ impl Controller for SlotineLi {
         }
         self.fill_regressor(target, measured);
         let columns = self.parameters.len();
-        let prismatic = &self.vectors[4];
+        let sliding = &self.vectors[4];
         if self.gamma > 0.0 && span_s > 0.0 {
-            for (joint, s) in prismatic.iter().enumerate() {
+            for (joint, s) in sliding.iter().enumerate() {
                 let row = &self.regressor[joint * columns..(joint + 1) * columns];
                 for (parameter, y) in self.parameters.iter_mut().zip(row) {
                     *parameter += span_s * self.gamma * y * s;
