@@ -15,7 +15,7 @@
 //! Anal. 10 (1973) 413).
 
 use super::nonnegative::nonnegative_least_squares;
-use crate::error::EstimationError;
+use crate::error::{EstimationError, require};
 use crate::factor::{FactorWorkspace, LinearProblem, TriangularFactor};
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use nalgebra::{DMatrix, DVector};
@@ -98,10 +98,7 @@ impl<'a> CrossValidation<'a> {
     /// [`EstimationError::Setting`] for fewer than two blocks; [`EstimationError::TooFewSegments`] when there are fewer
     /// segments than blocks; [`EstimationError::Empty`].
     pub fn new(problem: &'a LinearProblem, folds: usize) -> Result<Self, EstimationError> {
-        if folds < 2 {
-            let fix = "give at least 2 blocks";
-            return Err(EstimationError::Setting { setting: "folds", value: folds as f64, fix });
-        }
+        require(folds >= 2, "folds", folds as f64, "give at least 2 blocks")?;
         if problem.equations().is_empty() {
             return Err(EstimationError::Empty);
         }
@@ -174,10 +171,8 @@ impl<'a> CrossValidation<'a> {
                     to.count(from.rows());
                 };
                 let weight = weights[equation.joint];
-                if !(weight.is_finite() && weight >= 0.0) {
-                    let fix = "give a finite weight that is not negative";
-                    return Err(EstimationError::Setting { setting: "weight", value: weight, fix });
-                }
+                let fix = "give a finite weight that is not negative";
+                require(weight.is_finite() && weight >= 0.0, "weight", weight, fix)?;
                 // Later rows have nothing but torque, and what the triangle cannot explain does not count.
                 let seen = order.iter().filter_map(|&global| place[global]).max().map_or(0, |local| local + 1);
                 absorb(&mut triangle, &others[fold], weight, seen);

@@ -1,7 +1,7 @@
 //! The triangular factor of a stack of rows `[W | τ]`: all that linear estimation needs to remember of them.
 
 use super::reflect::{CHUNK_ROWS, Chunk, TriangleOnPanel, row_start};
-use crate::error::EstimationError;
+use crate::error::{EstimationError, require};
 use dynident_lanes::{Level, dispatch};
 use nalgebra::{DMatrix, DVector};
 
@@ -266,13 +266,7 @@ impl TriangularFactor {
     /// # Errors
     /// [`EstimationError::Setting`] for a weight that is negative, NaN or infinite.
     pub fn scaled(&self, weight: f64) -> Result<Self, EstimationError> {
-        if !(weight.is_finite() && weight >= 0.0) {
-            return Err(EstimationError::Setting {
-                setting: "weight",
-                value: weight,
-                fix: "give a finite weight that is not negative",
-            });
-        }
+        require(weight.is_finite() && weight >= 0.0, "weight", weight, "give a finite weight that is not negative")?;
         let mut scaled = self.clone();
         for value in &mut scaled.triangle {
             *value *= weight;

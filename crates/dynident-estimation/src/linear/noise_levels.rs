@@ -2,7 +2,7 @@
 
 use super::robust::{RowBlock, RowVisitor, scale_floors, with_factors};
 use super::weighted::{WeightedSettings, weighted_least_squares};
-use crate::error::EstimationError;
+use crate::error::{EstimationError, require, within};
 use crate::factor::{LinearProblem, RankSettings, SegmentedFactor};
 use crate::uncertainty::{CovarianceMethod, Estimate, EstimateStatus};
 use serde::{Deserialize, Serialize};
@@ -49,24 +49,11 @@ impl NoiseLevelSettings {
     /// outside 1e-9 to 1, fewer than two passes, or rank settings out of range.
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
-        let error = |setting, value, fix| Err(EstimationError::Setting { setting, value, fix });
-        if self.window_rows < 5 {
-            return error(
-                "window_rows",
-                self.window_rows as f64,
-                "give at least 5: fewer rows are no measure of noise",
-            );
-        }
-        if !(1.0e-6..=1.0).contains(&self.pooled_share) {
-            return error("pooled_share", self.pooled_share, "give a share from 1e-6 to 1");
-        }
-        if !(1.0e-9..=1.0).contains(&self.tolerance) {
-            return error("tolerance", self.tolerance, "give a change in error bars from 1e-9 to 1");
-        }
-        if self.max_passes < 2 {
-            return error("max_passes", self.max_passes as f64, "give at least 2");
-        }
-        Ok(())
+        let fix = "give at least 5: fewer rows are no measure of noise";
+        require(self.window_rows >= 5, "window_rows", self.window_rows as f64, fix)?;
+        within("pooled_share", self.pooled_share, 1.0e-6..=1.0, "give a share from 1e-6 to 1")?;
+        within("tolerance", self.tolerance, 1.0e-9..=1.0, "give a change in error bars from 1e-9 to 1")?;
+        require(self.max_passes >= 2, "max_passes", self.max_passes as f64, "give at least 2")
     }
 }
 

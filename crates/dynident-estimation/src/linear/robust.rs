@@ -1,7 +1,7 @@
 //! Iteratively reweighted least squares: rows that no noise explains lose their say.
 
 use super::weighted::{WeightedSettings, weighted_least_squares};
-use crate::error::EstimationError;
+use crate::error::{EstimationError, require, within};
 use crate::factor::{JointRows, LinearProblem, RankSettings, SegmentedFactor, Split, solve, split};
 use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom};
 use nalgebra::DMatrix;
@@ -117,22 +117,9 @@ impl RobustSettings {
             RowWeight::Huber { k } => ("weight.k", k),
             RowWeight::Tukey { c } => ("weight.c", c),
         };
-        if !(0.1..=100.0).contains(&value) {
-            return Err(EstimationError::Setting {
-                setting,
-                value,
-                fix: "give a number of deviations from 0.1 to 100",
-            });
-        }
-        if !(1.0e-13..=1.0).contains(&self.tolerance) {
-            let fix = "give a relative change from 1e-13 to 1";
-            return Err(EstimationError::Setting { setting: "tolerance", value: self.tolerance, fix });
-        }
-        if self.max_passes < 2 {
-            let value = self.max_passes as f64;
-            return Err(EstimationError::Setting { setting: "max_passes", value, fix: "give at least 2" });
-        }
-        Ok(())
+        within(setting, value, 0.1..=100.0, "give a number of deviations from 0.1 to 100")?;
+        within("tolerance", self.tolerance, 1.0e-13..=1.0, "give a relative change from 1e-13 to 1")?;
+        require(self.max_passes >= 2, "max_passes", self.max_passes as f64, "give at least 2")
     }
 }
 

@@ -1,7 +1,7 @@
 //! Maximum likelihood with errors in the motion as well as in the torque, both of known covariance: what averaged
 //! periods of a repeated motion allow.
 
-use crate::error::{EstimationError, expect};
+use crate::error::{EstimationError, expect, require, within};
 use crate::factor::{FactorWorkspace, RankReport, RankSettings, TriangularFactor, report, solve, split};
 use crate::uncertainty::{EstimateStatus, covariance_of_all};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -160,14 +160,8 @@ impl MaximumLikelihoodSettings {
         self.rank.validate()?;
         covariance("motion_covariance", &self.motion_covariance, false)?;
         covariance("torque_covariance", &self.torque_covariance, true)?;
-        if !(1.0e-12..=1.0).contains(&self.tolerance) {
-            let fix = "give a length in error bars from 1e-12 to 1";
-            return Err(EstimationError::Setting { setting: "tolerance", value: self.tolerance, fix });
-        }
-        if self.max_iterations == 0 {
-            return Err(EstimationError::Setting { setting: "max_iterations", value: 0.0, fix: "give at least 1" });
-        }
-        Ok(())
+        within("tolerance", self.tolerance, 1.0e-12..=1.0, "give a length in error bars from 1e-12 to 1")?;
+        require(self.max_iterations > 0, "max_iterations", 0.0, "give at least 1")
     }
 }
 

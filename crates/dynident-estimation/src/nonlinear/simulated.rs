@@ -1,6 +1,6 @@
 //! Estimators that compare a simulation with the record: DIDIM, CLIE and CLOE, behind one seam.
 
-use crate::error::{EstimationError, expect};
+use crate::error::{EstimationError, expect, require, within};
 use crate::factor::{FactorWorkspace, RankReport, RankSettings, TriangularFactor, report, solve, split};
 use crate::uncertainty::{EstimateStatus, covariance_of_all};
 use nalgebra::{DMatrix, DVector};
@@ -79,17 +79,9 @@ impl SimulatedSettings {
     /// [`EstimationError::Setting`].
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
-        let error = |setting, value, fix| Err(EstimationError::Setting { setting, value, fix });
-        if !(1.0e-10..=1.0).contains(&self.tolerance) {
-            return error("tolerance", self.tolerance, "give a length in error bars from 1e-10 to 1");
-        }
-        if !(1.0e-9..=0.1).contains(&self.difference) {
-            return error("difference", self.difference, "give a relative step from 1e-9 to 0.1");
-        }
-        if self.max_iterations == 0 {
-            return error("max_iterations", 0.0, "give at least 1");
-        }
-        Ok(())
+        within("tolerance", self.tolerance, 1.0e-10..=1.0, "give a length in error bars from 1e-10 to 1")?;
+        within("difference", self.difference, 1.0e-9..=0.1, "give a relative step from 1e-9 to 0.1")?;
+        require(self.max_iterations > 0, "max_iterations", 0.0, "give at least 1")
     }
 }
 

@@ -57,13 +57,8 @@ impl LogisticStrokesSettings {
     /// for one stroke to fit into the duration.
     pub fn validate(&self, duration_s: f64) -> Result<(), FamilyError> {
         let least = if self.returns { 2 } else { 1 };
-        require(
-            (least..=MOST).contains(&self.strokes),
-            NAME,
-            "strokes",
-            self.strokes as f64,
-            "give 1 to 1000, and at least 2 if the motion returns to its start",
-        )?;
+        let fix = "give 1 to 1000, and at least 2 if the motion returns to its start";
+        require((least..=MOST).contains(&self.strokes), NAME, "strokes", self.strokes as f64, fix)?;
         require(
             (LogisticStroke::LEAST_SHARPNESS..=MOST_SHARPNESS).contains(&self.sharpness),
             NAME,

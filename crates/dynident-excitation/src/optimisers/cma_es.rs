@@ -53,12 +53,8 @@ impl CmaEsSettings {
         let population = self.population.unwrap_or(4);
         let usable = population >= 4 && (self.population.is_none() || population <= self.max_evaluations);
         setting("population", population as f64, usable, "at least 4 and at most `max_evaluations`")?;
-        setting(
-            "restarts",
-            self.restarts as f64,
-            self.restarts <= 20,
-            "at most 20 (the population doubles each time)",
-        )?;
+        let fix = "at most 20 (the population doubles each time)";
+        setting("restarts", self.restarts as f64, self.restarts <= 20, fix)?;
         setting("max_evaluations", self.max_evaluations as f64, self.max_evaluations >= 1, "at least 1")?;
         setting("target", self.target.unwrap_or(0.0), !self.target.is_some_and(f64::is_nan), "a number")?;
         let (function, step) = (self.function_tolerance, self.step_tolerance);

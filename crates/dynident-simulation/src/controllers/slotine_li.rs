@@ -34,12 +34,8 @@ impl SlotineLiSettings {
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         self.lambda.gains("lambda", joints)?;
         self.kd.gains("kd", joints)?;
-        require(
-            self.gamma >= 0.0 && self.gamma.is_finite(),
-            "gamma",
-            self.gamma,
-            "give zero or a finite positive number",
-        )
+        let fix = "give zero or a finite positive number";
+        require(self.gamma >= 0.0 && self.gamma.is_finite(), "gamma", self.gamma, fix)
     }
 }
 
