@@ -173,7 +173,7 @@ pub struct RobustEstimate {
 }
 
 /// What one pass over the rows gathered.
-struct Gathered {
+struct PassSums {
     factors: Vec<SegmentedFactor>,
     residuals: Vec<Vec<f64>>,
     tally: Vec<Tally>,
@@ -307,7 +307,7 @@ fn gather<E: From<EstimationError>>(
     scales: &[f64],
     weight: &RowWeight,
     pass: &mut impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
-) -> Result<Gathered, E> {
+) -> Result<PassSums, E> {
     let equations = problem.equations();
     let mut factors: Vec<SegmentedFactor> = equations.iter().map(|equation| equation.factor.emptied()).collect();
     let locals: Vec<Vec<f64>> = equations.iter().map(|equation| equation.local(theta)).collect();
@@ -347,7 +347,7 @@ fn gather<E: From<EstimationError>>(
             );
         }
     }
-    Ok(Gathered { factors, residuals, tally })
+    Ok(PassSums { factors, residuals, tally })
 }
 
 /// The same problem over other factors; a prior stays.

@@ -65,7 +65,7 @@ pub struct MaximumLikelihoodEstimate {
 }
 
 /// What one pass gathers at θ.
-struct Gathered {
+struct PassSums {
     triangle: TriangularFactor,
     cost: f64,
 }
@@ -185,7 +185,7 @@ fn gathered<E: From<EstimationError>>(
     settings: &MaximumLikelihoodSettings,
     theta: &DVector<f64>,
     pass: &mut impl FnMut(&mut InstantVisitor<'_>) -> Result<(), E>,
-) -> Result<Gathered, E> {
+) -> Result<PassSums, E> {
     let joints = settings.torque_covariance.nrows();
     let mut triangle = TriangularFactor::new(columns);
     let mut workspace = FactorWorkspace::default();
@@ -230,5 +230,5 @@ fn gathered<E: From<EstimationError>>(
         triangle.absorb_with(&mut workspace, &panel, joints)
     };
     pass(&mut visit)?;
-    Ok(Gathered { triangle, cost })
+    Ok(PassSums { triangle, cost })
 }

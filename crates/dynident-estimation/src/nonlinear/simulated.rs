@@ -264,23 +264,28 @@ struct Run<'a, S> {
     simulations: usize,
 }
 
-struct Simulated {
+struct SimulationPoint {
     rows: SimulatedRows,
     cost: f64,
 }
 
 impl<S: SimulatedMotion> Run<'_, S> {
-    fn simulated(&mut self, theta: &DVector<f64>) -> Result<Option<Simulated>, S::Error> {
+    fn simulated(&mut self, theta: &DVector<f64>) -> Result<Option<SimulationPoint>, S::Error> {
         self.simulations += 1;
         let Some(rows) = self.simulation.simulate(theta.as_slice())? else { return Ok(None) };
         let measured = &self.problem.measured;
         expect("rows of the simulation", measured.len(), rows.output.len())?;
         let cost = (measured - &rows.output).component_div(&self.problem.noise_std).norm_squared();
-        Ok(cost.is_finite().then_some(Simulated { rows, cost }))
+        Ok(cost.is_finite().then_some(SimulationPoint { rows, cost }))
     }
 
     /// Central differences; one-sided where one side cannot be simulated, zero where neither can.
-    fn jacobian(&mut self, theta: &DVector<f64>, now: &Simulated, relative: f64) -> Result<DMatrix<f64>, S::Error> {
+    fn jacobian(
+        &mut self,
+        theta: &DVector<f64>,
+        now: &SimulationPoint,
+        relative: f64,
+    ) -> Result<DMatrix<f64>, S::Error> {
         let mut jacobian = DMatrix::zeros(self.problem.measured.len(), theta.len());
         for k in 0..theta.len() {
             let h = relative * self.problem.scale[k];

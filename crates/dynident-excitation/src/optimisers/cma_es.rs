@@ -159,6 +159,7 @@ pub fn cma_es(
             result.status = CmaEsStatus::EvaluationLimit;
             break;
         }
+        // One run: generations until it ends by itself or the search does.
         let mut strategy = Strategy::new(&from, steps, smallest << run);
         let before = result.evaluations;
         let mut lowest_of_run = f64::INFINITY;
@@ -202,6 +203,7 @@ pub fn cma_es(
         if matches!(status, CmaEsStatus::Stopped | CmaEsStatus::TargetReached | CmaEsStatus::EvaluationLimit) {
             break;
         }
+        // The next run begins anywhere, with twice the population.
         from = (0..start.len())
             .map(|i| {
                 let [lower, upper] = bounds[i];
