@@ -4,7 +4,7 @@ use super::error::{FamilyError, MOST, require, require_frame};
 use super::logistic_stroke::{LAST, LogisticStroke, StrokeDerivatives, logistic_and_bell, unit_stroke, warp};
 use super::random_start::{grid, scale_and_shift};
 use super::sampled_basis::{load_some, store_some};
-use crate::family::Family;
+use crate::family::{Family, check_shapes};
 use crate::motion::{Motion, MotionAdjoint};
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use dynident_model::sample::Random;
@@ -406,9 +406,7 @@ impl Family for LogisticStrokes {
     }
 
     fn apply_adjoint(&self, parameters: &[f64], times_s: &[f64], adjoint: &MotionAdjoint, gradient: &mut [f64]) {
-        assert_eq!(parameters.len(), self.parameters(), "parameters of {NAME}");
-        assert_eq!(gradient.len(), self.parameters(), "gradient of {NAME}");
-        assert_eq!((adjoint.joints, adjoint.samples), (self.joints, times_s.len()), "cotangent of {NAME}");
+        check_shapes(self, parameters, times_s, adjoint, gradient);
         let each = self.each();
         for (joint, own) in gradient.chunks_mut(each).enumerate() {
             let (_, strokes) = self.strokes(parameters, joint);
