@@ -28,7 +28,7 @@ def load(path):
     """The URDF as MuJoCo reads it, with inertias as given and fixed bodies kept apart from the world."""
     tree = ElementTree.parse(path)
     extension = ElementTree.SubElement(tree.getroot(), "mujoco")
-    # balanceinertia and boundmass stay off: MuJoCo must not mend the inertias that are compared.
+    # balanceinertia and boundmass stay off: MuJoCo must not fix the inertias that are compared.
     ElementTree.SubElement(extension, "compiler", fusestatic="false", balanceinertia="false", boundmass="0", boundinertia="0")
     model = mujoco.MjModel.from_xml_string(ElementTree.tostring(tree.getroot(), encoding="unicode"))
     for field in ("dof_damping", "dof_frictionloss", "dof_armature"):

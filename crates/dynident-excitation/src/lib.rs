@@ -25,7 +25,7 @@
 //! use dynident_excitation::criteria::DOptimal;
 //! use dynident_excitation::families::{Fourier, FourierSettings};
 //! use dynident_excitation::limits::{LimitSet, Limits};
-//! use dynident_excitation::{DesignSettings, DesignTask, Family, design, forecast};
+//! use dynident_excitation::{DesignSettings, DesignTask, Family, design, predicted_covariance};
 //!
 //! // An arm with two level axes, and limits beside those of its description.
 //! let arm = dynident_model::read_urdf(
