@@ -2,8 +2,7 @@
 
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use nalgebra::{DMatrix, DVector, DVectorView};
-use std::num::NonZero;
-use std::thread::available_parallelism;
+use rayon::prelude::*;
 
 /// What sums of some hundred products in double precision leave of an exact zero, with room.
 const ROUNDING: f64 = 1e-12;
@@ -152,8 +151,8 @@ const SIDE_BY_SIDE: usize = 32;
 const WORTH_THREADS: usize = 20_000_000;
 
 /// Back-substitution with the independent columns' triangle gives the regrouping. Each dependent column has entries for
-/// the independent ones before it. Groups of columns are independent, so the result does not depend on the threads that
-/// share them.
+/// the independent ones before it. Groups of columns are independent, so the result does not depend on the threads of
+/// the pool that share them.
 fn solved(triangle: &[Vec<f64>], dependent: &[Vec<f64>]) -> DMatrix<f64> {
     let (level, rank) = (Level::detect(), triangle.len());
     let mut regrouping = DMatrix::zeros(rank, dependent.len());
@@ -168,21 +167,11 @@ fn solved(triangle: &[Vec<f64>], dependent: &[Vec<f64>]) -> DMatrix<f64> {
         }
     };
     let products: usize = dependent.iter().map(|column| column.len() * column.len() / 2).sum();
-    let threads = if products < WORTH_THREADS { 1 } else { available_parallelism().map_or(1, NonZero::get) };
-    if threads == 1 {
+    if products < WORTH_THREADS {
         groups.for_each(solve);
-        return regrouping;
+    } else {
+        groups.collect::<Vec<_>>().into_par_iter().for_each(solve);
     }
-    // Later groups are longer: every thread gets some of all.
-    let mut shares: Vec<Vec<_>> = (0..threads).map(|_| Vec::new()).collect();
-    for (number, group) in groups.enumerate() {
-        shares[number % threads].push(group);
-    }
-    std::thread::scope(|scope| {
-        for share in shares {
-            scope.spawn(|| share.into_iter().for_each(solve));
-        }
-    });
     regrouping
 }
 
@@ -222,9 +211,25 @@ impl Kernel for BackSubstitution<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::{IndependentColumns, ROUNDING, independent_columns};
+    use super::{IndependentColumns, ROUNDING, WORTH_THREADS, independent_columns, solved};
     use nalgebra::{DMatrix, DVector};
     use proptest::prelude::*;
+
+    #[test]
+    fn threads_of_the_pool_change_no_bit() {
+        let number = |a: usize, b: usize| (1.3 * a as f64 + 0.7 * (a * b) as f64).sin();
+        let rank = 400;
+        let triangle: Vec<Vec<f64>> = (0..rank)
+            .map(|row| (row..rank).map(|k| if k == row { 9.0 } else { 0.1 * number(row, k) }).collect())
+            .collect();
+        let dependent: Vec<Vec<f64>> = (0..260).map(|c| (0..rank).map(|row| number(c, row)).collect()).collect();
+        assert!(dependent.len() * rank * rank / 2 > WORTH_THREADS);
+        let of = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| solved(&triangle, &dependent))
+        };
+        assert_eq!(of(1), of(3));
+    }
 
     #[test]
     fn a_dependent_column_spends_no_row() {

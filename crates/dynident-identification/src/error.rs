@@ -1,10 +1,11 @@
 //! Everything that can stop an identification, each with the log or the place and the fix in its message.
 
 use crate::consistent::ConsistencyError;
+use crate::estimators::EstimatorError;
 use crate::payload::PayloadError;
+use crate::recording::LogError;
 use dynident_dynamics::ParametricModelError;
 use dynident_estimation::EstimationError;
-use dynident_recording::{FilterError, RecordingError};
 use thiserror::Error;
 
 /// Why a model could not be identified. A poor fit is not an error.
@@ -14,81 +15,15 @@ pub enum IdentificationError {
     /// Nothing to fit to.
     #[error("no log has the role \"identify\": there is nothing to fit to")]
     NoTrainingLog,
-    /// A log that cannot be read.
-    #[error("log `{log}`: {source}")]
-    Recording {
-        /// The log.
-        log: String,
-        /// What is wrong.
-        source: Box<RecordingError>,
-    },
-    /// A log of other joints than the model has.
-    #[error("log `{log}`: there is no joint `{joint}` among its columns, which are of {}", known.join(", "))]
-    NoSuchJoint {
-        /// The log.
-        log: String,
-        /// The model's joint.
-        joint: String,
-        /// The log's joints.
-        known: Vec<String>,
-    },
-    /// A parallel filter that does not exist at the log's rate.
-    #[error("log `{log}`, [parallel_filter]: {source}")]
-    Filter {
-        /// The log.
-        log: String,
-        /// What is wrong.
-        source: FilterError,
-    },
-    /// A log without the temperature that friction depends on.
-    #[error(
-        "log `{log}`: friction of joint `{joint}` depends on the temperature, which the log does not have; give its columns as temperature of the format, or leave out the law `temperature`"
-    )]
-    NoTemperature {
-        /// The log.
-        log: String,
-        /// The first joint that needs it.
-        joint: String,
-    },
-    /// A log that leaves no rows after filtering.
-    #[error(
-        "log `{log}`: {rows} samples leave nothing behind the parallel filter, which needs {needed}; give a longer part of the log, a higher cut-off, or parallel_filter.enabled = false"
-    )]
-    NothingLeft {
-        /// The log.
-        log: String,
-        /// Samples of the log.
-        rows: u64,
-        /// Samples that one filtered row needs.
-        needed: usize,
-    },
-    /// Rows of a log that carry no factor.
-    #[error("{log}: {source}")]
-    Rows {
-        /// The log's label.
-        log: String,
-        /// What is wrong.
-        source: EstimationError,
-    },
+    /// A recording that gives no rows.
+    #[error(transparent)]
+    Log(#[from] LogError),
     /// An estimate that cannot be made.
     #[error(transparent)]
     Estimation(#[from] EstimationError),
-    /// A log or robot that lacks what the estimator chosen needs.
-    #[error("estimator.method = \"{method}\": {message}")]
-    Estimator {
-        /// The estimator.
-        method: &'static str,
-        /// What is wrong, and the fix.
-        message: String,
-    },
-    /// Instruments that do not belong to the log.
-    #[error("log `{log}`, instruments: {message}")]
-    Instruments {
-        /// The log.
-        log: String,
-        /// What is wrong, and the fix.
-        message: String,
-    },
+    /// An estimator that gives no estimate.
+    #[error(transparent)]
+    Estimator(EstimatorError),
     /// A robot whose parts do not fit.
     #[error(transparent)]
     Model(#[from] ParametricModelError),
@@ -103,9 +38,13 @@ pub enum IdentificationError {
     Intervals(ConsistencyError),
 }
 
-impl IdentificationError {
-    /// A log that cannot be read.
-    pub(crate) fn recording(log: &str, source: RecordingError) -> Self {
-        Self::Recording { log: log.to_owned(), source: Box::new(source) }
+impl From<EstimatorError> for IdentificationError {
+    /// What is wrong with a log or with rows stays what it is.
+    fn from(error: EstimatorError) -> Self {
+        match error {
+            EstimatorError::Log(error) => Self::Log(error),
+            EstimatorError::Estimation(error) => Self::Estimation(error),
+            EstimatorError::Requirement { .. } | EstimatorError::Instruments { .. } => Self::Estimator(error),
+        }
     }
 }

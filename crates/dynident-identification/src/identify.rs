@@ -5,16 +5,17 @@ use crate::consistent::{
     inertials, nearest_to_nominal,
 };
 use crate::error::IdentificationError;
-use crate::estimators::{Estimation, InstrumentSource, TrainingRows, estimate};
+use crate::estimators::{Estimation, InstrumentSource, estimate};
 use crate::examination::{
-    HeldOutExamination, LogTrace, ModelUnderTest, TorqueLag, TorqueSignCheck, Uncertainty, examine_held_out,
-    examine_training, pooled_delay, sign_evidence,
+    HeldOutExamination, LogTrace, ModelUnderTest, TorqueLag, TorqueSignCheck, Uncertainty, examine_training,
+    pooled_delay, sign_evidence, tested_on,
 };
 use crate::execution::Execution;
 use crate::logs::{Logs, of_role};
 use crate::payload::{KnownArm, PayloadResult, payload_results};
 use crate::recording::Role;
 use crate::regressor_model::RegressorModel;
+use crate::settings::IdentificationSettings;
 use crate::task::IdentificationTask;
 use crate::training::{Training, training_rows};
 use dynident_estimation::consistent::PhysicalFit;
@@ -179,20 +180,20 @@ fn identified(
     if chosen.is_empty() {
         return Err(IdentificationError::NoTrainingLog);
     }
-    settings.check_names(robot)?;
+    settings.check_names(robot).map_err(IdentificationError::Consistency)?;
 
     // Rows and factors, with the filters in force and the friction that the logs choose.
     let cutoff_hz = job.arm().and_then(KnownArm::cutoff_hz);
-    let logs = Logs::new(robot.model(), recordings, settings, &chosen, cutoff_hz, execution)?;
+    let logs = Logs::new(robot.model(), recordings, settings.filters(), &chosen, cutoff_hz, execution)?;
     let refit = job.arm().map(KnownArm::refit);
-    let training = training_rows(&logs, robot.clone().into(), &chosen, payloads, refit)?;
+    let training = training_rows((&logs, settings), robot.clone().into(), &chosen, payloads, refit)?;
     let model = &training.model;
     let mut times =
         StageTimes { logs_s: training.timings_s[0], estimation_s: training.timings_s[1], examination_s: 0.0 };
 
     // The estimate.
     let started = Instant::now();
-    let rows = TrainingRows { logs: &logs, model, training: &chosen, problem: &training.problem };
+    let rows = training.rows((&logs, settings), &chosen);
     let mut estimation = match job {
         Job::Payload(arm) => {
             Estimation::plain(arm.estimate(model, &training.columns, &training.problem, &settings.estimation)?)
@@ -208,26 +209,32 @@ fn identified(
         (estimation.estimate, dropped) = (rest, Some(report));
     }
 
-    // Bodies, friction and drives that a robot can have.
+    // Bodies, friction and drives that a robot can have; then what held-out recordings say of them.
     let held = job.arm().is_some();
     let bodies = || -> Result<_, IdentificationError> {
-        let found = if held {
-            (held_arm(task, &training, &estimation.estimate), None)
+        let consistent = if held {
+            held_arm(task, &training, &estimation.estimate)
         } else {
-            let consistent = consistent_stage(&logs, &training, &estimation.estimate)?;
-            (consistent, torque_sign(&training, &estimation.estimate)?)
+            consistent_stage((&logs, settings), &training, &estimation.estimate)?
         };
-        Ok((found, started.elapsed().as_secs_f64()))
+        let estimation_s = started.elapsed().as_secs_f64();
+        let physical = consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
+        let held_out = examine_all_held_out((&logs, settings), &training, &estimation.estimate, physical);
+        Ok((consistent, estimation_s, held_out))
     };
-    // Beside that, what training recordings say of the estimate; then what held-out ones do.
-    let examined = || examine_all_training(&logs, &training, &estimation.estimate);
-    let (bodies, examined) = if execution.parallel() { rayon::join(bodies, examined) } else { (bodies(), examined()) };
-    let ((consistent, sign), estimation_s) = bodies?;
-    let mut examination = examined?;
-    examination.sign = sign;
+    // Beside that, what training recordings say of the estimate.
+    let sign = || if held { Ok(None) } else { torque_sign(&training, &estimation.estimate) };
+    let examined = || examine_all_training((&logs, settings), &training, &estimation.estimate);
+    let (bodies, (sign, examined)) = if execution.parallel() {
+        rayon::join(bodies, || rayon::join(sign, examined))
+    } else {
+        (bodies(), (sign(), examined()))
+    };
+    let (consistent, estimation_s, held_out) = bodies?;
+    let sign = sign?;
+    let examination = TrainingExamination { sign, ..examined? };
+    let held_out = held_out?;
     times.estimation_s += estimation_s;
-    let physical = consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
-    let held_out = examine_all_held_out(&logs, &training, &estimation.estimate, physical)?;
     times.examination_s = started.elapsed().as_secs_f64() - estimation_s;
     Ok(Identification {
         payloads: payload_results((recordings, payloads), &chosen, &training.columns, &estimation.estimate),
@@ -262,11 +269,11 @@ fn held_arm(task: &IdentificationTask, training: &Training, estimate: &Estimate)
 /// Factors that do not belong to the estimate, intervals that cannot be had. That there is no consistent set is part of
 /// the result.
 pub fn consistent_stage(
-    logs: &Logs<'_>,
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
     training: &Training,
     estimate: &Estimate,
 ) -> Result<ConsistentParameters, IdentificationError> {
-    let (settings, robot) = (logs.settings, &training.model.parametric);
+    let robot = &training.model.parametric;
     let (alone, arm) = arm_alone(training, estimate)?;
     let problem = alone.as_ref().unwrap_or(&training.problem);
     let plain = settings.estimation.estimator.is_plain();
@@ -318,13 +325,13 @@ fn torque_sign(training: &Training, estimate: &Estimate) -> Result<Option<Torque
 
 /// [`examine_training`] of every training recording, side by side.
 fn examine_all_training(
-    logs: &Logs<'_>,
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
     training: &Training,
     estimate: &Estimate,
 ) -> Result<TrainingExamination, IdentificationError> {
     let one = |log: &crate::training::LogFactors| {
         let theta = training.columns.base_values(log.index, &estimate.values);
-        examine_training(logs, &training.model, log.index, &theta)
+        examine_training((logs, &settings.estimation), &training.model, log.index, &theta)
     };
     let found: Vec<_> = if logs.execution.parallel() {
         training.logs.par_iter().map(one).collect::<Result<_, _>>()?
@@ -337,15 +344,16 @@ fn examine_all_training(
     Ok(TrainingExamination { delays, traces, pooled_delays, sign: None })
 }
 
-/// [`examine_held_out`] of every recording to test on.
+/// [`examine_held_out`] of every recording to test on, side by side.
 fn examine_all_held_out(
-    logs: &Logs<'_>,
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
     training: &Training,
     estimate: &Estimate,
     physical: Option<&[f64]>,
 ) -> Result<Vec<HeldOutExamination>, IdentificationError> {
     let columns = &training.columns;
-    let one = |index: usize| {
+    let held_out = logs.of_role(Role::Validate);
+    let one = |&index: &usize| -> Result<_, IdentificationError> {
         let theta = columns.base_values(index, &estimate.values);
         let uncertainty = Uncertainty::of(estimate, columns.base_covariance(index, &estimate.covariance));
         let physical =
@@ -356,7 +364,18 @@ fn examine_all_held_out(
             uncertainty: Some(&uncertainty),
             traced: true,
         };
-        examine_held_out(logs, &training.model, index, &tested)
+        Ok(tested_on((logs, &settings.estimation), &training.model, index, &tested, held_out.len() == 1)?)
     };
-    logs.of_role(Role::Validate).into_iter().map(one).collect()
+    if held_out.is_empty() {
+        return Ok(Vec::new());
+    }
+    let names: Vec<&str> = held_out.iter().map(|&index| &logs.recordings[index].name[..]).collect();
+    logs.begin(&format!("testing on {}", names.join(", ")), &held_out);
+    let tested = if logs.execution.parallel() {
+        held_out.par_iter().map(one).collect()
+    } else {
+        held_out.iter().map(one).collect()
+    };
+    logs.end();
+    tested
 }

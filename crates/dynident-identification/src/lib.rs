@@ -48,7 +48,7 @@
 //!
 //! ```
 //! # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/ur10_arrays.rs"));
-//! use dynident_identification::estimators::{TrainingRows, estimate};
+//! use dynident_identification::estimators::estimate;
 //! use dynident_identification::examination::{ModelUnderTest, examine_held_out, examine_training};
 //! use dynident_identification::{Execution, IdentificationSettings, Logs, consistent_stage, training_rows};
 //! # use dynident_dynamics::ParametricModel;
@@ -67,22 +67,21 @@
 //! let settings = IdentificationSettings::default();
 //!
 //! // Rows of the regressor, kept as triangular factors; one cut-off frequency for all recordings.
-//! let logs = Logs::new(robot.model(), &recordings, &settings, &[0], None, Execution::default())?;
-//! let training = training_rows(&logs, robot.clone().into(), &[0], &[], None)?;
+//! let logs = Logs::new(robot.model(), &recordings, settings.filters(), &[0], None, Execution::default())?;
+//! let training = training_rows((&logs, &settings), robot.clone().into(), &[0], &[], None)?;
 //!
 //! // Base parameters with their covariance, by the estimator of the settings.
-//! let rows = TrainingRows { logs: &logs, model: &training.model, training: &[0], problem: &training.problem };
-//! let estimate = estimate(&rows, None)?.estimate;
+//! let estimate = estimate(&training.rows((&logs, &settings), &[0]), None)?.estimate;
 //!
 //! // Bodies and friction that can be real and explain the rows best.
-//! let consistent = consistent_stage(&logs, &training, &estimate)?;
+//! let consistent = consistent_stage((&logs, &settings), &training, &estimate)?;
 //! let fit = consistent.fit.expect("a consistent set explains what a real arm did");
 //!
 //! // What the recordings say of it: the lag of the torque, and the error on motion that was not used.
-//! let (lags, _) = examine_training(&logs, &training.model, 0, &estimate.values)?;
+//! let (lags, _) = examine_training((&logs, &settings.estimation), &training.model, 0, &estimate.values)?;
 //! assert_eq!(lags.len(), 6);
 //! let tested = ModelUnderTest { theta: &fit.base_values, physical: None, uncertainty: None, traced: false };
-//! let held_out = examine_held_out(&logs, &training.model, 1, &tested)?;
+//! let held_out = examine_held_out((&logs, &settings.estimation), &training.model, 1, &tested)?;
 //! assert!(held_out.validation.model.relative_error_percent.unwrap() < 1.0);
 //! # for (value, truth) in estimate.values.iter().zip(robot.base().values(&truth)) {
 //! #     // What the low-pass takes off the motion, and nothing off the torque.
@@ -133,6 +132,7 @@ mod task;
 mod training;
 
 pub use error::IdentificationError;
+pub use estimators::EstimationSettings;
 pub use execution::Execution;
 pub use identify::{
     ConsistentParameters, Identification, StageTimes, TrainingExamination, consistent_stage, identify,
@@ -140,8 +140,8 @@ pub use identify::{
 };
 pub use logs::Logs;
 pub use progress::{Progress, Silent};
-pub use recording::{Recording, Role, Samples};
+pub use recording::{LogError, MotionRecord, Recording, Role, Samples};
 pub use regressor_model::RegressorModel;
-pub use settings::{EstimationSettings, GainChoice, IdentificationSettings, OffsetChoice};
+pub use settings::{GainChoice, IdentificationSettings, OffsetChoice};
 pub use task::IdentificationTask;
 pub use training::{LogFactors, Training, log_factors, training_rows};

@@ -1,32 +1,30 @@
 //! The recordings of a task with the filters in force: what every pass over them needs.
 
-use crate::error::IdentificationError;
 use crate::execution::Execution;
-use crate::recording::{Recording, Role};
+use crate::recording::{LogError, Recording, Role};
 use crate::regressor_model::RegressorModel;
-use crate::rows::{KeptLog, LogPass};
-use crate::settings::IdentificationSettings;
+use crate::rows::{KeptLog, LogPass, ParallelFilterSettings};
 use dynident_model::Model;
 use dynident_recording::MotionSettings;
 use std::sync::OnceLock;
 
-/// The recordings of a task, its settings, and the filters in force. A log that fits into memory is read and
+/// The recordings of a task and the filters in force. A log that fits into memory is read and
 /// differentiated once, however many passes there are.
 #[derive(Debug)]
 pub struct Logs<'a> {
     /// All recordings, whatever their role.
     pub recordings: &'a [Recording],
-    /// The task's settings.
-    pub settings: &'a IdentificationSettings,
     /// The motion settings with one cut-off for all logs.
     pub motion: MotionSettings,
+    /// The low-pass and decimation that torque and regressor go through alike.
+    pub filter: &'a ParallelFilterSettings,
     /// How the job runs.
     pub execution: Execution<'a>,
     kept: Vec<OnceLock<KeptLog>>,
 }
 
 impl<'a> Logs<'a> {
-    /// Decides on one cut-off for all logs: the settings' own; or the one that a finished model was made with; or the
+    /// Decides on one cut-off for all logs: that of `settings`; or the one that a finished model was made with; or the
     /// highest that any of the logs `deciding` asks for. A model and its test must not differ in their filters.
     ///
     /// # Errors
@@ -34,19 +32,19 @@ impl<'a> Logs<'a> {
     pub fn new(
         model: &Model,
         recordings: &'a [Recording],
-        settings: &'a IdentificationSettings,
+        (settings, filter): (&MotionSettings, &'a ParallelFilterSettings),
         deciding: &[usize],
         cutoff_of_model_hz: Option<f64>,
         execution: Execution<'a>,
-    ) -> Result<Self, IdentificationError> {
-        let mut motion = settings.motion.clone();
+    ) -> Result<Self, LogError> {
+        let mut motion = settings.clone();
         if let Some(cutoff_hz) = cutoff_of_model_hz {
             motion.differentiator = motion.differentiator.with_cutoff(cutoff_hz);
         }
         if motion.differentiator.wants_cutoff() {
             let mut highest = 0.0_f64;
             for &index in deciding {
-                if let Some(stream) = recordings[index].open(model, &settings.motion)? {
+                if let Some(stream) = recordings[index].open(model, settings)? {
                     highest = highest.max(stream.cutoff().cutoff_hz);
                 }
             }
@@ -55,7 +53,7 @@ impl<'a> Logs<'a> {
             }
         }
         let kept = recordings.iter().map(|_| OnceLock::new()).collect();
-        Ok(Self { recordings, settings, motion, execution, kept })
+        Ok(Self { recordings, motion, filter, execution, kept })
     }
 
     /// Places of the recordings with this role.
@@ -69,7 +67,7 @@ impl<'a> Logs<'a> {
             recording: &self.recordings[index],
             model,
             motion: &self.motion,
-            filter: &self.settings.parallel_filter,
+            filter: self.filter,
             reader_thread: false,
             most_samples: None,
             progress: self.execution.progress,

@@ -1,14 +1,10 @@
 //! How a model is identified: filters, estimator, what is known of the bodies, whose friction is chosen.
 
-use crate::consistent::ConsistencySettings;
-use crate::error::IdentificationError;
-use crate::estimators::{Estimator, InstrumentSettings};
+use crate::consistent::{ConsistencyError, ConsistencySettings};
+use crate::estimators::EstimationSettings;
 use crate::friction::FrictionSearch;
 use crate::rows::ParallelFilterSettings;
 use dynident_dynamics::ParametricModel;
-use dynident_estimation::{
-    CovarianceMethod, EssentialSettings, OrdinarySettings, RankSettings, SegmentSettings, WeightedSettings,
-};
 use dynident_recording::MotionSettings;
 use serde::{Deserialize, Serialize};
 
@@ -33,43 +29,6 @@ pub enum GainChoice {
     Stated,
     /// The logs: joint by joint one gain, from logs without and with a payload that is known.
     Unknown,
-}
-
-/// From rows to base parameters, and how far these are trusted.
-#[derive(Clone, Debug, Default)]
-#[non_exhaustive]
-pub struct EstimationSettings {
-    /// The estimator; weighted least squares by default.
-    pub estimator: Estimator,
-    /// When a column counts as excited.
-    pub rank: RankSettings,
-    /// The covariance that error bars come from; jackknife by default.
-    pub covariance: CovarianceMethod,
-    /// How logs are cut into segments for the covariance.
-    pub segments: SegmentSettings,
-    /// Instruments that only test whether noise in the regressor biases the estimator; none by default.
-    pub exogeneity_test: Option<InstrumentSettings>,
-    /// Hold parameters that the data hardly determine at zero; not by default.
-    pub essential: Option<EssentialSettings>,
-    /// Base columns that are held at given values (place among the base columns, value); none by default.
-    pub held: Vec<(usize, f64)>,
-}
-
-impl EstimationSettings {
-    /// An estimator with the defaults of all else.
-    pub fn of(estimator: Estimator) -> Self {
-        Self { estimator, ..Self::default() }
-    }
-
-    /// Settings of weighted least squares with this rank rule and covariance.
-    pub(crate) fn weighted(&self) -> WeightedSettings {
-        WeightedSettings { rank: self.rank, covariance: self.covariance, ..WeightedSettings::default() }
-    }
-
-    /// Settings of ordinary least squares with this rank rule and covariance.
-    pub(crate) fn ordinary(&self) -> OrdinarySettings {
-        OrdinarySettings { rank: self.rank, covariance: self.covariance }
-    }
 }
 
 /// Everything that [`identify`](crate::identify()) can be given beside robot and recordings; the default is weighted
@@ -112,17 +71,22 @@ impl Default for IdentificationSettings {
 }
 
 impl IdentificationSettings {
+    /// What makes rows of positions: from positions to velocities and accelerations, and the parallel filter.
+    pub fn filters(&self) -> (&MotionSettings, &ParallelFilterSettings) {
+        (&self.motion, &self.parallel_filter)
+    }
+
     /// Checks that the bodies and terms of which something is known are there.
     ///
     /// # Errors
     /// A name that the robot does not have.
-    pub fn check_names(&self, robot: &ParametricModel) -> Result<(), IdentificationError> {
+    pub fn check_names(&self, robot: &ParametricModel) -> Result<(), ConsistencyError> {
         let Some(knowledge) = &self.consistency else { return Ok(()) };
         let mut named = knowledge.clone();
         if !self.friction.is_empty() {
             // Terms that the logs are to choose are not there yet.
             named.terms.clear();
         }
-        named.check_names(robot.model(), robot.terms()).map_err(IdentificationError::Consistency)
+        named.check_names(robot.model(), robot.terms())
     }
 }

@@ -1,14 +1,15 @@
 //! From training recordings to triangular factors, and the model whose terms they were made with.
 
 use crate::error::IdentificationError;
-use crate::estimators::Estimator;
+use crate::estimators::{EstimationSettings, Estimator, TrainingRows};
 use crate::examination::{Evidence, PriorAgreement};
 use crate::friction::{JointFriction, candidate_columns, choose_friction, chosen_model};
 use crate::logs::Logs;
-use crate::payload::{DriveGain, Gains, LoadColumns, Payload, Refit, drive_gains};
+use crate::payload::{DriveGain, Gains, LoadColumns, Payload, Refit, drive_gains, known_loads};
+use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
 use crate::rows::{JointRows, LogPass, LogStatistics, RowConsumer};
-use crate::settings::{EstimationSettings, GainChoice};
+use crate::settings::{GainChoice, IdentificationSettings};
 use dynident_dynamics::Column;
 use dynident_estimation::{
     Estimate, EstimationError, LinearProblem, SegmentedFactor, ordinary_least_squares, weighted_least_squares,
@@ -54,23 +55,35 @@ pub struct Training {
     pub timings_s: [f64; 2],
 }
 
+impl Training {
+    /// What estimators are given: the recordings `training`, as factors and to come back to.
+    pub fn rows<'a>(
+        &'a self,
+        (logs, settings): (&'a Logs<'a>, &'a IdentificationSettings),
+        training: &'a [usize],
+    ) -> TrainingRows<'a> {
+        let (settings, consistency) = (&settings.estimation, settings.consistency.as_ref());
+        TrainingRows { logs, model: &self.model, training, problem: &self.problem, settings, consistency }
+    }
+}
+
 /// Makes the factors of the recordings `training`; where friction is to be chosen or depends on the load, once more
 /// with what the first fit says. `known_arm` where the arm is held, with what of it is fitted again.
 ///
 /// # Errors
 /// Recordings that cannot be read, payloads and gains that do not go together, rows that do not carry an estimate.
 pub fn training_rows(
-    logs: &Logs<'_>,
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
     model: RegressorModel,
     training: &[usize],
     payloads: &[Payload],
     known_arm: Option<Refit>,
 ) -> Result<Training, IdentificationError> {
-    let job = Job { logs, training, payloads, known_arm };
+    let job = Job { logs, settings, training, payloads, known_arm };
     let mut fitted = job.fit(model)?;
-    if logs.settings.gains == GainChoice::Unknown {
-        let Gains { of_joints, estimate, problem } =
-            drive_gains(&logs.settings.estimation, &fitted.columns, &fitted.problem, training)?;
+    if settings.gains == GainChoice::Unknown {
+        let known = known_loads(&fitted.columns, training)?;
+        let Gains { of_joints, estimate, problem } = drive_gains(&settings.estimation, &known, &fitted.problem)?;
         fitted.model.torque_gains = of_joints.iter().map(|gain| gain.gain).collect();
         fitted.problem = problem;
         fitted.gains = Some((estimate, of_joints));
@@ -80,6 +93,7 @@ pub fn training_rows(
 
 struct Job<'a> {
     logs: &'a Logs<'a>,
+    settings: &'a IdentificationSettings,
     training: &'a [usize],
     payloads: &'a [Payload],
     known_arm: Option<Refit>,
@@ -87,7 +101,7 @@ struct Job<'a> {
 
 impl Job<'_> {
     fn fit(&self, model: RegressorModel) -> Result<Training, IdentificationError> {
-        let settings = self.logs.settings;
+        let settings = self.settings;
         let first = self.rows_once(model)?;
         let candidates: Vec<_> = settings
             .friction
@@ -143,14 +157,14 @@ impl Job<'_> {
     }
 
     fn columns(&self, model: &RegressorModel) -> Result<LoadColumns, IdentificationError> {
-        Ok(LoadColumns::new(self.logs.settings, self.logs.recordings, self.payloads, model, self.known_arm)?)
+        Ok(LoadColumns::new(self.settings, self.logs.recordings, self.payloads, model, self.known_arm)?)
     }
 
     /// Recordings side by side, or one with its reader on a second thread; results stand in their order either way.
-    fn read(&self, model: &RegressorModel) -> Result<Vec<LogFactors>, IdentificationError> {
+    fn read(&self, model: &RegressorModel) -> Result<Vec<LogFactors>, LogError> {
         self.logs.begin("logs to factors", self.training);
         let alone = self.training.len() == 1;
-        let one = |index: &usize| log_factors(self.logs, model, *index, alone);
+        let one = |index: &usize| log_factors((self.logs, self.settings), model, *index, alone);
         let factors = if !alone && self.logs.execution.parallel() {
             self.training.par_iter().map(one).collect()
         } else {
@@ -170,7 +184,7 @@ impl Job<'_> {
         let all_names = model.joint_names();
         let names = joints.iter().map(|&joint| all_names[joint].clone()).collect();
         let mut problem = LinearProblem::new(columns.symbols(model), names);
-        let keep_known = self.logs.settings.gains == GainChoice::Unknown;
+        let keep_known = self.settings.gains == GainChoice::Unknown;
         for log in logs {
             // Two recordings may share a name; their numbers keep them apart.
             let name = format!("{} ({})", self.logs.recordings[log.index].name, log.index + 1);
@@ -186,7 +200,7 @@ impl Job<'_> {
             nominal.resize(columns.count(), 0.0);
             problem = problem.with_fallback(nominal)?;
         }
-        hold(problem, &self.logs.settings.estimation.held)
+        hold(problem, &self.settings.estimation.held)
     }
 }
 
@@ -245,13 +259,13 @@ struct FactorConsumer<'a> {
 }
 
 impl RowConsumer for FactorConsumer<'_> {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         if let Some(evidence) = &mut self.evidence {
             evidence.filtered(rows, &mut self.buffer);
         }
         self.factors[rows.joint]
             .absorb(rows.panel, rows.rows)
-            .map_err(|source| IdentificationError::Rows { log: self.log.clone(), source })
+            .map_err(|source| LogError::Rows { log: self.log.clone(), source })
     }
 }
 
@@ -260,20 +274,20 @@ impl RowConsumer for FactorConsumer<'_> {
 /// # Errors
 /// What reading it can give.
 pub fn log_factors(
-    logs: &Logs<'_>,
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
     model: &RegressorModel,
     index: usize,
     alone: bool,
-) -> Result<LogFactors, IdentificationError> {
+) -> Result<LogFactors, LogError> {
     let columns: Vec<&[usize]> = (0..model.dof()).map(|joint| model.layout().joint_columns(joint)).collect();
     let log = logs.recordings[index].label();
     let factors = columns
         .iter()
-        .map(|columns| SegmentedFactor::new(columns.len(), logs.settings.estimation.segments))
+        .map(|columns| SegmentedFactor::new(columns.len(), settings.estimation.segments))
         .collect::<Result<Vec<_>, _>>()
-        .map_err(|source| IdentificationError::Rows { log: log.clone(), source })?;
+        .map_err(|source| LogError::Rows { log: log.clone(), source })?;
     // Torque in a unit that nobody knows says nothing about the description.
-    let nominal = model.parametric.nominal_base().filter(|_| logs.settings.gains == GainChoice::Stated);
+    let nominal = model.parametric.nominal_base().filter(|_| settings.gains == GainChoice::Stated);
     let evidence = nominal.map(|nominal| Evidence::new(columns, nominal));
     let mut consumer = FactorConsumer { log, factors, evidence, buffer: Vec::new() };
     let pass = LogPass { reader_thread: alone && logs.execution.parallel(), ..logs.pass(model, index) };

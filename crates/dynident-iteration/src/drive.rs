@@ -3,8 +3,9 @@
 use crate::error::IterationError;
 use crate::estimate::{RunEstimate, identify_run};
 use crate::leg::IterationTask;
+use crate::model_parameters::ModelParameters;
 use crate::policy::{self, Next, RunPlan};
-use crate::record::{ModelParameters, RunRecord, UsedController};
+use crate::record::{RunRecord, UsedController};
 use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest};
 use crate::settings::{IterationSettings, RunIdentificationSettings};
 use crate::status::IterationStatus;
@@ -64,21 +65,25 @@ impl Iteration {
     }
 
     /// What comes after these records: it depends on nothing else.
-    pub fn next(&self, records: &[RunRecord]) -> Next {
-        let next = policy::next(records, &self.settings, self.robot(records).nominal());
+    ///
+    /// # Errors
+    /// Records of another robot.
+    pub fn next(&self, records: &[RunRecord]) -> Result<Next, IterationError> {
+        let next = policy::next(records, &self.settings, self.robot(records)?.nominal());
         if let Next::Finished(IterationStatus::Converged | IterationStatus::RunsUsedUp) = next
-            && let Some(reason) = self.beyond_torque(records)
+            && let Some(reason) = self.beyond_torque(records)?
         {
-            return Next::Finished(IterationStatus::Refused { reason });
+            return Ok(Next::Finished(IterationStatus::Refused { reason }));
         }
-        next
+        Ok(next)
     }
 
     /// Where the trajectories ask for more torque than the joints have, by the last good model.
-    fn beyond_torque(&self, records: &[RunRecord]) -> Option<String> {
-        let limits = self.task.torque_limits.as_ref()?;
-        let estimate = records.iter().rev().find(|record| record.accepted)?.estimate.as_ref()?;
-        let mut model = self.controller_model(records, &estimate.for_controller()?).ok()?;
+    fn beyond_torque(&self, records: &[RunRecord]) -> Result<Option<String>, IterationError> {
+        let Some(limits) = &self.task.torque_limits else { return Ok(None) };
+        let good = records.iter().rev().find(|record| record.accepted).and_then(|record| record.estimate.as_ref());
+        let Some(parameters) = good.and_then(RunEstimate::for_controller) else { return Ok(None) };
+        let mut model = self.controller_model(records, &parameters)?;
         let dof = self.task.robot.dof();
         let mut tau = vec![0.0; dof];
         for leg in &self.task.legs {
@@ -91,31 +96,34 @@ impl Iteration {
                 for (joint, (tau, limit)) in tau.iter().zip(limits).enumerate() {
                     if tau.abs() > limit * BEYOND {
                         let name = &self.task.robot.model().joints()[joint].name;
-                        return Some(format!(
+                        return Ok(Some(format!(
                             "the trajectory asks joint {name} for {:.3} Nm at {:.2} s by the model found, its limit is {limit:.3} Nm: give another trajectory",
                             tau.abs(),
                             sample as f64 / rate_hz
-                        ));
+                        )));
                     }
                 }
             }
         }
-        None
+        Ok(None)
     }
 
     /// The robot with the friction that a run before chose.
-    pub fn robot(&self, records: &[RunRecord]) -> Cow<'_, ParametricModel> {
-        let estimates = records.iter().filter_map(|record| record.estimate.as_ref());
-        let choice = estimates.map(|estimate| &estimate.friction).find(|choice| !choice.is_empty());
-        match choice.map(|choice| chosen_model(&self.task.robot, choice)) {
-            Some(Ok(robot)) => Cow::Owned(robot),
-            _ => Cow::Borrowed(&self.task.robot),
-        }
+    ///
+    /// # Errors
+    /// Friction that this robot cannot have: the run is another robot's.
+    pub fn robot(&self, records: &[RunRecord]) -> Result<Cow<'_, ParametricModel>, IterationError> {
+        let choices = records.iter().filter_map(|record| Some((record.run, &record.estimate.as_ref()?.friction)));
+        let Some((run, choice)) = choices.into_iter().find(|(_, choice)| !choice.is_empty()) else {
+            return Ok(Cow::Borrowed(&self.task.robot));
+        };
+        let chosen = chosen_model(&self.task.robot, choice);
+        chosen.map(Cow::Owned).map_err(|source| IterationError::ChosenFriction { run, source })
     }
 
     /// What of a run's records: with the friction that a run before chose, if one did.
     fn identified(&self, records: &[Record], before: &[RunRecord]) -> Result<RunEstimate, IterationError> {
-        match self.robot(before) {
+        match self.robot(before)? {
             Cow::Borrowed(_) => identify_run(&self.task, records, &self.settings.identification),
             Cow::Owned(robot) => {
                 let task = IterationTask { robot, ..self.task.clone() };
@@ -134,14 +142,14 @@ impl Iteration {
         &self,
         records: &[RunRecord],
         parameters: &ModelParameters,
-    ) -> Result<ControllerModel, SimulationError> {
-        let robot = self.robot(records);
-        match parameters {
-            ModelParameters::All(values) => ControllerModel::from_parameters(robot.model(), robot.terms(), values),
+    ) -> Result<ControllerModel, IterationError> {
+        let robot = self.robot(records)?;
+        Ok(match parameters {
+            ModelParameters::All(values) => ControllerModel::from_parameters(robot.model(), robot.terms(), values)?,
             ModelParameters::Base(values) => {
-                ControllerModel::from_columns(robot.model(), &robot.base().base_columns(), values)
+                ControllerModel::from_columns(robot.model(), &robot.base().base_columns(), values)?
             }
-        }
+        })
     }
 
     /// Makes one run: every leg on its robot, then the identification.
@@ -183,13 +191,17 @@ impl Iteration {
             let records: Vec<Record> = runs.iter().map(|run| run.record.clone()).collect();
             match self.identified(&records, before) {
                 Ok(estimate) => record.estimate = Some(estimate),
-                Err(error @ (IterationError::File { .. } | IterationError::State { .. })) => return Err(error),
+                Err(
+                    error @ (IterationError::File { .. }
+                    | IterationError::State { .. }
+                    | IterationError::ChosenFriction { .. }),
+                ) => return Err(error),
                 Err(error) => record.reason = Some(error.to_string()),
             }
         }
         match policy::verdict(&record, before, &self.settings) {
             Ok(()) => record.accepted = true,
-            Err(reason) => record.reason = Some(reason),
+            Err(reason) => record.reason = Some(reason.to_string()),
         }
         Ok(PlannedRun::Run(Box::new(record), runs))
     }
@@ -246,7 +258,7 @@ pub fn iterate(
     }
     let mut records = store.map_or_else(|| Ok(Vec::new()), IterationStore::records)?;
     loop {
-        let plan = match iteration.next(&records) {
+        let plan = match iteration.next(&records)? {
             Next::Run(plan) => plan,
             Next::Finished(status) => return Ok(IterationOutcome { status, runs: records }),
         };

@@ -3,7 +3,8 @@
 
 use dynident_dynamics::ParametricModelError;
 use dynident_estimation::EstimationError;
-use dynident_identification::IdentificationError;
+use dynident_identification::estimators::EstimatorError;
+use dynident_identification::{IdentificationError, LogError};
 use dynident_recording::FilterError;
 use dynident_simulation::SimulationError;
 use std::path::{Path, PathBuf};
@@ -19,6 +20,16 @@ pub enum IterationError {
     /// A robot whose parts do not fit.
     #[error(transparent)]
     Model(#[from] ParametricModelError),
+    /// Friction that an earlier run is said to have chosen and that this robot cannot have.
+    #[error(
+        "the friction that run {run} chose does not fit this robot: {source}; start afresh, or give another folder"
+    )]
+    ChosenFriction {
+        /// The run.
+        run: usize,
+        /// What is wrong.
+        source: ParametricModelError,
+    },
     /// Rows that do not carry a model.
     #[error(transparent)]
     Identification(#[from] IdentificationError),
@@ -52,6 +63,18 @@ pub enum IterationError {
         /// What is wrong, and the fix.
         problem: String,
     },
+}
+
+impl From<LogError> for IterationError {
+    fn from(error: LogError) -> Self {
+        Self::Identification(error.into())
+    }
+}
+
+impl From<EstimatorError> for IterationError {
+    fn from(error: EstimatorError) -> Self {
+        Self::Identification(error.into())
+    }
 }
 
 impl IterationError {

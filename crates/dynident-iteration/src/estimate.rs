@@ -2,19 +2,19 @@
 
 use crate::error::IterationError;
 use crate::leg::IterationTask;
+use crate::model_parameters::ModelParameters;
 use crate::motion::measured_motion;
-use crate::record::ModelParameters;
 use crate::settings::{RunIdentificationSettings, Scheme};
 use crate::step_by_step::step_by_step;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::LinearProblem;
 use dynident_identification::consistent::{ConsistencySettings, consistent_parameters};
-use dynident_identification::estimators::{TrainingRows, estimate};
+use dynident_identification::estimators::estimate;
 use dynident_identification::examination::{TorqueLag, examine_training, pooled_delay};
 use dynident_identification::friction::JointFriction;
 use dynident_identification::rows::ParallelFilterSettings;
 use dynident_identification::{
-    Execution, IdentificationSettings, Logs, Recording, Training, consistent_stage, training_rows,
+    EstimationSettings, Execution, IdentificationSettings, Logs, Recording, Training, consistent_stage, training_rows,
 };
 use dynident_simulation::{Record, require_length};
 use serde::{Deserialize, Serialize};
@@ -87,14 +87,14 @@ pub fn identify_run(
     let all: Vec<usize> = (0..recordings.len()).collect();
     let identification = identification_settings(task, settings);
     let (robot, execution) = (&task.robot, Execution::default());
-    let logs = Logs::new(robot.model(), &recordings, &identification, &all, None, execution)?;
-    let training = training_rows(&logs, robot.clone().into(), &all, &settings.payloads, None)?;
+    let logs = Logs::new(robot.model(), &recordings, identification.filters(), &all, None, execution)?;
+    let training = training_rows((&logs, &identification), robot.clone().into(), &all, &settings.payloads, None)?;
     if training.problem.joint_rows().iter().sum::<usize>() == 0 {
         let problem = "no sample counts: the differentiator applies nowhere in the windows; look at its settings and at the tracking error".to_owned();
         return Err(IterationError::Record { joints: robot.joint_names(), problem });
     }
     match settings.scheme {
-        Scheme::AllJoints => all_joints(&logs, training, &all),
+        Scheme::AllJoints => all_joints((&logs, &identification), training, &all),
         Scheme::StepByStep => joint_by_joint(task, &logs, &training, settings),
     }
 }
@@ -128,15 +128,18 @@ fn identification_settings(task: &IterationTask, settings: &RunIdentificationSet
 }
 
 /// All joints at once.
-fn all_joints(logs: &Logs<'_>, training: Training, all: &[usize]) -> Result<RunEstimate, IterationError> {
-    let rows = TrainingRows { logs, model: &training.model, training: all, problem: &training.problem };
-    let estimate = estimate(&rows, None)?.estimate;
-    let consistent = consistent_stage(logs, &training, &estimate)?;
+fn all_joints(
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    training: Training,
+    all: &[usize],
+) -> Result<RunEstimate, IterationError> {
+    let estimate = estimate(&training.rows((logs, settings), all), None)?.estimate;
+    let consistent = consistent_stage((logs, settings), &training, &estimate)?;
     let arm = training.columns.arm_estimate(&estimate);
     let mut joint_sigma = vec![0.0; training.model.dof()];
     training.joints.iter().zip(&arm.joint_sigma).for_each(|(&joint, sigma)| joint_sigma[joint] = *sigma);
     let fixed = arm.rank.fixed.iter().map(|fixed| fixed.column).filter(|&column| column < arm.values.len()).collect();
-    let torque_lags = torque_lags(logs, &training, &estimate.values, all)?;
+    let torque_lags = torque_lags((logs, &settings.estimation), &training, &estimate.values, all)?;
     Ok(RunEstimate {
         std: (0..arm.values.len()).map(|k| arm.covariance[(k, k)].max(0.0).sqrt()).collect(),
         covariance: arm.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
@@ -161,7 +164,7 @@ fn joint_by_joint(
     let robot = &task.robot;
     let (names, joints) = (robot.base().expressions(), robot.joint_names());
     let fallback = robot.base().values(robot.nominal());
-    let steps = step_by_step(task, logs, &names, &joints, &fallback)?;
+    let steps = step_by_step(task, (logs, &settings.estimation), &names, &joints, &fallback)?;
     let given = task.known_values();
     let fixed = (0..names.len()).filter(|&k| !steps.found[k] && given[k].is_none()).collect();
     let sigma: Vec<f64> = training.joints.iter().map(|&joint| steps.joint_sigma[joint]).collect();
@@ -198,7 +201,7 @@ fn consistent(
 
 /// Delays of the torque over all legs, where every row counts; nothing otherwise, for they need rows without a gap.
 fn torque_lags(
-    logs: &Logs<'_>,
+    (logs, settings): (&Logs<'_>, &EstimationSettings),
     training: &Training,
     values: &[f64],
     all: &[usize],
@@ -207,10 +210,10 @@ fn torque_lags(
         return Ok(Vec::new());
     };
     let (robot, execution) = (training.model.model(), logs.execution);
-    let whole = Logs::new(robot, &whole, logs.settings, all, logs.motion.differentiator.cutoff_hz(), execution)?;
+    let whole = Logs::new(robot, &whole, (&logs.motion, logs.filter), all, None, execution)?;
     let of_leg = |&index: &usize| {
         let theta = training.columns.base_values(index, values);
-        examine_training(&whole, &training.model, index, &theta).map(|(delays, _)| delays)
+        examine_training((&whole, settings), &training.model, index, &theta).map(|(delays, _)| delays)
     };
     let delays: Vec<Vec<Option<TorqueLag>>> = all.iter().map(of_leg).collect::<Result<_, _>>()?;
     let of_joint = |joint: usize| -> Vec<TorqueLag> { delays.iter().filter_map(|leg| leg[joint]).collect() };

@@ -4,7 +4,7 @@ use crate::error::IterationError;
 use crate::leg::Leg;
 use crate::settings::RunIdentificationSettings;
 use core::ops::Range;
-use dynident_identification::rows::MotionRecord;
+use dynident_identification::MotionRecord;
 use dynident_recording::log::JointSamples;
 use dynident_recording::{Derivatives, DifferentiatorSettings, Log, MotionBlock, Place, RecordingError, cutoff};
 use dynident_simulation::Record;

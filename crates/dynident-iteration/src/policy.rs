@@ -1,11 +1,13 @@
 //! What the next run is: a pure function of the records so far.
 
 use crate::estimate::RunEstimate;
-use crate::record::{ModelParameters, RunRecord};
+use crate::model_parameters::ModelParameters;
+use crate::record::RunRecord;
 use crate::settings::{IterationSettings, StartWith};
 use crate::status::IterationStatus;
 use dynident_simulation::PerJoint;
 use dynident_simulation::controllers::{ControllerSettings, JointPdSettings, JointPidSettings};
+use thiserror::Error;
 
 /// A good run's estimate with error bars this many times wider than an earlier one's does not take its place.
 const FAR_WIDER: f64 = 3.0;
@@ -120,23 +122,41 @@ fn most_trusted(records: &[RunRecord]) -> Option<&RunRecord> {
     })
 }
 
+/// Why a run does not count as good.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub(crate) enum Rejection {
+    /// It did not get to its end.
+    #[error("{outcome}")]
+    NotDone { outcome: String },
+    /// It gave no estimate.
+    #[error("{reason}")]
+    NoEstimate { reason: String },
+    /// No robot can have its parameters.
+    #[error("no physically consistent set fits it: {reason}")]
+    Inconsistent { reason: String },
+    /// It followed the reference worse than the last good run did, rad (m).
+    #[error("it tracks worse: {now:.3e} rad after {then:.3e} rad")]
+    TracksWorse { now: f64, then: f64 },
+}
+
 /// Whether a run counts as good beside those before it, and why not.
-pub(crate) fn verdict(record: &RunRecord, before: &[RunRecord], settings: &IterationSettings) -> Result<(), String> {
+pub(crate) fn verdict(record: &RunRecord, before: &[RunRecord], settings: &IterationSettings) -> Result<(), Rejection> {
     if !record.done {
-        return Err(record.outcome.clone());
+        return Err(Rejection::NotDone { outcome: record.outcome.clone() });
     }
     let Some(estimate) = &record.estimate else {
-        return Err(record.reason.clone().unwrap_or_else(|| "it says nothing of the parameters".to_owned()));
+        let reason = record.reason.clone().unwrap_or_else(|| "it says nothing of the parameters".to_owned());
+        return Err(Rejection::NoEstimate { reason });
     };
     if let Some(reason) = &estimate.impossible {
-        return Err(format!("no physically consistent set fits it: {reason}"));
+        return Err(Rejection::Inconsistent { reason: reason.clone() });
     }
     let Some(good) = before.iter().rev().find(|record| record.accepted) else { return Ok(()) };
     let (now, then) = (record.tracking_error(), good.tracking_error());
     let worst = (settings.worse_factor * then).max(settings.settled.tracking_tolerance);
     // A controller without a model is what a bad one falls back to: its tracking is no reason to reject it.
     if settings.reject && record.controller.model.is_some() && now > worst {
-        return Err(format!("it tracks worse: {now:.3e} rad after {then:.3e} rad"));
+        return Err(Rejection::TracksWorse { now, then });
     }
     Ok(())
 }

@@ -1,36 +1,8 @@
 //! What is kept of a run.
 
 use crate::estimate::RunEstimate;
+use crate::model_parameters::ModelParameters;
 use serde::{Deserialize, Serialize};
-
-/// Parameters of a controller's model.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "of", content = "values", rename_all = "kebab-case")]
-pub enum ModelParameters {
-    /// Ten for each body, then one for each term.
-    All(Vec<f64>),
-    /// One for each base parameter.
-    Base(Vec<f64>),
-}
-
-impl ModelParameters {
-    /// The values.
-    pub fn values(&self) -> &[f64] {
-        match self {
-            Self::All(values) | Self::Base(values) => values,
-        }
-    }
-
-    /// `good + share (new - good)`; `new` itself where the kinds differ.
-    pub(crate) fn between(good: &Self, new: &Self, share: f64) -> Self {
-        let mixed = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect();
-        match (good, new) {
-            (Self::All(a), Self::All(b)) => Self::All(mixed(a, b)),
-            (Self::Base(a), Self::Base(b)) => Self::Base(mixed(a, b)),
-            _ => new.clone(),
-        }
-    }
-}
 
 /// What controlled a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -9,7 +9,7 @@ use dynident_estimation::{
 };
 use dynident_identification::estimators::Estimator;
 use dynident_identification::rows::{JointRows, RowConsumer};
-use dynident_identification::{EstimationSettings, IdentificationError, Logs, RegressorModel};
+use dynident_identification::{EstimationSettings, LogError, Logs, RegressorModel};
 use nalgebra::DMatrix;
 
 /// What the steps have found so far.
@@ -26,7 +26,7 @@ pub(crate) struct Steps {
 /// estimated before enters with its covariance, `∂θ_k/∂θ_known = -A⁺ B`.
 pub(crate) fn step_by_step(
     task: &IterationTask,
-    logs: &Logs<'_>,
+    (logs, settings): (&Logs<'_>, &EstimationSettings),
     names: &[String],
     joints: &[String],
     fallback: &[f64],
@@ -90,7 +90,7 @@ pub(crate) fn step_by_step(
         let mut problem = LinearProblem::new(own(&|column| names[column].clone()), vec![joints[joint].clone()])
             .with_fallback(unknown.iter().map(|&place| fallback[columns[place]]).collect())?;
         problem.add("run", 0, (0..unknown.len()).collect(), factor)?;
-        let estimate = least_squares(&problem, &logs.settings.estimation)?;
+        let estimate = least_squares(&problem, settings)?;
         steps.joint_sigma[joint] = estimate.joint_sigma[0];
         let fixed: Vec<usize> = estimate.rank.fixed.iter().map(|fixed| fixed.column).collect();
         let estimated: Vec<usize> = (0..unknown.len()).filter(|place| !fixed.contains(place)).collect();
@@ -166,8 +166,8 @@ fn least_squares(problem: &LinearProblem, settings: &EstimationSettings) -> Resu
 /// Hands rows to a function.
 struct Visit<F>(F);
 
-impl<F: FnMut(&JointRows<'_>) -> Result<(), IdentificationError>> RowConsumer for Visit<F> {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
+impl<F: FnMut(&JointRows<'_>) -> Result<(), LogError>> RowConsumer for Visit<F> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         (self.0)(rows)
     }
 }

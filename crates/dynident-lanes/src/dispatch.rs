@@ -1,19 +1,11 @@
 //! The run-time choice of processor level.
 
-use crate::lanes::{Lane, Wide};
+use crate::kernel::Kernel;
+use crate::lanes::Wide;
 use crate::portable::Portable;
 #[cfg(target_arch = "x86_64")]
 use crate::x86::{Avx2, Avx512, HasAvx2, HasAvx512, enter_avx2, enter_avx512};
 use std::sync::OnceLock;
-
-/// Work that can run over any lane type. Implementations mark `run`, and everything it calls in its hot path,
-/// `#[inline(always)]`, so that the whole body is compiled once for each processor level.
-pub trait Kernel {
-    /// What the work returns.
-    type Output;
-    /// Does the work on lanes of type `T`.
-    fn run<T: Lane>(self) -> Self::Output;
-}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Instructions {
@@ -113,6 +105,7 @@ pub fn dispatch_single<K: Kernel>(level: Level, kernel: K) -> K::Output {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lanes::Lane;
 
     struct SumOfSquares<'a>(&'a [f64]);
     impl Kernel for SumOfSquares<'_> {

@@ -14,6 +14,7 @@
 mod aligned;
 mod dispatch;
 mod dual;
+mod kernel;
 mod lanes;
 mod portable;
 mod register;
@@ -23,7 +24,8 @@ mod sin_cos;
 mod x86;
 
 pub use aligned::AlignedBuffer;
-pub use dispatch::{Kernel, Level, dispatch, dispatch_single};
+pub use dispatch::{Level, dispatch, dispatch_single};
 pub use dual::Dual;
+pub use kernel::Kernel;
 pub use lanes::Lane;
 pub use scalar::Scalar;

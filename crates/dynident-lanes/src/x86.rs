@@ -10,7 +10,7 @@
 
 #![allow(unsafe_code, reason = "SIMD intrinsics; see the module documentation for why it is sound")]
 
-use crate::dispatch::Kernel;
+use crate::kernel::Kernel;
 use crate::lanes::Lane;
 use crate::register::Register;
 #[allow(clippy::wildcard_imports, reason = "fifty intrinsics, used in this file only")]

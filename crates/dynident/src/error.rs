@@ -1,7 +1,8 @@
 //! Everything that can stop a job, each with the file, the place and the fix in its message.
 
 use dynident_estimation::EstimationError;
-use dynident_identification::IdentificationError;
+use dynident_identification::estimators::EstimatorError;
+use dynident_identification::{IdentificationError, LogError};
 use dynident_model::{ModelError, ReadError};
 use dynident_recording::{FilterError, RecordingError};
 use std::path::{Path, PathBuf};
@@ -169,17 +170,25 @@ impl Error {
     }
 
     /// What stops an identification, as an error of the study at `path`.
-    pub(crate) fn identification(path: &Path, error: IdentificationError) -> Self {
+    pub(crate) fn identification(path: &Path, error: impl Into<IdentificationError>) -> Self {
         let path = path.to_owned();
-        match error {
-            IdentificationError::Recording { log, source } => Self::Recording { log, source },
-            IdentificationError::Filter { log, source } => Self::Filter { log, source },
-            IdentificationError::NoTemperature { log, joint } => Self::NoTemperature { log, joint },
-            IdentificationError::NothingLeft { log, rows, needed } => Self::NothingLeft { log, rows, needed },
-            IdentificationError::Rows { log, source } => Self::Estimation { path: log.into(), source },
-            IdentificationError::Estimation(source) => Self::Estimation { path, source },
-            IdentificationError::Estimator { method, message } => Self::Method { path, method, message },
-            IdentificationError::Instruments { log, message } => Self::Instruments { log, message },
+        match error.into() {
+            IdentificationError::Log(LogError::Recording { log, source }) => Self::Recording { log, source },
+            IdentificationError::Log(LogError::Filter { log, source }) => Self::Filter { log, source },
+            IdentificationError::Log(LogError::NoTemperature { log, joint }) => Self::NoTemperature { log, joint },
+            IdentificationError::Log(LogError::NothingLeft { log, rows, needed }) => {
+                Self::NothingLeft { log, rows, needed }
+            }
+            IdentificationError::Log(LogError::Rows { log, source }) => Self::Estimation { path: log.into(), source },
+            IdentificationError::Log(LogError::Refused(source)) | IdentificationError::Estimation(source) => {
+                Self::Estimation { path, source }
+            }
+            IdentificationError::Estimator(EstimatorError::Requirement { method, message }) => {
+                Self::Method { path, method, message }
+            }
+            IdentificationError::Estimator(EstimatorError::Instruments { log, message }) => {
+                Self::Instruments { log, message }
+            }
             other => Self::Study { path, message: other.to_string() },
         }
     }

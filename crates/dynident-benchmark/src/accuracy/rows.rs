@@ -9,9 +9,10 @@ use dynident_estimation::{
     SegmentedFactor,
 };
 use dynident_identification::estimators::{Estimator, TrainingRows, estimate};
-use dynident_identification::rows::{JointRows, MotionRecord, RowConsumer};
+use dynident_identification::rows::{JointRows, RowConsumer};
 use dynident_identification::{
-    Execution, IdentificationError, IdentificationSettings, Logs, Recording, Silent, log_factors,
+    Execution, IdentificationError, IdentificationSettings, LogError, Logs, MotionRecord, Recording, Silent,
+    log_factors,
 };
 use dynident_recording::MotionBlock;
 use std::sync::Arc;
@@ -41,7 +42,7 @@ struct Block {
 struct BlockStore(Vec<Block>);
 
 impl RowConsumer for BlockStore {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         self.0.push(Block { joint: rows.joint, rows: rows.rows, panel: rows.panel.to_vec() });
         Ok(())
     }
@@ -67,8 +68,9 @@ impl<'a> Rows<'a> {
         let model = &scenario.model;
         let columns = model.layout().columns().iter().map(Column::symbol).collect();
         let mut problem = LinearProblem::new(columns, model.joint_names());
-        let logs = logs(scenario, &recordings, &settings)?;
-        for (joint, factor) in log_factors(&logs, model, 0, false)?.factors.into_iter().enumerate() {
+        let logs = logs(scenario, &recordings, &settings).map_err(IdentificationError::from)?;
+        let factors = log_factors((&logs, &settings), model, 0, false).map_err(IdentificationError::from)?.factors;
+        for (joint, factor) in factors.into_iter().enumerate() {
             problem
                 .add(LOG, joint, model.layout().joint_columns(joint).to_vec(), factor)
                 .map_err(IdentificationError::from)?;
@@ -85,8 +87,15 @@ impl<'a> Rows<'a> {
         let mut settings = self.settings.clone();
         (settings.estimation.estimator, settings.estimation.covariance) = (estimator, covariance);
         let logs = logs(self.scenario, &self.recordings, &settings)?;
-        let rows = TrainingRows { logs: &logs, model: &self.scenario.model, training: &[0], problem: &self.problem };
-        estimate(&rows, None).map(|found| found.estimate)
+        let rows = TrainingRows {
+            logs: &logs,
+            model: &self.scenario.model,
+            training: &[0],
+            problem: &self.problem,
+            settings: &settings.estimation,
+            consistency: settings.consistency.as_ref(),
+        };
+        Ok(estimate(&rows, None)?.estimate)
     }
 
     fn blocks(&self) -> Result<&[Block], IdentificationError> {
@@ -129,7 +138,7 @@ fn logs<'b>(
     scenario: &Scenario,
     recordings: &'b [Recording],
     settings: &'b IdentificationSettings,
-) -> Result<Logs<'b>, IdentificationError> {
+) -> Result<Logs<'b>, LogError> {
     let alone = Execution { threads: 1, progress: &Silent };
-    Logs::new(scenario.model.model(), recordings, settings, &[], None, alone)
+    Logs::new(scenario.model.model(), recordings, settings.filters(), &[], None, alone)
 }

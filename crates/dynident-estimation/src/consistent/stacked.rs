@@ -11,7 +11,7 @@
 //! Algebra Appl. 88 (1987) 31).
 
 use super::coordinates::Matrix10;
-use crate::factor::{CHUNK_ROWS, Chunk, TriangleOnPanel, row_start};
+use crate::factor::{CHUNK_ROWS, Chunk, TriangleOnPanel, heights, row_start};
 use dynident_lanes::{Level, dispatch};
 use nalgebra::{DMatrix, DVector};
 
@@ -303,7 +303,10 @@ fn reduced(size: usize, rows: &Rows, squares: &[f64], added: f64) -> Vec<f64> {
     for part in others {
         place(part.first, &part.matrix);
     }
-    dispatch(Level::detect(), TriangleOnPanel { triangle: &mut triangle, size, panel: &mut panel, chunks });
+    let mut filled = Vec::new();
+    heights(&panel, chunks, &mut filled);
+    let (panel, heights) = (&mut panel[..], &mut filled[..]);
+    dispatch(Level::detect(), TriangleOnPanel { triangle: &mut triangle, size, panel, chunks, heights });
     triangle
 }
 

@@ -16,9 +16,10 @@
 
 use super::nonnegative::nonnegative_least_squares;
 use crate::error::{EstimationError, require};
-use crate::factor::{FactorWorkspace, LinearProblem, TriangularFactor};
+use crate::factor::{FactorWorkspace, JointRows, LinearProblem, TriangularFactor};
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// A column of which earlier ones leave a smaller share than this has no value of its own.
 const DEPENDENT: f64 = 1.0e-8;
@@ -104,22 +105,27 @@ impl<'a> CrossValidation<'a> {
         }
         let joint_rows = problem.joint_rows();
         let mut before = vec![0; problem.joints().len()];
-        let mut parts = Vec::with_capacity(problem.equations().len());
         let mut most_segments = vec![0; problem.joints().len()];
+        let mut equations = Vec::with_capacity(problem.equations().len());
         for equation in problem.equations() {
+            equations.push((equation, before[equation.joint]));
+            before[equation.joint] += equation.factor.rows();
+            most_segments[equation.joint] += equation.factor.segment_rows().len();
+        }
+        let part = |(equation, mut before): (&JointRows, usize)| {
             let columns = equation.factor.columns();
             let mut own = vec![TriangularFactor::new(columns); folds];
             let mut workspace = FactorWorkspace::default();
-            most_segments[equation.joint] += equation.factor.segment_rows().len();
             for segment in equation.factor.segment_factors() {
-                let middle = before[equation.joint] + segment.rows() / 2;
+                let middle = before + segment.rows() / 2;
                 let fold = (middle * folds / joint_rows[equation.joint].max(1)).min(folds - 1);
                 own[fold].absorb_factor(&mut workspace, &segment);
-                before[equation.joint] += segment.rows();
+                before += segment.rows();
             }
             let others = all_but_one(&own, columns);
-            parts.push([own, others]);
-        }
+            [own, others]
+        };
+        let parts = equations.into_par_iter().map(part).collect();
         let fewest = most_segments.into_iter().filter(|&count| count > 0).min().unwrap_or(0);
         if fewest < folds {
             return Err(EstimationError::TooFewSegments { clusters: fewest });
@@ -164,15 +170,12 @@ impl<'a> CrossValidation<'a> {
                     place[column] = Some(local);
                 }
                 let mut absorb = |to: &mut TriangularFactor, from: &TriangularFactor, weight: f64, rows: usize| {
-                    to.absorb_entries(&mut workspace, rows, |row, column| {
-                        let local = order.get(column).map_or(Some(from.columns()), |&global| place[global]);
-                        weight * local.map_or(0.0, |local| from.entry(row, local))
-                    });
+                    let local = |column: usize| order.get(column).map_or(Some(from.columns()), |&global| place[global]);
+                    to.absorb_columns(&mut workspace, (from, rows, weight), local);
                     to.count(from.rows());
                 };
                 let weight = weights[equation.joint];
-                let fix = "give a finite weight that is not negative";
-                require(weight.is_finite() && weight >= 0.0, "weight", weight, fix)?;
+                crate::factor::check_weight(weight)?;
                 // Later rows have nothing but torque, and what the triangle cannot explain does not count.
                 let seen = order.iter().filter_map(|&global| place[global]).max().map_or(0, |local| local + 1);
                 absorb(&mut triangle, &others[fold], weight, seen);

@@ -1,9 +1,10 @@
 //! The linear problem that all estimators start from: which joint's rows see which columns, and what they hold.
 
 use super::segmented::SegmentedFactor;
-use super::triangular::{FactorWorkspace, TriangularFactor};
+use super::triangular::{FactorWorkspace, TriangularFactor, check_weight};
 use crate::error::{EstimationError, expect};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// The rows of one joint in one log.
 #[derive(Clone, Debug)]
@@ -184,7 +185,7 @@ impl LinearProblem {
 
     /// The totals of all equations, ready to be weighted again and again.
     pub(crate) fn stacked(&self) -> StackedProblem<'_> {
-        StackedProblem { problem: self, totals: self.equations.iter().map(|e| e.factor.total()).collect() }
+        StackedProblem { problem: self, totals: self.equations.par_iter().map(|e| e.factor.total()).collect() }
     }
 }
 
@@ -203,15 +204,14 @@ impl StackedProblem<'_> {
         let mut workspace = FactorWorkspace::default();
         let mut combined = TriangularFactor::new(columns);
         for (equation, total) in problem.equations.iter().zip(&self.totals) {
-            let total = total.scaled(weights[equation.joint])?;
+            let weight = weights[equation.joint];
+            check_weight(weight)?;
             let mut place = vec![None; columns + 1];
             for (local, &column) in equation.columns.iter().enumerate() {
                 place[column] = Some(local);
             }
             place[columns] = Some(total.columns());
-            combined.absorb_entries(&mut workspace, total.columns() + 1, |row, column| {
-                place[column].map_or(0.0, |local| total.entry(row, local))
-            });
+            combined.absorb_columns(&mut workspace, (total, total.columns() + 1, weight), |column| place[column]);
             combined.count(total.rows());
         }
         if let Some(prior) = &problem.prior {

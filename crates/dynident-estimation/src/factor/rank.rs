@@ -120,8 +120,39 @@ pub(crate) fn split(triangle: &TriangularFactor, settings: &RankSettings) -> Spl
     }
 }
 
+/// The values of all columns, and what is left to do for their uncertainty.
+pub(crate) struct SolvedValues {
+    /// One value per column, fixed ones included.
+    pub(crate) values: Vec<f64>,
+    /// The free columns, each divided by its scale.
+    reduced: TriangularFactor,
+    /// Scales of the free columns.
+    scales: Vec<f64>,
+}
+
+impl SolvedValues {
+    /// The values with their inverse triangle.
+    pub(crate) fn with_inverse(self) -> Solution {
+        let mut inverse = dispatch(Level::detect(), Inverse { triangle: &self.reduced });
+        for (k, scale) in self.scales.iter().enumerate() {
+            inverse.row_mut(k).scale_mut(1.0 / scale);
+        }
+        Solution { values: self.values, inverse }
+    }
+}
+
 /// Solves for the free columns with the others at `fallback`: `min ‖r − R_fixed θ_fixed − R_free θ_free‖`.
 pub(crate) fn solve(triangle: &TriangularFactor, split: &Split, settings: &RankSettings, fallback: &[f64]) -> Solution {
+    solved_values(triangle, split, settings, fallback).with_inverse()
+}
+
+/// [`solve`] for the values alone.
+pub(crate) fn solved_values(
+    triangle: &TriangularFactor,
+    split: &Split,
+    settings: &RankSettings,
+    fallback: &[f64],
+) -> SolvedValues {
     let size = triangle.columns();
     let free = split.free.len();
     let scales = scales(triangle, settings);
@@ -140,7 +171,6 @@ pub(crate) fn solve(triangle: &TriangularFactor, split: &Split, settings: &RankS
             triangle.entry(row, column) / scales[column]
         }
     });
-    let mut inverse = dispatch(Level::detect(), Inverse { triangle: &reduced });
     let mut solution = vec![0.0; free];
     for row in (0..free).rev() {
         let entries = reduced.row(row);
@@ -150,9 +180,8 @@ pub(crate) fn solve(triangle: &TriangularFactor, split: &Split, settings: &RankS
     let mut values = known;
     for (k, &column) in split.free.iter().enumerate() {
         values[column] = solution[k] / scales[column];
-        inverse.row_mut(k).scale_mut(1.0 / scales[column]);
     }
-    Solution { values, inverse }
+    SolvedValues { values, reduced, scales: split.free.iter().map(|&column| scales[column]).collect() }
 }
 
 /// The inverse of a factor's `R_W`, by back-substitution.

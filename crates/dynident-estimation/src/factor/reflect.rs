@@ -43,6 +43,18 @@ pub(crate) struct TriangleOnPanel<'a> {
     pub(crate) panel: &'a mut [Chunk],
     /// Chunks per column.
     pub(crate) chunks: usize,
+    /// Chunks of each column up to its last number that is not zero: see [`heights`].
+    pub(crate) heights: &'a mut [usize],
+}
+
+/// For each column of a panel how many of its chunks there are up to the last one with a number that is not zero. A
+/// triangle below a triangle, or rows that see few of the columns, take a fraction of the work of full ones; the sums
+/// come out to the last bit as over all rows, for what is left out are products with zero.
+pub(crate) fn heights(panel: &[Chunk], chunks: usize, out: &mut Vec<usize>) {
+    // A zero with the other sign would not be the same to the last bit.
+    let filled = |chunk: &Chunk| chunk.0.iter().any(|value| value.to_bits() != 0);
+    out.clear();
+    out.extend(panel.chunks_exact(chunks).map(|column| column.iter().rposition(filled).map_or(0, |last| last + 1)));
 }
 
 impl Kernel for TriangleOnPanel<'_> {
@@ -50,21 +62,38 @@ impl Kernel for TriangleOnPanel<'_> {
 
     #[inline(always)]
     fn run<T: Lane>(self) {
-        let Self { triangle, size, panel, chunks } = self;
+        let Self { triangle, size, panel, chunks, heights } = self;
         let mut first = 0;
         while first < size {
             let width = (size - first).min(REFLECTORS);
             let (head, targets) = panel.split_at_mut((first + width) * chunks);
-            let block = &mut head[first * chunks..];
-            match width {
-                4 => step::<T, 4>(triangle, size, first, block, targets, chunks),
-                3 => step::<T, 3>(triangle, size, first, block, targets, chunks),
-                2 => step::<T, 2>(triangle, size, first, block, targets, chunks),
-                _ => step::<T, 1>(triangle, size, first, block, targets, chunks),
+            let (own, others) = heights.split_at_mut(first + width);
+            let mut height = 0;
+            for own in &own[first..] {
+                height = height.max(*own);
+            }
+            // Nothing below these columns of the triangle: their reflectors are the identity.
+            if height > 0 {
+                let block = Block { columns: &mut head[first * chunks..], chunks, height };
+                match width {
+                    4 => step::<T, 4>(triangle, size, first, block, targets, others),
+                    3 => step::<T, 3>(triangle, size, first, block, targets, others),
+                    2 => step::<T, 2>(triangle, size, first, block, targets, others),
+                    _ => step::<T, 1>(triangle, size, first, block, targets, others),
+                }
             }
             first += width;
         }
     }
+}
+
+/// Columns that reflectors are made of.
+struct Block<'a> {
+    columns: &'a mut [Chunk],
+    /// Chunks from one column to the next.
+    chunks: usize,
+    /// Chunks of them that are not all zeros.
+    height: usize,
 }
 
 /// `V` reflectors `I - β v vᵀ` in the making. Their parts `ν` lie in different rows of the triangle, so the inner
@@ -95,42 +124,65 @@ fn step<T: Lane, const V: usize>(
     triangle: &mut [f64],
     size: usize,
     first: usize,
-    block: &mut [Chunk],
+    Block { columns: block, chunks, height }: Block<'_>,
     targets: &mut [Chunk],
-    chunks: usize,
+    heights: &mut [usize],
 ) {
     let mut reflectors = Reflectors::<V> { nu: [0.0; V], t: [[0.0; V]; V] };
     for i in 0..V {
         let (done, rest) = block.split_at_mut(i * chunks);
-        let column = &mut rest[..chunks];
+        let column = &mut rest[..height];
         match i {
-            0 => reflect_column::<T, V, 0>(triangle, size, first, done, column, &mut reflectors),
-            1 => reflect_column::<T, V, 1>(triangle, size, first, done, column, &mut reflectors),
-            2 => reflect_column::<T, V, 2>(triangle, size, first, done, column, &mut reflectors),
-            _ => reflect_column::<T, V, 3>(triangle, size, first, done, column, &mut reflectors),
+            0 => reflect_column::<T, V, 0>(triangle, size, first, (done, chunks), column, &mut reflectors),
+            1 => reflect_column::<T, V, 1>(triangle, size, first, (done, chunks), column, &mut reflectors),
+            2 => reflect_column::<T, V, 2>(triangle, size, first, (done, chunks), column, &mut reflectors),
+            _ => reflect_column::<T, V, 3>(triangle, size, first, (done, chunks), column, &mut reflectors),
         }
     }
-    let columns = columns::<V>(block, chunks);
+    let columns = columns::<V>(block, chunks, height);
     let mut index = first + V;
     let mut pairs = targets.chunks_exact_mut(2 * chunks);
     for pair in &mut pairs {
-        let (left, right) = pair.split_at_mut(chunks);
-        apply::<T, V, 2>(triangle, size, first, index, &columns, [left, right], &reflectors);
+        let mut idle = [false; 2];
+        for x in 0..2 {
+            idle[x] = heights[index + x - first - V] == 0 && is_zero::<V>(triangle, size, first, index + x);
+        }
+        if !(idle[0] && idle[1]) {
+            let (left, right) = pair.split_at_mut(chunks);
+            let targets = [&mut left[..height], &mut right[..height]];
+            apply::<T, V, 2>(triangle, size, first, index, &columns, targets, &reflectors);
+            for x in 0..2 {
+                let own = &mut heights[index + x - first - V];
+                *own = if idle[x] { 0 } else { height.max(*own) };
+            }
+        }
         index += 2;
     }
     let last = pairs.into_remainder();
     if !last.is_empty() {
-        apply::<T, V, 1>(triangle, size, first, index, &columns, [last], &reflectors);
+        apply::<T, V, 1>(triangle, size, first, index, &columns, [&mut last[..height]], &reflectors);
+        let own = &mut heights[index - first - V];
+        *own = height.max(*own);
     }
 }
 
-/// The first `N` columns of a block.
+/// Whether column `column` of the triangle is zero in the rows of `V` reflectors.
 #[inline(always)]
-fn columns<const N: usize>(block: &[Chunk], chunks: usize) -> [&[Chunk]; N] {
+fn is_zero<const V: usize>(triangle: &[f64], size: usize, first: usize, column: usize) -> bool {
+    let mut bits = 0;
+    for l in 0..V {
+        bits |= triangle[row_start(size, first + l) + column - first - l].to_bits();
+    }
+    bits == 0
+}
+
+/// The first `height` chunks of the first `N` columns of a block.
+#[inline(always)]
+fn columns<const N: usize>(block: &[Chunk], chunks: usize, height: usize) -> [&[Chunk]; N] {
     // No `array::from_fn`: its closure would not be inlined into the processor level's function.
     let mut columns: [&[Chunk]; N] = [&[]; N];
     for (i, column) in columns.iter_mut().enumerate() {
-        *column = &block[i * chunks..(i + 1) * chunks];
+        *column = &block[i * chunks..i * chunks + height];
     }
     columns
 }
@@ -141,12 +193,11 @@ fn reflect_column<T: Lane, const V: usize, const P: usize>(
     triangle: &mut [f64],
     size: usize,
     first: usize,
-    done: &[Chunk],
+    (done, chunks): (&[Chunk], usize),
     column: &mut [Chunk],
     reflectors: &mut Reflectors<V>,
 ) {
-    let chunks = column.len();
-    let done = columns::<P>(done, chunks);
+    let done = columns::<P>(done, chunks, column.len());
     let index = first + P;
     if P > 0 {
         let [dots] = inner_products::<T, P, 1>(&done, &[&*column]);
@@ -299,4 +350,53 @@ fn halving_sum<T: Lane>(lanes: T) -> f64 {
         half /= 2;
     }
     values[0]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynident_lanes::{Level, dispatch};
+
+    /// A triangle and a panel of which column `c` ends after `ends(c)` rows.
+    fn stack(size: usize, chunks: usize, ends: impl Fn(usize) -> usize) -> (Vec<f64>, Vec<Chunk>) {
+        let number = |k: usize| (1.7 * k as f64 * k as f64 + 0.3).sin();
+        let mut triangle: Vec<f64> = (0..row_start(size, size)).map(number).collect();
+        for row in 0..size {
+            triangle[row_start(size, row)] = triangle[row_start(size, row)].abs();
+            // The last but one column is not seen by the first half.
+            if row + 2 < size && row < size / 2 {
+                triangle[row_start(size, row) + size - 2 - row] = 0.0;
+            }
+        }
+        let mut panel = vec![Chunk::ZERO; size * chunks];
+        for column in 0..size {
+            for row in 0..ends(column) {
+                panel[column * chunks + row / CHUNK_ROWS].0[row % CHUNK_ROWS] = number(7 * column + 31 * row);
+            }
+        }
+        (triangle, panel)
+    }
+
+    #[test]
+    fn zeros_that_are_left_out_change_no_bit() {
+        let (size, chunks) = (23, 4);
+        let triangular = |column: usize| column + 1;
+        let few = |column: usize| if column.is_multiple_of(3) || column == size - 2 { 0 } else { 13 };
+        let late = |column: usize| if column < 9 { 0 } else { 30 };
+        let shapes: [&dyn Fn(usize) -> usize; 3] = [&triangular, &few, &late];
+        for (level, ends) in Level::available().into_iter().flat_map(|level| shapes.map(|ends| (level, ends))) {
+            let absorbed = |whole: bool| {
+                let (mut triangle, mut panel) = stack(size, chunks, ends);
+                let mut filled = Vec::new();
+                heights(&panel, chunks, &mut filled);
+                if whole {
+                    filled.fill(chunks);
+                }
+                let (panel, heights) = (&mut panel[..], &mut filled[..]);
+                dispatch(level, TriangleOnPanel { triangle: &mut triangle, size, panel, chunks, heights });
+                triangle.into_iter().map(f64::to_bits).collect::<Vec<_>>()
+            };
+            assert_eq!(absorbed(false), absorbed(true), "{}", level.name());
+        }
+    }
 }

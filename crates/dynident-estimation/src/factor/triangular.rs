@@ -1,6 +1,6 @@
 //! The triangular factor of a stack of rows `[W | τ]`: all that linear estimation needs to remember of them.
 
-use super::reflect::{CHUNK_ROWS, Chunk, TriangleOnPanel, row_start};
+use super::reflect::{CHUNK_ROWS, Chunk, TriangleOnPanel, heights, row_start};
 use crate::error::{EstimationError, expect, require};
 use dynident_lanes::{Level, dispatch};
 use nalgebra::{DMatrix, DVector};
@@ -52,6 +52,7 @@ pub struct TriangularFactor {
 pub struct FactorWorkspace {
     level: Level,
     panel: Vec<Chunk>,
+    heights: Vec<usize>,
 }
 
 impl Default for FactorWorkspace {
@@ -63,7 +64,7 @@ impl Default for FactorWorkspace {
 impl FactorWorkspace {
     /// A workspace whose work runs at the given processor level; [`Default`] takes the best one.
     pub fn new(level: Level) -> Self {
-        Self { level, panel: Vec::new() }
+        Self { level, panel: Vec::new(), heights: Vec::new() }
     }
 
     /// Room for a block; what it holds is left over from earlier work.
@@ -194,6 +195,29 @@ impl TriangularFactor {
         self.reflect(workspace, rows);
     }
 
+    /// Absorbs the first `rows` rows of `other` times `weight`: column `place(column)` of its triangle where this one
+    /// has column `column`, zeros for `None`. The caller counts the rows.
+    pub(crate) fn absorb_columns(
+        &mut self,
+        workspace: &mut FactorWorkspace,
+        (other, rows, weight): (&Self, usize, f64),
+        place: impl Fn(usize) -> Option<usize>,
+    ) {
+        let (chunks, size) = (rows.div_ceil(CHUNK_ROWS), other.columns + 1);
+        let block = workspace.block(rows, self.columns + 1);
+        block.fill(Chunk::ZERO);
+        for (column, out) in block.chunks_exact_mut(chunks.max(1)).enumerate() {
+            let Some(local) = place(column) else { continue };
+            // From a row to the next of a packed triangle.
+            let mut at = local;
+            for row in 0..rows.min(local + 1) {
+                out[row / CHUNK_ROWS].0[row % CHUNK_ROWS] = weight * other.triangle[at];
+                at += size - row - 1;
+            }
+        }
+        self.reflect(workspace, rows);
+    }
+
     /// Counts rows whose entries were absorbed in another form.
     pub(crate) fn count(&mut self, rows: usize) {
         self.rows += rows;
@@ -204,8 +228,10 @@ impl TriangularFactor {
         if chunks == 0 {
             return;
         }
-        let panel = &mut workspace.panel[..size * chunks];
-        dispatch(workspace.level, TriangleOnPanel { triangle: &mut self.triangle, size, panel, chunks });
+        let FactorWorkspace { level, panel, heights: own } = workspace;
+        let panel = &mut panel[..size * chunks];
+        heights(panel, chunks, own);
+        dispatch(*level, TriangleOnPanel { triangle: &mut self.triangle, size, panel, chunks, heights: own });
     }
 
     /// Adds what `other` has seen: afterwards this is the factor of both stacks of rows.
@@ -231,7 +257,7 @@ impl TriangularFactor {
         if self.rows == 0 {
             self.clone_from(other);
         } else if other.rows > 0 {
-            self.absorb_entries(workspace, other.filled_rows(), |row, column| other.entry(row, column));
+            self.absorb_columns(workspace, (other, other.filled_rows(), 1.0), Some);
             self.rows += other.rows;
         }
     }
@@ -260,7 +286,7 @@ impl TriangularFactor {
     /// # Errors
     /// [`EstimationError::Setting`] for a weight that is negative, NaN or infinite.
     pub fn scaled(&self, weight: f64) -> Result<Self, EstimationError> {
-        require(weight.is_finite() && weight >= 0.0, "weight", weight, "give a finite weight that is not negative")?;
+        check_weight(weight)?;
         let mut scaled = self.clone();
         for value in &mut scaled.triangle {
             *value *= weight;
@@ -307,9 +333,8 @@ impl TriangularFactor {
     pub fn selected(&self, columns: &[usize]) -> Result<Self, EstimationError> {
         check_columns(columns, self.columns)?;
         let mut selected = Self::new(columns.len());
-        selected.absorb_entries(&mut FactorWorkspace::default(), self.filled_rows(), |row, column| {
-            self.entry(row, columns.get(column).copied().unwrap_or(self.columns))
-        });
+        let place = |column: usize| Some(columns.get(column).copied().unwrap_or(self.columns));
+        selected.absorb_columns(&mut FactorWorkspace::default(), (self, self.filled_rows(), 1.0), place);
         selected.rows = self.rows;
         Ok(selected)
     }
@@ -342,6 +367,11 @@ impl TriangularFactor {
             .find(|&r| self.triangle[row_start(size, r)..row_start(size, r + 1)].iter().any(|&x| x != 0.0))
             .map_or(0, |r| r + 1)
     }
+}
+
+/// That a weight of rows is possible.
+pub(crate) fn check_weight(weight: f64) -> Result<(), EstimationError> {
+    require(weight.is_finite() && weight >= 0.0, "weight", weight, "give a finite weight that is not negative")
 }
 
 /// That all column numbers of a selection are below `size`.

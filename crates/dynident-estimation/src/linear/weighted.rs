@@ -1,7 +1,7 @@
 //! Weighted least squares: the rows of each joint count by that joint's own noise.
 
 use crate::error::{EstimationError, require, within};
-use crate::factor::{LinearProblem, RankSettings, solve, split};
+use crate::factor::{LinearProblem, RankSettings, solved_values, split};
 use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom};
 use serde::{Deserialize, Serialize};
 
@@ -70,7 +70,7 @@ pub fn weighted_least_squares(
     let mut triangle = stacked.combined(&weights)?;
     let split = split(&triangle, &settings.rank);
     let degrees_of_freedom = joint_degrees_of_freedom(&stacked, split.free.len())?;
-    let mut solution = solve(&triangle, &split, &settings.rank, problem.fallback());
+    let mut solution = solved_values(&triangle, &split, &settings.rank, problem.fallback());
     let mut joint_sigma;
     let (mut iterations, mut converged) = (1, false);
     loop {
@@ -87,11 +87,12 @@ pub fn weighted_least_squares(
             *weight = 1.0 / sigma;
         }
         triangle = stacked.combined(&weights)?;
-        solution = solve(&triangle, &split, &settings.rank, problem.fallback());
+        solution = solved_values(&triangle, &split, &settings.rank, problem.fallback());
         iterations += 1;
     }
     // The rows were scaled by the last weights; what noise is left in them is one up to the tolerance, unless the limit
     // came first.
+    let solution = solution.with_inverse();
     PointEstimate { triangle, split, solution, weights, joint_sigma, weighted_variance: 1.0, iterations, converged }
         .into_estimate(&stacked, &settings.rank, settings.covariance)
 }

@@ -17,10 +17,11 @@
 
 use super::bootstrap::{Blocks, replicated};
 use super::newey_west::{bandwidth, long_run};
-use super::scores::{Fit, Scores};
+use super::scores::{Fit, JointScores, Scores};
 use crate::error::EstimationError;
 use crate::factor::{LinearProblem, StackedProblem};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Which covariance an estimate reports as its own.
@@ -121,12 +122,10 @@ pub(crate) fn covariances(
 
 /// Each segment by the change that leaving it out makes: `(G − 1)/G Σ_g Δ_g Δ_gᵀ`.
 fn jackknife(scores: &Scores<'_>) -> Result<Moment, EstimationError> {
-    let mut changes = Vec::with_capacity(scores.clusters());
-    for joint in &scores.joints {
-        for segment in joint.rows.factor.segment_factors() {
-            changes.push(joint.change_without(&segment));
-        }
-    }
+    let of_joint = |joint: &JointScores<'_>| -> Vec<DVector<f64>> {
+        joint.rows.factor.segment_factors().iter().map(|segment| joint.change_without(segment)).collect()
+    };
+    let changes = scores.joints.par_iter().map(of_joint).collect::<Vec<_>>().concat();
     let g = at_least_two(changes.len())? as f64;
     Ok(second_moment(&changes, scores.free, (g - 1.0) / g))
 }

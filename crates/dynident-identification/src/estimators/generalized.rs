@@ -1,7 +1,7 @@
 //! Generalised least squares: the joints' rows of the same instants side by side, in one factor.
 
-use super::{Findings, TrainingRows};
-use crate::error::IdentificationError;
+use super::{EstimatorError, Findings, TrainingRows};
+use crate::recording::LogError;
 use crate::rows::{JointRows, RowConsumer};
 use dynident_estimation::{CrossProblem, Estimate, SegmentedFactor, generalized_least_squares};
 
@@ -13,7 +13,7 @@ struct SideBySide {
 }
 
 impl RowConsumer for SideBySide {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         // Joints of a block come in their order, with as many rows each.
         if rows.joint == 0 {
             self.panel.clear();
@@ -27,9 +27,9 @@ impl RowConsumer for SideBySide {
 }
 
 /// The estimate, from one more pass over the logs.
-pub(super) fn generalized(rows: &TrainingRows<'_>) -> Result<(Estimate, Findings), IdentificationError> {
+pub(super) fn generalized(rows: &TrainingRows<'_>) -> Result<(Estimate, Findings), EstimatorError> {
     let TrainingRows { logs, model, problem, .. } = *rows;
-    let settings = &logs.settings.estimation;
+    let settings = rows.settings;
     let joints = problem.joints().len();
     let lists = (0..joints).map(|joint| model.layout().joint_columns(joint).to_vec()).collect();
     let mut cross = CrossProblem::new(problem.columns().to_vec(), problem.joints().to_vec(), lists)

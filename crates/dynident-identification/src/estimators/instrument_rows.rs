@@ -1,9 +1,9 @@
 //! A log's rows with their instruments, `[Z | W | τ]`: two motions through the same regressor and the same parallel
 //! filter.
 
-use super::TrainingRows;
 use super::instruments::InstrumentSource;
-use crate::error::IdentificationError;
+use super::{EstimatorError, TrainingRows};
+use crate::recording::LogError;
 use crate::rows::{PANEL_SAMPLES, in_model_order, motion_band_hz};
 use dynident_dynamics::{BatchWorkspace, Panels, regressor_panels};
 use dynident_estimation::{EstimationError, SegmentedFactor};
@@ -15,19 +15,19 @@ pub(super) fn instrumented_factors(
     rows: &TrainingRows<'_>,
     index: usize,
     source: &mut dyn InstrumentSource,
-) -> Result<Vec<SegmentedFactor>, IdentificationError> {
+) -> Result<Vec<SegmentedFactor>, EstimatorError> {
     let (logs, recording) = (rows.logs, &rows.logs.recordings[index]);
     let log = recording.name.clone();
-    let failed = |source| IdentificationError::recording(&log, source);
-    let in_log = |source: EstimationError| IdentificationError::Rows { log: recording.label(), source };
+    let failed = |source| LogError::recording(&log, source);
+    let in_log = |source: EstimationError| LogError::Rows { log: recording.label(), source };
     let (model, layout) = (rows.model.model(), rows.model.layout());
     let places = recording.places(model)?;
     let Some(mut stream) = recording.open(model, &logs.motion)? else {
         let message = "a motion that is made already has no instruments: give its raw samples".to_owned();
-        return Err(IdentificationError::Instruments { log, message });
+        return Err(EstimatorError::Instruments { log, message });
     };
-    let settings = logs.settings.parallel_filter.decimation(stream.rate_hz(), motion_band_hz(&logs.motion));
-    let segments = logs.settings.estimation.segments;
+    let settings = logs.filter.decimation(stream.rate_hz(), motion_band_hz(&logs.motion));
+    let segments = rows.settings.segments;
     let widths: Vec<usize> = (0..model.dof()).map(|joint| 2 * layout.joint_columns(joint).len()).collect();
     let mut decimators = settings
         .map(|settings| {
@@ -35,7 +35,7 @@ pub(super) fn instrumented_factors(
             widths.iter().map(one).collect::<Result<Vec<_>, _>>()
         })
         .transpose()
-        .map_err(|source| IdentificationError::Filter { log: log.clone(), source })?;
+        .map_err(|source| LogError::Filter { log: log.clone(), source })?;
     let mut factors = widths
         .iter()
         .map(|width| SegmentedFactor::new(*width, segments))
@@ -56,7 +56,7 @@ pub(super) fn instrumented_factors(
                 let found = values.len();
                 let message =
                     format!("{found} numbers for {name} where {numbers} are needed: one for each joint and row");
-                return Err(IdentificationError::Instruments { log, message });
+                return Err(EstimatorError::Instruments { log, message });
             }
         }
         if measured.segment != segment {

@@ -1,10 +1,8 @@
 //! Instrumental variables, and the test of least squares against them.
 
-use super::TrainingRows;
 use super::instrument_rows::instrumented_factors;
 use super::instruments::{InstrumentSource, SmoothedMotion};
-use crate::error::IdentificationError;
-use crate::settings::EstimationSettings;
+use super::{EstimationSettings, EstimatorError, TrainingRows};
 use dynident_estimation::{
     HausmanSettings, HausmanTest, InstrumentReport, InstrumentalEstimate, InstrumentalSettings, InstrumentedProblem,
     hausman_test, instrumental_variables,
@@ -65,7 +63,7 @@ pub struct NoiseInRegressor {
 pub(super) fn with_smoothed_motion(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
-) -> Result<(InstrumentalEstimate, NoiseInRegressor), IdentificationError> {
+) -> Result<(InstrumentalEstimate, NoiseInRegressor), EstimatorError> {
     let mut source = SmoothedMotion::new(rows.logs, rows.model.model(), settings);
     let (found, mut noise) = with_instruments(rows, settings, &mut source)?;
     noise.instrument_cutoff_hz = source.cutoffs_hz.iter().fold(None, |range: Option<[f64; 2]>, &cutoff| {
@@ -79,8 +77,8 @@ pub(super) fn with_instruments(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
     source: &mut dyn InstrumentSource,
-) -> Result<(InstrumentalEstimate, NoiseInRegressor), IdentificationError> {
-    let (problem, estimation) = (rows.problem, &rows.logs.settings.estimation);
+) -> Result<(InstrumentalEstimate, NoiseInRegressor), EstimatorError> {
+    let (problem, estimation) = (rows.problem, rows.settings);
     let mut instrumented = InstrumentedProblem::new(problem.columns().to_vec(), problem.joints().to_vec())
         .with_fallback(problem.fallback().to_vec())?;
     rows.begin("instruments");

@@ -1,9 +1,10 @@
 //! Instruments for a log: a second account of the same motion, sample by sample, that is free of the noise in the
 //! first.
 
+use super::EstimatorError;
 use super::instrumental::InstrumentSettings;
-use crate::error::IdentificationError;
 use crate::logs::Logs;
+use crate::recording::LogError;
 use dynident_model::Model;
 use dynident_recording::{DifferentiatorSettings, MotionBlock, MotionSettings, MotionStream};
 
@@ -14,7 +15,7 @@ pub trait InstrumentSource: Send {
     ///
     /// # Errors
     /// If there is no motion for this log.
-    fn begin(&mut self, log: usize) -> Result<(), IdentificationError>;
+    fn begin(&mut self, log: usize) -> Result<(), EstimatorError>;
 
     /// Writes `q`, `dq` and `ddq` (joint-major, `joint * rows + row`, the log's order of joints, SI units) for the
     /// samples of `measured`, which come in the order of time: same rows, same piece of the log. Nothing else of
@@ -22,7 +23,7 @@ pub trait InstrumentSource: Send {
     ///
     /// # Errors
     /// If the motion does not cover these samples.
-    fn motion(&mut self, measured: &MotionBlock, instruments: &mut MotionBlock) -> Result<(), IdentificationError>;
+    fn motion(&mut self, measured: &MotionBlock, instruments: &mut MotionBlock) -> Result<(), EstimatorError>;
 }
 
 /// The motion of the log itself through another filter.
@@ -52,8 +53,8 @@ impl<'a> SmoothedMotion<'a> {
         self.logs.recordings[self.log].name.clone()
     }
 
-    fn unaligned(&self) -> IdentificationError {
-        IdentificationError::Instruments {
+    fn unaligned(&self) -> EstimatorError {
+        EstimatorError::Instruments {
             log: self.log_name(),
             message: "the smoothed motion does not cover the same samples as the regressor: a piece of the log is too short for one of the two filters; \
                       leave short pieces out with `rows` or `time_range_s`"
@@ -63,11 +64,11 @@ impl<'a> SmoothedMotion<'a> {
 }
 
 impl InstrumentSource for SmoothedMotion<'_> {
-    fn begin(&mut self, log: usize) -> Result<(), IdentificationError> {
+    fn begin(&mut self, log: usize) -> Result<(), EstimatorError> {
         self.log = log;
         let (recording, model) = (&self.logs.recordings[log], self.model);
         let open = |motion: &MotionSettings| {
-            recording.open(model, motion)?.ok_or_else(|| IdentificationError::Instruments {
+            recording.open(model, motion)?.ok_or_else(|| EstimatorError::Instruments {
                 log: recording.name.clone(),
                 message: "a motion that is made already cannot be smoothed anew: give its raw samples".to_owned(),
             })
@@ -85,7 +86,7 @@ impl InstrumentSource for SmoothedMotion<'_> {
         Ok(())
     }
 
-    fn motion(&mut self, measured: &MotionBlock, instruments: &mut MotionBlock) -> Result<(), IdentificationError> {
+    fn motion(&mut self, measured: &MotionBlock, instruments: &mut MotionBlock) -> Result<(), EstimatorError> {
         let (rows, joints) = (measured.rows, measured.joints);
         (instruments.rows, instruments.joints) = (rows, joints);
         for values in [&mut instruments.q, &mut instruments.dq, &mut instruments.ddq] {
@@ -97,9 +98,7 @@ impl InstrumentSource for SmoothedMotion<'_> {
             if self.used == self.block.rows {
                 let log = self.log_name();
                 let Some(stream) = &mut self.stream else { return Err(self.unaligned()) };
-                let more = stream
-                    .next_block(&mut self.block)
-                    .map_err(|source| IdentificationError::recording(&log, source))?;
+                let more = stream.next_block(&mut self.block).map_err(|source| LogError::recording(&log, source))?;
                 if !more {
                     return Err(self.unaligned());
                 }

@@ -1,9 +1,9 @@
 //! Maximum likelihood for a motion that repeats: from logs to mean periods, their noise, and an estimate.
 
-use super::TrainingRows;
 use super::row_pass::Stop;
 use super::simulated::torque_sigma;
-use crate::error::IdentificationError;
+use super::{EstimatorError, TrainingRows};
+use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
 use crate::rows::motion_band_hz;
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
@@ -15,6 +15,7 @@ use dynident_model::terms::JointMotion;
 use dynident_recording::{AveragedPeriods, MotionBlock, MotionSettings, averaged_periods};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 /// A motion whose periods differ by more than this share of its own size does not repeat.
 const MOST_DIFFERENCE: f64 = 0.1;
@@ -38,22 +39,44 @@ pub struct PeriodSettings {
     pub harmonics: Option<usize>,
 }
 
+/// Settings of a repeated motion that are impossible.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum PeriodError {
+    /// A period that is no time.
+    #[error("period_s = {period_s}: give the seconds after which the motion repeats")]
+    Period {
+        /// What was given.
+        period_s: f64,
+    },
+    /// A start that is no time.
+    #[error("skip_s = {skip_s}: give 0 or more seconds")]
+    Skip {
+        /// What was given.
+        skip_s: f64,
+    },
+    /// Too few or too many harmonics.
+    #[error("harmonics = {harmonics}: give 1 to 200")]
+    Harmonics {
+        /// What was given.
+        harmonics: usize,
+    },
+}
+
 impl PeriodSettings {
     /// Checks the numbers.
     ///
     /// # Errors
-    /// In words, with the key and the fix.
-    pub fn validate(&self) -> Result<(), String> {
-        if let Some(period) = self.period_s
-            && !(period > 0.0 && period.is_finite())
-        {
-            return Err(format!("period_s = {period}: give the seconds after which the motion repeats"));
+    /// The first number that is impossible.
+    pub fn validate(&self) -> Result<(), PeriodError> {
+        if let Some(period_s) = self.period_s.filter(|period| !(*period > 0.0 && period.is_finite())) {
+            return Err(PeriodError::Period { period_s });
         }
         if !(self.skip_s >= 0.0 && self.skip_s.is_finite()) {
-            return Err(format!("skip_s = {}: give 0 or more seconds", self.skip_s));
+            return Err(PeriodError::Skip { skip_s: self.skip_s });
         }
         if let Some(harmonics) = self.harmonics.filter(|harmonics| !(1..=200).contains(harmonics)) {
-            return Err(format!("harmonics = {harmonics}: give 1 to 200"));
+            return Err(PeriodError::Harmonics { harmonics });
         }
         Ok(())
     }
@@ -96,10 +119,10 @@ struct MeanPeriod {
 pub(super) fn periodic(
     rows: &TrainingRows<'_>,
     periods: &PeriodSettings,
-) -> Result<(Estimate, PeriodicFit), IdentificationError> {
+) -> Result<(Estimate, PeriodicFit), EstimatorError> {
     let TrainingRows { logs, model, problem, .. } = *rows;
     let method = "maximum-likelihood";
-    let wrong = |message: String| IdentificationError::Estimator { method, message };
+    let wrong = |message: String| EstimatorError::Requirement { method, message };
     if let Some(term) = model.terms().iter().find(|term| term.has_memory() || term.needs_load()) {
         return Err(wrong(format!(
             "{} depends on more than the motion of one instant: leave that law out, or take another method",
@@ -144,7 +167,7 @@ pub(super) fn periodic(
     let settings = MaximumLikelihoodSettings {
         motion_covariance,
         torque_covariance,
-        rank: logs.settings.estimation.rank,
+        rank: rows.settings.rank,
         tolerance: 1e-6,
         max_iterations: 50,
     };
@@ -188,19 +211,18 @@ fn mean_period(
     rows: &TrainingRows<'_>,
     index: usize,
     (period_s, skip_s): (f64, f64),
-    wrong: &dyn Fn(String) -> IdentificationError,
-) -> Result<MeanPeriod, IdentificationError> {
+    wrong: &dyn Fn(String) -> EstimatorError,
+) -> Result<MeanPeriod, EstimatorError> {
     let TrainingRows { logs, model, .. } = *rows;
     let (motion, recording) = (&logs.motion, &logs.recordings[index]);
     let places = recording.places(model.model())?;
     let alike = MotionSettings { smooth_torque: true, ..motion.clone() };
-    let failed = |source| IdentificationError::recording(&recording.name, source);
+    let failed = |source| LogError::recording(&recording.name, source);
     let Some(mut stream) = recording.open(model.model(), &alike)? else {
         return Err(wrong("a motion that is made already has no periods: give its raw samples".to_owned()));
     };
     let (rate_hz, dof) = (stream.rate_hz(), model.model().dof());
-    let stride =
-        logs.settings.parallel_filter.decimation(rate_hz, motion_band_hz(motion)).map_or(1, |settings| settings.factor);
+    let stride = logs.filter.decimation(rate_hz, motion_band_hz(motion)).map_or(1, |settings| settings.factor);
     let mut channels = vec![Vec::new(); 4 * dof];
     let (mut block, mut segment, mut begins_s) = (MotionBlock::default(), None, 0.0);
     while stream.next_block(&mut block).map_err(failed)? {

@@ -5,6 +5,7 @@
 //! [`Estimate`]; a variant of [`Estimator`], which the compiler then asks for here; and its name in the study file
 //! (`study/estimator.rs` of `dynident`), where the compiler asks for the rest.
 
+mod error;
 mod generalized;
 mod instrument_rows;
 mod instrumental;
@@ -14,20 +15,23 @@ mod noise_weighted;
 mod periodic_model;
 mod robust;
 mod row_pass;
+mod settings;
 mod simulated;
 mod simulated_loop;
 mod simultaneous;
 
+pub use error::EstimatorError;
 pub use instrumental::{InstrumentSettings, NoiseInRegressor};
 pub use instruments::{InstrumentSource, SmoothedMotion};
-pub use maximum_likelihood::{PeriodSettings, PeriodicFit};
+pub use maximum_likelihood::{PeriodError, PeriodSettings, PeriodicFit};
 pub use noise_weighted::NoiseLevels;
 pub use periodic_model::{FourierSeries, PeriodicModel, PeriodicRecord};
 pub use robust::GrossErrors;
+pub use settings::EstimationSettings;
 pub use simulated::{SimulatedFit, SimulatedLoopSettings, SimulationStart};
 pub use simultaneous::SeriesFit;
 
-use crate::error::IdentificationError;
+use crate::consistent::ConsistencySettings;
 use crate::logs::Logs;
 use crate::regressor_model::RegressorModel;
 use dynident_estimation::{
@@ -154,6 +158,10 @@ pub struct TrainingRows<'a> {
     pub training: &'a [usize],
     /// The rows as triangular factors.
     pub problem: &'a LinearProblem,
+    /// The estimator, and how far what it gives is trusted.
+    pub settings: &'a EstimationSettings,
+    /// What is known of the bodies, for simulations that begin at a consistent set.
+    pub consistency: Option<&'a ConsistencySettings>,
 }
 
 impl TrainingRows<'_> {
@@ -162,7 +170,7 @@ impl TrainingRows<'_> {
     }
 }
 
-/// The estimate that the task's settings ask for, and the test of least squares if there are instruments: those of
+/// The estimate that the settings ask for, and the test of least squares if there are instruments: those of
 /// `source`, or the settings' own.
 ///
 /// # Errors
@@ -170,8 +178,8 @@ impl TrainingRows<'_> {
 pub fn estimate(
     rows: &TrainingRows<'_>,
     source: Option<&mut dyn InstrumentSource>,
-) -> Result<Estimation, IdentificationError> {
-    let settings = &rows.logs.settings.estimation;
+) -> Result<Estimation, EstimatorError> {
+    let settings = rows.settings;
     let instruments = match &settings.estimator {
         Estimator::Instrumental(own) => Some(own),
         _ => settings.exogeneity_test.as_ref(),

@@ -1,9 +1,7 @@
 //! Rows weighted by the noise around them.
 
 use super::row_pass::{Stop, every_row};
-use super::{Findings, TrainingRows};
-use crate::error::IdentificationError;
-use crate::settings::EstimationSettings;
+use super::{EstimationSettings, EstimatorError, Findings, TrainingRows};
 use dynident_estimation::{Estimate, NoiseLevelSettings, noise_weighted_least_squares};
 use serde::{Deserialize, Serialize};
 
@@ -44,8 +42,8 @@ impl NoiseLevels {
 pub(super) fn noise_weighted(
     rows: &TrainingRows<'_>,
     levels: &NoiseLevels,
-) -> Result<(Estimate, Findings), IdentificationError> {
-    let settings = levels.settings(&rows.logs.settings.estimation);
+) -> Result<(Estimate, Findings), EstimatorError> {
+    let settings = levels.settings(rows.settings);
     let found = noise_weighted_least_squares::<Stop>(rows.problem, &settings, |visit| every_row(rows, visit))?;
     Ok((found.estimate, Findings::NoiseLevels(found.level_range)))
 }

@@ -1,8 +1,7 @@
 //! Iteratively reweighted least squares: rows far off count less, or not at all.
 
 use super::row_pass::{Stop, every_row};
-use super::{Findings, TrainingRows};
-use crate::error::IdentificationError;
+use super::{EstimatorError, Findings, TrainingRows};
 use dynident_estimation::{Estimate, RobustSettings, RowWeight, robust_least_squares};
 use serde::{Deserialize, Serialize};
 
@@ -16,8 +15,8 @@ pub struct GrossErrors {
 }
 
 /// The estimate with one pass over the rows for every reweighting.
-pub(super) fn robust(rows: &TrainingRows<'_>, weight: RowWeight) -> Result<(Estimate, Findings), IdentificationError> {
-    let estimation = &rows.logs.settings.estimation;
+pub(super) fn robust(rows: &TrainingRows<'_>, weight: RowWeight) -> Result<(Estimate, Findings), EstimatorError> {
+    let estimation = rows.settings;
     let settings = RobustSettings {
         weight,
         rank: estimation.rank,

@@ -1,14 +1,14 @@
 //! Every row of the training logs once more, for estimators that reweight them.
 
-use super::TrainingRows;
-use crate::error::IdentificationError;
+use super::{EstimatorError, TrainingRows};
+use crate::recording::LogError;
 use crate::rows::{JointRows, RowConsumer};
 use dynident_estimation::{EstimationError, RowBlock, RowVisitor};
 
 /// What stops an estimator that comes back to the logs: itself, or what reads or simulates them.
 pub(crate) enum Stop {
     Estimator(EstimationError),
-    Log(IdentificationError),
+    Log(EstimatorError),
 }
 
 impl From<EstimationError> for Stop {
@@ -25,7 +25,7 @@ struct VisitorConsumer<'a, 'b> {
 }
 
 impl RowConsumer for VisitorConsumer<'_, '_> {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         if self.refused.is_none() {
             let block = RowBlock { log: self.log, joint: rows.joint, rows: rows.rows, panel: rows.panel };
             self.refused = (self.visit)(&block).err();
@@ -34,7 +34,7 @@ impl RowConsumer for VisitorConsumer<'_, '_> {
     }
 }
 
-impl From<Stop> for IdentificationError {
+impl From<Stop> for EstimatorError {
     fn from(stop: Stop) -> Self {
         match stop {
             Stop::Estimator(source) => Self::Estimation(source),
@@ -48,7 +48,7 @@ pub(super) fn every_row(rows: &TrainingRows<'_>, visit: &mut RowVisitor<'_>) -> 
     rows.begin("reweighting rows");
     for (log, &index) in rows.training.iter().enumerate() {
         let mut consumer = VisitorConsumer { log, visit: &mut *visit, refused: None };
-        rows.logs.pass(rows.model, index).run(&mut consumer).map_err(Stop::Log)?;
+        rows.logs.pass(rows.model, index).run(&mut consumer).map_err(|error| Stop::Log(error.into()))?;
         if let Some(refused) = consumer.refused {
             return Err(refused.into());
         }

@@ -1,9 +1,8 @@
 //! DIDIM, CLIE and CLOE: from a controller and the commanded motion to an estimate.
 
-use super::TrainingRows;
 use super::simulated_loop::{LoopLog, SimulatedLoop};
-use crate::consistent::{ConsistencySettings, consistent_parameters};
-use crate::error::IdentificationError;
+use super::{EstimatorError, TrainingRows};
+use crate::consistent::{ConsistencyError, ConsistencySettings, consistent_parameters};
 use dynident_dynamics::Column;
 use dynident_estimation::{
     Estimate, EstimateStatus, EstimationError, LinearProblem, SegmentedFactor, SimulatedCriterion, SimulatedEstimate,
@@ -12,6 +11,7 @@ use dynident_estimation::{
 use dynident_simulation::{ControllerModel, ControllerSettings, LoopSettings, RunLimits, SensorSettings};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 /// Noise of the compared signal counts as at least this share of the signal's root mean square, so that noise-free data
 /// have weights.
@@ -113,11 +113,11 @@ pub(super) fn simulated(
     rows: &TrainingRows<'_>,
     experiment: &SimulatedLoopSettings,
     compared: ComparedSignal,
-) -> Result<(Estimate, SimulatedFit), IdentificationError> {
-    let TrainingRows { logs, model, problem, training } = *rows;
-    let estimation = &logs.settings.estimation;
+) -> Result<(Estimate, SimulatedFit), EstimatorError> {
+    let TrainingRows { logs, model, problem, training, .. } = *rows;
+    let estimation = rows.settings;
     let method = compared.method();
-    let wrong = |message: String| IdentificationError::Estimator { method, message };
+    let wrong = |message: String| EstimatorError::Requirement { method, message };
     let SimulatedLoopSettings { controller, rate_hz, .. } = experiment;
     let mut settings = experiment.loop_settings.clone();
     settings.limits = RunLimits { torque: settings.limits.torque, ..RunLimits::default() };
@@ -166,7 +166,7 @@ pub(super) fn simulated(
     let plain = weighted_least_squares(problem, &weighted)?;
     let measured = simulated.measured();
     let (mut begun, mut refused) = (Vec::new(), Vec::new());
-    for (values, name) in start_values(rows, experiment.start, &plain).map_err(&wrong)? {
+    for (values, name) in start_values(rows, experiment.start, &plain).map_err(|error| wrong(error.to_string()))? {
         match simulated.simulate(&values)? {
             Some(rows) => {
                 let sigma = deviations(&simulated, &(&measured - &rows.output), &measured, 0);
@@ -261,10 +261,10 @@ fn settled(
     simulated: &mut SimulatedLoop<'_>,
     (start, experiment): (SimulatedStart, &SimulatedLoopSettings),
     (measured, std): (&DVector<f64>, &[f64]),
-) -> Result<StartOutcome, IdentificationError> {
+) -> Result<StartOutcome, EstimatorError> {
     let settings = SimulatedSettings {
         criterion: simulated.compared.criterion(),
-        rank: rows.logs.settings.estimation.rank,
+        rank: rows.settings.rank,
         tolerance: experiment.tolerance,
         max_iterations: experiment.max_iterations,
         difference: experiment.difference,
@@ -297,32 +297,47 @@ fn settled(
     Err(EstimationError::NoSimulation.into())
 }
 
+/// Why there is nothing to begin with.
+#[derive(Debug, Error)]
+enum NoStartError {
+    #[error("there is no physically consistent set to start from: {0}")]
+    Inconsistent(ConsistencyError),
+    #[error("the description, which could be started from, has no inertial of {}", .0.join(", "))]
+    Undescribed(Vec<String>),
+    #[error("{0}; {1}")]
+    Both(Box<Self>, Box<Self>),
+}
+
 /// Where the iteration may begin, and what each is called.
 fn start_values(
     rows: &TrainingRows<'_>,
     choice: SimulationStart,
     plain: &Estimate,
-) -> Result<Vec<(Vec<f64>, &'static str)>, String> {
+) -> Result<Vec<(Vec<f64>, &'static str)>, NoStartError> {
     let (model, problem) = (rows.model, rows.problem);
     let mut starts = Vec::new();
     let mut why = Vec::new();
     if choice != SimulationStart::Description {
         let default = ConsistencySettings::default();
-        let settings = rows.logs.settings.consistency.as_ref().unwrap_or(&default);
+        let settings = rows.consistency.unwrap_or(&default);
         match consistent_parameters(&model.parametric, problem, &plain.joint_sigma, settings) {
             Ok(fit) => starts.push((fit.base_values, "estimate")),
-            Err(reason) => why.push(format!("there is no physically consistent set to start from: {reason}")),
+            Err(reason) => why.push(NoStartError::Inconsistent(reason)),
         }
     }
     if choice != SimulationStart::Estimate {
         if let Some(nominal) = model.parametric.nominal_base() {
             starts.push((nominal.to_vec(), "description"));
         } else {
-            let unknown = model.model().bodies_without_prior().join(", ");
-            why.push(format!("the description, which could be started from, has no inertial of {unknown}"));
+            let unknown = model.model().bodies_without_prior().into_iter().map(str::to_owned);
+            why.push(NoStartError::Undescribed(unknown.collect()));
         }
     }
-    if starts.is_empty() { Err(why.join("; ")) } else { Ok(starts) }
+    let both = |first, second| NoStartError::Both(Box::new(first), Box::new(second));
+    match why.into_iter().reduce(both) {
+        Some(error) if starts.is_empty() => Err(error),
+        _ => Ok(starts),
+    }
 }
 
 fn failure(simulated: &SimulatedLoop<'_>) -> String {
@@ -383,7 +398,7 @@ fn linearised(
     let mut at = 0;
     for (place, log) in simulated.logs.iter().enumerate() {
         for (joint, &count) in log.rows.iter().enumerate() {
-            let mut factor = SegmentedFactor::new(columns.len(), training.logs.settings.estimation.segments)?;
+            let mut factor = SegmentedFactor::new(columns.len(), training.settings.segments)?;
             let own = found.jacobian.rows(at, count);
             let panel: Vec<f64> = own.iter().copied().chain(target.rows(at, count).iter().copied()).collect();
             factor.absorb(&panel, count)?;

@@ -1,17 +1,19 @@
 //! The closed loop of an experiment behind the estimators' seam: the same controller, reference, instants and filters
 //! as the logs, other parameters.
 
-use super::TrainingRows;
 use super::row_pass::Stop;
 use super::simulated::ComparedSignal;
-use crate::error::IdentificationError;
+use super::{EstimatorError, TrainingRows};
+use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
 use crate::rows::{JointRows, RowBuilder, RowConsumer, motion_band_hz};
 use dynident_estimation::{SimulatedMotion, SimulatedRows};
 use dynident_excitation::Motion;
 use dynident_model::terms::TorqueTerm;
 use dynident_recording::{DecimationSettings, Decimator, FilterError, MotionBlock};
-use dynident_simulation::{ControllerModel, ControllerSettings, LoopSettings, Plant, Reference, Run, closed_loop};
+use dynident_simulation::{
+    ControllerModel, ControllerSettings, LoopSettings, Plant, Reference, Run, SimulationError, closed_loop,
+};
 use nalgebra::{DMatrix, DVector};
 
 /// Samples of a log without a gap.
@@ -47,7 +49,7 @@ pub(super) struct SimulatedLoop<'a> {
     pub(super) compared: ComparedSignal,
     pub(super) logs: Vec<LoopLog>,
     /// Makes an error from what is wrong.
-    pub(super) wrong: &'a dyn Fn(String) -> IdentificationError,
+    pub(super) wrong: &'a dyn Fn(String) -> EstimatorError,
     /// Why the last simulation that did not get through did not.
     pub(super) failure: Option<String>,
 }
@@ -59,8 +61,8 @@ impl LoopLog {
         index: usize,
         compared: ComparedSignal,
         rate_hz: f64,
-        wrong: &dyn Fn(String) -> IdentificationError,
-    ) -> Result<Self, IdentificationError> {
+        wrong: &dyn Fn(String) -> EstimatorError,
+    ) -> Result<Self, EstimatorError> {
         let TrainingRows { logs, model, .. } = *training;
         let (recording, motion) = (&logs.recordings[index], &logs.motion);
         let name = recording.name.clone();
@@ -75,12 +77,12 @@ impl LoopLog {
             )));
         };
         let places = recording.places(model.model())?;
-        let filter = logs.settings.parallel_filter.decimation(stream.rate_hz(), motion_band_hz(motion));
-        let in_filter = |source| IdentificationError::Filter { log: name.clone(), source };
+        let filter = logs.filter.decimation(stream.rate_hz(), motion_band_hz(motion));
+        let in_filter = |source| LogError::Filter { log: name.clone(), source };
         let dof = model.dof();
         let mut outputs = Outputs::new(dof, filter.as_ref(), stream.rate_hz()).map_err(in_filter)?;
         let (mut block, mut pieces, mut samples) = (MotionBlock::default(), Vec::new(), 0);
-        while stream.next_block(&mut block).map_err(|source| IdentificationError::recording(&name, source))? {
+        while stream.next_block(&mut block).map_err(|source| LogError::recording(&name, source))? {
             let values = if compared == ComparedSignal::Position { &block.q } else { &block.tau };
             for (joint, &place) in places.iter().enumerate() {
                 outputs.take(joint, block.segment, block.joint(values, place));
@@ -91,7 +93,8 @@ impl LoopLog {
         }
         let log_rate_hz = stream.rate_hz();
         if outputs.rows.iter().any(Vec::is_empty) {
-            return Err(IdentificationError::NothingLeft { log: name, rows: samples as u64, needed: outputs.needed() });
+            let (rows, needed) = (samples as u64, outputs.needed());
+            return Err(LogError::NothingLeft { log: name, rows, needed }.into());
         }
         let begins_s = commanded.start_s().min(0.0);
         let ends_s =
@@ -136,21 +139,20 @@ impl SimulatedLoop<'_> {
 
     /// The robot with base parameters θ: its torques, and so its mass matrix, are those of every full set that has
     /// these base parameters.
-    fn plant(&self, theta: &[f64]) -> Result<Plant, String> {
-        let model = ControllerModel::from_columns(self.model.model(), self.model.layout().columns(), theta)
-            .map_err(|error| error.to_string())?;
+    fn plant(&self, theta: &[f64]) -> Result<Plant, SimulationError> {
+        let model = ControllerModel::from_columns(self.model.model(), self.model.layout().columns(), theta)?;
         let (terms, values): (Vec<TorqueTerm>, Vec<f64>) = model.terms().iter().cloned().unzip();
-        Plant::new(model.model(), &terms, &values).map_err(|error| error.to_string())
+        Plant::new(model.model(), &terms, &values)
     }
 
     /// One log's rows of a run.
-    fn rows_of(&self, log: &LoopLog, run: &Run, out: &mut Gathered) -> Result<(), IdentificationError> {
+    fn rows_of(&self, log: &LoopLog, run: &Run, out: &mut Gathered) -> Result<(), EstimatorError> {
         let dof = self.model.model().dof();
         let motion = (self.compared != ComparedSignal::Torque)
             .then(|| sampled(run, log.begins_s))
             .transpose()
-            .map_err(|source| IdentificationError::Filter { log: log.name.clone(), source })?;
-        let in_filter = |source| IdentificationError::Filter { log: log.name.clone(), source };
+            .map_err(|source| LogError::Filter { log: log.name.clone(), source })?;
+        let in_filter = |source| LogError::Filter { log: log.name.clone(), source };
         let mut outputs = Outputs::new(dof, log.filter.as_ref(), log.rate_hz).map_err(in_filter)?;
         let layout = self.model.layout();
         let places: Vec<usize> = (0..dof).collect();
@@ -217,7 +219,7 @@ impl SimulatedMotion for SimulatedLoop<'_> {
         let mut plant = match self.plant(parameters) {
             Ok(plant) => plant,
             Err(reason) => {
-                self.failure = Some(reason);
+                self.failure = Some(reason.to_string());
                 return Ok(None);
             }
         };
@@ -229,7 +231,7 @@ impl SimulatedMotion for SimulatedLoop<'_> {
             filled: 0,
         };
         for log in &self.logs {
-            let in_loop = |error: dynident_simulation::SimulationError| {
+            let in_loop = |error: SimulationError| {
                 Stop::Log((self.wrong)(format!("log `{}`: the closed loop cannot be simulated: {error}", log.name)))
             };
             let mut controller = self.controller.build(plant.dof(), self.controller_model.as_ref()).map_err(in_loop)?;
@@ -290,7 +292,7 @@ struct PanelRows {
 }
 
 impl RowConsumer for PanelRows {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         self.joints[rows.joint].push((rows.rows, rows.panel.to_vec()));
         Ok(())
     }

@@ -3,8 +3,8 @@
 
 use super::periodic_model::{FourierSeries, PeriodicModel, PeriodicRecord, PeriodicRecords};
 use super::simulated::torque_sigma;
-use super::{Findings, PeriodSettings, TrainingRows};
-use crate::error::IdentificationError;
+use super::{EstimatorError, Findings, PeriodSettings, TrainingRows};
+use crate::recording::LogError;
 use dynident_estimation::{
     Estimate, SimultaneousModel, SimultaneousProblem, SimultaneousSettings, simultaneous_least_squares,
     weighted_least_squares,
@@ -48,9 +48,9 @@ struct RawRecord {
 pub(super) fn simultaneous(
     rows: &TrainingRows<'_>,
     periods: &PeriodSettings,
-) -> Result<(Estimate, Findings), IdentificationError> {
+) -> Result<(Estimate, Findings), EstimatorError> {
     let TrainingRows { logs, model, problem, .. } = *rows;
-    let wrong = |message: String| IdentificationError::Estimator { method: "simultaneous", message };
+    let wrong = |message: String| EstimatorError::Requirement { method: "simultaneous", message };
     let terms = model.terms().iter();
     if let Some(term) = terms.clone().find(|t| t.has_memory() || t.needs_load() || t.needs_temperature()) {
         return Err(wrong(format!(
@@ -78,7 +78,7 @@ pub(super) fn simultaneous(
         })?;
         motion.extend(fitted);
     }
-    let estimation = &logs.settings.estimation;
+    let estimation = rows.settings;
     let start = weighted_least_squares(problem, &estimation.weighted())?;
     let channel = |log: &usize| {
         let name = &logs.recordings[*log].name;
@@ -136,8 +136,8 @@ fn read(
     rows: &TrainingRows<'_>,
     index: usize,
     periods: &PeriodSettings,
-    wrong: &dyn Fn(String) -> IdentificationError,
-) -> Result<RawRecord, IdentificationError> {
+    wrong: &dyn Fn(String) -> EstimatorError,
+) -> Result<RawRecord, EstimatorError> {
     let TrainingRows { logs, model, .. } = *rows;
     let recording = &logs.recordings[index];
     let name = &recording.name;
@@ -158,7 +158,7 @@ fn read(
     let (rate_hz, places) = (stream.rate_hz(), recording.places(model.model())?);
     let mut channels = vec![Vec::new(); 2 * places.len()];
     let (mut block, mut segment) = (MotionBlock::default(), None);
-    while stream.next_block(&mut block).map_err(|source| IdentificationError::recording(name, source))? {
+    while stream.next_block(&mut block).map_err(|source| LogError::recording(name, source))? {
         if *segment.get_or_insert(block.segment) != block.segment {
             return Err(wrong(format!(
                 "log `{name}` has a gap, and its noise is followed from sample to sample: cut the longest piece out with time_range_s"

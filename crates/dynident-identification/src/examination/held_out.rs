@@ -4,9 +4,9 @@ use super::nominal_agreement::{Evidence, PriorAgreement};
 use super::residuals::{JointResiduals, JointWatch, Uncertainty};
 use super::torque_delay::{DelayCheck, TorqueLag};
 use super::torque_trace::{LogTrace, TraceConsumer};
-use crate::error::IdentificationError;
+use crate::estimators::EstimationSettings;
 use crate::logs::Logs;
-use crate::recording::Role;
+use crate::recording::{LogError, Role};
 use crate::regressor_model::RegressorModel;
 use crate::rows::{JointRows, LogPass, LogStatistics, RawSamples, RowConsumer, predicted_torque};
 use dynident_estimation::{Validation, ValidationReport};
@@ -63,13 +63,13 @@ struct Test<'a> {
 }
 
 impl Test<'_> {
-    fn failed(&self, source: dynident_estimation::EstimationError) -> IdentificationError {
-        IdentificationError::Rows { log: self.log.clone(), source }
+    fn failed(&self, source: dynident_estimation::EstimationError) -> LogError {
+        LogError::Rows { log: self.log.clone(), source }
     }
 }
 
 impl RowConsumer for Test<'_> {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         let columns = self.rows_of.layout().joint_columns(rows.joint);
         let measured = &rows.panel[columns.len() * rows.rows..];
         predicted_torque(rows.panel, rows.rows, columns, self.theta, &mut self.buffer);
@@ -78,7 +78,7 @@ impl RowConsumer for Test<'_> {
         for (prior, validation) in [&mut self.prior, &mut self.physical].into_iter().flatten() {
             predicted_torque(rows.panel, rows.rows, columns, prior, &mut self.buffer);
             let added = validation.add_joint(rows.joint, measured, &self.buffer);
-            added.map_err(|source| IdentificationError::Rows { log: self.log.clone(), source })?;
+            added.map_err(|source| LogError::Rows { log: self.log.clone(), source })?;
         }
         if let Some(evidence) = &mut self.evidence {
             evidence.filtered(rows, &mut self.buffer);
@@ -90,7 +90,7 @@ impl RowConsumer for Test<'_> {
         Ok(())
     }
 
-    fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), IdentificationError> {
+    fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), LogError> {
         let rows = samples.panels.samples();
         for joint in 0..self.rows_of.model().dof() {
             let columns = self.rows_of.layout().joint_columns(joint);
@@ -126,11 +126,25 @@ pub struct ModelUnderTest<'a> {
 /// # Errors
 /// What reading it can give.
 pub fn examine_held_out(
-    logs: &Logs<'_>,
+    (logs, settings): (&Logs<'_>, &EstimationSettings),
     model: &RegressorModel,
     index: usize,
     tested: &ModelUnderTest<'_>,
-) -> Result<HeldOutExamination, IdentificationError> {
+) -> Result<HeldOutExamination, LogError> {
+    logs.begin(&format!("testing on {}", logs.recordings[index].name), &[index]);
+    let found = tested_on((logs, settings), model, index, tested, true);
+    logs.end();
+    found
+}
+
+/// [`examine_held_out`] as a part of a stage; `alone` lets a second thread read.
+pub(crate) fn tested_on(
+    (logs, settings): (&Logs<'_>, &EstimationSettings),
+    model: &RegressorModel,
+    index: usize,
+    tested: &ModelUnderTest<'_>,
+    alone: bool,
+) -> Result<HeldOutExamination, LogError> {
     let ModelUnderTest { theta, physical, uncertainty, traced } = *tested;
     let (recording, joints) = (&logs.recordings[index], model.joint_names());
     let columns = (0..model.dof()).map(|joint| model.layout().joint_columns(joint)).collect();
@@ -149,11 +163,8 @@ pub fn examine_held_out(
         trace: traced.then(|| TraceConsumer::new(model, theta)),
         buffer: Vec::new(),
     };
-    logs.begin(&format!("testing on {}", recording.name), &[index]);
-    let pass = LogPass { reader_thread: logs.execution.parallel(), kept: None, ..logs.pass(model, index) };
-    let statistics = pass.run(&mut test);
-    logs.end();
-    let statistics = statistics?;
+    let reader_thread = alone && logs.execution.parallel();
+    let statistics = LogPass { reader_thread, kept: None, ..logs.pass(model, index) }.run(&mut test)?;
     let name = &recording.name;
     let residuals = test.watches.iter().zip(&joints).map(|(watch, joint)| watch.report(name, joint)).collect();
     Ok(HeldOutExamination {
@@ -167,7 +178,7 @@ pub fn examine_held_out(
             residuals,
         },
         nominal_agreement: test.evidence.as_ref().map(|evidence| evidence.agreement(&joints)),
-        delays: test.delay.delays(logs.settings, &logs.motion),
+        delays: test.delay.delays(logs, settings),
         trace: test.trace.map(|trace| trace.finished(name.clone(), Role::Validate, statistics.filtered_rate_hz)),
         statistics,
     })

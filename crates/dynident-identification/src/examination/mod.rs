@@ -18,4 +18,5 @@ pub use torque_sign::{TorqueSignCheck, sign_evidence, sign_findings};
 pub use torque_trace::{JointTrace, LogTrace};
 pub use training::examine_training;
 
+pub(crate) use held_out::tested_on;
 pub(crate) use nominal_agreement::Evidence;

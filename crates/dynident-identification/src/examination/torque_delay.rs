@@ -6,15 +6,16 @@
 //! taken `d` later, until `d` is the lag `δ` itself. The last step's covariance, from time segments, is the lag's. What
 //! the model cannot say (backlash, elasticity) is in it as far as it differs from segment to segment.
 
+use crate::estimators::EstimationSettings;
 use crate::examination::delay_rows::{DelayRows, NODES, Piece, lagrange};
+use crate::logs::Logs;
 use crate::regressor_model::RegressorModel;
 use crate::rows::{JointRows, RawSamples, motion_band_hz, predicted_torque};
-use crate::settings::IdentificationSettings;
 use dynident_estimation::{
     CovarianceMethod, Estimate, EstimationError, LinearProblem, SegmentedFactor, WeightedSettings,
     weighted_least_squares,
 };
-use dynident_recording::{DecimationSettings, Decimator, Finding, Level, MotionSettings, best_lag};
+use dynident_recording::{DecimationSettings, Decimator, Finding, Level, best_lag};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -95,9 +96,10 @@ impl<'a> DelayCheck<'a> {
     }
 
     /// Lag of torque behind motion by joint; `None` where the log does not determine it.
-    pub(crate) fn delays(&self, settings: &IdentificationSettings, motion: &MotionSettings) -> Vec<Option<TorqueLag>> {
+    pub(crate) fn delays(&self, logs: &Logs<'_>, settings: &EstimationSettings) -> Vec<Option<TorqueLag>> {
         let joints = self.model.model().dof();
-        let filter = settings.parallel_filter.decimation(self.rate_hz, motion_band_hz(motion));
+        let motion = &logs.motion;
+        let filter = logs.filter.decimation(self.rate_hz, motion_band_hz(motion));
         let longest = LONGEST_DELAY_S * self.rate_hz;
         let start = (0..joints)
             .into_par_iter()
@@ -125,7 +127,7 @@ impl<'a> DelayCheck<'a> {
 
     fn estimated(
         &self,
-        settings: &IdentificationSettings,
+        settings: &EstimationSettings,
         filter: Option<&DecimationSettings>,
         mut shift: Vec<f64>,
         longest: f64,
@@ -135,7 +137,7 @@ impl<'a> DelayCheck<'a> {
             .map(|joint| self.rows(settings, filter, joint, shift[joint]))
             .collect::<Result<_, _>>()?;
         let quick = WeightedSettings {
-            rank: settings.estimation.rank,
+            rank: settings.rank,
             covariance: CovarianceMethod::White,
             ..WeightedSettings::default()
         };
@@ -155,7 +157,7 @@ impl<'a> DelayCheck<'a> {
                 break;
             }
         }
-        let last_step = WeightedSettings { covariance: settings.estimation.covariance, ..quick };
+        let last_step = WeightedSettings { covariance: settings.covariance, ..quick };
         let last = weighted_least_squares(&self.problem(&rows, &shift, |rows| &rows.factor)?, &last_step)?;
         Ok((0..shift.len()).map(|joint| self.joint_delay(&last, &rows[joint], joint, shift[joint], longest)).collect())
     }
@@ -189,13 +191,13 @@ impl<'a> DelayCheck<'a> {
 
     fn rows(
         &self,
-        settings: &IdentificationSettings,
+        settings: &EstimationSettings,
         filter: Option<&DecimationSettings>,
         joint: usize,
         shift: f64,
     ) -> Result<DelayRows, EstimationError> {
         let columns = self.model.layout().joint_columns(joint).len();
-        DelayRows::new(&self.pieces, joint, columns, (self.rate_hz, filter), shift, settings.estimation.segments)
+        DelayRows::new(&self.pieces, joint, columns, (self.rate_hz, filter), shift, settings.segments)
     }
 
     /// Parameters, then the rest of every joint's lag in samples.
@@ -203,7 +205,7 @@ impl<'a> DelayCheck<'a> {
         &self,
         rows: &[DelayRows],
         shift: &[f64],
-        factor: impl Fn(&DelayRows) -> &SegmentedFactor,
+        factor: impl Fn(&DelayRows) -> &SegmentedFactor + Sync,
     ) -> Result<LinearProblem, EstimationError> {
         let layout = self.model.layout();
         let base = layout.columns().len();
@@ -212,7 +214,7 @@ impl<'a> DelayCheck<'a> {
         // What the log does not determine stays as it was fitted, for the slope was made with it.
         let fallback = self.theta.iter().copied().chain(vec![0.0; rows.len()]).collect();
         let mut problem = LinearProblem::new(names, joints).with_fallback(fallback)?;
-        for (joint, rows) in rows.iter().enumerate() {
+        let mapped = |(joint, rows): (usize, &DelayRows)| {
             let own = layout.joint_columns(joint);
             let mut map = DMatrix::zeros(own.len() + 1 + NODES, own.len() + 2);
             for column in 0..=own.len() {
@@ -221,8 +223,12 @@ impl<'a> DelayCheck<'a> {
             for (node, weight) in lagrange(shift[joint] - rows.centre as f64).into_iter().enumerate() {
                 map[(own.len() + 1 + node, own.len() + 1)] = weight;
             }
-            let columns = own.iter().copied().chain([base + joint]).collect();
-            problem.add("log", joint, columns, factor(rows).mapped(&map)?)?;
+            factor(rows).mapped(&map)
+        };
+        let mapped: Vec<_> = rows.par_iter().enumerate().map(mapped).collect::<Result<_, _>>()?;
+        for (joint, mapped) in mapped.into_iter().enumerate() {
+            let columns = layout.joint_columns(joint).iter().copied().chain([base + joint]).collect();
+            problem.add("log", joint, columns, mapped)?;
         }
         Ok(problem)
     }

@@ -2,10 +2,10 @@
 
 use super::torque_delay::{DELAY_SAMPLES, DelayCheck, TorqueLag};
 use super::torque_trace::{LogTrace, TraceConsumer};
-use crate::error::IdentificationError;
+use crate::estimators::EstimationSettings;
 use crate::logs::Logs;
 use crate::progress::Silent;
-use crate::recording::Role;
+use crate::recording::{LogError, Role};
 use crate::regressor_model::RegressorModel;
 use crate::rows::{JointRows, LogPass, RawSamples, RowConsumer};
 
@@ -16,13 +16,13 @@ struct SecondPass<'a> {
 }
 
 impl RowConsumer for SecondPass<'_> {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         self.trace.filtered(rows);
         self.delay.filtered(rows);
         Ok(())
     }
 
-    fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), IdentificationError> {
+    fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), LogError> {
         self.trace.raw(samples);
         self.delay.raw(samples);
         Ok(())
@@ -34,16 +34,16 @@ impl RowConsumer for SecondPass<'_> {
 /// # Errors
 /// What reading it can give.
 pub fn examine_training(
-    logs: &Logs<'_>,
+    (logs, settings): (&Logs<'_>, &EstimationSettings),
     model: &RegressorModel,
     index: usize,
     theta: &[f64],
-) -> Result<(Vec<Option<TorqueLag>>, LogTrace), IdentificationError> {
+) -> Result<(Vec<Option<TorqueLag>>, LogTrace), LogError> {
     let mut second = SecondPass { delay: DelayCheck::new(model, theta), trace: TraceConsumer::new(model, theta) };
     let most_samples = Some(DELAY_SAMPLES as u64);
     let pass = LogPass { most_samples, progress: &Silent, ..logs.pass(model, index) };
     let statistics = pass.run(&mut second)?;
-    let delays = second.delay.delays(logs.settings, &logs.motion);
+    let delays = second.delay.delays(logs, settings);
     let name = logs.recordings[index].name.clone();
     Ok((delays, second.trace.finished(name, Role::Identify, statistics.filtered_rate_hz)))
 }

@@ -3,10 +3,11 @@
 
 use super::columns::PayloadColumns;
 use dynident_estimation::consistent::{
-    BaseMap, PhysicalBody, PhysicalFit, PhysicalProblem, PhysicalSettings, physical_fit, rough_body,
+    BaseMap, PhysicalBody, PhysicalError, PhysicalFit, PhysicalProblem, PhysicalSettings, physical_fit, rough_body,
 };
-use dynident_estimation::{Estimate, TriangularFactor};
+use dynident_estimation::{Estimate, EstimationError, TriangularFactor};
 use nalgebra::{DMatrix, DVector};
+use thiserror::Error;
 
 /// What data leave open is taken from a body of the payload's mass with this radius of gyration about the link's
 /// origin, metres.
@@ -50,13 +51,23 @@ pub(crate) fn jacobian(p: &[f64; 10]) -> DMatrix<f64> {
 
 const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
+/// Why no body fits what logs say of a payload.
+#[derive(Debug, Error)]
+pub(crate) enum NoBodyError {
+    #[error("its covariance is not positive definite")]
+    Covariance,
+    #[error(transparent)]
+    Estimation(#[from] EstimationError),
+    #[error(transparent)]
+    Physical(#[from] PhysicalError),
+}
+
 /// The consistent body nearest to the estimate in the metric of its covariance; otherwise the reason why there is none.
 pub(crate) fn nearest_consistent_body(
     name: &str,
     columns: &PayloadColumns,
     estimate: &Estimate,
-) -> Result<PhysicalFit, String> {
-    let said = |error: &dyn core::fmt::Display| error.to_string();
+) -> Result<PhysicalFit, NoBodyError> {
     let n = columns.kept.len();
     let fixed = |place: &usize| estimate.rank.fixed.iter().any(|fixed| fixed.column == columns.first + place);
     let determined: Vec<usize> = (0..n).filter(|place| !fixed(place)).collect();
@@ -77,22 +88,22 @@ pub(crate) fn nearest_consistent_body(
         covariance[(i, i)] += (LEAST_RELATIVE_STD * mass * length).powi(2);
     }
     // V = L Lᵀ: rows L⁻¹ φ = L⁻¹ φ̂ have unit noise.
-    let lower = covariance.cholesky().ok_or_else(|| "its covariance is not positive definite".to_owned())?.l();
+    let lower = covariance.cholesky().ok_or(NoBodyError::Covariance)?.l();
     let values = DVector::from_iterator(determined.len(), determined.iter().map(|&place| value(place)));
     let (Some(rows), Some(target)) = (lower.clone().try_inverse(), lower.solve_lower_triangular(&values)) else {
-        return Err("its covariance is not positive definite".to_owned());
+        return Err(NoBodyError::Covariance);
     };
     let mut panel = vec![0.0; (n + 1) * determined.len()];
     for (i, &place) in determined.iter().enumerate() {
         panel[place * determined.len()..(place + 1) * determined.len()].copy_from_slice(rows.column(i).as_slice());
     }
     panel[n * determined.len()..].copy_from_slice(target.as_slice());
-    let factor = TriangularFactor::from_rows(n, &panel, determined.len()).map_err(|error| said(&error))?;
-    let map = BaseMap::from_regrouping(&columns.kept, &columns.dropped, &columns.regrouping).map_err(|e| said(&e))?;
+    let factor = TriangularFactor::from_rows(n, &panel, determined.len())?;
+    let map = BaseMap::from_regrouping(&columns.kept, &columns.dropped, &columns.regrouping)?;
     let body =
         PhysicalBody { name: name.to_owned(), reference, known: None, mass_kg: None, com_box_m: None, inside: None };
-    let problem = PhysicalProblem::new(map, vec![body], Vec::new(), &factor).map_err(|error| said(&error))?;
-    physical_fit(&problem, &PhysicalSettings::default()).map_err(|error| said(&error))
+    let problem = PhysicalProblem::new(map, vec![body], Vec::new(), &factor)?;
+    Ok(physical_fit(&problem, &PhysicalSettings::default())?)
 }
 
 #[cfg(test)]

@@ -2,8 +2,7 @@
 
 use super::columns::LoadColumns;
 use super::error::PayloadError;
-use crate::error::IdentificationError;
-use crate::settings::EstimationSettings;
+use crate::estimators::EstimationSettings;
 use dynident_estimation::{Estimate, EstimationError, GainProblem, JointGain, LinearProblem, joint_gains};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -38,23 +37,26 @@ pub(crate) struct Gains {
     pub(crate) problem: LinearProblem,
 }
 
-/// Gains and parameters together; `rows` has the torque as logged and the known payloads still in it, log by log in the
-/// order of `training`.
-pub(crate) fn drive_gains(
-    settings: &EstimationSettings,
-    columns: &LoadColumns,
-    rows: &LinearProblem,
-    training: &[usize],
-) -> Result<Gains, IdentificationError> {
+/// What the known payloads of the logs `training` add to the base parameters, log by log, if gains can be had by it.
+pub(crate) fn known_loads(columns: &LoadColumns, training: &[usize]) -> Result<Vec<Vec<f64>>, PayloadError> {
     let known: Vec<Vec<f64>> = training.iter().map(|&log| columns.known(log)).collect();
     let (with, without): (Vec<bool>, Vec<bool>) =
         known.iter().map(|known| known.iter().any(|&value| value != 0.0)).map(|loaded| (loaded, !loaded)).unzip();
     if !with.contains(&true) || !without.contains(&true) {
-        return Err(PayloadError::GainsNeedPayload.into());
+        return Err(PayloadError::GainsNeedPayload);
     }
-    let found = joint_gains(&GainProblem { rows, known: known.clone() }, &settings.weighted())?;
+    Ok(known)
+}
+
+/// Gains and parameters together; `rows` has the torque as logged and the `known` payloads still in it.
+pub(crate) fn drive_gains(
+    settings: &EstimationSettings,
+    known: &[Vec<f64>],
+    rows: &LinearProblem,
+) -> Result<Gains, EstimationError> {
+    let found = joint_gains(&GainProblem { rows, known: known.to_vec() }, &settings.weighted())?;
     let scale: Vec<f64> = found.gains.iter().map(|gain| gain.gain).collect();
-    let problem = in_newton_metres(rows, &known, &scale)?;
+    let problem = in_newton_metres(rows, known, &scale)?;
     let estimate = without_gains(found.estimate, rows.columns().len(), &scale);
     Ok(Gains { of_joints: found.gains.into_iter().map(drive_gain).collect(), estimate, problem })
 }

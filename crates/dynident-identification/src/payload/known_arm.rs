@@ -2,8 +2,8 @@
 
 use super::columns::LoadColumns;
 use super::error::PayloadError;
+use crate::estimators::EstimationSettings;
 use crate::regressor_model::RegressorModel;
-use crate::settings::EstimationSettings;
 use dynident_dynamics::Column;
 use dynident_estimation::{Estimate, EstimationError, KnownColumns, LinearProblem, weighted_least_squares_with_known};
 use dynident_model::terms::TorqueTerm;

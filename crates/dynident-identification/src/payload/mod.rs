@@ -13,4 +13,4 @@ pub use gains::DriveGain;
 pub use known_arm::{KnownArm, Refit};
 pub use result::{ConsistentPayload, Measured, PayloadParameter, PayloadResult, payload_results};
 
-pub(crate) use gains::{Gains, drive_gains};
+pub(crate) use gains::{Gains, drive_gains, known_loads};

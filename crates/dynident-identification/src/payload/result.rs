@@ -142,7 +142,7 @@ fn result(
             };
             (Some(possible), None)
         }
-        Err(reason) => (None, Some(reason)),
+        Err(reason) => (None, Some(reason.to_string())),
     };
     let added = (0..columns.change.nrows())
         .map(|row| (0..parameters.len()).map(|place| columns.change[(row, place)] * parameters[place].value).sum());

@@ -2,7 +2,7 @@
 
 use super::mask::RowMask;
 use super::{JointRows, PANEL_SAMPLES, RawSamples, RowConsumer};
-use crate::error::IdentificationError;
+use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_model::terms::JointMotion;
@@ -108,7 +108,7 @@ impl<'a> RowBuilder<'a> {
     ///
     /// # Errors
     /// What the consumer returns.
-    pub fn take(&mut self, block: &MotionBlock, consumer: &mut dyn RowConsumer) -> Result<(), IdentificationError> {
+    pub fn take(&mut self, block: &MotionBlock, consumer: &mut dyn RowConsumer) -> Result<(), LogError> {
         if block.segment != self.segment {
             self.segment = block.segment;
             self.history.restart();

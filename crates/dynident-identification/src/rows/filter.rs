@@ -2,6 +2,7 @@
 
 use dynident_recording::{DecimationSettings, MotionSettings};
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 /// The parallel filter: torque and every regressor column pass the same zero-phase low-pass, then every n-th row is
 /// kept.
@@ -38,14 +39,23 @@ impl From<Option<&DecimationSettings>> for ParallelFilterSettings {
     }
 }
 
+/// Settings of the parallel filter that are impossible.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum ParallelFilterError {
+    /// No sample would be kept.
+    #[error("parallel_filter.factor = 0: give 1 or more")]
+    ZeroFactor,
+}
+
 impl ParallelFilterSettings {
     /// Checks the numbers.
     ///
     /// # Errors
-    /// In words, with the key and the fix.
-    pub fn validate(&self) -> Result<(), String> {
+    /// A factor of zero.
+    pub fn validate(&self) -> Result<(), ParallelFilterError> {
         if self.factor == Some(0) {
-            return Err("parallel_filter.factor = 0: give 1 or more".to_owned());
+            return Err(ParallelFilterError::ZeroFactor);
         }
         Ok(())
     }

@@ -1,50 +1,7 @@
-//! A motion that is made already, and which of its rows count.
+//! Which rows of a motion that is made already count.
 
-use dynident_recording::{Log, MotionBlock};
-use std::sync::Arc;
-
-/// A motion that is made already, with its torques: joints in the model's order, one uninterrupted piece.
-#[derive(Clone, Debug)]
-pub struct MotionRecord {
-    /// What messages call it.
-    pub label: String,
-    /// Positions, velocities, accelerations and torques.
-    pub motion: Arc<MotionBlock>,
-    /// Sample by sample whether it can be used at all; empty if all can. A filtered row sees none that cannot.
-    pub usable: Vec<bool>,
-    /// For each joint the times (from, to; s) at which its torque counts; `None` if it always does.
-    pub windows: Option<Vec<Vec<[f64; 2]>>>,
-    /// The raw samples that it was made from, for estimators that smooth or simulate anew; joints in the model's order.
-    pub raw: Option<Log>,
-}
-
-impl MotionRecord {
-    /// The same with every row, where only samples at the ends do not count.
-    pub(crate) fn with_every_row(&self) -> Option<Self> {
-        let first = self.usable.iter().position(|usable| *usable).unwrap_or(0);
-        let last = self.usable.iter().rposition(|usable| *usable).unwrap_or(0);
-        let inside = self.usable.get(first..=last).unwrap_or_default();
-        let whole = self.windows.is_none() && inside.iter().all(|usable| *usable);
-        whole.then(|| Self { usable: Vec::new(), ..self.clone() })
-    }
-
-    /// The mask of its rows behind a filter that reaches `half` samples to either side and keeps every `factor`-th row;
-    /// `None` where all count.
-    pub(crate) fn mask(&self, half: usize, factor: usize) -> Option<RowMask<'_>> {
-        if self.usable.is_empty() && self.windows.is_none() {
-            return None;
-        }
-        let samples = self.motion.rows;
-        let mut unusable_before = Vec::with_capacity(samples + 1);
-        unusable_before.push(0_usize);
-        for sample in 0..samples {
-            let spoilt = self.usable.get(sample).is_some_and(|usable| !usable);
-            unusable_before.push(unusable_before[sample] + usize::from(spoilt));
-        }
-        let done = vec![0; self.motion.joints];
-        Some(RowMask { record: self, unusable_before, half, factor, done, places: Vec::new(), kept: Vec::new() })
-    }
-}
+use crate::recording::MotionRecord;
+use dynident_recording::MotionBlock;
 
 /// Leaves out rows that do not count.
 #[derive(Debug)]
@@ -60,7 +17,24 @@ pub(crate) struct RowMask<'a> {
     kept: Vec<f64>,
 }
 
-impl RowMask<'_> {
+impl<'a> RowMask<'a> {
+    /// The mask of a record's rows behind a filter that reaches `half` samples to either side and keeps every
+    /// `factor`-th row; `None` where all count.
+    pub(crate) fn of(record: &'a MotionRecord, half: usize, factor: usize) -> Option<Self> {
+        if record.usable.is_empty() && record.windows.is_none() {
+            return None;
+        }
+        let samples = record.motion.rows;
+        let mut unusable_before = Vec::with_capacity(samples + 1);
+        unusable_before.push(0_usize);
+        for sample in 0..samples {
+            let spoilt = record.usable.get(sample).is_some_and(|usable| !usable);
+            unusable_before.push(unusable_before[sample] + usize::from(spoilt));
+        }
+        let done = vec![0; record.motion.joints];
+        Some(Self { record, unusable_before, half, factor, done, places: Vec::new(), kept: Vec::new() })
+    }
+
     /// The rows that count of the next `rows` rows of a joint, as a panel of their own.
     pub(crate) fn apply(&mut self, joint: usize, rows: usize, panel: &[f64]) -> (usize, &[f64]) {
         let Self { record, unusable_before, half, factor, done, places, kept } = self;

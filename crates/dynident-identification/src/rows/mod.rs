@@ -11,11 +11,10 @@ mod reader;
 
 pub use builder::RowBuilder;
 pub(crate) use builder::in_model_order;
-pub use filter::{ParallelFilterSettings, motion_band_hz};
-pub use mask::MotionRecord;
+pub use filter::{ParallelFilterError, ParallelFilterSettings, motion_band_hz};
 pub use pass::{KeptLog, LogPass, LogStatistics};
 
-use crate::error::IdentificationError;
+use crate::recording::LogError;
 use dynident_dynamics::Panels;
 
 /// Samples that are made into regressor blocks at a time: small enough for the cache, large enough to spread the
@@ -51,13 +50,13 @@ pub trait RowConsumer {
     ///
     /// # Errors
     /// What stops the pass.
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), IdentificationError>;
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError>;
 
     /// Takes the same samples before the filter; they come before their rows. Ignored by default.
     ///
     /// # Errors
     /// What stops the pass.
-    fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), IdentificationError> {
+    fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), LogError> {
         let _ = samples;
         Ok(())
     }

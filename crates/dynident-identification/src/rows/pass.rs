@@ -1,12 +1,12 @@
 //! One pass over a recording: its rows to a consumer.
 
+use super::RowConsumer;
 use super::builder::RowBuilder;
 use super::filter::{ParallelFilterSettings, motion_band_hz};
+use super::mask::RowMask;
 use super::reader::read_beside;
-use super::{MotionRecord, RowConsumer};
-use crate::error::IdentificationError;
 use crate::progress::Progress;
-use crate::recording::{Recording, Samples};
+use crate::recording::{LogError, MotionRecord, Recording, Samples};
 use crate::regressor_model::RegressorModel;
 use dynident_recording::{ImportReport, MotionBlock, MotionSettings, MotionStream};
 use std::sync::OnceLock;
@@ -77,11 +77,11 @@ impl LogPass<'_> {
     /// # Errors
     /// A recording that cannot be read, lacks a temperature that friction needs, or leaves no rows behind the filter;
     /// and what the consumer returns.
-    pub fn run(&self, consumer: &mut dyn RowConsumer) -> Result<LogStatistics, IdentificationError> {
+    pub fn run(&self, consumer: &mut dyn RowConsumer) -> Result<LogStatistics, LogError> {
         let Recording { name, samples, .. } = self.recording;
         if let Some(joint) = self.model.joint_that_needs_temperature().filter(|_| !self.recording.has_temperature()) {
             let joint = self.model.model().joints()[joint].name.clone();
-            return Err(IdentificationError::NoTemperature { log: name.clone(), joint });
+            return Err(LogError::NoTemperature { log: name.clone(), joint });
         }
         let places = self.recording.places(self.model.model())?;
         let mut motion = match (samples, self.kept.and_then(OnceLock::get)) {
@@ -89,7 +89,7 @@ impl LogPass<'_> {
             (_, Some(kept)) => Motion::Kept(kept),
             _ => match self.recording.open(self.model.model(), self.motion)? {
                 Some(stream) => Motion::Stream(Box::new(stream)),
-                None => return Err(IdentificationError::NoTrainingLog),
+                None => return Err(LogError::NoSamples { log: name.clone() }),
             },
         };
         let rate_hz = match &motion {
@@ -98,12 +98,12 @@ impl LogPass<'_> {
             Motion::Record(record) => record.motion.rate_hz,
         };
         let filter = self.filter.decimation(rate_hz, motion_band_hz(self.motion));
-        let in_filter = |source| IdentificationError::Filter { log: name.clone(), source };
+        let in_filter = |source| LogError::Filter { log: name.clone(), source };
         let mut builder = RowBuilder::new(self.model, &places, rate_hz, filter.as_ref()).map_err(in_filter)?;
         let factor = filter.as_ref().map_or(1, |settings| settings.factor);
         if let Motion::Record(record) = &motion {
             let reach = builder.reach();
-            builder = builder.with_mask(record.mask(reach, factor));
+            builder = builder.with_mask(RowMask::of(record, reach, factor));
         }
         let mut report = None;
         match &mut motion {
@@ -129,7 +129,7 @@ impl LogPass<'_> {
         let filtered_rows = builder.filtered_rows();
         if filtered_rows == 0 {
             let (rows, needed) = (builder.samples(), builder.needed());
-            return Err(IdentificationError::NothingLeft { log: name.clone(), rows, needed });
+            return Err(LogError::NothingLeft { log: name.clone(), rows, needed });
         }
         let filtered_rate_hz = rate_hz / factor as f64;
         Ok(LogStatistics {
@@ -146,7 +146,7 @@ impl LogPass<'_> {
         block: &MotionBlock,
         builder: &mut RowBuilder<'_>,
         consumer: &mut dyn RowConsumer,
-    ) -> Result<(), IdentificationError> {
+    ) -> Result<(), LogError> {
         builder.take(block, consumer)?;
         self.progress.advance(block.rows as u64);
         Ok(())
@@ -163,7 +163,7 @@ impl LogPass<'_> {
         stream: &mut MotionStream,
         builder: &mut RowBuilder<'_>,
         consumer: &mut dyn RowConsumer,
-    ) -> Result<Option<Vec<MotionBlock>>, IdentificationError> {
+    ) -> Result<Option<Vec<MotionBlock>>, LogError> {
         let name = &self.recording.name;
         let mut keeper =
             BlockCache { blocks: (self.kept.is_some() && self.most_samples.is_none()).then(Vec::new), numbers: 0 };
@@ -176,7 +176,7 @@ impl LogPass<'_> {
         } else {
             let mut block = MotionBlock::default();
             while !self.is_enough(builder)
-                && stream.next_block(&mut block).map_err(|source| IdentificationError::recording(name, source))?
+                && stream.next_block(&mut block).map_err(|source| LogError::recording(name, source))?
             {
                 self.take(&block, builder, consumer)?;
                 block = keeper.keep(block).unwrap_or_default();

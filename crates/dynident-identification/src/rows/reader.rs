@@ -1,6 +1,6 @@
 //! Reading beside computing: motion blocks from a thread of their own.
 
-use crate::error::IdentificationError;
+use crate::recording::LogError;
 use dynident_recording::{MotionBlock, MotionStream, RecordingError};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
@@ -10,13 +10,13 @@ const WAITING: usize = 3;
 /// An error on either side of the channel.
 pub(crate) enum Side {
     Reading(RecordingError),
-    Computing(IdentificationError),
+    Computing(LogError),
 }
 
 impl Side {
-    pub(crate) fn named(self, log: &str) -> IdentificationError {
+    pub(crate) fn named(self, log: &str) -> LogError {
         match self {
-            Self::Reading(source) => IdentificationError::recording(log, source),
+            Self::Reading(source) => LogError::recording(log, source),
             Self::Computing(error) => error,
         }
     }
@@ -26,7 +26,7 @@ impl Side {
 /// does not keep. The order of work is the same as without the thread.
 pub(crate) fn read_beside(
     stream: &mut MotionStream,
-    mut take: impl FnMut(MotionBlock) -> Result<Option<MotionBlock>, IdentificationError>,
+    mut take: impl FnMut(MotionBlock) -> Result<Option<MotionBlock>, LogError>,
 ) -> Result<(), Side> {
     let (full_to, full): (SyncSender<MotionBlock>, Receiver<MotionBlock>) = sync_channel(WAITING);
     let (empty_to, empty) = sync_channel(WAITING + 1);

@@ -11,6 +11,7 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
+use thiserror::Error;
 
 /// Longest line that is read, bytes: a sample of a thousand joints is a tenth of it.
 const LONGEST_LINE: u64 = 1 << 20;
@@ -162,8 +163,17 @@ impl Robot for ProcessRobot {
     }
 }
 
+/// Why a line cannot be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+enum LineError {
+    #[error("longer than a megabyte")]
+    TooLong,
+    #[error("not UTF-8")]
+    NotText,
+}
+
 /// A line, or why there is none.
-type Line = Result<String, String>;
+type Line = Result<String, LineError>;
 
 /// The started program. Killed when dropped, if it does not end by itself.
 #[derive(Debug)]
@@ -256,7 +266,7 @@ impl Client {
         match self.lines.recv_timeout(wait.0) {
             Ok(Ok(line)) => message(&line)
                 .map_err(|error| RobotFault::Garbage { line: shortened(&line), reason: error.to_string() }),
-            Ok(Err(reason)) => Err(RobotFault::Garbage { line: String::new(), reason }),
+            Ok(Err(error)) => Err(RobotFault::Garbage { line: String::new(), reason: error.to_string() }),
             Err(RecvTimeoutError::Timeout) => {
                 Err(RobotFault::Hung { waiting_for: waiting_for.to_owned(), limit_s: wait.1 })
             }
@@ -308,8 +318,8 @@ fn read_lines(output: impl Read, sender: &SyncSender<Line>) {
         let read = reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut bytes);
         let line = match read {
             Ok(0) | Err(_) => return,
-            Ok(count) if count as u64 >= LONGEST_LINE => Err("longer than a megabyte".to_owned()),
-            Ok(_) => String::from_utf8(bytes).map_err(|_| "not UTF-8".to_owned()),
+            Ok(count) if count as u64 >= LONGEST_LINE => Err(LineError::TooLong),
+            Ok(_) => String::from_utf8(bytes).map_err(|_| LineError::NotText),
         };
         if line.as_ref().is_ok_and(|line| line.trim().is_empty()) {
             continue;

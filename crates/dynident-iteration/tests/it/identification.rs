@@ -8,8 +8,8 @@ use dynident_identification::friction::FrictionSearch;
 use dynident_identification::payload::Payload;
 use dynident_iteration::robot::RunRequest;
 use dynident_iteration::{
-    Iteration, IterationSettings, IterationTask, Leg, Robot, RunEstimate, RunIdentificationSettings, SimulatedRobot,
-    identify_run, iterate,
+    Iteration, IterationError, IterationSettings, IterationTask, Leg, Robot, RunEstimate, RunIdentificationSettings,
+    SimulatedRobot, identify_run, iterate,
 };
 use dynident_model::sample::planar_2r;
 use dynident_model::terms::{Coulomb, CoulombShape, TorqueTerm, Viscous};
@@ -149,7 +149,7 @@ fn friction_is_chosen_once_and_kept_by_the_runs_after() {
     let (first, second) = (first.estimate.as_ref().unwrap(), second.estimate.as_ref().unwrap());
     assert!(first.friction.iter().all(|joint| joint.terms.is_some()), "{:?}", first.friction);
     assert!(second.friction.is_empty());
-    let chosen = iteration.robot(&outcome.runs);
+    let chosen = iteration.robot(&outcome.runs).unwrap();
     // A step fifty times narrower than the stated one is distinguished from it.
     let widths: Vec<CoulombShape> = chosen
         .terms()
@@ -161,7 +161,14 @@ fn friction_is_chosen_once_and_kept_by_the_runs_after() {
     // Stored runs read back: a killed iteration goes on with the chosen terms.
     let text = serde_json::to_string(&outcome.runs).unwrap();
     let read: Vec<dynident_iteration::RunRecord> = serde_json::from_str(&text).unwrap();
-    assert_eq!(iteration.robot(&read).terms(), chosen.terms());
+    assert_eq!(iteration.robot(&read).unwrap().terms(), chosen.terms());
+    // Friction of a joint that this robot does not have: another robot's runs, which is said and not passed over.
+    let mut of_another = read;
+    let friction = &mut of_another[0].estimate.as_mut().unwrap().friction;
+    friction[0].terms = Some(vec![TorqueTerm::Viscous(Viscous { joint: 7 })]);
+    for error in [iteration.robot(&of_another).unwrap_err(), iteration.next(&of_another).unwrap_err()] {
+        assert!(matches!(error, IterationError::ChosenFriction { run: 1, .. }), "{error}");
+    }
 }
 
 #[test]

@@ -51,7 +51,7 @@ fn run(number: usize, model: Option<f64>, tracking: f64, accepted: bool, estimat
 }
 
 fn planned(records: &[RunRecord]) -> RunPlan {
-    match iteration().next(records) {
+    match iteration().next(records).unwrap() {
         Next::Run(plan) => plan,
         Next::Finished(status) => panic!("{status}"),
     }
@@ -104,5 +104,5 @@ fn what_is_hardly_known_has_not_settled() {
         [run(1, Some(1.0), 0.5, true, estimate(1.0, std)), run(2, Some(1.0), 0.5, true, estimate(1.0 + std, std))]
     };
     assert_eq!(model(&planned(&records(0.8))), Some(1.8));
-    assert_eq!(iteration().next(&records(0.01)), Next::Finished(IterationStatus::Converged));
+    assert_eq!(iteration().next(&records(0.01)).unwrap(), Next::Finished(IterationStatus::Converged));
 }

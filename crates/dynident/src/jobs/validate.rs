@@ -38,14 +38,14 @@ pub fn validate(
     let execution = options.execution();
     let (recordings, settings) = (&task.recordings, &task.settings);
     let tested = execution.install(|| {
-        let logs = Logs::new(robot.model(), recordings, settings, &chosen, stored.cutoff_hz(), execution)?;
+        let logs = Logs::new(robot.model(), recordings, settings.filters(), &chosen, stored.cutoff_hz(), execution)?;
         let one = |&index: &usize| {
             let carried = recordings[index].payload.as_ref();
             let theta = payloads.base_values(carried, &theta);
             let physical = consistent.as_ref().map(|values| payloads.base_values(carried, values));
             let tested =
                 ModelUnderTest { theta: &theta, physical: physical.as_deref(), uncertainty: None, traced: false };
-            examine_held_out(&logs, &model, index, &tested)
+            examine_held_out((&logs, &settings.estimation), &model, index, &tested)
         };
         chosen.iter().map(one).collect::<Result<Vec<_>, _>>()
     });

@@ -220,7 +220,7 @@ impl Study {
             payload.validate()?;
         }
         self.robot.validate()?;
-        self.parallel_filter.validate()?;
+        self.parallel_filter.validate().map_err(|error| error.to_string())?;
         if let Some(design) = &self.design {
             design.validate().map_err(|error| format!("[design]: {error}"))?;
         }

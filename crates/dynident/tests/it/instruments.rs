@@ -1,8 +1,7 @@
 //! Instruments from another source than the log: the seam for simulated motions.
 use crate::common::{Job, Motion, Random, Truth, format, header, repository, write_log};
 use dynident::estimation::HausmanVerdict;
-use dynident::identification::IdentificationError;
-use dynident::identification::estimators::InstrumentSource;
+use dynident::identification::estimators::{EstimatorError, InstrumentSource};
 use dynident::identify_with_instruments;
 use dynident::recording::MotionBlock;
 
@@ -13,12 +12,12 @@ struct TrueMotion {
 }
 
 impl InstrumentSource for TrueMotion {
-    fn begin(&mut self, _log: usize) -> Result<(), IdentificationError> {
+    fn begin(&mut self, _log: usize) -> Result<(), EstimatorError> {
         self.begun += 1;
         Ok(())
     }
 
-    fn motion(&mut self, measured: &MotionBlock, instruments: &mut MotionBlock) -> Result<(), IdentificationError> {
+    fn motion(&mut self, measured: &MotionBlock, instruments: &mut MotionBlock) -> Result<(), EstimatorError> {
         let size = measured.rows * measured.joints;
         for values in [&mut instruments.q, &mut instruments.dq, &mut instruments.ddq] {
             values.resize(size, 0.0);

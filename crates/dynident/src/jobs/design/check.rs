@@ -137,7 +137,7 @@ fn pieces(
     settings.motion = study.motion.clone();
     let execution = Execution::default();
     let (model, alone) = (robot.model(), core::slice::from_ref(&recording));
-    let motion = Logs::new(model, alone, &settings, &[0], None, execution).map_err(in_study)?.motion;
+    let motion = Logs::new(model, alone, settings.filters(), &[0], None, execution).map_err(in_study)?.motion;
     let places = recording.places(model).map_err(in_study)?;
     let Some(mut stream) = recording.open(model, &motion).map_err(in_study)? else {
         return Err(Error::study(study_path, format!("log `{log}` has no samples")));

@@ -9,6 +9,7 @@ use crate::jobs::options::{RunOptions, study_name};
 use crate::result::{LogSummary, PhysicalVerdict, RESULT_SCHEMA, ResultFile, Timings, TrainingResult};
 use crate::study::{ArmSection, EstimatorMethod, Folders, Study, StudyRobot};
 use dynident_estimation::{Estimate, strongest_correlations};
+use dynident_identification::IdentificationError;
 use dynident_identification::estimators::{Findings, InstrumentSource};
 use dynident_identification::examination::{LogTrace, sign_findings};
 use dynident_identification::{
@@ -96,7 +97,11 @@ fn identified(
     let robot = StudyRobot::new(study, study_path, &folders)?;
     let in_study = |error| Error::identification(study_path, error);
     // Names first: no log is read for a study that is wrong.
-    study.settings(study_path, &robot)?.check_names(&robot.parametric).map_err(in_study)?;
+    study
+        .settings(study_path, &robot)?
+        .check_names(&robot.parametric)
+        .map_err(IdentificationError::Consistency)
+        .map_err(in_study)?;
     let task = study.task(study_path, &robot, &folders)?;
     let mut timings = Timings { robot: start.elapsed().as_secs_f64(), ..Timings::default() };
 

@@ -123,15 +123,15 @@ pub fn iterate_study(
         let outcome = iterate(&iteration, &mut robots, Some(&stores[number]), &mut |record, runs| {
             so_far.push(record.clone());
             let status = IterationStatus::Waiting { reason: "for the next run".to_owned() };
-            let now = report.file(&Stage {
-                leg,
-                robot: &iteration.robot(&so_far),
-                records: &so_far,
-                status: &status,
-                known_std: &known_std,
-            });
-            let all: Vec<IterationsFile> = files.iter().cloned().chain([now]).collect();
-            unwritten = joined(all).and_then(|file| write_file(&target, &file).err());
+            unwritten = match iteration.robot(&so_far) {
+                Ok(robot) => {
+                    let (robot, records) = (&*robot, &so_far[..]);
+                    let now = report.file(&Stage { leg, robot, records, status: &status, known_std: &known_std });
+                    let all: Vec<IterationsFile> = files.iter().cloned().chain([now]).collect();
+                    joined(all).and_then(|file| write_file(&target, &file).err())
+                }
+                Err(error) => Some(in_iteration(error)),
+            };
             run(record, runs);
         });
         let outcome = outcome.map_err(in_iteration)?;
@@ -140,7 +140,7 @@ pub fn iterate_study(
         }
         made += outcome.runs.len() - runs_before;
         let (records, status) = (&outcome.runs[..], &outcome.status);
-        let in_force = &iteration.robot(records);
+        let in_force = &iteration.robot(records).map_err(in_iteration)?;
         files.push(report.file(&Stage { leg, robot: in_force, records, status, known_std: &known_std }));
         for record in records {
             for (place, own) in iteration.task().legs.iter().enumerate() {

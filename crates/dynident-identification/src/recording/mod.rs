@@ -1,7 +1,11 @@
 //! One recording of a task: its samples, what it is for, and what is known about how it was made.
 
-use crate::error::IdentificationError;
-use crate::rows::MotionRecord;
+mod error;
+mod motion_record;
+
+pub use error::LogError;
+pub use motion_record::MotionRecord;
+
 use dynident_model::Model;
 use dynident_recording::{Log, MotionSettings, MotionStream, Reference};
 use serde::{Deserialize, Serialize};
@@ -113,12 +117,12 @@ impl Recording {
     ///
     /// # Errors
     /// A joint that the recording does not have.
-    pub fn places(&self, model: &Model) -> Result<Vec<usize>, IdentificationError> {
+    pub fn places(&self, model: &Model) -> Result<Vec<usize>, LogError> {
         match &self.samples {
             Samples::Log(log) => {
                 let place = |name: &String| log.joints.iter().position(|joint| joint == name);
                 let of = |joint: &dynident_model::Joint| {
-                    place(&joint.name).ok_or_else(|| IdentificationError::NoSuchJoint {
+                    place(&joint.name).ok_or_else(|| LogError::NoSuchJoint {
                         log: self.name.clone(),
                         joint: joint.name.clone(),
                         known: log.joints.clone(),
@@ -135,7 +139,7 @@ impl Recording {
     ///
     /// # Errors
     /// What opening it can give.
-    pub fn open(&self, model: &Model, motion: &MotionSettings) -> Result<Option<MotionStream>, IdentificationError> {
+    pub fn open(&self, model: &Model, motion: &MotionSettings) -> Result<Option<MotionStream>, LogError> {
         let log = match &self.samples {
             Samples::Log(log) => log,
             Samples::Motion(record) => match &record.raw {
@@ -155,6 +159,6 @@ impl Recording {
             _ => None,
         };
         let stream = MotionStream::following(log, motion, reference.as_ref());
-        stream.map(Some).map_err(|source| IdentificationError::recording(&self.name, source))
+        stream.map(Some).map_err(|source| LogError::recording(&self.name, source))
     }
 }
