@@ -40,8 +40,8 @@ run 0 "$dynident" reproduce --out "$out/paper"
 # The programs behind the tables of the book, with the least work that they take.
 run 0 "$dynident" benchmark --runs 2 --seed 1 --robots planar2r --noise standard --out "$out/benchmark"
 run 0 cargo run --release --locked --quiet -p dynident-benchmark -- --only rnea
-run 0 cargo run --release --locked --quiet -p dynident-benchmark --bin designs -- --seconds 0.2 --criteria d-optimal
-run 0 cargo run --release --locked --quiet -p dynident-benchmark --bin iterations -- 1
+run 0 cargo run --release --locked --quiet -p dynident-benchmark --example designs -- --seconds 0.2 --criteria d-optimal
+run 0 cargo run --release --locked --quiet -p dynident-benchmark --example iterations -- 1
 run 0 cargo run --release --locked --quiet -p dynident-iteration --example basin -- 2 601
 run 0 cargo run --release --locked --quiet -p dynident-paper --example logistic_against_fourier
 run 0 cargo run --release --locked --quiet -p dynident-recording --example differentiators

@@ -2,8 +2,8 @@
 
 use crate::composite::Composite;
 use crate::states::{BodyDerivative, BodyState};
-use crate::workspace::{AnyScratch, CoreScratch, Workspace, take};
-use dynident_lanes::{Kernel, Lane, Scalar, dispatch_single};
+use crate::workspace::{CoreScratch, Workspace, one_sample_kernel};
+use dynident_lanes::{Scalar, dispatch_single};
 use dynident_model::{InertialParameters, Model, Transform, Vec3};
 
 /// Derivatives of the joint torques, row-major, dof × dof: row = torque, column = what it is derived by.
@@ -37,36 +37,12 @@ pub fn inverse_dynamics_derivatives<'w>(
 ) -> InverseDynamicsDerivatives<'w> {
     workspace.check(model, &[q, dq, ddq]);
     let Workspace { level, scratch, matrices, .. } = workspace;
-    dispatch_single(*level, Single { model, scratch, q, dq, ddq, out: matrices });
     let [by_position, by_velocity, by_acceleration] = matrices;
+    dispatch_single(*level, Single { model, scratch, q, dq, ddq, by_position, by_velocity, by_acceleration });
     InverseDynamicsDerivatives { by_position, by_velocity, by_acceleration }
 }
 
-struct Single<'a> {
-    model: &'a Model,
-    scratch: &'a mut AnyScratch,
-    q: &'a [f64],
-    dq: &'a [f64],
-    ddq: &'a [f64],
-    out: &'a mut [Vec<f64>; 3],
-}
-
-impl Kernel for Single<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<T: Lane>(self) {
-        let scratch = &mut self.scratch.of::<T>().core;
-        take(&mut scratch.q, self.q);
-        take(&mut scratch.dq, self.dq);
-        take(&mut scratch.ddq, self.ddq);
-        newton_euler_derivatives(self.model, scratch);
-        for (to, from) in self.out.iter_mut().zip(&scratch.matrices) {
-            for (to, from) in to.iter_mut().zip(from) {
-                *to = from.lane(0);
-            }
-        }
-    }
-}
+one_sample_kernel!((q, dq, ddq), newton_euler_derivatives, by_position: matrices[0], by_velocity: matrices[1], by_acceleration: matrices[2]);
 
 #[derive(Clone, Copy, PartialEq)]
 enum DerivativeBy {

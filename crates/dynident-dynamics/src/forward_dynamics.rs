@@ -1,8 +1,8 @@
 //! Forward dynamics: the articulated-body algorithm.
 
 use crate::inverse_dynamics::{inertial_wrench, outward};
-use crate::workspace::{AnyScratch, CoreScratch, Workspace, take};
-use dynident_lanes::{Kernel, Lane, Scalar, dispatch_single};
+use crate::workspace::{CoreScratch, Workspace, one_sample_kernel};
+use dynident_lanes::{Scalar, dispatch_single};
 use dynident_model::{Mat3, Model, Transform, Vec3};
 
 /// Joint accelerations `q̈ = M(q)⁻¹ (τ - C(q, q̇) q̇ - g(q))` of the rigid bodies, rad/s² (m/s²).
@@ -27,29 +27,7 @@ pub fn forward_dynamics<'w>(
     vector
 }
 
-struct Single<'a> {
-    model: &'a Model,
-    scratch: &'a mut AnyScratch,
-    q: &'a [f64],
-    dq: &'a [f64],
-    tau: &'a [f64],
-    ddq: &'a mut [f64],
-}
-
-impl Kernel for Single<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<T: Lane>(self) {
-        let scratch = &mut self.scratch.of::<T>().core;
-        take(&mut scratch.q, self.q);
-        take(&mut scratch.dq, self.dq);
-        take(&mut scratch.tau, self.tau);
-        articulated_bodies(self.model, scratch);
-        for (to, from) in self.ddq.iter_mut().zip(&scratch.ddq) {
-            *to = from.lane(0);
-        }
-    }
-}
+one_sample_kernel!((q, dq, tau), articulated_bodies, ddq: ddq);
 
 #[inline(always)]
 fn full<T: Scalar>(s: &[T; 6]) -> Mat3<T> {

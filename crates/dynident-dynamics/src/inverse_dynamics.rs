@@ -1,13 +1,13 @@
 //! Inverse dynamics: the recursive Newton-Euler algorithm.
 
 use crate::states::BodyState;
-use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Workspace, put_lanes, take, take_lanes};
+use crate::workspace::{AnyScratch, BatchWorkspace, CoreScratch, Workspace, one_sample_kernel, put_lanes, take_lanes};
 use dynident_lanes::{Kernel, Lane, Scalar, dispatch, dispatch_single};
 use dynident_model::terms::JointMotion;
 use dynident_model::{InertialParameters, JointMap, Mat3, Model, Transform, Vec3};
 
 /// Joint torques `τ = M(q) q̈ + C(q, q̇) q̇ + g(q)` of the rigid bodies with the model's inertial parameters, without
-/// friction and drives. One entry per joint: Nm for revolute joints, N for sliding ones.
+/// friction and drives. One entry per joint: Nm for revolute joints, N for prismatic ones.
 ///
 /// Recursive Newton-Euler: Luh, Walker and Paul (1980); Featherstone, *Rigid Body Dynamics Algorithms* (2008), section
 /// 5.3. Allocation-free. Bodies without a prior count as massless: see [`Model::bodies_without_prior`].
@@ -59,29 +59,7 @@ pub fn inverse_dynamics_batch(
     dispatch(*level, Batch { model, scratch, motion, tau });
 }
 
-struct Single<'a> {
-    model: &'a Model,
-    scratch: &'a mut AnyScratch,
-    q: &'a [f64],
-    dq: &'a [f64],
-    ddq: &'a [f64],
-    tau: &'a mut [f64],
-}
-
-impl Kernel for Single<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<T: Lane>(self) {
-        let scratch = &mut self.scratch.of::<T>().core;
-        take(&mut scratch.q, self.q);
-        take(&mut scratch.dq, self.dq);
-        take(&mut scratch.ddq, self.ddq);
-        newton_euler(self.model, scratch);
-        for (to, from) in self.tau.iter_mut().zip(&scratch.tau) {
-            *to = from.lane(0);
-        }
-    }
-}
+one_sample_kernel!((q, dq, ddq), newton_euler, tau: tau);
 
 struct Batch<'a> {
     model: &'a Model,

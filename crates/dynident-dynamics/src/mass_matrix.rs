@@ -1,8 +1,8 @@
 //! The joint-space mass matrix: the composite-rigid-body algorithm.
 
 use crate::composite::Composite;
-use crate::workspace::{AnyScratch, CoreScratch, Workspace, take};
-use dynident_lanes::{Kernel, Lane, Scalar, dispatch_single};
+use crate::workspace::{CoreScratch, Workspace, one_sample_kernel};
+use dynident_lanes::{Scalar, dispatch_single};
 use dynident_model::{Model, Vec3};
 
 /// The mass matrix `M(q)`, row-major, symmetric, dof × dof: `∂τ/∂q̈` of the inverse dynamics.
@@ -19,25 +19,7 @@ pub fn mass_matrix<'w>(model: &Model, workspace: &'w mut Workspace, q: &[f64]) -
     &matrices[0]
 }
 
-struct Single<'a> {
-    model: &'a Model,
-    scratch: &'a mut AnyScratch,
-    q: &'a [f64],
-    out: &'a mut [f64],
-}
-
-impl Kernel for Single<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<T: Lane>(self) {
-        let scratch = &mut self.scratch.of::<T>().core;
-        take(&mut scratch.q, self.q);
-        composite_rigid_bodies(self.model, scratch);
-        for (to, from) in self.out.iter_mut().zip(&scratch.matrices[0]) {
-            *to = from.lane(0);
-        }
-    }
-}
+one_sample_kernel!((q), composite_rigid_bodies, out: matrices[0]);
 
 /// From `q` of the scratch to its first matrix.
 #[inline(always)]

@@ -2,8 +2,8 @@
 
 use crate::inverse_dynamics::newton_euler_placed;
 use crate::mass_matrix::composite_rigid_bodies_placed;
-use crate::workspace::{AnyScratch, Workspace, take};
-use dynident_lanes::{Kernel, Lane, dispatch_single};
+use crate::workspace::{CoreScratch, Workspace, one_sample_kernel};
+use dynident_lanes::{Scalar, dispatch_single};
 use dynident_model::Model;
 
 /// Mass matrix `M(q)` (row-major, dof × dof) and bias `C(q, q̇) q̇ + g(q)` (Nm, N) of the rigid bodies: `M q̈ + bias =
@@ -27,31 +27,13 @@ pub fn mass_matrix_and_bias<'w>(
     (&matrices[0], vector)
 }
 
-struct Single<'a> {
-    model: &'a Model,
-    scratch: &'a mut AnyScratch,
-    q: &'a [f64],
-    dq: &'a [f64],
-    matrix: &'a mut [f64],
-    bias: &'a mut [f64],
-}
+one_sample_kernel!((q, dq), bias_and_mass, bias: tau, matrix: matrices[0]);
 
-impl Kernel for Single<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<T: Lane>(self) {
-        let scratch = &mut self.scratch.of::<T>().core;
-        take(&mut scratch.q, self.q);
-        take(&mut scratch.dq, self.dq);
-        scratch.ddq.fill(T::ZERO);
-        scratch.place(self.model.maps());
-        newton_euler_placed(self.model, scratch);
-        for (to, from) in self.bias.iter_mut().zip(&scratch.tau) {
-            *to = from.lane(0);
-        }
-        composite_rigid_bodies_placed(self.model, scratch);
-        for (to, from) in self.matrix.iter_mut().zip(&scratch.matrices[0]) {
-            *to = from.lane(0);
-        }
-    }
+/// From `q` and `dq` of the scratch to its `tau` and its first matrix.
+#[inline(always)]
+fn bias_and_mass<T: Scalar>(model: &Model, scratch: &mut CoreScratch<T>) {
+    scratch.ddq.fill(T::ZERO);
+    scratch.place(model.maps());
+    newton_euler_placed(model, scratch);
+    composite_rigid_bodies_placed(model, scratch);
 }

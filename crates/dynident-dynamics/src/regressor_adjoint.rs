@@ -4,7 +4,7 @@
 //! With `V` the cost's derivatives by the entries of `Y`, the cost varies as `Σ V_ji · Y_ji`, and `Y_ji = e_jᵀ N_i +
 //! l_jᵀ F_i` for each body `i` and each joint `j` that moves it (see `regressor.rs`). Backwards through that: every
 //! pair gives its share to the axis `(e_j, l_j)` and to the body's motion `(ω, α, a)`; shares then travel inward from
-//! frame to frame, and what each joint's revolute or prismatic changes on the way is the derivative by its position.
+//! frame to frame, and what each joint's turning or sliding changes on the way is the derivative by its position.
 //! One sweep gives all derivatives, at about twice the cost of the regressor.
 
 use crate::inverse_dynamics::outward;

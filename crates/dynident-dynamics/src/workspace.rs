@@ -91,6 +91,34 @@ impl AnyScratch {
     }
 }
 
+/// `struct Single`, the kernel of an algorithm for one sample: takes joint vectors into the scratch, runs the algorithm
+/// on it, and gives numbers of the scratch back. A macro, because only code that stands inside a [`Kernel`] is compiled
+/// for each processor level.
+macro_rules! one_sample_kernel {
+    (($($input:ident),*), $algorithm:ident, $($output:ident: $field:ident $([$index:literal])?),*) => {
+        struct Single<'a> {
+            model: &'a Model,
+            scratch: &'a mut $crate::workspace::AnyScratch,
+            $($input: &'a [f64],)*
+            $($output: &'a mut [f64],)*
+        }
+
+        impl dynident_lanes::Kernel for Single<'_> {
+            type Output = ();
+            #[inline(always)]
+            fn run<T: dynident_lanes::Lane>(self) {
+                let scratch = &mut self.scratch.of::<T>().core;
+                $($crate::workspace::take(&mut scratch.$input, self.$input);)*
+                $algorithm(self.model, scratch);
+                $(for (to, from) in self.$output.iter_mut().zip(&scratch.$field $([$index])?) {
+                    *to = from.lane(0);
+                })*
+            }
+        }
+    };
+}
+pub(crate) use one_sample_kernel;
+
 struct MakeScratch<'a>(&'a Model);
 
 impl Kernel for MakeScratch<'_> {

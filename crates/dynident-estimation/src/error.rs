@@ -124,3 +124,23 @@ pub enum EstimationError {
 pub(crate) fn expect(what: &str, expected: usize, found: usize) -> Result<(), EstimationError> {
     if expected == found { Ok(()) } else { Err(EstimationError::Mismatch { what: what.into(), expected, found }) }
 }
+
+/// That a setting means something.
+pub(crate) fn require(
+    holds: bool,
+    setting: &'static str,
+    value: f64,
+    fix: &'static str,
+) -> Result<(), EstimationError> {
+    if holds { Ok(()) } else { Err(EstimationError::Setting { setting, value, fix }) }
+}
+
+/// That a setting is in its range.
+pub(crate) fn within(
+    setting: &'static str,
+    value: f64,
+    range: impl core::ops::RangeBounds<f64>,
+    fix: &'static str,
+) -> Result<(), EstimationError> {
+    require(range.contains(&value), setting, value, fix)
+}

@@ -66,6 +66,7 @@ pub fn design_without_gradients(
     let mut margins = vec![MARGIN; task.limits.constraints().len()];
     let mut kept = None;
     let (mut history, mut evaluations) = (Vec::new(), 0);
+    // Searches with tighter limits while something is broken between the samples.
     for search in 0..SEARCHES {
         let objective = Objective { task, criterion, times: &times, weight, margins: &margins, idle: Mutex::default() };
         let fitness = |parameters: &[f64]| objective.fitness(parameters);
@@ -101,6 +102,7 @@ pub fn design_without_gradients(
         if search == 0 {
             history = curve;
         }
+        // What it is worth on the fine grid.
         let (found, worst) = assess(task, criterion, best, &fine, &logged);
         let whole = found.violation <= 0.0;
         if kept.as_ref().is_none_or(|kept| found.better_than(kept)) {

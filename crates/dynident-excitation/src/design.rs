@@ -157,6 +157,7 @@ pub fn design(
             stopped.load(Ordering::Relaxed)
         }
     };
+    // Rounds of searches from random starts, then around the best.
     let mut random = Random::new(settings.seed);
     let mut random_starts = Starts::new(task, &coarse);
     let mut starts: Vec<AugmentedLagrangianState> =
@@ -231,6 +232,7 @@ pub fn design(
             *margin += if *c > 0.0 { 1.2 * c + 1e-6 } else { 0.0 };
         }
     }
+    // What still breaks a limit is taken back inside.
     if kept.violation > 0.0 && !over() {
         let stop = |progress: &DesignProgress| watch_all(progress).is_break() || late();
         let used;

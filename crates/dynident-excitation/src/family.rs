@@ -67,3 +67,16 @@ pub trait Family: core::fmt::Debug + Send + Sync {
         false
     }
 }
+
+/// The panic of [`Family::apply_adjoint`].
+pub(crate) fn check_shapes(
+    family: &impl Family,
+    parameters: &[f64],
+    times_s: &[f64],
+    adjoint: &MotionAdjoint,
+    gradient: &[f64],
+) {
+    let (name, count) = (family.name(), family.parameters());
+    assert_eq!((parameters.len(), gradient.len()), (count, count), "parameters and gradient of {name}");
+    assert_eq!((adjoint.joints, adjoint.samples), (family.joints(), times_s.len()), "adjoint of {name}");
+}

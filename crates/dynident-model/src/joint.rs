@@ -2,7 +2,7 @@
 
 use crate::spatial::{Mat3, Transform, Vec3};
 
-/// The kinds of joint with a degree of degrees_of_freedom.
+/// The kinds of joint with a degree of freedom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointKind {
     /// Turns about its axis, between limits; position in radians.
@@ -92,7 +92,7 @@ pub struct JointMap {
     pub sine: Mat3,
     /// Translation at `q = 0`, in metres.
     pub translation: Vec3,
-    /// Axis in the parent frame for a prismatic joint, zero for a turning one.
+    /// Axis in the parent frame for a prismatic joint, zero for a revolute one.
     pub slide: Vec3,
 }
 

@@ -103,7 +103,7 @@ impl Model {
         &self.name
     }
 
-    /// Degrees of degrees_of_freedom: the length of every joint vector.
+    /// Degrees of freedom: the length of every joint vector.
     pub fn dof(&self) -> usize {
         self.joints.len()
     }

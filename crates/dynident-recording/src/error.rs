@@ -295,3 +295,8 @@ pub enum FilterError {
         method: &'static str,
     },
 }
+
+/// That a setting means something.
+pub(crate) fn require(holds: bool, name: &'static str, value: f64, fix: &'static str) -> Result<(), FilterError> {
+    if holds { Ok(()) } else { Err(FilterError::Setting { name, value, fix }) }
+}

@@ -97,7 +97,7 @@ impl BarPlot {
         let bars = self.bars.iter().enumerate().map(|(k, bar)| {
             let shown = finite(bar.value).then_some(bar.value);
             let half = bar.half_width.filter(|half| finite(*half) && shown.is_some());
-            Drawn {
+            BarView {
                 y: 26.0 + ROW * k as f64,
                 label: shortened(&bar.label),
                 whole: &bar.label,
@@ -145,11 +145,11 @@ struct Picture<'a> {
     labels: f64,
     zero: f64,
     ticks: Vec<(f64, String)>,
-    bars: Vec<Drawn<'a>>,
+    bars: Vec<BarView<'a>>,
 }
 
 #[derive(Serialize)]
-struct Drawn<'a> {
+struct BarView<'a> {
     y: f64,
     label: String,
     whole: &'a str,

@@ -88,7 +88,7 @@ impl HeatMap {
                 .filter(|(_, value)| value.is_finite())
                 .map(move |(column, value)| (row, column, *value))
         });
-        let cells = cells.map(|(row, column, value)| Drawn {
+        let cells = cells.map(|(row, column, value)| CellView {
             x: labels + side * column as f64,
             y: labels + side * row as f64,
             colour: if value < 0.0 { "#0072b2" } else { "#d55e00" },
@@ -124,11 +124,11 @@ struct Picture<'a> {
     side: f64,
     columns: Vec<(f64, String)>,
     rows: Vec<(f64, String)>,
-    cells: Vec<Drawn>,
+    cells: Vec<CellView>,
 }
 
 #[derive(Serialize)]
-struct Drawn {
+struct CellView {
     x: f64,
     y: f64,
     colour: &'static str,

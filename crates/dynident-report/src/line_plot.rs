@@ -158,7 +158,7 @@ impl LinePlot {
         };
         let lines = self.lines.iter().zip(&curves).enumerate().map(|(k, (line, curve))| {
             let points = kept.iter().filter(|&&i| line.points && curve[i].is_finite());
-            Drawn {
+            CurveView {
                 name: &line.name,
                 colour: COLOURS[k % COLOURS.len()],
                 dashed: line.dashed,
@@ -206,11 +206,11 @@ struct Picture<'a> {
     y_label: &'a str,
     x_ticks: Vec<(f64, String)>,
     y_ticks: Vec<(f64, String)>,
-    lines: Vec<Drawn<'a>>,
+    lines: Vec<CurveView<'a>>,
 }
 
 #[derive(Serialize)]
-struct Drawn<'a> {
+struct CurveView<'a> {
     name: &'a str,
     colour: &'a str,
     dashed: bool,

@@ -147,14 +147,14 @@ impl View<'_> {
         pen.path()
     }
 
-    fn drawn(&self, name: &'static str, picture: &PathPicture<'_>) -> Drawn {
+    fn drawn(&self, name: &'static str, picture: &PathPicture<'_>) -> PathView {
         let poses = picture.poses.iter().enumerate().rev().map(|(place, pose)| Pose {
             colour: if place == 0 { "#111" } else { "#e08a1e" },
             stroke: if place == 0 { 2.6 } else { 1.4 },
             rods: pose.rods.iter().map(|rod| self.line(rod)).collect(),
             dots: pose.joints.iter().map(|joint| self.at(joint).map(tenth)).collect(),
         });
-        Drawn {
+        PathView {
             name,
             left: self.left,
             floor: self.floor(picture),
@@ -230,11 +230,11 @@ struct Picture<'a> {
     gap: f64,
     top: f64,
     size: [f64; 2],
-    views: Vec<Drawn>,
+    views: Vec<PathView>,
 }
 
 #[derive(Serialize)]
-struct Drawn {
+struct PathView {
     name: &'static str,
     left: f64,
     floor: Option<[f64; 2]>,

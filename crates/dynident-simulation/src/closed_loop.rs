@@ -167,6 +167,7 @@ pub fn closed_loop(
     require_length("joints of the reference", joints, reference.joints())?;
     require_length("joints of the controller", joints, controller.joints())?;
     let samples = reference.samples();
+    // Robot, target and controller at the start.
     let mut target = ReferenceBuffer::new(reference);
     target.go_to(0);
     match &settings.start {
@@ -178,6 +179,7 @@ pub fn closed_loop(
         }
     }
     controller.reset();
+    // Room for the whole run: the loop allocates nothing.
     let zeros = || vec![0.0; joints * samples];
     let mut run = Run {
         joints: plant.model().joints().iter().map(|joint| joint.name.clone()).collect(),
@@ -201,6 +203,7 @@ pub fn closed_loop(
     let mut tape = MotionBuffer::new(joints);
     let mut kept = 0;
     for sample in 0..samples {
+        // The state at this sample: still inside its limits?
         let time_s = run.time_s(sample);
         plant.set_time_s(time_s);
         target.go_to(sample);
@@ -208,6 +211,7 @@ pub fn closed_loop(
             run.status = status;
             break;
         }
+        // Sensors, control law, drives that saturate.
         feedback.read(plant.q(), plant.dq());
         let measured = feedback.measured();
         controller.torque(time_s, target.target(), measured, &mut tau);
@@ -224,6 +228,7 @@ pub fn closed_loop(
             run.max_error[joint] = run.max_error[joint].max(error);
             run.rms_error[joint] += error * error;
         }
+        // Record the sample, and move on to the next.
         let row = Row { q: plant.q(), dq: plant.dq(), tau: &tau, measured_q: measured.q, measured_dq: measured.dq };
         if tape.push(row) {
             tape.flush(arrays(&mut run), samples);

@@ -117,12 +117,8 @@ impl SensorSettings {
                 values.values(what, joints, "give a finite positive number", |x| x > 0.0 && x.is_finite())?;
             }
         }
-        require(
-            (0.0..1.0).contains(&self.torque_correlation),
-            "torque_correlation",
-            self.torque_correlation,
-            "give 0 or more, below 1",
-        )?;
+        let fix = "give 0 or more, below 1";
+        require((0.0..1.0).contains(&self.torque_correlation), "torque_correlation", self.torque_correlation, fix)?;
         if let VelocitySource::Differences { cutoff_hz } = self.speed {
             require(cutoff_hz > 0.0 && cutoff_hz.is_finite(), "speed.cutoff_hz", cutoff_hz, "give a positive cut-off")?;
         }

@@ -5,7 +5,7 @@ use super::cone::least_eigenvalue;
 use super::conic::Program;
 use super::coordinates::pseudo_inertia;
 use super::description::{PhysicalProblem, expect};
-use super::interior_point::{Ending, Solved, interior_point};
+use super::interior_point::{Ending, InteriorPointResult, interior_point};
 use super::log_cholesky::log_cholesky;
 use super::{PhysicalError, PhysicalRoute, PhysicalSettings};
 use nalgebra::DVector;
@@ -144,12 +144,12 @@ fn interior_point_else_log_cholesky(
     program: &Program,
     start: &DVector<f64>,
     settings: &PhysicalSettings,
-) -> Option<Solved> {
+) -> Option<InteriorPointResult> {
     let first = interior_point(program, start.clone(), settings.tolerance, settings.max_iterations);
     if first.as_ref().is_some_and(|first| first.ending == Ending::Solved) {
         return first;
     }
-    let residual = |solved: &Solved| solved.certificate.stationarity.max(solved.certificate.gap);
+    let residual = |solved: &InteriorPointResult| solved.certificate.stationarity.max(solved.certificate.gap);
     let second = log_cholesky(program, start, settings.tolerance, settings.max_iterations);
     match (first, second) {
         (Some(first), Some(mut second)) if residual(&second) < residual(&first) => {
@@ -164,7 +164,7 @@ fn finished(
     problem: &PhysicalProblem,
     settings: &PhysicalSettings,
     assembled: &AssembledProgram,
-    solved: &Solved,
+    solved: &InteriorPointResult,
 ) -> PhysicalFit {
     let parameters = assembled.parameters(problem, &solved.x);
     let base = problem.base.matrix() * DVector::from_column_slice(&parameters);

@@ -32,7 +32,7 @@ pub(super) enum Ending {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Solved {
+pub(super) struct InteriorPointResult {
     pub(super) x: DVector<f64>,
     pub(super) multipliers: Multipliers,
     pub(super) certificate: Certificate,
@@ -64,7 +64,7 @@ pub(super) fn interior_point(
     start: DVector<f64>,
     tolerance: f64,
     max_iterations: usize,
-) -> Option<Solved> {
+) -> Option<InteriorPointResult> {
     let mut state = State::new(program, start)?;
     let mut best = state.solved(program, 0, Ending::Limit)?;
     let mut poor = 0;
@@ -184,7 +184,7 @@ impl State {
         Some(Self { x: Precise::new(x), cones, rows, balanced: false })
     }
 
-    fn solved(&self, program: &Program, iterations: usize, ending: Ending) -> Option<Solved> {
+    fn solved(&self, program: &Program, iterations: usize, ending: Ending) -> Option<InteriorPointResult> {
         let multipliers = Multipliers {
             blocks: self.cones.iter().map(|cone| cone.scaling.dual()).collect(),
             rows: self.rows.iter().map(|pair| pair.force).collect(),
@@ -194,7 +194,7 @@ impl State {
             rows: self.rows.iter().map(|pair| pair.slack).collect(),
         };
         let certificate = program.certificate_of(&self.x, &slacks, &multipliers)?;
-        Some(Solved { x: self.x.high.clone(), multipliers, certificate, iterations, ending })
+        Some(InteriorPointResult { x: self.x.high.clone(), multipliers, certificate, iterations, ending })
     }
 
     /// One step; gives whether there was one that double precision allows. Products out of balance are balanced first;

@@ -338,7 +338,7 @@ mod tests {
     use crate::consistent::{PhysicalBody, PhysicalScalar, rough_body};
     use crate::factor::TriangularFactor;
 
-    /// Free quantile of ordinary intervals at many degrees of degrees_of_freedom.
+    /// Free quantile of ordinary intervals at many degrees of freedom.
     const T: f64 = 1.959_964;
 
     fn body() -> PhysicalBody {

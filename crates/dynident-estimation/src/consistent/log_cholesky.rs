@@ -24,7 +24,7 @@
 use super::cone::{congruence, inverse, log_determinant, upper_factor};
 use super::conic::{BlockMap, Certificate, Multipliers, Program, Slacks};
 use super::coordinates::{Matrix10, PAIRS, Vector10, vector_of};
-use super::interior_point::{Ending, Solved};
+use super::interior_point::{Ending, InteriorPointResult};
 use super::precise::Precise;
 use super::stacked::{LocalRows, RightSide, Rows, StackedSystem};
 use nalgebra::{DMatrix, DVector, Matrix4};
@@ -51,7 +51,7 @@ pub(super) fn log_cholesky(
     start: &DVector<f64>,
     tolerance: f64,
     max_iterations: usize,
-) -> Option<Solved> {
+) -> Option<InteriorPointResult> {
     let plain = || program.blocks.iter().filter(|block| block.entropy == 0.0);
     let bodies = plain()
         .map(|block| match block.map {
@@ -66,7 +66,7 @@ pub(super) fn log_cholesky(
     };
     let degree = (4 * bodies.len() + program.rows.len()).max(1) as f64;
     let mut mu = program.gradient(&Precise::new(start.clone())).0.amax().clamp(1.0e-3, 1.0e12);
-    let mut best: Option<Solved> = None;
+    let mut best: Option<InteriorPointResult> = None;
     let (mut stage, mut idle, mut iterations) = (0, 0, 0);
     let mut pull = mu;
     let (mut ending, mut reduction) = (Ending::Limit, REDUCTION);
@@ -76,7 +76,7 @@ pub(super) fn log_cholesky(
         idle += 1;
         if best.as_ref().is_none_or(|b| certificate.residual() < b.certificate.residual()) {
             let x = point.x.high.clone();
-            best = Some(Solved { x, multipliers, certificate, iterations, ending: Ending::Limit });
+            best = Some(InteriorPointResult { x, multipliers, certificate, iterations, ending: Ending::Limit });
             idle = 0;
         }
         if certificate.residual() <= tolerance {

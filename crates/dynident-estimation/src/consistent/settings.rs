@@ -66,13 +66,8 @@ impl PhysicalSettings {
                 Err(PhysicalError::Setting { setting, value, fix })
             }
         };
-        within(
-            "prior_weight",
-            self.prior_weight,
-            1.0e-9,
-            1.0e9,
-            "give a weight from 1e-9 to 1e9: without any, directions that no data reach have no answer",
-        )?;
+        let fix = "give a weight from 1e-9 to 1e9: without any, directions that no data reach have no answer";
+        within("prior_weight", self.prior_weight, 1.0e-9, 1.0e9, fix)?;
         within("margin", self.margin, 1.0e-9, 0.5, "give a share of the reference body from 1e-9 to 0.5")?;
         within("tolerance", self.tolerance, 1.0e-10, 1.0e-2, "give a relative accuracy from 1e-10 to 1e-2")?;
         within("max_iterations", self.max_iterations as f64, 1.0, f64::INFINITY, "give at least 1")

@@ -15,7 +15,7 @@
 //! Anal. 10 (1973) 413).
 
 use super::nonnegative::nonnegative_least_squares;
-use crate::error::EstimationError;
+use crate::error::{EstimationError, require};
 use crate::factor::{FactorWorkspace, JointRows, LinearProblem, TriangularFactor};
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use nalgebra::{DMatrix, DVector};
@@ -99,10 +99,7 @@ impl<'a> CrossValidation<'a> {
     /// [`EstimationError::Setting`] for fewer than two blocks; [`EstimationError::TooFewSegments`] when there are fewer
     /// segments than blocks; [`EstimationError::Empty`].
     pub fn new(problem: &'a LinearProblem, folds: usize) -> Result<Self, EstimationError> {
-        if folds < 2 {
-            let fix = "give at least 2 blocks";
-            return Err(EstimationError::Setting { setting: "folds", value: folds as f64, fix });
-        }
+        require(folds >= 2, "folds", folds as f64, "give at least 2 blocks")?;
         if problem.equations().is_empty() {
             return Err(EstimationError::Empty);
         }

@@ -1,7 +1,7 @@
 //! Essential parameters: which base parameters do the data really determine, and what does the fit lose without the
 //! others?
 
-use crate::error::EstimationError;
+use crate::error::{EstimationError, require};
 use crate::uncertainty::{Estimate, f_tail, student_half_width};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -31,14 +31,9 @@ impl EssentialSettings {
     /// # Errors
     /// [`EstimationError::Setting`] for a ratio below 1 or a significance that is not between 0 and 1.
     pub fn validate(&self) -> Result<(), EstimationError> {
-        if !(self.ratio >= 1.0 && self.ratio.is_finite()) {
-            return Err(EstimationError::Setting { setting: "ratio", value: self.ratio, fix: "give 1 or more" });
-        }
-        if !(self.significance > 0.0 && self.significance < 1.0) {
-            let fix = "give a probability above 0 and below 1";
-            return Err(EstimationError::Setting { setting: "significance", value: self.significance, fix });
-        }
-        Ok(())
+        require(self.ratio >= 1.0 && self.ratio.is_finite(), "ratio", self.ratio, "give 1 or more")?;
+        let fix = "give a probability above 0 and below 1";
+        require(self.significance > 0.0 && self.significance < 1.0, "significance", self.significance, fix)
     }
 }
 

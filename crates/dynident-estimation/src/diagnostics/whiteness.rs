@@ -13,7 +13,7 @@ const LAGS: usize = 10;
 /// ```
 ///
 /// Residuals are taken as they are, not less their mean: an offset that the model does not have is an error as well.
-/// Parameters fitted to other data cost no degree of degrees_of_freedom.
+/// Parameters fitted to other data cost no degree of freedom.
 ///
 /// ```
 /// use dynident_estimation::Whiteness;

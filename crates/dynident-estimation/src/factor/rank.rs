@@ -1,7 +1,7 @@
 //! Which columns the data excite, decided on scaled columns with a stated tolerance; and the solution on those.
 
 use super::triangular::{FactorWorkspace, TriangularFactor};
-use crate::error::EstimationError;
+use crate::error::{EstimationError, within};
 use dynident_dynamics::independent_columns;
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use nalgebra::DMatrix;
@@ -35,9 +35,7 @@ impl RankSettings {
     pub fn validate(&self) -> Result<(), EstimationError> {
         for (setting, value) in [("rank.tolerance", self.tolerance), ("rank.negligible_column", self.negligible_column)]
         {
-            if !(1.0e-14..1.0).contains(&value) {
-                return Err(EstimationError::Setting { setting, value, fix: "give a share from 1e-14 to below 1" });
-            }
+            within(setting, value, 1.0e-14..1.0, "give a share from 1e-14 to below 1")?;
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! A factor that remembers when: the rows of one joint in one log as at most K factors of consecutive time segments.
 
 use super::triangular::{FactorWorkspace, TriangularFactor, check_columns, check_panel};
-use crate::error::{EstimationError, expect};
+use crate::error::{EstimationError, expect, require};
 use core::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -42,14 +42,8 @@ impl SegmentSettings {
     /// # Errors
     /// [`EstimationError::Setting`] for fewer than two segments or a length of zero.
     pub fn validate(&self) -> Result<(), EstimationError> {
-        if self.max_segments < 2 {
-            let value = self.max_segments as f64;
-            return Err(EstimationError::Setting { setting: "max_segments", value, fix: "give at least 2" });
-        }
-        if self.first_length_rows == 0 {
-            return Err(EstimationError::Setting { setting: "first_length_rows", value: 0.0, fix: "give at least 1" });
-        }
-        Ok(())
+        require(self.max_segments >= 2, "max_segments", self.max_segments as f64, "give at least 2")?;
+        require(self.first_length_rows > 0, "first_length_rows", 0.0, "give at least 1")
     }
 }
 

@@ -1,7 +1,7 @@
 //! The triangular factor of a stack of rows `[W | τ]`: all that linear estimation needs to remember of them.
 
 use super::reflect::{CHUNK_ROWS, Chunk, TriangleOnPanel, heights, row_start};
-use crate::error::EstimationError;
+use crate::error::{EstimationError, expect, require};
 use dynident_lanes::{Level, dispatch};
 use nalgebra::{DMatrix, DVector};
 
@@ -247,13 +247,7 @@ impl TriangularFactor {
     /// # Errors
     /// As [`merge`](Self::merge).
     pub fn merge_with(&mut self, workspace: &mut FactorWorkspace, other: &Self) -> Result<(), EstimationError> {
-        if self.columns != other.columns {
-            return Err(EstimationError::Mismatch {
-                what: "columns of merged factors".into(),
-                expected: self.columns,
-                found: other.columns,
-            });
-        }
+        expect("columns of merged factors", self.columns, other.columns)?;
         self.absorb_factor(workspace, other);
         Ok(())
     }
@@ -305,13 +299,7 @@ impl TriangularFactor {
     /// # Errors
     /// [`EstimationError::Mismatch`] when `theta` does not have one value per column.
     pub fn residual_sum_of_squares(&self, theta: &[f64]) -> Result<f64, EstimationError> {
-        if theta.len() != self.columns {
-            return Err(EstimationError::Mismatch {
-                what: "parameters for a factor's columns".into(),
-                expected: self.columns,
-                found: theta.len(),
-            });
-        }
+        expect("parameters for a factor's columns", self.columns, theta.len())?;
         let rho = self.entry(self.columns, self.columns);
         Ok(self.residual(theta).norm_squared() + rho * rho)
     }
@@ -383,11 +371,7 @@ impl TriangularFactor {
 
 /// That a weight of rows is possible.
 pub(crate) fn check_weight(weight: f64) -> Result<(), EstimationError> {
-    if weight.is_finite() && weight >= 0.0 {
-        return Ok(());
-    }
-    let fix = "give a finite weight that is not negative";
-    Err(EstimationError::Setting { setting: "weight", value: weight, fix })
+    require(weight.is_finite() && weight >= 0.0, "weight", weight, "give a finite weight that is not negative")
 }
 
 /// That all column numbers of a selection are below `size`.

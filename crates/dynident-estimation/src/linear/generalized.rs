@@ -194,6 +194,7 @@ pub fn generalized_least_squares(
     if rows == 0 {
         return Err(EstimationError::Empty);
     }
+    // The first solution takes joints as independent and equally noisy.
     let mut whitener = DMatrix::identity(joints, joints);
     let mut whitened = problem.whitened(&whitener)?;
     let mut triangle = whitened.stacked().combined(&[1.0])?;
@@ -201,16 +202,14 @@ pub fn generalized_least_squares(
     let share = choice.free.len() as f64 / joints as f64;
     let degrees_of_freedom = rows as f64 - share;
     if degrees_of_freedom <= joints as f64 {
-        return Err(EstimationError::TooFewRows {
-            what: "every joint".into(),
-            rows,
-            parameters: share + joints as f64,
-        });
+        let (what, parameters) = ("every joint".to_owned(), share + joints as f64);
+        return Err(EstimationError::TooFewRows { what, rows, parameters });
     }
     let mut solution = solve(&triangle, &choice, &settings.rank, &problem.fallback);
     let mut omega: DMatrix<f64>;
     let mut previous: Option<DMatrix<f64>> = None;
     let (mut iterations, mut converged) = (1, false);
+    // Covariance from residuals, and solution from covariance, in turn.
     loop {
         let (products, torque) = problem.residual_products(&solution.values);
         let squares: Vec<f64> = products.diagonal().iter().copied().collect();
@@ -238,6 +237,7 @@ pub fn generalized_least_squares(
         previous = Some(omega);
         iterations += 1;
     }
+    // All joints are one whitened problem, whose figures each of them shares.
     let sigma: Vec<f64> = omega.diagonal().iter().map(|variance| variance.sqrt()).collect();
     let fitted = PointEstimate {
         triangle,

@@ -3,7 +3,7 @@
 use super::instrumental::{InstrumentalEstimate, noisy_columns};
 use super::projection::Projection;
 use super::weighted::noise_of_joints;
-use crate::error::EstimationError;
+use crate::error::{EstimationError, within};
 use crate::factor::{InstrumentedProblem, RankSettings, solve, split};
 use crate::uncertainty::{CovarianceMethod, PointEstimate, f_tail, joint_degrees_of_freedom};
 use nalgebra::{DMatrix, DVector};
@@ -36,11 +36,7 @@ impl HausmanSettings {
     /// [`EstimationError::Setting`] for a level outside 1e-6 to 0.5 or rank settings out of range.
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
-        if !(1.0e-6..=0.5).contains(&self.level) {
-            let fix = "give a probability from 1e-6 to 0.5";
-            return Err(EstimationError::Setting { setting: "level", value: self.level, fix });
-        }
-        Ok(())
+        within("level", self.level, 1.0e-6..=0.5, "give a probability from 1e-6 to 0.5")
     }
 }
 
@@ -65,7 +61,7 @@ pub struct HausmanTest {
     pub verdict: HausmanVerdict,
     /// The statistic; none when undecided.
     pub f: Option<f64>,
-    /// Degrees of degrees_of_freedom: tested columns; time segments (or rows, with white residuals) less those.
+    /// Degrees of freedom: tested columns; time segments (or rows, with white residuals) less those.
     pub degrees_of_freedom: [f64; 2],
     /// Probability of such an F where least squares is right.
     pub p_value: Option<f64>,

@@ -2,7 +2,7 @@
 
 use super::projection::Projection;
 use super::weighted::{WeightedSettings, noise_change, noise_of_joints};
-use crate::error::EstimationError;
+use crate::error::{EstimationError, require};
 use crate::factor::{FactorWorkspace, InstrumentedProblem, RankSettings, Split, TriangularFactor, solve, split};
 use crate::uncertainty::{CovarianceMethod, Estimate, EstimateStatus, PointEstimate, joint_degrees_of_freedom};
 use nalgebra::{DMatrix, DVector};
@@ -47,11 +47,8 @@ impl InstrumentalSettings {
         let (rank, covariance) = (self.rank, self.covariance);
         let (tolerance, max_iterations) = (self.tolerance, self.max_iterations);
         WeightedSettings { rank, covariance, tolerance, max_iterations }.validate()?;
-        if !(self.weak_below.is_finite() && self.weak_below > 0.0) {
-            let fix = "give a positive limit for the first-stage F, 10 by default";
-            return Err(EstimationError::Setting { setting: "weak_below", value: self.weak_below, fix });
-        }
-        Ok(())
+        let fix = "give a positive limit for the first-stage F, 10 by default";
+        require(self.weak_below.is_finite() && self.weak_below > 0.0, "weak_below", self.weak_below, fix)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::robust::{RowBlock, RowVisitor, scale_floors, with_factors};
 use super::weighted::{WeightedSettings, weighted_least_squares};
-use crate::error::EstimationError;
+use crate::error::{EstimationError, require, within};
 use crate::factor::{LinearProblem, RankSettings, SegmentedFactor};
 use crate::uncertainty::{CovarianceMethod, Estimate, EstimateStatus};
 use serde::{Deserialize, Serialize};
@@ -49,24 +49,11 @@ impl NoiseLevelSettings {
     /// outside 1e-9 to 1, fewer than two passes, or rank settings out of range.
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
-        let error = |setting, value, fix| Err(EstimationError::Setting { setting, value, fix });
-        if self.window_rows < 5 {
-            return error(
-                "window_rows",
-                self.window_rows as f64,
-                "give at least 5: fewer rows are no measure of noise",
-            );
-        }
-        if !(1.0e-6..=1.0).contains(&self.pooled_share) {
-            return error("pooled_share", self.pooled_share, "give a share from 1e-6 to 1");
-        }
-        if !(1.0e-9..=1.0).contains(&self.tolerance) {
-            return error("tolerance", self.tolerance, "give a change in error bars from 1e-9 to 1");
-        }
-        if self.max_passes < 2 {
-            return error("max_passes", self.max_passes as f64, "give at least 2");
-        }
-        Ok(())
+        let fix = "give at least 5: fewer rows are no measure of noise";
+        require(self.window_rows >= 5, "window_rows", self.window_rows as f64, fix)?;
+        within("pooled_share", self.pooled_share, 1.0e-6..=1.0, "give a share from 1e-6 to 1")?;
+        within("tolerance", self.tolerance, 1.0e-9..=1.0, "give a change in error bars from 1e-9 to 1")?;
+        require(self.max_passes >= 2, "max_passes", self.max_passes as f64, "give at least 2")
     }
 }
 
@@ -222,16 +209,7 @@ fn gathered<E: From<EstimationError>>(
         EstimationError::Mismatch { what, expected: equation.factor.rows(), found }
     };
     let mut visit = |block: &RowBlock<'_>| -> Result<(), EstimationError> {
-        let found = equations.iter().position(|e| e.log == block.log && e.joint == block.joint);
-        let Some(at) = found else {
-            let what = "a block's log and joint in the problem".to_owned();
-            return Err(EstimationError::Mismatch { what, expected: equations.len(), found: block.log });
-        };
-        let local = &locals[at];
-        let expected = (local.len() + 1) * block.rows;
-        if block.panel.len() != expected {
-            return Err(EstimationError::Shape { what: "a block of rows", expected, found: block.panel.len() });
-        }
+        let at = block.equation(equations)?;
         let first = residuals[at].len();
         if first + block.rows > equations[at].factor.rows() {
             return Err(mismatch(at, first + block.rows));
@@ -239,9 +217,7 @@ fn gathered<E: From<EstimationError>>(
         scaled.clear();
         scaled.extend_from_slice(block.panel);
         for row in 0..block.rows {
-            let at_column = |column: usize| block.panel[column * block.rows + row];
-            let predicted: f64 = local.iter().enumerate().map(|(column, value)| value * at_column(column)).sum();
-            residuals[at].push(at_column(local.len()) - predicted);
+            residuals[at].push(block.residual(row, &locals[at]));
             if let Some(levels) = levels {
                 let weight = 1.0 / levels.relative[at][first + row];
                 scaled.iter_mut().skip(row).step_by(block.rows).for_each(|value| *value *= weight);

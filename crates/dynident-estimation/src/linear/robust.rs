@@ -1,8 +1,8 @@
 //! Iteratively reweighted least squares: rows that no noise explains lose their say.
 
 use super::weighted::{WeightedSettings, weighted_least_squares};
-use crate::error::EstimationError;
-use crate::factor::{LinearProblem, RankSettings, SegmentedFactor, Split, solve, split};
+use crate::error::{EstimationError, require, within};
+use crate::factor::{JointRows, LinearProblem, RankSettings, SegmentedFactor, Split, solve, split};
 use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -117,22 +117,9 @@ impl RobustSettings {
             RowWeight::Huber { k } => ("weight.k", k),
             RowWeight::Tukey { c } => ("weight.c", c),
         };
-        if !(0.1..=100.0).contains(&value) {
-            return Err(EstimationError::Setting {
-                setting,
-                value,
-                fix: "give a number of deviations from 0.1 to 100",
-            });
-        }
-        if !(1.0e-13..=1.0).contains(&self.tolerance) {
-            let fix = "give a relative change from 1e-13 to 1";
-            return Err(EstimationError::Setting { setting: "tolerance", value: self.tolerance, fix });
-        }
-        if self.max_passes < 2 {
-            let value = self.max_passes as f64;
-            return Err(EstimationError::Setting { setting: "max_passes", value, fix: "give at least 2" });
-        }
-        Ok(())
+        within(setting, value, 0.1..=100.0, "give a number of deviations from 0.1 to 100")?;
+        within("tolerance", self.tolerance, 1.0e-13..=1.0, "give a relative change from 1e-13 to 1")?;
+        require(self.max_passes >= 2, "max_passes", self.max_passes as f64, "give at least 2")
     }
 }
 
@@ -147,6 +134,28 @@ pub struct RowBlock<'a> {
     pub rows: usize,
     /// Column by column, torque last, as in [`TriangularFactor::absorb`](crate::TriangularFactor::absorb).
     pub panel: &'a [f64],
+}
+
+impl RowBlock<'_> {
+    /// Place of the block's equation, whose columns the panel must have.
+    pub(super) fn equation(&self, equations: &[JointRows]) -> Result<usize, EstimationError> {
+        let Some(at) = equations.iter().position(|e| e.log == self.log && e.joint == self.joint) else {
+            let what = "a block's log and joint in the problem".to_owned();
+            return Err(EstimationError::Mismatch { what, expected: equations.len(), found: self.log });
+        };
+        let expected = (equations[at].columns.len() + 1) * self.rows;
+        if self.panel.len() != expected {
+            return Err(EstimationError::Shape { what: "a block of rows", expected, found: self.panel.len() });
+        }
+        Ok(at)
+    }
+
+    /// `τ − w θ` of one row, θ of the equation's columns.
+    pub(super) fn residual(&self, row: usize, theta: &[f64]) -> f64 {
+        let at_column = |column: usize| self.panel[column * self.rows + row];
+        let predicted: f64 = theta.iter().enumerate().map(|(column, value)| value * at_column(column)).sum();
+        at_column(theta.len()) - predicted
+    }
 }
 
 /// What a pass hands every block of rows to.
@@ -164,7 +173,7 @@ pub struct RobustEstimate {
 }
 
 /// What one pass over the rows gathered.
-struct Gathered {
+struct PassSums {
     factors: Vec<SegmentedFactor>,
     residuals: Vec<Vec<f64>>,
     tally: Vec<Tally>,
@@ -298,35 +307,21 @@ fn gather<E: From<EstimationError>>(
     scales: &[f64],
     weight: &RowWeight,
     pass: &mut impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
-) -> Result<Gathered, E> {
+) -> Result<PassSums, E> {
     let equations = problem.equations();
-    let mut factors = Vec::with_capacity(equations.len());
-    for equation in equations {
-        factors.push(equation.factor.emptied());
-    }
+    let mut factors: Vec<SegmentedFactor> = equations.iter().map(|equation| equation.factor.emptied()).collect();
     let locals: Vec<Vec<f64>> = equations.iter().map(|equation| equation.local(theta)).collect();
     let joints = problem.joints().len();
     let (mut residuals, mut tally) = (vec![Vec::new(); joints], vec![Tally::default(); joints]);
     let mut scaled = Vec::new();
     let mut visit = |block: &RowBlock<'_>| -> Result<(), EstimationError> {
-        let found = equations.iter().position(|e| e.log == block.log && e.joint == block.joint);
-        let Some(at) = found else {
-            let what = "a block's log and joint in the problem".to_owned();
-            return Err(EstimationError::Mismatch { what, expected: equations.len(), found: block.log });
-        };
-        let local = &locals[at];
-        let expected = (local.len() + 1) * block.rows;
-        if block.panel.len() != expected {
-            return Err(EstimationError::Shape { what: "a block of rows", expected, found: block.panel.len() });
-        }
+        let at = block.equation(equations)?;
         scaled.clear();
         scaled.extend_from_slice(block.panel);
         let scale = scales[block.joint];
         let tally = &mut tally[block.joint];
         for row in 0..block.rows {
-            let at_column = |column: usize| block.panel[column * block.rows + row];
-            let predicted: f64 = local.iter().enumerate().map(|(column, value)| value * at_column(column)).sum();
-            let residual = at_column(local.len()) - predicted;
+            let residual = block.residual(row, &locals[at]);
             residuals[block.joint].push(residual);
             let u = residual / scale;
             let w = weight.weight(u);
@@ -352,7 +347,7 @@ fn gather<E: From<EstimationError>>(
             );
         }
     }
-    Ok(Gathered { factors, residuals, tally })
+    Ok(PassSums { factors, residuals, tally })
 }
 
 /// The same problem over other factors; a prior stays.

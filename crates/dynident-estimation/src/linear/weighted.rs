@@ -1,6 +1,6 @@
 //! Weighted least squares: the rows of each joint count by that joint's own noise.
 
-use crate::error::EstimationError;
+use crate::error::{EstimationError, require, within};
 use crate::factor::{LinearProblem, RankSettings, solved_values, split};
 use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom};
 use serde::{Deserialize, Serialize};
@@ -38,14 +38,8 @@ impl WeightedSettings {
     /// [`EstimationError::Setting`] for a tolerance outside 1e-12 to 1, no iterations, or rank settings out of range.
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
-        if !(1.0e-12..=1.0).contains(&self.tolerance) {
-            let fix = "give a relative change from 1e-12 to 1";
-            return Err(EstimationError::Setting { setting: "tolerance", value: self.tolerance, fix });
-        }
-        if self.max_iterations == 0 {
-            return Err(EstimationError::Setting { setting: "max_iterations", value: 0.0, fix: "give at least 1" });
-        }
-        Ok(())
+        within("tolerance", self.tolerance, 1.0e-12..=1.0, "give a relative change from 1e-12 to 1")?;
+        require(self.max_iterations > 0, "max_iterations", 0.0, "give at least 1")
     }
 }
 

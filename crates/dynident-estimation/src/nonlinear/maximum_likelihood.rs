@@ -1,9 +1,9 @@
 //! Maximum likelihood with errors in the motion as well as in the torque, both of known covariance: what averaged
 //! periods of a repeated motion allow.
 
-use crate::error::{EstimationError, expect};
+use crate::error::{EstimationError, expect, require, within};
 use crate::factor::{FactorWorkspace, RankReport, RankSettings, TriangularFactor, report, solve, split};
-use crate::uncertainty::EstimateStatus;
+use crate::uncertainty::{EstimateStatus, covariance_of_all};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use serde::Serialize;
 
@@ -65,7 +65,7 @@ pub struct MaximumLikelihoodEstimate {
 }
 
 /// What one pass gathers at θ.
-struct Gathered {
+struct PassSums {
     triangle: TriangularFactor,
     cost: f64,
 }
@@ -136,24 +136,8 @@ pub fn maximum_likelihood<E: From<EstimationError>>(
     }
     let solution = solve(&now.triangle, &choice, &settings.rank, &fallback);
     let small = &solution.inverse * solution.inverse.transpose();
-    let mut covariance = DMatrix::zeros(columns, columns);
-    for (a, &i) in choice.free.iter().enumerate() {
-        for (b, &j) in choice.free.iter().enumerate() {
-            covariance[(i, j)] = small[(a, b)];
-        }
-    }
-    let std: Vec<f64> = covariance.diagonal().iter().map(|variance: &f64| variance.sqrt()).collect();
-    if let Some(k) = (0..columns).find(|&k| !(theta[k].is_finite() && std[k].is_finite())) {
-        return Err(EstimationError::Overflow { name: names[k].clone() }.into());
-    }
+    let (covariance, std) = covariance_of_all(names, &theta, &choice.free, &small)?;
     let rank = report(&now.triangle, &choice, &settings.rank, names, &fallback);
-    let status = if !converged {
-        EstimateStatus::IterationLimit
-    } else if rank.fixed.is_empty() {
-        EstimateStatus::Complete
-    } else {
-        EstimateStatus::NotAllExcited
-    };
     Ok(MaximumLikelihoodEstimate {
         names: names.to_vec(),
         values: theta.iter().copied().collect(),
@@ -162,7 +146,7 @@ pub fn maximum_likelihood<E: From<EstimationError>>(
         cost: now.cost,
         degrees_of_freedom: rows - free,
         iterations,
-        status,
+        status: EstimateStatus::of(converged, &rank),
         rank,
     })
 }
@@ -176,14 +160,8 @@ impl MaximumLikelihoodSettings {
         self.rank.validate()?;
         covariance("motion_covariance", &self.motion_covariance, false)?;
         covariance("torque_covariance", &self.torque_covariance, true)?;
-        if !(1.0e-12..=1.0).contains(&self.tolerance) {
-            let fix = "give a length in error bars from 1e-12 to 1";
-            return Err(EstimationError::Setting { setting: "tolerance", value: self.tolerance, fix });
-        }
-        if self.max_iterations == 0 {
-            return Err(EstimationError::Setting { setting: "max_iterations", value: 0.0, fix: "give at least 1" });
-        }
-        Ok(())
+        within("tolerance", self.tolerance, 1.0e-12..=1.0, "give a length in error bars from 1e-12 to 1")?;
+        require(self.max_iterations > 0, "max_iterations", 0.0, "give at least 1")
     }
 }
 
@@ -207,7 +185,7 @@ fn gathered<E: From<EstimationError>>(
     settings: &MaximumLikelihoodSettings,
     theta: &DVector<f64>,
     pass: &mut impl FnMut(&mut InstantVisitor<'_>) -> Result<(), E>,
-) -> Result<Gathered, E> {
+) -> Result<PassSums, E> {
     let joints = settings.torque_covariance.nrows();
     let mut triangle = TriangularFactor::new(columns);
     let mut workspace = FactorWorkspace::default();
@@ -252,5 +230,5 @@ fn gathered<E: From<EstimationError>>(
         triangle.absorb_with(&mut workspace, &panel, joints)
     };
     pass(&mut visit)?;
-    Ok(Gathered { triangle, cost })
+    Ok(PassSums { triangle, cost })
 }

@@ -1,8 +1,8 @@
 //! Estimators that compare a simulation with the record: DIDIM, CLIE and CLOE, behind one seam.
 
-use crate::error::{EstimationError, expect};
+use crate::error::{EstimationError, expect, require, within};
 use crate::factor::{FactorWorkspace, RankReport, RankSettings, TriangularFactor, report, solve, split};
-use crate::uncertainty::EstimateStatus;
+use crate::uncertainty::{EstimateStatus, covariance_of_all};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -79,17 +79,9 @@ impl SimulatedSettings {
     /// [`EstimationError::Setting`].
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
-        let error = |setting, value, fix| Err(EstimationError::Setting { setting, value, fix });
-        if !(1.0e-10..=1.0).contains(&self.tolerance) {
-            return error("tolerance", self.tolerance, "give a length in error bars from 1e-10 to 1");
-        }
-        if !(1.0e-9..=0.1).contains(&self.difference) {
-            return error("difference", self.difference, "give a relative step from 1e-9 to 0.1");
-        }
-        if self.max_iterations == 0 {
-            return error("max_iterations", 0.0, "give at least 1");
-        }
-        Ok(())
+        within("tolerance", self.tolerance, 1.0e-10..=1.0, "give a length in error bars from 1e-10 to 1")?;
+        within("difference", self.difference, 1.0e-9..=0.1, "give a relative step from 1e-9 to 0.1")?;
+        require(self.max_iterations > 0, "max_iterations", 0.0, "give at least 1")
     }
 }
 
@@ -229,24 +221,8 @@ pub fn simulated_least_squares<S: SimulatedMotion>(
     let solution = solve(&triangle, &choice, &settings.rank, &vec![0.0; columns]);
     let variance = now.cost / (rows - choice.free.len()) as f64;
     let small = &solution.inverse * solution.inverse.transpose() * variance;
-    let mut covariance = DMatrix::zeros(columns, columns);
-    for (a, &i) in choice.free.iter().enumerate() {
-        for (b, &j) in choice.free.iter().enumerate() {
-            covariance[(i, j)] = small[(a, b)];
-        }
-    }
-    let std: Vec<f64> = covariance.diagonal().iter().map(|variance: &f64| variance.sqrt()).collect();
-    if let Some(k) = (0..columns).find(|&k| !(theta[k].is_finite() && std[k].is_finite())) {
-        return Err(EstimationError::Overflow { name: problem.names[k].clone() }.into());
-    }
+    let (covariance, std) = covariance_of_all(&problem.names, &theta, &choice.free, &small)?;
     let rank = report(&triangle, &choice, &settings.rank, &problem.names, &problem.start);
-    let status = if !converged {
-        EstimateStatus::IterationLimit
-    } else if rank.fixed.is_empty() {
-        EstimateStatus::Complete
-    } else {
-        EstimateStatus::NotAllExcited
-    };
     Ok(SimulatedEstimate {
         names: problem.names.clone(),
         values: theta.iter().copied().collect(),
@@ -255,7 +231,7 @@ pub fn simulated_least_squares<S: SimulatedMotion>(
         cost: now.cost,
         iterations,
         simulations,
-        status,
+        status: EstimateStatus::of(converged, &rank),
         rank,
         jacobian: last_jacobian,
         residual: last_residual,
@@ -288,23 +264,28 @@ struct Run<'a, S> {
     simulations: usize,
 }
 
-struct Simulated {
+struct SimulationPoint {
     rows: SimulatedRows,
     cost: f64,
 }
 
 impl<S: SimulatedMotion> Run<'_, S> {
-    fn simulated(&mut self, theta: &DVector<f64>) -> Result<Option<Simulated>, S::Error> {
+    fn simulated(&mut self, theta: &DVector<f64>) -> Result<Option<SimulationPoint>, S::Error> {
         self.simulations += 1;
         let Some(rows) = self.simulation.simulate(theta.as_slice())? else { return Ok(None) };
         let measured = &self.problem.measured;
         expect("rows of the simulation", measured.len(), rows.output.len())?;
         let cost = (measured - &rows.output).component_div(&self.problem.noise_std).norm_squared();
-        Ok(cost.is_finite().then_some(Simulated { rows, cost }))
+        Ok(cost.is_finite().then_some(SimulationPoint { rows, cost }))
     }
 
     /// Central differences; one-sided where one side cannot be simulated, zero where neither can.
-    fn jacobian(&mut self, theta: &DVector<f64>, now: &Simulated, relative: f64) -> Result<DMatrix<f64>, S::Error> {
+    fn jacobian(
+        &mut self,
+        theta: &DVector<f64>,
+        now: &SimulationPoint,
+        relative: f64,
+    ) -> Result<DMatrix<f64>, S::Error> {
         let mut jacobian = DMatrix::zeros(self.problem.measured.len(), theta.len());
         for k in 0..theta.len() {
             let h = relative * self.problem.scale[k];

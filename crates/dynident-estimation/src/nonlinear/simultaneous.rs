@@ -3,7 +3,7 @@
 
 use super::autoregression::autoregression;
 use super::simultaneous_rows::{ChannelRows, WhiteRows, cost};
-use crate::error::{EstimationError, expect};
+use crate::error::{EstimationError, expect, require, within};
 use crate::factor::{RankSettings, solve, split};
 use crate::uncertainty::{CovarianceMethod, Estimate, PointEstimate, joint_degrees_of_freedom};
 use nalgebra::{DMatrix, DVector};
@@ -88,17 +88,10 @@ impl SimultaneousSettings {
     /// rank settings out of range.
     pub fn validate(&self) -> Result<(), EstimationError> {
         self.rank.validate()?;
-        let error = |setting, value, fix| Err(EstimationError::Setting { setting, value, fix });
-        if self.most_autoregression > 64 {
-            return error("most_autoregression", self.most_autoregression as f64, "give 0 to 64");
-        }
-        if !(1.0e-9..=1.0).contains(&self.tolerance) {
-            return error("tolerance", self.tolerance, "give a length in error bars from 1e-9 to 1");
-        }
-        if self.max_iterations < 2 {
-            return error("max_iterations", self.max_iterations as f64, "give at least 2");
-        }
-        Ok(())
+        let fix = "give 0 to 64";
+        require(self.most_autoregression <= 64, "most_autoregression", self.most_autoregression as f64, fix)?;
+        within("tolerance", self.tolerance, 1.0e-9..=1.0, "give a length in error bars from 1e-9 to 1")?;
+        require(self.max_iterations >= 2, "max_iterations", self.max_iterations as f64, "give at least 2")
     }
 }
 
@@ -332,7 +325,7 @@ mod tests {
         // The tolerance of the steps, 1e-9 of error bars of 0.1.
         assert!((theta - ts / qs).abs() < 1e-9 && (c - qs / ss).abs() < 1e-9, "{theta} {c}");
         let [sigma_q, sigma_tau] = [found.noise[0].std, found.noise[1].std];
-        // Each of the two unknowns takes one degree of degrees_of_freedom, half from each channel or all from one: σ is
+        // Each of the two unknowns takes one degree of freedom, half from each channel or all from one: σ is
         // known to a per cent of its own error.
         assert!((sigma_q / 0.3 - 1.0).abs() < 0.2 && (sigma_tau / 0.5 - 1.0).abs() < 0.2);
         let std = ((sigma_tau.powi(2) + (theta * sigma_q).powi(2)) / (c * c * ss)).sqrt();

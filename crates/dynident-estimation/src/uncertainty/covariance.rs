@@ -59,7 +59,7 @@ pub(crate) struct Covariances {
     pub(crate) white: DMatrix<f64>,
     /// Clusters G (0 for the white method).
     pub(crate) clusters: usize,
-    /// Degrees of degrees_of_freedom behind every column's variance (infinite for fixed columns).
+    /// Degrees of freedom behind every column's variance (infinite for fixed columns).
     pub(crate) degrees_of_freedom: Vec<f64>,
     /// For every joint the mean score variance over what white noise would give.
     pub(crate) inflation: Vec<f64>,

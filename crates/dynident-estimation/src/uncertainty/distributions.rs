@@ -1,14 +1,14 @@
 //! The distributions that intervals and tests are read from: Student's t, Fisher's F, chi-squared.
 //!
 //! The incomplete beta and gamma functions are those of `statrs`; its inverse for Student's t loses digits from a
-//! thousand degrees of degrees_of_freedom on (decision 0005), where an expansion about the normal distribution has them
+//! thousand degrees of freedom on (decision 0005), where an expansion about the normal distribution has them
 //! all.
 
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use statrs::function::{beta::checked_beta_reg, gamma::checked_gamma_ur};
 
-/// Probability that a chi-squared variable with `degrees_of_freedom` degrees of degrees_of_freedom exceeds `value`; NaN
-/// for a NaN or for no degrees_of_freedom.
+/// Probability that a chi-squared variable with `degrees_of_freedom` degrees of freedom exceeds `value`; NaN
+/// for a NaN or for none of them.
 pub(crate) fn chi_squared_tail(value: f64, degrees_of_freedom: f64) -> f64 {
     if value.is_nan() || degrees_of_freedom.is_nan() || degrees_of_freedom <= 0.0 {
         return f64::NAN;
@@ -20,7 +20,7 @@ pub(crate) fn chi_squared_tail(value: f64, degrees_of_freedom: f64) -> f64 {
     checked_gamma_ur(0.5 * degrees_of_freedom, (0.5 * value).min(1.0e300)).unwrap_or(f64::NAN)
 }
 
-/// Probability that an F variable with `numerator` and `denominator` degrees of degrees_of_freedom exceeds `value`.
+/// Probability that an F variable with `numerator` and `denominator` degrees of freedom exceeds `value`.
 pub(crate) fn f_tail(value: f64, numerator: f64, denominator: f64) -> f64 {
     if value.is_nan() || !(numerator > 0.0 && denominator > 0.0) {
         return f64::NAN;
@@ -29,7 +29,7 @@ pub(crate) fn f_tail(value: f64, numerator: f64, denominator: f64) -> f64 {
     checked_beta_reg(0.5 * denominator, 0.5 * numerator, share).unwrap_or(f64::NAN)
 }
 
-/// The t for which a Student variable with `degrees_of_freedom` degrees of degrees_of_freedom (they need not be whole)
+/// The t for which a Student variable with `degrees_of_freedom` degrees of freedom (they need not be whole)
 /// lies between -t and t with probability `level`. Below one degree it is that of one, from a million on that of a
 /// million, 1e-6 from the normal distribution's. NaN unless `level` lies between 0 and 1.
 ///

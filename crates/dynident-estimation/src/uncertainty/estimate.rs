@@ -5,7 +5,7 @@ use super::distributions::student_half_width;
 use super::scores::Fit;
 use crate::error::EstimationError;
 use crate::factor::{RankReport, RankSettings, Solution, Split, StackedProblem, TriangularFactor, report};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use serde::{Serialize, Serializer, ser::SerializeSeq};
 
 /// How an estimator ended.
@@ -18,6 +18,42 @@ pub enum EstimateStatus {
     NotAllExcited,
     /// The iterations stopped at their limit before the weights settled.
     IterationLimit,
+}
+
+impl EstimateStatus {
+    /// From what became of the iteration and of the columns.
+    pub(crate) fn of(converged: bool, rank: &RankReport) -> Self {
+        if !converged {
+            Self::IterationLimit
+        } else if rank.fixed.is_empty() {
+            Self::Complete
+        } else {
+            Self::NotAllExcited
+        }
+    }
+}
+
+/// The covariance of all columns from that of the `free` ones, zero for the others, and the roots of its diagonal.
+///
+/// # Errors
+/// [`EstimationError::Overflow`] where a value or its deviation is not a finite number.
+pub(crate) fn covariance_of_all(
+    names: &[String],
+    values: &DVector<f64>,
+    free: &[usize],
+    covariance_of_free: &DMatrix<f64>,
+) -> Result<(DMatrix<f64>, Vec<f64>), EstimationError> {
+    let mut covariance = DMatrix::zeros(names.len(), names.len());
+    for (a, &i) in free.iter().enumerate() {
+        for (b, &j) in free.iter().enumerate() {
+            covariance[(i, j)] = covariance_of_free[(a, b)];
+        }
+    }
+    let std: Vec<f64> = covariance.diagonal().iter().map(|variance: &f64| variance.sqrt()).collect();
+    match (0..names.len()).find(|&k| !(values[k].is_finite() && std[k].is_finite())) {
+        Some(k) => Err(EstimationError::Overflow { name: names[k].clone() }),
+        None => Ok((covariance, std)),
+    }
 }
 
 /// What a linear estimator found.
@@ -41,7 +77,7 @@ pub struct Estimate {
     /// Square roots of the diagonal of `covariance`.
     pub std: Vec<f64>,
     /// How many independent squares the variance of each value was found from (Satterthwaite's degrees of
-    /// degrees_of_freedom; N − p for white errors). With few, an interval is wider than 1.96 std.
+    /// freedom; N − p for white errors). With few, an interval is wider than 1.96 std.
     pub std_degrees_of_freedom: Vec<f64>,
     /// Half the width of the 95 % interval: `t₀.₉₇₅(std_degrees_of_freedom) · std`; zero for fixed columns.
     pub half_width_95: Vec<f64>,
@@ -119,13 +155,6 @@ impl PointEstimate {
         }
         let relative = |(std, value): (&f64, &f64)| (*std > 0.0 && *value != 0.0).then(|| 100.0 * std / value.abs());
         let rank = report(&self.triangle, &self.split, rank, problem.columns(), problem.fallback());
-        let status = if !self.converged {
-            EstimateStatus::IterationLimit
-        } else if rank.fixed.is_empty() {
-            EstimateStatus::Complete
-        } else {
-            EstimateStatus::NotAllExcited
-        };
         Ok(Estimate {
             names: problem.columns().to_vec(),
             half_width_95: std
@@ -140,7 +169,7 @@ impl PointEstimate {
             covariance_white: covariances.white,
             covariance_method: method,
             clusters: covariances.clusters,
-            status,
+            status: EstimateStatus::of(self.converged, &rank),
             iterations: self.iterations,
             joint_sigma: self.joint_sigma,
             effective_lag1: covariances.inflation.iter().map(|v| (v - 1.0) / (v + 1.0)).collect(),
@@ -155,7 +184,7 @@ impl PointEstimate {
     }
 }
 
-/// Checks that all rows together and each joint's share leave degrees_of_freedom for the noise, and gives `N_j − p/n`
+/// Checks that all rows together and each joint's share leave degrees of freedom for the noise, and gives `N_j − p/n`
 /// for every joint.
 pub(crate) fn joint_degrees_of_freedom(stacked: &StackedProblem<'_>, free: usize) -> Result<Vec<f64>, EstimationError> {
     let problem = stacked.problem;

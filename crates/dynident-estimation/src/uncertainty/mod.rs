@@ -2,7 +2,7 @@
 //!
 //! Residuals of robot torque are correlated in time, so the textbook covariance is too small. A [`CovarianceMethod`]
 //! names another: the default leaves out one time segment after the other (delete-one jackknife). Degrees of
-//! degrees_of_freedom by Satterthwaite turn a standard deviation into a half-width of 95 % by [`student_half_width`].
+//! freedom by Satterthwaite turn a standard deviation into a half-width of 95 % by [`student_half_width`].
 
 mod bootstrap;
 mod covariance;
@@ -15,4 +15,4 @@ pub use covariance::{CovarianceMethod, correlation};
 pub use distributions::student_half_width;
 pub(crate) use distributions::{chi_squared_tail, f_tail};
 pub use estimate::{Estimate, EstimateStatus};
-pub(crate) use estimate::{PointEstimate, joint_degrees_of_freedom};
+pub(crate) use estimate::{PointEstimate, covariance_of_all, joint_degrees_of_freedom};

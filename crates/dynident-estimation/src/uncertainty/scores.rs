@@ -106,7 +106,7 @@ impl<'a> Scores<'a> {
         })
     }
 
-    /// Degrees of degrees_of_freedom of every column's variance, `independent` times those of its clusters under white
+    /// Degrees of freedom of every column's variance, `independent` times those of its clusters under white
     /// noise; infinite for fixed columns.
     pub(super) fn degrees_of_freedom(&self, independent: f64) -> Vec<f64> {
         // What share of each estimate's variance comes from each cluster.
@@ -146,7 +146,7 @@ impl JointScores<'_> {
     }
 }
 
-/// `(Σ_g h_g)² / Σ_g h_g²`: the degrees of degrees_of_freedom of a sum of independent squares with expectations h_g.
+/// `(Σ_g h_g)² / Σ_g h_g²`: the degrees of freedom of a sum of independent squares with expectations h_g.
 ///
 /// Satterthwaite, Biometrics Bulletin 2 (1946) 110; for clusters Bell and McCaffrey, Survey Methodology 28 (2002) 169,
 /// here without the correlation that the fit puts between clusters, and less the one degree that the jackknife's factor

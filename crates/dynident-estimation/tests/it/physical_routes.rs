@@ -93,8 +93,10 @@ fn check(worst: &Worst) {
 /// their references.
 #[test]
 fn both_routes_find_the_same_optimum_of_problems_that_were_hard() {
-    // At 1757 and 1766 the interior point stalls at 5e-7 and 2e-7 and the other route has to finish.
-    check(&run([1081, 1110, 1113, 1757, 1766].into_iter().map(|seed| (seed, 2 + (seed % 29) as usize))));
+    // At 1757 and 1766 the interior point stalls at 5e-7 and 2e-7 and the other route has to finish. The last one has
+    // 28 bodies and takes most of the time: it is solved in the long run.
+    let seeds = [1081, 1110, 1113, 1757, 1766].into_iter().take(count(4, 5));
+    check(&run(seeds.map(|seed| (seed, 2 + (seed % 29) as usize))));
 }
 
 /// Mostly small ones, one of twelve bodies in thirty.

@@ -6,7 +6,7 @@
 
 use super::DesignTask;
 use crate::motion::Motion;
-use crate::optimisers::{Known, Step};
+use crate::optimisers::{CurvatureFacts, Step};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// `σ G + C`, one block a joint: `G` the mean square of the motion in units of its limits, `C` the curvature of the
@@ -72,8 +72,14 @@ impl Metric {
     /// Takes up the limits that push at the parameters `at`, and the criterion's share from the last step and its
     /// change of the gradient, or, at the start, such that the first step is a fifth of the motion. False if no
     /// positive matrix comes of it.
-    pub(super) fn prepare(&mut self, task: &DesignTask<'_>, times: &[f64], at: &[f64], known: &Known<'_>) -> bool {
-        let Known { pushing, gradient, free, last } = *known;
+    pub(super) fn prepare(
+        &mut self,
+        task: &DesignTask<'_>,
+        times: &[f64],
+        at: &[f64],
+        known: &CurvatureFacts<'_>,
+    ) -> bool {
+        let CurvatureFacts { pushing, gradient, free, last } = *known;
         // A linear family's size is the same everywhere; another's is taken anew wherever the memory of steps begins
         // anew.
         if (!self.sized || (last.is_none() && !task.family.is_linear())) && !self.take_size(task, times, at) {

@@ -6,7 +6,7 @@ use crate::criteria::Criterion;
 use crate::information::Information;
 use crate::limits::LimitWorkspace;
 use crate::motion::Motion;
-use crate::optimisers::{ConstrainedProblem, Known};
+use crate::optimisers::{ConstrainedProblem, CurvatureFacts};
 use nalgebra::DMatrix;
 
 /// A place that is broken weighs so much more than a velocity: a search may wander outside a joint's limits and come
@@ -153,7 +153,7 @@ impl ConstrainedProblem for Problem<'_> {
         self.task.family.apply_adjoint(&self.parameters, self.times, &self.adjoint, gradient);
     }
 
-    fn prepare_metric(&mut self, known: &Known<'_>) -> bool {
+    fn prepare_metric(&mut self, known: &CurvatureFacts<'_>) -> bool {
         let Some(metric) = &mut self.metric else { return false };
         metric.prepare(self.task, self.times, &self.at_gradient, known)
     }

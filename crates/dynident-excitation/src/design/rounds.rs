@@ -48,7 +48,7 @@ pub(super) struct Candidate {
 }
 
 /// The best of a round.
-pub(super) struct Found {
+pub(super) struct RoundResult {
     pub(super) best: Candidate,
     pub(super) evaluations: usize,
 }
@@ -62,7 +62,7 @@ impl Rounds<'_> {
         starts: &[AugmentedLagrangianState],
         budget: usize,
         stop: impl Fn(f64, f64) -> bool + Sync,
-    ) -> Result<Found, OptimiserError> {
+    ) -> Result<RoundResult, OptimiserError> {
         let first = self.all(criterion, margins, starts, &self.descent(criterion, budget, LOOSE, 1e-4), &stop)?;
         let mut evaluations = evaluations(&first);
         let mut candidates = self.candidates(criterion, first);
@@ -74,7 +74,7 @@ impl Rounds<'_> {
         let last = self.all(criterion, margins, &ends, &self.descent(criterion, budget, 1e-6, 1e-7), &stop)?;
         evaluations += self::evaluations(&last);
         let best = self.candidates(criterion, last).into_iter().next().ok_or(OptimiserError::Start)?;
-        Ok(Found { best, evaluations })
+        Ok(RoundResult { best, evaluations })
     }
 
     /// Goes on from one point to the end.
@@ -85,11 +85,11 @@ impl Rounds<'_> {
         start: AugmentedLagrangianState,
         budget: usize,
         stop: impl Fn(f64, f64) -> bool + Sync,
-    ) -> Result<Found, OptimiserError> {
+    ) -> Result<RoundResult, OptimiserError> {
         let runs = self.all(criterion, margins, &[start], &self.descent(criterion, budget, 1e-7, 1e-8), &stop)?;
         let evaluations = evaluations(&runs);
         let best = self.candidates(criterion, runs).into_iter().next().ok_or(OptimiserError::Start)?;
-        Ok(Found { best, evaluations })
+        Ok(RoundResult { best, evaluations })
     }
 
     fn all(

@@ -30,13 +30,8 @@ impl BSplineSettings {
     /// # Errors
     /// Fewer than 7 control points (with 6 nothing moves if the motion returns), or more than 1000.
     pub fn validate(&self) -> Result<(), FamilyError> {
-        require(
-            (7..=MOST).contains(&self.control_points),
-            NAME,
-            "control_points",
-            self.control_points as f64,
-            "give 7 to 1000",
-        )
+        let fix = "give 7 to 1000";
+        require((7..=MOST).contains(&self.control_points), NAME, "control_points", self.control_points as f64, fix)
     }
 }
 

@@ -49,11 +49,6 @@ pub(crate) fn require(
 /// The checks that all families share: some joints, and a duration with which rates can be computed.
 pub(crate) fn require_frame(family: &'static str, joints: usize, duration_s: f64) -> Result<(), FamilyError> {
     require((1..=MOST).contains(&joints), family, "joints", joints as f64, "give between 1 and 1000 joints")?;
-    require(
-        (1e-3..=1e7).contains(&duration_s),
-        family,
-        "duration_s",
-        duration_s,
-        "give between a millisecond and 1e7 seconds",
-    )
+    let fix = "give between a millisecond and 1e7 seconds";
+    require((1e-3..=1e7).contains(&duration_s), family, "duration_s", duration_s, fix)
 }

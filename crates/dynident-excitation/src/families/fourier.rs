@@ -33,13 +33,8 @@ impl FourierSettings {
     /// No harmonics (at rest: fewer than 2, which cannot move), no periods, or more than 1000 of either.
     pub fn validate(&self) -> Result<(), FamilyError> {
         let least = if self.rest { 2 } else { 1 };
-        require(
-            (least..=MOST).contains(&self.harmonics),
-            NAME,
-            "harmonics",
-            self.harmonics as f64,
-            "give 1 to 1000, and at least 2 if the ends are at rest",
-        )?;
+        let fix = "give 1 to 1000, and at least 2 if the ends are at rest";
+        require((least..=MOST).contains(&self.harmonics), NAME, "harmonics", self.harmonics as f64, fix)?;
         require((1..=MOST).contains(&self.periods), NAME, "periods", self.periods as f64, "give 1 to 1000")
     }
 }

@@ -49,13 +49,8 @@ impl FrictionLadderSettings {
     /// No rung, a part outside 0..1, or ramps that leave no time at constant velocity.
     pub fn validate(&self, joints: usize, duration_s: f64) -> Result<(), FamilyError> {
         require((1..=MOST).contains(&self.rungs), NAME, "rungs", self.rungs as f64, "give 1 to 1000")?;
-        require(
-            self.slowest_part > 0.0 && self.slowest_part <= 1.0,
-            NAME,
-            "slowest_part",
-            self.slowest_part,
-            "give a part above 0 and at most 1",
-        )?;
+        let fix = "give a part above 0 and at most 1";
+        require(self.slowest_part > 0.0 && self.slowest_part <= 1.0, NAME, "slowest_part", self.slowest_part, fix)?;
         require(self.ramp_s >= 1e-3, NAME, "ramp_s", self.ramp_s, "give a millisecond or more")?;
         require(
             self.cruising_s(joints, duration_s) > 0.0,

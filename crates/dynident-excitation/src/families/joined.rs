@@ -2,7 +2,7 @@
 
 use super::error::{FamilyError, require};
 use super::polynomials::quintic_hermite;
-use crate::family::Family;
+use crate::family::{Family, check_shapes};
 use crate::motion::{Motion, MotionAdjoint};
 use core::ops::Range;
 use dynident_model::sample::Random;
@@ -224,9 +224,7 @@ impl Family for JoinedFamily {
     }
 
     fn apply_adjoint(&self, parameters: &[f64], times_s: &[f64], adjoint: &MotionAdjoint, gradient: &mut [f64]) {
-        assert_eq!(parameters.len(), self.parameters(), "parameters of {NAME}");
-        assert_eq!(gradient.len(), self.parameters(), "gradient of {NAME}");
-        assert_eq!((adjoint.joints, adjoint.samples), (self.joints, times_s.len()), "cotangent of {NAME}");
+        check_shapes(self, parameters, times_s, adjoint, gradient);
         let own = self.ranges();
         let arrays = [&adjoint.q, &adjoint.dq, &adjoint.ddq, &adjoint.dddq];
         // What the moves pull on both ends of each member.

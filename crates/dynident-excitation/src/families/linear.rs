@@ -2,7 +2,7 @@
 
 use super::random_start::{grid, scale_and_shift};
 use super::sampled_basis::{GridCache, SampledBasis};
-use crate::family::Family;
+use crate::family::{Family, check_shapes};
 use crate::motion::{Motion, MotionAdjoint};
 use dynident_model::sample::Random;
 use nalgebra::DMatrix;
@@ -59,10 +59,15 @@ impl<B: Basis> LinearFamily<B> {
         if self.basis.differs_by_joint() { self.joints } else { 1 }
     }
 
-    fn sample(&self, times_s: &[f64]) -> SampledBasis {
-        SampledBasis::new(self.basis.columns(), self.sets(), times_s, |joint, time, out| {
-            self.basis.row(joint, time.clamp(0.0, self.duration_s), out);
-        })
+    /// Calls `with` for the basis on the grid, or for each of its pieces and where it begins.
+    fn on_grid(&self, times_s: &[f64], with: impl FnMut(&SampledBasis, usize)) {
+        let (columns, sets) = (self.basis.columns(), self.sets());
+        let sample = |times: &[f64]| {
+            SampledBasis::new(columns, sets, times, |joint, time, out| {
+                self.basis.row(joint, time.clamp(0.0, self.duration_s), out);
+            })
+        };
+        self.grids.each(columns * sets, times_s, sample, with);
     }
 }
 
@@ -106,26 +111,12 @@ impl<B: Basis> Family for LinearFamily<B> {
     fn motion(&self, parameters: &[f64], times_s: &[f64], out: &mut Motion) {
         assert_eq!(parameters.len(), self.parameters(), "parameters of {}", B::NAME);
         out.reset(self.joints, times_s.len());
-        let functions = self.sets() * self.basis.columns();
-        self.grids.each(
-            functions,
-            times_s,
-            |times| self.sample(times),
-            |basis, from| basis.motion(parameters, from, out),
-        );
+        self.on_grid(times_s, |basis, from| basis.motion(parameters, from, out));
     }
 
     fn apply_adjoint(&self, parameters: &[f64], times_s: &[f64], adjoint: &MotionAdjoint, gradient: &mut [f64]) {
-        assert_eq!(parameters.len(), self.parameters(), "parameters of {}", B::NAME);
-        assert_eq!(gradient.len(), self.parameters(), "gradient of {}", B::NAME);
-        assert_eq!((adjoint.joints, adjoint.samples), (self.joints, times_s.len()), "cotangent of {}", B::NAME);
-        let functions = self.sets() * self.basis.columns();
-        self.grids.each(
-            functions,
-            times_s,
-            |times| self.sample(times),
-            |basis, from| basis.apply_adjoint(from, adjoint, gradient),
-        );
+        check_shapes(self, parameters, times_s, adjoint, gradient);
+        self.on_grid(times_s, |basis, from| basis.apply_adjoint(from, adjoint, gradient));
     }
 
     fn is_linear(&self) -> bool {
@@ -143,12 +134,7 @@ impl<B: Basis> Family for LinearFamily<B> {
         let columns = self.basis.columns();
         assert_eq!(out.shape(), (columns, columns), "curvature of {}", B::NAME);
         assert_eq!((weights.joints, weights.samples), (self.joints, times_s.len()), "weights of {}", B::NAME);
-        self.grids.each(
-            self.sets() * columns,
-            times_s,
-            |times| self.sample(times),
-            |basis, from| basis.curvature(from, joint, weights, out),
-        );
+        self.on_grid(times_s, |basis, from| basis.curvature(from, joint, weights, out));
         true
     }
 }

@@ -4,7 +4,7 @@ use super::error::{FamilyError, MOST, require, require_frame};
 use super::logistic_stroke::{LAST, LogisticStroke, StrokeDerivatives, logistic_and_bell, unit_stroke, warp};
 use super::random_start::{grid, scale_and_shift};
 use super::sampled_basis::{load_some, store_some};
-use crate::family::Family;
+use crate::family::{Family, check_shapes};
 use crate::motion::{Motion, MotionAdjoint};
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use dynident_model::sample::Random;
@@ -59,13 +59,8 @@ impl LogisticStrokesSettings {
     /// for one stroke to fit into the duration.
     pub fn validate(&self, duration_s: f64) -> Result<(), FamilyError> {
         let least = if self.returns { 2 } else { 1 };
-        require(
-            (least..=MOST).contains(&self.strokes),
-            NAME,
-            "strokes",
-            self.strokes as f64,
-            "give 1 to 1000, and at least 2 if the motion returns to its start",
-        )?;
+        let fix = "give 1 to 1000, and at least 2 if the motion returns to its start";
+        require((least..=MOST).contains(&self.strokes), NAME, "strokes", self.strokes as f64, fix)?;
         require(
             (LogisticStroke::LEAST_SHARPNESS..=MOST_SHARPNESS).contains(&self.sharpness),
             NAME,
@@ -413,9 +408,7 @@ impl Family for LogisticStrokes {
     }
 
     fn apply_adjoint(&self, parameters: &[f64], times_s: &[f64], adjoint: &MotionAdjoint, gradient: &mut [f64]) {
-        assert_eq!(parameters.len(), self.parameters(), "parameters of {NAME}");
-        assert_eq!(gradient.len(), self.parameters(), "gradient of {NAME}");
-        assert_eq!((adjoint.joints, adjoint.samples), (self.joints, times_s.len()), "cotangent of {NAME}");
+        check_shapes(self, parameters, times_s, adjoint, gradient);
         let each = self.each();
         for (joint, own) in gradient.chunks_mut(each).enumerate() {
             let (_, strokes) = self.strokes(parameters, joint);

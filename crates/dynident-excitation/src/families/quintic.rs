@@ -35,13 +35,8 @@ impl QuinticSettings {
     /// Fewer waypoints than a motion needs (2, or 3 if it returns), or more than 1000.
     pub fn validate(&self) -> Result<(), FamilyError> {
         let least = if self.returns { 3 } else { 2 };
-        require(
-            (least..=MOST).contains(&self.way_points),
-            NAME,
-            "way_points",
-            self.way_points as f64,
-            "give 2 to 1000, and at least 3 if the motion returns to its start",
-        )
+        let fix = "give 2 to 1000, and at least 3 if the motion returns to its start";
+        require((least..=MOST).contains(&self.way_points), NAME, "way_points", self.way_points as f64, fix)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::error::{FamilyError, MOST, require, require_frame};
 use super::random_start::{grid, scale_and_shift};
-use crate::family::Family;
+use crate::family::{Family, check_shapes};
 use crate::motion::{Motion, MotionAdjoint};
 use dynident_model::sample::Random;
 use serde::{Deserialize, Serialize};
@@ -239,9 +239,7 @@ impl Family for SplicedLogistic {
     }
 
     fn apply_adjoint(&self, parameters: &[f64], times_s: &[f64], adjoint: &MotionAdjoint, gradient: &mut [f64]) {
-        assert_eq!(parameters.len(), self.parameters(), "parameters of {NAME}");
-        assert_eq!(gradient.len(), self.parameters(), "gradient of {NAME}");
-        assert_eq!((adjoint.joints, adjoint.samples), (self.joints, times_s.len()), "cotangent of {NAME}");
+        check_shapes(self, parameters, times_s, adjoint, gradient);
         for (joint, own) in parameters.chunks(self.each()).enumerate() {
             let (amplitude, omega) = (own[0], own[1]);
             let mut sum = [0.0; 3];

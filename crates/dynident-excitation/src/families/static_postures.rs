@@ -31,13 +31,8 @@ impl StaticPosturesSettings {
     /// Fewer than 2 postures or more than 1000, or a resting part outside 0..1 (ends excluded).
     pub fn validate(&self) -> Result<(), FamilyError> {
         require((2..=MOST).contains(&self.postures), NAME, "postures", self.postures as f64, "give 2 to 1000")?;
-        require(
-            self.rest_part > 0.0 && self.rest_part < 1.0,
-            NAME,
-            "rest_part",
-            self.rest_part,
-            "give a part between 0 and 1",
-        )
+        let fix = "give a part between 0 and 1";
+        require(self.rest_part > 0.0 && self.rest_part < 1.0, NAME, "rest_part", self.rest_part, fix)
     }
 }
 

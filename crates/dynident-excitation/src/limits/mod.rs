@@ -6,7 +6,6 @@
 //! [`diagnose()`] says what binds and what would help. The final word has [`check`](crate::check), which shares none of
 //! this.
 
-mod between_samples;
 mod capsules;
 mod combined;
 mod description;

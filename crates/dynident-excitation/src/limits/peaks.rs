@@ -8,7 +8,7 @@ use crate::motion::Motion;
 pub struct Peak {
     /// The row of the set.
     pub row: usize,
-    /// Largest value, with the set's tightening in it; infinite if the motion is not finite.
+    /// Largest value; infinite if the motion is not finite.
     pub value: f64,
     /// Largest value at the given times.
     pub sampled: f64,

@@ -23,7 +23,6 @@ pub struct LimitSet {
     rows_of: Vec<usize>,
     constraints: Vec<Constraint>,
     bands: Vec<JointBand>,
-    tightening: Vec<f64>,
     torque: bool,
     placements: bool,
 }
@@ -87,7 +86,6 @@ impl LimitSet {
             model: model.clone(),
             torque: terms.iter().any(|term| term.needs_torque()),
             placements: terms.iter().any(|term| term.needs_placements()),
-            tightening: vec![0.0; constraints.len()],
             bands,
             terms,
             rows_of,
@@ -131,21 +129,6 @@ impl LimitSet {
         }
     }
 
-    /// Adds a constant to every value of each row from now on, so that a motion kept at 0 on samples keeps the true
-    /// limit between them. Zero to begin with.
-    ///
-    /// # Panics
-    /// If there is not one number a row.
-    pub fn tighten(&mut self, margins: &[f64]) {
-        assert_eq!(margins.len(), self.constraints.len(), "one margin per row");
-        self.tightening.copy_from_slice(margins);
-    }
-
-    /// The margins in force, one a row.
-    pub fn tightening(&self) -> &[f64] {
-        &self.tightening
-    }
-
     /// Constraint values of all rows at all samples.
     ///
     /// # Panics
@@ -164,13 +147,6 @@ impl LimitSet {
             let (own, others) = rest.split_at_mut(rows * samples);
             term.values(&inputs, own);
             rest = others;
-        }
-        for (row, margin) in out.chunks_exact_mut(samples).zip(&self.tightening) {
-            if *margin != 0.0 {
-                for c in row {
-                    *c += margin;
-                }
-            }
         }
     }
 

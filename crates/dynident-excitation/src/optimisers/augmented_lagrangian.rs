@@ -29,7 +29,7 @@ pub(crate) trait ConstrainedProblem {
     /// Optional: takes up a positive definite model of the augmented Lagrangian's curvature at the `x` of the last
     /// [`gradient`](ConstrainedProblem::gradient), from which the quasi-Newton matrix starts at every step. Returns
     /// whether there is a model.
-    fn prepare_metric(&mut self, _known: &Known<'_>) -> bool {
+    fn prepare_metric(&mut self, _known: &CurvatureFacts<'_>) -> bool {
         false
     }
     /// Multiplies with the inverse of the model of the last [`prepare_metric`](ConstrainedProblem::prepare_metric).
@@ -38,7 +38,7 @@ pub(crate) trait ConstrainedProblem {
 
 /// What is known of the augmented Lagrangian at a point, for a model of its curvature.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Known<'a> {
+pub(crate) struct CurvatureFacts<'a> {
     /// For every constraint the penalty where it pushes, 0 where it does not.
     pub pushing: &'a [f64],
     /// Gradient.
@@ -400,7 +400,7 @@ impl<P: ConstrainedProblem> Smooth for Search<'_, '_, P> {
     }
 
     fn prepare_metric(&mut self, gradient: &[f64], free: &[bool], last: Option<Step<'_>>) -> bool {
-        self.problem.prepare_metric(&Known { pushing: &self.curvature, gradient, free, last })
+        self.problem.prepare_metric(&CurvatureFacts { pushing: &self.curvature, gradient, free, last })
     }
 
     fn divide_by_metric(&self, vector: &mut [f64]) {

@@ -54,12 +54,8 @@ impl CmaEsSettings {
         let population = self.population.unwrap_or(4);
         let usable = population >= 4 && (self.population.is_none() || population <= self.max_evaluations);
         setting("population", population as f64, usable, "at least 4 and at most `max_evaluations`")?;
-        setting(
-            "restarts",
-            self.restarts as f64,
-            self.restarts <= 20,
-            "at most 20 (the population doubles each time)",
-        )?;
+        let fix = "at most 20 (the population doubles each time)";
+        setting("restarts", self.restarts as f64, self.restarts <= 20, fix)?;
         setting("max_evaluations", self.max_evaluations as f64, self.max_evaluations >= 1, "at least 1")?;
         setting("target", self.target.unwrap_or(0.0), !self.target.is_some_and(f64::is_nan), "a number")?;
         let (function, step) = (self.function_tolerance, self.step_tolerance);
@@ -164,6 +160,7 @@ pub fn cma_es(
             result.status = CmaEsStatus::EvaluationLimit;
             break;
         }
+        // One run: generations until it ends by itself or the search does.
         let mut strategy = Strategy::new(&from, steps, smallest << run);
         let before = result.evaluations;
         let mut lowest_of_run = f64::INFINITY;
@@ -207,6 +204,7 @@ pub fn cma_es(
         if matches!(status, CmaEsStatus::Stopped | CmaEsStatus::TargetReached | CmaEsStatus::EvaluationLimit) {
             break;
         }
+        // The next run begins anywhere, with twice the population.
         from = (0..start.len())
             .map(|i| {
                 let [lower, upper] = bounds[i];

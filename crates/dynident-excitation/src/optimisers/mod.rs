@@ -14,8 +14,8 @@ mod projected_lbfgs;
 #[cfg(test)]
 pub(crate) use augmented_lagrangian::AugmentedLagrangianStatus;
 pub(crate) use augmented_lagrangian::{
-    AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianState, ConstrainedProblem, Known,
-    augmented_lagrangian,
+    AugmentedLagrangianResult, AugmentedLagrangianSettings, AugmentedLagrangianState, ConstrainedProblem,
+    CurvatureFacts, augmented_lagrangian,
 };
 pub use binary_genetic::{BinaryGeneticResult, BinaryGeneticSettings, Generation, binary_genetic};
 pub use cma_es::{CmaEsResult, CmaEsRun, CmaEsSettings, CmaEsStatus, cma_es};

@@ -159,37 +159,6 @@ fn check_agrees_with_the_values_and_peaks_bound_both() {
 }
 
 #[test]
-fn sampling_margins_bound_what_happens_between_samples() {
-    let model = random_tree(5, 4);
-    let family = Harmonics::random(&mut Random::new(9), 4, 0.6);
-    let mut limits = all_limits(&model);
-    let dense = grid(2.0, 20_000);
-    let mut motion = Motion::default();
-    family.motion(&dense, &mut motion);
-    // Limits that just hold, so that the bound's premise does.
-    for (joint, limit) in limits.joints.iter_mut().enumerate() {
-        let most = |values: &[f64]| values[motion.of(joint)].iter().fold(0.0_f64, |most, x| most.max(x.abs())) * 1.001;
-        limit.acceleration = Some(most(&motion.ddq));
-        limit.jerk = Some(most(&motion.dddq));
-    }
-    let set = LimitSet::new(&limits, &model).unwrap();
-    let mut workspace = set.workspace();
-    let found = peaks(&set, &mut workspace, &grid(2.0, 40), PeakSettings::default(), |times, out| {
-        family.motion(times, out);
-    });
-    let margins = set.sampling_margins(0.05);
-    let mut compared = 0;
-    for (peak, margin) in found.iter().zip(&margins) {
-        if let Some(margin) = margin {
-            assert!(peak.value <= peak.sampled + margin, "{:?}: {peak:?} {margin}", set.constraints()[peak.row]);
-            compared += 1;
-        }
-    }
-    assert_eq!(compared, 3 * 4);
-    assert!(found.iter().any(|peak| peak.value > peak.sampled + 1e-6), "some peak lies between samples");
-}
-
-#[test]
 fn a_peak_between_samples_is_found_to_its_last_digits() {
     let model = random_tree(1, 1);
     let name = model.joints()[0].name.clone();
@@ -205,20 +174,4 @@ fn a_peak_between_samples_is_found_to_its_last_digits() {
     // The place of a flat top is known to the square root of rounding.
     assert!((found[0].at_s - 1.234).abs() < 1e-6, "{found:?}");
     assert!((found[0].sampled - (1.5 * 0.234_f64.cos() - 1.0)).abs() < 1e-12, "{found:?}");
-}
-
-#[test]
-fn tightening_shifts_values_by_its_amount() {
-    let model = ur10();
-    let mut set = LimitSet::new(&all_limits(&model), &model).unwrap();
-    let mut motion = Motion::default();
-    motion.reset(6, 2);
-    let (mut plain, mut tight) = (Vec::new(), Vec::new());
-    set.values(&mut set.workspace(), &motion, &mut plain);
-    let margins: Vec<f64> = (0..set.constraints().len()).map(|row| row as f64 * 0.01).collect();
-    set.tighten(&margins);
-    set.values(&mut set.workspace(), &motion, &mut tight);
-    for (at, (plain, tight)) in plain.iter().zip(&tight).enumerate() {
-        assert_eq!(plain + margins[at / 2], *tight);
-    }
 }

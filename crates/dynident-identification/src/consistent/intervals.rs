@@ -48,7 +48,7 @@ pub fn consistent_intervals(
     }
     let own = IntervalSettings::default();
     let physical = PhysicalSettings { prior_weight: own.physical.prior_weight, ..settings.fit() };
-    // Each base parameter's variance has its own degrees of degrees_of_freedom; a sum of several has about the middle
+    // Each base parameter's variance has its own degrees of freedom; a sum of several has about the middle
     // one's.
     let mut degrees_of_freedom: Vec<f64> = estimate
         .std_degrees_of_freedom

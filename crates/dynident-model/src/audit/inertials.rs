@@ -45,12 +45,8 @@ fn check_consistent(link: &str, inertial: &InertialParameters, findings: &mut Fi
     let place = || format!("link {link}");
     let mass = inertial.mass_kg();
     if *inertial == InertialParameters::ZERO {
-        findings.add(
-            Info,
-            "mass-not-positive",
-            place(),
-            "is given as massless; delete its <inertial> if it is not known".to_owned(),
-        );
+        let message = "is given as massless; delete its <inertial> if it is not known".to_owned();
+        findings.add(Info, "mass-not-positive", place(), message);
         return;
     }
     let Some(moments) = inertial.principal_moments().filter(|_| mass > 0.0) else {
@@ -62,28 +58,20 @@ fn check_consistent(link: &str, inertial: &InertialParameters, findings: &mut Fi
     // The moments are a difference from the inertia about the frame's origin, and carry its rounding.
     let rounding = NUMERICAL * trace(&inertial.inertia_at_origin()).abs();
     if least < -rounding {
-        findings.add(
-            Problem,
-            "inertia-not-positive",
-            place(),
-            format!(
-                "has principal moments of inertia {least:.4e}, {middle:.4e}, {most:.4e} kg m^2 about its centre of mass: none may be negative; \
-                 check signs, products of inertia, and the point that the inertia is about"
-            ),
+        let message = format!(
+            "has principal moments of inertia {least:.4e}, {middle:.4e}, {most:.4e} kg m^2 about its centre of mass: none may be negative; \
+             check signs, products of inertia, and the point that the inertia is about"
         );
+        findings.add(Problem, "inertia-not-positive", place(), message);
     } else if least + middle < most - rounding {
         let excess = (most - least - middle) / most;
         let level = if excess < ROUNDING { Warning } else { Problem };
-        findings.add(
-            level,
-            "triangle-inequality",
-            place(),
-            format!(
-                "has principal moments of inertia {least:.4e}, {middle:.4e}, {most:.4e} kg m^2: the largest may not exceed the sum of the others \
-                 (by {:.2} % here); no mass distribution has them, check the moments",
-                100.0 * excess
-            ),
+        let message = format!(
+            "has principal moments of inertia {least:.4e}, {middle:.4e}, {most:.4e} kg m^2: the largest may not exceed the sum of the others \
+             (by {:.2} % here); no mass distribution has them, check the moments",
+            100.0 * excess
         );
+        findings.add(level, "triangle-inequality", place(), message);
     }
 }
 
@@ -103,12 +91,9 @@ fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &m
     if distance > FAR * length_m {
         let absurd = distance > ABSURDLY_FAR * length_m;
         let fix = if absurd { "; if that is millimetres, divide by 1000" } else { ": check its frame and unit" };
-        findings.add(
-            if absurd { Problem } else { Warning },
-            "centre-of-mass-outside",
-            place(),
-            format!("has its centre of mass {distance:.4} m from its frame, on a body of about {length_m:.3} m{fix}"),
-        );
+        let message =
+            format!("has its centre of mass {distance:.4} m from its frame, on a body of about {length_m:.3} m{fix}");
+        findings.add(if absurd { Problem } else { Warning }, "centre-of-mass-outside", place(), message);
     }
     // Mean square distance of the mass from its centre: half the trace of the inertia over the mass.
     let square = 0.5 * trace(&inertia) / mass;
@@ -126,27 +111,22 @@ fn likely(link: &str, inertial: &InertialParameters, length_m: f64, findings: &m
     }
     let ball_radius = (3.0 * mass / (4.0 * core::f64::consts::PI * OSMIUM_DENSITY_KG_M3)).cbrt();
     if square >= 0.0 && square < 0.6 * ball_radius.powi(2) {
-        findings.add(
-            Warning,
-            "inertia-too-small",
-            place(),
-            format!(
-                "has less inertia than a ball of osmium of its {mass} kg ({:.2e} kg m^2): it is a point mass or a placeholder, or the unit slipped",
-                0.4 * mass * ball_radius.powi(2)
-            ),
+        let message = format!(
+            "has less inertia than a ball of osmium of its {mass} kg ({:.2e} kg m^2): it is a point mass or a placeholder, or the unit slipped",
+            0.4 * mass * ball_radius.powi(2)
         );
+        findings.add(Warning, "inertia-too-small", place(), message);
     }
     about_origin(link, inertial, com, &inertia, findings);
     let d = [inertia.0[0][0], inertia.0[1][1], inertia.0[2][2]];
     let products = [inertia.0[0][1], inertia.0[0][2], inertia.0[1][2]];
     let power_of_ten = |x: f64| x > 0.0 && (x.log10() - x.log10().round()).abs() < 1e-9;
     if com == Vec3::ZERO && products == [0.0; 3] && d[0] == d[1] && d[1] == d[2] && power_of_ten(d[0]) {
-        findings.add(
-            Warning,
-            "placeholder",
-            place(),
-            format!("has the inertia {} kg m^2 about all axes and its centre of mass at the frame: that looks like a placeholder", d[0]),
+        let message = format!(
+            "has the inertia {} kg m^2 about all axes and its centre of mass at the frame: that looks like a placeholder",
+            d[0]
         );
+        findings.add(Warning, "placeholder", place(), message);
     }
 }
 
@@ -163,16 +143,12 @@ fn about_origin(link: &str, inertial: &InertialParameters, com: Vec3, inertia: &
     let mut moments: [f64; 3] = Matrix3::from_fn(|a, b| rest.0[a][b]).symmetric_eigenvalues().into();
     moments.sort_by(f64::total_cmp);
     if moments[0] > 0.0 && moments[0] + moments[1] >= moments[2] {
-        findings.add(
-            Warning,
-            "inertia-at-origin",
-            format!("link {link}"),
-            format!(
-                "has an inertia of which {:.0} % could be the parallel-axis term m r^2 of its centre of mass: if it was computed about the link's \
-                 origin, move it to the centre of mass",
-                100.0 * share
-            ),
+        let message = format!(
+            "has an inertia of which {:.0} % could be the parallel-axis term m r^2 of its centre of mass: if it was computed about the link's \
+             origin, move it to the centre of mass",
+            100.0 * share
         );
+        findings.add(Warning, "inertia-at-origin", format!("link {link}"), message);
     }
 }
 
@@ -181,12 +157,8 @@ fn unknown(model: &Model, index: usize, findings: &mut Findings) {
     let body = &model.bodies()[index];
     let place = || format!("link {}", body.name());
     if body.prior().is_none() {
-        findings.add(
-            Warning,
-            "inertial-unknown",
-            place(),
-            "moves but has no inertial (nor a link fixed to it): its prior is unknown and counts as zero in predictions".to_owned(),
-        );
+        let message = "moves but has no inertial (nor a link fixed to it): its prior is unknown and counts as zero in predictions".to_owned();
+        findings.add(Warning, "inertial-unknown", place(), message);
     } else {
         let names: Vec<&str> =
             body.links.iter().filter(|link| link.inertial.is_none()).map(|link| link.name.as_str()).collect();
@@ -209,12 +181,9 @@ fn massless(model: &Model, findings: &mut Findings) {
         }
     }
     for (joint, _) in model.joints().iter().zip(carries).filter(|(_, carries)| !carries) {
-        findings.add(
-            Problem,
-            "massless-subtree",
-            format!("joint {}", joint.name),
-            "moves no mass that is known: the mass matrix is singular; give an inertial, or lock the joint".to_owned(),
-        );
+        let message =
+            "moves no mass that is known: the mass matrix is singular; give an inertial, or lock the joint".to_owned();
+        findings.add(Problem, "massless-subtree", format!("joint {}", joint.name), message);
     }
 }
 
@@ -227,12 +196,8 @@ fn equal(model: &Model, findings: &mut Findings) {
         .filter(|(_, inertial)| **inertial != InertialParameters::ZERO)
         .collect();
     if known.len() >= 3 && known.iter().all(|(_, inertial)| *inertial == known[0].1) {
-        findings.add(
-            Warning,
-            "equal-inertials",
-            "model".to_owned(),
-            format!("all {} inertials are the same: that looks like placeholders", known.len()),
-        );
+        let message = format!("all {} inertials are the same: that looks like placeholders", known.len());
+        findings.add(Warning, "equal-inertials", "model".to_owned(), message);
     }
 }
 

@@ -1,10 +1,9 @@
 //! Coulomb friction: `τ = F_c s(q̇)` with a sign or a smooth step `s`.
 
 use super::kind::{
-    JointProperty, MotionFunction, TermAction, TermConstant, TermJoints, TermKind, VelocityCurve, VelocityFriction,
-    VelocityFunction, halves,
+    JointProperty, MotionFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve,
+    VelocityFriction, VelocityFunction, column_of_velocity, halves,
 };
-use super::{JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
 /// The step near zero velocity.
@@ -77,16 +76,8 @@ pub struct Coulomb {
 }
 
 impl TermKind for Coulomb {
-    fn name(&self) -> &'static str {
-        "coulomb"
-    }
-
-    fn symbol(&self) -> String {
-        format!("fc{}", self.joint + 1)
-    }
-
-    fn unit(&self) -> &'static str {
-        "Nm"
+    fn label(&self) -> TermLabel {
+        TermLabel { kind: "coulomb", symbol: format!("fc{}", self.joint + 1), unit: "Nm" }
     }
 
     fn joints(&self) -> TermJoints {
@@ -105,13 +96,7 @@ impl TermKind for Coulomb {
         vec![("shape", TermConstant::Step(self.shape))]
     }
 
-    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
-        self.shape.fill(self.joint, motion, out);
-    }
-
-    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
-        self.shape.add_slopes(self.joint, motion, weights, by_dq);
-    }
+    column_of_velocity!(shape);
 
     fn functions(&self) -> Vec<MotionFunction> {
         halves(self.joint, &format!("{:?}", self.shape)).into()

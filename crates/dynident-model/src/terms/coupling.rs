@@ -6,7 +6,7 @@
 //! * viscous friction: `τ_1 += k_1 k_2 F q̇_2`, `τ_2 += k_1 k_2 F q̇_1`,
 //! * Coulomb friction: `τ_1 += k_1 F s(w)`, `τ_2 += k_2 F s(w)`.
 
-use super::kind::{MotionFunction, TermAction, TermConstant, TermJoints, TermKind, VelocityFriction};
+use super::kind::{MotionFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction};
 use super::{CoulombShape, JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
@@ -40,25 +40,13 @@ pub struct Coupling {
 }
 
 impl TermKind for Coupling {
-    fn name(&self) -> &'static str {
-        "coupling"
-    }
-
-    fn symbol(&self) -> String {
-        let prefix = match self.effect {
-            CouplingEffect::Inertia => "Ia",
-            CouplingEffect::Viscous => "fv",
-            CouplingEffect::Coulomb(_) => "fc",
+    fn label(&self) -> TermLabel {
+        let (letters, unit) = match self.effect {
+            CouplingEffect::Inertia => ("Ia", "kg m^2"),
+            CouplingEffect::Viscous => ("fv", "Nm s/rad"),
+            CouplingEffect::Coulomb(_) => ("fc", "Nm"),
         };
-        format!("{prefix}_{}", self.name)
-    }
-
-    fn unit(&self) -> &'static str {
-        match self.effect {
-            CouplingEffect::Inertia => "kg m^2",
-            CouplingEffect::Viscous => "Nm s/rad",
-            CouplingEffect::Coulomb(_) => "Nm",
-        }
+        TermLabel { kind: "coupling", symbol: format!("{letters}_{}", self.name), unit }
     }
 
     fn joints(&self) -> TermJoints {

@@ -4,11 +4,11 @@
 //! `s`. All four parameters are positive where friction takes power. With a step that is a sign, the two Coulomb
 //! columns and an offset say the same: keep two of the three.
 
+use super::CoulombShape;
 use super::kind::{
-    MotionFunction, TermAction, TermConstant, TermJoints, TermKind, VelocityCurve, VelocityFriction, VelocityFunction,
-    halves,
+    MotionFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction,
+    VelocityFunction, column_of_velocity, halves,
 };
-use super::{CoulombShape, JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
 /// Sense of motion.
@@ -85,16 +85,12 @@ impl VelocityFunction for DirectionalViscous {
 }
 
 impl TermKind for DirectionalViscous {
-    fn name(&self) -> &'static str {
-        "directional-viscous"
-    }
-
-    fn symbol(&self) -> String {
-        format!("fv{}{}", self.joint + 1, self.direction.sign())
-    }
-
-    fn unit(&self) -> &'static str {
-        "Nm s/rad"
+    fn label(&self) -> TermLabel {
+        TermLabel {
+            kind: "directional-viscous",
+            symbol: format!("fv{}{}", self.joint + 1, self.direction.sign()),
+            unit: "Nm s/rad",
+        }
     }
 
     fn joints(&self) -> TermJoints {
@@ -113,13 +109,7 @@ impl TermKind for DirectionalViscous {
         vec![("direction", self.direction.constant())]
     }
 
-    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
-        self.fill(self.joint, motion, out);
-    }
-
-    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
-        self.add_slopes(self.joint, motion, weights, by_dq);
-    }
+    column_of_velocity!();
 
     fn functions(&self) -> Vec<MotionFunction> {
         self.direction.half(halves(self.joint, "viscous"))
@@ -149,16 +139,12 @@ impl VelocityFunction for DirectionalCoulomb {
 }
 
 impl TermKind for DirectionalCoulomb {
-    fn name(&self) -> &'static str {
-        "directional-coulomb"
-    }
-
-    fn symbol(&self) -> String {
-        format!("fc{}{}", self.joint + 1, self.direction.sign())
-    }
-
-    fn unit(&self) -> &'static str {
-        "Nm"
+    fn label(&self) -> TermLabel {
+        TermLabel {
+            kind: "directional-coulomb",
+            symbol: format!("fc{}{}", self.joint + 1, self.direction.sign()),
+            unit: "Nm",
+        }
     }
 
     fn joints(&self) -> TermJoints {
@@ -182,13 +168,7 @@ impl TermKind for DirectionalCoulomb {
         vec![("direction", self.direction.constant()), ("shape", TermConstant::Step(self.shape))]
     }
 
-    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
-        self.fill(self.joint, motion, out);
-    }
-
-    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
-        self.add_slopes(self.joint, motion, weights, by_dq);
-    }
+    column_of_velocity!();
 
     fn functions(&self) -> Vec<MotionFunction> {
         self.direction.half(halves(self.joint, &format!("{:?}", self.shape)))

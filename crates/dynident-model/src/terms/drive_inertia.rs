@@ -1,6 +1,6 @@
 //! Inertia of rotor and gear, reflected to the joint: `τ = I_a q̈`.
 
-use super::kind::{TermAction, TermConstant, TermJoints, TermKind};
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel};
 use super::{JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
@@ -14,16 +14,8 @@ pub struct DriveInertia {
 }
 
 impl TermKind for DriveInertia {
-    fn name(&self) -> &'static str {
-        "drive-inertia"
-    }
-
-    fn symbol(&self) -> String {
-        format!("Ia{}", self.joint + 1)
-    }
-
-    fn unit(&self) -> &'static str {
-        "kg m^2"
+    fn label(&self) -> TermLabel {
+        TermLabel { kind: "drive-inertia", symbol: format!("Ia{}", self.joint + 1), unit: "kg m^2" }
     }
 
     fn joints(&self) -> TermJoints {

@@ -131,16 +131,20 @@ pub enum TermConstant {
     Nothing,
 }
 
+/// What a term is called.
+pub(super) struct TermLabel {
+    /// Name of the kind.
+    pub(super) kind: &'static str,
+    /// Symbol of the parameter with the joint's number from 1.
+    pub(super) symbol: String,
+    /// Unit of the parameter at a revolute joint.
+    pub(super) unit: &'static str,
+}
+
 /// What a kind of torque term says of itself.
 pub(super) trait TermKind: Debug {
-    /// Name of the kind.
-    fn name(&self) -> &'static str;
-
-    /// Symbol of the parameter with the joint's number from 1.
-    fn symbol(&self) -> String;
-
-    /// Unit of the parameter at a revolute joint.
-    fn unit(&self) -> &'static str;
+    /// What it is called.
+    fn label(&self) -> TermLabel;
 
     /// The joints that feel it.
     fn joints(&self) -> TermJoints;
@@ -181,6 +185,34 @@ pub(super) trait TermKind: Debug {
         None
     }
 }
+
+/// Regressor column and adjoint of a term that follows its own joint's velocity: by itself, or by the field that is
+/// named.
+macro_rules! column_of_velocity {
+    ($($field:ident)?) => {
+        fn column(
+            &self,
+            _: usize,
+            motion: &super::JointMotion<'_>,
+            _: &mut super::TermInput<'_>,
+            out: &mut [f64],
+        ) {
+            self$(.$field)?.fill(self.joint, motion, out);
+        }
+
+        fn apply_adjoint(
+            &self,
+            _: usize,
+            motion: &super::JointMotion<'_>,
+            weights: &[f64],
+            by_dq: &mut [f64],
+            _: &mut [f64],
+        ) {
+            self$(.$field)?.add_slopes(self.joint, motion, weights, by_dq);
+        }
+    };
+}
+pub(super) use column_of_velocity;
 
 /// Both halves of a function that [`MotionFunction`]s by direction share: for positive and for negative velocity.
 pub(super) fn halves(row: usize, function: &str) -> [MotionFunction; 2] {

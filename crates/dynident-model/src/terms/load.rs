@@ -4,7 +4,7 @@
 //! only, so the load comes with them (see [`TermInput`](super::TermInput)); without one the column is zero. Source:
 //! Hamon, Gautier and Garrec, IROS 2010, 6187.
 
-use super::kind::{TermAction, TermConstant, TermJoints, TermKind, VelocityFriction};
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction};
 use super::{CoulombShape, JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
@@ -19,16 +19,8 @@ pub struct LoadFriction {
 }
 
 impl TermKind for LoadFriction {
-    fn name(&self) -> &'static str {
-        "load"
-    }
-
-    fn symbol(&self) -> String {
-        format!("fl{}", self.joint + 1)
-    }
-
-    fn unit(&self) -> &'static str {
-        "1"
+    fn label(&self) -> TermLabel {
+        TermLabel { kind: "load", symbol: format!("fl{}", self.joint + 1), unit: "1" }
     }
 
     fn joints(&self) -> TermJoints {

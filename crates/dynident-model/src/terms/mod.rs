@@ -139,17 +139,17 @@ impl TorqueTerm {
 
     /// Name of the kind: `viscous`, `coulomb`, `maxwell-slip`, ..
     pub fn kind_name(&self) -> &'static str {
-        self.kind().name()
+        self.kind().label().kind
     }
 
     /// Readable name of the parameter: its symbol, and the joint's number from 1 (`fv3`), as in the field's papers.
     pub fn symbol(&self) -> String {
-        self.kind().symbol()
+        self.kind().label().symbol
     }
 
     /// Unit of the parameter at a revolute joint.
     pub fn unit(&self) -> &'static str {
-        self.kind().unit()
+        self.kind().label().unit
     }
 
     /// Its constants by name, beside joints and parameter.

@@ -1,6 +1,6 @@
 //! A constant torque: sensor bias, unmodelled spring, asymmetric friction. `τ = τ_0`.
 
-use super::kind::{TermAction, TermConstant, TermJoints, TermKind};
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel};
 use super::{JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
@@ -13,16 +13,8 @@ pub struct Offset {
 }
 
 impl TermKind for Offset {
-    fn name(&self) -> &'static str {
-        "offset"
-    }
-
-    fn symbol(&self) -> String {
-        format!("off{}", self.joint + 1)
-    }
-
-    fn unit(&self) -> &'static str {
-        "Nm"
+    fn label(&self) -> TermLabel {
+        TermLabel { kind: "offset", symbol: format!("off{}", self.joint + 1), unit: "Nm" }
     }
 
     fn joints(&self) -> TermJoints {

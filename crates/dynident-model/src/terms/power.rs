@@ -4,8 +4,10 @@
 //! `p = 1/3`: the sub-linear losses of harmonic drives. `p = 2`: churning lubricant. The rounding keeps the slope
 //! finite at rest, where that of a cube root is not.
 
-use super::kind::{TermAction, TermConstant, TermJoints, TermKind, VelocityCurve, VelocityFriction, VelocityFunction};
-use super::{JointMotion, TermInput};
+use super::kind::{
+    TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction, VelocityFunction,
+    column_of_velocity,
+};
 use serde::{Deserialize, Serialize};
 
 /// Friction of one joint by a power of its velocity, Nm (s/rad)^p.
@@ -58,22 +60,12 @@ impl VelocityFunction for Power {
 }
 
 impl TermKind for Power {
-    fn name(&self) -> &'static str {
-        "power"
-    }
-
-    fn symbol(&self) -> String {
-        match self.exponent {
-            PowerExponent::CubeRoot => format!("fr{}", self.joint + 1),
-            PowerExponent::Quadratic => format!("fq{}", self.joint + 1),
-        }
-    }
-
-    fn unit(&self) -> &'static str {
-        match self.exponent {
-            PowerExponent::CubeRoot => "Nm (s/rad)^(1/3)",
-            PowerExponent::Quadratic => "Nm (s/rad)^2",
-        }
+    fn label(&self) -> TermLabel {
+        let (letters, unit) = match self.exponent {
+            PowerExponent::CubeRoot => ("fr", "Nm (s/rad)^(1/3)"),
+            PowerExponent::Quadratic => ("fq", "Nm (s/rad)^2"),
+        };
+        TermLabel { kind: "power", symbol: format!("{letters}{}", self.joint + 1), unit }
     }
 
     fn joints(&self) -> TermJoints {
@@ -95,11 +87,5 @@ impl TermKind for Power {
         ]
     }
 
-    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
-        self.fill(self.joint, motion, out);
-    }
-
-    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
-        self.add_slopes(self.joint, motion, weights, by_dq);
-    }
+    column_of_velocity!();
 }

@@ -4,8 +4,10 @@
 //! it is half a smooth Coulomb step of width `2/φ₂`. Source: Gaz, Cognetti, Oliva, Robuffo Giordano and De Luca, IEEE
 //! RA-L 4 (2019) 4147.
 
-use super::kind::{TermAction, TermConstant, TermJoints, TermKind, VelocityCurve, VelocityFriction, VelocityFunction};
-use super::{JointMotion, TermInput};
+use super::kind::{
+    TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction, VelocityFunction,
+    column_of_velocity,
+};
 use serde::{Deserialize, Serialize};
 
 /// The step of one joint, Nm (N).
@@ -37,16 +39,8 @@ impl VelocityFunction for Sigmoid {
 }
 
 impl TermKind for Sigmoid {
-    fn name(&self) -> &'static str {
-        "sigmoid"
-    }
-
-    fn symbol(&self) -> String {
-        format!("sig{}", self.joint + 1)
-    }
-
-    fn unit(&self) -> &'static str {
-        "Nm"
+    fn label(&self) -> TermLabel {
+        TermLabel { kind: "sigmoid", symbol: format!("sig{}", self.joint + 1), unit: "Nm" }
     }
 
     fn joints(&self) -> TermJoints {
@@ -68,11 +62,5 @@ impl TermKind for Sigmoid {
         ]
     }
 
-    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
-        self.fill(self.joint, motion, out);
-    }
-
-    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
-        self.add_slopes(self.joint, motion, weights, by_dq);
-    }
+    column_of_velocity!();
 }

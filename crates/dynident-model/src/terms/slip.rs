@@ -7,7 +7,7 @@
 //! direction. Source: Al-Bender, Lampaert and Swevers, IEEE Trans. Automatic Control 50 (2005) 1883 (without its
 //! sliding dynamics); Lampaert, Swevers and Al-Bender (2002).
 
-use super::kind::{TermAction, TermConstant, TermJoints, TermKind};
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel};
 use super::{JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
@@ -36,16 +36,12 @@ impl HysteresisState {
 }
 
 impl TermKind for MaxwellSlip {
-    fn name(&self) -> &'static str {
-        "maxwell-slip"
-    }
-
-    fn symbol(&self) -> String {
-        format!("slip{}_{}", self.joint + 1, self.yield_displacement)
-    }
-
-    fn unit(&self) -> &'static str {
-        "Nm"
+    fn label(&self) -> TermLabel {
+        TermLabel {
+            kind: "maxwell-slip",
+            symbol: format!("slip{}_{}", self.joint + 1, self.yield_displacement),
+            unit: "Nm",
+        }
     }
 
     fn joints(&self) -> TermJoints {

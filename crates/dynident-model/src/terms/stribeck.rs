@@ -3,8 +3,10 @@
 //! Beside Coulomb friction `F_c`, `F_s` is what static friction has more. Linear in `F_s` at given `v_s` and `δ`.
 //! Source: Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083.
 
-use super::kind::{TermAction, TermConstant, TermJoints, TermKind, VelocityFriction, VelocityFunction};
-use super::{CoulombShape, JointMotion, TermInput};
+use super::CoulombShape;
+use super::kind::{
+    TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFriction, VelocityFunction, column_of_velocity,
+};
 use serde::{Deserialize, Serialize};
 
 /// Extra friction of one joint near rest, Nm (N).
@@ -41,16 +43,8 @@ impl VelocityFunction for Stribeck {
 }
 
 impl TermKind for Stribeck {
-    fn name(&self) -> &'static str {
-        "stribeck"
-    }
-
-    fn symbol(&self) -> String {
-        format!("fs{}", self.joint + 1)
-    }
-
-    fn unit(&self) -> &'static str {
-        "Nm"
+    fn label(&self) -> TermLabel {
+        TermLabel { kind: "stribeck", symbol: format!("fs{}", self.joint + 1), unit: "Nm" }
     }
 
     fn joints(&self) -> TermJoints {
@@ -76,11 +70,5 @@ impl TermKind for Stribeck {
         ]
     }
 
-    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
-        self.fill(self.joint, motion, out);
-    }
-
-    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
-        self.add_slopes(self.joint, motion, weights, by_dq);
-    }
+    column_of_velocity!();
 }

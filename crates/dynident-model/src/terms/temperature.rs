@@ -7,7 +7,7 @@
 //! Source: Bittencourt and Axelsson, IEEE/ASME Trans. Mechatronics 19 (2014) 1484; Simoni et al., IFAC PapersOnLine 48
 //! (2015) 183.
 
-use super::kind::{TermAction, TermConstant, TermJoints, TermKind};
+use super::kind::{TermAction, TermConstant, TermJoints, TermKind, TermLabel};
 use super::{CoulombShape, JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
@@ -58,16 +58,8 @@ impl TemperatureCoulomb {
 }
 
 impl TermKind for TemperatureViscous {
-    fn name(&self) -> &'static str {
-        "temperature-viscous"
-    }
-
-    fn symbol(&self) -> String {
-        format!("fvT{}", self.joint + 1)
-    }
-
-    fn unit(&self) -> &'static str {
-        "Nm s/(rad K)"
+    fn label(&self) -> TermLabel {
+        TermLabel { kind: "temperature-viscous", symbol: format!("fvT{}", self.joint + 1), unit: "Nm s/(rad K)" }
     }
 
     fn joints(&self) -> TermJoints {
@@ -96,16 +88,8 @@ impl TermKind for TemperatureViscous {
 }
 
 impl TermKind for TemperatureCoulomb {
-    fn name(&self) -> &'static str {
-        "temperature-coulomb"
-    }
-
-    fn symbol(&self) -> String {
-        format!("fcT{}", self.joint + 1)
-    }
-
-    fn unit(&self) -> &'static str {
-        "Nm/K"
+    fn label(&self) -> TermLabel {
+        TermLabel { kind: "temperature-coulomb", symbol: format!("fcT{}", self.joint + 1), unit: "Nm/K" }
     }
 
     fn joints(&self) -> TermJoints {

@@ -1,9 +1,9 @@
 //! Viscous friction: `τ = F_v q̇`.
 
 use super::kind::{
-    JointProperty, MotionFunction, TermAction, TermConstant, TermJoints, TermKind, VelocityFunction, halves,
+    JointProperty, MotionFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityFunction,
+    column_of_velocity, halves,
 };
-use super::{JointMotion, TermInput};
 use serde::{Deserialize, Serialize};
 
 /// Viscous friction of one joint, Nm s/rad (N s/m).
@@ -25,16 +25,8 @@ impl VelocityFunction for Viscous {
 }
 
 impl TermKind for Viscous {
-    fn name(&self) -> &'static str {
-        "viscous"
-    }
-
-    fn symbol(&self) -> String {
-        format!("fv{}", self.joint + 1)
-    }
-
-    fn unit(&self) -> &'static str {
-        "Nm s/rad"
+    fn label(&self) -> TermLabel {
+        TermLabel { kind: "viscous", symbol: format!("fv{}", self.joint + 1), unit: "Nm s/rad" }
     }
 
     fn joints(&self) -> TermJoints {
@@ -53,13 +45,7 @@ impl TermKind for Viscous {
         Vec::new()
     }
 
-    fn column(&self, _: usize, motion: &JointMotion<'_>, _: &mut TermInput<'_>, out: &mut [f64]) {
-        self.fill(self.joint, motion, out);
-    }
-
-    fn apply_adjoint(&self, _: usize, motion: &JointMotion<'_>, weights: &[f64], by_dq: &mut [f64], _: &mut [f64]) {
-        self.add_slopes(self.joint, motion, weights, by_dq);
-    }
+    column_of_velocity!();
 
     fn functions(&self) -> Vec<MotionFunction> {
         halves(self.joint, "viscous").into()

@@ -81,63 +81,7 @@ fn run_backwards(sections: &[Section], signal: &mut [Triple]) {
 /// is what a 5 kHz log needs (two differences of y would cost eight digits there).
 /// Source: Abramowitz and Stegun, Handbook of Mathematical Functions, 25.3; Gustafsson, IEEE Trans. Signal Process. 44
 /// (1996) 988.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ButterworthZeroPhase {
-    cascade: Cascade,
-}
-
-impl ButterworthZeroPhase {
-    /// A filter of one-way order `order` and cut-off `cutoff_hz`.
-    ///
-    /// # Errors
-    /// If `order` is not 1 to 12 or the cut-off is not positive.
-    pub fn new(order: usize, cutoff_hz: f64) -> Result<Self, FilterError> {
-        Ok(Self { cascade: Cascade::new(order, cutoff_hz)? })
-    }
-
-    /// The cut-off, where the two-way gain is one half.
-    pub fn cutoff_hz(&self) -> f64 {
-        self.cascade.cutoff_hz
-    }
-}
-
-impl Differentiator for ButterworthZeroPhase {
-    fn name(&self) -> &'static str {
-        "butterworth"
-    }
-
-    fn context_samples(&self, rate_hz: f64) -> Option<usize> {
-        Some(self.cascade.context_samples(rate_hz))
-    }
-
-    fn minimum_samples(&self) -> usize {
-        self.cascade.padding() + 1
-    }
-
-    fn differentiate_at(&self, place: Place, q: &[f64], mut out: Derivatives<'_>) -> Result<SampleRanges, FilterError> {
-        self.check_length(q.len())?;
-        let (sections, pad) = (self.cascade.sections(place.rate_hz)?, self.cascade.padding());
-        let mut signal = extended(q, pad);
-        add_differences(&mut signal);
-        run_forwards(&sections, &mut signal);
-        // Beyond the end the first difference is zero, so the second difference at the end is minus the first there.
-        let last = signal.len() - 1;
-        signal[last][2] = -signal[last][1];
-        run_backwards(&sections, &mut signal);
-        write_derivatives(&signal, pad, q.len(), place.rate_hz, &mut out);
-        Ok(Vec::new())
-    }
-
-    fn smooth(&self, rate_hz: f64, input: &[f64], out: &mut [f64]) -> Result<(), FilterError> {
-        self.check_length(input.len())?;
-        let (sections, pad) = (self.cascade.sections(rate_hz)?, self.cascade.padding());
-        let mut signal = extended(input, pad);
-        run_forwards(&sections, &mut signal);
-        run_backwards(&sections, &mut signal);
-        write_values(&signal[pad..pad + input.len()], out);
-        Ok(())
-    }
-}
+pub type ButterworthZeroPhase = Butterworth<true>;
 
 /// A Butterworth low-pass run forwards only, then differentiated by central differences of sixth order.
 ///
@@ -150,13 +94,16 @@ impl Differentiator for ButterworthZeroPhase {
 /// [`ButterworthZeroPhase`].
 /// Source: Atkeson, An, Hollerbach, Int. J. Robotics Res. 5 (1986) 101 (filtered by a low-pass before differentiation);
 /// Oppenheim and Schafer, Discrete-Time Signal Processing, 7.1.2.
+pub type LowPass = Butterworth<false>;
+
+/// A [`ButterworthZeroPhase`], run `BOTH_WAYS`, or a [`LowPass`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct LowPass {
+pub struct Butterworth<const BOTH_WAYS: bool> {
     cascade: Cascade,
 }
 
-impl LowPass {
-    /// A filter of order `order` and cut-off `cutoff_hz`.
+impl<const BOTH_WAYS: bool> Butterworth<BOTH_WAYS> {
+    /// A filter of one-way order `order` and cut-off `cutoff_hz`.
     ///
     /// # Errors
     /// If `order` is not 1 to 12 or the cut-off is not positive.
@@ -164,6 +111,32 @@ impl LowPass {
         Ok(Self { cascade: Cascade::new(order, cutoff_hz)? })
     }
 
+    /// The cut-off of one run: of both, the gain there is one half.
+    pub fn cutoff_hz(&self) -> f64 {
+        self.cascade.cutoff_hz
+    }
+
+    /// The filtered signal between its extensions of the returned length, with its differences if they are wanted.
+    fn filtered(&self, rate_hz: f64, signal: &[f64], differences: bool) -> Result<(Vec<Triple>, usize), FilterError> {
+        self.check_length(signal.len())?;
+        let (sections, pad) = (self.cascade.sections(rate_hz)?, self.cascade.padding());
+        let mut signal = extended(signal, pad);
+        if differences {
+            add_differences(&mut signal);
+        }
+        run_forwards(&sections, &mut signal);
+        if BOTH_WAYS {
+            // Beyond the end the first difference is zero, so the second difference at the end is minus the first
+            // there.
+            let last = signal.len() - 1;
+            signal[last][2] = -signal[last][1];
+            run_backwards(&sections, &mut signal);
+        }
+        Ok((signal, pad))
+    }
+}
+
+impl LowPass {
     /// Seconds by which a slow signal comes out late: the group delay at zero frequency. For an analogue Butterworth
     /// filter of order n that is `Σ_k sin(π(2k+1)/2n) / (2π f_c)`, so 2.61/(2π f_c) for order 4.
     ///
@@ -180,9 +153,9 @@ impl LowPass {
     }
 }
 
-impl Differentiator for LowPass {
+impl<const BOTH_WAYS: bool> Differentiator for Butterworth<BOTH_WAYS> {
     fn name(&self) -> &'static str {
-        "low-pass"
+        if BOTH_WAYS { "butterworth" } else { "low-pass" }
     }
 
     fn context_samples(&self, rate_hz: f64) -> Option<usize> {
@@ -193,35 +166,20 @@ impl Differentiator for LowPass {
         self.cascade.padding() + 1
     }
 
-    fn differentiate_at(&self, place: Place, q: &[f64], mut out: Derivatives<'_>) -> Result<SampleRanges, FilterError> {
-        self.check_length(q.len())?;
-        let (sections, pad) = (self.cascade.sections(place.rate_hz)?, self.cascade.padding());
-        let mut signal = extended(q, pad);
-        add_differences(&mut signal);
-        run_forwards(&sections, &mut signal);
-        write_derivatives(&signal, pad, q.len(), place.rate_hz, &mut out);
+    fn differentiate_at(&self, place: Place, q: &[f64], out: Derivatives<'_>) -> Result<SampleRanges, FilterError> {
+        let (signal, pad) = self.filtered(place.rate_hz, q, true)?;
+        for i in 0..q.len() {
+            [out.q[i], out.dq[i], out.ddq[i]] = sixth_order(&signal, pad + i, place.rate_hz);
+        }
         Ok(Vec::new())
     }
 
     fn smooth(&self, rate_hz: f64, input: &[f64], out: &mut [f64]) -> Result<(), FilterError> {
-        self.check_length(input.len())?;
-        let (sections, pad) = (self.cascade.sections(rate_hz)?, self.cascade.padding());
-        let mut signal = extended(input, pad);
-        run_forwards(&sections, &mut signal);
-        write_values(&signal[pad..pad + input.len()], out);
+        let (signal, pad) = self.filtered(rate_hz, input, false)?;
+        for (out, value) in out.iter_mut().zip(&signal[pad..pad + input.len()]) {
+            *out = value[0];
+        }
         Ok(())
-    }
-}
-
-fn write_derivatives(signal: &[Triple], pad: usize, samples: usize, rate_hz: f64, out: &mut Derivatives<'_>) {
-    for i in 0..samples {
-        [out.q[i], out.dq[i], out.ddq[i]] = sixth_order(signal, pad + i, rate_hz);
-    }
-}
-
-fn write_values(signal: &[Triple], out: &mut [f64]) {
-    for (out, value) in out.iter_mut().zip(signal) {
-        *out = value[0];
     }
 }
 

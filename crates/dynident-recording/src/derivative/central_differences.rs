@@ -1,7 +1,7 @@
 //! Central differences of order 2 to 8 of the positions as logged: no filter.
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
-use crate::error::FilterError;
+use crate::error::{FilterError, require};
 
 /// Finite differences on `order + 1` points, central inside, shifted at the two ends (the same points, weights for the
 /// place), so exact for polynomials of degree `order`. The position is passed through.
@@ -21,9 +21,7 @@ impl CentralDifferences {
     /// # Errors
     /// If `order` is not 2, 4, 6 or 8.
     pub fn new(order: usize) -> Result<Self, FilterError> {
-        if !matches!(order, 2 | 4 | 6 | 8) {
-            return Err(FilterError::Setting { name: "order", value: order as f64, fix: "give 2, 4, 6 or 8" });
-        }
+        require(matches!(order, 2 | 4 | 6 | 8), "order", order as f64, "give 2, 4, 6 or 8")?;
         let points: Vec<f64> = (0..=order).map(|i| i as f64).collect();
         let weights = (0..=order).map(|place| fornberg(place as f64, &points)).collect();
         Ok(Self { order, weights })

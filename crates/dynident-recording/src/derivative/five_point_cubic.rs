@@ -4,7 +4,7 @@ use super::butterworth::ButterworthZeroPhase;
 use super::central_differences::CentralDifferences;
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use super::savitzky_golay::SavitzkyGolay;
-use crate::error::FilterError;
+use crate::error::{FilterError, require};
 
 /// Torque ([`smooth`](Differentiator::smooth)): the least-squares cubic on five points, `(-3, 12, 17, 12, -3)/35`,
 /// `passes` times, at the ends the first and last cubic's own values. Position: one zero-phase Butterworth filter of
@@ -28,9 +28,7 @@ impl FivePointCubic {
     /// # Errors
     /// If `passes` is not 1 to 1000 or the cut-off is not positive.
     pub fn new(passes: usize, cutoff_hz: f64) -> Result<Self, FilterError> {
-        if !(1..=1000).contains(&passes) {
-            return Err(FilterError::Setting { name: "passes", value: passes as f64, fix: "give 1 to 1000" });
-        }
+        require((1..=1000).contains(&passes), "passes", passes as f64, "give 1 to 1000")?;
         Ok(Self {
             cubic: SavitzkyGolay::new(5, 3)?,
             passes,

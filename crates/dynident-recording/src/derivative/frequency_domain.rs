@@ -1,7 +1,7 @@
 //! Differentiation in the frequency domain.
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
-use crate::error::FilterError;
+use crate::error::{FilterError, require};
 use crate::filter::bridge::{LEAST_SAMPLES, bridge};
 use core::f64::consts::{PI, TAU};
 use realfft::RealFftPlanner;
@@ -54,11 +54,8 @@ impl FrequencyDomain {
     /// # Errors
     /// If the cut-off is not positive.
     pub fn new(cutoff_hz: f64, ends: Ends) -> Result<Self, FilterError> {
-        if cutoff_hz.is_finite() && cutoff_hz > 0.0 {
-            Ok(Self { cutoff_hz, ends })
-        } else {
-            Err(FilterError::Setting { name: "cutoff_hz", value: cutoff_hz, fix: "give a positive frequency" })
-        }
+        require(cutoff_hz.is_finite() && cutoff_hz > 0.0, "cutoff_hz", cutoff_hz, "give a positive frequency")?;
+        Ok(Self { cutoff_hz, ends })
     }
 
     /// Samples of one period of the cut-off: what a polynomial is fitted to at tapered ends, and what does not count

@@ -1,6 +1,6 @@
 //! Least squares of a straight line and harmonics: the series, its fit and its derivatives.
 
-use crate::error::FilterError;
+use crate::error::{FilterError, require};
 use core::f64::consts::TAU;
 
 /// Rows that are gathered before the next reduction to a triangle.
@@ -110,14 +110,9 @@ impl HarmonicFit {
 /// # Errors
 /// A base frequency that is not positive, or harmonics that are not 1 to 200.
 pub(crate) fn check_series(base_hz: f64, harmonics: usize) -> Result<(), FilterError> {
-    if !(base_hz.is_finite() && base_hz > 0.0) {
-        let fix = "give the trajectory's base frequency, positive, in Hz";
-        return Err(FilterError::Setting { name: "base_hz", value: base_hz, fix });
-    }
-    if !(1..=200).contains(&harmonics) {
-        return Err(FilterError::Setting { name: "harmonics", value: harmonics as f64, fix: "give 1 to 200" });
-    }
-    Ok(())
+    let fix = "give the trajectory's base frequency, positive, in Hz";
+    require(base_hz.is_finite() && base_hz > 0.0, "base_hz", base_hz, fix)?;
+    require((1..=200).contains(&harmonics), "harmonics", harmonics as f64, "give 1 to 200")
 }
 
 /// The triangular factor of a tall matrix that comes row by row; its last column is the right-hand side.

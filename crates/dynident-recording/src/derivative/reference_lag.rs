@@ -1,7 +1,7 @@
 //! By how much a joint comes after its reference, stroke by stroke.
 
 use super::differentiator::Place;
-use crate::error::FilterError;
+use crate::error::{FilterError, require};
 use crate::reference::Reference;
 use crate::reference::Stroke;
 
@@ -62,10 +62,7 @@ pub(super) fn piece_lag(reference: &Reference, place: Place, q: &[f64], max_lag_
 }
 
 pub(super) fn check_max_lag(max_lag_s: f64) -> Result<(), FilterError> {
-    if max_lag_s > 0.0 && max_lag_s <= 60.0 {
-        return Ok(());
-    }
-    Err(FilterError::Setting { name: "max_lag_s", value: max_lag_s, fix: "give seconds, above 0 and at most 60" })
+    require(max_lag_s > 0.0 && max_lag_s <= 60.0, "max_lag_s", max_lag_s, "give seconds, above 0 and at most 60")
 }
 
 pub(super) fn check_joint(reference: &Reference, place: Place) -> Result<(), FilterError> {

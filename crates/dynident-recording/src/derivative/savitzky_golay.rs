@@ -1,7 +1,7 @@
 //! Savitzky-Golay: a polynomial fitted to a sliding window.
 
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
-use crate::error::FilterError;
+use crate::error::{FilterError, require};
 use crate::filter::orthonormal::orthonormal_polynomials;
 
 /// Least-squares polynomial of `degree` on `window` samples, its value and derivatives at the middle; in the first and
@@ -21,20 +21,10 @@ impl SavitzkyGolay {
     /// # Errors
     /// If `window` is even or beyond 501, or `degree` is not 2 to 8 and below `window`.
     pub fn new(window: usize, degree: usize) -> Result<Self, FilterError> {
-        if window.is_multiple_of(2) || !(3..=501).contains(&window) {
-            return Err(FilterError::Setting {
-                name: "window",
-                value: window as f64,
-                fix: "give an odd number, 3 to 501",
-            });
-        }
-        if !(2..=8).contains(&degree) || degree >= window {
-            return Err(FilterError::Setting {
-                name: "degree",
-                value: degree as f64,
-                fix: "give 2 to 8, below the window",
-            });
-        }
+        let fix = "give an odd number, 3 to 501";
+        require(window % 2 == 1 && (3..=501).contains(&window), "window", window as f64, fix)?;
+        let fix = "give 2 to 8, below the window";
+        require((2..=8).contains(&degree) && degree < window, "degree", degree as f64, fix)?;
         Ok(Self { window, weights: polynomial_weights(window, degree) })
     }
 }

@@ -174,30 +174,20 @@ impl DifferentiatorSettings {
     /// # Errors
     /// A [`FilterError`] that names the setting.
     pub fn validate(&self) -> Result<(), FilterError> {
-        match self {
-            Self::PositionMap { reference, max_lag_s } | Self::TimeWarp { reference, max_lag_s } => {
-                reference.validate()?;
-                check_max_lag(*max_lag_s)
-            }
-            Self::Deviation { reference, smoother, max_lag_s } => {
-                reference.validate()?;
-                max_lag_s.map_or(Ok(()), check_max_lag)?;
-                if smoother.reference().is_some() {
-                    let problem = "the smoother of a deviation must not need a reference itself".to_owned();
-                    return Err(FilterError::Reference { problem });
-                }
-                smoother.validate()
-            }
-            Self::Butterworth { .. }
-            | Self::CentralDifferences { .. }
-            | Self::SavitzkyGolay { .. }
-            | Self::LowPass { .. }
-            | Self::FourierFit { .. }
-            | Self::FrequencyDomain { .. }
-            | Self::SmoothedDifferences { .. }
-            | Self::FivePointCubic { .. }
-            | Self::VelocitySeries { .. } => self.build(1.0).map(drop),
+        let Some(reference) = self.reference() else { return self.build(1.0).map(drop) };
+        reference.validate()?;
+        if let Self::PositionMap { max_lag_s, .. } | Self::TimeWarp { max_lag_s, .. } = self {
+            check_max_lag(*max_lag_s)?;
         }
+        if let Self::Deviation { smoother, max_lag_s, .. } = self {
+            max_lag_s.map_or(Ok(()), check_max_lag)?;
+            if smoother.reference().is_some() {
+                let problem = "the smoother of a deviation must not need a reference itself".to_owned();
+                return Err(FilterError::Reference { problem });
+            }
+            smoother.validate()?;
+        }
+        Ok(())
     }
 
     /// How the commanded motion is named; `None` for differentiators that need none.
@@ -278,25 +268,18 @@ impl DifferentiatorSettings {
             Some(given) => Ok(Arc::clone(given)),
             None => settings.closed_form()?.map(Arc::new).ok_or(FilterError::NoReference { method }),
         };
+        let cutoff_hz = self.cutoff_hz().unwrap_or(chosen_cutoff_hz);
         Ok(match self {
-            Self::Butterworth { order, cutoff_hz } => {
-                Box::new(ButterworthZeroPhase::new(*order, cutoff_hz.unwrap_or(chosen_cutoff_hz))?)
-            }
+            Self::Butterworth { order, .. } => Box::new(ButterworthZeroPhase::new(*order, cutoff_hz)?),
             Self::CentralDifferences { order } => Box::new(CentralDifferences::new(*order)?),
             Self::SavitzkyGolay { window, degree } => Box::new(SavitzkyGolay::new(*window, *degree)?),
-            Self::LowPass { order, cutoff_hz } => {
-                Box::new(LowPass::new(*order, cutoff_hz.unwrap_or(chosen_cutoff_hz))?)
-            }
+            Self::LowPass { order, .. } => Box::new(LowPass::new(*order, cutoff_hz)?),
             Self::FourierFit { base_hz, harmonics, trend } => Box::new(FourierFit::new(*base_hz, *harmonics, *trend)?),
-            Self::FrequencyDomain { cutoff_hz, ends } => {
-                Box::new(FrequencyDomain::new(cutoff_hz.unwrap_or(chosen_cutoff_hz), *ends)?)
-            }
+            Self::FrequencyDomain { ends, .. } => Box::new(FrequencyDomain::new(cutoff_hz, *ends)?),
             Self::SmoothedDifferences { order, window } => Box::new(SmoothedDifferences::new(*order, *window)?),
-            Self::FivePointCubic { passes, cutoff_hz } => {
-                Box::new(FivePointCubic::new(*passes, cutoff_hz.unwrap_or(chosen_cutoff_hz))?)
-            }
-            Self::VelocitySeries { base_hz, harmonics, cutoff_hz } => {
-                Box::new(VelocitySeries::new(*base_hz, *harmonics, cutoff_hz.unwrap_or(chosen_cutoff_hz))?)
+            Self::FivePointCubic { passes, .. } => Box::new(FivePointCubic::new(*passes, cutoff_hz)?),
+            Self::VelocitySeries { base_hz, harmonics, .. } => {
+                Box::new(VelocitySeries::new(*base_hz, *harmonics, cutoff_hz)?)
             }
             Self::PositionMap { reference, max_lag_s } => {
                 Box::new(PositionMap::new(motion(reference, "position-map")?, *max_lag_s)?)

@@ -2,7 +2,7 @@
 
 use super::central_differences::CentralDifferences;
 use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
-use crate::error::FilterError;
+use crate::error::{FilterError, require};
 
 /// Central differences of the positions as logged, the acceleration then smoothed by a moving average of `window`
 /// samples; the torque is smoothed the same differentiator where `smooth_torque` asks for it. Position and velocity
@@ -26,10 +26,8 @@ impl SmoothedDifferences {
     /// # Errors
     /// If `order` is not 2, 4, 6 or 8, or `window` is even or beyond 501.
     pub fn new(order: usize, window: usize) -> Result<Self, FilterError> {
-        if window.is_multiple_of(2) || !(3..=501).contains(&window) {
-            let fix = "give an odd number, 3 to 501";
-            return Err(FilterError::Setting { name: "window", value: window as f64, fix });
-        }
+        let fix = "give an odd number, 3 to 501";
+        require(window % 2 == 1 && (3..=501).contains(&window), "window", window as f64, fix)?;
         Ok(Self { differences: CentralDifferences::new(order)?, order, window })
     }
 }

@@ -1,6 +1,6 @@
 //! The parallel filter: one linear-phase low-pass for torque and every regressor column, then every n-th row.
 
-use crate::error::FilterError;
+use crate::error::{FilterError, require};
 use core::f64::consts::PI;
 use dynident_lanes::{Kernel, Lane, Level, dispatch};
 use serde::{Deserialize, Serialize};
@@ -46,31 +46,20 @@ impl DecimationSettings {
     /// # Errors
     /// A [`FilterError`] that names the setting.
     pub fn taps(&self, rate_hz: f64) -> Result<Vec<f64>, FilterError> {
-        let bad = |name, value, fix| Err(FilterError::Setting { name, value, fix });
-        if !(1..=1000).contains(&self.factor) {
-            return bad("factor", self.factor as f64, "give 1 to 1000");
-        }
-        if !(21.0..=120.0).contains(&self.stop_band_db) {
-            return bad("stop_band_db", self.stop_band_db, "give 21 to 120 dB");
-        }
-        if !(rate_hz.is_finite() && rate_hz > 0.0) {
-            return bad("rate_hz", rate_hz, "give a positive rate");
-        }
+        require((1..=1000).contains(&self.factor), "factor", self.factor as f64, "give 1 to 1000")?;
+        require((21.0..=120.0).contains(&self.stop_band_db), "stop_band_db", self.stop_band_db, "give 21 to 120 dB")?;
+        require(rate_hz.is_finite() && rate_hz > 0.0, "rate_hz", rate_hz, "give a positive rate")?;
         if self.factor == 1 && self.cutoff_hz.is_none() {
             return Ok(vec![1.0]);
         }
         let reduced = rate_hz / self.factor as f64;
         let cutoff = self.cutoff_hz.unwrap_or(0.4 * reduced);
-        if !(cutoff.is_finite() && cutoff > 0.0) {
-            return bad("cutoff_hz", cutoff, "give a positive frequency");
-        }
+        require(cutoff.is_finite() && cutoff > 0.0, "cutoff_hz", cutoff, "give a positive frequency")?;
         if cutoff >= 0.5 * rate_hz {
             return Err(FilterError::AboveNyquist { cutoff_hz: cutoff, rate_hz });
         }
         let transition = self.transition_hz.unwrap_or(0.4 * reduced).min(2.0 * cutoff).min(rate_hz - 2.0 * cutoff);
-        if !(transition.is_finite() && transition > 0.0) {
-            return bad("transition_hz", transition, "give a positive width");
-        }
+        require(transition.is_finite() && transition > 0.0, "transition_hz", transition, "give a positive width")?;
         // Kaiser's formulas are good to about a decibel; aiming two higher makes the documented figures hold.
         let attenuation = self.stop_band_db + 2.0;
         let beta = if attenuation > 50.0 {
@@ -79,9 +68,8 @@ impl DecimationSettings {
             0.5842 * (attenuation - 21.0).powf(0.4) + 0.07886 * (attenuation - 21.0)
         };
         let length = (attenuation - 7.95) / (2.285 * 2.0 * PI * transition / rate_hz) + 1.0;
-        if length > MAX_TAPS as f64 {
-            return bad("transition_hz", transition, "widen it: the filter would have more than 20001 coefficients");
-        }
+        let fix = "widen it: the filter would have more than 20001 coefficients";
+        require(length <= MAX_TAPS as f64, "transition_hz", transition, fix)?;
         let half = ((length.ceil() as usize) / 2).max(1);
         let middle = half as f64;
         let mut taps: Vec<f64> = (0..=2 * half)

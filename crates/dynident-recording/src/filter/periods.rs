@@ -38,7 +38,7 @@ impl AveragedPeriods {
 /// // Two periods of three samples, 0.2 apart everywhere.
 /// let found = dynident_recording::averaged_periods(&[&[0.9, 1.9, 2.9, 1.1, 2.1, 3.1]], 3)?;
 /// assert!((found.mean[0][2] - 3.0).abs() < 1e-12);
-/// assert!((found.sample_covariance[0][0] - 0.02).abs() < 1e-12); // 2 · 0.1² over one degree of degrees_of_freedom
+/// assert!((found.sample_covariance[0][0] - 0.02).abs() < 1e-12); // 2 · 0.1² over one degree of freedom
 /// # Ok::<(), dynident_recording::FormatError>(())
 /// ```
 pub fn averaged_periods(channels: &[&[f64]], period_samples: usize) -> Result<AveragedPeriods, FormatError> {

@@ -1,6 +1,6 @@
 //! Second-order sections: design of the digital Butterworth low-pass, and its run over three signals side by side.
 
-use crate::error::FilterError;
+use crate::error::{FilterError, require};
 use core::f64::consts::PI;
 
 /// `H(z) = (b0 + b1 z⁻¹ + b2 z⁻²) / (1 + a1 z⁻¹ + a2 z⁻²)`.
@@ -23,22 +23,13 @@ const LOWEST: f64 = 1e-5;
 /// # Errors
 /// If `order` is not 1 to 12, or the cut-off is not from 1e-5 of the rate to below half of it.
 pub(crate) fn butterworth_low_pass(order: usize, cutoff_hz: f64, rate_hz: f64) -> Result<Vec<Section>, FilterError> {
-    if !(1..=12).contains(&order) {
-        return Err(FilterError::Setting { name: "order", value: order as f64, fix: "give 1 to 12" });
-    }
-    if !(cutoff_hz.is_finite() && cutoff_hz > 0.0) {
-        return Err(FilterError::Setting { name: "cutoff_hz", value: cutoff_hz, fix: "give a positive frequency" });
-    }
+    require((1..=12).contains(&order), "order", order as f64, "give 1 to 12")?;
+    require(cutoff_hz.is_finite() && cutoff_hz > 0.0, "cutoff_hz", cutoff_hz, "give a positive frequency")?;
     if cutoff_hz.partial_cmp(&(0.5 * rate_hz)) != Some(core::cmp::Ordering::Less) {
         return Err(FilterError::AboveNyquist { cutoff_hz, rate_hz });
     }
-    if cutoff_hz < LOWEST * rate_hz {
-        return Err(FilterError::Setting {
-            name: "cutoff_hz",
-            value: cutoff_hz,
-            fix: "raise it: below 1e-5 of the sampling rate the recursion has no digits left",
-        });
-    }
+    let fix = "raise it: below 1e-5 of the sampling rate the recursion has no digits left";
+    require(cutoff_hz >= LOWEST * rate_hz, "cutoff_hz", cutoff_hz, fix)?;
     let warped = (PI * cutoff_hz / rate_hz).tan();
     let mut sections: Vec<Section> = (0..order / 2)
         .map(|k| {

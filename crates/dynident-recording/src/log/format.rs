@@ -350,81 +350,55 @@ impl LogFormat {
     /// # Errors
     /// A [`FormatError`] that names the key and the fix.
     pub fn validate(&self, joints: &[String]) -> Result<(), FormatError> {
+        let wrong = |key: &str, problem: &str, fix: &str| Err(FormatError::new(key, problem, fix));
         if joints.is_empty() {
-            return Err(FormatError::new("position", "the study names no joints", "list at least one joint"));
+            return wrong("position", "the study names no joints", "list at least one joint");
         }
         match (&self.time, self.rate_hz) {
             (None, None) => {
-                return Err(FormatError::new(
-                    "time",
-                    "neither time nor rate_hz is given",
-                    "write time = { column = \"t_s\" } or rate_hz = 1000.0",
-                ));
+                let fix = "write time = { column = \"t_s\" } or rate_hz = 1000.0";
+                return wrong("time", "neither time nor rate_hz is given", fix);
             }
-            (Some(_), Some(_)) => {
-                return Err(FormatError::new("rate_hz", "time and rate_hz are both given", "keep one of them"));
-            }
+            (Some(_), Some(_)) => return wrong("rate_hz", "time and rate_hz are both given", "keep one of them"),
             (None, Some(rate)) if !(rate.is_finite() && rate > 0.0 && rate <= 1e7) => {
-                return Err(FormatError::new(
-                    "rate_hz",
-                    format!("{rate} is not a rate"),
-                    "give samples per second, above 0 and at most 1e7",
-                ));
+                let fix = "give samples per second, above 0 and at most 1e7";
+                return wrong("rate_hz", &format!("{rate} is not a rate"), fix);
             }
             (Some(time), None) if !(time.scale.is_finite() && time.scale > 0.0) => {
-                return Err(FormatError::new(
-                    "time.scale",
-                    format!("{} is not a positive factor", time.scale),
-                    "give seconds per tick, or leave it out",
-                ));
+                let problem = format!("{} is not a positive factor", time.scale);
+                return wrong("time.scale", &problem, "give seconds per tick, or leave it out");
             }
             _ => {}
         }
         if let Some(delimiter) = self.delimiter
             && !matches!(delimiter, ',' | ';' | '\t' | ' ' | '|' | ':')
         {
-            return Err(FormatError::new(
-                "delimiter",
-                format!("{delimiter:?} is not offered"),
-                "use one of \",\" \";\" \"\\t\" \" \" \"|\" \":\"",
-            ));
+            let fix = "use one of \",\" \";\" \"\\t\" \" \" \"|\" \":\"";
+            return wrong("delimiter", &format!("{delimiter:?} is not offered"), fix);
         }
         if let Some([first, end]) = self.rows
             && first >= end
         {
-            return Err(FormatError::new(
-                "rows",
-                format!("[{first}, {end}] is empty"),
-                "write [first, end) with first < end",
-            ));
+            return wrong("rows", &format!("[{first}, {end}] is empty"), "write [first, end) with first < end");
         }
         if self.rows.is_some() && self.fraction.is_some() {
-            return Err(FormatError::new("fraction", "rows and fraction are both given", "keep one of them"));
+            return wrong("fraction", "rows and fraction are both given", "keep one of them");
         }
         if let Some([from, to]) = self.fraction
             && !(from >= 0.0 && from < to && to <= 1.0)
         {
-            return Err(FormatError::new(
-                "fraction",
-                format!("[{from}, {to}] is no part of a log"),
-                "write [from, to] with 0 <= from < to <= 1",
-            ));
+            let fix = "write [from, to] with 0 <= from < to <= 1";
+            return wrong("fraction", &format!("[{from}, {to}] is no part of a log"), fix);
         }
         if let Some([from, to]) = self.time_range_s
             && !(from.is_finite() && from < to)
         {
-            return Err(FormatError::new(
-                "time_range_s",
-                format!("[{from}, {to}] is empty"),
-                "write [from, to] in seconds with from < to",
-            ));
+            let fix = "write [from, to] in seconds with from < to";
+            return wrong("time_range_s", &format!("[{from}, {to}] is empty"), fix);
         }
         if !(1.5..=1000.0).contains(&self.max_gap_steps) {
-            return Err(FormatError::new(
-                "max_gap_steps",
-                format!("{} is out of range", self.max_gap_steps),
-                "give 1.5 to 1000 median steps",
-            ));
+            let problem = format!("{} is out of range", self.max_gap_steps);
+            return wrong("max_gap_steps", &problem, "give 1.5 to 1000 median steps");
         }
         for (quantity, group) in self.groups() {
             group.validate(quantity, joints)?;

@@ -163,11 +163,6 @@ impl LogReader {
         &self.dropped
     }
 
-    /// Data rows of the file that were passed so far.
-    pub fn rows_passed(&self) -> u64 {
-        self.next_row
-    }
-
     /// What messages call the log.
     pub fn label(&self) -> &str {
         &self.label

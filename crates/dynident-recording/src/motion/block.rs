@@ -1,7 +1,7 @@
 //! A motion in blocks, and how a log is to become one.
 
 use crate::derivative::DifferentiatorSettings;
-use crate::error::FilterError;
+use crate::error::{FilterError, require};
 use serde::{Deserialize, Serialize};
 
 /// How a log becomes a motion.
@@ -24,9 +24,7 @@ impl MotionSettings {
     /// # Errors
     /// A [`FilterError`] that names the setting.
     pub fn validate(&self) -> Result<(), FilterError> {
-        if !(0.0..=60.0).contains(&self.trim_s) {
-            return Err(FilterError::Setting { name: "trim_s", value: self.trim_s, fix: "give seconds, 0 to 60" });
-        }
+        require((0.0..=60.0).contains(&self.trim_s), "trim_s", self.trim_s, "give seconds, 0 to 60")?;
         self.differentiator.validate()
     }
 }

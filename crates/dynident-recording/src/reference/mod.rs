@@ -43,13 +43,13 @@ struct JointReference {
 
 #[derive(Clone, Debug)]
 enum JointPath {
-    Sampled(Sampled),
+    Sampled(ReferenceTable),
     Logistic(LogisticPath),
 }
 
 /// Samples of one joint; between them the quintic that has both ends' position, velocity and acceleration.
 #[derive(Clone, Debug)]
-struct Sampled {
+struct ReferenceTable {
     times_s: std::sync::Arc<[f64]>,
     /// q, dq, ddq.
     values: Vec<[f64; 3]>,
@@ -92,7 +92,7 @@ impl Reference {
                 let resting: Vec<bool> = values.iter().map(|value| rests(value, peak)).collect();
                 let strokes = strokes_of(&times, &values, &resting);
                 Ok(JointReference {
-                    path: JointPath::Sampled(Sampled { times_s: times.clone(), values }),
+                    path: JointPath::Sampled(ReferenceTable { times_s: times.clone(), values }),
                     peak,
                     strokes,
                 })
@@ -288,7 +288,7 @@ fn rests(value: &[f64; 3], peak: [f64; 2]) -> bool {
     value[1].abs() <= RESTING[0] * peak[0] && value[2].abs() <= RESTING[1] * peak[1]
 }
 
-impl Sampled {
+impl ReferenceTable {
     fn at(&self, time_s: f64) -> [f64; 3] {
         let last = self.times_s.len() - 1;
         if time_s <= self.times_s[0] || time_s.is_nan() {

@@ -2,7 +2,7 @@
 
 use super::logistic_path::LogisticPath;
 use super::{Reference, check_boundaries};
-use crate::error::FilterError;
+use crate::error::{FilterError, require};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -81,9 +81,7 @@ impl ReferenceSettings {
     /// [`FilterError::Reference`] if file and joints are both given or a path has no meaning; [`FilterError::Setting`]
     /// if the start is not finite.
     pub fn validate(&self) -> Result<(), FilterError> {
-        if !(self.start_s.is_finite() && self.start_s.abs() <= 1e6) {
-            return Err(FilterError::Setting { name: "start_s", value: self.start_s, fix: "give seconds" });
-        }
+        require(self.start_s.is_finite() && self.start_s.abs() <= 1e6, "start_s", self.start_s, "give seconds")?;
         if self.file.is_some() && !self.joints.is_empty() {
             return Err(FilterError::Reference {
                 problem: "file and joints are both given: keep one of them".to_owned(),

@@ -120,6 +120,7 @@ impl ImportReport {
         let mut add = |level, channel: &str, message: String| {
             findings.push(Finding { level, channel: channel.to_owned(), message });
         };
+        // The clock.
         add(Level::Info, "time", format!("{} rows at {:.4} Hz; {}", self.rows, self.rate_hz, self.clock.evidence));
         if let Some(gap) = self.gaps.first() {
             let message = format!(
@@ -133,11 +134,8 @@ impl ImportReport {
         }
         if self.short_segments[0] > 0 {
             let [pieces, samples] = self.short_segments;
-            add(
-                Level::Warning,
-                "time",
-                format!("{pieces} pieces too short for the filter were left out ({samples} samples)"),
-            );
+            let message = format!("{pieces} pieces too short for the filter were left out ({samples} samples)");
+            add(Level::Warning, "time", message);
         }
         if self.unmapped_samples > 0 {
             let message = format!(
@@ -157,12 +155,14 @@ impl ImportReport {
                 format!("{} samples stand too close to the one before and were left out", self.crowded_samples);
             add(Level::Info, "time", message);
         }
+        // Rows left out.
         if self.dropped.missing > 0 {
             add(Level::Warning, "rows", format!("{} rows with missing values were left out", self.dropped.missing));
         }
         if let Some(place) = &self.dropped.truncated {
             add(Level::Info, "rows", format!("the cut-off last line was left out ({place})"));
         }
+        // Each channel by itself.
         for channel in &self.channels {
             let name = format!("{} {}", channel.channel.key(), channel.joint);
             let measured = matches!(channel.channel, Quantity::Position | Quantity::Torque);
@@ -187,17 +187,15 @@ impl ImportReport {
                 add(Level::Info, &name, format!("quantised in steps of {step:.3e}"));
             }
         }
+        // Logged derivatives beside those of the position.
         for (quantity, comparisons) in [("velocity", &self.velocity), ("acceleration", &self.acceleration)] {
             for comparison in comparisons {
                 let name = format!("{quantity} {}", comparison.joint);
                 let difference = 100.0 * comparison.relative_rms_difference;
                 match &comparison.lag {
                     Some(lag) if lag.correlation < -0.5 => {
-                        add(
-                            Level::Problem,
-                            &name,
-                            "the logged signal has the opposite sign of the position's derivative".to_owned(),
-                        );
+                        let message = "the logged signal has the opposite sign of the position's derivative";
+                        add(Level::Problem, &name, message.to_owned());
                     }
                     Some(lag) if difference > 20.0 => {
                         let message = format!(

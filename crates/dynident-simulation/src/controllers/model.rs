@@ -37,7 +37,7 @@ impl core::fmt::Debug for ControllerModel {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("ControllerModel")
             .field("model", &self.model.name())
-            .field("laws", &self.terms)
+            .field("terms", &self.terms)
             .finish_non_exhaustive()
     }
 }
@@ -54,7 +54,7 @@ impl ControllerModel {
     /// # Errors
     /// Counts that differ, numbers that are not finite, terms of joints that do not exist.
     pub fn new(model: &Model, terms: &[TorqueTerm], term_parameters: &[f64]) -> Result<Self, SimulationError> {
-        require_length("parameters of laws", terms.len(), term_parameters.len())?;
+        require_length("parameters of terms", terms.len(), term_parameters.len())?;
         for (term, &value) in terms.iter().zip(term_parameters) {
             require(value.is_finite(), term.symbol(), value, "give a finite number")?;
             if term.joints().iter().any(|&joint| joint >= model.dof()) {

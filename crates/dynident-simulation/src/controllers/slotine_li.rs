@@ -35,12 +35,8 @@ impl SlotineLiSettings {
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
         self.lambda.gains("lambda", joints)?;
         self.kd.gains("kd", joints)?;
-        require(
-            self.gamma >= 0.0 && self.gamma.is_finite(),
-            "gamma",
-            self.gamma,
-            "give zero or a finite positive number",
-        )
+        let fix = "give zero or a finite positive number";
+        require(self.gamma >= 0.0 && self.gamma.is_finite(), "gamma", self.gamma, fix)
     }
 }
 
@@ -173,9 +169,9 @@ impl Controller for SlotineLi {
         }
         self.fill_regressor(target, measured);
         let columns = self.parameters.len();
-        let prismatic = &self.vectors[4];
+        let sliding = &self.vectors[4];
         if self.gamma > 0.0 && span_s > 0.0 {
-            for (joint, s) in prismatic.iter().enumerate() {
+            for (joint, s) in sliding.iter().enumerate() {
                 let row = &self.regressor[joint * columns..(joint + 1) * columns];
                 for (parameter, y) in self.parameters.iter_mut().zip(row) {
                     *parameter += span_s * self.gamma * y * s;

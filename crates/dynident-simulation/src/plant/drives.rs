@@ -32,7 +32,7 @@ struct Slip {
 impl Drives {
     pub(super) fn new(model: &Model, terms: &[TorqueTerm], parameters: &[f64]) -> Result<Self, SimulationError> {
         let dof = model.dof();
-        require_length("parameters of laws", terms.len(), parameters.len())?;
+        require_length("parameters of terms", terms.len(), parameters.len())?;
         let mut drives = Self {
             inertia: Vec::new(),
             constant: vec![0.0; dof],

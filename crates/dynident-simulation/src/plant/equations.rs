@@ -134,7 +134,7 @@ impl Equations {
             let torque = match mode {
                 Mode::Held => continue,
                 // Without a jump the direction does not matter.
-                mode => unit.prismatic(unit.speed(dq), *mode == Mode::Forward),
+                mode => unit.sliding(unit.speed(dq), *mode == Mode::Forward),
             };
             for &(joint, ratio) in &unit.joints {
                 if !self.locked[joint] {

@@ -117,7 +117,7 @@ impl FrictionUnit {
     /// Friction torque at `speed` in motion forward (or backward): the map's branch, also where the velocity has just
     /// crossed zero.
     #[inline]
-    pub(super) fn prismatic(&self, speed: f64, forward: bool) -> f64 {
+    pub(super) fn sliding(&self, speed: f64, forward: bool) -> f64 {
         let jump = if forward { self.level[0] } else { -self.level[1] };
         jump + self.smooth(speed)[0]
     }

@@ -165,11 +165,6 @@ impl Plant {
         (&self.terms.0, &self.terms.1)
     }
 
-    /// Whether a joint is locked.
-    pub fn is_locked(&self, joint: usize) -> bool {
-        self.equations.locked[joint]
-    }
-
     /// Time since the run's begin, s.
     pub fn time_s(&self) -> f64 {
         self.state.time_s

@@ -103,7 +103,7 @@ pub struct RobotSummary {
     pub name: String,
     /// The description.
     pub file: String,
-    /// Degrees of degrees_of_freedom.
+    /// Degrees of freedom.
     pub dof: usize,
     /// Joint names in the order of all vectors.
     pub joints: Vec<String>,

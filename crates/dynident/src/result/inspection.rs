@@ -15,7 +15,7 @@ pub struct Inspection {
     pub name: String,
     /// The file.
     pub file: String,
-    /// Degrees of degrees_of_freedom.
+    /// Degrees of freedom.
     pub dof: usize,
     /// Mass of the moving bodies with known inertials.
     pub moving_mass_kg: f64,

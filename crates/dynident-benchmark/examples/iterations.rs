@@ -2,7 +2,7 @@
 //! of the Cramér-Rao bound, tracking, and runs.
 //!
 //! ```text
-//! cargo run --release -p dynident-benchmark --bin iterations -- [SEEDS] [STUDY.toml ..]
+//! cargo run --release -p dynident-benchmark --example iterations -- [SEEDS] [STUDY.toml ..]
 //! ```
 //!
 //! The trajectory is looked for once. Every seed has its own noise and, where the robot differs from its description,
