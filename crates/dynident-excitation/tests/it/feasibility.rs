@@ -1,8 +1,8 @@
-//! A hundred random problems (in the long run; forty every day): each ends with a motion that keeps every limit by the independent check at 10 kHz, or
-//! with the limits that bind, or is refused by name before any search.
+//! A hundred random problems (in the long run; forty every day): each ends with a motion that keeps every limit by the
+//! independent check at 10 kHz, or with the limits that bind, or is refused by name before any search.
 //!
-//! Three in five are built around a motion of the family: its peaks, 5 % wider, are the limits, so that something feasible is
-//! known to exist and must be found. The others have random limits.
+//! Three in five are built around a motion of the family: its peaks, 5 % wider, are the limits, so that something
+//! feasible is known to exist and must be found. The others have random limits.
 
 use core::ops::ControlFlow;
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, PanelLayout};
