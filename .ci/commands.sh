@@ -1,6 +1,5 @@
 #!/usr/bin/env bash
-# commands.sh SCRATCH: every command that README and the book name, once and short, with the program and the programs of measurement that
-# `cargo build --release --workspace --bins --examples` made. Outputs go to SCRATCH.
+# commands.sh SCRATCH: every command that README and the book name, once and short, after `cargo build --release`. Outputs go to SCRATCH.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=$1
