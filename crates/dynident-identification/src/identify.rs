@@ -7,8 +7,8 @@ use crate::consistent::{
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
 use crate::examination::{
-    HeldOutExamination, LogTrace, ModelUnderTest, TorqueLag, TorqueSignCheck, Uncertainty, examine_training,
-    pooled_delay, sign_evidence, tested_on,
+    FrictionSign, HeldOutExamination, LogTrace, ModelUnderTest, TorqueLag, TorqueSignCheck, Uncertainty,
+    examine_training, friction_signs, pooled_delay, sign_evidence, tested_on,
 };
 use crate::execution::Execution;
 use crate::logs::{Logs, of_role};
@@ -63,6 +63,8 @@ pub struct TrainingExamination {
     pub pooled_delays: Vec<Option<TorqueLag>>,
     /// How well consistent sets explain the torque with either sign; none where a fit fails, and for payloads.
     pub sign: Option<TorqueSignCheck>,
+    /// The mean friction of every joint with friction of its own; empty for payloads on a known arm.
+    pub friction_signs: Vec<FrictionSign>,
 }
 
 /// An identified model with everything that was found on the way.
@@ -223,16 +225,16 @@ fn identified(
         Ok((consistent, estimation_s, held_out))
     };
     // Beside that, what training recordings say of the estimate.
-    let sign = || if held { Ok(None) } else { torque_sign(&training, &estimation.estimate) };
+    let signs = || if held { Ok((None, Vec::new())) } else { torque_signs(&training, &estimation.estimate) };
     let examined = || examine_all_training((&logs, settings), &training, &estimation.estimate);
-    let (bodies, (sign, examined)) = if execution.parallel() {
-        rayon::join(bodies, || rayon::join(sign, examined))
+    let (bodies, (signs, examined)) = if execution.parallel() {
+        rayon::join(bodies, || rayon::join(signs, examined))
     } else {
-        (bodies(), (sign(), examined()))
+        (bodies(), (signs(), examined()))
     };
     let (consistent, estimation_s, held_out) = bodies?;
-    let sign = sign?;
-    let examination = TrainingExamination { sign, ..examined? };
+    let (sign, friction_signs) = signs?;
+    let examination = TrainingExamination { sign, friction_signs, ..examined? };
     let held_out = held_out?;
     times.estimation_s += estimation_s;
     times.examination_s = started.elapsed().as_secs_f64() - estimation_s;
@@ -317,10 +319,16 @@ fn arm_alone(
     Ok((alone, columns.arm_estimate(estimate)))
 }
 
-/// How well consistent sets explain the torque with either sign; none where a fit fails.
-fn torque_sign(training: &Training, estimate: &Estimate) -> Result<Option<TorqueSignCheck>, IdentificationError> {
+/// How well consistent sets explain the torque with either sign, none where a fit fails; and the sign of each joint's
+/// friction.
+fn torque_signs(
+    training: &Training,
+    estimate: &Estimate,
+) -> Result<(Option<TorqueSignCheck>, Vec<FrictionSign>), IdentificationError> {
     let (alone, arm) = arm_alone(training, estimate)?;
-    Ok(sign_evidence(&training.model.parametric, alone.as_ref().unwrap_or(&training.problem), &arm))
+    let problem = alone.as_ref().unwrap_or(&training.problem);
+    let frictions = friction_signs(&training.model, problem, &arm);
+    Ok((sign_evidence(&training.model.parametric, problem, &arm), frictions))
 }
 
 /// [`examine_training`] of every training recording, side by side.
@@ -341,7 +349,7 @@ fn examine_all_training(
     let (delays, traces): (Vec<Vec<Option<TorqueLag>>>, Vec<LogTrace>) = found.into_iter().unzip();
     let of_joint = |joint: usize| -> Vec<TorqueLag> { delays.iter().filter_map(|log| log[joint]).collect() };
     let pooled_delays = (0..training.model.dof()).map(|joint| pooled_delay(&of_joint(joint))).collect();
-    Ok(TrainingExamination { delays, traces, pooled_delays, sign: None })
+    Ok(TrainingExamination { delays, traces, pooled_delays, sign: None, friction_signs: Vec::new() })
 }
 
 /// [`examine_held_out`] of every recording to test on, side by side.

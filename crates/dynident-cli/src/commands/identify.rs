@@ -7,6 +7,8 @@ use std::path::PathBuf;
 
 /// The user's description with the new values.
 const URDF: &str = "identified.urdf";
+/// Problems on standard error; the others stand in the file.
+const PROBLEMS_SHOWN: usize = 8;
 
 /// Options of `identify`.
 #[derive(clap::Args)]
@@ -46,5 +48,13 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     } else if !context.quiet {
         terminal::print(&summary::identification(result, &options.out, identification.urdf.is_some()));
     }
-    Ok(judged(&result.validation, options.max_validation_error))
+    let problems = result.problems();
+    for problem in problems.iter().take(PROBLEMS_SHOWN) {
+        terminal::remark(&format!("PROBLEM: {problem}"));
+    }
+    if problems.len() > PROBLEMS_SHOWN {
+        terminal::remark(&format!("and {} more problems, listed in result.json", problems.len() - PROBLEMS_SHOWN));
+    }
+    let within = judged(&result.validation, options.max_validation_error);
+    Ok(if problems.is_empty() { within } else { Verdict::Negative })
 }

@@ -76,16 +76,22 @@ pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
     }
     let mut verdict = Verdict::Good;
     for log in logs {
-        match log.model.relative_error_percent {
-            Some(error) if error <= limit => continue,
-            Some(error) => {
-                terminal::remark(&format!("{}: the error of {error:.2} % is above the {limit} % asked for", log.log));
+        // Of the model that is written where there is a consistent set, and of the estimate behind it.
+        let models = [Some((&log.model, "estimate")), log.physical.as_ref().map(|report| (report, "written model"))];
+        for (report, whose) in models.into_iter().flatten() {
+            match report.relative_error_percent {
+                Some(error) if error <= limit => continue,
+                Some(error) => terminal::remark(&format!(
+                    "{}: the {whose}'s error of {error:.2} % is above the {limit} % asked for",
+                    log.log
+                )),
+                None => terminal::remark(&format!(
+                    "{}: the torque is zero throughout, so it has no relative error",
+                    log.log
+                )),
             }
-            None => {
-                terminal::remark(&format!("{}: the torque is zero throughout, so it has no relative error", log.log));
-            }
+            verdict = Verdict::Negative;
         }
-        verdict = Verdict::Negative;
     }
     verdict
 }

@@ -10,3 +10,4 @@ mod design_paper;
 mod evaluation;
 mod iterate;
 mod reproduce;
+mod verdict;

@@ -2,6 +2,7 @@
 //! not fitted to.
 
 mod delay_rows;
+mod friction_sign;
 mod held_out;
 mod nominal_agreement;
 mod residuals;
@@ -10,6 +11,7 @@ mod torque_sign;
 mod torque_trace;
 mod training;
 
+pub use friction_sign::{FrictionSign, friction_sign_findings, friction_signs};
 pub use held_out::{HeldOutExamination, LogValidation, ModelUnderTest, examine_held_out};
 pub use nominal_agreement::{PriorAgreement, agreement_findings};
 pub use residuals::{JointResiduals, TorqueBand, Uncertainty};

@@ -118,6 +118,16 @@ pub enum StudyError {
         /// What the other key makes of a joint.
         state: &'static str,
     },
+    /// A held-out log with samples that the model is fitted to.
+    #[error(
+        "log `{held_out}` is to test what `{training}` is fitted to, and has samples of it: give the two parts of a file that do not overlap (both by rows, by fraction, or by time_range_s), or another file"
+    )]
+    Overlap {
+        /// The log that is fitted to.
+        training: String,
+        /// The log to test on.
+        held_out: String,
+    },
     /// Keys of which one can be given.
     #[error("{} are both given: keep one", keys.join(" and "))]
     Exclusive {

@@ -7,6 +7,7 @@ mod identification;
 mod inspection;
 mod iterations;
 mod numbers;
+mod problems;
 mod simulation;
 pub(crate) mod stored;
 mod validation;

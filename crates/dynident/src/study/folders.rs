@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 /// Where a study's files lie: the folder that the user named, then the study file's own, then the study's `data`.
 #[derive(Clone, Debug)]
 pub struct Folders {
+    /// What the user named.
+    named: Option<PathBuf>,
     candidates: Vec<PathBuf>,
 }
 
@@ -17,14 +19,18 @@ impl Folders {
         let mut candidates: Vec<PathBuf> = data.map(Path::to_owned).into_iter().collect();
         candidates.push(own.clone());
         candidates.extend(study.data.as_ref().map(|data| own.join(data)));
-        Self { candidates }
+        Self { named: data.map(Path::to_owned), candidates }
     }
 
     /// The first folder that holds `file`.
     ///
     /// # Errors
-    /// If none does; the message names all that were tried, and the study's source if it says one.
+    /// If the folder that the user named is none, and if no folder holds it; the message names all that were tried, and the study's source if it says one.
     pub fn find(&self, file: &Path, source: Option<&str>) -> Result<PathBuf, Error> {
+        if let Some(folder) = self.named.as_ref().filter(|folder| !folder.is_dir()) {
+            let source = std::io::Error::from(std::io::ErrorKind::NotADirectory);
+            return Err(Error::File { path: folder.clone(), source });
+        }
         let tried: Vec<PathBuf> = self.candidates.iter().map(|folder| folder.join(file)).collect();
         tried.iter().find(|path| path.is_file()).cloned().ok_or_else(|| Error::Missing {
             file: file.to_owned(),

@@ -9,6 +9,7 @@ mod friction;
 mod friction_keys;
 mod iteration;
 mod log;
+mod overlap;
 mod payload;
 mod physical;
 mod robot;

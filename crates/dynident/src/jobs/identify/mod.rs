@@ -10,7 +10,7 @@ use crate::result::{LogSummary, PhysicalVerdict, RESULT_SCHEMA, ResultFile, Timi
 use crate::study::{ArmSection, EstimatorMethod, Folders, Study, StudyRobot};
 use dynident_estimation::{Estimate, strongest_correlations};
 use dynident_identification::estimators::{Findings, InstrumentSource};
-use dynident_identification::examination::{LogTrace, sign_findings};
+use dynident_identification::examination::{LogTrace, friction_sign_findings, sign_findings};
 use dynident_identification::{
     Identification, IdentificationError, IdentificationTask, identify as identify_task, identify_payload,
     identify_with_instruments as identify_task_with_instruments,
@@ -99,6 +99,7 @@ fn identified(
     let settings = study.settings(study_path, &robot)?;
     settings.check_names(&robot.parametric).map_err(|error| in_study(IdentificationError::Consistency(error)))?;
     let task = study.task_with(settings, &robot, &folders)?;
+    study.check_overlap(&study.log_files(&folders)?).map_err(Error::study(study_path))?;
     let mut timings = Timings { robot: start.elapsed().as_secs_f64(), ..Timings::default() };
 
     // The identification itself.
@@ -262,6 +263,7 @@ fn log_summaries(task: &IdentificationTask, found: &Identification) -> Vec<LogSu
     let training = pairs.map(|(factors, delays)| {
         let mut summary = training_summary(&task.recordings[factors.index], factors, delays, &joints);
         summary.model_findings.extend(found.examination.sign.as_ref().and_then(sign_findings));
+        summary.model_findings.extend(friction_sign_findings(&found.examination.friction_signs));
         summary
     });
     let held_out = found.held_out.iter().map(|log| held_out_summary(&task.recordings[log.index], log, &joints));
