@@ -7,6 +7,7 @@ use dynident_estimation::LinearProblem;
 use dynident_estimation::consistent::{
     BaseMap, Ellipsoid, PhysicalBody, PhysicalFit, PhysicalProblem, PhysicalScalar, physical_fit, rough_body,
 };
+use dynident_model::terms::TorqueTerm;
 use dynident_model::{InertialParameters, Model};
 
 /// A joint's noise counts as at least this share of its torque's root mean square: no model is better, and with
@@ -129,10 +130,11 @@ pub fn consistency_problem(
             inside: knowledge.inside.map(inside),
         }
     });
-    let scalars = terms.iter().zip(&prior[10 * model.dof()..]).map(|(term, &value)| {
+    let sizes = term_sizes(robot, problem);
+    let scalars = terms.iter().zip(&prior[10 * model.dof()..]).zip(sizes).map(|((term, &value), size)| {
         let bounded = term.is_nonnegative();
         let own = settings.terms.get(&term.symbol());
-        let scale = if term.is_drive_inertia() { mean_mass * length * length } else { 1.0 };
+        let scale = if term.is_drive_inertia() { mean_mass * length * length } else { size };
         let lower = own.map(|limits| limits[0]);
         PhysicalScalar {
             name: term.symbol(),
@@ -147,6 +149,29 @@ pub fn consistency_problem(
         Some(limits) => Ok(described.with_total_mass_kg(limits)?),
         None => Ok(described),
     }
+}
+
+/// How large the parameter of each torque term can be at all: what it would be if it alone made the torque of its
+/// joint, `‖τ_j‖ / ‖w‖` over all rows of the joint. So the prior weighs as much for a watch as for a crane, in
+/// any units. 1 where the data do not see the term: there it stays where it is.
+fn term_sizes(robot: &ParametricModel, problem: &LinearProblem) -> Vec<f64> {
+    let first = 10 * robot.model().dof();
+    let size = |(index, _): (usize, &TorqueTerm)| {
+        let column = robot.base().independent().iter().position(|&independent| independent == first + index)?;
+        let (mut torque, mut norm) = (0.0, 0.0);
+        for equation in problem.equations() {
+            let Some(place) = equation.columns.iter().position(|&own| own == column) else { continue };
+            let factor = equation.factor.total();
+            let own = factor.column_norms()[place];
+            if own > 0.0 {
+                torque += factor.torque_norm().powi(2);
+                norm += own * own;
+            }
+        }
+        let size = (torque / norm).sqrt();
+        (size.is_finite() && size > 0.0).then_some(size)
+    };
+    robot.terms().iter().enumerate().map(|term| size(term).unwrap_or(1.0)).collect()
 }
 
 /// A length that the robot's links have: the mean distance between successive joints, at least a centimetre.

@@ -21,6 +21,7 @@ mod real_logs;
 mod report;
 mod result_files;
 mod same_result;
+mod scales;
 mod simulated_loop;
 mod synthetic_truth;
 mod temperature;
