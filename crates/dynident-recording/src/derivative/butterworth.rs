@@ -86,7 +86,7 @@ pub type ButterworthZeroPhase = Butterworth<true>;
 /// A Butterworth low-pass run forwards only, then differentiated by central differences of sixth order.
 ///
 /// Amplitude `1 / √(1 + (tan(πf/rate)/tan(πf_c/rate))^(2 order))`, so 0.707 at the cut-off. q, dq and ddq all come late
-/// by the filter's [delay](Self::delay_s); the torque does not, unless it passes [`smooth`](Differentiator::smooth) as
+/// by the filter's delay; the torque does not, unless it passes [`smooth`](Differentiator::smooth) as
 /// well. A regressor that lags the torque by δ biases the fit by about ωδ at each frequency ω of the motion: this way
 /// stands here for comparison, and for logs whose torque was filtered the same way.
 ///
