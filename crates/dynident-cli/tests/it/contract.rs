@@ -15,12 +15,48 @@ fn has(value: &Value, keys: &[&str]) {
     }
 }
 
-/// Identifies the good study with a held-out part into `out`; returns standard output.
+/// A log that a robot could have made, 1,500 rows at 100 Hz: torques of the fixture's arm by the command itself, friction
+/// that opposes the motion, and a noise of a few mNm.
+fn honest_log(folder: &Path) {
+    let mut states = "q1,q2,dq1,dq2,ddq1,ddq2\n".to_owned();
+    let motion = |t: f64| {
+        let mut moved = [[0.0; 3]; 2];
+        for (joint, terms) in [[(0.7, 2.1), (0.3, 5.3)], [(0.9, 3.1), (0.25, 6.7)]].into_iter().enumerate() {
+            for (a, w) in terms {
+                let (sin, cos) = f64::sin_cos(w * t);
+                moved[joint][0] += a * sin;
+                moved[joint][1] += a * w * cos;
+                moved[joint][2] -= a * w * w * sin;
+            }
+        }
+        moved
+    };
+    let motions: Vec<[[f64; 3]; 2]> = (0..1500).map(|row| motion(0.01 * f64::from(row))).collect();
+    for [a, b] in &motions {
+        states += &format!("{},{},{},{},{},{}\n", a[0], b[0], a[1], b[1], a[2], b[2]);
+    }
+    std::fs::write(folder.join("states.csv"), states).unwrap();
+    let states = folder.join("states.csv").display().to_string();
+    let ran = run_in(&broken(), &["evaluate", "arm.urdf", "--states", &states, "--quantity", "inverse-dynamics"]);
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    let mut log = "t,q1,q2,tau1,tau2\n".to_owned();
+    for (row, (line, [a, b])) in ran.stdout.lines().skip(1).zip(&motions).enumerate() {
+        let torques: Vec<f64> = line.split(',').map(|field| field.parse().unwrap()).collect();
+        let noise = |k: usize| 0.004 * f64::sin(12.9898 * (2 * row + k) as f64) * f64::sin(78.233 * row as f64);
+        let tau = |k: usize, dq: f64| torques[k] + 0.3 * dq + 0.2 * (dq / 0.05).tanh() + noise(k);
+        log += &format!("{:.2},{:.9},{:.9},{:.6},{:.6}\n", 0.01 * row as f64, a[0], b[0], tau(0, a[1]), tau(1, b[1]));
+    }
+    std::fs::write(folder.join("honest.csv"), log).unwrap();
+}
+
+/// Identifies the fixture's arm from one part of an honest log, tested on the other, into `out`; returns standard output.
 fn identify_held_out(out: &Path, further: &[&str]) -> crate::common::CommandOutcome {
+    honest_log(out);
+    let log = out.join("honest.csv").display().to_string();
     let study = std::fs::read_to_string(broken().join("good.toml")).unwrap();
-    let study = study.replace("file = \"log.csv\"", "file = \"log.csv\"\nrows = [0, 250]");
+    let study = study.replace("file = \"log.csv\"", &format!("file = {log:?}\nrows = [0, 1000]"));
     let path = out.join("study.toml");
-    let held_out = "\n[[log]]\nfile = \"log.csv\"\nrows = [250, 400]\nrole = \"validate\"\n";
+    let held_out = format!("\n[[log]]\nfile = {log:?}\nrows = [1000, 1500]\nrole = \"validate\"\n");
     std::fs::write(&path, format!("{study}{held_out}")).unwrap();
     let (path, out) = (path.display().to_string(), out.display().to_string());
     run_in(&broken(), &[&["identify", &path, "--out", &out, "--data", "."], further].concat())
@@ -129,8 +165,9 @@ fn identify_and_validate_agree_and_print_the_contracts_keys() {
 
 #[test]
 fn two_threads_write_the_same_files_as_one() {
+    // One folder for both: the log's path stands in the result.
+    let folder = tempfile::tempdir().unwrap();
     let outcome = |threads: &str| {
-        let folder = tempfile::tempdir().unwrap();
         let ran = identify_held_out(folder.path(), &["--quiet", "--threads", threads]);
         assert_eq!((ran.status, &ran.stdout[..], &ran.stderr[..]), (0, "", ""));
         let mut result = json(&std::fs::read_to_string(folder.path().join("result.json")).unwrap());
