@@ -1,9 +1,11 @@
 #!/usr/bin/env bash
-# commands.sh SCRATCH: every command that README and the book name, once and short, after `cargo build --release`. Outputs go to SCRATCH.
+# commands.sh SCRATCH: the commands that README and the book name but the programs that take minutes (logistic_against_fourier, differentiators), once and short: the command as
+# `cargo run --release` built it, programs of measurement as the tests built them (a release build of each would take minutes). Outputs go to SCRATCH.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=$1
 dynident=target/release/dynident
+examples=target/debug/examples
 
 # run STATUS COMMAND...: says the command and how long it took; its output is shown only if the exit status is another one.
 run() {
@@ -22,7 +24,7 @@ run() {
 run 0 "$dynident" inspect robots/ur10.urdf
 run 0 "$dynident" identify examples/ur10_simulated.toml --out "$out/result"
 run 0 "$dynident" validate "$out/result/result.json" --study examples/ur10_simulated.toml
-run 0 cargo run --release --locked --quiet -p dynident --example simulate_ur10 -- "$out/ur10_simulated"
+run 0 "$examples/simulate_ur10" "$out/ur10_simulated"
 
 # A designed motion, looked at again, and its torques.
 run 0 "$dynident" design examples/design_ur10.toml --out "$out/motion" --to ros2
@@ -38,10 +40,8 @@ run 0 "$dynident" reproduce --out "$out/paper"
 
 # The programs behind the tables of the book, with the least work that they take.
 run 0 "$dynident" benchmark --runs 2 --seed 1 --robots planar2r --noise standard --out "$out/benchmark"
-run 0 cargo run --release --locked --quiet -p dynident-benchmark -- --only rnea
-run 0 cargo run --release --locked --quiet -p dynident-benchmark --example designs -- --seconds 0.2 --criteria d-optimal
-run 0 cargo run --release --locked --quiet -p dynident-benchmark --example iterations -- 1
-run 0 cargo run --release --locked --quiet -p dynident-iteration --example basin -- 2 601
-run 0 cargo run --release --locked --quiet -p dynident-paper --example logistic_against_fourier
-run 0 cargo run --release --locked --quiet -p dynident-recording --example differentiators
+run 0 target/debug/dynident-benchmark --only rnea
+run 0 "$examples/designs" --seconds 0.2 --criteria d-optimal --families Fourier examples/design_ur10.toml
+run 0 "$examples/iterations" 1 examples/iterate_paper_2r_noise.toml
+run 0 "$examples/basin" 2 601
 run 0 python3 docs/summaries.py --check

@@ -46,6 +46,7 @@ pub struct JointFriction {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FrictionCandidate {
     /// Its terms.
+    #[serde(rename = "law")]
     pub term: String,
     /// Symbols of the parameters that are not zero.
     pub parameters: Vec<String>,
