@@ -1,5 +1,6 @@
 //! What other people's scripts rest on: exit statuses, JSON, files that are whole or not there.
 use crate::common::{broken, command, repository, run_in};
+use core::fmt::Write;
 use serde_json::Value;
 use std::io::Read;
 use std::path::Path;
@@ -33,7 +34,7 @@ fn honest_log(folder: &Path) {
     };
     let motions: Vec<[[f64; 3]; 2]> = (0..1500).map(|row| motion(0.01 * f64::from(row))).collect();
     for [a, b] in &motions {
-        states += &format!("{},{},{},{},{},{}\n", a[0], b[0], a[1], b[1], a[2], b[2]);
+        writeln!(states, "{},{},{},{},{},{}", a[0], b[0], a[1], b[1], a[2], b[2]).unwrap();
     }
     std::fs::write(folder.join("states.csv"), states).unwrap();
     let states = folder.join("states.csv").display().to_string();
@@ -44,7 +45,8 @@ fn honest_log(folder: &Path) {
         let torques: Vec<f64> = line.split(',').map(|field| field.parse().unwrap()).collect();
         let noise = |k: usize| 0.004 * f64::sin(12.9898 * (2 * row + k) as f64) * f64::sin(78.233 * row as f64);
         let tau = |k: usize, dq: f64| torques[k] + 0.3 * dq + 0.2 * (dq / 0.05).tanh() + noise(k);
-        log += &format!("{:.2},{:.9},{:.9},{:.6},{:.6}\n", 0.01 * row as f64, a[0], b[0], tau(0, a[1]), tau(1, b[1]));
+        writeln!(log, "{:.2},{:.9},{:.9},{:.6},{:.6}", 0.01 * row as f64, a[0], b[0], tau(0, a[1]), tau(1, b[1]))
+            .unwrap();
     }
     std::fs::write(folder.join("honest.csv"), log).unwrap();
 }
