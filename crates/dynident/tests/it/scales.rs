@@ -2,6 +2,7 @@
 //! same model, a thousand times as heavy.
 
 use super::common::{Job, repository};
+use core::fmt::Write;
 use dynident::IdentificationOutcome;
 
 /// The description with all masses and moments of inertia times `factor`.
@@ -12,7 +13,7 @@ fn heavier(urdf: &str, factor: f64) -> String {
         let mut scaled = parts.next().unwrap().to_owned();
         for part in parts {
             let (number, rest) = part.split_once('"').unwrap();
-            scaled += &format!("{key}{:e}\"{rest}", factor * number.trim().parse::<f64>().unwrap());
+            write!(scaled, "{key}{:e}\"{rest}", factor * number.trim().parse::<f64>().unwrap()).unwrap();
         }
         scaled
     })
