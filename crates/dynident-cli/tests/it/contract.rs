@@ -16,8 +16,8 @@ fn has(value: &Value, keys: &[&str]) {
     }
 }
 
-/// A log that a robot could have made, 1,500 rows at 100 Hz: torques of the fixture's arm by the command itself, friction
-/// that opposes the motion, and a noise of a few mNm.
+/// A log that a robot could have made, 1,500 rows at 100 Hz: torques of the fixture's arm by the command itself,
+/// friction that opposes the motion, and a noise of a few mNm.
 fn honest_log(folder: &Path) {
     let mut states = "q1,q2,dq1,dq2,ddq1,ddq2\n".to_owned();
     let motion = |t: f64| {
@@ -51,7 +51,8 @@ fn honest_log(folder: &Path) {
     std::fs::write(folder.join("honest.csv"), log).unwrap();
 }
 
-/// Identifies the fixture's arm from one part of an honest log, tested on the other, into `out`; returns standard output.
+/// Identifies the fixture's arm from one part of an honest log, tested on the other, into `out`; returns standard
+/// output.
 fn identify_held_out(out: &Path, further: &[&str]) -> crate::common::CommandOutcome {
     honest_log(out);
     let log = out.join("honest.csv").display().to_string();

@@ -1,4 +1,5 @@
-//! A yes that means yes: what speaks against a model is exit status 1 and stands on standard error, whatever is printed.
+//! A yes that means yes: what speaks against a model is exit status 1 and stands on standard error, whatever is
+//! printed.
 use crate::common::{CommandOutcome, repository, run_in};
 use std::path::Path;
 

@@ -25,7 +25,8 @@ impl Folders {
     /// The first folder that holds `file`.
     ///
     /// # Errors
-    /// If the folder that the user named is none, and if no folder holds it; the message names all that were tried, and the study's source if it says one.
+    /// If the folder that the user named is none, and if no folder holds it; the message names all that were tried, and
+    /// the study's source if it says one.
     pub fn find(&self, file: &Path, source: Option<&str>) -> Result<PathBuf, Error> {
         if let Some(folder) = self.named.as_ref().filter(|folder| !folder.is_dir()) {
             let source = std::io::Error::from(std::io::ErrorKind::NotADirectory);
