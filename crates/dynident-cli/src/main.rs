@@ -52,7 +52,7 @@ enum Command {
     Inspect(commands::inspect::Options),
     /// Dynamics of a robot for a table of states, as CSV with 17 digits.
     Evaluate(commands::evaluate::Options),
-    /// Find the motion that determines most about a study's robot, inside every limit.
+    /// Find the motion that says most about a study's robot, inside every limit.
     Design(commands::design::Options),
     /// Fit a study's model to its logs and test it on the held-out ones.
     Identify(commands::identify::Options),

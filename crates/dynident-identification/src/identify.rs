@@ -55,7 +55,7 @@ pub struct ConsistentParameters {
 /// What the training recordings say of the estimate.
 #[derive(Clone, Debug)]
 pub struct TrainingExamination {
-    /// For each training recording the delays of its torque, joint by joint; none where it does not determine.
+    /// For each training recording the delays of its torque, joint by joint; none where it does not determine one.
     pub delays: Vec<Vec<Option<TorqueLag>>>,
     /// Measured and predicted torque over time.
     pub traces: Vec<LogTrace>,

@@ -44,8 +44,8 @@ pub struct RunEstimate {
     /// The friction that this run chose, for itself and the runs after it; empty where it was stated or chosen before.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub friction: Vec<JointFriction>,
-    /// By how much each joint's torque comes after the motion, where the run determines; empty where windows leave rows
-    /// out.
+    /// By how much each joint's torque comes after the motion, where the run determines it; empty where windows leave
+    /// rows out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub torque_lags: Vec<Option<TorqueLag>>,
 }

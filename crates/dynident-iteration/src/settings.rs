@@ -40,7 +40,7 @@ pub struct RunIdentificationSettings {
     /// The estimator, what counts as excited, where error bars come from. Default weighted least squares. Step by step
     /// takes ordinary or weighted least squares.
     pub estimation: EstimationSettings,
-    /// Joints whose friction the first run that can determine chooses, for itself and all runs after it. Default none.
+    /// Joints whose friction the first run that is able to chooses, for itself and all runs after it. Default none.
     pub friction: Vec<FrictionSearch>,
     /// What is known of the bodies of the consistent set that controllers get; `None` gives them the estimate as it is.
     pub consistency: Option<ConsistencySettings>,

@@ -25,7 +25,7 @@ pub(crate) struct Options {
     /// with a forecast.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["check_log", "seed"])]
     check: Option<PathBuf>,
-    /// Do not search: judge a log of the study, by its name or file: what the finished run determines about each
+    /// Do not search: judge a log of the study, by its name or file: what the finished run says about each
     /// parameter.
     #[arg(long, value_name = "NAME", conflicts_with = "seed")]
     check_log: Option<String>,

@@ -11,7 +11,7 @@ const SHOWN: usize = 5;
 /// Columns that are left for an expression.
 const EXPRESSION: usize = 40;
 
-/// What was found, and how well it will determine.
+/// What was found, and how well each parameter will come out.
 pub(crate) fn design(d: &DesignFile, out: &Path, files: &[&str]) -> String {
     let mut text = wrapped(&d.name, 2);
     let _ = writeln!(

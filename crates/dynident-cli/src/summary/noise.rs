@@ -62,7 +62,7 @@ fn loops(r: &ResultFile) -> String {
         );
         text += &wrapped(&line, 2);
     }
-    if r.method.status == "iteration-limit" {
+    if !r.method.is_settled() {
         text += &wrapped("NOT settled: the estimator stopped before its values did; take them for what they are", 2);
     }
     text

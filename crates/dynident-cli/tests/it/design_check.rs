@@ -52,7 +52,7 @@ fn a_designed_motion_given_as_a_file_has_the_figures_of_its_design() {
     assert!(judged["diagnosis"].to_string().contains("acceleration"), "{}", judged["diagnosis"]);
 }
 
-/// A log determines what it has excited; one that the study does not have is named.
+/// A log says what it has excited; one that the study does not have is named.
 #[test]
 fn a_log_of_the_study_is_judged() {
     let folder = tempfile::tempdir().unwrap();

@@ -312,7 +312,7 @@ impl Kernel for Residuals<'_> {
     fn run<T: Lane>(self) -> Self::Output {
         let Self { fold, places, theta } = self;
         let (start, end) = (fold.independent.len(), theta.len());
-        // All parameters: a common column that the rows do not determine from earlier ones is zero.
+        // All parameters: a common column that the rows do not separate from earlier ones is zero.
         for row in (0..start).rev() {
             let entries = fold.triangle.row(row);
             let mut value = [0.0; SIDE_BY_SIDE];

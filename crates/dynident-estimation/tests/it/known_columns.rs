@@ -67,7 +67,7 @@ fn known_exactly_it_is_the_fit_of_what_is_left() {
     let strong = problem.clone().with_prior(vec![0.0, -1.1, 0.0], DMatrix::from_row_slice(1, 3, &[0.0, 1e7, 0.0]));
     let expected = weighted_least_squares(&strong.unwrap(), &settings).unwrap();
     for column in 0..3 {
-        // The prior's own rows change degrees of degrees_of_freedom by one in 1600.
+        // The prior's own rows change degrees of freedom by one in 1600.
         assert!((found.values[column] - expected.values[column]).abs() < 1e-6, "{column}");
         assert!((found.std[column] - expected.std[column]).abs() < 2e-3 * expected.std[column] + 2e-7, "{column}");
     }

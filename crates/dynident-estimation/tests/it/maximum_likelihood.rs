@@ -111,7 +111,7 @@ fn noise_in_the_motion_does_not_bias_and_the_error_bars_are_right() {
         // A variance from 200 squares has a deviation of 10 %; four of them.
         assert!((squares[k] / runs - 1.0).abs() < 0.4, "p{k}: {}", squares[k] / runs);
     }
-    // χ² over 397 degrees of degrees_of_freedom, mean of 200: a deviation of 0.5 %; and the curvature.
+    // χ² over 397 degrees of freedom, mean of 200: a deviation of 0.5 %; and the curvature.
     assert!((cost / runs - 1.0).abs() < 0.03, "{}", cost / runs);
     // Without the motion's noise it is least squares, drawn towards zero: 0.36 of noise beside 1.9 of signal in q̈
     // takes about 15 %.

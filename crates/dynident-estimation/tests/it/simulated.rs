@@ -96,7 +96,7 @@ fn with_noise_they_agree_with_the_truth_within_their_error_bars() {
             let problem = problem(position, noise, seed, [1.4, 4.0, 9.0]);
             let found = simulated_least_squares(&problem, &settings, &mut Plant { position }).unwrap();
             assert_eq!(found.status, EstimateStatus::Complete, "{criterion:?} {position}");
-            // 397 degrees of degrees_of_freedom: a deviation of 28.
+            // 397 degrees of freedom: a deviation of 28.
             assert!((found.cost - 397.0).abs() < 4.0 * 28.2, "{}", found.cost);
             if criterion == SimulatedCriterion::Didim {
                 assert!(found.simulations <= 2 * found.iterations + 1);

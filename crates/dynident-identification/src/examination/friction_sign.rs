@@ -1,7 +1,7 @@
 //! Friction that drives its joint: the sign of that joint's torque, or of its motion, is reversed.
 //!
-//! Least squares follows a reversed joint: its friction comes out negative, which no robot has. [`TorqueSignCheck`](
-//! super::TorqueSignCheck) asks the same of all joints at once and does not see a single one.
+//! Least squares follows a reversed joint: its friction comes out negative, which no robot has. The check of the torque
+//! as a whole, [`sign_evidence`](super::sign_evidence), asks the same of all joints at once and does not see one alone.
 
 use crate::regressor_model::RegressorModel;
 use dynident_dynamics::Column;

@@ -42,7 +42,7 @@ pub struct HeldOutExamination {
     pub statistics: LogStatistics,
     /// How well the nominal values explain it, where they are known.
     pub nominal_agreement: Option<PriorAgreement>,
-    /// Delays of the torque, joint by joint; none where the log does not determine.
+    /// Delays of the torque, joint by joint; none where the log does not determine one.
     pub delays: Vec<Option<TorqueLag>>,
     /// Measured and predicted torque over time, if asked for.
     pub trace: Option<LogTrace>,

@@ -1,6 +1,6 @@
 //! What the description's own inertials say about a log: is the torque's sign right?
 //!
-//! Least squares fits either sign equally well (all parameters change sign), so only a prior can determine.
+//! Least squares fits either sign equally well (all parameters change sign), so only a nominal model can decide.
 
 use crate::rows::{JointRows, predicted_torque};
 use dynident_recording::{Finding, Level};

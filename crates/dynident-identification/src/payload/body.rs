@@ -1,4 +1,4 @@
-//! From what the logs hold information about a payload to a body with mass, centre of mass and inertia, and to a
+//! From what the logs say about a payload to a body with mass, centre of mass and inertia, and to a
 //! consistent one.
 
 use super::columns::PayloadColumns;

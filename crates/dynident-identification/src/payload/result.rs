@@ -1,4 +1,4 @@
-//! What logs hold information about payloads: values with error bars, and a body that it may be.
+//! What logs say about payloads: values with error bars, and a body that it may be.
 
 use super::body::{at_centre_of_mass, jacobian, nearest_consistent_body};
 use super::columns::{LoadColumns, Payload, PayloadColumns};
@@ -65,7 +65,7 @@ pub struct PayloadResult {
     pub link: String,
     /// Training logs that carry it.
     pub logs: Vec<String>,
-    /// What the logs hold information about its ten parameters about the link's origin, one by one or as sums.
+    /// What the logs say about its ten parameters about the link's origin, one by one or as sums.
     pub parameters: Vec<PayloadParameter>,
     /// Mass, kg; none where it is not determined alone.
     pub mass_kg: Option<Measured>,

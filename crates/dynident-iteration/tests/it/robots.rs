@@ -251,7 +251,7 @@ fn what_is_handed_over_is_enough() {
 /// MuJoCo behind the example program, in both modes and under four controllers, against the built-in simulator. Needs
 /// Python with MuJoCo: DYNIDENT_PYTHON names the interpreter.
 #[test]
-#[ignore = "needs Python with MuJoCo in DYNIDENT_PYTHON"]
+#[ignore = "needs Python with MuJoCo in DYNIDENT_PYTHON; .ci/run runs it"]
 fn mujoco_is_a_robot() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let python = std::env::var("DYNIDENT_PYTHON").unwrap();

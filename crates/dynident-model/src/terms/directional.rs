@@ -7,7 +7,7 @@
 use super::CoulombShape;
 use super::kind::{
     MotionFunction, TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction,
-    VelocityFunction, column_of_velocity, halves,
+    VelocityFunction, column_of_velocity, halves, smooth_friction,
 };
 use serde::{Deserialize, Serialize};
 
@@ -93,17 +93,7 @@ impl TermKind for DirectionalViscous {
         }
     }
 
-    fn joints(&self) -> TermJoints {
-        TermJoints::One(self.joint)
-    }
-
-    fn is_nonnegative(&self) -> bool {
-        true
-    }
-
-    fn action(&self) -> TermAction<'_> {
-        TermAction::Friction(VelocityFriction::of(VelocityCurve::Smooth(self)))
-    }
+    smooth_friction!();
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         vec![("direction", self.direction.constant())]

@@ -186,6 +186,24 @@ pub(super) trait TermKind: Debug {
     }
 }
 
+/// The joint, sign and action of friction that follows one joint's velocity by a smooth curve: the term itself.
+macro_rules! smooth_friction {
+    () => {
+        fn joints(&self) -> TermJoints {
+            TermJoints::One(self.joint)
+        }
+
+        fn is_nonnegative(&self) -> bool {
+            true
+        }
+
+        fn action(&self) -> TermAction<'_> {
+            TermAction::Friction(VelocityFriction::of(VelocityCurve::Smooth(self)))
+        }
+    };
+}
+pub(super) use smooth_friction;
+
 /// Regressor column and adjoint of a term that follows its own joint's velocity: by itself, or by the field that is
 /// named.
 macro_rules! column_of_velocity {

@@ -6,7 +6,7 @@
 
 use super::kind::{
     TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction, VelocityFunction,
-    column_of_velocity,
+    column_of_velocity, smooth_friction,
 };
 use serde::{Deserialize, Serialize};
 
@@ -68,17 +68,7 @@ impl TermKind for Power {
         TermLabel { kind: "power", symbol: format!("{letters}{}", self.joint + 1), unit }
     }
 
-    fn joints(&self) -> TermJoints {
-        TermJoints::One(self.joint)
-    }
-
-    fn is_nonnegative(&self) -> bool {
-        true
-    }
-
-    fn action(&self) -> TermAction<'_> {
-        TermAction::Friction(VelocityFriction::of(VelocityCurve::Smooth(self)))
-    }
+    smooth_friction!();
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         vec![

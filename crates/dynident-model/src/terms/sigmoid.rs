@@ -6,7 +6,7 @@
 
 use super::kind::{
     TermAction, TermConstant, TermJoints, TermKind, TermLabel, VelocityCurve, VelocityFriction, VelocityFunction,
-    column_of_velocity,
+    column_of_velocity, smooth_friction,
 };
 use serde::{Deserialize, Serialize};
 
@@ -43,17 +43,7 @@ impl TermKind for Sigmoid {
         TermLabel { kind: "sigmoid", symbol: format!("sig{}", self.joint + 1), unit: "Nm" }
     }
 
-    fn joints(&self) -> TermJoints {
-        TermJoints::One(self.joint)
-    }
-
-    fn is_nonnegative(&self) -> bool {
-        true
-    }
-
-    fn action(&self) -> TermAction<'_> {
-        TermAction::Friction(VelocityFriction::of(VelocityCurve::Smooth(self)))
-    }
+    smooth_friction!();
 
     fn constants(&self) -> Vec<(&'static str, TermConstant)> {
         vec![

@@ -3,7 +3,7 @@
 use crate::common::{ARM, foreign_urdfs};
 use dynident_model::{JointKind, Vec3, audit, load_robot, read_urdf, rewrite_urdf};
 
-/// Degrees of degrees_of_freedom and mass of the moving bodies in kg, as Pinocchio 4.1.0 reads the same files
+/// Degrees of freedom and mass of the moving bodies in kg, as Pinocchio 4.1.0 reads the same files
 /// (`robots/README.md`).
 const TOTALS: [(&str, usize, f64); 8] = [
     ("planar2r", 2, 3.5),

@@ -17,7 +17,7 @@ pub(crate) const NEGLIGIBLE_JITTER: f64 = 1e-3;
 /// when stamps are interpolated.
 pub(crate) const SHORTEST_STEP: f64 = 0.1;
 
-/// What the first rows determine about the clock.
+/// What the first rows say about the clock.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Clock {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// Halvings that bring a bracket of any stroke below the last bit of its time.
 const HALVINGS: usize = 60;
 
-/// On a stroke that goes one differentiator, position alone determines velocity and acceleration, `dq = g(q)`, `ddq =
+/// On a stroke that goes one way, position alone determines velocity and acceleration, `dq = g(q)`, `ddq =
 /// g'(q) g(q)`. For the paper's logistic strokes in closed form, its Eqs. 15 and 16
 /// ([`LogisticPath::rates`](crate::LogisticPath::rates)); for any other reference by solving `q_d(s) = q` for s within
 /// the stroke.

@@ -5,7 +5,7 @@ use super::differentiator::{Derivatives, Differentiator, Place, SampleRanges};
 use crate::error::{FilterError, require};
 
 /// Central differences of the positions as logged, the acceleration then smoothed by a moving average of `window`
-/// samples; the torque is smoothed the same differentiator where `smooth_torque` asks for it. Position and velocity
+/// samples; the torque is smoothed in the same way where `smooth_torque` asks for it. Position and velocity
 /// stay as they are.
 ///
 /// White noise σ of the position leaves `σ rate/√2` in dq (order 2). In ddq the average of second differences

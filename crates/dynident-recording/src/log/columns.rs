@@ -5,7 +5,7 @@ use super::source::LogTable;
 use crate::error::RecordingError;
 use crate::place::LogPlace;
 
-/// A table under differentiator, and the columns of it that are wanted.
+/// A table under way, and the columns of it that are wanted.
 #[derive(Debug)]
 pub(super) struct ColumnSelection {
     pub(super) label: String,

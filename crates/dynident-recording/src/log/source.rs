@@ -76,7 +76,7 @@ pub trait LogSource: fmt::Debug + Send + Sync {
     /// What messages and reports call it: the path of a file, or a name that the caller gave.
     fn label(&self) -> String;
 
-    /// Begins a pass at the first row. Passes know nothing of each other: several may be under differentiator at once.
+    /// Begins a pass at the first row. Passes know nothing of each other: several may be under way at once.
     ///
     /// # Errors
     /// If it cannot be read, or is no table.

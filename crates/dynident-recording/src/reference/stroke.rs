@@ -13,7 +13,7 @@ pub struct Stroke {
     pub from_s: f64,
     /// .. to here.
     pub to_s: f64,
-    /// Whether it goes one differentiator only, so that position determines velocity.
+    /// Whether it goes one way only, so that position determines velocity.
     pub monotone: bool,
 }
 

@@ -19,7 +19,7 @@ pub struct Lag {
     pub at_limit: bool,
 }
 
-/// The lag of `b` behind `a`, searched up to `max_lag_samples` either differentiator: the shift `k` of largest
+/// The lag of `b` behind `a`, searched up to `max_lag_samples` either way: the shift `k` of largest
 /// `|corr(a[i], b[i + k])|` (Pearson's correlation, the same samples of `a` for every shift), refined by a parabola.
 /// `None` for signals that are constant, not finite, or not at least three times as long as the largest lag. Filter
 /// both signals alike before.

@@ -148,6 +148,13 @@ pub struct MethodSummary {
     pub load_parameters: Option<Vec<f64>>,
 }
 
+impl MethodSummary {
+    /// Whether the estimator's values had settled before its iterations were used up.
+    pub fn is_settled(&self) -> bool {
+        self.status != "iteration-limit"
+    }
+}
+
 /// One base parameter.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -238,8 +245,8 @@ pub struct JointResult {
     pub residual_std_nm: f64,
     /// How strongly its residual is correlated in time: the lag-1 correlation that matters for the error bars.
     pub residual_correlation: Option<f64>,
-    /// Lag of its torque behind the motion by all training logs; none where they do not determine. The model itself is
-    /// fitted to the torque as logged.
+    /// Lag of its torque behind the motion by all training logs; none where they do not determine one. The model itself
+    /// is fitted to the torque as logged.
     pub torque_lag: Option<TorqueLag>,
 }
 

@@ -24,7 +24,7 @@ impl ResultFile {
                 problems.push(format!("log `{}`, {}: {}", log.log, finding.channel, finding.message));
             }
         }
-        if self.method.status == "iteration-limit" {
+        if !self.method.is_settled() {
             problems.push(format!(
                 "the estimator {} did not settle: its values are those of its last iteration",
                 self.method.estimator

@@ -7,7 +7,7 @@ use dynident::{Error, identify};
 use std::fmt::Write;
 use std::path::Path;
 
-/// At 100 Hz and 25 s: whole multiples of nothing, so that no differentiator is exact by accident.
+/// At 100 Hz and 25 s: whole multiples of nothing, so that nothing is exact by accident.
 const CLOCK: (f64, f64) = (100.0, 25.0);
 
 fn ur10() -> String {

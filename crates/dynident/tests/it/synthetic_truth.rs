@@ -239,7 +239,7 @@ fn noise_widens_the_error_bars_by_as_much_as_it_moves_the_values() {
     let truth = truth.base_values(&job.robot());
     let scores: Vec<f64> =
         found.result.base_parameters.iter().zip(&truth).map(|(p, truth)| (p.value - truth) / p.std).collect();
-    // 54 scores from segments (a t distribution with tens of degrees of degrees_of_freedom): none beyond 6. Their mean
+    // 54 scores from segments (a t distribution with tens of degrees of freedom): none beyond 6. Their mean
     // square is one on average; its own deviation would be sqrt(2/54) = 0.2 for independent scores and is larger for
     // these, which are correlated: 0.4 to 2.
     let mean_square = scores.iter().map(|z| z * z).sum::<f64>() / scores.len() as f64;

@@ -61,7 +61,7 @@ pub fn check_trajectory(
     Ok(DesignOutcome::new(setup, origin, MotionReview { duration_s, rate_hz, information, check }))
 }
 
-/// Judges a log of the study, by its name or its file: what the run that is over determines about each parameter.
+/// Judges a log of the study, by its name or its file: what the finished run says about each parameter.
 /// Positions go the same way to velocities and accelerations as they would to a fit; limits are looked at on the log's
 /// own samples, every one of which counts for the forecast.
 ///

@@ -57,7 +57,7 @@ pub fn design_study(
         _ => search(&setup, study_path, watch)?,
     };
 
-    // Its limits, by a check that shares nothing with the search, and what it determines.
+    // Its limits, by a check that shares nothing with the search, and what it says about the parameters.
     let duration_s = found.family.duration_s();
     let motion_at = |times: &[f64], out: &mut Motion| found.family.motion(&found.parameters, times, out);
     let mut check = LimitCheck::of(&setup, study_path, duration_s, CHECK_RATE_HZ, "the motion itself", &motion_at)?;

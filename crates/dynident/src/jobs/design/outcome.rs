@@ -102,7 +102,7 @@ pub(super) struct MotionReview {
     pub(super) duration_s: f64,
     /// Rate of the samples that count for the information, Hz.
     pub(super) rate_hz: f64,
-    /// What the motion determines.
+    /// What the motion says about the parameters.
     pub(super) information: MotionInformation,
     /// The limits.
     pub(super) check: LimitCheck,

@@ -96,7 +96,7 @@ impl DesignSetup {
         if self.section.criterion.of_regressor() { &self.ones } else { &self.torque_std_nm }
     }
 
-    /// What a motion determines at `times`.
+    /// What a motion says about the parameters at `times`.
     pub(super) fn information(&self, times: &[f64], motion_at: &dyn Fn(&[f64], &mut Motion)) -> MotionInformation {
         let [plain, weighted] =
             [&self.ones, &self.torque_std_nm].map(|std| information(&self.robot, std, times, motion_at));
