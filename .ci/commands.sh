@@ -22,6 +22,7 @@ run() {
 
 # README and the first pages: the user's robot.
 run 0 "$dynident" inspect robots/ur10.urdf
+run 0 "$dynident" check examples/ur10_simulated.toml
 run 0 "$dynident" identify examples/ur10_simulated.toml --out "$out/result"
 run 0 "$dynident" validate "$out/result/result.json" --study examples/ur10_simulated.toml
 run 0 "$examples/simulate_ur10" "$out/ur10_simulated"

@@ -1,6 +1,6 @@
 //! Before any fit is believed: do study, robot and recordings fit together?
 
-use crate::diagnosis::{Diagnosis, diagnose};
+use crate::diagnosis::{Diagnosis, diagnose, has_jumps};
 use crate::error::IdentificationError;
 use crate::execution::Execution;
 use crate::logs::{Logs, of_role};
@@ -18,8 +18,8 @@ use dynident_recording::ImportReport;
 pub struct StudyExamination {
     /// For each recording its number and what its import found; none for motions that were made already.
     pub imports: Vec<(usize, Option<ImportReport>)>,
-    /// Readings of the training recordings, units of torque, loads.
-    pub diagnosis: Diagnosis,
+    /// Readings of the training recordings, units of torque, loads; none where jumps in a log make them meaningless.
+    pub diagnosis: Option<Diagnosis>,
     /// Rows of all joints that a fit would have.
     pub rows: usize,
     /// Base parameters that a fit would have.
@@ -50,7 +50,10 @@ fn examined(task: &IdentificationTask, execution: Execution<'_>) -> Result<Study
     let estimate = weighted_least_squares(&training.problem, &WeightedSettings::default())?;
     let theta = &estimate.values[..training.columns.base()];
     let known = training.columns.is_plain().then_some(theta);
-    let diagnosis = diagnose((&logs, &settings), robot, &chosen, known)?;
+    let diagnosis = match has_jumps(&training) {
+        true => None,
+        false => Some(diagnose((&logs, &settings), robot, &chosen, known)?),
+    };
     let mut imports: Vec<(usize, Option<ImportReport>)> =
         training.logs.iter().map(|log| (log.index, log.statistics.report.clone())).collect();
     let model: RegressorModel = robot.clone().into();

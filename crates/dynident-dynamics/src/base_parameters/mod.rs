@@ -5,11 +5,13 @@
 //! Khalil 1990; Gautier 1991). The dependencies come from the robot's structure ([`structural`]); the rank of
 //! regressors at random states ([`numerical_rank`], [`numerical_rank_by_body`]) is the cross-check.
 
+mod determination;
 mod expression;
 mod numerical;
 mod one_joint_motions;
 mod structural;
 
+pub use determination::Determination;
 pub use numerical::{NumericalRank, numerical_rank};
 pub use one_joint_motions::numerical_rank_by_body;
 

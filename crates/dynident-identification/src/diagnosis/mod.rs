@@ -86,6 +86,12 @@ pub(crate) fn is_beyond_limits(model: &Model, report: &ImportReport) -> bool {
     plausibility::is_beyond(model, report)
 }
 
+/// Whether a log has jumps that no motion makes: wrapped angles, absurd samples. Until these are mended, readings of
+/// it would mean nothing.
+pub(crate) fn has_jumps(training: &Training) -> bool {
+    training.logs.iter().filter_map(|log| log.statistics.report.as_ref()).any(plausibility::has_jumps)
+}
+
 /// Whether a fit's own figures give reason to try other readings: a consistent robot that leaves clearly more than
 /// parameters of each joint's own.
 pub(crate) fn is_doubtful(training: &Training, consistent: Option<&[f64]>) -> bool {

@@ -1,7 +1,7 @@
 //! The search for the reading that explains the samples best.
 //!
-//! Every candidate is bounded from below by the fit without physical limits, which is ten times cheaper: what cannot win
-//! is never fitted with them. A reading counts as better only by a clear margin, and those that come close to the best
+//! Every candidate is bounded from below by the fit without physical limits, which is ten times cheaper: what cannot
+//! win is never fitted with them. A reading counts as better only by a clear margin, and those that come close to the best
 //! are named beside it.
 
 use super::candidates::candidates;
@@ -14,8 +14,12 @@ use rayon::prelude::*;
 /// By how much a reading must score better before the study is doubted: as if one joint had less than 0.55 of what was
 /// left of its torque. On seven sets of real logs the best wrong reading gains 0.41.
 pub(super) const CLEARLY_BETTER: f64 = 0.6;
+/// Times what the study as written leaves of all torque that a better reading may leave.
+const NO_WORSE: f64 = 1.05;
 /// Readings this close to the best cannot be told from it.
 const ALIKE: f64 = 0.2;
+/// By how much a number between those tried must be better than the nearest of these.
+const WORTH_REFINING: f64 = 0.3;
 /// Mistakes of one study.
 const MOST_MISTAKES: usize = 3;
 /// Other readings that are named.
@@ -45,11 +49,12 @@ pub(super) fn search(start: Corrected, consistency: &ConsistencySettings) -> Res
     let as_written = start.reading(Some(consistency))?;
     let (mut at, mut best) = (start, as_written.clone());
     let (mut alike, mut tried): (Vec<Reading>, usize) = (Vec::new(), 0);
-    for _ in 0..MOST_MISTAKES {
-        let (round, count) = one_round(&at, &best, consistency);
+    for round in 0..MOST_MISTAKES {
+        let (fitted, count) = one_round(&at, &best, consistency);
         tried += count;
-        let Some((first, rest)) = round.split_first() else { break };
-        if first.1.score() > best.score() - CLEARLY_BETTER {
+        let Some((first, rest)) = fitted.split_first() else { break };
+        // A second mistake is rarer than the first.
+        if first.1.score() > best.score() - CLEARLY_BETTER * (round + 1) as f64 {
             break;
         }
         let refined = refined(&at, first, consistency);
@@ -86,6 +91,8 @@ fn one_round(at: &Corrected, best: &Reading, consistency: &ConsistencySettings) 
         fitted.extend(batch.par_iter().filter_map(fit).collect::<Vec<_>>());
         least = fitted.iter().map(|(_, reading)| reading.score()).fold(least, f64::min);
     }
+    // What explains a weak joint at the cost of the strong ones explains the wrong thing.
+    fitted.retain(|(_, reading)| reading.left_of_all <= NO_WORSE * best.left_of_all);
     fitted.sort_by(|a, b| a.1.score().total_cmp(&b.1.score()));
     (fitted, all.len())
 }
@@ -132,7 +139,8 @@ fn refined(
     };
     let corrected = at.without(&mistake);
     let reading = corrected.reading(Some(consistency)).ok()?;
-    (reading.score() < first.1.score()).then_some((corrected, reading))
+    // Free numbers follow the noise: the round one stays unless the exact one is clearly better.
+    (reading.score() < first.1.score() - WORTH_REFINING).then_some((corrected, reading))
 }
 
 /// Where `value` is least within `reach` of `centre`, by thirds, to a hundredth of the reach.

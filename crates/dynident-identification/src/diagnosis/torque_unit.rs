@@ -19,10 +19,13 @@ pub struct TorqueUnit {
 }
 
 impl TorqueUnit {
-    /// Joints whose torque cannot be in newton metres if the description is near the truth.
+    /// Joints whose torque cannot be in newton metres if the description is near the truth; none unless most joints
+    /// that say anything agree, for single bodies may be described badly.
     pub fn joints_in_another_unit(&self) -> Vec<usize> {
         let is_far = |scale: f64| !(UNIT_FACTOR.recip()..=UNIT_FACTOR).contains(&scale);
-        (0..self.scale.len()).filter(|&joint| self.scale[joint].is_some_and(is_far)).collect()
+        let far: Vec<usize> = (0..self.scale.len()).filter(|&joint| self.scale[joint].is_some_and(is_far)).collect();
+        let telling = self.scale.iter().flatten().count();
+        if 2 * far.len() > telling { far } else { Vec::new() }
     }
 }
 

@@ -216,6 +216,22 @@ pub struct BodyResult {
     pub prior: Option<[f64; 10]>,
     /// Smallest eigenvalue of the pseudo-inertia: positive for a consistent body.
     pub pseudo_inertia_min_eigenvalue: f64,
+    /// For each of the ten whether torque told it; none in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sources: Option<[ValueSource; 10]>,
+}
+
+/// Where a body's value comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "lowercase")]
+pub enum ValueSource {
+    /// Torque tells it by itself.
+    Measured,
+    /// Torque tells sums of it with others; shared out so that it stays near the description's.
+    Partly,
+    /// Torque does not tell it: near the description's, as far as a consistent body allows.
+    Nominal,
 }
 
 /// A parameter of a term.

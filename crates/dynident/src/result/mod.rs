@@ -21,7 +21,7 @@ pub use evaluation::{EVALUATION_SCHEMA, EvaluationFile};
 pub use identification::{
     BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, LogSummary, MethodSummary,
     PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, TermResult,
-    Timings, TrainingJoint, TrainingResult,
+    Timings, TrainingJoint, TrainingResult, ValueSource,
 };
 pub use inspection::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary};
 pub use iterations::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile};

@@ -17,9 +17,10 @@ use dynident_identification::{
     identify_with_instruments as identify_task_with_instruments,
 };
 use dynident_model::InertialParameters;
+use dynident_recording::Level;
 use sections::{
     base_parameters, bodies, friction_results, joint_results, method_summary, offset_results, physical_fit_result,
-    robot_summary, term_results, training_result, verdict,
+    robot_summary, sources, term_results, training_result, verdict,
 };
 use std::path::Path;
 use std::time::Instant;
@@ -187,7 +188,9 @@ fn exported_urdf(
             "the bodies are not physically possible: {reason} (estimator.physical = false writes them as they are)"
         ));
     }
-    written_urdf(robot, &found.model().parametric, &found.inertials(), &found.consistent.parameters)
+    let sources = sources(found.model(), found.estimate());
+    let values = (&found.inertials()[..], &found.consistent.parameters[..]);
+    written_urdf(robot, &found.model().parametric, values, &sources)
 }
 
 /// What the result has beside the identification itself.
@@ -237,7 +240,7 @@ fn result_file(
         simulated,
         base_parameters: base_parameters(model, estimate, found.consistent_base_values()),
         base_parameter_covariance: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
-        bodies: bodies(model, parts.inertials),
+        bodies: bodies(model, parts.inertials, &sources(model, estimate)),
         possible_intervals: found.consistent.intervals.clone(),
         essential: found.essential.clone(),
         correlations: strongest_correlations(estimate, CORRELATIONS),
@@ -269,5 +272,11 @@ fn log_summaries(task: &IdentificationTask, found: &Identification) -> Vec<LogSu
         summary
     });
     let held_out = found.held_out.iter().map(|log| held_out_summary(&task.recordings[log.index], log, &joints));
-    training.chain(held_out).collect()
+    // Another reading names the mistake; signs seen joint by joint are its consequences, and would name others.
+    let is_explained = found.diagnosis.as_ref().is_some_and(|diagnosis| diagnosis.search.best.is_some());
+    let mut all: Vec<LogSummary> = training.chain(held_out).collect();
+    if is_explained {
+        all.iter_mut().for_each(|log| log.model_findings.retain(|finding| finding.level != Level::Problem));
+    }
+    all
 }

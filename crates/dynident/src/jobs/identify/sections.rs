@@ -2,9 +2,10 @@
 
 use crate::result::{
     BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, MethodSummary, PhysicalBodyResult,
-    PhysicalFitResult, PhysicalVerdict, RobotSummary, TermResult, TrainingJoint, TrainingResult,
+    PhysicalFitResult, PhysicalVerdict, RobotSummary, TermResult, TrainingJoint, TrainingResult, ValueSource,
 };
 use crate::study::{JointDrive, StudyRobot};
+use dynident_dynamics::Determination;
 use dynident_estimation::consistent::{PhysicalFit, PhysicalStatus};
 use dynident_estimation::{Estimate, EstimateStatus};
 use dynident_identification::examination::TorqueLag;
@@ -77,13 +78,30 @@ pub(super) fn base_parameters(
         .collect()
 }
 
-pub(super) fn bodies(model: &RegressorModel, inertials: &[InertialParameters]) -> Vec<BodyResult> {
+/// For each body its ten values' sources; base parameters that the logs do not excite count as not measured.
+pub(super) fn sources(model: &RegressorModel, estimate: &Estimate) -> Vec<[ValueSource; 10]> {
+    let fixed: Vec<usize> = estimate.rank.fixed.iter().map(|fixed| fixed.column).collect();
+    let all = model.base().determination(&fixed);
+    let source = |determination: Determination| match determination {
+        Determination::Measured => ValueSource::Measured,
+        Determination::Partly => ValueSource::Partly,
+        Determination::Nominal => ValueSource::Nominal,
+    };
+    (0..model.dof()).map(|body| core::array::from_fn(|k| source(all[10 * body + k]))).collect()
+}
+
+pub(super) fn bodies(
+    model: &RegressorModel,
+    inertials: &[InertialParameters],
+    sources: &[[ValueSource; 10]],
+) -> Vec<BodyResult> {
     model
         .model()
         .bodies()
         .iter()
         .zip(inertials)
-        .map(|(body, inertial)| BodyResult {
+        .zip(sources)
+        .map(|((body, inertial), sources)| BodyResult {
             name: body.name().to_owned(),
             links: body.links.iter().map(|link| link.name.clone()).collect(),
             mass_kg: inertial.mass_kg(),
@@ -92,6 +110,7 @@ pub(super) fn bodies(model: &RegressorModel, inertials: &[InertialParameters]) -
             parameters: inertial.0,
             prior: body.prior().map(|prior| prior.0),
             pseudo_inertia_min_eigenvalue: inertial.pseudo_inertia().symmetric_eigenvalues().min(),
+            sources: Some(*sources),
         })
         .collect()
 }
