@@ -72,8 +72,8 @@ pub use read::{DescriptionFormat, MAX_DESCRIPTION_BYTES, ReadError, Robot, load_
 pub use spatial::{Mat3, Transform, Vec3};
 pub use tree::{Body, Link, Model, STANDARD_GRAVITY};
 pub use urdf::{
-    JointChange, LinkChange, UnreadElement, UrdfError, UrdfFault, UrdfRobot, UrdfWriteError, link_changes, read_urdf,
-    rewrite_urdf,
+    JointChange, LinkChange, UnreadElement, UrdfError, UrdfFault, UrdfIrregularity, UrdfRobot, UrdfWriteError,
+    link_changes, read_urdf, rewrite_urdf,
 };
 
 #[cfg(doctest)]

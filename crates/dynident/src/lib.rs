@@ -39,6 +39,7 @@
 pub mod book;
 mod cpu_time;
 mod error;
+mod inputs;
 mod jobs;
 mod output;
 mod pages;
@@ -56,6 +57,7 @@ pub use dynident_simulation as simulation;
 
 pub use dynident_identification::{Progress, Role, Silent};
 pub use error::{Error, Expected, StudyError};
+pub use inputs::{refuse_overwriting, study_inputs};
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
 pub use jobs::evaluate::{Quantity, evaluate};
 pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instruments};

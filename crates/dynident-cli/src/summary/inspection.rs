@@ -1,6 +1,6 @@
 //! The summary of `inspect`.
 
-use super::text::{name, table, wrapped};
+use super::text::{name, rounded, table, wrapped};
 use core::fmt::Write;
 use dynident::Inspection;
 
@@ -33,7 +33,7 @@ pub(crate) fn inspection(i: &Inspection) -> String {
     let base = &i.base_parameters;
     let _ = writeln!(text, "\n{} base parameters (what motion and torque can determine):", base.count);
     for expression in &base.expressions {
-        text += &wrapped(&format!("  {expression}"), 6);
+        text += &wrapped(&format!("  {}", rounded(expression)), 6);
     }
     if base.numerical_rank != base.count {
         let doubt = format!("  regressors at random states have rank {}: the split is not clear", base.numerical_rank);

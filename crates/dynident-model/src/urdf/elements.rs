@@ -107,7 +107,7 @@ fn joint<'a, 'input>(node: Node<'a, 'input>) -> Result<JointElement<'a, 'input>,
     };
     let parent = name(required_child(node, joint, "joint", "parent", "")?, "link")?;
     let child_link = name(required_child(node, joint, "joint", "child", "")?, "link")?;
-    let origin = origin(node)?;
+    let origin = origin(node, || format!("joint `{joint}`"))?;
     let mut element = JointElement {
         node,
         name: joint,
@@ -157,7 +157,7 @@ fn joint<'a, 'input>(node: Node<'a, 'input>) -> Result<JointElement<'a, 'input>,
 /// `<inertial>`: mass, centre of mass, and inertia about it in axes turned by the origin's rpy.
 fn inertial(node: Node<'_, '_>, link: &str) -> Result<InertialParameters, UrdfError> {
     const HINT: &str = ", or delete <inertial> so that the link counts as unknown";
-    let link_from_com = origin(node)?;
+    let link_from_com = origin(node, || format!("the inertial of link `{link}`"))?;
     let mass = required_number(required_child(node, link, "inertial", "mass", HINT)?, "value")?;
     let element = required_child(node, link, "inertial", "inertia", HINT)?;
     let mut moments = [0.0; 6];
@@ -172,12 +172,27 @@ fn inertial(node: Node<'_, '_>, link: &str) -> Result<InertialParameters, UrdfEr
     Ok(InertialParameters::from_centre_of_mass(mass, link_from_com.translation, &turned))
 }
 
-/// `<origin xyz rpy>`; the identity where it is missing.
-fn origin(node: Node<'_, '_>) -> Result<Transform, UrdfError> {
+/// `<origin xyz rpy>` or, as URDF 1.1 has it, `<origin xyz quat_xyzw>`; the identity where it is missing. Both at once
+/// are refused, as the reference parser does.
+fn origin(node: Node<'_, '_>, owner: impl Fn() -> String) -> Result<Transform, UrdfError> {
     let Some(origin) = child(node, "origin") else { return Ok(Transform::IDENTITY) };
-    let [roll, pitch, yaw] = numbers(origin, "rpy")?.unwrap_or_default();
     let translation = Vec3(numbers(origin, "xyz")?.unwrap_or_default());
-    Ok(Transform { rotation: Mat3::from_roll_pitch_yaw(roll, pitch, yaw), translation })
+    let rotation = match (numbers(origin, "rpy")?, numbers::<4>(origin, "quat_xyzw")?) {
+        (Some(_), Some(_)) => return Err(fault_at(origin, UrdfFault::TwoRotations { owner: owner() })),
+        (None, Some(quaternion)) => {
+            let norm = quaternion.iter().map(|x| x * x).sum::<f64>().sqrt();
+            // Digits of a unit quaternion are lost in print, not a tenth of its length.
+            if (norm - 1.0).abs() > 0.1 {
+                return Err(fault_at(origin, UrdfFault::NoRotation { owner: owner(), norm }));
+            }
+            Mat3::from_quaternion(quaternion.map(|x| x / norm))
+        }
+        (rpy, None) => {
+            let [roll, pitch, yaw] = rpy.unwrap_or_default();
+            Mat3::from_roll_pitch_yaw(roll, pitch, yaw)
+        }
+    };
+    Ok(Transform { rotation, translation })
 }
 
 fn refuse_duplicate<'a, 'input>(

@@ -5,6 +5,7 @@
 //! them: [`link_changes`] gives the whole body to the joint's own link, takes the `<inertial>` from the links fixed to
 //! it, and says so in a comment.
 
+use super::prefixes::without_undeclared;
 use super::{UrdfError, parse};
 use crate::inertial::InertialParameters;
 use crate::tree::Model;
@@ -143,7 +144,9 @@ pub fn link_changes(model: &Model, inertials: &[InertialParameters]) -> Result<V
 /// If the original is no URDF, a link or joint is unknown or named twice, a value is not finite, or a link has moments
 /// without mass.
 pub fn rewrite_urdf(original: &str, links: &[LinkChange], joints: &[JointChange]) -> Result<String, UrdfWriteError> {
-    let document = parse(original)?;
+    // Of the same length, so that its places are the original's.
+    let (regular, _) = without_undeclared(original);
+    let document = parse(&regular)?;
     let robot = document.root_element();
     let source = Source { text: original, eol: if original.contains("\r\n") { "\r\n" } else { "\n" } };
     let mut nodes = HashMap::new();

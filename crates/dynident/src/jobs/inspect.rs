@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::result::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary};
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, numerical_rank_by_body};
-use dynident_model::{InertialParameters, audit, load_robot};
+use dynident_model::{InertialParameters, UrdfIrregularity, audit, load_robot};
 use std::path::Path;
 
 /// Reads and audits a robot description.
@@ -50,6 +50,7 @@ pub fn inspect(path: &Path) -> Result<Inspection, Error> {
         place: format!("line {}", unread.line),
         what: format!("<{}> under <{}> was not read: misspelt, or given twice", unread.element, unread.parent),
     }));
+    entries.extend(robot.irregularities.iter().map(irregularity));
     Ok(Inspection {
         schema: INSPECTION_SCHEMA.to_owned(),
         name: model.name().to_owned(),
@@ -61,11 +62,31 @@ pub fn inspect(path: &Path) -> Result<Inspection, Error> {
         bodies: bodies.collect(),
         base_parameters: BaseSummary {
             count: base.count(),
-            expressions: base.expressions(),
+            expressions: base.exact_expressions(),
             unidentifiable: base.unidentifiable().iter().map(|&column| base.all_columns()[column].symbol()).collect(),
             numerical_rank: numerical_rank_by_body(model, 1, settings.tolerance).independent.len(),
             gap: [weakest, strongest],
         },
         audit: entries,
     })
+}
+
+fn irregularity(found: &UrdfIrregularity) -> AuditEntry {
+    let (check, line, what) = match found {
+        UrdfIrregularity::UndeclaredPrefix { line, prefix } => (
+            "undeclared-prefix",
+            line,
+            format!(
+                "names begin with `{prefix}:`, which no xmlns:{prefix} declares: they are passed over; strict XML readers refuse the file"
+            ),
+        ),
+        UrdfIrregularity::UnknownMimic { line, joint, source_joint } => (
+            "unknown-mimic",
+            line,
+            format!(
+                "joint `{joint}` mimics `{source_joint}`, which is no joint of this robot, and counts as free: fix the name or delete <mimic>"
+            ),
+        ),
+    };
+    AuditEntry { level: "warning".to_owned(), check: check.to_owned(), place: format!("line {line}"), what }
 }

@@ -74,7 +74,7 @@ pub struct BodySummary {
 pub struct BaseSummary {
     /// How many.
     pub count: usize,
-    /// What each sums.
+    /// What each sums, every factor in the shortest form that reads back to the same number.
     pub expressions: Vec<String>,
     /// Parameters that no motion can determine.
     pub unidentifiable: Vec<String>,
