@@ -15,7 +15,7 @@ mod validation;
 pub(crate) use benchmark::benchmark;
 pub(crate) use design::design;
 pub(crate) use identification::identification;
-pub(crate) use inspection::inspection;
+pub(crate) use inspection::{inspection, mended};
 pub(crate) use iteration::{iteration, simulation};
 pub(crate) use reproduction::reproduction;
 pub(crate) use validation::validation;

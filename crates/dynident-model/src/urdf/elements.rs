@@ -1,5 +1,6 @@
 //! The elements `<link>` and `<joint>`, before the tree is built.
 
+use super::stated::MOMENT_NAMES;
 use super::values::{child, name, number, numbers, required_child, required_number};
 use super::{MAX_MOVING_JOINTS, UrdfError, UrdfFault, UrdfRobot, fault_at};
 use crate::inertial::InertialParameters;
@@ -160,11 +161,7 @@ fn inertial(node: Node<'_, '_>, link: &str) -> Result<InertialParameters, UrdfEr
     let link_from_com = origin(node, || format!("the inertial of link `{link}`"))?;
     let mass = required_number(required_child(node, link, "inertial", "mass", HINT)?, "value")?;
     let element = required_child(node, link, "inertial", "inertia", HINT)?;
-    let mut moments = [0.0; 6];
-    for (moment, attribute) in moments.iter_mut().zip(["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]) {
-        *moment = required_number(element, attribute)?;
-    }
-    let [xx, xy, xz, yy, yz, zz] = moments;
+    let [xx, xy, xz, yy, yz, zz] = stated_moments(element)?;
     let at_com = Mat3([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]);
     let r = &link_from_com.rotation;
     // Exact numbers stay exact where nothing turns.
@@ -172,9 +169,18 @@ fn inertial(node: Node<'_, '_>, link: &str) -> Result<InertialParameters, UrdfEr
     Ok(InertialParameters::from_centre_of_mass(mass, link_from_com.translation, &turned))
 }
 
+/// The six moments of `<inertia>`, in the order of the names.
+pub(super) fn stated_moments(element: Node<'_, '_>) -> Result<[f64; 6], UrdfError> {
+    let mut moments = [0.0; 6];
+    for (moment, attribute) in moments.iter_mut().zip(MOMENT_NAMES) {
+        *moment = required_number(element, attribute)?;
+    }
+    Ok(moments)
+}
+
 /// `<origin xyz rpy>` or, as URDF 1.1 has it, `<origin xyz quat_xyzw>`; the identity where it is missing. Both at once
 /// are refused, as the reference parser does.
-fn origin(node: Node<'_, '_>, owner: impl Fn() -> String) -> Result<Transform, UrdfError> {
+pub(super) fn origin(node: Node<'_, '_>, owner: impl Fn() -> String) -> Result<Transform, UrdfError> {
     let Some(origin) = child(node, "origin") else { return Ok(Transform::IDENTITY) };
     let translation = Vec3(numbers(origin, "xyz")?.unwrap_or_default());
     let rotation = match (numbers(origin, "rpy")?, numbers::<4>(origin, "quat_xyzw")?) {

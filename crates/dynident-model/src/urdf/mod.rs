@@ -27,9 +27,11 @@ mod assemble;
 mod elements;
 mod flood;
 mod prefixes;
+mod stated;
 mod values;
 mod write;
 
+pub use stated::{MOMENT_NAMES, StatedInertial, rewrite_inertials, stated_inertials};
 pub use write::{JointChange, LinkChange, UrdfWriteError, link_changes, rewrite_urdf};
 
 use crate::error::ModelError;

@@ -101,7 +101,7 @@ mod tests {
         let wanted = text.replace("p:", "p_").replace("s:t", "s_t");
         assert_eq!(mended, wanted);
         let found: Vec<(&str, usize)> = found.iter().map(|one| (one.prefix, one.at)).collect();
-        assert_eq!(found, [("p", text.find("p:").unwrap()), ("s", text.find("s:").unwrap())]);
+        assert_eq!(found, [("p", text.find("p:").unwrap()), ("s", text.find("s:t").unwrap())]);
         for kept in ["<a", "<a b:c=", "<!-- a:b", "<xacro:if/>", "<:a/>", "<a :b='1'/>"] {
             let expected = kept.replace("b:c", "b_c");
             assert_eq!(without_undeclared(kept).0, expected);
