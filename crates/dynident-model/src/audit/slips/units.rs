@@ -34,7 +34,7 @@ const CANDIDATES: [Units; 10] = [
 const GYRATION: f64 = -0.45;
 const GYRATIONS: [[f64; 2]; 2] = [[-1.2, 0.8], [-1.7, 1.3]];
 const DENSITY: f64 = 2.2;
-const DENSITIES: [[f64; 2]; 2] = [[-0.7, 3.7], [-5.0, 4.2]];
+const DENSITIES: [[f64; 2]; 2] = [[-0.7, 3.7], [-0.7, 4.2]];
 /// Largest distance of a centre of mass over L; least where it is what was changed.
 const FARTHEST: f64 = 20.0;
 const NEAREST: f64 = 0.02;
@@ -61,6 +61,11 @@ pub(super) fn look(search: &mut Search) {
         return;
     }
     for place in places {
+        // Sensors and frames have a mass for the simulator's sake, of no body.
+        let one = Figures::of(core::iter::once((search.now[place].clone(), lengths[place])));
+        if one.density < DENSITIES[1][0] {
+            continue;
+        }
         explain(search, &[place], &lengths, true);
     }
 }
