@@ -80,11 +80,11 @@ impl Mutator {
         (self.next() % end.max(1) as u64) as usize
     }
 
-    /// The name of a seed, and that seed with one to eight mutations.
+    /// The name of a seed, and that seed with one mutation, half as often with two, and so on.
     pub(crate) fn input<'a>(&mut self, corpus: &'a Corpus) -> (&'a str, Vec<u8>) {
         let (name, seed) = &corpus.seeds[self.below(corpus.seeds.len())];
         let mut bytes = seed.clone();
-        for _ in 0..=self.below(8) {
+        for _ in 0..=self.next().trailing_zeros() {
             self.mutate(&mut bytes, corpus);
             bytes.truncate(LONGEST);
         }

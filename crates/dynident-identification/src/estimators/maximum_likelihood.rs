@@ -48,7 +48,7 @@ pub struct PeriodSettings {
 #[non_exhaustive]
 pub enum PeriodError {
     /// A period that is no time.
-    #[error("period_s = {period_s}: give the seconds after which the motion repeats, at most {MOST_PERIOD_S:e}")]
+    #[error("period_s = {period_s:?}: give the seconds after which the motion repeats, at most {MOST_PERIOD_S:e}")]
     Period {
         /// What was given.
         period_s: f64,

@@ -6,7 +6,7 @@
 //! it, and says so in a comment.
 
 use super::prefixes::without_undeclared;
-use super::{UrdfError, parse};
+use super::{MAX_MAGNITUDE, UrdfError, parse};
 use crate::inertial::InertialParameters;
 use crate::tree::Model;
 use roxmltree::Node;
@@ -88,6 +88,16 @@ pub enum UrdfWriteError {
     NoMass {
         /// The link.
         link: String,
+    },
+    /// A value that no reader would take.
+    #[error(
+        "the new values of link `{link}` hold {value:e}, beyond the {MAX_MAGNITUDE:e} that a description may hold: check its lengths and masses"
+    )]
+    TooLarge {
+        /// The link.
+        link: String,
+        /// The value.
+        value: f64,
     },
     /// As many parameter sets as moving bodies are needed.
     #[error("{found} parameter sets for {expected} moving bodies")]
@@ -212,6 +222,14 @@ fn inertial_lines(link: &str, inertial: &InertialParameters, note: Option<&str>)
     };
     if com.0.iter().chain(inertia.0.iter().flatten()).any(|x| !x.is_finite()) {
         return Err(UrdfWriteError::NoMass { link: link.to_owned() });
+    }
+    let largest = com
+        .0
+        .iter()
+        .chain(inertia.0.iter().flatten())
+        .fold(inertial.mass_kg(), |a, b| if b.abs() > a.abs() { *b } else { a });
+    if largest.abs() > MAX_MAGNITUDE {
+        return Err(UrdfWriteError::TooLarge { link: link.to_owned(), value: largest });
     }
     let ([x, y, z], i) = (com.0, inertia.0);
     let mut lines = vec![(0, "<inertial>".to_owned())];

@@ -365,7 +365,7 @@ impl LogFormat {
                 return wrong("rate_hz", &format!("{rate} is not a rate"), fix);
             }
             (Some(time), None) if !(1e-15..=1e6).contains(&time.scale) => {
-                let problem = format!("{} is no length of a tick", time.scale);
+                let problem = format!("{:?} is no length of a tick", time.scale);
                 return wrong("time.scale", &problem, "give 1e-15 to 1e6 units per tick, or leave it out");
             }
             _ => {}
@@ -509,7 +509,7 @@ impl ChannelGroup {
                     "scale" => "give a factor of 1e-15 to 1e15 in size",
                     _ => "give a number of at most 1e15 in size",
                 };
-                return Err(FormatError::new(at(name), format!("{value} is not allowed"), fix));
+                return Err(FormatError::new(at(name), format!("{value:?} is not allowed"), fix));
             }
         }
         if let Some(matrix) = &self.matrix {
