@@ -1,9 +1,9 @@
 //! Millimetres and grams.
 //!
 //! Three figures say whether masses, centres of mass and moments fit the distances between the joints (`L`, of the body
-//! that a link belongs to): the radius of gyration `√(½ tr I / m)` over L, the mass over L³, and the largest distance of
-//! a centre of mass over L. On the published descriptions of arms and humanoids the medians of the first two are 0.26 to
-//! 0.44 (1.7 where many links are wheels and fingers) and 10 to 500 kg/m³, the third is 0.5 to 4.5.
+//! that a link belongs to): the radius of gyration `√(½ tr I / m)` over L, the mass over L³, and the distance of the
+//! centre of mass over L. On the published descriptions of arms and humanoids their medians are 0.26 to 0.44 (1.7 where
+//! many links are wheels and fingers), 10 to 500 kg/m³, and at most 0.5; single centres of mass are up to 4.5 L away.
 
 use super::{Search, SlipKind, shifted, trace};
 use crate::urdf::StatedInertial;
@@ -35,9 +35,10 @@ const GYRATION: f64 = -0.45;
 const GYRATIONS: [[f64; 2]; 2] = [[-1.2, 0.8], [-1.7, 1.3]];
 const DENSITY: f64 = 2.2;
 const DENSITIES: [[f64; 2]; 2] = [[-0.7, 3.7], [-0.7, 4.2]];
-/// Largest distance of a centre of mass over L; least where it is what was changed.
+/// Largest distance of a centre of mass over L (the median of those that are not zero), and the least where it was
+/// changed.
 const FARTHEST: f64 = 20.0;
-const NEAREST: f64 = 0.02;
+const NEAREST: f64 = 0.005;
 /// A second explanation that fits within this much (in decades) of the best makes it ambiguous.
 const APART: f64 = 0.4;
 
@@ -131,12 +132,15 @@ struct Figures {
 
 impl Figures {
     fn of(links: impl Iterator<Item = (StatedInertial, f64)>) -> Self {
-        let (mut gyrations, mut densities, mut com) = (Vec::new(), Vec::new(), 0.0_f64);
+        let (mut gyrations, mut densities, mut distances) = (Vec::new(), Vec::new(), Vec::new());
         for (stated, length) in links {
             gyrations.push((0.5 * trace(&stated.moments) / stated.mass_kg).sqrt().log10() - length.log10());
             densities.push(stated.mass_kg.log10() - 3.0 * length.log10());
-            com = com.max(stated.com_m.iter().map(|x| x * x).sum::<f64>().sqrt() / length);
+            let distance = stated.com_m.iter().map(|x| x * x).sum::<f64>().sqrt() / length;
+            // Many frames stand in the centre of mass.
+            distances.extend((distance > 0.0).then_some(distance));
         }
+        let com = if distances.is_empty() { 0.0 } else { median(distances) };
         Self { gyration: median(gyrations), density: median(densities), com }
     }
 
@@ -157,7 +161,7 @@ impl core::fmt::Display for Figures {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         write!(
             f,
-            "radii of gyration are {:.2e} of the links' lengths, masses {:.2e} kg per cubed length, centres of mass at most {:.2e} lengths away",
+            "radii of gyration are {:.2e} of the links' lengths, masses {:.2e} kg per cubed length, centres of mass {:.2e} lengths away",
             10_f64.powf(self.gyration),
             10_f64.powf(self.density),
             self.com
