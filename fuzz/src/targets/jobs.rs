@@ -1,7 +1,7 @@
 //! The small commands on a folder in which one file was mutated: study, robot, log, states or result.
 
 use super::Run;
-use dynident::{Quantity, ResultFile, RunOptions, Silent, Study, identify, inspect, validate};
+use dynident::{Quantity, ResultFile, RunOptions, Silent, Study, check, identify, inspect, validate};
 use std::io;
 use std::path::Path;
 use tempfile::TempDir;
@@ -39,7 +39,7 @@ impl Run for Jobs {
     }
 }
 
-/// Inspects, evaluates, identifies and validates.
+/// Inspects, evaluates, validates, checks and identifies.
 fn commands(at: &dyn Fn(&str) -> std::path::PathBuf) -> bool {
     let mut accepted = true;
     let mut heard = |outcome: Result<(), dynident::Error>| {
@@ -62,6 +62,7 @@ fn commands(at: &dyn Fn(&str) -> std::path::PathBuf) -> bool {
         Ok(study) => {
             let options = RunOptions { data: None, threads: 1, progress: &Silent };
             heard(validate(&at("result.json"), &study, &path, &options).map(|_| ()));
+            heard(check(&study, &path, &options).map(|_| ()));
             heard(identify(&study, &path, &options).map(|found| {
                 let finite = found.result.base_parameters.iter().all(|parameter| parameter.value.is_finite());
                 assert!(finite, "a parameter that is no number");
