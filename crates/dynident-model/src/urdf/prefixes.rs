@@ -64,7 +64,6 @@ fn for_each_prefix<'a>(text: &'a str, take: &mut dyn FnMut(usize, &'a str)) {
             let place = start + offset;
             match (quote, byte) {
                 (Some(open), byte) if open == byte => quote = None,
-                (Some(_), _) => {}
                 (None, b'>') => {
                     at = place + 1;
                     break;
@@ -77,7 +76,7 @@ fn for_each_prefix<'a>(text: &'a str, take: &mut dyn FnMut(usize, &'a str)) {
                 }
                 (None, b'/' | b' ' | b'\t' | b'\r' | b'\n') => word = Some(place + 1),
                 (None, b'=') => word = None,
-                (None, _) => {}
+                (Some(_) | None, _) => {}
             }
         }
     }

@@ -58,9 +58,9 @@ pub fn stated_inertials(text: &str) -> Result<Vec<StatedInertial>, UrdfError> {
     Ok(stated)
 }
 
-/// `original` with the numbers of `<inertial>` that differ between `from` and `to` changed in place, every other byte as
-/// it was. `from` are its [`stated_inertials`], `to` the same links in the same order. A number whose sign alone changes
-/// keeps its digits; others are written in the shortest form that reads back to the same `f64`.
+/// `original` with the numbers of `<inertial>` that differ between `from` and `to` changed in place, every other byte
+/// as it was. `from` are its [`stated_inertials`], `to` the same links in the same order. A number whose sign alone
+/// changes keeps its digits; others are written in the shortest form that reads back to the same `f64`.
 ///
 /// # Errors
 /// If the original is not readable, a link of `to` is not in it, or a number is not finite.
