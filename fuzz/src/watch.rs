@@ -60,13 +60,11 @@ impl Watch {
         self.set(thread, Some(Running { target, input: input.to_vec(), since: Instant::now() }));
         let outcome = catch_unwind(AssertUnwindSafe(run));
         self.set(thread, None);
-        match outcome {
-            Ok(accepted) => (accepted, false),
-            Err(_) => {
-                keep(&self.found, target, input, &PANIC.take());
-                (false, true)
-            }
+        if let Ok(accepted) = outcome {
+            return (accepted, false);
         }
+        keep(&self.found, target, input, &PANIC.take());
+        (false, true)
     }
 
     fn set(&self, thread: usize, now: Option<Running>) {

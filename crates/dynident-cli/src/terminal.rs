@@ -48,10 +48,12 @@ pub(crate) fn visible(text: &str) -> String {
         c.is_control() && c != '\n'
             || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
     };
+    use core::fmt::Write;
     let mut shown = String::with_capacity(text.len());
     for c in text.chars() {
         if steers(c) {
-            shown.push_str(&format!("\\u{:04x}", u32::from(c)));
+            // Writing to a string cannot fail.
+            let _ = write!(shown, "\\u{:04x}", u32::from(c));
         } else {
             shown.push(c);
         }

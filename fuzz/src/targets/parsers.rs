@@ -36,6 +36,7 @@ impl Run for OfFile {
     }
 }
 
+#[allow(clippy::unnecessary_wraps, reason = "the shape of all targets")]
 fn plain(run: fn(&[u8]) -> bool) -> io::Result<Box<dyn Run>> {
     Ok(Box::new(Plain(run)))
 }

@@ -95,7 +95,7 @@ pub(super) fn shortened(expression: &str, longest: usize) -> String {
 /// A sum with six digits of each factor, to be read.
 pub(super) fn rounded(expression: &str) -> String {
     let digits = |word: &str| match word.parse::<f64>() {
-        Ok(factor) => format!("{:.5e}", factor).parse::<f64>().unwrap_or(factor).to_string(),
+        Ok(factor) => format!("{factor:.5e}").parse::<f64>().unwrap_or(factor).to_string(),
         Err(_) => word.to_owned(),
     };
     expression.split(' ').map(digits).collect::<Vec<_>>().join(" ")
