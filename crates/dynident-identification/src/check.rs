@@ -1,6 +1,7 @@
 //! Before any fit is believed: do study, robot and recordings fit together?
 
-use crate::diagnosis::{Diagnosis, diagnose, has_jumps};
+use crate::diagnosis::{Diagnosis, diagnose};
+use crate::doubt::have_jumps;
 use crate::error::IdentificationError;
 use crate::execution::Execution;
 use crate::logs::{Logs, of_role};
@@ -50,7 +51,7 @@ fn examined(task: &IdentificationTask, execution: Execution<'_>) -> Result<Study
     let estimate = weighted_least_squares(&training.problem, &WeightedSettings::default())?;
     let theta = &estimate.values[..training.columns.base()];
     let known = training.columns.is_plain().then_some(theta);
-    let diagnosis = match has_jumps(&training) {
+    let diagnosis = match have_jumps(&training) {
         true => None,
         false => Some(diagnose((&logs, &settings), robot, &chosen, known)?),
     };

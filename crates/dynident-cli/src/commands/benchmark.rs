@@ -50,9 +50,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         write_whole(&out.join("benchmark.json"), &pretty_json(&file)?).map_err(message_of)?;
     }
     if context.json {
-        terminal::print(&json(&file)?);
+        terminal::print(&json(&file)?)?;
     } else if !context.quiet || options.out.is_none() {
-        terminal::print(&summary::benchmark(&file));
+        terminal::print(&summary::benchmark(&file))?;
     }
     Ok(Verdict::Good)
 }

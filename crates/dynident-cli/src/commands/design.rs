@@ -1,7 +1,7 @@
 //! `dynident design STUDY.toml --out DIR`.
 
 use super::search::Search;
-use super::{Context, json, known_in, message_of, pretty_json};
+use super::{Context, json, known_in, message_of, pretty_json, refuse_overwriting};
 use crate::{Verdict, summary, terminal};
 use clap::ValueEnum;
 use dynident::excitation::DesignProgress;
@@ -12,6 +12,21 @@ use dynident::{
     DesignOutcome, RunOptions, Study, check_log, check_trajectory, check_writable, design_study, write_whole,
 };
 use std::path::PathBuf;
+
+/// The motion; not written where it was given.
+const TRAJECTORY: &str = "trajectory.csv";
+/// Every file that may be written.
+const FILES: [&str; 9] = [
+    "design.json",
+    TRAJECTORY,
+    "preview.svg",
+    "path.svg",
+    "fitness.csv",
+    "fitness.svg",
+    "trajectory.ros2.yaml",
+    "waypoints.csv",
+    "trajectory.script",
+];
 
 /// Options of `design`.
 #[derive(clap::Args)]
@@ -64,6 +79,13 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     if let Some(seed) = options.seed {
         study.design.get_or_insert_default().search.seed = seed;
     }
+    let given = options.check.is_some() || options.check_log.is_some();
+    let names: Vec<&str> = FILES.into_iter().filter(|name| !(given && *name == TRAJECTORY)).collect();
+    let sections: &[&str] =
+        if options.check_log.is_some() { &["robot", "design", "log"] } else { &["robot", "design"] };
+    let further: Vec<PathBuf> = options.check.iter().cloned().collect();
+    let of_study = (&study, &*options.study, options.data.as_deref());
+    refuse_overwriting((&options.out, &names), of_study, sections, &further)?;
     check_writable(&options.out).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
@@ -89,10 +111,10 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         terminal::remark("no file for the robot was written: the motion breaks its limits");
     }
     if context.json {
-        terminal::print(&json(&outcome.file)?);
+        terminal::print(&json(&outcome.file)?)?;
     } else if !context.quiet {
         let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
-        terminal::print(&summary::design(&outcome.file, &options.out, &names));
+        terminal::print(&summary::design(&outcome.file, &options.out, &names))?;
     }
     Ok(if outcome.file.feasible { Verdict::Good } else { Verdict::Negative })
 }
@@ -114,7 +136,7 @@ fn files(outcome: &DesignOutcome, options: &Options) -> Result<Vec<(&'static str
     ];
     // Who brings a trajectory has it, maybe under this very name.
     if file.given.is_none() {
-        files.insert(0, ("trajectory.csv", plain(trajectory_csv)?));
+        files.insert(0, (TRAJECTORY, plain(trajectory_csv)?));
     }
     if let Some(picture) = outcome.fitness_svg().map_err(message_of)? {
         files.push(("fitness.csv", fitness_csv(&outcome.history).into_bytes()));

@@ -1,6 +1,6 @@
 //! `dynident identify STUDY.toml --out DIR`.
 
-use super::{Context, json, judged, known_in, message_of, pretty_json};
+use super::{Context, json, judged, known_in, message_of, pretty_json, refuse_overwriting};
 use crate::{Verdict, summary, terminal};
 use dynident::{RunOptions, Study, check_writable, identify, write_whole};
 use std::path::PathBuf;
@@ -28,6 +28,9 @@ pub(crate) struct Options {
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     let study = Study::load(&options.study).map_err(message_of)?;
+    let out = (&*options.out, &[URDF, "report.html", "result.json"][..]);
+    let of_study = (&study, &*options.study, options.data.as_deref());
+    refuse_overwriting(out, of_study, &["robot", "log", "arm", "format", "motion", "estimator"], &[])?;
     check_writable(&options.out).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
@@ -44,9 +47,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     // The result last: where it stands, everything stands.
     write_whole(&options.out.join("result.json"), &pretty_json(result)?).map_err(message_of)?;
     if context.json {
-        terminal::print(&json(result)?);
+        terminal::print(&json(result)?)?;
     } else if !context.quiet {
-        terminal::print(&summary::identification(result, &options.out, identification.urdf.is_some()));
+        terminal::print(&summary::identification(result, &options.out, identification.urdf.is_some()))?;
     }
     let problems = result.problems();
     for problem in problems.iter().take(PROBLEMS_SHOWN) {

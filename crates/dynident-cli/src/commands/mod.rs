@@ -15,9 +15,9 @@ pub(crate) mod validate;
 use crate::progress::Bar;
 use crate::{Verdict, terminal};
 use dynident::identification::examination::LogValidation;
-use dynident::{Progress, Silent};
+use dynident::{Progress, Silent, Study, study_inputs};
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What every command knows of how it was called.
 pub(crate) struct Context {
@@ -95,6 +95,19 @@ pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
         }
     }
     verdict
+}
+
+/// That none of the files (or folders) `names` in the folder `out` is one that the study names in `sections`, or one of
+/// `further`.
+pub(crate) fn refuse_overwriting(
+    (out, names): (&Path, &[&str]),
+    (study, path, data): (&Study, &Path, Option<&Path>),
+    sections: &[&str],
+    further: &[PathBuf],
+) -> Result<(), String> {
+    let outputs: Vec<PathBuf> = names.iter().map(|name| out.join(name)).collect();
+    let inputs = [study_inputs(study, path, data, sections), further.to_vec()].concat();
+    dynident::refuse_overwriting(&outputs, &inputs).map_err(message_of)
 }
 
 /// The message of an error that a study led to. Where it speaks of another file, the study that names that file is

@@ -24,9 +24,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     // The JSON last: where it stands, everything stands.
     write_whole(&options.out.join("paper.json"), &pretty_json(&file)?).map_err(message_of)?;
     if context.json {
-        terminal::print(&json(&file)?);
+        terminal::print(&json(&file)?)?;
     } else if !context.quiet {
-        terminal::print(&summary::reproduction(&file, &options.out));
+        terminal::print(&summary::reproduction(&file, &options.out))?;
     }
     Ok(if file.reached.iter().all(|goal| goal.met) { Verdict::Good } else { Verdict::Negative })
 }

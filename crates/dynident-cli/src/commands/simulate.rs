@@ -1,7 +1,7 @@
 //! `dynident simulate STUDY.toml --out DIR`.
 
 use super::search::Search;
-use super::{Context, json, known_in, message_of, pretty_json};
+use super::{Context, json, known_in, message_of, pretty_json, refuse_overwriting};
 use crate::{Verdict, summary, terminal};
 use dynident::{RunOptions, Study, check_writable, simulate_study, write_whole};
 use std::path::PathBuf;
@@ -27,6 +27,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     if let Some(seed) = options.seed {
         study.simulation.get_or_insert_default().sensors.seed = seed;
     }
+    let of_study = (&study, &*options.study, options.data.as_deref());
+    let sections = ["robot", "design", "iteration", "simulation", "controller"];
+    refuse_overwriting((&options.out, &["log.csv", "truth.json"]), of_study, &sections, &[])?;
     check_writable(&options.out).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
@@ -38,9 +41,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     // The truth last: where it stands, everything stands.
     write_whole(&options.out.join("truth.json"), &pretty_json(&simulation.file)?).map_err(message_of)?;
     if context.json {
-        terminal::print(&json(&simulation.file)?);
+        terminal::print(&json(&simulation.file)?)?;
     } else if !context.quiet {
-        terminal::print(&summary::simulation(&simulation.file, &options.out));
+        terminal::print(&summary::simulation(&simulation.file, &options.out))?;
     }
     Ok(if simulation.file.done { Verdict::Good } else { Verdict::Negative })
 }

@@ -1,8 +1,8 @@
 //! The search for the reading that explains the samples best.
 //!
 //! Every candidate is bounded from below by the fit without physical limits, which is ten times cheaper: what cannot
-//! win is never fitted with them. A reading counts as better only by a clear margin, and those that come close to the best
-//! are named beside it.
+//! win is never fitted with them. A reading counts as better only by a clear margin, and those that come close to the
+//! best are named beside it.
 
 use super::candidates::candidates;
 use super::mistake::Mistake;

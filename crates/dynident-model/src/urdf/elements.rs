@@ -1,5 +1,6 @@
 //! The elements `<link>` and `<joint>`, before the tree is built.
 
+use super::stated::MOMENT_NAMES;
 use super::values::{child, name, number, numbers, required_child, required_number};
 use super::{MAX_MOVING_JOINTS, UrdfError, UrdfFault, UrdfRobot, fault_at};
 use crate::inertial::InertialParameters;
@@ -107,7 +108,7 @@ fn joint<'a, 'input>(node: Node<'a, 'input>) -> Result<JointElement<'a, 'input>,
     };
     let parent = name(required_child(node, joint, "joint", "parent", "")?, "link")?;
     let child_link = name(required_child(node, joint, "joint", "child", "")?, "link")?;
-    let origin = origin(node)?;
+    let origin = origin(node, || format!("joint `{joint}`"))?;
     let mut element = JointElement {
         node,
         name: joint,
@@ -157,14 +158,10 @@ fn joint<'a, 'input>(node: Node<'a, 'input>) -> Result<JointElement<'a, 'input>,
 /// `<inertial>`: mass, centre of mass, and inertia about it in axes turned by the origin's rpy.
 fn inertial(node: Node<'_, '_>, link: &str) -> Result<InertialParameters, UrdfError> {
     const HINT: &str = ", or delete <inertial> so that the link counts as unknown";
-    let link_from_com = origin(node)?;
+    let link_from_com = origin(node, || format!("the inertial of link `{link}`"))?;
     let mass = required_number(required_child(node, link, "inertial", "mass", HINT)?, "value")?;
     let element = required_child(node, link, "inertial", "inertia", HINT)?;
-    let mut moments = [0.0; 6];
-    for (moment, attribute) in moments.iter_mut().zip(["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]) {
-        *moment = required_number(element, attribute)?;
-    }
-    let [xx, xy, xz, yy, yz, zz] = moments;
+    let [xx, xy, xz, yy, yz, zz] = stated_moments(element)?;
     let at_com = Mat3([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]);
     let r = &link_from_com.rotation;
     // Exact numbers stay exact where nothing turns.
@@ -172,12 +169,36 @@ fn inertial(node: Node<'_, '_>, link: &str) -> Result<InertialParameters, UrdfEr
     Ok(InertialParameters::from_centre_of_mass(mass, link_from_com.translation, &turned))
 }
 
-/// `<origin xyz rpy>`; the identity where it is missing.
-fn origin(node: Node<'_, '_>) -> Result<Transform, UrdfError> {
+/// The six moments of `<inertia>`, in the order of the names.
+pub(super) fn stated_moments(element: Node<'_, '_>) -> Result<[f64; 6], UrdfError> {
+    let mut moments = [0.0; 6];
+    for (moment, attribute) in moments.iter_mut().zip(MOMENT_NAMES) {
+        *moment = required_number(element, attribute)?;
+    }
+    Ok(moments)
+}
+
+/// `<origin xyz rpy>` or, as URDF 1.1 has it, `<origin xyz quat_xyzw>`; the identity where it is missing. Both at once
+/// are refused, as the reference parser does.
+pub(super) fn origin(node: Node<'_, '_>, owner: impl Fn() -> String) -> Result<Transform, UrdfError> {
     let Some(origin) = child(node, "origin") else { return Ok(Transform::IDENTITY) };
-    let [roll, pitch, yaw] = numbers(origin, "rpy")?.unwrap_or_default();
     let translation = Vec3(numbers(origin, "xyz")?.unwrap_or_default());
-    Ok(Transform { rotation: Mat3::from_roll_pitch_yaw(roll, pitch, yaw), translation })
+    let rotation = match (numbers(origin, "rpy")?, numbers::<4>(origin, "quat_xyzw")?) {
+        (Some(_), Some(_)) => return Err(fault_at(origin, UrdfFault::TwoRotations { owner: owner() })),
+        (None, Some(quaternion)) => {
+            let norm = quaternion.iter().map(|x| x * x).sum::<f64>().sqrt();
+            // Digits of a unit quaternion are lost in print, not a tenth of its length.
+            if (norm - 1.0).abs() > 0.1 {
+                return Err(fault_at(origin, UrdfFault::NoRotation { owner: owner(), norm }));
+            }
+            Mat3::from_quaternion(quaternion.map(|x| x / norm))
+        }
+        (rpy, None) => {
+            let [roll, pitch, yaw] = rpy.unwrap_or_default();
+            Mat3::from_roll_pitch_yaw(roll, pitch, yaw)
+        }
+    };
+    Ok(Transform { rotation, translation })
 }
 
 fn refuse_duplicate<'a, 'input>(

@@ -23,7 +23,9 @@ pub use identification::{
     PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, TermResult,
     Timings, TrainingJoint, TrainingResult, ValueSource,
 };
-pub use inspection::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary};
+pub use inspection::{
+    AuditEntry, BaseSummary, BodySummary, CorrectionEntry, INSPECTION_SCHEMA, Inspection, JointSummary, SlipEntry,
+};
 pub use iterations::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile};
 pub use simulation::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};
 // What the files hold of the crates below.
