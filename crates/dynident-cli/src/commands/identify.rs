@@ -2,7 +2,7 @@
 
 use super::{Context, json, judged, known_in, message_of, pretty_json};
 use crate::{Verdict, summary, terminal};
-use dynident::{RunOptions, Study, check_writable, identify, write_whole};
+use dynident::{OutputSet, RunOptions, Study, check_writable, identify};
 use std::path::PathBuf;
 
 /// The user's description with the new values.
@@ -33,16 +33,14 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let identification = identify(&study, &options.study, &run).map_err(known_in(&options.study))?;
     let result = &identification.result;
-    if let Some(urdf) = &identification.urdf {
-        write_whole(&options.out.join(URDF), urdf.as_bytes()).map_err(message_of)?;
-    } else if options.out.join(URDF).exists() {
-        let old = options.out.join(URDF);
-        terminal::remark(&format!("{} is of an earlier run and does not belong to this result", old.display()));
-    }
-    let report = identification.report().map_err(message_of)?;
-    write_whole(&options.out.join("report.html"), report.as_bytes()).map_err(message_of)?;
-    // The result last: where it stands, everything stands.
-    write_whole(&options.out.join("result.json"), &pretty_json(result)?).map_err(message_of)?;
+    let set = OutputSet::new(&options.out)
+        .file("result.json", pretty_json(result)?)
+        .file("report.html", identification.report().map_err(message_of)?);
+    let set = match &identification.urdf {
+        Some(urdf) => set.file(URDF, urdf.as_str()),
+        None => set.absent(URDF),
+    };
+    set.write().map_err(message_of)?;
     if context.json {
         terminal::print(&json(result)?);
     } else if !context.quiet {
