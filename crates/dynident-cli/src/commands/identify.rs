@@ -46,7 +46,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     } else if !context.quiet {
         terminal::print(&summary::identification(result, &options.out, identification.urdf.is_some()));
     }
-    let problems = result.problems();
+    let problems = &result.problems;
     for problem in problems.iter().take(PROBLEMS_SHOWN) {
         terminal::remark(&format!("PROBLEM: {problem}"));
     }
