@@ -65,7 +65,7 @@ pub use jobs::iterate::{IterationWatch, iterate_study};
 pub use jobs::options::RunOptions;
 pub use jobs::simulate::{Simulation, simulate_study};
 pub use jobs::validate::validate;
-pub use output::{check_writable, write_whole};
+pub use output::{check_outputs, check_writable, write_whole};
 pub use output_set::OutputSet;
 pub use result::{DesignFile, Inspection, IterationsFile, ResultFile, SimulationFile, ValidationFile};
 pub use study::{Folders, Study, StudyRobot};

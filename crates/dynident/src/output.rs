@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Writes `contents` to `path` by way of a temporary file in the same folder: a reader sees the old file or the new
 /// one, never a half of one, and an error leaves what was there.
@@ -36,4 +36,19 @@ pub fn check_writable(folder: &Path) -> Result<(), Error> {
     let nearest = folder.ancestors().find(|ancestor| ancestor.exists() || ancestor.as_os_str().is_empty());
     let nearest = nearest.filter(|ancestor| !ancestor.as_os_str().is_empty()).unwrap_or(Path::new("."));
     tempfile::NamedTempFile::new_in(nearest).map(drop).map_err(cannot)
+}
+
+/// [`check_writable`], and that no file of these names in `folder` is one of the `inputs` of the job, under whatever path
+/// and through whatever links: what a job reads it does not write over.
+///
+/// # Errors
+/// [`Error::Output`] with the system's reason, [`Error::OverInput`].
+pub fn check_outputs(folder: &Path, names: &[&str], inputs: &[PathBuf]) -> Result<(), Error> {
+    check_writable(folder)?;
+    let read: Vec<PathBuf> = inputs.iter().filter_map(|input| input.canonicalize().ok()).collect();
+    let over = names.iter().map(|name| folder.join(name)).find(|path| {
+        let there = path.canonicalize();
+        there.is_ok_and(|there| read.contains(&there))
+    });
+    over.map_or(Ok(()), |path| Err(Error::OverInput { path }))
 }

@@ -8,9 +8,7 @@ use dynident::excitation::DesignProgress;
 use dynident::excitation::export::{
     Sampled, UrScriptSettings, fitness_csv, ros2_joint_trajectory, trajectory_csv, urscript, waypoints_csv,
 };
-use dynident::{
-    DesignOutcome, OutputSet, RunOptions, Study, check_log, check_trajectory, check_writable, design_study,
-};
+use dynident::{DesignOutcome, OutputSet, RunOptions, Study, check_log, check_outputs, check_trajectory, design_study};
 use std::path::PathBuf;
 
 /// The motion; who lets one be checked has it, maybe under this very name.
@@ -70,7 +68,14 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     if let Some(seed) = options.seed {
         study.design.get_or_insert_default().search.seed = seed;
     }
-    check_writable(&options.out).map_err(message_of)?;
+    let reads_log = options.check_log.is_some();
+    let mut inputs = study.input_files(&options.study, options.data.as_deref(), reads_log);
+    inputs.extend(options.check.clone());
+    // A trajectory that is checked may stand among the outputs under its usual name: it is not written then.
+    let is_checked = options.check.is_some() || reads_log;
+    let written = FURTHER.iter().filter(|name| !(is_checked && **name == TRAJECTORY)).copied();
+    let names: Vec<&str> = ["design.json", "preview.svg", "path.svg"].into_iter().chain(written).collect();
+    check_outputs(&options.out, &names, &inputs).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let search = Search::new(context);

@@ -41,6 +41,11 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         Chosen::Gravity => Quantity::Gravity,
         Chosen::Regressor => Quantity::Regressor,
     };
+    if let Some((folder, name)) = options.out.as_ref().and_then(|out| out.parent().zip(out.file_name()?.to_str())) {
+        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        let inputs = [options.robot.clone(), options.states.clone()];
+        dynident::check_outputs(folder, &[name], &inputs).map_err(message_of)?;
+    }
     let robot = dynident::model::load_robot(&options.robot).map_err(|error| error.to_string())?;
     if context.json || options.out.is_some() {
         let mut table = Vec::new();

@@ -2,7 +2,7 @@
 
 use super::{Context, json, judged, known_in, message_of, pretty_json};
 use crate::{Verdict, summary, terminal};
-use dynident::{OutputSet, RunOptions, Study, check_writable, identify};
+use dynident::{OutputSet, RunOptions, Study, check_outputs, identify};
 use std::path::PathBuf;
 
 /// The user's description with the new values.
@@ -28,10 +28,14 @@ pub(crate) struct Options {
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     let study = Study::load(&options.study).map_err(message_of)?;
-    check_writable(&options.out).map_err(message_of)?;
+    let inputs = study.input_files(&options.study, options.data.as_deref(), true);
+    check_outputs(&options.out, &["result.json", "report.html", URDF], &inputs).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
-    let identification = identify(&study, &options.study, &run).map_err(known_in(&options.study))?;
+    let mut identification = identify(&study, &options.study, &run).map_err(known_in(&options.study))?;
+    if let Some(provenance) = &mut identification.result.provenance {
+        provenance.command = Some(command(options));
+    }
     let result = &identification.result;
     let set = OutputSet::new(&options.out)
         .file("result.json", pretty_json(result)?)
@@ -55,4 +59,15 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     }
     let within = judged(&result.validation, options.max_validation_error);
     Ok(if problems.is_empty() { within } else { Verdict::Negative })
+}
+
+/// What was asked for, without what does not change the result. Folders are left to the list of files: their names say
+/// more of a computer than of a result.
+fn command(options: &Options) -> String {
+    let study = options.study.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let mut command = format!("dynident identify {study}");
+    if let Some(limit) = options.max_validation_error {
+        command += &format!(" --max-validation-error {limit}");
+    }
+    command
 }

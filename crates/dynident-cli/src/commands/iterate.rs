@@ -4,7 +4,7 @@ use super::search::Search;
 use super::{Context, json, known_in, message_of};
 use crate::{Verdict, summary, terminal};
 use dynident::study::LegOrder;
-use dynident::{IterationWatch, RunOptions, Study, check_writable, iterate_study};
+use dynident::{IterationWatch, RunOptions, Study, check_outputs, iterate_study};
 use std::path::PathBuf;
 
 /// Options of `iterate`.
@@ -31,7 +31,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     if let Some(seed) = options.seed {
         study.simulation.get_or_insert_default().sensors.seed = seed;
     }
-    check_writable(&options.out).map_err(message_of)?;
+    let inputs = study.input_files(&options.study, options.data.as_deref(), false);
+    let names = ["iterations.json", "report.html", "trajectory.json"];
+    check_outputs(&options.out, &names, &inputs).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let search = Search::new(context);

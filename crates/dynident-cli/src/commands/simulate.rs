@@ -3,7 +3,7 @@
 use super::search::Search;
 use super::{Context, json, known_in, message_of, pretty_json};
 use crate::{Verdict, summary, terminal};
-use dynident::{OutputSet, RunOptions, Study, check_writable, simulate_study};
+use dynident::{OutputSet, RunOptions, Study, check_outputs, simulate_study};
 use std::path::PathBuf;
 
 /// Options of `simulate`.
@@ -27,7 +27,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     if let Some(seed) = options.seed {
         study.simulation.get_or_insert_default().sensors.seed = seed;
     }
-    check_writable(&options.out).map_err(message_of)?;
+    // The study's logs are what this may make: it reads none.
+    let inputs = study.input_files(&options.study, options.data.as_deref(), false);
+    check_outputs(&options.out, &["truth.json", "log.csv"], &inputs).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let search = Search::new(context);

@@ -93,6 +93,12 @@ pub enum Error {
         /// What is wrong, and the fix.
         message: String,
     },
+    /// An output that would stand in the place of a file that is read.
+    #[error("{}: is read by this command and would be written over; name another place for the outputs", path.display())]
+    OverInput {
+        /// The file.
+        path: PathBuf,
+    },
     /// An output that cannot be written. What was there before is untouched.
     #[error("{}: cannot be written: {source}; nothing that was there has changed", path.display())]
     Output {
