@@ -3,10 +3,9 @@
 use super::findings::{problems, warnings};
 use super::noise::noise;
 use super::text::{WIDTH, listed, name, percent, shortened, table, with_deviation, wrapped};
-use super::validation::residuals;
+use super::validation::{residuals, written};
 use core::fmt::Write;
 use dynident::ResultFile;
-use dynident::estimation::ValidationReport;
 use dynident::identification::consistent::ParameterInterval;
 use dynident::identification::examination::LogValidation;
 use dynident::identification::friction::FrictionCandidate;
@@ -106,18 +105,13 @@ fn headline(r: &ResultFile) -> String {
     for (number, log) in r.validation.iter().enumerate() {
         let prior =
             prior_of(log, None).map_or(String::new(), |p| format!("; description's own {}\u{a0}%", percent(Some(p))));
-        let error = percent(judged(log).relative_error_percent);
+        let error = percent(written(log).relative_error_percent);
         text += &wrapped(
             &format!("held-out torque error {error}\u{a0}% on [{}] {} (fit {fit}\u{a0}%{prior})", number + 1, log.log),
             2,
         );
     }
     text + &beside(r)
-}
-
-/// What is written is judged: the consistent set where there is one, else the estimate.
-fn judged(log: &LogValidation) -> &ValidationReport {
-    log.physical.as_ref().unwrap_or(&log.model)
 }
 
 /// The free fit beside the model that is written, and whether the logs tell the two apart.
@@ -171,7 +165,7 @@ fn joints(r: &ResultFile) -> String {
             joint.map_or(("all joints", all), |j| (&joints[j].name[..], joints[j].relative_error_percent));
         let mut row = vec![name(title), percent(fit)];
         for log in logs {
-            let written = judged(log);
+            let written = written(log);
             let (relative, rms) = joint.map_or((written.relative_error_percent, written.rmse_nm), |j| {
                 let joint = &written.joints[j];
                 (joint.relative_error_percent, joint.rmse_nm)

@@ -78,7 +78,7 @@
       const own = colour(number);
       return {
         label: curve.name,
-        stroke: curve.broad ? own + "8c" : own,
+        stroke: curve.broad ? own + "bf" : own,
         width: curve.points ? 0 : curve.broad ? 4.5 : 1.3,
         dash: curve.dashed ? [7, 4] : undefined,
         points: curve.points ? { show: true, size: 5, fill: own } : curve.broad ? { show: false } : points(own),

@@ -101,6 +101,10 @@ fn text_and_curves_stand_out_from_the_paper() {
             let ratio = contrast(of(&format!("c{number}")), of("paper"));
             assert!(ratio >= 3.0, "{scope} curve {number}: {ratio:.2}");
         }
+        // The broad curve below others, of the first colour at three quarters of its strength (`line_plot.svg`).
+        let (own, paper) = (of("c0"), of("paper"));
+        let pale = [0, 1, 2].map(|k| 0.75 * own[k] + 0.25 * paper[k]);
+        assert!(contrast(pale, paper) >= 3.0, "{scope} broad curve: {:.2}", contrast(pale, paper));
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::result::{InputFile, Provenance};
-use crate::study::Study;
+use crate::study::{Folders, Study};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -42,6 +42,21 @@ pub(crate) fn provenance(
     let mut identity = hexadecimal(&identity.finalize());
     identity.truncate(DIGITS);
     Ok(Provenance { identity, version: version.to_owned(), command: None, study: own, inputs })
+}
+
+/// [`provenance()`] of a motion that is designed, simulated or iterated, with further files that were read.
+///
+/// # Errors
+/// As [`provenance()`].
+pub(crate) fn motion_provenance(
+    study: &Study,
+    study_path: &Path,
+    data: Option<&Path>,
+    further: &[(&'static str, &Path)],
+) -> Result<Provenance, Error> {
+    let mut read = study.motion_inputs(&Folders::new(study, study_path, data));
+    read.extend(further.iter().map(|(what, path)| (*what, path.to_path_buf())));
+    provenance(study, study_path, &read)
 }
 
 /// [`provenance()`] beside a job, on a thread of its own if there may be more than one.

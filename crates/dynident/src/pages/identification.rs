@@ -72,7 +72,7 @@ fn unit(unit: &str) -> String {
 }
 
 fn percent(value: Option<f64>) -> String {
-    value.map_or_else(|| "–".to_owned(), |value| format!("{} %", short(value, 3)))
+    value.map_or_else(|| "–".to_owned(), |value| format!("{}\u{a0}%", short(value, 3)))
 }
 
 fn figures(r: &ResultFile) -> KeyFigures {

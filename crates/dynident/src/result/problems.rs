@@ -28,7 +28,7 @@ impl ResultFile {
 
     /// Of [`problems`](Self::problems) those that no single log's findings name: an estimator that did not settle, and
     /// a consistent set (which is what is written) that predicts clearly worse than the estimate it was made from; on
-    /// the held-out logs, or on the rows that were fitted to where none was held out.
+    /// the held-out logs, or, where none was held out, on the rows that were fitted to if the logs tell the two apart.
     pub fn problems_of_the_model(&self) -> Vec<String> {
         let mut problems = Vec::new();
         if !self.method.is_settled() {
@@ -45,7 +45,10 @@ impl ResultFile {
             worse_when_consistent(&format!("log `{}`", log.log), &free, &written)
         });
         problems.extend(tested);
-        if let (true, Some(physical)) = (self.validation.is_empty(), &self.training.physical) {
+        // On the rows that it was fitted to the estimate is the better by itself: only what is more than chance counts.
+        let difference = self.physical.fit.as_ref().and_then(|fit| fit.difference);
+        let is_tested = self.validation.is_empty() && difference.is_none_or(|test| test.is_significant);
+        if let (true, Some(physical)) = (is_tested, &self.training.physical) {
             let pairs = [
                 (self.training.relative_error_percent, &self.training.joints),
                 (physical.relative_error_percent, &physical.joints),

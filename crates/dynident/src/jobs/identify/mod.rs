@@ -148,7 +148,11 @@ fn identified(
     };
     let mut result = result_file(study, &robot, &task, &found, parts);
     result.problems = result.found_problems();
-    result.robot.file = seen_from(study_path.parent().unwrap_or(Path::new("")), &robot.robot.path);
+    let folder = study_path.parent().unwrap_or(Path::new(""));
+    result.robot.file = seen_from(folder, &robot.robot.path);
+    for log in &mut result.logs {
+        log.import.file = seen_from(folder, Path::new(&log.import.file));
+    }
     let mut traces = found.examination.traces;
     traces.extend(found.held_out.into_iter().filter_map(|log| log.trace));
     Ok(IdentificationOutcome { result, estimate: found.estimation.estimate, inertials, urdf, traces })

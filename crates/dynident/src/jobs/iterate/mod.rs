@@ -9,6 +9,7 @@ pub(super) use trajectory::Trajectory;
 
 use crate::error::{Error, StudyError};
 use crate::jobs::options::RunOptions;
+use crate::jobs::provenance::motion_provenance;
 use crate::output::write_whole;
 use crate::output_set::OutputSet;
 use crate::pages::iteration::{RunName, RunTrace, TimeSpent, iteration_report};
@@ -103,6 +104,7 @@ pub fn iterate_study(
     let report = IterationReport {
         study,
         study_path,
+        provenance: motion_provenance(study, study_path, options.data.as_deref(), &[])?,
         robot: &robot,
         duration_s: legs.iter().map(|leg| leg.reference().duration_s()).sum(),
         truth: truth.map(|truth| truth.base_values),
