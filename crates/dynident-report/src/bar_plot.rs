@@ -6,7 +6,7 @@ use crate::ticks::{short, ticks};
 use serde::Serialize;
 
 /// Letters of a label that are drawn; the whole label stands under the pointer.
-const LETTERS: usize = 44;
+const LETTERS: usize = 38;
 /// Bars that are read aloud.
 const SPOKEN: usize = 12;
 /// Width of the picture, of the labels, of the figures, and height of a bar's row, px.

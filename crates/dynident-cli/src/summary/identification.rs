@@ -89,9 +89,8 @@ fn estimator(name: &str) -> String {
 
 /// The figures that count, first.
 fn headline(r: &ResultFile) -> String {
-    let written = r.training.physical.as_ref().map(|written| percent(written.relative_error_percent));
-    let free = percent(r.training.relative_error_percent);
-    let fit = written.as_ref().unwrap_or(&free);
+    let fitted = r.training.physical.as_ref();
+    let fit = percent(fitted.map_or(r.training.relative_error_percent, |fitted| fitted.relative_error_percent));
     if r.validation.is_empty() {
         return wrapped(
             &format!(
