@@ -1,6 +1,6 @@
 //! What speaks against loading a result's model into a robot.
 
-use super::ResultFile;
+use super::{ResultFile, StudyCheck};
 use dynident_recording::Level;
 
 /// Times the estimate's error that the consistent set may have on a held-out log. On the real logs that Dynident is
@@ -13,24 +13,24 @@ const LEAST_SHARE: f64 = 1.0e-3;
 
 impl ResultFile {
     /// Everything that speaks against loading the model that was written into a robot, a sentence each; empty where
-    /// nothing does: problems of the logs, and [`of_the_model`](Self::problems_of_the_model).
+    /// nothing does: [`problems_of_the_model`](Self::problems_of_the_model), then the problems of the logs.
     pub(crate) fn found_problems(&self) -> Vec<String> {
-        let mut problems = Vec::new();
+        let mut problems = self.problems_of_the_model();
         for log in &self.logs {
             let findings = log.import.findings.iter().chain(&log.model_findings);
             for finding in findings.filter(|finding| finding.level == Level::Problem) {
                 problems.push(format!("log `{}`, {}: {}", log.log, finding.channel, finding.message));
             }
         }
-        problems.extend(self.problems_of_the_model());
         problems
     }
 
-    /// Of [`problems`](Self::problems) those that no single log's findings name: an estimator that did not settle, and
+    /// Of [`problems`](Self::problems) those that no single log's findings name: what the examiner of studies found, an
+    /// estimator that did not settle, and
     /// a consistent set (which is what is written) that predicts clearly worse than the estimate it was made from; on
     /// the held-out logs, or, where none was held out, on the rows that were fitted to if the logs tell the two apart.
     pub fn problems_of_the_model(&self) -> Vec<String> {
-        let mut problems = Vec::new();
+        let mut problems: Vec<String> = self.check.iter().flat_map(StudyCheck::problems).collect();
         if !self.method.is_settled() {
             problems.push(format!(
                 "the estimator {} did not settle: its values are those of its last iteration",
