@@ -4,6 +4,7 @@ use crate::decimation::kept_samples;
 use crate::error::ReportError;
 use crate::pen::{Pen, tenth};
 use crate::ticks::{short, ticks};
+use core::fmt::Write;
 use serde::Serialize;
 
 /// The page's colours: distinguished by people who see colours differently (after Okabe and Ito), three to one and more
@@ -68,16 +69,17 @@ impl CurvePicture<'_> {
             (low <= high).then(|| format!("{} to {}", short(low, 3), short(high, 3)))
         };
         let mut words = format!("{}; {}", self.x_label, range(self.x).unwrap_or_else(|| "empty".to_owned()));
+        // Writing to a string cannot fail.
         for curve in &self.curves {
             let range = range(&curve.values).unwrap_or_else(|| "no values".to_owned());
-            words += &format!("; {}: {range}", curve.name);
+            let _ = write!(words, "; {}: {range}", curve.name);
         }
         if let Some((name, values)) = self.strip() {
             let squares: Vec<f64> =
                 values.iter().filter(|value| value.is_finite()).map(|value| value * value).collect();
             if !squares.is_empty() {
                 let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
-                words += &format!("; {name}: root mean square {}", short(rms, 3));
+                let _ = write!(words, "; {name}: root mean square {}", short(rms, 3));
             }
         }
         words + &format!("; in {}", self.y_label)

@@ -38,8 +38,8 @@ pub fn check_writable(folder: &Path) -> Result<(), Error> {
     tempfile::NamedTempFile::new_in(nearest).map(drop).map_err(cannot)
 }
 
-/// [`check_writable`], and that no file of these names in `folder` is one of the `inputs` of the job, under whatever path
-/// and through whatever links: what a job reads it does not write over.
+/// [`check_writable`], and that no file of these names in `folder` is one of the `inputs` of the job, under whatever
+/// path and through whatever links: what a job reads it does not write over.
 ///
 /// # Errors
 /// [`Error::Output`] with the system's reason, [`Error::OverInput`].

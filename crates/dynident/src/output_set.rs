@@ -202,7 +202,7 @@ impl Stage {
         up.join(self.path.file_name().unwrap_or_default()).join(CURRENT).join(name)
     }
 
-    /// Puts files in the places of the links, those of the set that is in force, and removes the stage. Needs no room on
+    /// Puts files in the places of the links, those of the set in force, and removes the stage. Needs no room on
     /// the disk. What cannot be done stays as it is: the links lead to the same files.
     fn settle(&self) {
         let in_force = fs::read_link(self.path.join(CURRENT)).unwrap_or_default();

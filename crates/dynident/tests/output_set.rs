@@ -17,7 +17,7 @@ const NAMES: [&str; 4] = ["result.json", "report.html", "identified.urdf", "stud
 fn set(folder: &Path, k: usize, long: usize) -> OutputSet {
     let mut set = OutputSet::new(folder);
     for (place, name) in NAMES.iter().enumerate() {
-        let is_absent = k % 3 == 0 && place == 2;
+        let is_absent = k.is_multiple_of(3) && place == 2;
         set = if is_absent { set.absent(name) } else { set.file(name, format!("{k} {}", "x".repeat(long))) };
     }
     set
@@ -30,7 +30,7 @@ fn found(folder: &Path) -> Option<usize> {
         Some(text.split(' ').next().unwrap().parse().unwrap())
     };
     let all: Vec<Option<usize>> = NAMES.iter().map(|name| number(name)).collect();
-    let expected = |place: usize| all[0].filter(|k| !(k % 3 == 0 && place == 2));
+    let expected = |place: usize| all[0].filter(|k| !(k.is_multiple_of(3) && place == 2));
     for place in 0..NAMES.len() {
         assert_eq!(all[place], expected(place), "{all:?}");
     }
@@ -106,8 +106,7 @@ fn child_on_a_full_disk() {
     while std::fs::write(ballast(pages), [1_u8; 4096]).is_ok() {
         pages += 1;
     }
-    let mut failures = 0;
-    for page in (0..=pages).rev() {
+    for (failures, page) in (0..=pages).rev().enumerate() {
         // The last one may have failed before it had a name.
         let _ = std::fs::remove_file(ballast(page));
         let Err(error) = set(folder, 2, 9000).write() else {
@@ -118,7 +117,6 @@ fn child_on_a_full_disk() {
         assert!(matches!(error, Error::Output { .. }), "{error}");
         assert!(error.to_string().contains("nothing that was there has changed"), "{error}");
         assert_eq!((found(folder), stages(folder)), (Some(1), 0), "{error}");
-        failures += 1;
     }
     panic!("the set never fitted");
 }
@@ -184,7 +182,9 @@ fn two_programs_at_once_leave_the_set_of_one() {
         std::thread::spawn(move || (0..5).for_each(|again| set(&path, 10 * again + k, 100).write().unwrap()))
     });
     let writers: Vec<_> = writers.collect();
-    writers.into_iter().for_each(|writer| writer.join().unwrap());
+    for writer in writers {
+        writer.join().unwrap();
+    }
     assert!(found(folder.path()).is_some());
     assert_eq!(stages(folder.path()), 0);
 }

@@ -65,9 +65,6 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
 /// more of a computer than of a result.
 fn command(options: &Options) -> String {
     let study = options.study.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let mut command = format!("dynident identify {study}");
-    if let Some(limit) = options.max_validation_error {
-        command += &format!(" --max-validation-error {limit}");
-    }
-    command
+    let limit = options.max_validation_error.map(|limit| format!(" --max-validation-error {limit}"));
+    format!("dynident identify {study}{}", limit.unwrap_or_default())
 }

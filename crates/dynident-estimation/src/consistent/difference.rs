@@ -49,7 +49,7 @@ impl PhysicalFit {
         let f = self.moved_sigma * self.moved_sigma / (parameters * inflation);
         let p_value = f_tail(f, parameters, rest);
         let known = f.is_finite() && p_value.is_finite();
-        known.then(|| ConsistencyTest {
+        known.then_some(ConsistencyTest {
             f,
             degrees_of_freedom: [parameters, rest],
             p_value,

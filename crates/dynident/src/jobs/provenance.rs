@@ -5,6 +5,7 @@ use crate::result::{InputFile, Provenance};
 use crate::study::{Folders, Study};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
+use std::fmt::Write;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
@@ -98,7 +99,11 @@ fn input(what: &str, path: &Path, folder: &Path) -> Result<InputFile, Error> {
 }
 
 fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
 }
 
 /// The way from a folder to a file, with `/`; the file's name alone where there is none (another drive).

@@ -81,10 +81,10 @@ fn figures(r: &ResultFile) -> KeyFigures {
         let prior = log.prior.as_ref().and_then(|prior| prior.relative_error_percent);
         let mut note = log.log.clone();
         if log.physical.is_some() {
-            note += &format!("; free fit {}", percent(log.model.relative_error_percent));
+            note = format!("{note}; free fit {}", percent(log.model.relative_error_percent));
         }
         if prior.is_some() {
-            note += &format!("; description {}", percent(prior));
+            note = format!("{note}; description {}", percent(prior));
         }
         figures = figures.figure("held-out torque error", percent(written(log).relative_error_percent), note);
     }

@@ -26,9 +26,9 @@ impl ResultFile {
     }
 
     /// Of [`problems`](Self::problems) those that no single log's findings name: what the examiner of studies found, an
-    /// estimator that did not settle, and
-    /// a consistent set (which is what is written) that predicts clearly worse than the estimate it was made from; on
-    /// the held-out logs, or, where none was held out, on the rows that were fitted to if the logs tell the two apart.
+    /// estimator that did not settle, and a consistent set (which is what is written) that predicts clearly worse than
+    /// the estimate it was made from; on the held-out logs, or, where none was held out, on the rows that were fitted
+    /// to if the logs tell the two apart.
     pub fn problems_of_the_model(&self) -> Vec<String> {
         let mut problems: Vec<String> = self.check.iter().flat_map(StudyCheck::problems).collect();
         if !self.method.is_settled() {

@@ -14,8 +14,8 @@ impl Study {
         [path.to_owned()].into_iter().chain(others).chain(arm).chain(logs).collect()
     }
 
-    /// What a motion is designed, simulated or iterated from, with what each file is: the robot's description, the result
-    /// behind a prior, trajectories.
+    /// What a motion is designed, simulated or iterated from, with what each file is: the robot's description, the
+    /// result behind a prior, trajectories.
     pub(crate) fn motion_inputs(&self, folders: &Folders) -> Vec<(&'static str, PathBuf)> {
         let iteration = self.iteration.as_ref();
         let trajectories = iteration.and_then(|section| section.trajectory.as_ref()).into_iter();

@@ -64,7 +64,7 @@ pub fn check_trajectory(
         None => trajectory.display().to_string(),
     };
     let origin = MotionOrigin::given(&setup, name, given, &information);
-    DesignOutcome::new(setup, origin, MotionReview { duration_s, rate_hz, information, check }).from_files(
+    DesignOutcome::new(setup, origin, MotionReview { duration_s, rate_hz, information, check }).with_provenance(
         (study, study_path),
         options,
         &[("trajectory", trajectory)],
@@ -111,7 +111,7 @@ pub fn check_log(
         .fold(0, |best, piece| if pieces[piece].duration_s() > pieces[best].duration_s() { piece } else { best });
     let information = MotionInformation { plain, weighted };
     let origin = MotionOrigin::given(&setup, study.log_name(index), pieces.swap_remove(longest), &information);
-    DesignOutcome::new(setup, origin, MotionReview { duration_s, rate_hz, information, check }).from_files(
+    DesignOutcome::new(setup, origin, MotionReview { duration_s, rate_hz, information, check }).with_provenance(
         (study, study_path),
         options,
         &[("log", &file)],

@@ -173,7 +173,7 @@ impl DesignOutcome {
     }
 
     /// The outcome with what it comes from: of the study, and of further files that were read.
-    pub(super) fn from_files(
+    pub(super) fn with_provenance(
         mut self,
         (study, study_path): (&Study, &Path),
         options: &RunOptions<'_>,
