@@ -1,7 +1,8 @@
 //! The only place that prints. What is printed may hold text from outside (names in files, file names, what a robot's
 //! program says): no character of it steers the terminal.
 
-use std::io::{self, IsTerminal, Write};
+use core::fmt::Write as _;
+use std::io::{self, IsTerminal, Write as _};
 
 /// Prints to standard output. A reader that has gone (`| head`) ends the printing, not the program.
 ///
@@ -48,7 +49,6 @@ pub(crate) fn visible(text: &str) -> String {
         c.is_control() && c != '\n'
             || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
     };
-    use core::fmt::Write;
     let mut shown = String::with_capacity(text.len());
     for c in text.chars() {
         if steers(c) {

@@ -51,10 +51,8 @@ fn examined(task: &IdentificationTask, execution: Execution<'_>) -> Result<Study
     let estimate = weighted_least_squares(&training.problem, &WeightedSettings::default())?;
     let theta = &estimate.values[..training.columns.base()];
     let known = training.columns.is_plain().then_some(theta);
-    let diagnosis = match have_jumps(&training) {
-        true => None,
-        false => Some(diagnose((&logs, &settings), robot, &chosen, known)?),
-    };
+    let diagnosis =
+        if have_jumps(&training) { None } else { Some(diagnose((&logs, &settings), robot, &chosen, known)?) };
     let mut imports: Vec<(usize, Option<ImportReport>)> =
         training.logs.iter().map(|log| (log.index, log.statistics.report.clone())).collect();
     let model: RegressorModel = robot.clone().into();

@@ -9,7 +9,7 @@ use dynident::excitation::export::{
     Sampled, UrScriptSettings, fitness_csv, ros2_joint_trajectory, trajectory_csv, urscript, waypoints_csv,
 };
 use dynident::{
-    DesignOutcome, RunOptions, Study, check_log, check_trajectory, check_writable, design_study, write_whole,
+    DesignOutcome, OutputSet, RunOptions, Study, check_log, check_trajectory, check_writable, design_study,
 };
 use std::path::PathBuf;
 
@@ -27,6 +27,9 @@ const FILES: [&str; 9] = [
     "waypoints.csv",
     "trajectory.script",
 ];
+/// Those of them that not every design has.
+const FURTHER: [&str; 6] =
+    [TRAJECTORY, "fitness.csv", "fitness.svg", "trajectory.ros2.yaml", "waypoints.csv", "trajectory.script"];
 
 /// Options of `design`.
 #[derive(clap::Args)]
@@ -102,11 +105,17 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         terminal::remark("stopped: this is the best motion so far");
     }
     let files = files(&outcome, options)?;
+    let mut set = OutputSet::new(&options.out).file("design.json", pretty_json(&outcome.file)?);
     for (name, contents) in &files {
-        write_whole(&options.out.join(name), contents).map_err(message_of)?;
+        set = set.file(name, contents.as_slice());
     }
-    // The design last: where it stands, everything stands.
-    write_whole(&options.out.join("design.json"), &pretty_json(&outcome.file)?).map_err(message_of)?;
+    // What an earlier design left is not of this motion.
+    let is_checked = outcome.file.given.is_some();
+    let others = FURTHER.iter().filter(|name| !files.iter().any(|(written, _)| written == *name));
+    for name in others.filter(|name| !(is_checked && **name == TRAJECTORY)) {
+        set = set.absent(name);
+    }
+    set.write().map_err(message_of)?;
     if !outcome.file.feasible && !options.to.is_empty() {
         terminal::remark("no file for the robot was written: the motion breaks its limits");
     }
@@ -134,7 +143,6 @@ fn files(outcome: &DesignOutcome, options: &Options) -> Result<Vec<(&'static str
         ("preview.svg", outcome.preview_svg().map_err(message_of)?.into_bytes()),
         ("path.svg", outcome.path_svg().map_err(message_of)?.into_bytes()),
     ];
-    // Who brings a trajectory has it, maybe under this very name.
     if file.given.is_none() {
         files.insert(0, (TRAJECTORY, plain(trajectory_csv)?));
     }

@@ -68,7 +68,8 @@ pub(crate) fn percentage(text: &str) -> Result<f64, String> {
     if value.is_finite() && value >= 0.0 { Ok(value) } else { Err("give 0 or more percent".to_owned()) }
 }
 
-/// Whether every log stays below the error that was asked for, if one was.
+/// Whether every log stays below the error that was asked for, if one was: of the model that is written, which is the
+/// consistent set where there is one.
 pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
     let Some(limit) = limit else { return Verdict::Good };
     if logs.is_empty() {
@@ -77,22 +78,19 @@ pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
     }
     let mut verdict = Verdict::Good;
     for log in logs {
-        // Of the model that is written where there is a consistent set, and of the estimate behind it.
-        let models = [Some((&log.model, "estimate")), log.physical.as_ref().map(|report| (report, "written model"))];
-        for (report, whose) in models.into_iter().flatten() {
-            match report.relative_error_percent {
-                Some(error) if error <= limit => continue,
-                Some(error) => terminal::remark(&format!(
-                    "{}: the {whose}'s error of {error:.2} % is above the {limit} % asked for",
-                    log.log
-                )),
-                None => terminal::remark(&format!(
-                    "{}: the torque is zero throughout, so it has no relative error",
-                    log.log
-                )),
+        let written = log.physical.as_ref();
+        let whose = if written.is_some() { "written model" } else { "estimate" };
+        match written.unwrap_or(&log.model).relative_error_percent {
+            Some(error) if error <= limit => continue,
+            Some(error) => terminal::remark(&format!(
+                "{}: the {whose}'s error of {error:.2} % is above the {limit} % asked for",
+                log.log
+            )),
+            None => {
+                terminal::remark(&format!("{}: the torque is zero throughout, so it has no relative error", log.log));
             }
-            verdict = Verdict::Negative;
         }
+        verdict = Verdict::Negative;
     }
     verdict
 }

@@ -3,7 +3,7 @@
 use super::search::Search;
 use super::{Context, json, known_in, message_of, pretty_json, refuse_overwriting};
 use crate::{Verdict, summary, terminal};
-use dynident::{RunOptions, Study, check_writable, simulate_study, write_whole};
+use dynident::{OutputSet, RunOptions, Study, check_writable, simulate_study};
 use std::path::PathBuf;
 
 /// Options of `simulate`.
@@ -37,9 +37,8 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let simulation =
         simulate_study(&study, &options.study, &run, &|at| search.hear(at)).map_err(known_in(&options.study))?;
     search.end();
-    write_whole(&options.out.join("log.csv"), simulation.log.as_bytes()).map_err(message_of)?;
-    // The truth last: where it stands, everything stands.
-    write_whole(&options.out.join("truth.json"), &pretty_json(&simulation.file)?).map_err(message_of)?;
+    let set = OutputSet::new(&options.out).file("truth.json", pretty_json(&simulation.file)?);
+    set.file("log.csv", simulation.log.as_str()).write().map_err(message_of)?;
     if context.json {
         terminal::print(&json(&simulation.file)?)?;
     } else if !context.quiet {

@@ -112,7 +112,7 @@ fn problem(robot: &ParametricModel, rows: &MotionRows) -> Result<(LinearProblem,
     let (model, layout) = (robot.model(), robot.layout());
     let samples = rows.len();
     let mut panels = panels(robot, rows);
-    let mut problem = LinearProblem::new(robot.base().expressions().to_vec(), robot.joint_names());
+    let mut problem = LinearProblem::new(robot.base().expressions(), robot.joint_names());
     let mut alone = Vec::with_capacity(model.dof());
     for joint in 0..model.dof() {
         panels.torque_mut(joint).copy_from_slice(&rows.tau[joint]);

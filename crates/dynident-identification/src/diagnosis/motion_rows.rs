@@ -51,9 +51,9 @@ impl MotionRows {
             let Some(decimator) = &mut decimator else { return };
             if block.segment != segment {
                 segment = block.segment;
-                decimator.iter_mut().for_each(|decimator| {
+                if let Some(decimator) = decimator {
                     decimator.finish();
-                });
+                }
             }
             panel.clear();
             for values in [&block.q, &block.dq, &block.ddq, &block.tau] {

@@ -2,7 +2,9 @@
 
 use super::check::StudyCheck;
 use super::numbers::{number, rows};
+use super::provenance::Provenance;
 use crate::study::JointDrive;
+use dynident_estimation::consistent::ConsistencyTest;
 use dynident_estimation::{CorrelatedPair, EssentialReport};
 use dynident_identification::Role;
 use dynident_identification::consistent::ParameterInterval;
@@ -24,6 +26,13 @@ pub struct ResultFile {
     pub schema: String,
     /// Name of the study.
     pub name: String,
+    /// Everything that speaks against loading the model that was written into a robot, a sentence each; empty where
+    /// nothing does.
+    #[serde(default)]
+    pub problems: Vec<String>,
+    /// Where it comes from; none in results of before 0.1.
+    #[serde(default)]
+    pub provenance: Option<Provenance>,
     /// The robot.
     pub robot: RobotSummary,
     /// How the fit was made.
@@ -105,7 +114,7 @@ pub struct ResultFile {
 pub struct RobotSummary {
     /// Its name.
     pub name: String,
-    /// The description.
+    /// The description, seen from the study's folder.
     pub file: String,
     /// Degrees of freedom.
     pub dof: usize,
@@ -194,6 +203,13 @@ pub struct BaseParameterResult {
     pub physical: Option<f64>,
     /// False when the data do not excite it; value is then the prior's and std means nothing.
     pub excited: bool,
+}
+
+impl BaseParameterResult {
+    /// `100 half_width_95 / |value|`; none for a value of zero and for what the data do not excite.
+    pub fn relative_half_width_percent(&self) -> Option<f64> {
+        (self.excited && self.value != 0.0).then(|| 100.0 * self.half_width_95 / self.value.abs())
+    }
 }
 
 /// One body of the full set.
@@ -298,6 +314,19 @@ pub struct TrainingResult {
     pub relative_error_percent: Option<f64>,
     /// Joint by joint.
     pub joints: Vec<TrainingJoint>,
+    /// The same of the physically consistent set, which is what is written; none without one.
+    #[serde(default)]
+    pub physical: Option<TrainingErrors>,
+}
+
+/// Errors of a set of parameters on the logs that were fitted to.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct TrainingErrors {
+    /// `100 ‖τ - τ̂‖ / ‖τ‖`, filtered, all joints stacked.
+    pub relative_error_percent: Option<f64>,
+    /// Joint by joint.
+    pub joints: Vec<TrainingJoint>,
 }
 
 /// One joint of [`TrainingResult`].
@@ -357,6 +386,9 @@ pub struct PhysicalFitResult {
     pub moved_sigma: f64,
     /// The largest move of a base parameter in units of its reported standard deviation.
     pub largest_move_std: Option<f64>,
+    /// Whether the logs contradict the consistent set: the distance tested; none where it cannot be.
+    #[serde(default)]
+    pub difference: Option<ConsistencyTest>,
     /// Limits that hold with equality and push: friction or drive inertia at zero.
     #[serde(default)]
     pub active: Vec<String>,
@@ -411,10 +443,13 @@ pub struct LogSummary {
     pub model_findings: Vec<Finding>,
 }
 
-/// Where the time went, in seconds.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+/// When it was made, and where the time went, in seconds: all that is not the same when it is made again.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Timings {
+    /// When it was made, by the computer's clock, in universal time: `2026-11-22T10:30:13Z`.
+    #[serde(default)]
+    pub made_at: String,
     /// Reading the robot, base parameters.
     #[serde(rename = "machine")]
     pub robot: f64,
