@@ -16,6 +16,9 @@ use rayon::prelude::*;
 pub(super) const CLEARLY_BETTER: f64 = 0.6;
 /// Times what the study as written leaves of all torque that a better reading may leave.
 const NO_WORSE: f64 = 1.05;
+/// Times what was left of a joint's torque, and a share of it, that a better reading may leave.
+const SACRIFICED: f64 = 1.25;
+const LITTLE: f64 = 0.02;
 /// Readings this close to the best cannot be told from it.
 const ALIKE: f64 = 0.2;
 /// By how much a number between those tried must be better than the nearest of these.
@@ -92,9 +95,18 @@ fn one_round(at: &Corrected, best: &Reading, consistency: &ConsistencySettings) 
         least = fitted.iter().map(|(_, reading)| reading.score()).fold(least, f64::min);
     }
     // What explains a weak joint at the cost of the strong ones explains the wrong thing.
-    fitted.retain(|(_, reading)| reading.left_of_all <= NO_WORSE * best.left_of_all);
+    fitted.retain(|(_, reading)| reading.left_of_all <= NO_WORSE * best.left_of_all && !sacrifices(reading, best));
     fitted.sort_by(|a, b| a.1.score().total_cmp(&b.1.score()));
     (fitted, all.len())
+}
+
+/// Whether a reading leaves clearly more of some joint's torque than the one it was made from.
+fn sacrifices(reading: &Reading, from: &Reading) -> bool {
+    let last = reading.mistakes.last();
+    (0..reading.left.len()).any(|joint| {
+        let before = last.map_or(joint, |mistake| mistake.torque_from(joint));
+        reading.left[joint] > SACRIFICED * from.left[before] + LITTLE
+    })
 }
 
 /// A zero or a mounting that lies between those tried.
