@@ -90,7 +90,7 @@ fn what_is_read_is_not_written_over() {
         let link = path.clone();
         let ran = identify(out.path(), from, &link.display().to_string(), &[]);
         assert_eq!(ran.status, 2, "{}", ran.stderr);
-        assert!(ran.stderr.contains(name) && ran.stderr.contains("written over"), "{}", ran.stderr);
+        assert!(ran.stderr.contains(name) && ran.stderr.contains("would overwrite"), "{}", ran.stderr);
         assert_eq!(std::fs::read(&path).unwrap(), std::fs::read(&input).unwrap());
         std::fs::remove_file(&path).unwrap();
     }

@@ -23,6 +23,8 @@ const LITTLE: f64 = 0.02;
 const ALIKE: f64 = 0.2;
 /// By how much a number between those tried must be better than the nearest of these.
 const WORTH_REFINING: f64 = 0.3;
+/// Readings beside the best from which a second mistake is looked for, once there is one.
+const RUNNERS_UP: usize = 3;
 /// Mistakes of one study.
 const MOST_MISTAKES: usize = 3;
 /// Other readings that are named.
@@ -52,6 +54,7 @@ pub(super) fn search(start: Corrected, consistency: &ConsistencySettings) -> Res
     let as_written = start.reading(Some(consistency))?;
     let (mut at, mut best) = (start, as_written.clone());
     let (mut alike, mut tried): (Vec<Reading>, usize) = (Vec::new(), 0);
+    let mut runners_up: Vec<(Corrected, Reading)> = Vec::new();
     for round in 0..MOST_MISTAKES {
         let (fitted, count) = one_round(&at, &best, consistency);
         tried += count;
@@ -60,14 +63,35 @@ pub(super) fn search(start: Corrected, consistency: &ConsistencySettings) -> Res
         if first.1.score() > best.score() - CLEARLY_BETTER * (round + 1) as f64 {
             break;
         }
-        let refined = refined(&at, first, consistency);
-        let (corrected, reading) = refined.unwrap_or_else(|| first.clone());
+        // What a second mistake is found behind, others may be found behind as well: the pair that explains most
+        // counts, for the first one was chosen with the other still made.
+        let mut first = first.clone();
+        if round == 1 {
+            for (start, reading) in &runners_up {
+                let (further, count) = one_round(start, reading, consistency);
+                tried += count;
+                if let Some(pair) = further.into_iter().next().filter(|pair| pair.1.score() < first.1.score()) {
+                    first = pair;
+                }
+            }
+        } else {
+            runners_up = rest.iter().take(RUNNERS_UP).cloned().collect();
+        }
+        let start = before_last(&first, &at, &runners_up);
+        let (corrected, reading) = refined(&start, &first, consistency).unwrap_or_else(|| first.clone());
         let close = |(_, other): &&(Corrected, Reading)| other.score() < reading.score() + ALIKE;
         alike = rest.iter().filter(close).take(MOST_ALIKE).map(|(_, other)| other.clone()).collect();
         (at, best) = (corrected, reading);
     }
     let found = !best.mistakes.is_empty();
     Ok(Search { as_written, best: found.then_some(best), alike, tried })
+}
+
+/// Where the last mistake of a reading was corrected from.
+fn before_last(reached: &(Corrected, Reading), at: &Corrected, others: &[(Corrected, Reading)]) -> Corrected {
+    let before = &reached.0.mistakes[..reached.0.mistakes.len().saturating_sub(1)];
+    let other = others.iter().find(|(other, _)| other.mistakes == before && at.mistakes != before);
+    other.map_or_else(|| at.clone(), |(other, _)| other.clone())
 }
 
 /// The readings with one more mistake corrected that can win, best first, and how many were tried.
