@@ -52,7 +52,7 @@ run 0 "$examples/designs" --seconds 0.2 --criteria d-optimal --families Fourier 
 run 0 "$examples/iterations" 1 examples/iterate_paper_2r_noise.toml
 run 0 "$examples/basin" 2 601
 run 0 "$examples/logistic_against_fourier" 2 0.3
-run 0 "$examples/differentiators" 1 8
+run 0 "$examples/differentiators" 1 12
 run 0 "$examples/import_speed" 20000
 run 0 "$examples/gallery" "$out/gallery.html"
 run 0 env DYNIDENT_BENCHMARK='target/debug/dynident-benchmark --only rnea' benchmarks/compare.sh --own-only "$venv" "$out/compare" 1
