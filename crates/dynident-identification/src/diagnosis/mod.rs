@@ -45,6 +45,7 @@ use thiserror::Error;
 
 /// Instants that readings are compared on; more make it slower and not surer.
 const INSTANTS: usize = 300;
+
 /// What was found about study, robot and logs.
 #[derive(Clone, Debug)]
 pub struct Diagnosis {

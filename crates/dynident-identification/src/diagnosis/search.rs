@@ -79,7 +79,11 @@ pub(super) fn search(start: Corrected, consistency: &ConsistencySettings) -> Res
         }
         let start = before_last(&first, &at, &runners_up);
         let (corrected, reading) = refined(&start, &first, consistency).unwrap_or_else(|| first.clone());
-        let close = |(_, other): &&(Corrected, Reading)| other.score() < reading.score() + ALIKE;
+        // Beside the last mistake only: what was corrected before it is the same.
+        let before = reading.mistakes.len() - 1;
+        let close = |(_, other): &&(Corrected, Reading)| {
+            other.mistakes[..before] == reading.mistakes[..before] && other.score() < reading.score() + ALIKE
+        };
         alike = rest.iter().filter(close).take(MOST_ALIKE).map(|(_, other)| other.clone()).collect();
         (at, best) = (corrected, reading);
     }
@@ -96,8 +100,8 @@ fn before_last(reached: &(Corrected, Reading), at: &Corrected, others: &[(Correc
 
 /// The readings with one more mistake corrected that can win, best first, and how many were tried.
 fn one_round(at: &Corrected, best: &Reading, consistency: &ConsistencySettings) -> (Vec<(Corrected, Reading)>, usize) {
-    let undone = |mistake: &Mistake| at.mistakes.iter().any(|made| made == mistake);
-    let all: Vec<Mistake> = candidates(&at.robot, &at.rows).into_iter().filter(|mistake| !undone(mistake)).collect();
+    let is_new = |mistake: &Mistake| !at.mistakes.contains(mistake);
+    let all: Vec<Mistake> = candidates(&at.robot, &at.rows).into_iter().filter(is_new).collect();
     let bounded = |mistake: &Mistake| {
         let corrected = at.without(mistake);
         let bound = corrected.reading(None).ok()?.lower_bound();

@@ -1,7 +1,8 @@
 //! Is the torque in newton metres? What the description's bodies say of each joint's column.
 
 use super::motion_rows::MotionRows;
-use dynident_dynamics::{ParametricModel, Workspace, inverse_dynamics};
+use super::nominal::nominal_torque;
+use dynident_dynamics::ParametricModel;
 use nalgebra::{DMatrix, DVector};
 
 /// Share of a joint's torque that the description's bodies, times any factor, must explain beside friction before the
@@ -32,17 +33,8 @@ impl TorqueUnit {
 /// Fits each joint's torque by the nominal bodies' torque times a factor, with viscous and Coulomb friction, drive
 /// inertia and an offset; `None` while a body's inertials are unknown.
 pub(super) fn torque_unit(robot: &ParametricModel, rows: &MotionRows) -> Option<TorqueUnit> {
-    robot.nominal_base()?;
-    let model = robot.model();
-    let mut workspace = Workspace::new(model);
-    let mut predicted = vec![Vec::with_capacity(rows.len()); model.dof()];
-    let at = |values: &[Vec<f64>], row: usize| -> Vec<f64> { values.iter().map(|values| values[row]).collect() };
-    for row in 0..rows.len() {
-        let (q, dq, ddq) = (at(&rows.q, row), at(&rows.dq, row), at(&rows.ddq, row));
-        let torque = inverse_dynamics(model, &mut workspace, &q, &dq, &ddq);
-        predicted.iter_mut().zip(torque).for_each(|(to, torque)| to.push(*torque));
-    }
-    let scale = (0..model.dof()).map(|joint| scale_of(rows, joint, &predicted[joint]));
+    let nominal = nominal_torque(robot, rows)?;
+    let scale = nominal.iter().enumerate().map(|(joint, nominal)| scale_of(rows, joint, nominal));
     Some(TorqueUnit { scale: scale.collect() })
 }
 

@@ -2,6 +2,7 @@
 //! other readers of URDF know no namespaces and read on. Their colon becomes an underscore, so that every byte stays
 //! at its place and no such name is one of URDF's.
 
+use super::flood::length_beside_elements;
 use std::borrow::Cow;
 use std::collections::HashSet;
 
@@ -49,11 +50,8 @@ fn for_each_prefix<'a>(text: &'a str, take: &mut dyn FnMut(usize, &'a str)) {
     let mut at = 0;
     while let Some(start) = text[at..].find('<').map(|next| at + next) {
         let rest = &text[start..];
-        let skipped =
-            [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")].into_iter().find(|(open, _)| rest.starts_with(open));
-        if let Some((open, close)) = skipped {
-            let Some(end) = rest[open.len()..].find(close) else { return };
-            at = start + open.len() + end + close.len();
+        if let Some(length) = length_beside_elements(rest) {
+            at = start + length;
             continue;
         }
         let mut quote = None;

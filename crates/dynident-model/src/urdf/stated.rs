@@ -3,6 +3,7 @@
 use super::elements::{origin, stated_moments};
 use super::prefixes::without_undeclared;
 use super::values::{child, required_child, required_number};
+use super::write::edited;
 use super::{UrdfError, UrdfWriteError, parse};
 use crate::spatial::{Mat3, Vec3};
 use roxmltree::Node;
@@ -106,16 +107,7 @@ pub fn rewrite_inertials(
             change("inertia", name, 0, (old.moments[moment], new.moments[moment]))?;
         }
     }
-    edits.sort_by_key(|(range, _)| range.start);
-    let mut text = String::with_capacity(original.len() + 16 * edits.len());
-    let mut done = 0;
-    for (range, new) in edits {
-        text += &original[done..range.start];
-        text += &new;
-        done = range.end;
-    }
-    text += &original[done..];
-    Ok(text)
+    Ok(edited(original, edits))
 }
 
 /// Where word number `word` of an attribute stands.

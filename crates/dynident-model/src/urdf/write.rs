@@ -196,8 +196,13 @@ pub fn rewrite_urdf(original: &str, links: &[LinkChange], joints: &[JointChange]
         source.friction(node, change, &mut edits)?;
     }
 
+    Ok(edited(original, edits))
+}
+
+/// `original` with pieces of it replaced; the pieces do not overlap, every other byte stays.
+pub(super) fn edited(original: &str, mut edits: Vec<(Range<usize>, String)>) -> String {
     edits.sort_by_key(|(range, _)| range.start);
-    let mut text = String::with_capacity(original.len() + 256 * edits.len());
+    let mut text = String::with_capacity(original.len() + edits.iter().map(|(_, new)| new.len()).sum::<usize>());
     let mut done = 0;
     for (range, new) in edits {
         text += &original[done..range.start];
@@ -205,7 +210,7 @@ pub fn rewrite_urdf(original: &str, links: &[LinkChange], joints: &[JointChange]
         done = range.end;
     }
     text += &original[done..];
-    Ok(text)
+    text
 }
 
 /// A line of a new element, with its depth below the element's own indentation.
