@@ -21,8 +21,8 @@ const COLUMNS: usize = 5;
 /// Columns that are left for an expression.
 const EXPRESSION: usize = 44;
 
-/// What was found, proved and written.
-pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
+/// What was found, proved and written, the files of the model among it.
+pub(crate) fn identification(r: &ResultFile, out: &Path, models: &[&str]) -> String {
     let mut text = wrapped(&r.name, 2);
     let _ = writeln!(
         text,
@@ -67,7 +67,13 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
         text,
         "\nwrote {}{} in {:.2} s",
         out.join("result.json").display(),
-        if urdf { ", report.html and identified.urdf" } else { " and report.html" },
+        match models.split_last() {
+            None => " and report.html".to_owned(),
+            Some((last, others)) =>
+                [&["report.html"], others].concat().iter().map(|name| format!(", {name}")).collect::<String>()
+                    + " and "
+                    + last,
+        },
         r.timings_s.total
     );
     if let Some(reason) = &r.no_urdf {

@@ -51,8 +51,8 @@ impl DescriptionFit {
 }
 
 /// Fits each joint's torque by the nominal bodies' torque times a factor, with viscous and Coulomb friction, drive
-/// inertia and an offset; `None` while a body's inertials are unknown or the bodies need no torque at all. `left` is the
-/// share of each joint's torque that the best robot of this description leaves.
+/// inertia and an offset; `None` while a body's inertials are unknown or the bodies need no torque at all. `left` is
+/// the share of each joint's torque that the best robot of this description leaves.
 pub(super) fn description_fit(robot: &ParametricModel, rows: &MotionRows, left: &[f64]) -> Option<DescriptionFit> {
     let nominal = nominal_torque(robot, rows)?;
     let fits = nominal.iter().zip(left).enumerate().map(|(joint, of)| joint_fit(rows, joint, of));

@@ -26,11 +26,13 @@
 mod assemble;
 mod elements;
 mod flood;
+mod from_model;
 mod prefixes;
 mod stated;
 mod values;
 mod write;
 
+pub use from_model::write_urdf;
 pub use stated::{MOMENT_NAMES, StatedInertial, rewrite_inertials, stated_inertials};
 pub use write::{JointChange, LinkChange, UrdfWriteError, link_changes, rewrite_urdf};
 
