@@ -63,19 +63,8 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, models: &[&str]) -> Str
     for log in &r.logs {
         text += &wrapped(&data(log), 4);
     }
-    let _ = writeln!(
-        text,
-        "\nwrote {}{} in {:.2} s",
-        out.join("result.json").display(),
-        match models.split_last() {
-            None => " and report.html".to_owned(),
-            Some((last, others)) =>
-                [&["report.html"], others].concat().iter().map(|name| format!(", {name}")).collect::<String>()
-                    + " and "
-                    + last,
-        },
-        r.timings_s.total
-    );
+    let others = [&["report.html"], models].concat().join(", ");
+    let _ = writeln!(text, "\nwrote {}, {others} in {:.2} s", out.join("result.json").display(), r.timings_s.total);
     if let Some(reason) = &r.no_urdf {
         text += &wrapped(&format!("no identified.urdf: {reason}"), 2);
     }
