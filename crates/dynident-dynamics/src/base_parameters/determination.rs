@@ -30,9 +30,8 @@ impl BaseParameters {
         let size = |column: usize| match &self.all_columns()[column] {
             Column::Body { parameter: 0, .. } => 1.0,
             Column::Body { parameter: 1..=3, .. } => length_m,
-            Column::Body { .. } => length_m * length_m,
             // Drive inertia stands beside moments of inertia; nothing else of a drive is regrouped.
-            Column::Term(_) => length_m * length_m,
+            Column::Body { .. } | Column::Term(_) => length_m * length_m,
         };
         let mut regrouping = self.regrouping().clone();
         for (place, &column) in self.dependent().iter().enumerate() {

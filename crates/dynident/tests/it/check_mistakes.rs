@@ -1,7 +1,7 @@
 //! The corpus of mistakes that users make: each is named with the key that mends it, and honest logs raise no alarm.
 //! Review of trust, section 2: 17 of 43 such mistakes ran to a green tick.
 
-use super::common::{Motion, Random, Truth, header, recordings, repository, write_log};
+use super::common::{Job, Motion, Random, Truth, header, recordings, repository, write_log};
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
 use dynident::model::{InertialParameters, Mat3, Vec3};
 use dynident::recording::Level;
@@ -365,7 +365,8 @@ fn write_noisy(path: &Path, truth: &Truth, seed: u64) {
 /// The study of a robot and logs in its folder, the second one held out.
 fn study_of(description: &Path, dof: usize, logs: &[&str]) -> String {
     let mut study = format!(
-        "[robot]\nfile = {description:?}\n[format]\ntime = {{ column = \"t\" }}\nposition = {{ columns = \"q{{1..{dof}}}\" }}\ntorque = {{ columns = \"tau{{1..{dof}}}\" }}\n"
+        "[robot]\nfile = {:?}\n[format]\ntime = {{ column = \"t\" }}\nposition = {{ columns = \"q{{1..{dof}}}\" }}\ntorque = {{ columns = \"tau{{1..{dof}}}\" }}\n",
+        description.display().to_string()
     );
     for (log, role) in logs.iter().zip(["identify", "validate"]) {
         write!(study, "[[log]]\nfile = {log:?}\nrole = {role:?}\n").unwrap();
@@ -411,6 +412,23 @@ fn a_description_of_another_robot_is_doubted() {
         let problems = beside_limits(&found);
         assert!(problems.iter().any(|(kind, _)| kind == "description"), "{problems:?} {:?}", found.as_written);
     }
+}
+
+/// Three seconds of a log for 58 parameters: the fit is excellent and the model is not.
+#[test]
+fn a_fit_that_follows_its_noise_is_no_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = std::fs::read_to_string(repository("examples/ur10_simulated.toml")).unwrap();
+    let problems = |rows: usize| {
+        let text = study
+            .replace("../robots/", &format!("{}/", repository("robots").display()))
+            .replace("train.csv\"", &format!("train.csv\"\nrows = [0, {rows}]"))
+            .replace("\"ur10_simulated/", &format!("\"{}/", repository("examples/ur10_simulated").display()));
+        Job::new(folder.path(), &text).identify().result.problems
+    };
+    let short = problems(375);
+    assert!(short.iter().any(|problem| problem.contains("the fit follows their noise")), "{short:?}");
+    assert_eq!(problems(2500), Vec::<String>::new());
 }
 
 /// Of the seven sets of real logs only one has anything to be said of: TIAGo's dead channels.
