@@ -15,6 +15,7 @@ mod friction_choice;
 mod instruments;
 mod iteration_legs;
 mod iteration_report;
+mod masses;
 mod modules;
 mod mutated_studies;
 mod payload;
