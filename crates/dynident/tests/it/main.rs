@@ -22,6 +22,7 @@ mod payload;
 mod real_logs;
 mod report;
 mod result_files;
+mod reversed_torque;
 mod same_result;
 mod scales;
 mod simulated_loop;
