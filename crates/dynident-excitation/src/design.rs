@@ -11,6 +11,7 @@ mod metric;
 mod problem;
 mod restoration;
 mod rounds;
+mod single_change;
 
 use crate::criteria::Criterion;
 use crate::family::Family;
@@ -26,6 +27,7 @@ use nalgebra::DMatrix;
 use restoration::restored;
 use rounds::{Candidate, Rounds};
 use serde::{Deserialize, Serialize};
+pub use single_change::single_changes;
 use std::time::Instant;
 
 /// How much is searched, and how finely.
@@ -140,7 +142,9 @@ pub fn design(
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
 ) -> Result<Design, OptimiserError> {
     let begun = Instant::now();
-    let late = || settings.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > limit);
+    // Searches end early enough that what was found can be polished and taken back inside the limits in time.
+    let later = |share: f64| settings.time_limit_s.is_some_and(|limit| begun.elapsed().as_secs_f64() > share * limit);
+    let late = || later(SEARCH_SHARE);
     let evaluations = AtomicU64::new(0);
     let logged = grid(task.family.duration_s(), (task.family.duration_s() * settings.rate_hz).round() as usize + 1);
     let coarse = grid(task.family.duration_s(), settings.search_grid(task.family, task.limits));
@@ -211,7 +215,7 @@ pub fn design(
         let ended = over();
         let budget = if ended { LAST_EVALUATIONS } else { settings.polish_evaluations };
         let report = watch("polish");
-        let stop = |value, violation| report(value, violation) && !ended;
+        let stop = |value, violation| (report(value, violation) && !ended) || later(POLISH_SHARE);
         let found = rounds.polish(criterion, &margins, state, budget, stop)?;
         evaluations.fetch_add(found.evaluations as u64, Ordering::Relaxed);
         state = found.best.state;
@@ -224,7 +228,7 @@ pub fn design(
                 kept = candidate;
             }
         }
-        if whole {
+        if whole || later(POLISH_SHARE) {
             break;
         }
         for (margin, c) in margins.iter_mut().zip(&worst) {
@@ -233,8 +237,8 @@ pub fn design(
         }
     }
     // What still breaks a limit is taken back inside.
-    if kept.violation > 0.0 && !over() {
-        let stop = |progress: &DesignProgress| watch_all(progress).is_break() || late();
+    if kept.violation > 0.0 && !stopped.load(Ordering::Relaxed) && !later(RESTORATION_SHARE) {
+        let stop = |progress: &DesignProgress| watch_all(progress).is_break() || later(RESTORATION_SHARE);
         let used;
         (kept, used) = restored(task, settings, kept, [&fine, &logged], &stop)?;
         evaluations.fetch_add(used as u64, Ordering::Relaxed);
@@ -248,6 +252,12 @@ pub fn design(
         seconds: begun.elapsed().as_secs_f64(),
     })
 }
+
+/// Shares of the time limit after which searches, polishes and the way back inside the limits end; the rest is for the
+/// check.
+const SEARCH_SHARE: f64 = 0.55;
+const POLISH_SHARE: f64 = 0.75;
+const RESTORATION_SHARE: f64 = 0.85;
 
 /// Noise of the restarts, as shares of each joint's root mean square, round after round.
 const RESTART_NOISE: [f64; 3] = [0.3, 0.15, 0.08];

@@ -96,7 +96,7 @@ mod predicted_covariance;
 pub mod step_wise;
 
 pub use derivative_free::{DerivativeFree, design_without_gradients};
-pub use design::{Design, DesignProgress, DesignSettings, DesignTask, design, grid};
+pub use design::{Design, DesignProgress, DesignSettings, DesignTask, design, grid, single_changes};
 pub use family::Family;
 pub use information::Information;
 pub use motion::{Motion, MotionAdjoint};

@@ -80,7 +80,7 @@ fn around(model: &Model, family: &dyn Family, parameters: &[f64], floor: bool) -
     };
     let mut limits = Limits {
         joints: model.joints().iter().map(|joint| unit(&joint.name)).collect(),
-        floor: floor.then(|| FloorLimit { height_m: 0.0, points: Vec::new() }),
+        floor: floor.then(|| FloorLimit { height_m: 0.0, ..Default::default() }),
         ..Limits::default()
     };
     let reports = check_limits(&limits, model, family.duration_s(), 2000.0, |times, out| {
@@ -129,8 +129,8 @@ fn anyhow(model: &Model, index: usize, random: &mut Random) -> Limits {
     });
     let joints = joints.collect();
     let floor = match index % 8 {
-        0 => Some(FloorLimit { height_m: OUT_OF_REACH_M, points: Vec::new() }),
-        1 | 2 => some(0.01, 1.0, 1.0).map(|depth| FloorLimit { height_m: -depth, points: Vec::new() }),
+        0 => Some(FloorLimit { height_m: OUT_OF_REACH_M, ..Default::default() }),
+        1 | 2 => some(0.01, 1.0, 1.0).map(|depth| FloorLimit { height_m: -depth, ..Default::default() }),
         _ => None,
     };
     Limits { joints, floor, ..Limits::default() }

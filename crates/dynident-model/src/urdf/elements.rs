@@ -1,7 +1,9 @@
 //! The elements `<link>` and `<joint>`, before the tree is built.
 
+use super::collision;
 use super::values::{child, name, number, numbers, required_child, required_number};
 use super::{MAX_MOVING_JOINTS, UrdfError, UrdfFault, UrdfRobot, fault_at};
+use crate::collision::CollisionShape;
 use crate::inertial::InertialParameters;
 use crate::joint::{JointKind, JointLimits, Mimic};
 use crate::spatial::{Mat3, Transform, Vec3};
@@ -14,6 +16,8 @@ pub(super) struct LinkElement<'a, 'input> {
     pub(super) name: &'a str,
     /// In the link's frame.
     pub(super) inertial: Option<InertialParameters>,
+    /// In the link's frame.
+    pub(super) collision: Vec<CollisionShape>,
 }
 
 /// A `<joint>`.
@@ -62,7 +66,9 @@ pub(super) fn links<'a, 'input>(
             }
             None => None,
         };
-        links.push(LinkElement { node, name, inertial });
+        let (collision, faulty) = collision::shapes(node);
+        unread.extend(faulty.into_iter().take(UrdfRobot::MAX_UNREAD.saturating_sub(unread.len())));
+        links.push(LinkElement { node, name, inertial, collision });
     }
     Ok(links)
 }
@@ -173,7 +179,7 @@ fn inertial(node: Node<'_, '_>, link: &str) -> Result<InertialParameters, UrdfEr
 }
 
 /// `<origin xyz rpy>`; the identity where it is missing.
-fn origin(node: Node<'_, '_>) -> Result<Transform, UrdfError> {
+pub(super) fn origin(node: Node<'_, '_>) -> Result<Transform, UrdfError> {
     let Some(origin) = child(node, "origin") else { return Ok(Transform::IDENTITY) };
     let [roll, pitch, yaw] = numbers(origin, "rpy")?.unwrap_or_default();
     let translation = Vec3(numbers(origin, "xyz")?.unwrap_or_default());

@@ -24,6 +24,7 @@
 //! ```
 
 mod assemble;
+mod collision;
 mod elements;
 mod flood;
 mod values;

@@ -162,6 +162,8 @@ impl DesignOutcome {
             seconds: origin.seconds,
             seed: setup.section.search.seed,
             diagnosis: review.check.diagnosis,
+            assumed: setup.assumed,
+            not_checked: setup.not_checked,
             notes: setup.notes,
         };
         let (robot, limits) = (setup.robot, setup.limits);
