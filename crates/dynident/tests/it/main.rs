@@ -5,6 +5,7 @@ mod book;
 mod common;
 mod consistent_intervals;
 mod consistent_parameters;
+mod design_contact;
 mod design_messages;
 mod design_tasks;
 mod differentiators;

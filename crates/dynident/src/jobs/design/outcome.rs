@@ -23,7 +23,7 @@ const PICTURES_HZ: f64 = 100.0;
 
 /// What a job has cost so far.
 pub(super) struct Stopwatch {
-    started: Instant,
+    pub(super) started: Instant,
     cpu_s: Option<f64>,
 }
 
