@@ -246,7 +246,7 @@ impl Diagnosis {
                     }
                     parts.extend(changes.iter().map(|(kind, changed)| format!("{kind}: {}", in_words(*kind, changed))));
                     format!(
-                        "For this path no single change would do. The smallest together, by the sum of their shares: {}.",
+                        "No single change would do. The smallest together, by the sum of their shares: {}.",
                         parts.join("; ")
                     )
                 }
@@ -259,9 +259,9 @@ impl Diagnosis {
     }
 }
 
-/// A factor above 1 with four decimals, rounded up so that it does.
+/// A factor above 1 with four decimals, which must not read 1.
 fn factor_in_words(factor: f64) -> String {
-    format!("{:.4}", (factor * 1e4 - 1e-6).ceil() / 1e4)
+    format!("{:.4}", factor.max(1.0001))
 }
 
 /// One limit's change, with its factor where the limit is a magnitude.

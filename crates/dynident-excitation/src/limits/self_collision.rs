@@ -47,9 +47,25 @@ impl Term for SelfCollisionLimits {
     }
 
     fn values(&self, inputs: &Inputs<'_>, out: &mut [f64]) {
-        for ((pair, _), row) in self.rows.iter().zip(out.chunks_exact_mut(inputs.motion.samples)) {
+        let samples = inputs.motion.samples;
+        // Most links are far from each other most of the time: balls about them say so.
+        let centre = |solid: &LinkSolid, sample: usize| match solid.body {
+            Some(body) => inputs.placements[sample * inputs.motion.joints + body].point(solid.centre),
+            None => solid.centre,
+        };
+        let centres: Vec<Vec3> =
+            self.solids.iter().flat_map(|solid| (0..samples).map(move |sample| centre(solid, sample))).collect();
+        for ((pair, _), row) in self.rows.iter().zip(out.chunks_exact_mut(samples)) {
             let mut guess = Vec3::ZERO;
+            let [first, second] = pair.of.map(|place| &centres[place * samples..(place + 1) * samples]);
+            let [reach, other_reach] = pair.of.map(|place| self.solids[place].reach_m);
+            let far = reach + other_reach + pair.clearance_m + pair.size_m;
             for (sample, c) in row.iter_mut().enumerate() {
+                let between = first[sample] - second[sample];
+                if between.dot(between) > far * far {
+                    *c = -1.0;
+                    continue;
+                }
                 let apart = self.apart(pair, inputs, sample, &mut guess);
                 *c = ((pair.clearance_m - apart.surface_m) / pair.size_m).max(-1.0);
             }
@@ -63,8 +79,11 @@ impl Term for SelfCollisionLimits {
                 if weight == 0.0 {
                     continue;
                 }
-                let SolidDistance { points, direction, slope, .. } =
+                let SolidDistance { surface_m, points, direction, slope } =
                     self.apart(pair, inputs, sample, &mut Vec3::ZERO.clone());
+                if surface_m >= pair.clearance_m + pair.size_m {
+                    continue;
+                }
                 let gradient = direction.scale(-weight * slope / pair.size_m);
                 let [first, second] = pair.of.map(|place| self.solids[place].body);
                 pull.point(first, joints, sample, points[0], gradient);

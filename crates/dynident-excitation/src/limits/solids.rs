@@ -23,8 +23,10 @@ pub(crate) struct LinkSolid {
     pub body: Option<usize>,
     pub link: String,
     pub shapes: Vec<BodyShape>,
-    centre: Vec3,
-    reach_m: f64,
+    /// Mean of all corners.
+    pub centre: Vec3,
+    /// Radius of a ball about it that holds all shapes, m.
+    pub reach_m: f64,
 }
 
 /// How far two links are apart.
