@@ -14,7 +14,7 @@ fn job(folder: &Path, design: &str, further: &str) -> Job {
     let joints = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint"];
     let limits = joints.map(|joint| format!("{{ joint = \"{joint}\", acceleration = 10.0 }}"));
     let text = format!(
-        "[robot]\nfile = {:?}\njoints = {joints:?}\n[design]\n{SMALL}\n{design}\n[design.limits]\njoints = [{}]\n{further}",
+        "[robot]\nfile = {:?}\njoints = {joints:?}\n[design]\n{SMALL}\n{design}\n[design.defaults]\nfloor = false\nself_collision = false\n[design.limits]\njoints = [{}]\n{further}",
         repository("robots/ur10.urdf").canonicalize().unwrap().display().to_string(),
         limits.join(", ")
     );
