@@ -189,13 +189,10 @@ fn probes(limits: &Limits, model: &Model) -> Result<Vec<(Probe, LimitReport)>, L
         let resolved = limit.resolve(model)?;
         for pair in resolved.pairs {
             let solids = pair.of.map(|place| &resolved.solids[place]);
-            let links = solids.map(|solid| Link {
-                body: solid.body,
-                hulls: solid
-                    .shapes
-                    .iter()
-                    .map(|shape| Hull { corners: shape.corners.clone(), radius_m: shape.radius_m })
-                    .collect(),
+            let links = solids.map(|solid| {
+                let hull = |corners: &Vec<Vec3>, radius_m| Hull { corners: corners.clone(), radius_m };
+                let hulls = solid.shapes.iter().map(|shape| hull(&shape.corners, shape.radius_m));
+                Link::new(solid.body, hulls.collect())
             });
             let name = solids.map(|solid| solid.link.as_str()).join(" / ");
             add(LimitKind::SelfCollision, name, Probe::Pair(Pair::new(links, pair.clearance_m, pair.size_m)));
@@ -248,23 +245,19 @@ fn arm_length_m(model: &Model) -> f64 {
 
 /// Links with shapes, in the order of the description's.
 fn links(model: &Model, shapes: &[LinkShape]) -> Vec<(String, Link)> {
-    let mut found: Vec<(String, Link)> = Vec::new();
+    let mut found: Vec<(String, Option<usize>, Vec<Hull>)> = Vec::new();
     for shape in shapes {
         let bodies = core::iter::once((None, model.base())).chain((0..).map(Some).zip(model.bodies()));
-        let Some((body, link)) = bodies
-            .flat_map(|(body, of)| of.links.iter().map(move |link| (body, link)))
-            .find(|(_, link)| link.name == shape.link)
-        else {
-            continue;
-        };
+        let mut all = bodies.flat_map(|(body, of)| of.links.iter().map(move |link| (body, link)));
+        let Some((body, link)) = all.find(|(_, link)| link.name == shape.link) else { continue };
         let place = |corner: &[f64; 3]| link.placement.rotation.mul_vec(Vec3(*corner)) + link.placement.translation;
         let hull = Hull { corners: shape.corners_m.iter().map(place).collect(), radius_m: shape.radius_m };
-        match found.iter_mut().find(|(name, _)| *name == shape.link) {
-            Some((_, known)) => known.hulls.push(hull),
-            None => found.push((shape.link.clone(), Link { body, hulls: vec![hull] })),
+        match found.iter_mut().find(|(name, ..)| *name == shape.link) {
+            Some((.., hulls)) => hulls.push(hull),
+            None => found.push((shape.link.clone(), body, vec![hull])),
         }
     }
-    found
+    found.into_iter().map(|(name, body, hulls)| (name, Link::new(body, hulls))).collect()
 }
 
 /// Where a point of a body stands in the base frame.
@@ -291,10 +284,7 @@ impl Probe {
             }
             Self::Floor { point, height_m } => 1.0 + (*height_m - (at(point)[2] - point.radius_m)),
             Self::FloorLink { link, height_m, length_m } => {
-                let corners =
-                    link.hulls.iter().flat_map(|hull| hull.corners.iter().map(move |corner| (corner, hull.radius_m)));
-                let heights = corners.map(|(corner, radius_m)| place(placements, link.body, *corner)[2] - radius_m);
-                1.0 + (*height_m - heights.fold(f64::INFINITY, f64::min)) / *length_m
+                1.0 + link.below_m(placements, *height_m, (worst - 1.0) * *length_m) / *length_m
             }
             Self::Column { point, x, y, radius_m, top_m } => {
                 let at = at(point);

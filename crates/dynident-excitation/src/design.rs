@@ -35,11 +35,12 @@ use std::time::Instant;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct DesignSettings {
-    /// Random starts of the first round. Default 8.
+    /// Random starts of the first round. Default 12.
     pub starts: usize,
-    /// Rounds of restarts around the best, of half as many starts. Default 1.
+    /// Rounds of restarts around the best, of half as many starts. Default 12: many short ones
+    /// find more than few long ones.
     pub rounds: usize,
-    /// Evaluations of one start at most. Default 1,000.
+    /// Evaluations of one start at most. Default 300.
     pub evaluations_per_start: usize,
     /// Evaluations of one polish at most (up to six, while something is broken between samples). Default 1,000.
     pub polish_evaluations: usize,
@@ -58,9 +59,9 @@ pub struct DesignSettings {
 impl Default for DesignSettings {
     fn default() -> Self {
         Self {
-            starts: 8,
-            rounds: 1,
-            evaluations_per_start: 1_000,
+            starts: 12,
+            rounds: 12,
+            evaluations_per_start: 300,
             polish_evaluations: 1_000,
             search_samples: None,
             rate_hz: 100.0,

@@ -16,6 +16,8 @@ pub(super) struct Hull {
 pub(super) struct Link {
     pub(super) body: Option<usize>,
     pub(super) hulls: Vec<Hull>,
+    /// No point is farther from the body's origin, m.
+    far_m: f64,
 }
 
 /// Two links and what is known of their distance.
@@ -68,16 +70,40 @@ impl Pair {
 }
 
 impl Link {
+    pub(super) fn new(body: Option<usize>, hulls: Vec<Hull>) -> Self {
+        let far = |hull: &Hull| {
+            hull.corners
+                .iter()
+                .map(|corner| corner.norm())
+                .fold(hull.radius_m, |far, corner| far.max(corner + hull.radius_m))
+        };
+        let far_m = hulls.iter().map(far).fold(0.0, f64::max);
+        Self { body, hulls, far_m }
+    }
+
+    /// How much lower than `height_m` the lowest point is, m; `worst_m` where that cannot be more.
+    pub(super) fn below_m(&self, placements: &[Transform], height_m: f64, worst_m: f64) -> f64 {
+        let at = self.body.map_or(Transform::IDENTITY, |body| placements[body]);
+        if height_m - (at.translation[2] - self.far_m) <= worst_m {
+            return worst_m;
+        }
+        let up = Vec3(at.rotation.0[2]);
+        let mut lowest = f64::INFINITY;
+        for hull in &self.hulls {
+            for corner in &hull.corners {
+                lowest = lowest.min(up.dot(*corner) + at.translation[2] - hull.radius_m);
+            }
+        }
+        height_m - lowest
+    }
+
     /// A bound of how far any point of the link has gone from one place to another.
     fn farthest_gone(&self, then: &Transform, now: &Transform) -> f64 {
-        let far =
-            self.hulls.iter().flat_map(|hull| hull.corners.iter().map(move |corner| corner.norm() + hull.radius_m));
-        let far = far.fold(0.0, f64::max);
         let turned: f64 = (0..3)
             .flat_map(|row| (0..3).map(move |column| (row, column)))
             .map(|(row, column)| (now.rotation.0[row][column] - then.rotation.0[row][column]).powi(2))
             .sum();
-        (now.translation - then.translation).norm() + far * turned.sqrt()
+        (now.translation - then.translation).norm() + self.far_m * turned.sqrt()
     }
 }
 

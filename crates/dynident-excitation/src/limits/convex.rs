@@ -101,23 +101,25 @@ pub(crate) fn hull_distance(first: Placed<'_>, second: Placed<'_>, beyond: f64, 
             // Rounding: no nearer any more.
             break;
         }
-        let kept: Vec<Corner> = (0..simplex.len()).filter(|&k| found.shares[k] > 0.0).map(|k| simplex[k]).collect();
-        let whole = kept.len() == 4;
-        let shares: Vec<f64> = found.shares.into_iter().filter(|share| *share > 0.0).collect();
-        simplex = kept;
         let largest =
-            simplex.iter().fold(0.0_f64, |largest, corner| largest.max(corner.difference.dot(corner.difference)));
+            simplex.iter().fold(0.0_f64, |largest, known| largest.max(known.difference.dot(known.difference)));
+        let whole = simplex.len() == 4 && found.shares.iter().all(|share| *share > 0.0);
         if whole || found.square <= 1e-24 * largest {
             return overlapping(first, second);
         }
+        let mut points = [Vec3::ZERO; 2];
+        let mut kept = 0;
+        for (k, share) in found.shares.into_iter().enumerate().take(simplex.len()) {
+            if share > 0.0 {
+                points[0] += simplex[k].first.scale(share);
+                points[1] += simplex[k].second.scale(share);
+                simplex.swap(kept, k);
+                kept += 1;
+            }
+        }
+        simplex.truncate(kept);
         towards = found.point;
-        let point = |of: fn(&Corner) -> Vec3| {
-            simplex.iter().zip(&shares).fold(Vec3::ZERO, |sum, (corner, share)| sum + of(corner).scale(*share))
-        };
-        nearest = Some(Nearest {
-            square: found.square,
-            points: [point(|corner| corner.first), point(|corner| corner.second)],
-        });
+        nearest = Some(Nearest { square: found.square, points });
     }
     let Some(Nearest { square, points }) = nearest else { return overlapping(first, second) };
     *guess = towards;

@@ -15,6 +15,9 @@ pub(crate) struct SolidPairs {
     /// Pairs of links that are not checked although they are no neighbours and nobody ignores them, because their
     /// shapes stand in each other: give shapes of their own to links that can really touch.
     pub left_out: Vec<[String; 2]>,
+    /// Pairs that are always nearer than the clearance and touch in no posture tried: they run close by each other by
+    /// design, and are not checked either.
+    pub close: Vec<[String; 2]>,
 }
 
 /// Two solids that must stay apart.
@@ -108,7 +111,7 @@ impl SelfCollision {
                 }
             }
         }
-        let mut resolved = SolidPairs { solids, pairs, left_out: Vec::new() };
+        let mut resolved = SolidPairs { solids, pairs, left_out: Vec::new(), close: Vec::new() };
         if self.fitted() || self.leave_out_touching {
             resolved.leave_out(model, self.leave_out_touching);
         }
@@ -155,8 +158,13 @@ impl SolidPairs {
             let always = touched == POSTURES;
             if always || (touching && neutral && touched as f64 > MOSTLY * POSTURES as f64) {
                 self.left_out.push(pair.of.map(|place| self.solids[place].link.clone()));
-            } else if touching {
-                kept.push(SolidPair { clearance_m: pair.clearance_m.min(0.5 * farthest.max(0.0)), ..*pair });
+            } else if touching && farthest < pair.clearance_m {
+                // They run close by each other by design: where some posture brings them together they must not touch.
+                if neutral || touched > 0 {
+                    kept.push(SolidPair { clearance_m: 0.0, ..*pair });
+                } else {
+                    self.close.push(pair.of.map(|place| self.solids[place].link.clone()));
+                }
             } else {
                 kept.push(*pair);
             }

@@ -23,8 +23,8 @@ pub struct SelfCollision {
     /// Pairs of links that may touch, besides neighbours.
     pub ignored: Vec<[String; 2]>,
     /// Also leave out pairs that touch both in the neutral posture (every joint at zero, or as near to it as its limits
-    /// allow) and in most of 256 others within the limits: links whose shapes stand in each other. Pairs that never
-    /// come as far apart as `clearance_m` then have half of the farthest as their clearance.
+    /// allow) and in most of 256 others within the limits: links whose shapes stand in each other. Pairs that are
+    /// nearer than `clearance_m` in all of these postures are left out if they touch in none, and else must not touch.
     pub leave_out_touching: bool,
 }
 

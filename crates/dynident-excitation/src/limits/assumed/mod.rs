@@ -188,6 +188,10 @@ fn self_collision_gaps(model: &Model, shapes: &ShapesOfLinks, limits: &Limits) -
         let pairs: Vec<String> = resolved.left_out.iter().map(|[a, b]| format!("{a} / {b}")).collect();
         gaps.push(format!("pairs whose shapes stand in each other: {}", listed(&pairs)));
     }
+    if !resolved.close.is_empty() {
+        let pairs: Vec<String> = resolved.close.iter().map(|[a, b]| format!("{a} / {b}")).collect();
+        gaps.push(format!("pairs that run close by each other in every posture: {}", listed(&pairs)));
+    }
     if limit.leave_out_touching && !shapes.without.is_empty() {
         gaps.push(format!("links without a collision shape: {}", listed(&shapes.without)));
     }
