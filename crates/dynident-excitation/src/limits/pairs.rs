@@ -5,7 +5,7 @@ use super::self_collision_shapes::SelfCollision;
 use super::solids::{LinkSolid, solid_distance};
 use dynident_dynamics::{Workspace, body_placements};
 use dynident_model::sample::Random;
-use dynident_model::{Model, Transform, Vec3};
+use dynident_model::{Model, Transform};
 
 /// The links of a robot as solids and which of them must stay apart.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -143,7 +143,7 @@ impl SolidPairs {
                     (solid, solid.body.map_or(Transform::IDENTITY, |body| placements[body]))
                 });
                 let beyond = 2.0 * pair.clearance_m;
-                let apart = solid_distance((a.0, &a.1), (b.0, &b.1), beyond, &mut Vec3::ZERO.clone()).surface_m;
+                let apart = solid_distance((a.0, &a.1), (b.0, &b.1), beyond, &mut Vec::new()).surface_m;
                 let short = if touching { apart <= 0.0 } else { apart < pair.clearance_m };
                 if number == 0 {
                     *neutral = short;

@@ -8,8 +8,12 @@ use super::solids::{LinkSolid, SolidDistance, solid_distance};
 use super::term::{Inputs, Pull, Term};
 use dynident_model::{Model, Vec3};
 
-/// `(clearance - d) / size` with `d` the distance of the two links from surface to surface, and -1 for all that are
-/// farther apart.
+/// A lack of distance below minus this share of a pair's size is not told apart: links are then far enough from each
+/// other for every purpose of a search, and a bound of their distance is found at once.
+const FAR: f64 = 0.25;
+
+/// `(clearance - d) / size` with `d` the distance of the two links from surface to surface, and no less than -[`FAR`]:
+/// all that are farther apart are alike.
 #[derive(Clone, Debug)]
 pub(crate) struct SelfCollisionLimits {
     solids: Vec<LinkSolid>,
@@ -34,10 +38,10 @@ impl SelfCollisionLimits {
         Ok(Self { solids, rows })
     }
 
-    fn apart(&self, pair: &SolidPair, inputs: &Inputs<'_>, sample: usize, guess: &mut Vec3) -> SolidDistance {
+    fn apart(&self, pair: &SolidPair, inputs: &Inputs<'_>, sample: usize, guesses: &mut Vec<Vec3>) -> SolidDistance {
         let [first, second] = pair.of.map(|place| &self.solids[place]);
         let [one, other] = [first, second].map(|solid| inputs.placement(solid.body, sample));
-        solid_distance((first, &one), (second, &other), pair.clearance_m + pair.size_m, guess)
+        solid_distance((first, &one), (second, &other), pair.clearance_m + FAR * pair.size_m, guesses)
     }
 }
 
@@ -56,18 +60,18 @@ impl Term for SelfCollisionLimits {
         let centres: Vec<Vec3> =
             self.solids.iter().flat_map(|solid| (0..samples).map(move |sample| centre(solid, sample))).collect();
         for ((pair, _), row) in self.rows.iter().zip(out.chunks_exact_mut(samples)) {
-            let mut guess = Vec3::ZERO;
+            let mut guesses = Vec::new();
             let [first, second] = pair.of.map(|place| &centres[place * samples..(place + 1) * samples]);
             let [reach, other_reach] = pair.of.map(|place| self.solids[place].reach_m);
-            let far = reach + other_reach + pair.clearance_m + pair.size_m;
+            let far = reach + other_reach + pair.clearance_m + FAR * pair.size_m;
             for (sample, c) in row.iter_mut().enumerate() {
                 let between = first[sample] - second[sample];
                 if between.dot(between) > far * far {
-                    *c = -1.0;
+                    *c = -FAR;
                     continue;
                 }
-                let apart = self.apart(pair, inputs, sample, &mut guess);
-                *c = ((pair.clearance_m - apart.surface_m) / pair.size_m).max(-1.0);
+                let apart = self.apart(pair, inputs, sample, &mut guesses);
+                *c = ((pair.clearance_m - apart.surface_m) / pair.size_m).max(-FAR);
             }
         }
     }
@@ -80,8 +84,8 @@ impl Term for SelfCollisionLimits {
                     continue;
                 }
                 let SolidDistance { surface_m, points, direction, slope } =
-                    self.apart(pair, inputs, sample, &mut Vec3::ZERO.clone());
-                if surface_m >= pair.clearance_m + pair.size_m {
+                    self.apart(pair, inputs, sample, &mut Vec::new());
+                if surface_m >= pair.clearance_m + FAR * pair.size_m {
                     continue;
                 }
                 let gradient = direction.scale(-weight * slope / pair.size_m);

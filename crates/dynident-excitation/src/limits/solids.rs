@@ -105,13 +105,13 @@ impl LinkSolid {
     }
 }
 
-/// The distance of two links from surface to surface. What is above `beyond` need not be exact. `guess`: as for
-/// [`hull_distance`].
+/// The distance of two links from surface to surface. What is above `beyond` need not be exact. `guesses`: what [`hull_distance`] keeps of
+/// each two shapes.
 pub(crate) fn solid_distance(
     (first, first_at): (&LinkSolid, &Transform),
     (second, second_at): (&LinkSolid, &Transform),
     beyond: f64,
-    guess: &mut Vec3,
+    guesses: &mut Vec<Vec3>,
 ) -> SolidDistance {
     let mut nearest =
         by_balls((first_at.point(first.centre), first.reach_m), (second_at.point(second.centre), second.reach_m));
@@ -119,18 +119,18 @@ pub(crate) fn solid_distance(
         return nearest;
     }
     nearest.surface_m = f64::INFINITY;
-    let single = first.shapes.len() == 1 && second.shapes.len() == 1;
+    guesses.resize(first.shapes.len() * second.shapes.len(), Vec3::ZERO);
+    let mut guesses = guesses.iter_mut();
     let mut bound: Option<SolidDistance> = None;
     for a in &first.shapes {
         for b in &second.shapes {
+            let Some(guess) = guesses.next() else { continue };
             let centres = [first_at.point(a.centre), second_at.point(b.centre)];
             let balls = by_balls((centres[0], a.reach_m), (centres[1], b.reach_m));
             let beyond = beyond.min(nearest.surface_m);
             let found = if balls.surface_m > beyond {
                 balls
             } else {
-                let mut own = Vec3::ZERO;
-                let guess = if single { &mut *guess } else { &mut own };
                 let radii = a.radius_m + b.radius_m;
                 let hulls =
                     [Placed { corners: &a.corners, at: first_at }, Placed { corners: &b.corners, at: second_at }];
