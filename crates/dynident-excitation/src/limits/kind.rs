@@ -67,7 +67,8 @@ impl fmt::Display for LimitKind {
 /// One limit: a row of constraint values over the samples.
 ///
 /// Its value `c` is at most 0 when the limit holds: `|x - middle| / size - 1` for magnitudes and ranges, `1 - distance
-/// / size` for a column, `(clearance - distance) / size` between links (at least -0.25), and for the floor `(height + radius - z) / 1 m`.
+/// / size` for a column, `(clearance - distance) / size` between links (at least -0.25), and for the floor `(height +
+/// radius - z) / 1 m`, or per arm's length for shapes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Constraint {
     /// What is limited.

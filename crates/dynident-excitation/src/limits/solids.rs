@@ -105,8 +105,8 @@ impl LinkSolid {
     }
 }
 
-/// The distance of two links from surface to surface. What is above `beyond` need not be exact. `guesses`: what [`hull_distance`] keeps of
-/// each two shapes.
+/// The distance of two links from surface to surface. What is above `beyond` need not be exact. `guesses`: what
+/// [`hull_distance`] keeps of each two shapes.
 pub(crate) fn solid_distance(
     (first, first_at): (&LinkSolid, &Transform),
     (second, second_at): (&LinkSolid, &Transform),
