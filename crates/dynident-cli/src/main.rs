@@ -19,9 +19,10 @@ use std::process::ExitCode;
         The path:\n  \
         1. dynident inspect arm.urdf             what the description says, and what is wrong with it\n  \
         2. write study.toml                      robot, logs, columns (examples/, docs/src/study.md)\n  \
-        3. dynident identify study.toml --out R  fit, test on held-out logs, write R/result.json and R/identified.urdf\n  \
-        4. dynident validate R/result.json --study other.toml\n  \
-        5. load R/identified.urdf into your controller or simulator\n\n\
+        3. dynident check study.toml             do study, robot and logs fit together? names mistakes and their keys\n  \
+        4. dynident identify study.toml --out R  fit, test on held-out logs, write R/result.json and R/identified.urdf\n  \
+        5. dynident validate R/result.json --study other.toml\n  \
+        6. load R/identified.urdf into your controller or simulator\n\n\
         dynident iterate runs a robot again and again, each time with the better model; simulate runs it once.\n\
         dynident reproduce works through the paper behind this program; dynident benchmark compares estimators."
 )]
@@ -54,6 +55,8 @@ enum Command {
     Evaluate(commands::evaluate::Options),
     /// Find the motion that says most about a study's robot, inside every limit.
     Design(commands::design::Options),
+    /// Examine a study against its robot and its logs before any fit is believed; names mistakes and what to write.
+    Check(commands::check::Options),
     /// Fit a study's model to its logs and test it on the held-out ones.
     Identify(commands::identify::Options),
     /// Test a finished model on other logs.
@@ -96,6 +99,7 @@ fn main() -> ExitCode {
         Command::Inspect(options) => commands::inspect::run(&options, &context),
         Command::Evaluate(options) => commands::evaluate::run(&options, &context),
         Command::Design(options) => commands::design::run(&options, &context),
+        Command::Check(options) => commands::check::run(&options, &context),
         Command::Identify(options) => commands::identify::run(&options, &context),
         Command::Validate(options) => commands::validate::run(&options, &context),
         Command::Simulate(options) => commands::simulate::run(&options, &context),

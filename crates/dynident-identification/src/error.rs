@@ -1,6 +1,7 @@
 //! Everything that can stop an identification, each with the log or the place and the fix in its message.
 
 use crate::consistent::ConsistencyError;
+use crate::diagnosis::DiagnosisError;
 use crate::estimators::EstimatorError;
 use crate::payload::PayloadError;
 use crate::recording::LogError;
@@ -36,6 +37,15 @@ pub enum IdentificationError {
     /// Intervals of parameters that cannot be had.
     #[error("estimator.intervals: {0}")]
     Intervals(ConsistencyError),
+}
+
+impl From<DiagnosisError> for IdentificationError {
+    fn from(error: DiagnosisError) -> Self {
+        match error {
+            DiagnosisError::Log(error) => Self::Log(error),
+            DiagnosisError::Estimation(error) => Self::Estimation(error),
+        }
+    }
 }
 
 impl From<EstimatorError> for IdentificationError {

@@ -4,10 +4,11 @@ use crate::consistent::{
     ConsistencyError, ParameterInterval, consistent_intervals, consistent_with_estimate, inconsistent_nominal_bodies,
     inertials, nearest_to_nominal,
 };
+use crate::diagnosis::{Diagnosis, diagnose, is_beyond_limits, is_doubtful};
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
 use crate::examination::{
-    FrictionSign, HeldOutExamination, LogTrace, ModelUnderTest, TorqueLag, TorqueSignCheck, Uncertainty,
+    FrictionSign, HeldOutExamination, LogTrace, LogValidation, ModelUnderTest, TorqueLag, TorqueSignCheck, Uncertainty,
     examine_training, friction_signs, pooled_delay, sign_evidence, tested_on,
 };
 use crate::execution::Execution;
@@ -15,7 +16,7 @@ use crate::logs::{Logs, of_role};
 use crate::payload::{KnownArm, PayloadResult, payload_results};
 use crate::recording::Role;
 use crate::regressor_model::RegressorModel;
-use crate::settings::IdentificationSettings;
+use crate::settings::{DiagnosisChoice, IdentificationSettings};
 use crate::task::IdentificationTask;
 use crate::training::{Training, training_rows};
 use dynident_estimation::consistent::PhysicalFit;
@@ -87,6 +88,9 @@ pub struct Identification {
     pub examination: TrainingExamination,
     /// Tests on recordings that were not fitted to.
     pub held_out: Vec<HeldOutExamination>,
+    /// Other readings of the recordings beside the task's; none where there was no reason to try them, and for
+    /// payloads.
+    pub diagnosis: Option<Diagnosis>,
     /// Where the time went.
     pub times: StageTimes,
 }
@@ -236,6 +240,27 @@ fn identified(
     let (sign, friction_signs) = signs?;
     let examination = TrainingExamination { sign, friction_signs, ..examined? };
     let held_out = held_out?;
+    // Where something does not fit: what the recordings would be under another study.
+    let theta = consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
+    let is_doubted = || {
+        let reports = training.logs.iter().filter_map(|log| log.statistics.report.as_ref());
+        is_doubtful(&training, theta)
+            || examination.friction_signs.iter().any(FrictionSign::is_reversed)
+            || examination.sign.as_ref().is_some_and(TorqueSignCheck::is_reversed)
+            || reports.into_iter().any(|report| is_beyond_limits(robot.model(), report))
+            || held_out.iter().any(|log| is_far_worse(&log.validation, &estimation.estimate.joint_sigma))
+    };
+    let plain = training.columns.is_plain().then(|| &estimation.estimate.values[..training.columns.base()]);
+    let own_terms = training.friction_choice.is_empty();
+    let diagnosis = match settings.diagnosis {
+        DiagnosisChoice::Never => None,
+        _ if held => None,
+        DiagnosisChoice::WhenDoubtful if !is_doubted() => None,
+        DiagnosisChoice::WhenDoubtful | DiagnosisChoice::Always => {
+            let of_task = plain.filter(|_| own_terms);
+            Some(diagnose((&logs, settings), robot, &chosen, of_task)?)
+        }
+    };
     times.estimation_s += estimation_s;
     times.examination_s = started.elapsed().as_secs_f64() - estimation_s;
     Ok(Identification {
@@ -247,8 +272,20 @@ fn identified(
         consistent,
         examination,
         held_out,
+        diagnosis,
         times,
     })
+}
+
+/// Times the noise of the fit that a held-out log may be worse before it gives reason to doubt: friction that changes
+/// with the motion costs less.
+const FAR_WORSE: f64 = 1.7;
+
+/// Whether a held-out log is far worse explained than the training logs, joints in units of their own noise.
+fn is_far_worse(log: &LogValidation, sigma: &[f64]) -> bool {
+    let joints = log.model.joints.iter().zip(sigma).filter(|(_, sigma)| **sigma > 0.0);
+    let squares: Vec<f64> = joints.map(|(joint, sigma)| (joint.rmse_nm / sigma).powi(2)).collect();
+    squares.iter().sum::<f64>() > FAR_WORSE * FAR_WORSE * squares.len() as f64
 }
 
 /// The arm's bodies are those of the earlier result; what the estimate of payloads says of them is the set nearest to

@@ -106,6 +106,7 @@
 //! | motor constants | [`GainChoice::Unknown`], with a known payload on some of the logs |
 //! | a payload on a known arm | [`identify_payload`] with a [`KnownArm`](payload::KnownArm) |
 //! | the lag of the torque, its sign, its residuals | [`TrainingExamination`], [`examination`] |
+//! | whether study, robot and logs fit together at all | [`examine_study`], [`diagnosis`] |
 //! | the rows themselves | [`LogPass`](rows::LogPass) with a [`RowConsumer`](rows::RowConsumer) of one's own |
 //! | a progress bar | [`Progress`] in [`Execution`] |
 //!
@@ -114,7 +115,9 @@
 
 #![forbid(unsafe_code)]
 
+mod check;
 pub mod consistent;
+pub mod diagnosis;
 mod error;
 pub mod estimators;
 pub mod examination;
@@ -131,6 +134,7 @@ mod settings;
 mod task;
 mod training;
 
+pub use check::{StudyExamination, examine_study};
 pub use error::IdentificationError;
 pub use estimators::EstimationSettings;
 pub use execution::Execution;
@@ -142,6 +146,6 @@ pub use logs::Logs;
 pub use progress::{Progress, Silent};
 pub use recording::{LogError, MotionRecord, Recording, Role, Samples};
 pub use regressor_model::RegressorModel;
-pub use settings::{GainChoice, IdentificationSettings, OffsetChoice};
+pub use settings::{DiagnosisChoice, GainChoice, IdentificationSettings, OffsetChoice};
 pub use task::IdentificationTask;
 pub use training::{LogFactors, Training, log_factors, training_rows};

@@ -33,6 +33,19 @@ pub enum GainChoice {
     Unknown,
 }
 
+/// Whether other readings of the logs are tried: see [`diagnosis`](crate::diagnosis).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DiagnosisChoice {
+    /// Not at all.
+    Never,
+    /// Where the fit gives reason to: a consistent robot leaves clearly more than parameters of each joint's own, or
+    /// friction drives a joint, or a joint is beyond its limits.
+    #[default]
+    WhenDoubtful,
+    /// In any case.
+    Always,
+}
+
 /// Everything that [`identify`](crate::identify()) can be given beside robot and recordings; the default is weighted
 /// least squares with consistent parameters.
 #[derive(Clone, Debug)]
@@ -55,6 +68,9 @@ pub struct IdentificationSettings {
     pub offsets: OffsetChoice,
     /// Whether torque is in newton metres; by default it is.
     pub gains: GainChoice,
+    /// Whether other readings of the training logs are compared with the study's; where the fit gives reason to, by
+    /// default.
+    pub diagnosis: DiagnosisChoice,
 }
 
 impl Default for IdentificationSettings {
@@ -68,6 +84,7 @@ impl Default for IdentificationSettings {
             friction: Vec::new(),
             offsets: OffsetChoice::default(),
             gains: GainChoice::default(),
+            diagnosis: DiagnosisChoice::default(),
         }
     }
 }

@@ -56,6 +56,7 @@ pub use dynident_simulation as simulation;
 
 pub use dynident_identification::{Progress, Role, Silent};
 pub use error::{Error, Expected, StudyError};
+pub use jobs::check::check;
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
 pub use jobs::evaluate::{Quantity, evaluate};
 pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instruments};
@@ -65,5 +66,5 @@ pub use jobs::options::RunOptions;
 pub use jobs::simulate::{Simulation, simulate_study};
 pub use jobs::validate::validate;
 pub use output::{check_writable, write_whole};
-pub use result::{DesignFile, Inspection, IterationsFile, ResultFile, SimulationFile, ValidationFile};
+pub use result::{CheckFile, DesignFile, Inspection, IterationsFile, ResultFile, SimulationFile, ValidationFile};
 pub use study::{Folders, Study, StudyRobot};

@@ -1,6 +1,7 @@
 //! One file per subcommand.
 
 pub(crate) mod benchmark;
+pub(crate) mod check;
 pub(crate) mod design;
 pub(crate) mod evaluate;
 pub(crate) mod identify;

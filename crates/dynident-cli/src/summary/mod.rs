@@ -1,6 +1,7 @@
 //! Results as a person likes to read them: the important first, at most [`WIDTH`](text::WIDTH) columns.
 
 mod benchmark;
+mod check;
 mod design;
 mod findings;
 mod identification;
@@ -13,6 +14,7 @@ mod text;
 mod validation;
 
 pub(crate) use benchmark::benchmark;
+pub(crate) use check::check;
 pub(crate) use design::design;
 pub(crate) use identification::identification;
 pub(crate) use inspection::inspection;

@@ -141,6 +141,24 @@ impl LogPass<'_> {
         })
     }
 
+    /// Gives the motion to `take`, block by block and without its regressor: as it was kept, or read once more.
+    pub(crate) fn each_block(&self, take: &mut dyn FnMut(&MotionBlock)) -> Result<(), LogError> {
+        let Recording { name, samples, .. } = self.recording;
+        match (samples, self.kept.and_then(OnceLock::get)) {
+            (Samples::Motion(record), _) => take(&record.motion),
+            (_, Some(kept)) => kept.blocks.iter().for_each(take),
+            _ => {
+                let stream = self.recording.open(self.model.model(), self.motion)?;
+                let mut stream = stream.ok_or_else(|| LogError::NoSamples { log: name.clone() })?;
+                let mut block = MotionBlock::default();
+                while stream.next_block(&mut block).map_err(|source| LogError::recording(name, source))? {
+                    take(&block);
+                }
+            }
+        }
+        Ok(())
+    }
+
     fn take(
         &self,
         block: &MotionBlock,

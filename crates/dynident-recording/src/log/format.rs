@@ -184,7 +184,8 @@ pub enum TimeUnit {
 }
 
 impl TimeUnit {
-    pub(crate) fn seconds(self) -> f64 {
+    /// Seconds in one unit.
+    pub fn seconds(self) -> f64 {
         match self {
             Self::Seconds => 1.0,
             Self::Milliseconds => 1e-3,

@@ -1,5 +1,6 @@
 //! What a channel looks like: its range, whether it is alive, quantised, saturated. Accumulated block by block.
 
+use super::jumps::{JumpCheck, LoneSample};
 use crate::log::Quantity;
 use serde::{Deserialize, Serialize};
 
@@ -24,6 +25,15 @@ pub struct ChannelReport {
     pub longest_run_at_extreme: u64,
     /// Quantisation step, if nine tenths of the steps of the first rows are its multiples.
     pub quantisation_step: Option<f64>,
+    /// Steps of a whole turn from one sample to the next (positions): angles that wrap.
+    #[serde(default)]
+    pub turns: u64,
+    /// Single samples far from both of their neighbours.
+    #[serde(default)]
+    pub lone_samples: u64,
+    /// The one that stands off farthest.
+    #[serde(default)]
+    pub worst_lone_sample: Option<LoneSample>,
 }
 
 impl ChannelReport {
@@ -46,6 +56,7 @@ pub(crate) struct ChannelCheck {
     high: Extreme,
     zeros: u64,
     samples: u64,
+    jumps: JumpCheck,
     pub(crate) quantisation_step: Option<f64>,
 }
 
@@ -85,6 +96,7 @@ impl ChannelCheck {
             high: Extreme::new(),
             zeros: 0,
             samples: 0,
+            jumps: JumpCheck::new((quantity == Quantity::Position).then_some(core::f64::consts::TAU)),
             quantisation_step: None,
         }
     }
@@ -94,11 +106,13 @@ impl ChannelCheck {
             self.high.see(*value);
             self.low.see(-value);
             self.zeros += u64::from(*value == 0.0);
+            self.jumps.see(*value);
         }
         self.samples += values.len() as u64;
     }
 
     pub(crate) fn report(&self) -> ChannelReport {
+        let (lone_samples, worst_lone_sample) = self.jumps.lone();
         ChannelReport {
             channel: self.quantity,
             joint: self.joint.clone(),
@@ -112,6 +126,9 @@ impl ChannelCheck {
                 .max()
                 .unwrap_or(0),
             quantisation_step: self.quantisation_step,
+            turns: self.jumps.wraps(),
+            lone_samples,
+            worst_lone_sample,
         }
     }
 }

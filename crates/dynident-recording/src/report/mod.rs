@@ -6,11 +6,13 @@
 
 pub(crate) mod channels;
 pub(crate) mod comparison;
+mod jumps;
 mod lag;
 pub(crate) mod steps;
 
 pub use channels::ChannelReport;
 pub use comparison::DerivativeComparison;
+pub use jumps::LoneSample;
 pub use lag::{Lag, best_lag};
 
 use crate::clock::Clock;
@@ -180,6 +182,22 @@ impl ImportReport {
                     channel.longest_run_at_extreme, channel.min, channel.max
                 );
                 add(Level::Warning, &name, message);
+            }
+            if channel.turns > 0 {
+                let message = format!(
+                    "jumps by a whole turn {} times: the angles wrap, and a motion cannot be made of them; unwrap them \
+                     (numpy.unwrap) before they are read",
+                    channel.turns
+                );
+                add(Level::Problem, &name, message);
+            }
+            if let Some(worst) = &channel.worst_lone_sample {
+                let message = format!(
+                    "{} samples stand alone, the worst in row {} of those used: {:.6e} after {:.6e}; empty the field \
+                     and write `missing = \"drop\"`",
+                    channel.lone_samples, worst.row, worst.value, worst.before
+                );
+                add(if measured { Level::Problem } else { Level::Warning }, &name, message);
             }
             if let Some(step) = channel.quantisation_step
                 && measured

@@ -1,5 +1,6 @@
 //! The jobs of the command: each reads files, calls the crates below, and returns what is written.
 
+pub(crate) mod check;
 pub(crate) mod design;
 pub(crate) mod evaluate;
 pub(crate) mod identify;

@@ -1,5 +1,6 @@
 //! What `identify` writes: the schema of `result.json`.
 
+use super::check::StudyCheck;
 use super::numbers::{number, rows};
 use crate::study::JointDrive;
 use dynident_estimation::{CorrelatedPair, EssentialReport};
@@ -89,6 +90,9 @@ pub struct ResultFile {
     pub physical: PhysicalVerdict,
     /// What the importer found in each log.
     pub logs: Vec<LogSummary>,
+    /// Whether another reading of the logs explains them better; none where there was no reason to ask.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub check: Option<StudyCheck>,
     /// Why there is no identified.urdf; none when there is one.
     pub no_urdf: Option<String>,
     /// Where the time went.

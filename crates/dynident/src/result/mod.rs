@@ -1,6 +1,7 @@
 //! **What jobs write**: one type for each file, read back as it was written. Keys are added, never renamed, within a
 //! version of a schema.
 
+mod check;
 mod design;
 mod evaluation;
 mod identification;
@@ -12,6 +13,7 @@ mod simulation;
 pub(crate) mod stored;
 mod validation;
 
+pub use check::{CHECK_SCHEMA, CheckFile, CheckFinding, ReadingResult, StudyChange, StudyCheck};
 pub use design::{
     DESIGN_SCHEMA, DesignFile, DirectionForecast, ParameterForecast, StrokeFile, StrokeLimitFile, WindowedFile,
 };

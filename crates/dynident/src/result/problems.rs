@@ -1,6 +1,6 @@
 //! What speaks against loading a result's model into a robot.
 
-use super::ResultFile;
+use super::{ResultFile, StudyCheck};
 use dynident_identification::examination::LogValidation;
 use dynident_recording::Level;
 
@@ -17,7 +17,7 @@ impl ResultFile {
     /// nothing does. Problems of the logs, an estimator that did not settle, and a consistent set (which is what is
     /// written) that predicts clearly worse than the estimate it was made from.
     pub fn problems(&self) -> Vec<String> {
-        let mut problems = Vec::new();
+        let mut problems: Vec<String> = self.check.iter().flat_map(StudyCheck::problems).collect();
         for log in &self.logs {
             let findings = log.import.findings.iter().chain(&log.model_findings);
             for finding in findings.filter(|finding| finding.level == Level::Problem) {

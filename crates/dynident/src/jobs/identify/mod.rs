@@ -4,6 +4,7 @@ mod sections;
 mod urdf;
 
 use crate::error::Error;
+use crate::jobs::check::diagnosis_check;
 use crate::jobs::log_summary::{held_out_summary, training_summary};
 use crate::jobs::options::{RunOptions, study_name};
 use crate::result::{LogSummary, PhysicalVerdict, RESULT_SCHEMA, ResultFile, Timings, TrainingResult};
@@ -251,6 +252,7 @@ fn result_file(
         validation: held_out.map(|log| log.validation.clone()).collect(),
         physical: parts.verdict,
         logs: log_summaries(task, found),
+        check: found.diagnosis.as_ref().map(|diagnosis| diagnosis_check((study, robot), &task.settings, diagnosis)),
         no_urdf: parts.no_urdf,
         timings_s: parts.timings,
     }

@@ -1,0 +1,31 @@
+//! `dynident check STUDY.toml`.
+
+use super::{Context, json, known_in, message_of};
+use crate::{Verdict, summary, terminal};
+use dynident::recording::Level;
+use dynident::{RunOptions, Study, check};
+use std::path::PathBuf;
+
+/// Options of `check`.
+#[derive(clap::Args)]
+pub(crate) struct Options {
+    /// The study file.
+    study: PathBuf,
+    /// Folder of the recordings, in place of the study's own.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+}
+
+pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
+    let study = Study::load(&options.study).map_err(message_of)?;
+    let progress = context.progress();
+    let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
+    let file = check(&study, &options.study, &run).map_err(known_in(&options.study))?;
+    let is_problem = file.check.findings.iter().any(|finding| finding.level == Level::Problem);
+    if context.json {
+        terminal::print(&json(&file)?);
+    } else if is_problem || !context.quiet {
+        terminal::print(&summary::check(&file));
+    }
+    Ok(if is_problem { Verdict::Negative } else { Verdict::Good })
+}

@@ -1,0 +1,71 @@
+//! Before any fit is believed: do study, robot and recordings fit together?
+
+use crate::diagnosis::{Diagnosis, diagnose};
+use crate::error::IdentificationError;
+use crate::execution::Execution;
+use crate::logs::{Logs, of_role};
+use crate::recording::{LogError, Role};
+use crate::regressor_model::RegressorModel;
+use crate::rows::{JointRows, RowConsumer};
+use crate::settings::IdentificationSettings;
+use crate::task::IdentificationTask;
+use crate::training::training_rows;
+use dynident_estimation::{WeightedSettings, weighted_least_squares};
+use dynident_recording::ImportReport;
+
+/// What was found about a task's recordings before any fit is believed.
+#[derive(Clone, Debug)]
+pub struct StudyExamination {
+    /// For each recording its number and what its import found; none for motions that were made already.
+    pub imports: Vec<(usize, Option<ImportReport>)>,
+    /// Readings of the training recordings, units of torque, loads.
+    pub diagnosis: Diagnosis,
+    /// Rows of all joints that a fit would have.
+    pub rows: usize,
+    /// Base parameters that a fit would have.
+    pub parameters: usize,
+}
+
+/// Reads every recording of a task, compares the readings of those to fit to, and looks for loads in the others. No
+/// friction is chosen and no bodies are looked for.
+///
+/// # Errors
+/// Recordings that cannot be read, too few rows.
+pub fn examine_study(
+    task: &IdentificationTask,
+    execution: Execution<'_>,
+) -> Result<StudyExamination, IdentificationError> {
+    execution.install(|| examined(task, execution))
+}
+
+fn examined(task: &IdentificationTask, execution: Execution<'_>) -> Result<StudyExamination, IdentificationError> {
+    let IdentificationTask { robot, recordings, payloads, settings } = task;
+    let chosen = of_role(recordings, Role::Identify);
+    if chosen.is_empty() {
+        return Err(IdentificationError::NoTrainingLog);
+    }
+    let settings = IdentificationSettings { friction: Vec::new(), ..settings.clone() };
+    let logs = Logs::new(robot.model(), recordings, settings.filters(), &chosen, None, execution)?;
+    let training = training_rows((&logs, &settings), robot.clone().into(), &chosen, payloads, None)?;
+    let estimate = weighted_least_squares(&training.problem, &WeightedSettings::default())?;
+    let theta = &estimate.values[..training.columns.base()];
+    let known = training.columns.is_plain().then_some(theta);
+    let diagnosis = diagnose((&logs, &settings), robot, &chosen, known)?;
+    let mut imports: Vec<(usize, Option<ImportReport>)> =
+        training.logs.iter().map(|log| (log.index, log.statistics.report.clone())).collect();
+    let model: RegressorModel = robot.clone().into();
+    for index in of_role(recordings, Role::Validate) {
+        imports.push((index, logs.pass(&model, index).run(&mut Unused)?.report));
+    }
+    let rows = training.problem.joint_rows().iter().sum();
+    Ok(StudyExamination { imports, diagnosis, rows, parameters: robot.base().count() })
+}
+
+/// A pass for its report's sake.
+struct Unused;
+
+impl RowConsumer for Unused {
+    fn filtered(&mut self, _rows: &JointRows<'_>) -> Result<(), LogError> {
+        Ok(())
+    }
+}

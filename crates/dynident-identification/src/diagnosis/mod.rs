@@ -1,0 +1,145 @@
+//! Do study, robot and log fit together, and if not, which mistake explains it?
+//!
+//! A fit of base parameters explains many a wrong study: signs, orders and units hide in its parameters. Here the same
+//! samples are read as they would be if one mistake or another had been made, and every reading is asked how well a
+//! robot explains it that can exist: positive masses, friction that takes energy out, stops and velocities that hold,
+//! bodies not too far from the description's. The study is doubted only if another reading is better by a clear margin.
+//!
+//! | file | holds |
+//! | --- | --- |
+//! | `motion_rows` | a recording as a few hundred instants |
+//! | `mistake`, `candidates` | mistakes of studies, and which to try |
+//! | `explanation`, `nominal`, `plausibility` | the witnesses: best robots, the description, limits |
+//! | `reading`, `search` | their sum, and the reading with the best |
+//! | `torque_unit`, `unseen_load` | what no reading of single columns covers: units of torque, payloads |
+
+mod candidates;
+mod explanation;
+mod mistake;
+mod motion_rows;
+mod nominal;
+mod plausibility;
+mod reading;
+mod search;
+mod torque_unit;
+mod unseen_load;
+
+pub use mistake::{Channels, Mistake};
+pub use motion_rows::MotionRows;
+pub use plausibility::BeyondLimit;
+pub use reading::Reading;
+pub use search::Search;
+pub use torque_unit::TorqueUnit;
+pub use unseen_load::UnseenLoad;
+
+use crate::logs::Logs;
+use crate::recording::{LogError, Role};
+use crate::settings::IdentificationSettings;
+use crate::training::Training;
+use dynident_dynamics::ParametricModel;
+use dynident_estimation::EstimationError;
+use dynident_model::Model;
+use dynident_recording::ImportReport;
+use reading::Corrected;
+use search::rough_consistency;
+use thiserror::Error;
+
+/// Instants that readings are compared on; more make it slower and not surer.
+const INSTANTS: usize = 300;
+/// Per joint: what a consistent robot leaves more than parameters of each joint's own do, as a logarithm, before other
+/// readings are tried unasked. Simulated and well-described robots stay below 0.05.
+const DOUBTFUL: f64 = 0.1;
+
+/// What was found about study, robot and logs.
+#[derive(Clone, Debug)]
+pub struct Diagnosis {
+    /// The readings that were compared.
+    pub search: Search,
+    /// What the description says of the torque's unit, in the best reading; none while its bodies are unknown.
+    pub torque_unit: Option<TorqueUnit>,
+    /// Loads that held-out logs carry and training logs do not, or the other way round.
+    pub unseen_loads: Vec<UnseenLoad>,
+}
+
+impl Diagnosis {
+    /// Whether even the best reading leaves far more than each joint's own parameters do: the description is not this
+    /// robot's, or several mistakes were made at once.
+    pub fn is_unexplained(&self) -> bool {
+        self.search.best.as_ref().unwrap_or(&self.search.as_written).is_unexplained()
+    }
+}
+
+/// Why a diagnosis could not be made.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum DiagnosisError {
+    /// A recording that cannot be read.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// Rows that carry no estimate.
+    #[error(transparent)]
+    Estimation(#[from] EstimationError),
+}
+
+/// Whether an import report has a joint beyond its limits, or a rate that no recorder has.
+pub(crate) fn is_beyond_limits(model: &Model, report: &ImportReport) -> bool {
+    plausibility::is_beyond(model, report)
+}
+
+/// Whether a fit's own figures give reason to try other readings: a consistent robot that leaves clearly more than
+/// parameters of each joint's own.
+pub(crate) fn is_doubtful(training: &Training, consistent: Option<&[f64]>) -> bool {
+    let Some(theta) = consistent else { return true };
+    let mut sums = vec![(0.0, 0.0, 0.0_f64); training.problem.joints().len()];
+    for equation in training.problem.equations() {
+        let factor = equation.factor.total();
+        let own: Vec<f64> = equation.columns.iter().map(|&column| theta.get(column).copied().unwrap_or(0.0)).collect();
+        let columns = equation.columns.len();
+        let sum = &mut sums[equation.joint];
+        sum.0 += factor.residual_sum_of_squares(&own).unwrap_or(f64::INFINITY);
+        sum.1 += factor.entry(columns, columns).powi(2);
+        sum.2 += factor.torque_norm().powi(2);
+    }
+    // As in an `Explanation`: below a hundredth of the torque nothing is left.
+    let log = |(left, alone, torque): &(f64, f64, f64)| {
+        let floor = 1e-4 * torque;
+        if *torque > 0.0 { 0.5 * (left.max(floor) / alone.max(floor)).ln() } else { 0.0 }
+    };
+    sums.iter().map(log).sum::<f64>() > DOUBTFUL * sums.len() as f64
+}
+
+/// Compares readings of the recordings `training`, and looks for loads in the held-out ones beside the base parameters
+/// `theta`, where these are given.
+///
+/// # Errors
+/// Recordings that cannot be read, too few rows.
+pub fn diagnose(
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    robot: &ParametricModel,
+    training: &[usize],
+    theta: Option<&[f64]>,
+) -> Result<Diagnosis, DiagnosisError> {
+    let model = robot.clone().into();
+    let mut rows = MotionRows::empty(robot.dof());
+    for &index in training {
+        rows.append(&MotionRows::of_recording(logs, &model, index, INSTANTS / training.len().max(1))?);
+    }
+    let consistency = rough_consistency(settings.consistency.as_ref());
+    let start = Corrected { robot: robot.clone(), rows: rows.clone(), mistakes: Vec::new() };
+    let search = search::search(start, &consistency)?;
+    // Units of torque are judged in the best reading, payloads only where the study is believed.
+    let (mut best_robot, mut best_rows) = (robot.clone(), rows);
+    for mistake in search.best.iter().flat_map(|best| &best.mistakes) {
+        best_rows = mistake.corrected(&best_rows);
+        best_robot = mistake.corrected_robot(&best_robot).unwrap_or(best_robot);
+    }
+    let torque_unit = torque_unit::torque_unit(&best_robot, &best_rows);
+    let mut unseen_loads = Vec::new();
+    if let (Some(theta), None) = (theta, &search.best) {
+        for index in logs.of_role(Role::Validate) {
+            let rows = MotionRows::of_recording(logs, &model, index, INSTANTS)?;
+            unseen_loads.extend(unseen_load::unseen_load(robot, &rows, index, theta));
+        }
+    }
+    Ok(Diagnosis { search, torque_unit, unseen_loads })
+}

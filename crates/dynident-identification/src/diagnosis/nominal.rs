@@ -1,0 +1,55 @@
+//! What the description's own bodies leave of the torque, with friction fitted joint by joint.
+
+use super::motion_rows::MotionRows;
+use dynident_dynamics::{ParametricModel, Workspace, inverse_dynamics};
+use nalgebra::{DMatrix, DVector};
+
+/// Root mean square of what the nominal bodies leave of each joint's torque, Nm (N), beside viscous and Coulomb
+/// friction of at least zero and an offset that fit the rest best; `None` while a body's inertials are unknown.
+pub(super) fn left_by_nominal(robot: &ParametricModel, rows: &MotionRows) -> Option<Vec<f64>> {
+    robot.nominal_base()?;
+    let model = robot.model();
+    let (dof, count) = (model.dof(), rows.len());
+    let mut rest = rows.tau.clone();
+    let mut workspace = Workspace::new(model);
+    let at = |values: &[Vec<f64>], row: usize| -> Vec<f64> { values.iter().map(|values| values[row]).collect() };
+    for row in 0..count {
+        let (q, dq, ddq) = (at(&rows.q, row), at(&rows.dq, row), at(&rows.ddq, row));
+        let torque = inverse_dynamics(model, &mut workspace, &q, &dq, &ddq);
+        for joint in 0..dof {
+            rest[joint][row] -= torque[joint];
+        }
+    }
+    Some((0..dof).map(|joint| left_by_friction(&rows.dq[joint], &rest[joint])).collect())
+}
+
+/// Root mean square of `tau` beside an offset and friction of at least zero.
+fn left_by_friction(dq: &[f64], tau: &[f64]) -> f64 {
+    let count = tau.len();
+    let column = |which: usize, row: usize| match which {
+        0 => 1.0,
+        1 => dq[row],
+        _ => dq[row].signum(),
+    };
+    let tau = DVector::from_column_slice(tau);
+    let mut kept = vec![0, 1, 2];
+    loop {
+        let matrix = DMatrix::from_fn(count, kept.len(), |row, k| column(kept[k], row));
+        let gram = matrix.transpose() * &matrix;
+        let solution = gram.cholesky().map(|factor| factor.solve(&(matrix.transpose() * &tau)));
+        let Some(solution) = solution else {
+            if kept.len() > 1 {
+                kept.pop();
+                continue;
+            }
+            return tau.norm() / (count.max(1) as f64).sqrt();
+        };
+        // Friction that would drive the joint is none.
+        let negative =
+            (1..kept.len()).filter(|&k| solution[k] < 0.0).min_by(|&a, &b| solution[a].total_cmp(&solution[b]));
+        match negative {
+            Some(k) => drop(kept.remove(k)),
+            None => return (&tau - &matrix * solution).norm() / (count.max(1) as f64).sqrt(),
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! One reading of the samples and what speaks for and against it.
+
+use super::explanation::Explanation;
+use super::mistake::Mistake;
+use super::motion_rows::MotionRows;
+use super::plausibility::{BeyondLimit, beyond_limits, is_rate_of_a_recorder};
+use crate::consistent::ConsistencySettings;
+use dynident_dynamics::ParametricModel;
+use dynident_estimation::EstimationError;
+
+/// Weight of what the description's own bodies leave beside what the best consistent ones leave: descriptions err.
+const NOMINAL_WEIGHT: f64 = 0.5;
+/// Per joint: what a consistent robot leaves more than parameters of each joint's own do, as a logarithm, from which a
+/// reading explains nothing; real logs of arms with friction of their own reach 0.55.
+const UNEXPLAINED: f64 = 0.9;
+/// What a joint beyond its limits costs, as if e times as much of one joint's torque were left.
+const LIMIT_COST: f64 = 1.0;
+
+/// The samples with some mistakes corrected, and how well a robot explains them.
+#[derive(Clone, Debug)]
+pub struct Reading {
+    /// Mistakes that are corrected in it, in the order of their correction; none for the study as it is.
+    pub mistakes: Vec<Mistake>,
+    /// Share of each joint's torque that no physically consistent robot explains, 0 to 1 (root mean squares).
+    pub left: Vec<f64>,
+    /// Joints beyond their limits.
+    pub beyond: Vec<BeyondLimit>,
+    /// Whether the rate is one that recorders have.
+    pub plausible_rate: bool,
+    /// `Σ_j ln(left of joint j)` by the best consistent robot.
+    pub consistent_score: f64,
+    /// The same by one set of base parameters, consistent or not.
+    pub free_score: f64,
+    /// The same by parameters of each joint's own.
+    pub alone_score: f64,
+    /// The same by the description's own bodies; zero where it has none.
+    pub nominal_score: f64,
+}
+
+impl Reading {
+    /// All evidence as one number, the less the better: logarithms of what is left, plus one for each limit that is
+    /// broken, plus a little for mistakes that are rare.
+    pub fn score(&self) -> f64 {
+        self.consistent_score + self.beside_fit()
+    }
+
+    /// Whether it leaves far more than parameters of each joint's own do: then it is no explanation either.
+    pub fn is_unexplained(&self) -> bool {
+        self.consistent_score - self.alone_score > UNEXPLAINED * self.left.len() as f64
+    }
+
+    /// The least that [`score`](Self::score) could be, whatever a consistent robot leaves.
+    pub(super) fn lower_bound(&self) -> f64 {
+        self.free_score + self.beside_fit()
+    }
+
+    fn beside_fit(&self) -> f64 {
+        let broken = self.beyond.len() + usize::from(!self.plausible_rate);
+        let rarity: f64 = self.mistakes.iter().map(Mistake::rarity).sum();
+        NOMINAL_WEIGHT * self.nominal_score + LIMIT_COST * broken as f64 + rarity
+    }
+}
+
+/// The robot and the rows of a reading, for going on from it.
+#[derive(Clone, Debug)]
+pub(super) struct Corrected {
+    pub(super) robot: ParametricModel,
+    pub(super) rows: MotionRows,
+    pub(super) mistakes: Vec<Mistake>,
+}
+
+impl Corrected {
+    /// With one more mistake corrected.
+    pub(super) fn without(&self, mistake: &Mistake) -> Self {
+        let robot = mistake.corrected_robot(&self.robot).unwrap_or_else(|| self.robot.clone());
+        let mistakes = self.mistakes.iter().chain([mistake]).cloned().collect();
+        Self { robot, rows: mistake.corrected(&self.rows), mistakes }
+    }
+
+    /// What speaks for it and against it; without a consistent robot where `consistency` is not given.
+    pub(super) fn reading(&self, consistency: Option<&ConsistencySettings>) -> Result<Reading, EstimationError> {
+        let explained = Explanation::new(&self.robot, &self.rows, consistency)?;
+        let best = if explained.consistent.is_empty() { &explained.torque } else { &explained.consistent };
+        let share = |(left, torque): (&f64, &f64)| if *torque > 0.0 { left / torque } else { 0.0 };
+        Ok(Reading {
+            mistakes: self.mistakes.clone(),
+            left: best.iter().zip(&explained.torque).map(share).collect(),
+            beyond: beyond_limits(self.robot.model(), &self.rows),
+            plausible_rate: is_rate_of_a_recorder(self.rows.rate_hz),
+            consistent_score: explained.consistent_score(),
+            free_score: explained.free_score(),
+            alone_score: explained.alone_score(),
+            nominal_score: explained.nominal_score(),
+        })
+    }
+}

@@ -1,0 +1,150 @@
+//! Samples that no motion makes: angles that wrap after a turn, and single values far from their neighbours.
+
+use serde::{Deserialize, Serialize};
+
+/// How far from a whole turn a step may be and still count as a wrapped angle, as a share of the turn: what the joint
+/// moves meanwhile.
+const TURN_TOLERANCE: f64 = 0.1;
+/// Times the largest step nearby that a lone sample must stand off, on both sides.
+const TIMES_NEARBY: f64 = 20.0;
+/// What remains of the largest step nearby from one sample to the next: it is forgotten within some hundred samples.
+const MEMORY: f64 = 0.99;
+/// A lone sample counts only if it stands off by this share of the range of all others.
+const SHARE_OF_RANGE: f64 = 0.25;
+/// Steps to learn from before a sample can stand out.
+const LEARN: u64 = 20;
+
+/// A sample that stands alone.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct LoneSample {
+    /// Its number among the rows used, from 0.
+    pub row: u64,
+    /// Its value (SI).
+    pub value: f64,
+    /// The value before it.
+    pub before: f64,
+}
+
+/// What was seen of one channel's steps.
+#[derive(Clone, Debug)]
+pub(super) struct JumpCheck {
+    turn: Option<f64>,
+    samples: u64,
+    last: [f64; 2],
+    nearby: f64,
+    low: f64,
+    high: f64,
+    wraps: u64,
+    alone: u64,
+    worst: Option<LoneSample>,
+    worst_by: f64,
+}
+
+impl JumpCheck {
+    /// For a channel whose angles may wrap at `turn`, if any.
+    pub(super) fn new(turn: Option<f64>) -> Self {
+        Self {
+            turn,
+            samples: 0,
+            last: [0.0; 2],
+            nearby: 0.0,
+            low: f64::INFINITY,
+            high: f64::NEG_INFINITY,
+            wraps: 0,
+            alone: 0,
+            worst: None,
+            worst_by: 0.0,
+        }
+    }
+
+    #[inline]
+    pub(super) fn see(&mut self, value: f64) {
+        let [before, middle] = self.last;
+        if self.samples >= 2 {
+            let (to, from) = (middle - before, value - middle);
+            let least = to.abs().min(from.abs());
+            // A lone sample is known for one once its successor is back.
+            if to * from < 0.0 && least > TIMES_NEARBY * self.nearby && self.samples > LEARN && self.nearby > 0.0 {
+                self.alone += 1;
+                if least > self.worst_by {
+                    self.worst_by = least;
+                    self.worst = Some(LoneSample { row: self.samples - 1, value: middle, before });
+                }
+                // As if it had not been there.
+                self.last = [before, value];
+                self.samples += 1;
+                return;
+            }
+            if let Some(turn) = self.turn
+                && (to.abs() - turn).abs() < TURN_TOLERANCE * turn
+                && self.nearby < 0.25 * turn
+            {
+                self.wraps += 1;
+            } else {
+                self.nearby = (MEMORY * self.nearby).max(to.abs());
+            }
+            self.low = self.low.min(middle);
+            self.high = self.high.max(middle);
+        }
+        self.last = [middle, value];
+        self.samples += 1;
+    }
+
+    /// Steps of a whole turn.
+    pub(super) fn wraps(&self) -> u64 {
+        self.wraps
+    }
+
+    /// Lone samples and the worst of them, where it stands off far enough.
+    pub(super) fn lone(&self) -> (u64, Option<LoneSample>) {
+        let range = self.high - self.low;
+        match self.worst {
+            Some(worst) if self.worst_by > SHARE_OF_RANGE * range => (self.alone, Some(worst)),
+            _ => (0, None),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(turn: Option<f64>, values: impl IntoIterator<Item = f64>) -> JumpCheck {
+        let mut check = JumpCheck::new(turn);
+        values.into_iter().for_each(|value| check.see(value));
+        check
+    }
+
+    fn noise(i: usize) -> f64 {
+        (i as f64 * 0.754_877_666).fract() - 0.5
+    }
+
+    #[test]
+    fn one_absurd_sample_is_found_and_noise_and_steps_are_not() {
+        let clean = |i: usize| 20.0 * (i as f64 * 0.01).sin() + noise(i) + if i > 700 { 9.0 } else { 0.0 };
+        assert_eq!(seen(None, (0..2000).map(clean)).lone(), (0, None));
+        let one = seen(None, (0..2000).map(|i| if i == 1234 { 1e9 } else { clean(i) }));
+        let (count, worst) = one.lone();
+        assert_eq!((count, worst.map(|worst| (worst.row, worst.value))), (1, Some((1234, 1e9))));
+    }
+
+    #[test]
+    fn wrapped_angles_are_counted_and_fast_ones_are_not() {
+        let angle = |i: usize| 2.5 + 1.5 * (i as f64 * 0.01).sin();
+        let pi = core::f64::consts::PI;
+        let wrapped = |i: usize| if angle(i) > pi { angle(i) - 2.0 * pi } else { angle(i) };
+        assert_eq!(seen(Some(2.0 * pi), (0..2000).map(angle)).wraps(), 0);
+        let check = seen(Some(2.0 * pi), (0..2000).map(wrapped));
+        assert!(check.wraps() > 3 && check.lone().1.is_none(), "{check:?}");
+    }
+
+    #[test]
+    fn a_channel_at_rest_with_single_flickers_of_its_last_digit_is_not_absurd() {
+        let check = seen(
+            None,
+            (0..2000).map(|i| 5.0 * (i as f64 * 0.01).sin().clamp(-0.2, 0.2) + if i % 97 == 0 { 1e-3 } else { 0.0 }),
+        );
+        assert_eq!(check.lone(), (0, None));
+    }
+}

@@ -1,0 +1,265 @@
+//! What a diagnosis says to the person who wrote the study.
+
+use super::changes::StudyFormat;
+use crate::result::{CheckFinding, ReadingResult, StudyChange, StudyCheck};
+use crate::study::{Study, StudyRobot};
+use core::f64::consts::PI;
+use dynident_identification::Role;
+use dynident_identification::diagnosis::{BeyondLimit, Channels, Diagnosis, Mistake, Reading, UnseenLoad};
+use dynident_identification::{GainChoice, IdentificationSettings};
+use dynident_recording::Level;
+use dynident_recording::log::OneOrMany;
+
+/// A finding under way: a sentence without its evidence.
+fn finding(kind: &str, what: String, evidence: String) -> CheckFinding {
+    CheckFinding { level: Level::Problem, kind: kind.to_owned(), what, evidence, write: Vec::new(), or: Vec::new() }
+}
+
+/// The diagnosis of a study as findings and readings.
+pub(super) fn study_check(
+    (study, robot): (&Study, &StudyRobot),
+    settings: &IdentificationSettings,
+    diagnosis: &Diagnosis,
+) -> StudyCheck {
+    let joints = robot.parametric.joint_names();
+    let format = StudyFormat::new(study, robot);
+    let search = &diagnosis.search;
+    let mut findings = Vec::new();
+    // Another reading, one finding for each of its mistakes; what cannot be told from it stands with the last.
+    // A reading that explains nothing is no advice.
+    let best = search.best.as_ref().filter(|best| !best.is_unexplained());
+    if let Some(best) = best {
+        for (number, mistake) in best.mistakes.iter().enumerate() {
+            let mut found = finding(
+                kind(mistake),
+                sentence(mistake, &joints),
+                evidence(mistake, (&search.as_written, best), &joints),
+            );
+            found.write = format.as_ref().map_or_else(Vec::new, |format| format.changes(mistake));
+            if number + 1 == best.mistakes.len() {
+                let others = search.alike.iter().filter_map(|other| other.mistakes.last());
+                found.or = others.map(|other| alternative(other, &joints, format.as_ref())).collect();
+            }
+            findings.push(found);
+        }
+    } else if !search.as_written.beyond.is_empty() {
+        findings.extend(search.as_written.beyond.iter().map(|beyond| behind_limit(beyond, &joints)));
+    }
+    let is_stated = settings.gains == GainChoice::Stated;
+    if let Some(unit) = diagnosis.torque_unit.as_ref().filter(|_| is_stated) {
+        let far = unit.joints_in_another_unit();
+        if !far.is_empty() {
+            let factors = far.iter().map(|&joint| format!("{} {:.3}", joints[joint], unit.scale[joint].unwrap_or(1.0)));
+            let factors: Vec<String> = factors.collect();
+            let mut found = finding(
+                "unit",
+                "the torque is not in Nm (N)".to_owned(),
+                format!(
+                    "by the description's bodies, friction aside, a unit of it is worth this many Nm (N): {}; for currents that is motor constant times gear ratio, \
+                     which the maker's data say better, or write `gains = \"unknown\"` under [estimator] and add a log with a known payload",
+                    factors.join(", ")
+                ),
+            );
+            found.write = format.as_ref().map(|format| format.torque_scale(&unit.scale)).into_iter().collect();
+            findings.push(found);
+        }
+    }
+    findings.extend(diagnosis.unseen_loads.iter().map(|load| unseen_load(study, robot, load)));
+    if findings.is_empty() && diagnosis.is_unexplained() {
+        let left = &search.as_written.left;
+        let worst = (0..left.len()).max_by(|&a, &b| left[a].total_cmp(&left[b])).unwrap_or(0);
+        findings.push(finding(
+            "description",
+            "the description is not this robot's, or several mistakes were made at once".to_owned(),
+            format!(
+                "none of {} readings of the logs (signs, orders, zeros, mounting) makes a robot of this description that explains them: {:.0} % of the torque of `{}` is left; \
+                 check link lengths, axes and the kind of the robot",
+                search.tried,
+                100.0 * left[worst],
+                joints[worst]
+            ),
+        ));
+    }
+    StudyCheck {
+        findings,
+        as_written: Some(reading_result(&search.as_written, &joints)),
+        best: best.map(|best| reading_result(best, &joints)),
+        joints,
+        tried: search.tried,
+    }
+}
+
+/// What the study alone says of units.
+pub(super) fn currents_without_scale(study: &Study, settings: &IdentificationSettings) -> Option<CheckFinding> {
+    let index = *study.logs_of_role(Role::Identify).first()?;
+    let torque = study.format_of(index).torque;
+    let units = match torque.unit.as_ref()? {
+        OneOrMany::One(unit) => vec![unit.clone()],
+        OneOrMany::Many(units) => units.clone(),
+    };
+    let odd = units.into_iter().find(|unit| matches!(unit.as_str(), "A" | "mA" | "%" | "raw"))?;
+    let is_told = torque.scale.is_some() || torque.matrix.is_some() || torque.inverse_matrix.is_some();
+    if is_told || settings.gains == GainChoice::Unknown {
+        return None;
+    }
+    let mut found = finding(
+        "unit",
+        format!("the torque columns are in {odd} and no `scale` says what that is in Nm (N)"),
+        "every mass would come out in units of the motor constant".to_owned(),
+    );
+    let line = "scale = [...]   # motor constant times gear ratio, Nm per unit, one for each joint".to_owned();
+    found.write.push(StudyChange { table: "format.torque".to_owned(), line });
+    Some(found)
+}
+
+fn kind(mistake: &Mistake) -> &'static str {
+    match mistake {
+        Mistake::Sign { .. } => "sign",
+        Mistake::Order { .. } => "order",
+        Mistake::Offset { .. } => "offset",
+        Mistake::PositionUnit { .. } | Mistake::TimeUnit { .. } => "unit",
+        Mistake::Gravity { .. } => "mounting",
+    }
+}
+
+fn channels_text(channels: Channels) -> &'static str {
+    match channels {
+        Channels::Position => "the position",
+        Channels::Torque => "the torque",
+        Channels::Both => "position and torque",
+    }
+}
+
+fn of_joints(all: &[usize], joints: &[String]) -> String {
+    if all.len() > 1 && all.len() == joints.len() {
+        return "all joints".to_owned();
+    }
+    let names: Vec<String> = all.iter().map(|&joint| format!("joint `{}`", joints[joint])).collect();
+    names.join(", ")
+}
+
+/// A mistake in a sentence that names the joints.
+fn sentence(mistake: &Mistake, joints: &[String]) -> String {
+    match mistake {
+        Mistake::Sign { joints: which, channels } => {
+            let verb = if *channels == Channels::Both { "have" } else { "has" };
+            format!("{} of {} {verb} the opposite sign", channels_text(*channels), of_joints(which, joints))
+        }
+        Mistake::Order { order, channels } => {
+            let moved: Vec<usize> = (0..order.len()).filter(|&joint| order[joint] != joint).collect();
+            if let [a, b] = moved[..] {
+                return format!(
+                    "{} of joints `{}` and `{}` are exchanged",
+                    channels_text(*channels),
+                    joints[a],
+                    joints[b]
+                );
+            }
+            let names: Vec<String> = order.iter().map(|&joint| format!("`{}`", joints[joint])).collect();
+            format!(
+                "the columns of {} stand in another order: where the study has {} they are of {}",
+                channels_text(*channels),
+                joints.join(", "),
+                names.join(", ")
+            )
+        }
+        Mistake::Offset { joint, offset_rad } => format!(
+            "the zero of joint `{}` lies {:.1} degrees away from the description's",
+            joints[*joint],
+            offset_rad * 180.0 / PI
+        ),
+        Mistake::PositionUnit { factor } => {
+            format!("the positions are in another unit or of the motor side: times {factor:.6} they are rad")
+        }
+        Mistake::TimeUnit { factor } => format!("time is in another unit: times {factor:e} it is in seconds"),
+        Mistake::Gravity { gravity_m_s2: [x, y, z] } => {
+            format!("the base is mounted otherwise: gravity is [{x:.2}, {y:.2}, {z:.2}] m/s² in its frame")
+        }
+    }
+}
+
+/// Another explanation, with what it would have one write.
+fn alternative(mistake: &Mistake, joints: &[String], format: Option<&StudyFormat<'_>>) -> String {
+    let changes = format.map_or_else(Vec::new, |format| format.changes(mistake));
+    let write: Vec<String> = changes.iter().map(|change| format!("[{}] {}", change.table, change.line)).collect();
+    format!("{} ({})", sentence(mistake, joints), write.join(", "))
+}
+
+/// What speaks for a mistake: the joint whose torque it explains most, limits that then hold.
+fn evidence(mistake: &Mistake, (before, after): (&Reading, &Reading), joints: &[String]) -> String {
+    let gain = |joint: &usize| (before.left[*joint].max(1e-6) / after.left[*joint].max(1e-6)).ln();
+    let named: Vec<usize> = match mistake {
+        Mistake::Sign { joints, .. } => joints.clone(),
+        Mistake::Offset { joint, .. } => vec![*joint],
+        _ => (0..joints.len()).collect(),
+    };
+    // The named joint's own torque where that tells; else the one that tells most.
+    let own = named.iter().copied().max_by(|a, b| gain(a).total_cmp(&gain(b))).filter(|joint| gain(joint) > 0.2);
+    let most = (0..joints.len()).max_by(|a, b| gain(a).total_cmp(&gain(b))).unwrap_or(0);
+    let joint = own.unwrap_or(most);
+    let mut text = format!(
+        "the best robot that can exist leaves {:.1} % of the torque of `{}` as the study is written and {:.1} % so corrected",
+        100.0 * before.left[joint],
+        joints[joint],
+        100.0 * after.left[joint]
+    );
+    if before.beyond.len() > after.beyond.len() {
+        let worst = &before.beyond[0];
+        text += &format!(
+            "; as written, the {} of `{}` reaches {:.4} where its limit is {:.4}",
+            worst.quantity, joints[worst.joint], worst.value, worst.limit
+        );
+    }
+    if !before.plausible_rate && after.plausible_rate {
+        text += "; as written, no recorder has such a rate";
+    }
+    text
+}
+
+fn behind_limit(beyond: &BeyondLimit, joints: &[String]) -> CheckFinding {
+    let what = format!("the {} of joint `{}` goes beyond its limit", beyond.quantity, joints[beyond.joint]);
+    let evidence = format!(
+        "it reaches {:.4} where the description allows {:.4}: compare `unit`, `scale` (gear ratio: positions of the motor side?), `sign` and `offset` under position, \
+         or the limits of the description",
+        beyond.value, beyond.limit
+    );
+    finding("limits", what, evidence)
+}
+
+fn unseen_load(study: &Study, robot: &StudyRobot, load: &UnseenLoad) -> CheckFinding {
+    let log = study.log_name(load.log);
+    let link = robot.model().bodies().last().map_or("", |body| body.name());
+    let [x, y, z] = load.com_m;
+    let mut found = finding(
+        "payload",
+        if load.mass_kg > 0.0 {
+            format!("log `{log}` carries a payload that the training logs do not")
+        } else {
+            format!("the training logs carry a payload that log `{log}` does not")
+        },
+        format!(
+            "with {:.2} ± {:.2} kg at [{x:.3}, {y:.3}, {z:.3}] m of `{link}` what is left of its torque falls from {:.3} to {:.3} Nm",
+            load.mass_kg.abs(),
+            1.96 * load.mass_std_kg,
+            load.left_without,
+            load.left_with
+        ),
+    );
+    let section = StudyChange { table: "[[payload]]".to_owned(), line: format!("name = \"tool\", link = {link:?}") };
+    let number =
+        if load.mass_kg > 0.0 { load.log } else { study.logs_of_role(Role::Identify).first().copied().unwrap_or(0) };
+    found.write = vec![
+        section,
+        StudyChange { table: format!("[[log]] number {}", number + 1), line: "payload = \"tool\"".to_owned() },
+    ];
+    found
+}
+
+fn reading_result(reading: &Reading, joints: &[String]) -> ReadingResult {
+    let beyond = |beyond: &BeyondLimit| format!("{} of {}", beyond.quantity, joints[beyond.joint]);
+    ReadingResult {
+        left_percent: reading.left.iter().map(|left| 100.0 * left).collect(),
+        beyond_limits: reading.beyond.iter().map(beyond).collect(),
+        score: reading.score(),
+    }
+}

@@ -1,0 +1,81 @@
+//! Before any fit is believed: do study, robot and logs fit together?
+
+mod changes;
+mod findings;
+
+use crate::error::Error;
+use crate::jobs::options::{RunOptions, study_name};
+use crate::result::{CHECK_SCHEMA, CheckFile, CheckFinding, StudyCheck};
+use crate::study::{Folders, Study, StudyRobot};
+use dynident_identification::diagnosis::Diagnosis;
+use dynident_identification::{IdentificationError, IdentificationSettings, examine_study};
+use dynident_recording::{ImportReport, Level};
+use findings::{currents_without_scale, study_check};
+use std::path::Path;
+
+/// Equations for each parameter below which a fit proves nothing.
+const EQUATIONS_PER_PARAMETER: usize = 2;
+
+/// Examines a study against its robot and its logs: channels, clock and samples of every log, and which reading of the
+/// training logs a robot that can exist explains best. Nothing is written.
+///
+/// # Errors
+/// Everything that [`Error`] names: files, study, logs. Mistakes that are found are no error.
+pub fn check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<CheckFile, Error> {
+    study.require_training_log(study_path)?;
+    let folders = Folders::new(study, study_path, options.data.as_deref());
+    let robot = StudyRobot::new(study, study_path, &folders)?;
+    let in_study = Error::identification::<IdentificationError>(study_path);
+    let settings = study.settings(study_path, &robot)?;
+    let task = study.task_with(settings, &robot, &folders)?;
+    study.check_overlap(&study.log_files(&folders)?).map_err(Error::study(study_path))?;
+    let examined = examine_study(&task, options.execution()).map_err(in_study)?;
+
+    let mut check = diagnosis_check((study, &robot), &task.settings, &examined.diagnosis);
+    for (index, import) in &examined.imports {
+        check.findings.extend(import.iter().flat_map(|import| import_findings(&study.log_name(*index), import)));
+    }
+    if examined.rows < EQUATIONS_PER_PARAMETER * examined.parameters {
+        check.findings.push(CheckFinding {
+            level: Level::Problem,
+            kind: "rows".to_owned(),
+            what: "the training logs are too short for this robot".to_owned(),
+            evidence: format!(
+                "{} equations for {} parameters after filter and decimation: a fit would follow the noise; record for longer, or give more logs the role \"identify\"",
+                examined.rows, examined.parameters
+            ),
+            write: Vec::new(),
+            or: Vec::new(),
+        });
+    }
+    check.findings.sort_by_key(|finding| core::cmp::Reverse(finding.level));
+    Ok(CheckFile { schema: CHECK_SCHEMA.to_owned(), name: study_name(study, study_path), check })
+}
+
+/// A diagnosis as findings, with what the study alone says of units.
+pub(super) fn diagnosis_check(
+    (study, robot): (&Study, &StudyRobot),
+    settings: &IdentificationSettings,
+    diagnosis: &Diagnosis,
+) -> StudyCheck {
+    let mut check = study_check((study, robot), settings, diagnosis);
+    if let Some(currents) = currents_without_scale(study, settings) {
+        check.findings.retain(|finding| finding.kind != "unit" || finding.what.contains("position"));
+        check.findings.insert(0, currents);
+    }
+    check
+}
+
+/// What the import found in one log, where it matters.
+fn import_findings(log: &str, import: &ImportReport) -> Vec<CheckFinding> {
+    let matters = import.findings.iter().filter(|finding| finding.level != Level::Info);
+    let one = |finding: &dynident_recording::Finding| CheckFinding {
+        level: finding.level,
+        kind: "log".to_owned(),
+        what: format!("log `{log}`, {}", finding.channel),
+        evidence: finding.message.clone(),
+        write: Vec::new(),
+        or: Vec::new(),
+    };
+    matters.map(one).collect()
+}
