@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# commands.sh SCRATCH: the commands that README and the book name but the programs that take minutes (logistic_against_fourier, differentiators), once and short: the command as
-# `cargo run --release` built it, programs of measurement as the tests built them (a release build of each would take minutes). Outputs go to SCRATCH.
+# commands.sh SCRATCH VENV: the commands that README and the book name, once and short: the command as `cargo run --release` built it, programs of measurement as the tests
+# built them (a release build of each would take minutes). Outputs go to SCRATCH; VENV is a Python environment with golden/requirements.txt.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=$1
+venv=$2
 dynident=target/release/dynident
 examples=target/debug/examples
 
@@ -22,6 +23,12 @@ run() {
 
 # README and the first pages: the user's robot.
 run 0 "$dynident" inspect robots/ur10.urdf
+run 0 "$dynident" check examples/ur10_simulated.toml
+# All moments negated, as exporters do: named, and undone in a copy.
+sed -E 's/(i[xyz][xyz]=")([1-9]|0\.0*[1-9])/\1-\2/g' robots/iiwa14.urdf >"$out/slip.urdf"
+run 1 "$dynident" inspect "$out/slip.urdf" --json
+run 0 "$dynident" inspect "$out/slip.urdf" --fix "$out/mended.urdf"
+run 0 cmp "$out/mended.urdf" robots/iiwa14.urdf
 run 0 "$dynident" identify examples/ur10_simulated.toml --out "$out/result"
 run 0 "$dynident" validate "$out/result/result.json" --study examples/ur10_simulated.toml
 run 0 "$examples/simulate_ur10" "$out/ur10_simulated"
@@ -44,4 +51,9 @@ run 0 target/debug/dynident-benchmark --only rnea
 run 0 "$examples/designs" --seconds 0.2 --criteria d-optimal --families Fourier examples/design_ur10.toml
 run 0 "$examples/iterations" 1 examples/iterate_paper_2r_noise.toml
 run 0 "$examples/basin" 2 601
+run 0 "$examples/logistic_against_fourier" 2 0.3
+run 0 "$examples/differentiators" 1 12
+run 0 "$examples/import_speed" 20000
+run 0 "$examples/gallery" "$out/gallery.html"
+run 0 env DYNIDENT_BENCHMARK='target/debug/dynident-benchmark --only rnea' benchmarks/compare.sh --own-only "$venv" "$out/compare" 1
 run 0 python3 docs/summaries.py --check

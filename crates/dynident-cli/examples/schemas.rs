@@ -6,8 +6,9 @@
 
 use dynident::iteration::{RUN_SCHEMA, RunFile};
 use dynident::result::{
-    DESIGN_SCHEMA, DesignFile, EVALUATION_SCHEMA, EvaluationFile, INSPECTION_SCHEMA, ITERATIONS_SCHEMA, Inspection,
-    IterationsFile, RESULT_SCHEMA, ResultFile, SIMULATION_SCHEMA, SimulationFile, VALIDATION_SCHEMA, ValidationFile,
+    CHECK_SCHEMA, CheckFile, DESIGN_SCHEMA, DesignFile, EVALUATION_SCHEMA, EvaluationFile, INSPECTION_SCHEMA,
+    ITERATIONS_SCHEMA, Inspection, IterationsFile, RESULT_SCHEMA, ResultFile, SIMULATION_SCHEMA, SimulationFile,
+    VALIDATION_SCHEMA, ValidationFile,
 };
 use dynident_benchmark::accuracy::{BENCHMARK_SCHEMA, BenchmarkFile};
 use dynident_paper::{PAPER_SCHEMA, PaperFile};
@@ -23,6 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(&folder)?;
     let files = [
         (BENCHMARK_SCHEMA, written::<BenchmarkFile>()),
+        (CHECK_SCHEMA, written::<CheckFile>()),
         (DESIGN_SCHEMA, written::<DesignFile>()),
         (EVALUATION_SCHEMA, written::<EvaluationFile>()),
         (INSPECTION_SCHEMA, written::<Inspection>()),

@@ -7,6 +7,7 @@ mod summary;
 mod terminal;
 
 use clap::{Parser, Subcommand};
+use std::io::Write;
 use std::process::ExitCode;
 
 /// Robot dynamic identification: logs to a dynamic model that can be trusted.
@@ -84,10 +85,12 @@ fn main() -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => {
-            let asked = !error.use_stderr();
-            // Nothing is left to report if the terminal has gone.
-            let _ = error.print();
-            return ExitCode::from(if asked { 0 } else { 2 });
+            return if error.use_stderr() {
+                refused(&error);
+                ExitCode::from(2)
+            } else {
+                ended(terminal::written(error.print().and_then(|()| std::io::stdout().flush())).map(|()| Verdict::Good))
+            };
         }
     };
     let threads = arguments
@@ -107,6 +110,22 @@ fn main() -> ExitCode {
         Command::Reproduce(options) => commands::reproduce::run(&options, &context),
         Command::Benchmark(options) => commands::benchmark::run(&options, &context),
     });
+    ended(outcome)
+}
+
+/// What is wrong with the command line. In colours, unless it holds an argument that would steer the terminal.
+fn refused(error: &clap::Error) {
+    let text = error.render().to_string();
+    if terminal::visible(&text) == text {
+        // Nothing is left to report if the terminal has gone.
+        let _ = error.print();
+    } else {
+        terminal::complain(text.strip_prefix("error: ").unwrap_or(&text));
+    }
+}
+
+/// The exit status.
+fn ended(outcome: Result<Verdict, String>) -> ExitCode {
     match outcome {
         Ok(Verdict::Good) => ExitCode::SUCCESS,
         Ok(Verdict::Negative) => ExitCode::from(1),

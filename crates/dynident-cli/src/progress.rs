@@ -1,12 +1,19 @@
 //! A progress bar with the time left, once a stage takes longer than a second.
 
+use crate::terminal;
 use dynident::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// How long a stage runs before its bar shows.
+/// How long a stage runs before its bar shows, and how often a stage that says nothing shows its time.
 const PATIENCE: Duration = Duration::from_secs(1);
+
+/// The line of a stage that has not said how many rows it has, nor that any are done.
+const WITHOUT_ROWS: &str = "{msg} {spinner} {elapsed}";
+
+/// The same once some are.
+const WITH_ROWS: &str = "{msg} {spinner} {human_pos} rows  {elapsed}";
 
 /// Shows the stage that runs, on standard error.
 #[derive(Default)]
@@ -26,15 +33,11 @@ impl Stage {
     fn show(&mut self) {
         if self.bar.is_none() && self.started.elapsed() >= PATIENCE {
             let bar = self.total.map_or_else(ProgressBar::new_spinner, ProgressBar::new);
-            let template = if self.total.is_some() {
-                "{msg} {wide_bar} {percent} %  {eta} left"
-            } else {
-                "{msg} {spinner} {human_pos} rows  {elapsed}"
-            };
+            let template = if self.total.is_some() { "{msg} {wide_bar} {percent} %  {eta} left" } else { WITH_ROWS };
             if let Ok(style) = ProgressStyle::with_template(template) {
                 bar.set_style(style);
             }
-            bar.set_message(self.name.clone());
+            bar.set_message(terminal::visible(&self.name));
             bar.reset_elapsed();
             self.bar = Some(bar);
         }
@@ -47,7 +50,16 @@ impl Stage {
 impl Progress for Bar {
     fn begin(&self, stage: &str, total: Option<u64>) {
         if let Ok(mut current) = self.stage.lock() {
-            *current = Some(Stage { name: stage.to_owned(), total, done: 0, started: Instant::now(), bar: None });
+            // A stage of unknown size may never say a word: its line is drawn by a clock.
+            let bar = total.is_none().then(|| {
+                let bar = ProgressBar::new_spinner().with_message(terminal::visible(stage));
+                if let Ok(style) = ProgressStyle::with_template(WITHOUT_ROWS) {
+                    bar.set_style(style);
+                }
+                bar.enable_steady_tick(PATIENCE);
+                bar
+            });
+            *current = Some(Stage { name: stage.to_owned(), total, done: 0, started: Instant::now(), bar });
         }
     }
 
@@ -55,6 +67,12 @@ impl Progress for Bar {
         if let Ok(mut current) = self.stage.lock()
             && let Some(stage) = current.as_mut()
         {
+            if stage.done == 0
+                && stage.total.is_none()
+                && let (Some(bar), Ok(style)) = (&stage.bar, ProgressStyle::with_template(WITH_ROWS))
+            {
+                bar.set_style(style);
+            }
             stage.done += rows;
             stage.show();
         }
@@ -66,5 +84,27 @@ impl Progress for Bar {
         {
             bar.finish_and_clear();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Bar;
+    use dynident::Progress;
+
+    #[test]
+    fn a_stage_that_says_nothing_has_its_line() {
+        let bar = Bar::default();
+        let shown = || bar.stage.lock().is_ok_and(|stage| stage.as_ref().is_some_and(|stage| stage.bar.is_some()));
+        bar.begin("1 of 5: a long one", None);
+        assert!(shown());
+        bar.advance(10);
+        assert!(shown());
+        bar.end();
+        assert!(!shown());
+        // One of known size comes after a second, if it lasts.
+        bar.begin("rows", Some(1000));
+        bar.advance(10);
+        assert!(!shown());
     }
 }

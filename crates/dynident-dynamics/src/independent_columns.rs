@@ -35,6 +35,13 @@ pub fn independent_columns(matrix: &DMatrix<f64>, tolerance: f64) -> Independent
     split_columns(matrix, tolerance)
 }
 
+/// As [`independent_columns`], but a whole column is noise below `tolerance` of the largest: for regressors of a
+/// robot, where a column that hangs on nothing but the rounding of the description's angles (9.81 · 4e-10 for a π
+/// written as 3.141592654) is no direction, whatever its own norm.
+pub(crate) fn independent_regressor_columns(matrix: &DMatrix<f64>, tolerance: f64) -> IndependentColumns {
+    split_above(matrix, tolerance, ROUNDING.max(tolerance))
+}
+
 /// The columns of a matrix that need not be stored as a whole.
 pub(crate) trait Columns {
     /// Length of every column.
@@ -61,6 +68,11 @@ impl Columns for DMatrix<f64> {
 /// own. What is kept are the reflections without their zeros, the triangle of the independent columns, and what the
 /// dependent ones have in its rows.
 pub(crate) fn split_columns(columns: &impl Columns, tolerance: f64) -> IndependentColumns {
+    split_above(columns, tolerance, ROUNDING.max(tolerance * tolerance))
+}
+
+/// Where a column below `noise` times the largest is no direction.
+fn split_above(columns: &impl Columns, tolerance: f64, noise: f64) -> IndependentColumns {
     let rows = columns.rows();
     let mut column = Column { entries: DVector::zeros(rows), end: 0 };
     let mut norms = Vec::new();
@@ -70,7 +82,7 @@ pub(crate) fn split_columns(columns: &impl Columns, tolerance: f64) -> Independe
     });
     let largest = norms.iter().copied().fold(0.0, f64::max);
     // A column that is nothing but rounding beside the others would be independent of everything if measured by itself.
-    let noise = ROUNDING.max(tolerance * tolerance) * largest;
+    let noise = noise * largest;
     let (mut independent, mut dependent) = (Vec::new(), Vec::new());
     let (mut weakest_independent, mut strongest_dependent) = (1.0_f64, 0.0_f64);
     // Reflection `k` begins at row `k`; row `k` of the triangle at its diagonal.

@@ -63,7 +63,7 @@ mod term_history;
 mod workspace;
 
 pub use base_parameters::{
-    BaseParameterSettings, BaseParameters, NumericalRank, numerical_rank, numerical_rank_by_body,
+    BaseParameterSettings, BaseParameters, Determination, NumericalRank, numerical_rank, numerical_rank_by_body,
 };
 pub use derivatives::{InverseDynamicsDerivatives, inverse_dynamics_derivatives};
 pub use energy::{kinetic_energy, potential_energy};

@@ -3,7 +3,7 @@
 use crate::base_parameters::{BaseParameterSettings, BaseParameters};
 use crate::regressor_panels::{Column, PanelLayout};
 use dynident_model::Model;
-use dynident_model::terms::TorqueTerm;
+use dynident_model::terms::{Coupling, TorqueTerm};
 use thiserror::Error;
 
 /// Why a parametric model could not be put together.
@@ -17,6 +17,14 @@ pub enum ParametricModelError {
         term: String,
         /// Joints of the model.
         joints: usize,
+    },
+    /// A coupling whose ratios no drive has, so that their product could leave the range of numbers.
+    #[error("coupling {term}: ratio {ratio}: give ratios of 1e-6 to 1e6 in size")]
+    Ratio {
+        /// The term's symbol.
+        term: String,
+        /// The ratio.
+        ratio: f64,
     },
     /// Nominal values of another number than there are parameters.
     #[error("parameters of the prior: {found} entries where {expected} are needed")]
@@ -75,6 +83,13 @@ impl ParametricModel {
     pub fn new(model: Model, terms: Vec<TorqueTerm>) -> Result<Self, ParametricModelError> {
         if let Some(term) = terms.iter().find(|term| term.joints().iter().any(|&joint| joint >= model.dof())) {
             return Err(ParametricModelError::NoSuchJoint { term: term.symbol(), joints: model.dof() });
+        }
+        for term in &terms {
+            if let TorqueTerm::Coupling(coupling) = term
+                && let Some(&ratio) = coupling.ratios.iter().find(|ratio| !Coupling::RATIOS.contains(&ratio.abs()))
+            {
+                return Err(ParametricModelError::Ratio { term: term.symbol(), ratio });
+            }
         }
         let base = BaseParameters::new(&model, &terms, &BaseParameterSettings::default());
         let layout = PanelLayout::new(&model, base.base_columns());

@@ -36,10 +36,10 @@ pub struct LimitReport {
     pub joint: String,
     /// 1 on the limit, above it in violation: `|x - middle| / half range`, `|x| / limit`; for a column `2 - distance /
     /// least`, for two links 1 plus the lack of distance as a share of their radii and clearance (of 5 % of the arm's
-    /// length at least), for the floor 1 plus the metres below it (for
-    /// shapes: arm's lengths). Infinite if the motion is not finite.
-    #[serde(deserialize_with = "finite_or_infinite")]
-    #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
+    /// length at least), for the floor 1 plus the metres below it (for shapes: arm's lengths). Infinite if the motion
+    /// is not finite: in JSON the largest number, 1.8e308.
+    #[serde(serialize_with = "largest_for_infinite", deserialize_with = "infinite_for_largest")]
+    #[cfg_attr(feature = "schema", schemars(with = "f64"))]
     pub worst_ratio: f64,
     /// When the ratio is worst, s.
     pub at_s: f64,
@@ -47,9 +47,15 @@ pub struct LimitReport {
     pub violated: bool,
 }
 
-/// A ratio as JSON has it, which knows no infinity and writes null.
-fn finite_or_infinite<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
-    Ok(Option::deserialize(from)?.unwrap_or(f64::INFINITY))
+/// A ratio as JSON has it, which knows no infinity.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "the shape that serde wants")]
+fn largest_for_infinite<S: serde::Serializer>(ratio: &f64, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_f64(ratio.min(f64::MAX))
+}
+
+/// A ratio from JSON; files of earlier versions have null for infinity.
+fn infinite_for_largest<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.filter(|ratio| *ratio < f64::MAX).unwrap_or(f64::INFINITY))
 }
 
 /// What is checked at each sample.

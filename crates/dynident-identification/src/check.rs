@@ -1,12 +1,12 @@
 //! Before any fit is believed: do study, robot and recordings fit together?
 
 use crate::diagnosis::{Diagnosis, diagnose};
+use crate::doubt::have_jumps;
 use crate::error::IdentificationError;
 use crate::execution::Execution;
 use crate::logs::{Logs, of_role};
-use crate::recording::{LogError, Role};
+use crate::recording::Role;
 use crate::regressor_model::RegressorModel;
-use crate::rows::{JointRows, RowConsumer};
 use crate::settings::IdentificationSettings;
 use crate::task::IdentificationTask;
 use crate::training::training_rows;
@@ -18,8 +18,8 @@ use dynident_recording::ImportReport;
 pub struct StudyExamination {
     /// For each recording its number and what its import found; none for motions that were made already.
     pub imports: Vec<(usize, Option<ImportReport>)>,
-    /// Readings of the training recordings, units of torque, loads.
-    pub diagnosis: Diagnosis,
+    /// Readings of the training recordings, units of torque, loads; none where jumps in a log make them meaningless.
+    pub diagnosis: Option<Diagnosis>,
     /// Rows of all joints that a fit would have.
     pub rows: usize,
     /// Base parameters that a fit would have.
@@ -50,22 +50,15 @@ fn examined(task: &IdentificationTask, execution: Execution<'_>) -> Result<Study
     let estimate = weighted_least_squares(&training.problem, &WeightedSettings::default())?;
     let theta = &estimate.values[..training.columns.base()];
     let known = training.columns.is_plain().then_some(theta);
-    let diagnosis = diagnose((&logs, &settings), robot, &chosen, known)?;
     let mut imports: Vec<(usize, Option<ImportReport>)> =
         training.logs.iter().map(|log| (log.index, log.statistics.report.clone())).collect();
+    // Before the diagnosis, which finds them kept.
     let model: RegressorModel = robot.clone().into();
     for index in of_role(recordings, Role::Validate) {
-        imports.push((index, logs.pass(&model, index).run(&mut Unused)?.report));
+        imports.push((index, logs.pass(&model, index).each_block(&mut |_| Ok(()))?));
     }
+    let diagnosis =
+        if have_jumps(&training) { None } else { Some(diagnose((&logs, &settings), robot, &chosen, known)?) };
     let rows = training.problem.joint_rows().iter().sum();
     Ok(StudyExamination { imports, diagnosis, rows, parameters: robot.base().count() })
-}
-
-/// A pass for its report's sake.
-struct Unused;
-
-impl RowConsumer for Unused {
-    fn filtered(&mut self, _rows: &JointRows<'_>) -> Result<(), LogError> {
-        Ok(())
-    }
 }

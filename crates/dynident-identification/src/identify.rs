@@ -4,12 +4,13 @@ use crate::consistent::{
     ConsistencyError, ParameterInterval, consistent_intervals, consistent_with_estimate, inconsistent_nominal_bodies,
     inertials, nearest_to_nominal,
 };
-use crate::diagnosis::{Diagnosis, diagnose, is_beyond_limits, is_doubtful};
+use crate::diagnosis::{Diagnosis, diagnose};
+use crate::doubt::{break_limits, have_jumps, is_doubtful};
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
 use crate::examination::{
-    FrictionSign, HeldOutExamination, LogTrace, LogValidation, ModelUnderTest, TorqueLag, TorqueSignCheck, Uncertainty,
-    examine_training, friction_signs, pooled_delay, sign_evidence, tested_on,
+    FrictionSign, HeldOutExamination, LogTrace, LogValidation, ModelUnderTest, PriorAgreement, TorqueLag,
+    TorqueSignCheck, Uncertainty, examine_training, friction_signs, pooled_delay, sign_evidence, tested_on,
 };
 use crate::execution::Execution;
 use crate::logs::{Logs, of_role};
@@ -243,18 +244,18 @@ fn identified(
     // Where something does not fit: what the recordings would be under another study.
     let theta = consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
     let is_doubted = || {
-        let reports = training.logs.iter().filter_map(|log| log.statistics.report.as_ref());
         is_doubtful(&training, theta)
             || examination.friction_signs.iter().any(FrictionSign::is_reversed)
+            || training.logs.iter().any(|log| log.nominal_agreement.as_ref().is_some_and(PriorAgreement::is_reversed))
             || examination.sign.as_ref().is_some_and(TorqueSignCheck::is_reversed)
-            || reports.into_iter().any(|report| is_beyond_limits(robot.model(), report))
+            || break_limits(&training, robot.model())
             || held_out.iter().any(|log| is_far_worse(&log.validation, &estimation.estimate.joint_sigma))
     };
     let plain = training.columns.is_plain().then(|| &estimation.estimate.values[..training.columns.base()]);
     let own_terms = training.friction_choice.is_empty();
     let diagnosis = match settings.diagnosis {
         DiagnosisChoice::Never => None,
-        _ if held => None,
+        _ if held || have_jumps(&training) => None,
         DiagnosisChoice::WhenDoubtful if !is_doubted() => None,
         DiagnosisChoice::WhenDoubtful | DiagnosisChoice::Always => {
             let of_task = plain.filter(|_| own_terms);

@@ -118,6 +118,7 @@
 mod check;
 pub mod consistent;
 pub mod diagnosis;
+mod doubt;
 mod error;
 pub mod estimators;
 pub mod examination;

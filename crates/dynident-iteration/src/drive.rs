@@ -257,6 +257,12 @@ pub fn iterate(
         require_length("robots", legs, robots.len())?;
     }
     let mut records = store.map_or_else(|| Ok(Vec::new()), IterationStore::records)?;
+    if let Some(store) = store {
+        let robot = iteration.robot(&records)?;
+        for record in &records {
+            record.check(&robot).map_err(|problem| store.refused(record.run, problem))?;
+        }
+    }
     loop {
         let plan = match iteration.next(&records)? {
             Next::Run(plan) => plan,

@@ -2,6 +2,7 @@
 
 use crate::estimate::RunEstimate;
 use crate::model_parameters::ModelParameters;
+use dynident_dynamics::ParametricModel;
 use serde::{Deserialize, Serialize};
 
 /// What controlled a run.
@@ -41,6 +42,47 @@ pub struct RunRecord {
 }
 
 impl RunRecord {
+    /// That its numbers are those of `robot`, the robot with the friction in force: a file from outside may hold
+    /// anything.
+    pub(crate) fn check(&self, robot: &ParametricModel) -> Result<(), String> {
+        let (joints, columns) = (robot.dof(), robot.layout().columns().len());
+        let all = 10 * joints + robot.terms().len();
+        let length = |what: &str, found: usize, expected: usize| {
+            if found == expected {
+                return Ok(());
+            }
+            Err(format!(
+                "holds {found} numbers as {what} where this robot has {expected}: remove its folder and those of the runs after it"
+            ))
+        };
+        length("max_tracking_error_rad", self.max_tracking_error_rad.len(), joints)?;
+        match &self.controller.model {
+            Some(ModelParameters::All(values)) => length("controller.model", values.len(), all)?,
+            Some(ModelParameters::Base(values)) => length("controller.model", values.len(), columns)?,
+            None => {}
+        }
+        let Some(estimate) = &self.estimate else { return Ok(()) };
+        length("estimate.values", estimate.values.len(), columns)?;
+        length("estimate.std", estimate.std.len(), columns)?;
+        length("estimate.covariance", estimate.covariance.len(), columns)?;
+        for row in &estimate.covariance {
+            length("a row of estimate.covariance", row.len(), columns)?;
+        }
+        length("estimate.joint_sigma", estimate.joint_sigma.len(), joints)?;
+        if let Some(possible) = &estimate.possible {
+            length("estimate.possible", possible.len(), all)?;
+        }
+        if let Some(column) = estimate.fixed.iter().find(|&&column| column >= columns) {
+            return Err(format!(
+                "names base parameter {column} as fixed where this robot has {columns}: remove its folder"
+            ));
+        }
+        if !estimate.torque_lags.is_empty() {
+            length("estimate.torque_lags", estimate.torque_lags.len(), joints)?;
+        }
+        Ok(())
+    }
+
     /// Mean over the joints of the largest tracking error, rad (m).
     pub fn tracking_error(&self) -> f64 {
         let errors = &self.max_tracking_error_rad;

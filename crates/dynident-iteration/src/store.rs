@@ -117,6 +117,11 @@ impl IterationStore {
         sync_folder(&self.runs)
     }
 
+    /// That run number `run` cannot be gone on from.
+    pub(crate) fn refused(&self, run: usize, problem: String) -> IterationError {
+        IterationError::State { path: self.run_folder(run).join("run.json"), problem }
+    }
+
     /// The folder of a run.
     pub fn run_folder(&self, run: usize) -> PathBuf {
         self.runs.join(format!("run_{run}"))

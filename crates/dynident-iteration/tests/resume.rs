@@ -111,6 +111,42 @@ fn killed_at_some_moments_it_goes_on_to_the_same_result() {
     killed_at(dynident_testing::count(4, 50));
 }
 
+/// A file from outside may hold anything: what does not fit the robot is refused with the file's name, and nothing is
+/// overwritten.
+#[test]
+fn runs_whose_numbers_do_not_fit_the_robot_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    outcome(folder.path()).unwrap();
+    let path = folder.path().join("runs/run_2/run.json");
+    let good = std::fs::read_to_string(&path).unwrap();
+    let file: serde_json::Value = serde_json::from_str(&good).unwrap();
+    let numbers = [
+        "/estimate/values",
+        "/estimate/std",
+        "/estimate/covariance",
+        "/estimate/covariance/0",
+        "/estimate/joint_sigma",
+        "/max_tracking_error_rad",
+        "/controller/model/values",
+    ];
+    for key in numbers {
+        let mut short = file.clone();
+        short.pointer_mut(key).unwrap().as_array_mut().unwrap().pop();
+        let text = short.to_string();
+        std::fs::write(&path, &text).unwrap();
+        let error = outcome(folder.path()).unwrap_err();
+        assert!(matches!(error, IterationError::State { .. }), "{key}: {error}");
+        assert!(error.to_string().contains("run_2") && error.to_string().contains("numbers as"), "{key}: {error}");
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+    }
+    let mut beyond = file;
+    beyond.pointer_mut("/estimate/fixed").unwrap().as_array_mut().unwrap().push(99.into());
+    std::fs::write(&path, beyond.to_string()).unwrap();
+    assert!(outcome(folder.path()).unwrap_err().to_string().contains("base parameter 99"));
+    std::fs::write(&path, good).unwrap();
+    outcome(folder.path()).unwrap();
+}
+
 #[test]
 fn runs_of_another_iteration_are_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -63,7 +63,7 @@ pub mod terms;
 mod tree;
 pub mod urdf;
 
-pub use audit::{AuditFinding, AuditLevel, audit};
+pub use audit::{AuditFinding, AuditLevel, Correction, Slip, SlipKind, Slips, audit, slips};
 pub use dh::{DhError, DhFault, read_dh};
 pub use error::ModelError;
 pub use inertial::{INERTIAL_NAMES, InertialParameters};
@@ -73,8 +73,8 @@ pub use read::{DescriptionFormat, MAX_DESCRIPTION_BYTES, ReadError, Robot, load_
 pub use spatial::{Mat3, Transform, Vec3};
 pub use tree::{Body, Link, Model, STANDARD_GRAVITY};
 pub use urdf::{
-    JointChange, LinkChange, UnreadElement, UrdfError, UrdfFault, UrdfRobot, UrdfWriteError, link_changes, read_urdf,
-    rewrite_urdf,
+    JointChange, LinkChange, StatedInertial, UnreadElement, UrdfError, UrdfFault, UrdfIrregularity, UrdfRobot,
+    UrdfWriteError, link_changes, read_urdf, rewrite_inertials, rewrite_urdf, stated_inertials,
 };
 
 #[cfg(doctest)]

@@ -3,7 +3,7 @@
 use crate::dh::{DhError, read_dh};
 use crate::place::line_and_column;
 use crate::tree::Model;
-use crate::urdf::{UnreadElement, UrdfError, read_urdf};
+use crate::urdf::{UnreadElement, UrdfError, UrdfIrregularity, read_urdf};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -34,6 +34,8 @@ pub struct Robot {
     pub text: String,
     /// Elements of a URDF that were not read.
     pub unread: Vec<UnreadElement>,
+    /// What of a URDF is against the rules and leaves no doubt about the robot.
+    pub irregularities: Vec<UrdfIrregularity>,
 }
 
 /// Why a file gave no robot. Every message begins with the file, and with line and column where there are any.
@@ -72,6 +74,16 @@ pub enum ReadError {
         /// What it may be.
         hint: &'static str,
     },
+    /// A file of another kind.
+    #[error("{}:1:1: {what}, not a robot description: {fix}", path.display())]
+    NoDescription {
+        /// The file.
+        path: PathBuf,
+        /// What it seems to be.
+        what: &'static str,
+        /// What to do.
+        fix: &'static str,
+    },
     /// The URDF is faulty.
     #[error("{}:{source}", path.display())]
     Urdf {
@@ -108,27 +120,64 @@ pub fn load_robot(path: impl AsRef<Path>) -> Result<Robot, ReadError> {
     if bytes.len() as u64 > MAX_DESCRIPTION_BYTES {
         return Err(ReadError::TooLarge { path: named() });
     }
+    let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
+    if let Some((what, fix)) = other_kind(&bytes, extension.as_deref()) {
+        return Err(ReadError::NoDescription { path: named(), what, fix });
+    }
     let text = decode(bytes, path)?;
     if text.trim_start_matches('\u{feff}').trim().is_empty() {
         return Err(ReadError::Empty { path: named() });
     }
-    let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
     let format = match extension.as_deref() {
         Some("urdf" | "xml" | "xacro") => DescriptionFormat::Urdf,
         Some("toml") => DescriptionFormat::Dh,
         _ if text.trim_start_matches('\u{feff}').trim_start().starts_with('<') => DescriptionFormat::Urdf,
         _ => DescriptionFormat::Dh,
     };
-    let (model, unread) = match format {
+    let (model, unread, irregularities) = match format {
         DescriptionFormat::Urdf => {
             let robot = read_urdf(&text).map_err(|error| ReadError::Urdf { path: named(), source: Box::new(error) })?;
-            (robot.model, robot.unread)
+            (robot.model, robot.unread, robot.irregularities)
         }
         DescriptionFormat::Dh => {
-            (read_dh(&text).map_err(|error| ReadError::Dh { path: named(), source: Box::new(error) })?, Vec::new())
+            let model = read_dh(&text).map_err(|error| ReadError::Dh { path: named(), source: Box::new(error) })?;
+            (model, Vec::new(), Vec::new())
         }
     };
-    Ok(Robot { model, format, path: named(), text, unread })
+    Ok(Robot { model, format, path: named(), text, unread, irregularities })
+}
+
+/// Extensions of recordings and tables.
+const RECORDINGS: [&str; 16] = [
+    "csv", "tsv", "dat", "log", "mcap", "bag", "db3", "h5", "hdf5", "mat", "npy", "npz", "parquet", "feather", "xlsx",
+    "ods",
+];
+
+/// What a file is that is plainly no robot description, and what to do with it.
+fn other_kind(bytes: &[u8], extension: Option<&str>) -> Option<(&'static str, &'static str)> {
+    const LOG: &str = "name the log in a study, as `file` of a [[log]], and give the URDF or the D-H table here";
+    if extension.is_some_and(|extension| RECORDINGS.contains(&extension)) {
+        return Some(("a recording or a table of numbers", LOG));
+    }
+    let text = str::from_utf8(bytes).ok()?;
+    let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
+    if extension == Some("toml") {
+        // Sections that a study has and a D-H table has not.
+        let section = |line: &str| matches!(line, "[robot]" | "[[log]]" | "[format]" | "[design]" | "[iteration]");
+        return lines.any(section).then_some((
+            "a study",
+            "give the file that its [robot] names; the study itself is for `identify`, `design` and `iterate`",
+        ));
+    }
+    let first = lines.next()?;
+    if first.starts_with('{') && extension == Some("json") {
+        return Some(("a JSON file", "give the URDF or the D-H table"));
+    }
+    // A row of names or numbers, without any key or bracket of TOML or XML.
+    let plain = |c: char| !matches!(c, '=' | '[' | ']' | '<' | '>' | '{' | '}' | '"');
+    let table =
+        [',', ';', '\t'].iter().any(|delimiter| first.matches(*delimiter).count() >= 2) && first.chars().all(plain);
+    table.then_some(("a table", LOG))
 }
 
 fn decode(bytes: Vec<u8>, path: &Path) -> Result<String, ReadError> {

@@ -225,6 +225,15 @@ impl Mat3<f64> {
         ])
     }
 
+    /// The rotation that the unit quaternion `x y z w` stands for.
+    pub fn from_quaternion([x, y, z, w]: [f64; 4]) -> Self {
+        Self([
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+            [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
+            [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
+        ])
+    }
+
     /// The rotation by `angle` radians about the unit vector `axis` (Rodrigues).
     pub fn from_axis_angle(axis: Vec3, angle: f64) -> Self {
         let (sin, cos) = angle.sin_cos();

@@ -2,8 +2,10 @@
 //! parameters over many noisy runs.
 //!
 //! ```text
-//! cargo run --release -p dynident-paper --example logistic_against_fourier [SEEDS]
+//! cargo run --release -p dynident-paper --example logistic_against_fourier [SEEDS [SECONDS]]
 //! ```
+//!
+//! SECONDS ends each search early: a trial, not a comparison.
 
 #![allow(clippy::print_stdout, reason = "printing a table is what this program is for")]
 
@@ -39,12 +41,13 @@ const FAMILIES: [(&str, &str); 4] = [
 
 fn main() -> Result<(), Box<dyn Error>> {
     let seeds: u64 = std::env::args().nth(1).map_or(Ok(100), |text| text.parse())?;
+    let seconds: Option<f64> = std::env::args().nth(2).map(|text| text.parse()).transpose()?;
     println!("| arm | family | log det | error against Fourier | largest tracking error, rad |");
     println!("| --- | --- | --- | --- | --- |");
     for (arm, path, duration_s) in STUDIES {
         let mut first: Option<Vec<f64>> = None;
         for (name, family) in FAMILIES {
-            match compared(Path::new(path), family, duration_s, seeds)? {
+            match compared(Path::new(path), family, (duration_s, seconds), seeds)? {
                 None => println!("| {arm} | {name} | none inside the limits | | |"),
                 Some(Outcome { log_det, errors, tracking }) => {
                     let reference = first.get_or_insert_with(|| errors.clone());
@@ -71,7 +74,12 @@ struct Outcome {
 }
 
 /// Designs, runs and identifies; none if nothing was found inside the limits.
-fn compared(path: &Path, family: &str, duration_s: Option<f64>, seeds: u64) -> Result<Option<Outcome>, Box<dyn Error>> {
+fn compared(
+    path: &Path,
+    family: &str,
+    (duration_s, seconds): (Option<f64>, Option<f64>),
+    seeds: u64,
+) -> Result<Option<Outcome>, Box<dyn Error>> {
     let mut study = Study::load(path)?;
     let section = study.design.get_or_insert_default();
     section.family = toml::from_str(family)?;
@@ -79,6 +87,9 @@ fn compared(path: &Path, family: &str, duration_s: Option<f64>, seeds: u64) -> R
     section.optimiser = dynident::study::OptimiserChoice::Gradient;
     if let Some(duration_s) = duration_s {
         section.duration_s = duration_s;
+    }
+    if seconds.is_some() {
+        section.search.time_limit_s = seconds;
     }
     let options = RunOptions { data: None, threads: 2, progress: &Silent };
     let outcome = design_study(&study, path, &options, |_| ControlFlow::Continue(()))?;

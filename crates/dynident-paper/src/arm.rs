@@ -4,9 +4,10 @@ use dynident::{Error, write_whole};
 use dynident_model::{Model, load_robot};
 use std::path::{Path, PathBuf};
 
-/// The arm and its design study, as they lie in the examples.
-const ARM: &str = include_str!("../study/robots/paper_2r.toml");
-const DESIGN: &str = include_str!("../study/design_paper.toml");
+/// The arm and its design study, as they lie in the examples: their names among the outputs, and their texts.
+pub(crate) const DESCRIPTION: (&str, &str) =
+    ("study/robots/paper_2r.toml", include_str!("../study/robots/paper_2r.toml"));
+pub(crate) const DESIGN: (&str, &str) = ("study/design_paper.toml", include_str!("../study/design_paper.toml"));
 
 /// The arm's length between the joints, m, and gravity.
 pub(crate) const A1: f64 = 1.0;
@@ -23,12 +24,11 @@ pub(crate) struct Arm {
 }
 
 impl Arm {
-    /// Writes the description and the design study into `out/study` and reads them back, as a user's own would be.
-    pub(crate) fn written(out: &Path) -> Result<Self, Error> {
-        let description = out.join("study/robots/paper_2r.toml");
-        let design = out.join("study/design_paper.toml");
-        write_whole(&description, ARM.as_bytes())?;
-        write_whole(&design, DESIGN.as_bytes())?;
+    /// Writes the description and the design study into `folder` and reads them back, as a user's own would be.
+    pub(crate) fn written(folder: &Path) -> Result<Self, Error> {
+        let (description, design) = (folder.join(DESCRIPTION.0), folder.join(DESIGN.0));
+        write_whole(&description, DESCRIPTION.1.as_bytes())?;
+        write_whole(&design, DESIGN.1.as_bytes())?;
         Ok(Self { model: load_robot(&description)?.model, description, design })
     }
 }

@@ -52,6 +52,9 @@ acceleration = false
 stop_margin_percent = 0.0
 "#;
 
+/// Its name among the outputs, and its text.
+pub(crate) const DESIGN: (&str, &str) = ("study/design_fourier.toml", STUDY);
+
 const PERIOD_S: f64 = 40.0;
 const RATE_HZ: f64 = 1000.0;
 /// Harmonics of the fit to measured positions: the commanded five, and what the tracking error adds.
@@ -69,9 +72,9 @@ pub(crate) struct FourierRuns {
 }
 
 /// Designs the series, runs and identifies three times with both joints moving, and keeps the last estimate.
-pub(crate) fn fourier(arm: &Arm, out: &Path, seed: u64, options: &RunOptions<'_>) -> Result<FourierRuns, Error> {
-    let path = out.join("study/design_fourier.toml");
-    write_whole(&path, STUDY.as_bytes())?;
+pub(crate) fn fourier(arm: &Arm, folder: &Path, seed: u64, options: &RunOptions<'_>) -> Result<FourierRuns, Error> {
+    let path = folder.join(DESIGN.0);
+    write_whole(&path, DESIGN.1.as_bytes())?;
     let mut study = Study::load(&path)?;
     study.design.get_or_insert_default().search.seed = seed;
     let outcome = design_study(&study, &path, options, |_| ControlFlow::Continue(()))?;

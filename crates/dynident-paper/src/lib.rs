@@ -23,7 +23,7 @@ pub use piece::{Deviation, PaperCell, PaperFigure, PaperTable};
 
 use arm::Arm;
 use deviations::deviations;
-use dynident::{Error, RunOptions, check_writable, write_whole};
+use dynident::{Error, OutputSet, RunOptions, check_writable};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -83,20 +83,22 @@ pub fn reproduce(out: &Path, seed: u64, options: &RunOptions<'_>) -> Result<Pape
     check_writable(out)?;
     let stage = |name: &str| options.progress.begin(name, None);
     let done = || options.progress.end();
-    stage("base parameters and strokes");
-    let arm = Arm::written(out)?;
+    stage("1 of 5: base parameters and strokes");
+    // The studies are read as a user's own would be, and appear with everything else in the end.
+    let folder = tempfile::tempdir().map_err(|source| Error::Output { path: std::env::temp_dir(), source })?;
+    let arm = Arm::written(folder.path())?;
     let (table_2, difference) = base_parameters::table_2(&arm);
     done();
-    stage("genetic algorithm, and the optimum beside it");
+    stage("2 of 5: genetic algorithm, and the optimum beside it");
     let optimised = optimisation::optimised(&arm, seed, options)?;
     done();
-    stage("runs of joint 2 and joint 1");
+    stage("3 of 5: runs of joint 2 and joint 1");
     let runs = joint_runs::joint_runs(&arm, &optimised.optimum)?;
     done();
-    stage("Fourier series");
-    let fourier = fourier::fourier(&arm, out, seed, options)?;
+    stage("4 of 5: Fourier series");
+    let fourier = fourier::fourier(&arm, folder.path(), seed, options)?;
     done();
-    stage("verification");
+    stage("5 of 5: verification");
     let verification = verification::figures_16_and_17(&arm, &runs.ours, &fourier.values);
     done();
     let [one, two] = &optimised.optimum;
@@ -127,10 +129,17 @@ pub fn reproduce(out: &Path, seed: u64, options: &RunOptions<'_>) -> Result<Pape
         deviations: deviations(),
         seconds: begun.elapsed().as_secs_f64(),
     };
-    for figure in &file.figures {
-        write_whole(&out.join(&figure.file), figure.plot.svg(WIDTH, HEIGHT)?.as_bytes())?;
+    let json = serde_json::to_string_pretty(&file)
+        .map_err(|error| Error::Result { path: out.join("paper.json"), message: error.to_string() })?;
+    let mut set = OutputSet::new(out).file("paper.json", json + "\n");
+    set = set.file("report.html", page::page(&file, &tables, &file.figures)?);
+    for (name, contents) in [arm::DESCRIPTION, arm::DESIGN, fourier::DESIGN] {
+        set = set.file(name, contents);
     }
-    write_whole(&out.join("report.html"), page::page(&file, &tables, &file.figures)?.as_bytes())?;
+    for figure in &file.figures {
+        set = set.file(&figure.file, figure.plot.svg(WIDTH, HEIGHT)?);
+    }
+    set.write()?;
     Ok(file)
 }
 

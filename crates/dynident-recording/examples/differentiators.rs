@@ -1,7 +1,8 @@
 //! Bias and noise of every differentiator, against noise level and tracking error. Prints the tables of the book's page
 //! on differentiators.
 //!
-//! `cargo run --release -p dynident-recording --example differentiators`
+//! `cargo run --release -p dynident-recording --example differentiators [SEEDS [SECONDS]]`: 3 seeds and 40 s are what
+//! the book has; less is a trial.
 
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "printing tables is what this program is for")]
 
@@ -12,6 +13,7 @@ use std::sync::Arc;
 const RATE_HZ: f64 = 1000.0;
 /// BIRDy's three levels, and two beyond; degrees.
 const NOISE_DEG: [f64; 5] = [0.0, 1e-4, 1e-3, 1e-2, 1e-1];
+/// What the book's tables are made with.
 const SEEDS: u64 = 3;
 const DURATION_S: f64 = 40.0;
 /// Left out at both ends.
@@ -126,9 +128,21 @@ struct Figures {
     refused: f64,
 }
 
+/// How often noise is drawn, and how much of the motion is looked at, s.
+#[derive(Clone, Copy)]
+struct Extent {
+    seeds: u64,
+    duration_s: f64,
+}
+
 fn main() {
+    let argument = |n: usize| std::env::args().nth(n);
+    let extent = Extent {
+        seeds: argument(1).map_or(SEEDS, |text| text.parse().unwrap()),
+        duration_s: argument(2).map_or(DURATION_S, |text| text.parse().unwrap()),
+    };
     for command in [CommandKind::Stroke, CommandKind::Series] {
-        let n = (DURATION_S * RATE_HZ) as usize;
+        let n = (extent.duration_s * RATE_HZ) as usize;
         let none = TRACKING[0].1;
         let times: Vec<f64> = (0..n + 200).map(|i| i as f64 / RATE_HZ).collect();
         let columns = [0, 1, 2].map(|order| times.iter().map(|t| command.at(*t, none)[order]).collect());
@@ -140,7 +154,9 @@ fn main() {
                 let settings = settings.replace("SERIES", command.series());
                 let differentiator: DifferentiatorSettings =
                     toml::from_str(&format!("method = {method:?}\n{settings}")).unwrap();
-                let cell = |noise, tracking: Tracking| measured(command, &differentiator, &reference, noise, tracking);
+                let cell = |noise, tracking: Tracking| {
+                    measured((command, extent), &differentiator, &reference, noise, tracking)
+                };
                 NOISE_DEG.iter().map(|noise| TRACKING.iter().map(|(_, t)| cell(*noise, *t)).collect()).collect()
             })
             .collect();
@@ -205,13 +221,13 @@ fn winners(figures: &[Vec<Vec<Figures>>], order: usize, quantity: &str) {
 }
 
 fn measured(
-    command: CommandKind,
+    (command, extent): (CommandKind, Extent),
     differentiator: &DifferentiatorSettings,
     reference: &Arc<Reference>,
     noise_deg: f64,
     tracking: Tracking,
 ) -> Figures {
-    let n = (DURATION_S * RATE_HZ) as usize;
+    let n = (extent.duration_s * RATE_HZ) as usize;
     let exact: Vec<[f64; 3]> = (0..n).map(|i| command.at(i as f64 / RATE_HZ, tracking)).collect();
     let clean: Vec<f64> = exact.iter().map(|x| x[0]).collect();
     let run = |q: &[f64], cutoff_hz: f64| {
@@ -228,7 +244,7 @@ fn measured(
     };
     let trim = (TRIM_S * RATE_HZ) as usize;
     let (mut figures, mut count, mut refused) = (Figures::default(), 0.0, 0.0);
-    for seed in 0..if noise_deg > 0.0 { SEEDS } else { 1 } {
+    for seed in 0..if noise_deg > 0.0 { extent.seeds } else { 1 } {
         let q: Vec<f64> = clean.iter().zip(normal(seed, n)).map(|(x, e)| x + noise_deg.to_radians() * e).collect();
         // Without noise, but with the cut-off that the noisy data ask for.
         let cutoff_hz = cutoff(&[&q[..]], RATE_HZ).cutoff_hz;

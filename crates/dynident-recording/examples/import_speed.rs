@@ -1,5 +1,5 @@
 //! How fast a log of a million samples of seven joints becomes a motion:
-//! `cargo run --release -p dynident-recording --example import_speed`.
+//! `cargo run --release -p dynident-recording --example import_speed [ROWS]`.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a benchmark for people")]
 
 use dynident_recording::{
@@ -11,7 +11,7 @@ use std::time::Instant;
 fn main() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("long.csv");
-    let rows = 1_000_000;
+    let rows: i32 = std::env::args().nth(1).map_or(1_000_000, |text| text.parse().unwrap());
     let mut out = std::io::BufWriter::new(std::fs::File::create(&file).unwrap());
     let names = |name: &str| (1..=7).map(|i| format!("{name}{i}")).collect::<Vec<_>>().join(",");
     writeln!(out, "t,{},{},{}", names("q"), names("v"), names("tau")).unwrap();

@@ -6,7 +6,9 @@ use crate::ticks::{short, ticks};
 use serde::Serialize;
 
 /// Letters of a label that are drawn; the whole label stands under the pointer.
-const LETTERS: usize = 44;
+const LETTERS: usize = 38;
+/// Bars that are read aloud.
+const SPOKEN: usize = 12;
 /// Width of the picture, of the labels, of the figures, and height of a bar's row, px.
 const WIDTH: f64 = 800.0;
 const LABELS: f64 = 270.0;
@@ -80,6 +82,18 @@ impl BarPlot {
         self
     }
 
+    /// The bars in words, for who does not see them.
+    fn in_words(&self) -> String {
+        let bars = self.bars.iter().map(|bar| {
+            let half = bar.half_width.map_or_else(String::new, |half| format!(" ± {}", short(half, 2)));
+            format!("{}: {}{half}", shortened(&bar.label), short(bar.value, 4))
+        });
+        let shown: Vec<String> = bars.take(SPOKEN).collect();
+        let more = self.bars.len().saturating_sub(SPOKEN);
+        let rest = if more > 0 { format!("; and {more} more, which the table has") } else { String::new() };
+        format!("{}; {}{rest}", self.label, shown.join("; "))
+    }
+
     /// The plot as an SVG picture; its colours are those of the page around it, or the defaults written into it.
     ///
     /// # Errors
@@ -115,6 +129,7 @@ impl BarPlot {
         let view = Picture {
             plot: self.label.as_str(),
             title: &self.title,
+            words: self.in_words(),
             width: WIDTH,
             height: 26.0 + ROW * self.bars.len() as f64 + 8.0,
             right,
@@ -139,6 +154,7 @@ fn shortened(label: &str) -> String {
 struct Picture<'a> {
     plot: &'a str,
     title: &'a str,
+    words: String,
     width: f64,
     height: f64,
     right: f64,

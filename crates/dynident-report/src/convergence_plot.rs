@@ -1,5 +1,6 @@
 //! How figures settle from run to run.
 
+use crate::curve_picture::{Curve, CurvePicture};
 use crate::error::ReportError;
 use crate::plot_data::{CurveData, PlotData, check_length, rounded};
 
@@ -71,6 +72,35 @@ impl ConvergencePlot {
         self
     }
 
+    /// The numbers of the runs.
+    pub(crate) fn axis(&self) -> Vec<f64> {
+        let runs = self.curves.iter().map(|(_, values, _)| values.len()).max().unwrap_or(0);
+        (0..runs).map(|run| f64::from(self.first) + run as f64).collect()
+    }
+
+    /// Over the axis `x`; [`data`](Self::data) checks.
+    pub(crate) fn picture<'a>(&'a self, x: &'a [f64]) -> CurvePicture<'a> {
+        let curve = |(name, values, half_widths): &'a (String, Vec<f64>, Vec<f64>)| {
+            let ends = |sign: f64| -> Vec<f64> {
+                values.iter().zip(half_widths).map(|(value, half)| value + sign * half).collect()
+            };
+            let mut filled = values.clone();
+            filled.resize(x.len(), f64::NAN);
+            let bars = (!half_widths.is_empty()).then(|| [ends(-1.0), ends(1.0)]);
+            Curve { name, values: filled, dashed: false, points: false, broad: false, bars }
+        };
+        CurvePicture {
+            title: &self.title,
+            x_label: &self.x_label,
+            y_label: &self.y_label,
+            x,
+            curves: self.curves.iter().map(curve).collect(),
+            log_y: self.log_y,
+            difference: None,
+            counts: true,
+        }
+    }
+
     pub(crate) fn data(&self) -> Result<String, ReportError> {
         let runs = self.curves.iter().map(|(_, values, _)| values.len()).max().unwrap_or(0);
         let drawn = |value: f64| rounded(value).filter(|value| !self.log_y || *value > 0.0);
@@ -90,12 +120,13 @@ impl ConvergencePlot {
                     ends
                 };
                 let bars = (!half_widths.is_empty()).then(|| [ends(-1.0), ends(1.0)]);
-                Ok(CurveData { name, y, dashed: false, points: true, bars })
+                Ok(CurveData { name, y, dashed: false, points: true, broad: false, bars })
             })
             .collect::<Result<Vec<_>, ReportError>>()?;
         PlotData {
-            x: (0..runs).map(|run| f64::from(self.first) + run as f64).collect(),
+            x: self.axis(),
             curves,
+            strip: None,
             x_label: &self.x_label,
             y_label: &self.y_label,
             log: self.log_y,

@@ -1,6 +1,7 @@
 //! A matrix in colours.
 
 use crate::error::ReportError;
+use crate::pen::tenth;
 use crate::ticks::short;
 use serde::Serialize;
 
@@ -10,9 +11,17 @@ const MOST_TEXTS: usize = 4096;
 const CELLS: f64 = 560.0;
 const LETTERS: usize = 22;
 const LETTER: f64 = 6.5;
+/// Colours below and above zero.
+const BELOW: &str = "#0072b2";
+const ABOVE: &str = "#d55e00";
+/// Width of the colour scale, px, and its steps to either side.
+const SCALE: f64 = 240.0;
+const STEPS: usize = 10;
+/// Entries that are read aloud.
+const SPOKEN: usize = 5;
 
-/// A matrix in colours: blue below zero, red above, as strong as the value against the largest; gaps stay empty. The
-/// value stands under the pointer.
+/// A matrix in colours: blue below zero, red above, as strong as the value against the largest, with a scale; gaps stay
+/// empty, and so does the upper half of a symmetric one. The value stands under the pointer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeatMap {
     /// Headline.
@@ -61,6 +70,32 @@ impl HeatMap {
         self
     }
 
+    /// Whether it says everything twice: its lower half is enough.
+    fn is_symmetric(&self) -> bool {
+        let same = |row: usize, column: usize| {
+            let [one, other] = [self.values[row][column], self.values[column][row]];
+            one == other || (one.is_nan() && other.is_nan())
+        };
+        self.rows == self.columns && (0..self.rows.len()).all(|row| (0..row).all(|column| same(row, column)))
+    }
+
+    /// The strongest entries off the diagonal in words, for who does not see colours.
+    fn in_words(&self) -> String {
+        let entries = self
+            .values
+            .iter()
+            .enumerate()
+            .flat_map(|(row, values)| values.iter().enumerate().map(move |(column, value)| (row, column, *value)));
+        let symmetric = self.is_symmetric();
+        let wanted = |(row, column, value): &(usize, usize, f64)| value.is_finite() && (!symmetric || row > column);
+        let mut entries: Vec<_> = entries.filter(wanted).collect();
+        entries.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
+        let words = entries.iter().take(SPOKEN).map(|(row, column, value)| {
+            format!("{} and {} {}", self.rows[*row], self.columns[*column], short(*value, 2))
+        });
+        format!("strongest {}", words.collect::<Vec<_>>().join(", "))
+    }
+
     /// The map as an SVG picture.
     ///
     /// # Errors
@@ -81,19 +116,47 @@ impl HeatMap {
         let longest = self.rows.iter().chain(&self.columns).map(|name| name.chars().count().min(LETTERS)).max();
         let labels = 14.0 + LETTER * longest.unwrap_or(0) as f64;
         let texts = self.columns.len() * self.rows.len() <= MOST_TEXTS;
+        let symmetric = self.is_symmetric();
         let cells = self.values.iter().enumerate().flat_map(|(row, values)| {
             values
                 .iter()
                 .enumerate()
-                .filter(|(_, value)| value.is_finite())
+                .filter(move |(column, value)| value.is_finite() && !(symmetric && *column > row))
                 .map(move |(column, value)| (row, column, *value))
         });
-        let cells = cells.map(|(row, column, value)| CellView {
-            x: labels + side * column as f64,
-            y: labels + side * row as f64,
-            colour: if value < 0.0 { "#0072b2" } else { "#d55e00" },
-            strength: if limit > 0.0 { ((value.abs() / limit).min(1.0) * 100.0).round() / 100.0 } else { 0.0 },
-            text: texts.then(|| format!("{} × {}: {}", self.rows[row], self.columns[column], short(value, 4))),
+        let strength =
+            |value: f64| if limit > 0.0 { ((value.abs() / limit).min(1.0) * 100.0).round() / 100.0 } else { 0.0 };
+        // What is not seen needs no cell, unless for its text.
+        let views = cells.filter(|cell| texts || strength(cell.2) > 0.0).map(|(row, column, value)| {
+            let cell = CellView {
+                x: tenth(labels + side * column as f64),
+                y: tenth(labels + side * row as f64),
+                strength: format!("{}", strength(value)),
+                text: texts.then(|| format!("{} × {}: {}", self.rows[row], self.columns[column], short(value, 3))),
+            };
+            (value < 0.0, cell)
+        });
+        let (below, above): (Vec<_>, Vec<_>) = views.partition(|(is_below, _)| *is_below);
+        let cells_of = |cells: Vec<(bool, CellView)>| cells.into_iter().map(|(_, cell)| cell).collect();
+        let (right, bottom) = (labels + side * self.columns.len() as f64, labels + side * self.rows.len() as f64);
+        let lines = (0..=self.columns.len())
+            .map(|k| format!("M{} {labels}V{}", tenth(labels + side * k as f64), tenth(bottom)));
+        let rows =
+            (0..=self.rows.len()).map(|k| format!("M{labels} {}H{}", tenth(labels + side * k as f64), tenth(right)));
+        // The scale: from the limit below zero to that above.
+        let step_width = SCALE / (2 * STEPS + 1) as f64;
+        let scale = (0..=2 * STEPS).map(|k| {
+            let value = k as f64 / STEPS as f64 - 1.0;
+            ScaleStep {
+                x: tenth(labels + step_width * k as f64),
+                y: tenth(bottom + 18.0),
+                colour: if value < 0.0 { BELOW } else { ABOVE },
+                strength: value.abs(),
+            }
+        });
+        let marks = [-1.0, -0.5, 0.0, 0.5, 1.0].map(|share| {
+            let x = labels + 0.5 * step_width + (SCALE - step_width) * 0.5 * (share + 1.0);
+            (tenth(x), short(share * limit, 3))
         });
         // Names that would overlap are left out; the text under the pointer has them.
         let every = (11.0 / side).ceil().max(1.0) as usize;
@@ -103,13 +166,19 @@ impl HeatMap {
         };
         let view = Picture {
             title: &self.title,
-            width: labels + side * self.columns.len() as f64 + 8.0,
-            height: labels + side * self.rows.len() as f64 + 8.0,
+            words: self.in_words(),
+            width: (right + 8.0).max(labels + SCALE + 24.0),
+            height: bottom + 46.0,
             labels,
-            side,
+            side: tenth(side),
             columns: names(&self.columns),
             rows: names(&self.rows),
-            cells: cells.collect(),
+            signs: [(BELOW, cells_of(below)), (ABOVE, cells_of(above))],
+            grid: lines.chain(rows).collect(),
+            scale: scale.collect(),
+            step_width: tenth(step_width + 0.1),
+            scale_frame: [labels, tenth(bottom + 18.0), SCALE],
+            marks,
         };
         crate::templates::rendered("heat_map.svg", &view)
     }
@@ -118,21 +187,34 @@ impl HeatMap {
 #[derive(Serialize)]
 struct Picture<'a> {
     title: &'a str,
+    words: String,
     width: f64,
     height: f64,
     labels: f64,
     side: f64,
     columns: Vec<(f64, String)>,
     rows: Vec<(f64, String)>,
-    cells: Vec<CellView>,
+    signs: [(&'static str, Vec<CellView>); 2],
+    grid: Vec<String>,
+    scale: Vec<ScaleStep>,
+    step_width: f64,
+    scale_frame: [f64; 3],
+    marks: [(f64, String); 5],
+}
+
+#[derive(Serialize)]
+struct ScaleStep {
+    x: f64,
+    y: f64,
+    colour: &'static str,
+    strength: f64,
 }
 
 #[derive(Serialize)]
 struct CellView {
     x: f64,
     y: f64,
-    colour: &'static str,
-    strength: f64,
+    strength: String,
     text: Option<String>,
 }
 
@@ -144,7 +226,8 @@ mod tests {
     fn gaps_stay_empty_and_ragged_matrices_are_refused() {
         let map = HeatMap::new("t", ["a", "b"], ["x", "y<"], vec![vec![1.0, -0.5], vec![f64::NAN, 0.0]]);
         let svg = map.svg().unwrap();
-        assert_eq!(svg.matches("<title>").count() - 1, 3, "{svg}");
+        assert_eq!(svg.matches("<title>").count(), 3, "{svg}");
+        assert!(svg.contains("strongest a and x 1") && svg.contains(">-0.5</text>"), "{svg}");
         assert!(svg.contains("b × y&lt;: 0") && !svg.contains("NaN"));
         assert!(HeatMap::new("t", ["a"], ["x"], vec![]).svg().is_err());
         assert!(HeatMap::new("t", ["a"], ["x"], vec![vec![1.0, 2.0]]).svg().is_err());

@@ -2,9 +2,9 @@
 //!
 //! A [`Report`] is a list of typed sections, each a plain struct with its own template. Line plots are interactive
 //! ([uPlot](https://github.com/leeoniya/uPlot), embedded): values under the pointer, a stretch zoomed by dragging,
-//! curves switched by a click on the legend. Bars and heat maps are pictures with values under the pointer. Light and
-//! dark, wide and narrow screens. What a section is given is escaped: no name of a joint or file becomes markup or
-//! script.
+//! curves switched by a click on the legend. Bars and heat maps are pictures with values under the pointer. Without the
+//! script, and on paper, every plot is a still picture. Light and dark, wide and narrow screens, keyboard and screen
+//! reader. What a section is given is escaped: no name of a joint or file becomes markup or script.
 //!
 //! ```
 //! use dynident_report::{KeyFigures, LinePlot, Report, Table};
@@ -25,6 +25,7 @@
 
 mod bar_plot;
 mod convergence_plot;
+mod curve_picture;
 mod decimation;
 mod error;
 mod fitness_picture;

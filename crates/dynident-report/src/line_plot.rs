@@ -1,11 +1,9 @@
 //! Curves over a common axis.
 
+use crate::curve_picture::{Curve, CurvePicture, Place};
 use crate::decimation::kept_samples;
 use crate::error::ReportError;
-use crate::pen::{Pen, tenth};
-use crate::plot_data::{CurveData, PlotData, check_axis, check_length, rounded};
-use crate::ticks::{short, ticks};
-use serde::Serialize;
+use crate::plot_data::{CurveData, PlotData, StripData, check_axis, check_length, rounded, rounded_time};
 
 /// Pixel columns that a curve is drawn for.
 const COLUMNS: usize = 1200;
@@ -21,6 +19,8 @@ pub struct Line {
     pub dashed: bool,
     /// Drawn as points without a line.
     pub points: bool,
+    /// Drawn broad and pale, so that a curve over it shows where the two part.
+    pub broad: bool,
 }
 
 /// Curves over a common axis: zoomed by dragging, values under the pointer, curves switched in the legend.
@@ -43,6 +43,8 @@ pub struct LinePlot {
     pub lines: Vec<Line>,
     /// Logarithmic y axis; values that are not positive leave gaps.
     pub log_y: bool,
+    /// A strip below with a difference of two curves, on a scale of its own: its name, and which less which.
+    pub difference: Option<(String, [usize; 2])>,
 }
 
 impl LinePlot {
@@ -56,6 +58,7 @@ impl LinePlot {
             x,
             lines: Vec::new(),
             log_y: false,
+            difference: None,
         }
     }
 
@@ -69,21 +72,35 @@ impl LinePlot {
     /// A further curve.
     #[must_use]
     pub fn line(mut self, name: impl Into<String>, values: Vec<f64>) -> Self {
-        self.lines.push(Line { name: name.into(), values, dashed: false, points: false });
+        self.lines.push(Line { name: name.into(), values, dashed: false, points: false, broad: false });
         self
     }
 
     /// A further curve, dashed.
     #[must_use]
     pub fn dashed(mut self, name: impl Into<String>, values: Vec<f64>) -> Self {
-        self.lines.push(Line { name: name.into(), values, dashed: true, points: false });
+        self.lines.push(Line { name: name.into(), values, dashed: true, points: false, broad: false });
         self
     }
 
     /// A further curve, as points.
     #[must_use]
     pub fn points(mut self, name: impl Into<String>, values: Vec<f64>) -> Self {
-        self.lines.push(Line { name: name.into(), values, dashed: false, points: true });
+        self.lines.push(Line { name: name.into(), values, dashed: false, points: true, broad: false });
+        self
+    }
+
+    /// A further curve, broad and pale, for others to lie over.
+    #[must_use]
+    pub fn broad(mut self, name: impl Into<String>, values: Vec<f64>) -> Self {
+        self.lines.push(Line { name: name.into(), values, dashed: false, points: false, broad: true });
+        self
+    }
+
+    /// A strip below with curve number `of` less number `less` (from 0), on a scale of its own.
+    #[must_use]
+    pub fn difference(mut self, name: impl Into<String>, of: usize, less: usize) -> Self {
+        self.difference = Some((name.into(), [of, less]));
         self
     }
 
@@ -96,6 +113,10 @@ impl LinePlot {
 
     fn check(&self) -> Result<(), ReportError> {
         check_axis(&self.title, &self.x)?;
+        if let Some((name, of)) = &self.difference {
+            let largest = of.iter().max().map_or(0, |largest| largest + 1);
+            check_length(&self.title, name, self.lines.len(), largest.max(self.lines.len()))?;
+        }
         self.lines.iter().try_for_each(|line| check_length(&self.title, &line.name, line.values.len(), self.x.len()))
     }
 
@@ -106,12 +127,15 @@ impl LinePlot {
 
     pub(crate) fn data(&self) -> Result<String, ReportError> {
         self.check()?;
-        let curves: Vec<&[f64]> = self.lines.iter().map(|line| &line.values[..]).collect();
+        let strip = self.difference.as_ref().map(|(_, [of, less])| -> Vec<f64> {
+            let pairs = self.lines[*of].values.iter().zip(&self.lines[*less].values);
+            pairs.map(|(of, less)| of - less).collect()
+        });
+        let curves: Vec<&[f64]> = self.lines.iter().map(|line| &line.values[..]).chain(strip.as_deref()).collect();
         let kept = kept_samples(&self.x, &curves, COLUMNS);
         let curve = |line: &Line| kept.iter().map(|&i| rounded(self.drawn(line.values[i]))).collect();
         PlotData {
-            // Times keep their digits: at seven, a long log's samples would fall together.
-            x: kept.iter().map(|&i| self.x[i]).collect(),
+            x: kept.iter().map(|&i| rounded_time(self.x[i])).collect(),
             curves: self
                 .lines
                 .iter()
@@ -120,9 +144,11 @@ impl LinePlot {
                     y: curve(line),
                     dashed: line.dashed,
                     points: line.points,
+                    broad: line.broad,
                     bars: None,
                 })
                 .collect(),
+            strip: self.difference.as_ref().map(|(name, of)| StripData { name, of: *of }),
             x_label: &self.x_label,
             y_label: &self.y_label,
             log: self.log_y,
@@ -137,91 +163,37 @@ impl LinePlot {
     /// As [`Report::html`](crate::Report::html).
     pub fn svg(&self, width: f64, height: f64) -> Result<String, ReportError> {
         self.check()?;
-        let value = |x: f64| if self.log_y { self.drawn(x).log10() } else { x };
-        let curves: Vec<Vec<f64>> =
-            self.lines.iter().map(|line| line.values.iter().map(|x| value(*x)).collect()).collect();
-        let all = curves.iter().flatten().copied().filter(|x| x.is_finite());
-        let [low, high] = padded(all.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]));
-        let (from, to) = (self.x.first().copied().unwrap_or(0.0), self.x.last().copied().unwrap_or(1.0));
-        let to = if to > from { to } else { from + 1.0 };
-        let (left, top, right, bottom) = (64.0, 34.0, width - 12.0, height - 42.0);
-        let at_x = |x: f64| left + (x - from) / (to - from) * (right - left);
-        let at_y = |y: f64| bottom - (y - low) / (high - low) * (bottom - top);
-        let views: Vec<&[f64]> = curves.iter().map(|curve| &curve[..]).collect();
-        let kept = kept_samples(&self.x, &views, (right - left).max(1.0) as usize);
-        let path = |curve: &Vec<f64>| {
-            let mut pen = Pen::default();
-            for &i in &kept {
-                pen.to([at_x(self.x[i]), at_y(curve[i])]);
-            }
-            pen.path()
-        };
-        let lines = self.lines.iter().zip(&curves).enumerate().map(|(k, (line, curve))| {
-            let points = kept.iter().filter(|&&i| line.points && curve[i].is_finite());
-            CurveView {
-                name: &line.name,
-                colour: COLOURS[k % COLOURS.len()],
-                dashed: line.dashed,
-                path: if line.points { String::new() } else { path(curve) },
-                points: points.map(|&i| [tenth(at_x(self.x[i])), tenth(at_y(curve[i]))]).collect(),
-                legend_x: left + 130.0 * k as f64,
-            }
-        });
-        let exact = |y: f64| if self.log_y { 10.0_f64.powf(y) } else { y };
-        let view = Picture {
+        self.picture().svg(width, height, Place::Document)
+    }
+
+    pub(crate) fn picture(&self) -> CurvePicture<'_> {
+        let curve = |line: &'_ Line| -> Vec<f64> { line.values.iter().map(|value| self.drawn(*value)).collect() };
+        CurvePicture {
             title: &self.title,
-            width,
-            height,
-            frame: [left, top, right, bottom],
             x_label: &self.x_label,
             y_label: &self.y_label,
-            x_ticks: ticks(from, to, 6).into_iter().map(|x| (tenth(at_x(x)), short(x, 4))).collect(),
-            y_ticks: ticks(low, high, 5).into_iter().map(|y| (tenth(at_y(y)), short(exact(y), 3))).collect(),
-            lines: lines.collect(),
-        };
-        crate::templates::rendered("line_plot.svg", &view)
+            x: &self.x,
+            curves: (self.lines.iter())
+                .map(|line| Curve {
+                    name: &line.name,
+                    values: curve(line),
+                    dashed: line.dashed,
+                    points: line.points,
+                    broad: line.broad,
+                    bars: None,
+                })
+                .collect(),
+            log_y: self.log_y,
+            difference: self.difference.as_ref().map(|(name, of)| (&name[..], *of)),
+            counts: false,
+        }
     }
-}
-
-/// The page's colours: distinguished by people who see colours differently (Okabe and Ito), and dark enough on white.
-pub(crate) const COLOURS: [&str; 8] =
-    ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00", "#56b4e9", "#7a3fb0", "#5f6368"];
-
-/// A little air above and below; a flat or empty range gets one of its own.
-fn padded([low, high]: [f64; 2]) -> [f64; 2] {
-    if !(low.is_finite() && high.is_finite()) {
-        return [0.0, 1.0];
-    }
-    let air = if high > low { 0.05 * (high - low) } else { (0.1 * low.abs()).max(1e-12) };
-    [low - air, high + air]
-}
-
-#[derive(Serialize)]
-struct Picture<'a> {
-    title: &'a str,
-    width: f64,
-    height: f64,
-    frame: [f64; 4],
-    x_label: &'a str,
-    y_label: &'a str,
-    x_ticks: Vec<(f64, String)>,
-    y_ticks: Vec<(f64, String)>,
-    lines: Vec<CurveView<'a>>,
-}
-
-#[derive(Serialize)]
-struct CurveView<'a> {
-    name: &'a str,
-    colour: &'a str,
-    dashed: bool,
-    path: String,
-    points: Vec<[f64; 2]>,
-    legend_x: f64,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::curve_picture::COLOURS;
 
     fn plot() -> LinePlot {
         LinePlot::new("a <b>", "t, s", "τ, Nm", vec![0.0, 1.0, 2.0, 3.0]).line("x", vec![1.0, f64::NAN, -2.0, 1e-9])
@@ -231,7 +203,8 @@ mod tests {
     fn gaps_are_null_and_break_the_picture() {
         assert!(plot().data().unwrap().contains("[1.0,null,-2.0,1e-9]"));
         let svg = plot().svg(400.0, 200.0).unwrap();
-        let curve = svg.lines().find(|line| line.contains(COLOURS[0])).unwrap();
+        let group = svg.split_once(&format!("<g stroke=\"{}\"", COLOURS[0])).unwrap().1;
+        let curve = group.lines().nth(1).unwrap();
         assert_eq!((curve.matches('M').count(), curve.matches('L').count()), (2, 1), "{curve}");
         assert!(svg.contains("a &lt;b&gt;") && !svg.contains("NaN"));
     }
@@ -240,6 +213,18 @@ mod tests {
     fn a_logarithmic_axis_has_no_place_for_what_is_not_positive() {
         assert!(plot().log_y().data().unwrap().contains("[1.0,null,null,1e-9]"));
         assert!(!plot().log_y().svg(400.0, 200.0).unwrap().contains("NaN"));
+    }
+
+    #[test]
+    fn a_difference_stands_in_a_strip_of_its_own() {
+        let pair = LinePlot::new("t", "t, s", "Nm", vec![0.0, 1.0]).broad("predicted", vec![1.0, 2.0]);
+        let pair = pair.line("measured", vec![1.5, 2.5]).difference("measured less predicted", 1, 0);
+        let (with, without) = (pair.svg(400.0, 200.0).unwrap(), plot().svg(400.0, 200.0).unwrap());
+        assert!(with.contains("measured less predicted") && with.contains("root mean square 0.5"), "{with}");
+        assert!(with.contains("viewBox=\"0 0 400.0 310.0") && without.contains("viewBox=\"0 0 400.0 200.0"), "{with}");
+        assert!(pair.data().unwrap().contains("\"of\":[1,0]"));
+        let none = plot().difference("of nothing", 0, 3);
+        assert!(none.data().is_err() && none.svg(300.0, 100.0).is_err());
     }
 
     #[test]

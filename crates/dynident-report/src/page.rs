@@ -2,6 +2,7 @@
 
 use crate::bar_plot::BarPlot;
 use crate::convergence_plot::ConvergencePlot;
+use crate::curve_picture::{CurvePicture, Place};
 use crate::error::ReportError;
 use crate::heading::Heading;
 use crate::heat_map::HeatMap;
@@ -54,6 +55,9 @@ pub struct Report {
     /// The sections.
     pub sections: Vec<Section>,
 }
+
+/// Width and height of a plot where the script does not draw it, px.
+const STILL: [f64; 2] = [1040.0, 300.0];
 
 const UPLOT_JS: &str = include_str!("../vendor/uplot/uPlot.iife.min.js");
 const UPLOT_CSS: &str = include_str!("../vendor/uplot/uPlot.min.css");
@@ -118,9 +122,11 @@ impl Section {
             let svg = Value::from_safe_string(svg);
             rendered("picture.html", &context! { title, note, svg, legend })
         };
-        let plot = |title: &str, note: &str, data: String| {
+        let plot = |title: &str, note: &str, data: String, picture: CurvePicture<'_>| {
             let data = Value::from_safe_string(data);
-            rendered("plot.html", &context! { number, title, note, data })
+            let svg = Value::from_safe_string(picture.svg(STILL[0], STILL[1], Place::Page)?);
+            let words = picture.in_words();
+            rendered("plot.html", &context! { number, title, note, data, svg, words })
         };
         match self {
             Self::Heading(heading) => rendered("heading.html", &context! { number, text => heading.text }),
@@ -130,8 +136,11 @@ impl Section {
                 table.check()?;
                 rendered("table.html", &context! { table, numeric => table.numeric() })
             }
-            Self::LinePlot(section) => plot(&section.title, &section.note, section.data()?),
-            Self::ConvergencePlot(section) => plot(&section.title, &section.note, section.data()?),
+            Self::LinePlot(section) => plot(&section.title, &section.note, section.data()?, section.picture()),
+            Self::ConvergencePlot(section) => {
+                let axis = section.axis();
+                plot(&section.title, &section.note, section.data()?, section.picture(&axis))
+            }
             Self::BarPlot(section) => picture(&section.title, &section.note, section.svg()?, &section.reference_label),
             Self::HeatMap(section) => picture(&section.title, &section.note, section.svg()?, ""),
         }

@@ -8,6 +8,9 @@ use serde::Serialize;
 pub(crate) struct PlotData<'a> {
     pub(crate) x: Vec<f64>,
     pub(crate) curves: Vec<CurveData<'a>>,
+    /// A strip below with a difference.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) strip: Option<StripData<'a>>,
     pub(crate) x_label: &'a str,
     pub(crate) y_label: &'a str,
     pub(crate) log: bool,
@@ -22,9 +25,18 @@ pub(crate) struct CurveData<'a> {
     pub(crate) y: Vec<Option<f64>>,
     pub(crate) dashed: bool,
     pub(crate) points: bool,
+    pub(crate) broad: bool,
     /// Lower and upper ends of error bars.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) bars: Option<[Vec<Option<f64>>; 2]>,
+}
+
+/// The difference of two curves, of their numbers.
+#[derive(Serialize)]
+pub(crate) struct StripData<'a> {
+    pub(crate) name: &'a str,
+    /// Which less which.
+    pub(crate) of: [usize; 2],
 }
 
 impl PlotData<'_> {
@@ -42,6 +54,11 @@ pub(crate) fn rounded(value: f64) -> Option<f64> {
         return None;
     }
     format!("{value:.6e}").parse().ok()
+}
+
+/// Eleven significant digits of a time: at seven, a long log's samples would fall together.
+pub(crate) fn rounded_time(value: f64) -> f64 {
+    format!("{value:.10e}").parse().unwrap_or(value)
 }
 
 /// The x axis must be finite and not decrease.

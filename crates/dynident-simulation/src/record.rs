@@ -1,6 +1,6 @@
 //! A run as a log holds it.
 
-use crate::error::SimulationError;
+use crate::error::{SimulationError, require};
 use crate::run::Run;
 use crate::sensors::SensorSettings;
 use dynident_model::Model;
@@ -65,7 +65,7 @@ impl SensorSettings {
     /// the readings that the controller saw, with the same noise.
     ///
     /// # Errors
-    /// As [`validate`](Self::validate).
+    /// As [`validate`](Self::validate); noise or steps so large that a record would not be finite.
     pub fn record(&self, model: &Model, run: &Run) -> Result<Record, SimulationError> {
         let joints = run.joints.len();
         self.validate(joints)?;
@@ -112,6 +112,11 @@ impl SensorSettings {
                     error = correlation * error + fresh * torque.normal();
                 }
             }
+        }
+        // Noise and steps of any size are allowed, and a run's own numbers are finite.
+        if let Some(&value) = q.iter().chain(&tau).find(|value| !value.is_finite()) {
+            let fix = "give position_std, torque_std, encoder_steps and torque_step sizes that a sensor can have";
+            require(false, "a recorded position or torque", value, fix)?;
         }
         Ok(Record { joints: run.joints.clone(), rate_hz, samples, times_s, q, tau })
     }

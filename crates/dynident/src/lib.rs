@@ -5,7 +5,7 @@
 //! | read a study file | [`Study::load`], [`Study::parse`] |
 //! | logs to a model | [`identify()`]; its result: [`ResultFile`], a page: [`IdentificationOutcome::report`] |
 //! | a finished model on other logs | [`validate()`] |
-//! | look at a robot description | [`inspect()`] |
+//! | look at a robot description | [`inspect()`]; undo its slips: [`mended()`] |
 //! | dynamics for a table of states | [`evaluate()`] |
 //! | the motion to record | [`design_study()`]; judge one that is there: [`check_trajectory()`], [`check_log()`] |
 //! | one run of a simulated robot | [`simulate_study()`] |
@@ -39,8 +39,10 @@
 pub mod book;
 mod cpu_time;
 mod error;
+mod inputs;
 mod jobs;
 mod output;
+mod output_set;
 mod pages;
 pub mod result;
 pub mod study;
@@ -56,15 +58,17 @@ pub use dynident_simulation as simulation;
 
 pub use dynident_identification::{Progress, Role, Silent};
 pub use error::{Error, Expected, StudyError};
+pub use inputs::{refuse_overwriting, study_inputs};
 pub use jobs::check::check;
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
 pub use jobs::evaluate::{Quantity, evaluate};
 pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instruments};
-pub use jobs::inspect::inspect;
+pub use jobs::inspect::{InspectSettings, MendedDescription, inspect, inspect_with, mended};
 pub use jobs::iterate::{IterationWatch, iterate_study};
 pub use jobs::options::RunOptions;
 pub use jobs::simulate::{Simulation, simulate_study};
 pub use jobs::validate::validate;
 pub use output::{check_writable, write_whole};
+pub use output_set::OutputSet;
 pub use result::{CheckFile, DesignFile, Inspection, IterationsFile, ResultFile, SimulationFile, ValidationFile};
 pub use study::{Folders, Study, StudyRobot};

@@ -2,7 +2,7 @@
 
 use super::{Context, json, message_of, pretty_json};
 use crate::{Verdict, summary, terminal};
-use dynident::{check_writable, write_whole};
+use dynident::{OutputSet, check_writable};
 use dynident_benchmark::accuracy::{BenchmarkSettings, benchmark, cells_csv};
 use std::path::PathBuf;
 
@@ -45,14 +45,13 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     }
     let file = benchmark(&settings, &*context.progress()).map_err(|error| error.to_string())?;
     if let Some(out) = &options.out {
-        write_whole(&out.join("benchmark.csv"), cells_csv(&file.cells).as_bytes()).map_err(message_of)?;
-        // The JSON last: where it stands, everything stands.
-        write_whole(&out.join("benchmark.json"), &pretty_json(&file)?).map_err(message_of)?;
+        let set = OutputSet::new(out).file("benchmark.json", pretty_json(&file)?);
+        set.file("benchmark.csv", cells_csv(&file.cells)).write().map_err(message_of)?;
     }
     if context.json {
-        terminal::print(&json(&file)?);
+        terminal::print(&json(&file)?)?;
     } else if !context.quiet || options.out.is_none() {
-        terminal::print(&summary::benchmark(&file));
+        terminal::print(&summary::benchmark(&file))?;
     }
     Ok(Verdict::Good)
 }

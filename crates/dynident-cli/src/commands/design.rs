@@ -1,7 +1,7 @@
 //! `dynident design STUDY.toml --out DIR`.
 
 use super::search::Search;
-use super::{Context, json, known_in, message_of, pretty_json};
+use super::{Context, json, known_in, message_of, pretty_json, refuse_overwriting};
 use crate::{Verdict, summary, terminal};
 use clap::ValueEnum;
 use dynident::excitation::DesignProgress;
@@ -9,10 +9,28 @@ use dynident::excitation::export::{
     ExportError, Sampled, UrScriptSettings, fitness_csv, ros2_joint_trajectory, trajectory_csv, urscript, waypoints_csv,
 };
 use dynident::{
-    DesignOutcome, Folders, RunOptions, Study, StudyRobot, check_log, check_trajectory, check_writable, design_study,
-    write_whole,
+    DesignOutcome, Folders, OutputSet, RunOptions, Study, StudyRobot, check_log, check_trajectory, check_writable,
+    design_study,
 };
 use std::path::PathBuf;
+
+/// The motion; not written where it was given.
+const TRAJECTORY: &str = "trajectory.csv";
+/// Every file that may be written.
+const FILES: [&str; 9] = [
+    "design.json",
+    TRAJECTORY,
+    "preview.svg",
+    "path.svg",
+    "fitness.csv",
+    "fitness.svg",
+    "trajectory.ros2.yaml",
+    "waypoints.csv",
+    "trajectory.script",
+];
+/// Those of them that not every design has.
+const FURTHER: [&str; 6] =
+    [TRAJECTORY, "fitness.csv", "fitness.svg", "trajectory.ros2.yaml", "waypoints.csv", "trajectory.script"];
 
 /// Options of `design`.
 #[derive(clap::Args)]
@@ -65,6 +83,13 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     if let Some(seed) = options.seed {
         study.design.get_or_insert_default().search.seed = seed;
     }
+    let given = options.check.is_some() || options.check_log.is_some();
+    let names: Vec<&str> = FILES.into_iter().filter(|name| !(given && *name == TRAJECTORY)).collect();
+    let sections: &[&str] =
+        if options.check_log.is_some() { &["robot", "design", "log"] } else { &["robot", "design"] };
+    let further: Vec<PathBuf> = options.check.iter().cloned().collect();
+    let of_study = (&study, &*options.study, options.data.as_deref());
+    refuse_overwriting((&options.out, &names), of_study, sections, &further)?;
     check_writable(&options.out).map_err(message_of)?;
     writable_formats(options, &study)?;
     let progress = context.progress();
@@ -82,19 +107,25 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         terminal::remark("stopped: this is the best motion so far");
     }
     let files = files(&outcome, options)?;
+    let mut set = OutputSet::new(&options.out).file("design.json", pretty_json(&outcome.file)?);
     for (name, contents) in &files {
-        write_whole(&options.out.join(name), contents).map_err(message_of)?;
+        set = set.file(name, contents.as_slice());
     }
-    // The design last: where it stands, everything stands.
-    write_whole(&options.out.join("design.json"), &pretty_json(&outcome.file)?).map_err(message_of)?;
+    // What an earlier design left is not of this motion.
+    let is_checked = outcome.file.given.is_some();
+    let others = FURTHER.iter().filter(|name| !files.iter().any(|(written, _)| written == *name));
+    for name in others.filter(|name| !(is_checked && **name == TRAJECTORY)) {
+        set = set.absent(name);
+    }
+    set.write().map_err(message_of)?;
     if !outcome.file.feasible && !options.to.is_empty() {
         terminal::remark("no file for the robot was written: the motion breaks its limits");
     }
     if context.json {
-        terminal::print(&json(&outcome.file)?);
+        terminal::print(&json(&outcome.file)?)?;
     } else if !context.quiet {
         let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
-        terminal::print(&summary::design(&outcome.file, &options.out, &names));
+        terminal::print(&summary::design(&outcome.file, &options.out, &names))?;
     }
     Ok(if outcome.file.feasible { Verdict::Good } else { Verdict::Negative })
 }
@@ -131,9 +162,8 @@ fn files(outcome: &DesignOutcome, options: &Options) -> Result<Vec<(&'static str
         ("preview.svg", outcome.preview_svg().map_err(message_of)?.into_bytes()),
         ("path.svg", outcome.path_svg().map_err(message_of)?.into_bytes()),
     ];
-    // Who brings a trajectory has it, maybe under this very name.
     if file.given.is_none() {
-        files.insert(0, ("trajectory.csv", plain(trajectory_csv)?));
+        files.insert(0, (TRAJECTORY, plain(trajectory_csv)?));
     }
     if let Some(picture) = outcome.fitness_svg().map_err(message_of)? {
         files.push(("fitness.csv", fitness_csv(&outcome.history).into_bytes()));

@@ -41,6 +41,10 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         Chosen::Gravity => Quantity::Gravity,
         Chosen::Regressor => Quantity::Regressor,
     };
+    if let Some(out) = &options.out {
+        let inputs = [options.robot.clone(), options.states.clone()];
+        dynident::refuse_overwriting(core::slice::from_ref(out), &inputs).map_err(message_of)?;
+    }
     let robot = dynident::model::load_robot(&options.robot).map_err(|error| error.to_string())?;
     if context.json || options.out.is_some() {
         let mut table = Vec::new();
@@ -51,7 +55,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         if context.json {
             let table = String::from_utf8_lossy(&table);
             let name = options.quantity.to_possible_value().map_or(String::new(), |value| value.get_name().to_owned());
-            terminal::print(&object(name, robot.model.dof(), rows, options.out.as_deref(), &table)?);
+            terminal::print(&object(name, robot.model.dof(), rows, options.out.as_deref(), &table)?)?;
         }
         return Ok(Verdict::Good);
     }

@@ -1,8 +1,8 @@
 //! `dynident identify STUDY.toml --out DIR`.
 
-use super::{Context, json, judged, known_in, message_of, pretty_json};
+use super::{Context, json, judged, known_in, message_of, pretty_json, refuse_overwriting};
 use crate::{Verdict, summary, terminal};
-use dynident::{RunOptions, Study, check_writable, identify, write_whole};
+use dynident::{OutputSet, RunOptions, Study, check_writable, identify};
 use std::path::PathBuf;
 
 /// The user's description with the new values.
@@ -28,27 +28,31 @@ pub(crate) struct Options {
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     let study = Study::load(&options.study).map_err(message_of)?;
+    let out = (&*options.out, &[URDF, "report.html", "result.json"][..]);
+    let of_study = (&study, &*options.study, options.data.as_deref());
+    refuse_overwriting(out, of_study, &["robot", "log", "arm", "format", "motion", "estimator"], &[])?;
     check_writable(&options.out).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
-    let identification = identify(&study, &options.study, &run).map_err(known_in(&options.study))?;
+    let mut identification = identify(&study, &options.study, &run).map_err(known_in(&options.study))?;
+    if let Some(provenance) = &mut identification.result.provenance {
+        provenance.command = Some(command(options));
+    }
     let result = &identification.result;
-    if let Some(urdf) = &identification.urdf {
-        write_whole(&options.out.join(URDF), urdf.as_bytes()).map_err(message_of)?;
-    } else if options.out.join(URDF).exists() {
-        let old = options.out.join(URDF);
-        terminal::remark(&format!("{} is of an earlier run and does not belong to this result", old.display()));
-    }
-    let report = identification.report().map_err(message_of)?;
-    write_whole(&options.out.join("report.html"), report.as_bytes()).map_err(message_of)?;
-    // The result last: where it stands, everything stands.
-    write_whole(&options.out.join("result.json"), &pretty_json(result)?).map_err(message_of)?;
+    let set = OutputSet::new(&options.out)
+        .file("result.json", pretty_json(result)?)
+        .file("report.html", identification.report().map_err(message_of)?);
+    let set = match &identification.urdf {
+        Some(urdf) => set.file(URDF, urdf.as_str()),
+        None => set.absent(URDF),
+    };
+    set.write().map_err(message_of)?;
     if context.json {
-        terminal::print(&json(result)?);
+        terminal::print(&json(result)?)?;
     } else if !context.quiet {
-        terminal::print(&summary::identification(result, &options.out, identification.urdf.is_some()));
+        terminal::print(&summary::identification(result, &options.out, identification.urdf.is_some()))?;
     }
-    let problems = result.problems();
+    let problems = &result.problems;
     for problem in problems.iter().take(PROBLEMS_SHOWN) {
         terminal::remark(&format!("PROBLEM: {problem}"));
     }
@@ -57,4 +61,12 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     }
     let within = judged(&result.validation, options.max_validation_error);
     Ok(if problems.is_empty() { within } else { Verdict::Negative })
+}
+
+/// What was asked for, without what does not change the result. Folders are left to the list of files: their names say
+/// more of a computer than of a result.
+fn command(options: &Options) -> String {
+    let study = options.study.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let limit = options.max_validation_error.map(|limit| format!(" --max-validation-error {limit}"));
+    format!("dynident identify {study}{}", limit.unwrap_or_default())
 }

@@ -2,6 +2,7 @@
 
 use super::{Context, json, message_of};
 use crate::{Verdict, summary, terminal};
+use dynident::{InspectSettings, Inspection, MendedDescription, inspect_with, mended, write_whole};
 use std::path::PathBuf;
 
 /// Options of `inspect`.
@@ -9,11 +10,52 @@ use std::path::PathBuf;
 pub(crate) struct Options {
     /// URDF, or D-H table in TOML.
     robot: PathBuf,
+    /// Write a copy of the URDF in which the slips that were found are corrected, and nothing else is changed.
+    #[arg(long, value_name = "OUT.urdf")]
+    fix: Option<PathBuf>,
+    /// What all masses, the base's with them, should add up to, kg; by default what a comment of the file says.
+    #[arg(long, value_name = "KG", value_parser = kilograms)]
+    total_mass: Option<f64>,
+}
+
+fn kilograms(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().map_err(|error| format!("{error}: give a number of kilograms"))?;
+    if value > 0.0 && value <= 1e6 { Ok(value) } else { Err("give more than 0 and at most 1e6 kg".to_owned()) }
 }
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
-    let inspection = dynident::inspect(&options.robot).map_err(message_of)?;
-    terminal::print(&if context.json { json(&inspection)? } else { summary::inspection(&inspection) });
-    // A description with problems is read all the same; the status says that a person should look.
-    Ok(if inspection.audit.iter().any(|entry| entry.level == "problem") { Verdict::Negative } else { Verdict::Good })
+    let settings = InspectSettings { total_mass_kg: options.total_mass };
+    if let Some(out) = &options.fix {
+        dynident::refuse_overwriting(core::slice::from_ref(out), core::slice::from_ref(&options.robot))
+            .map_err(message_of)?;
+    }
+    let inspection = inspect_with(&options.robot, &settings).map_err(message_of)?;
+    terminal::print(&if context.json { json(&inspection)? } else { summary::inspection(&inspection) })?;
+    let Some(out) = &options.fix else { return Ok(verdict(&inspection)) };
+    match mended(&options.robot, &settings).map_err(message_of)? {
+        MendedDescription::Urdf(text) => {
+            write_whole(out, text.as_bytes()).map_err(message_of)?;
+            let left = inspect_with(out, &settings).map_err(message_of)?;
+            if !context.quiet {
+                terminal::remark(&summary::mended(&inspection, &left, out));
+            }
+            Ok(verdict(&left))
+        }
+        MendedDescription::NothingToMend => {
+            terminal::remark(&format!(
+                "{} was not written: no slip was found whose numbers can be known",
+                out.display()
+            ));
+            Ok(verdict(&inspection))
+        }
+        MendedDescription::NoUrdf => {
+            Err(format!("{}: --fix looks for slips in URDFs, and this is a D-H table", options.robot.display()))
+        }
+    }
+}
+
+/// A description with problems is read all the same; the status says that a person should look.
+fn verdict(inspection: &Inspection) -> Verdict {
+    let problem = inspection.audit.iter().any(|entry| entry.level == "problem");
+    if problem || !inspection.slips.is_empty() { Verdict::Negative } else { Verdict::Good }
 }

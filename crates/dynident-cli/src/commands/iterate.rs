@@ -1,7 +1,7 @@
 //! `dynident iterate STUDY.toml --out DIR`.
 
 use super::search::Search;
-use super::{Context, json, known_in, message_of};
+use super::{Context, json, known_in, message_of, refuse_overwriting};
 use crate::{Verdict, summary, terminal};
 use dynident::study::LegOrder;
 use dynident::{IterationWatch, RunOptions, Study, check_writable, iterate_study};
@@ -31,6 +31,13 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     if let Some(seed) = options.seed {
         study.simulation.get_or_insert_default().sensors.seed = seed;
     }
+    let legs = study.iteration.as_ref().map_or(0, |section| section.leg.len());
+    let legs: Vec<String> = (1..=legs).map(|leg| format!("leg_{leg}/runs")).collect();
+    let mut names = vec!["iterations.json", "report.html", "trajectory.json", "runs"];
+    names.extend(legs.iter().map(String::as_str));
+    let of_study = (&study, &*options.study, options.data.as_deref());
+    let sections = ["robot", "design", "iteration", "simulation", "controller"];
+    refuse_overwriting((&options.out, &names), of_study, &sections, &[])?;
     check_writable(&options.out).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
@@ -46,9 +53,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let file = file.map_err(known_in(&options.study))?;
     search.end();
     if context.json {
-        terminal::print(&json(&file)?);
+        terminal::print(&json(&file)?)?;
     } else if !context.quiet {
-        terminal::print(&summary::iteration(&file, &options.out));
+        terminal::print(&summary::iteration(&file, &options.out))?;
     }
     Ok(if file.converged { Verdict::Good } else { Verdict::Negative })
 }

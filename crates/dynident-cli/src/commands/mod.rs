@@ -15,9 +15,9 @@ pub(crate) mod validate;
 use crate::progress::Bar;
 use crate::{Verdict, terminal};
 use dynident::identification::examination::LogValidation;
-use dynident::{Progress, Silent};
+use dynident::{Progress, Silent, Study, study_inputs};
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What every command knows of how it was called.
 pub(crate) struct Context {
@@ -68,7 +68,8 @@ pub(crate) fn percentage(text: &str) -> Result<f64, String> {
     if value.is_finite() && value >= 0.0 { Ok(value) } else { Err("give 0 or more percent".to_owned()) }
 }
 
-/// Whether every log stays below the error that was asked for, if one was.
+/// Whether every log stays below the error that was asked for, if one was: of the model that is written, which is the
+/// consistent set where there is one.
 pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
     let Some(limit) = limit else { return Verdict::Good };
     if logs.is_empty() {
@@ -77,24 +78,34 @@ pub(crate) fn judged(logs: &[LogValidation], limit: Option<f64>) -> Verdict {
     }
     let mut verdict = Verdict::Good;
     for log in logs {
-        // Of the model that is written where there is a consistent set, and of the estimate behind it.
-        let models = [Some((&log.model, "estimate")), log.physical.as_ref().map(|report| (report, "written model"))];
-        for (report, whose) in models.into_iter().flatten() {
-            match report.relative_error_percent {
-                Some(error) if error <= limit => continue,
-                Some(error) => terminal::remark(&format!(
-                    "{}: the {whose}'s error of {error:.2} % is above the {limit} % asked for",
-                    log.log
-                )),
-                None => terminal::remark(&format!(
-                    "{}: the torque is zero throughout, so it has no relative error",
-                    log.log
-                )),
+        let written = log.physical.as_ref();
+        let whose = if written.is_some() { "written model" } else { "estimate" };
+        match written.unwrap_or(&log.model).relative_error_percent {
+            Some(error) if error <= limit => continue,
+            Some(error) => terminal::remark(&format!(
+                "{}: the {whose}'s error of {error:.2} % is above the {limit} % asked for",
+                log.log
+            )),
+            None => {
+                terminal::remark(&format!("{}: the torque is zero throughout, so it has no relative error", log.log));
             }
-            verdict = Verdict::Negative;
         }
+        verdict = Verdict::Negative;
     }
     verdict
+}
+
+/// That none of the files (or folders) `names` in the folder `out` is one that the study names in `sections`, or one of
+/// `further`.
+pub(crate) fn refuse_overwriting(
+    (out, names): (&Path, &[&str]),
+    (study, path, data): (&Study, &Path, Option<&Path>),
+    sections: &[&str],
+    further: &[PathBuf],
+) -> Result<(), String> {
+    let outputs: Vec<PathBuf> = names.iter().map(|name| out.join(name)).collect();
+    let inputs = [study_inputs(study, path, data, sections), further.to_vec()].concat();
+    dynident::refuse_overwriting(&outputs, &inputs).map_err(message_of)
 }
 
 /// The message of an error that a study led to. Where it speaks of another file, the study that names that file is

@@ -1,8 +1,8 @@
 //! `dynident reproduce --out DIR`.
 
-use super::{Context, json, message_of, pretty_json};
+use super::{Context, json, message_of};
 use crate::{Verdict, summary, terminal};
-use dynident::{RunOptions, write_whole};
+use dynident::RunOptions;
 use dynident_paper::reproduce;
 use std::path::PathBuf;
 
@@ -21,12 +21,10 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let progress = context.progress();
     let run = RunOptions { data: None, threads: context.threads, progress: &*progress };
     let file = reproduce(&options.out, options.seed, &run).map_err(message_of)?;
-    // The JSON last: where it stands, everything stands.
-    write_whole(&options.out.join("paper.json"), &pretty_json(&file)?).map_err(message_of)?;
     if context.json {
-        terminal::print(&json(&file)?);
+        terminal::print(&json(&file)?)?;
     } else if !context.quiet {
-        terminal::print(&summary::reproduction(&file, &options.out));
+        terminal::print(&summary::reproduction(&file, &options.out))?;
     }
     Ok(if file.reached.iter().all(|goal| goal.met) { Verdict::Good } else { Verdict::Negative })
 }

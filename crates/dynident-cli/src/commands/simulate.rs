@@ -1,9 +1,9 @@
 //! `dynident simulate STUDY.toml --out DIR`.
 
 use super::search::Search;
-use super::{Context, json, known_in, message_of, pretty_json};
+use super::{Context, json, known_in, message_of, pretty_json, refuse_overwriting};
 use crate::{Verdict, summary, terminal};
-use dynident::{RunOptions, Study, check_writable, simulate_study, write_whole};
+use dynident::{OutputSet, RunOptions, Study, check_writable, simulate_study};
 use std::path::PathBuf;
 
 /// Options of `simulate`.
@@ -27,6 +27,9 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     if let Some(seed) = options.seed {
         study.simulation.get_or_insert_default().sensors.seed = seed;
     }
+    let of_study = (&study, &*options.study, options.data.as_deref());
+    let sections = ["robot", "design", "iteration", "simulation", "controller"];
+    refuse_overwriting((&options.out, &["log.csv", "truth.json"]), of_study, &sections, &[])?;
     check_writable(&options.out).map_err(message_of)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
@@ -34,13 +37,12 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let simulation =
         simulate_study(&study, &options.study, &run, &|at| search.hear(at)).map_err(known_in(&options.study))?;
     search.end();
-    write_whole(&options.out.join("log.csv"), simulation.log.as_bytes()).map_err(message_of)?;
-    // The truth last: where it stands, everything stands.
-    write_whole(&options.out.join("truth.json"), &pretty_json(&simulation.file)?).map_err(message_of)?;
+    let set = OutputSet::new(&options.out).file("truth.json", pretty_json(&simulation.file)?);
+    set.file("log.csv", simulation.log.as_str()).write().map_err(message_of)?;
     if context.json {
-        terminal::print(&json(&simulation.file)?);
+        terminal::print(&json(&simulation.file)?)?;
     } else if !context.quiet {
-        terminal::print(&summary::simulation(&simulation.file, &options.out));
+        terminal::print(&summary::simulation(&simulation.file, &options.out))?;
     }
     Ok(if simulation.file.done { Verdict::Good } else { Verdict::Negative })
 }

@@ -26,6 +26,6 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let file = validate(&options.result, &study, &options.study, &run).map_err(known_in(&options.study))?;
-    terminal::print(&if context.json { json(&file)? } else { summary::validation(&file.validation, &file.logs) });
+    terminal::print(&if context.json { json(&file)? } else { summary::validation(&file.validation, &file.logs) })?;
     Ok(judged(&file.validation, options.max_validation_error))
 }

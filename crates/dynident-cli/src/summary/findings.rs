@@ -1,6 +1,7 @@
 //! What the importer found, said once however many joints and logs it concerns.
 
 use super::text::wrapped;
+use dynident::ResultFile;
 use dynident::recording::Level;
 use dynident::result::LogSummary;
 
@@ -18,23 +19,39 @@ struct Group {
 
 /// Problems and warnings of all logs, problems first.
 pub(super) fn findings(logs: &[LogSummary]) -> String {
+    let problems = of_level(logs, Level::Problem);
+    let spoilt = if problems.is_empty() { "" } else { SPOILT };
+    problems + spoilt + &warnings(logs)
+}
+
+/// What stands below problems.
+const SPOILT: &str = "  A PROBLEM spoils the result: fix it before trusting any figure here.\n";
+
+/// Everything that speaks against a result's model, alike findings of several joints and logs as one.
+pub(super) fn problems(r: &ResultFile) -> String {
+    let mut text = of_level(&r.logs, Level::Problem);
+    for problem in r.problems_of_the_model() {
+        text += &wrapped(&format!("  PROBLEM {problem}"), 4);
+    }
+    if text.is_empty() { text } else { text + SPOILT }
+}
+
+/// Warnings of all logs.
+pub(super) fn warnings(logs: &[LogSummary]) -> String {
+    of_level(logs, Level::Warning)
+}
+
+/// Findings of one level, alike ones as one.
+fn of_level(logs: &[LogSummary], level: Level) -> String {
     let mut groups: Vec<Group> = Vec::new();
     for (log, summary) in logs.iter().enumerate() {
         for finding in summary.import.findings.iter().chain(&summary.model_findings) {
-            if finding.level != Level::Info {
+            if finding.level == level {
                 add(&mut groups, log, finding);
             }
         }
     }
-    groups.sort_by_key(|group| core::cmp::Reverse(group.level));
-    let mut text = String::new();
-    for group in &groups {
-        text += &wrapped(&sentence(group, logs), 4);
-    }
-    if groups.iter().any(|group| group.level == Level::Problem) {
-        text += "  A PROBLEM spoils the result: fix it before trusting any figure here.\n";
-    }
-    text
+    groups.iter().map(|group| wrapped(&sentence(group, logs), 4)).collect()
 }
 
 fn add(groups: &mut Vec<Group>, log: usize, finding: &dynident::recording::Finding) {

@@ -1,9 +1,9 @@
 //! The summary of `identify`.
 
-use super::findings::findings;
+use super::findings::{problems, warnings};
 use super::noise::noise;
 use super::text::{WIDTH, listed, name, percent, shortened, table, with_deviation, wrapped};
-use super::validation::residuals;
+use super::validation::{residuals, written};
 use core::fmt::Write;
 use dynident::ResultFile;
 use dynident::identification::consistent::ParameterInterval;
@@ -31,9 +31,13 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
         r.base_parameters.len(),
         estimator(&r.method.estimator)
     );
+    let against = problems(r);
+    if !against.is_empty() {
+        let _ = writeln!(text, "{against}");
+    }
     text += &headline(r);
     text.push('\n');
-    let found = findings(&r.logs);
+    let found = warnings(&r.logs);
     if !found.is_empty() {
         let _ = writeln!(text, "{found}");
     }
@@ -85,7 +89,8 @@ fn estimator(name: &str) -> String {
 
 /// The figures that count, first.
 fn headline(r: &ResultFile) -> String {
-    let fit = percent(r.training.relative_error_percent);
+    let fitted = r.training.physical.as_ref();
+    let fit = percent(fitted.map_or(r.training.relative_error_percent, |fitted| fitted.relative_error_percent));
     if r.validation.is_empty() {
         return wrapped(
             &format!(
@@ -93,19 +98,45 @@ fn headline(r: &ResultFile) -> String {
                  Give a log (or a part of one) the role \"validate\"."
             ),
             0,
-        );
+        ) + &beside(r);
     }
     let mut text = String::new();
     for (number, log) in r.validation.iter().enumerate() {
         let prior =
             prior_of(log, None).map_or(String::new(), |p| format!("; description's own {}\u{a0}%", percent(Some(p))));
-        let error = percent(log.model.relative_error_percent);
+        let error = percent(written(log).relative_error_percent);
         text += &wrapped(
             &format!("held-out torque error {error}\u{a0}% on [{}] {} (fit {fit}\u{a0}%{prior})", number + 1, log.log),
             2,
         );
     }
-    text
+    text + &beside(r)
+}
+
+/// The free fit beside the model that is written, and whether the logs tell the two apart.
+fn beside(r: &ResultFile) -> String {
+    let Some(fit) = &r.physical.fit else { return String::new() };
+    let free = |log: &LogValidation| format!("{}\u{a0}%", percent(log.model.relative_error_percent));
+    let mut errors: Vec<String> = r.validation.iter().take(COLUMNS).map(free).collect();
+    if errors.is_empty() {
+        errors.push(format!("{}\u{a0}%", percent(r.training.relative_error_percent)));
+    }
+    let verdict = match fit.difference {
+        Some(test) if test.is_significant => format!(
+            ", which the logs tell apart from it (p\u{a0}=\u{a0}{:.1e}): what is consistent does not explain all that \
+             the logs show",
+            test.p_value
+        ),
+        Some(test) => format!(", no more than chance away (p\u{a0}=\u{a0}{:.2})", test.p_value),
+        None => String::new(),
+    };
+    wrapped(
+        &format!(
+            "  that is the physically consistent model, the one that is written; the free fit has {}{verdict}",
+            errors.join(", ")
+        ),
+        4,
+    )
 }
 
 fn prior_of(log: &LogValidation, joint: Option<usize>) -> Option<f64> {
@@ -125,14 +156,17 @@ fn joints(r: &ResultFile) -> String {
         }
     }
     let row = |joint: Option<usize>| {
-        let (title, fit) = joint.map_or(("all joints", r.training.relative_error_percent), |j| {
-            let joint = &r.training.joints[j];
-            (&joint.name[..], joint.relative_error_percent)
-        });
+        let (all, joints) =
+            r.training.physical.as_ref().map_or((r.training.relative_error_percent, &r.training.joints), |written| {
+                (written.relative_error_percent, &written.joints)
+            });
+        let (title, fit) =
+            joint.map_or(("all joints", all), |j| (&joints[j].name[..], joints[j].relative_error_percent));
         let mut row = vec![name(title), percent(fit)];
         for log in logs {
-            let (relative, rms) = joint.map_or((log.model.relative_error_percent, log.model.rmse_nm), |j| {
-                let joint = &log.model.joints[j];
+            let written = written(log);
+            let (relative, rms) = joint.map_or((written.relative_error_percent, written.rmse_nm), |j| {
+                let joint = &written.joints[j];
                 (joint.relative_error_percent, joint.rmse_nm)
             });
             row.push(percent(relative));
@@ -183,12 +217,12 @@ fn friction(r: &ResultFile) -> String {
 /// The best known base parameters, and how many are hardly known.
 fn parameters(r: &ResultFile) -> String {
     let mut order: Vec<usize> = (0..r.base_parameters.len()).filter(|&i| r.base_parameters[i].excited).collect();
-    let error = |index: usize| r.base_parameters[index].relative_std_percent.unwrap_or(f64::INFINITY);
+    let error = |index: usize| r.base_parameters[index].relative_half_width_percent().unwrap_or(f64::INFINITY);
     order.sort_by(|a, b| error(*a).total_cmp(&error(*b)));
     let counted = |limit: f64| order.iter().filter(|index| error(**index) <= limit).count();
     let mut text = wrapped(
         &format!(
-            "error bars: {} of {} base parameters known to 10 %, {} to 30 %. The best:",
+            "95 % error bars: {} of {} base parameters known to 10 %, {} to 30 %. The best:",
             counted(10.0),
             r.base_parameters.len(),
             counted(30.0)
@@ -197,10 +231,10 @@ fn parameters(r: &ResultFile) -> String {
     );
     let rows = order.iter().take(SHOWN).map(|&index| {
         let p = &r.base_parameters[index];
-        let [value, std] = with_deviation(p.value, p.std);
-        vec![value, std, p.unit.clone(), shortened(&p.expression, EXPRESSION)]
+        let [value, half_width] = with_deviation(p.value, p.half_width_95);
+        vec![value, half_width, p.unit.clone(), shortened(&p.expression, EXPRESSION)]
     });
-    let header = ["value", "+-", "unit", "base parameter"].map(str::to_owned);
+    let header = ["value", "+- (95 %)", "unit", "base parameter"].map(str::to_owned);
     text += &table(&header, 0..2, rows.collect());
     let vague: Vec<&str> = order
         .iter()

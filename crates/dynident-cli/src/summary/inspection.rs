@@ -1,8 +1,13 @@
 //! The summary of `inspect`.
 
-use super::text::{name, table, wrapped};
+use super::text::{name, rounded, table, wrapped};
 use core::fmt::Write;
 use dynident::Inspection;
+use dynident::result::SlipEntry;
+use std::path::Path;
+
+/// Corrections of one slip that are shown; JSON has all.
+const SHOWN: usize = 6;
 
 /// A robot description: joints, base parameters, and what is wrong with it.
 pub(crate) fn inspection(i: &Inspection) -> String {
@@ -14,6 +19,9 @@ pub(crate) fn inspection(i: &Inspection) -> String {
             let level = if level == "problem" { "PROBLEM" } else { level };
             text += &wrapped(&format!("  {level} {}: {}", entry.place, entry.what), 4);
         }
+    }
+    for slip in &i.slips {
+        text += &of_slip(slip);
     }
     text.push('\n');
     let rows = i.joints.iter().zip(&i.bodies).map(|(joint, body)| {
@@ -33,11 +41,42 @@ pub(crate) fn inspection(i: &Inspection) -> String {
     let base = &i.base_parameters;
     let _ = writeln!(text, "\n{} base parameters (what motion and torque can determine):", base.count);
     for expression in &base.expressions {
-        text += &wrapped(&format!("  {expression}"), 6);
+        text += &wrapped(&format!("  {}", rounded(expression)), 6);
     }
     if base.numerical_rank != base.count {
         let doubt = format!("  regressors at random states have rank {}: the split is not clear", base.numerical_rank);
         text += &wrapped(&doubt, 4);
     }
     text
+}
+
+/// A slip, its evidence and its corrections.
+fn of_slip(slip: &SlipEntry) -> String {
+    let mut text = wrapped(&format!("  SLIP ({}): {}", slip.slip, slip.what), 4);
+    text += &wrapped(&format!("    evidence: {}", slip.evidence), 6);
+    for one in slip.corrections.iter().take(SHOWN) {
+        text += &wrapped(&format!("    {} {}: {} -> {}", name(&one.link), one.number, one.from, one.to), 6);
+    }
+    let count = slip.corrections.len();
+    if count > SHOWN {
+        let _ = writeln!(text, "    and {} more numbers", count - SHOWN);
+    }
+    if count > 0 {
+        text += "    --fix OUT.urdf writes a copy with these numbers\n";
+    }
+    text
+}
+
+/// What a mended copy has become.
+pub(crate) fn mended(before: &Inspection, after: &Inspection, out: &Path) -> String {
+    let numbers: usize = before.slips.iter().map(|slip| slip.corrections.len()).sum();
+    let problems = |i: &Inspection| i.audit.iter().filter(|entry| entry.level == "problem").count();
+    format!(
+        "{}: {numbers} numbers changed, every other byte as it was; problems before {} and now {}, slips before {} and now {}",
+        out.display(),
+        problems(before),
+        problems(after),
+        before.slips.len(),
+        after.slips.len()
+    )
 }

@@ -17,7 +17,7 @@ pub(crate) use benchmark::benchmark;
 pub(crate) use check::check;
 pub(crate) use design::design;
 pub(crate) use identification::identification;
-pub(crate) use inspection::inspection;
+pub(crate) use inspection::{inspection, mended};
 pub(crate) use iteration::{iteration, simulation};
 pub(crate) use reproduction::reproduction;
 pub(crate) use validation::validation;

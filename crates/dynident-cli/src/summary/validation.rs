@@ -13,17 +13,21 @@ const SIGNIFICANCE: f64 = 0.01;
 pub(crate) fn validation(logs: &[LogValidation], summaries: &[LogSummary]) -> String {
     let mut text = String::new();
     for log in logs {
+        let free = match log.physical {
+            Some(_) => format!("free fit {} %, ", percent(log.model.relative_error_percent)),
+            None => String::new(),
+        };
         let headline = format!(
-            "{}: torque error {} % (description's own parameters {} %), {} samples",
+            "{}: torque error {} % ({free}description's own parameters {} %), {} samples",
             log.log,
-            percent(log.model.relative_error_percent),
+            percent(written(log).relative_error_percent),
             percent(log.prior.as_ref().and_then(|prior| prior.relative_error_percent)),
             log.model.samples
         );
         text += &wrapped(&headline, 4);
         let mut rows: Vec<Vec<String>> = (0..log.model.joints.len()).map(|joint| row(log, Some(joint))).collect();
         rows.push(row(log, None));
-        let header = ["joint", "error %", "rms Nm", "max Nm", "R2", "unfiltered %", "prior %"].map(str::to_owned);
+        let header = ["joint", "error %", "rms Nm", "max Nm", "R2", "free, raw %", "prior %"].map(str::to_owned);
         text += &table(&header, 1..7, rows);
         text += &residuals(log);
         text.push('\n');
@@ -94,17 +98,23 @@ fn at_rest(log: &LogValidation) -> String {
     }
 }
 
+/// The model that is written: the consistent set where there is one, else the estimate.
+pub(super) fn written(log: &LogValidation) -> &ValidationReport {
+    log.physical.as_ref().unwrap_or(&log.model)
+}
+
 fn row(log: &LogValidation, joint: Option<usize>) -> Vec<String> {
     let relative = |report: &ValidationReport| {
         joint.map_or(report.relative_error_percent, |j| report.joints[j].relative_error_percent)
     };
-    let (rms, max, r_squared) = joint.map_or((log.model.rmse_nm, log.model.max_error_nm, log.model.r_squared), |j| {
-        let joint = &log.model.joints[j];
+    let own = written(log);
+    let (rms, max, r_squared) = joint.map_or((own.rmse_nm, own.max_error_nm, own.r_squared), |j| {
+        let joint = &own.joints[j];
         (joint.rmse_nm, joint.max_error_nm, joint.r_squared)
     });
     vec![
         joint.map_or("all joints".to_owned(), |j| name(&log.model.joints[j].name)),
-        percent(relative(&log.model)),
+        percent(relative(own)),
         format!("{rms:.4}"),
         format!("{max:.4}"),
         r_squared.map_or("-".to_owned(), |r| format!("{r:.4}")),

@@ -69,11 +69,18 @@ fn identify_held_out(out: &Path, further: &[&str]) -> crate::common::CommandOutc
 fn help_tells_the_path_and_needs_no_arguments() {
     let ran = run_in(&broken(), &["--help"]);
     assert_eq!(ran.status, 0);
-    for step in ["1. dynident inspect", "2. write study.toml", "3. dynident identify", "4. dynident validate", "5. "] {
+    for step in [
+        "1. dynident inspect",
+        "2. write study.toml",
+        "3. dynident check",
+        "4. dynident identify",
+        "5. dynident validate",
+        "6. ",
+    ] {
         assert!(ran.stdout.contains(step), "{}", ran.stdout);
     }
     assert!(run_in(&broken(), &["--version"]).stdout.starts_with("dynident "));
-    for name in ["inspect", "evaluate", "design", "identify", "validate"] {
+    for name in ["inspect", "evaluate", "design", "check", "identify", "validate"] {
         assert_eq!(run_in(&broken(), &[name, "--help"]).status, 0);
     }
 }

@@ -9,7 +9,7 @@ fn identify(out: &Path, from: &str, to: &str, further: &[&str]) -> CommandOutcom
     let study = std::fs::read_to_string(examples.join("ur10_simulated.toml")).unwrap();
     assert!(study.contains(from), "{study}");
     let robot = repository("robots/ur10.urdf");
-    let study = study.replace("../robots/ur10.urdf", &robot.display().to_string()).replace(from, to);
+    let study = study.replace(from, to).replace("../robots/ur10.urdf", &robot.display().to_string());
     let path = out.join("study.toml");
     std::fs::write(&path, study).unwrap();
     let (path, data) = (path.display().to_string(), examples.display().to_string());
@@ -64,4 +64,103 @@ fn a_data_folder_that_is_none_is_an_error() {
     let ran = identify(out.path(), "role", "role", &["--data", "/nonexistent"]);
     assert_eq!(ran.status, 2);
     assert!(ran.stderr.contains("/nonexistent"), "{}", ran.stderr);
+}
+
+/// The outputs of `identify` in a folder of their own.
+fn outputs(folder: &Path) -> Vec<Vec<u8>> {
+    let names = ["found/result.json", "found/report.html", "found/identified.urdf"];
+    names.iter().map(|name| std::fs::read(folder.join(name)).unwrap()).collect()
+}
+
+#[test]
+fn what_is_read_is_not_written_over() {
+    let out = tempfile::tempdir().unwrap();
+    std::fs::create_dir(out.path().join("found")).unwrap();
+    for (from, input, name) in [
+        ("../robots/ur10.urdf", repository("robots/ur10.urdf"), "identified.urdf"),
+        ("ur10_simulated/train.csv", repository("examples/ur10_simulated/train.csv"), "result.json"),
+    ] {
+        let path = out.path().join("found").join(name);
+        std::fs::copy(&input, &path).unwrap();
+        // By a link, too: it is the same file.
+        let link = out.path().join(format!("link_to_{name}.csv"));
+        #[cfg(unix)]
+        std::os::unix::fs::symlink(&path, &link).unwrap();
+        #[cfg(not(unix))]
+        let link = path.clone();
+        let ran = identify(out.path(), from, &link.display().to_string(), &[]);
+        assert_eq!(ran.status, 2, "{}", ran.stderr);
+        assert!(ran.stderr.contains(name) && ran.stderr.contains("would overwrite"), "{}", ran.stderr);
+        assert_eq!(std::fs::read(&path).unwrap(), std::fs::read(&input).unwrap());
+        std::fs::remove_file(&path).unwrap();
+    }
+}
+
+/// Report, result and description of one run say the same of where they come from, and nothing of this computer.
+#[test]
+fn outputs_carry_one_identity() {
+    let identity = |from: &str, to: &str| -> String {
+        let out = tempfile::tempdir().unwrap();
+        // Paths as a user has them, seen from the study.
+        for (source, name) in [("robots", "robots"), ("examples/ur10_simulated", "ur10_simulated")] {
+            std::fs::create_dir(out.path().join(name)).unwrap();
+            for entry in std::fs::read_dir(repository(source)).unwrap().flatten().filter(|e| e.path().is_file()) {
+                std::fs::copy(entry.path(), out.path().join(name).join(entry.file_name())).unwrap();
+            }
+        }
+        let study = std::fs::read_to_string(repository("examples/ur10_simulated.toml")).unwrap();
+        let study = study.replace("../robots", "robots");
+        assert!(study.contains(from));
+        std::fs::write(out.path().join("study.toml"), study.replace(from, to)).unwrap();
+        let study = out.path().join("study.toml").display().to_string();
+        let ran = run_in(out.path(), &["identify", &study, "--out", "found", "--quiet"]);
+        assert_eq!(ran.status, 0, "{}", ran.stderr);
+        let texts: Vec<String> =
+            outputs(out.path()).into_iter().map(|bytes| String::from_utf8(bytes).unwrap()).collect();
+        let result: serde_json::Value = serde_json::from_str(&texts[0]).unwrap();
+        let provenance = &result["provenance"];
+        let identity = provenance["identity"].as_str().unwrap().to_owned();
+        let here = out.path().display().to_string();
+        for text in &texts {
+            assert!(text.contains(&identity) && !text.contains(&here), "{identity}");
+        }
+        assert!(texts[1].contains("SHA-256") && texts[1].contains(result["timings_s"]["made_at"].as_str().unwrap()));
+        assert_eq!(provenance["command"], "dynident identify study.toml");
+        let inputs: Vec<&str> =
+            provenance["inputs"].as_array().unwrap().iter().map(|input| input["file"].as_str().unwrap()).collect();
+        assert_eq!(inputs, ["robots/ur10.urdf", "ur10_simulated/train.csv", "ur10_simulated/test.csv"]);
+        assert_eq!(result["problems"], serde_json::json!([]));
+        identity
+    };
+    let same = identity("role", "role");
+    assert_eq!(identity("role", "role"), same, "in another folder");
+    assert_ne!(identity("name = \"UR10, simulated\"", "name = \"another\""), same, "another study");
+}
+
+/// Without held-out logs the same question is put to the rows that were fitted to.
+#[test]
+fn a_reversed_torque_is_found_without_held_out_logs() {
+    let out = tempfile::tempdir().unwrap();
+    let columns = "torque = { columns = \"tau{1..6}_Nm\"";
+    let examples = repository("examples");
+    let study = std::fs::read_to_string(examples.join("ur10_simulated.toml")).unwrap();
+    let study = study.replace(columns, &format!("{columns}, sign = [-1, 1, 1, 1, 1, 1]"));
+    let study = study.replace("../robots", &repository("robots").display().to_string());
+    let study = study.replace("role = \"validate\"", "role = \"identify\"");
+    std::fs::write(out.path().join("study.toml"), study).unwrap();
+    let data = examples.display().to_string();
+    let ran = run_in(out.path(), &["identify", "study.toml", "--out", "found", "--data", &data]);
+    assert_eq!(ran.status, 1, "{}", ran.stderr);
+    assert!(ran.stdout.contains("PROBLEM"), "{}", ran.stdout);
+    let result: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(out.path().join("found/result.json")).unwrap()).unwrap();
+    let problems: Vec<&str> = result["problems"].as_array().unwrap().iter().filter_map(|p| p.as_str()).collect();
+    let fitted = |problem: &&&str| problem.contains("fitted to") && problem.contains("shoulder_pan_joint");
+    assert!(problems.iter().any(|problem| fitted(&problem)), "{problems:?}");
+    assert_eq!(result["physical"]["fit"]["difference"]["is_significant"], true);
+    // On the page the problems stand before any figure, and no tick beside them.
+    let page = std::fs::read_to_string(out.path().join("found/report.html")).unwrap();
+    let at = |what: &str| page.find(what).unwrap_or_else(|| panic!("{what} is not on the page"));
+    assert!(at("What speaks against loading this model") < at("class=\"key-figures\""));
+    assert!(!page.contains("class=\"good\""));
 }

@@ -7,15 +7,24 @@ use core::fmt::Write;
 /// Coefficients below this are rounding noise of the split, not geometry (lengths are given to a micrometre at best).
 pub(super) const NEGLIGIBLE: f64 = 1e-9;
 
+/// How many digits the factors of a sum have.
+#[derive(Clone, Copy)]
+pub(super) enum Digits {
+    /// Six, without trailing zeros: a name to read.
+    Six,
+    /// As many as read back to the same `f64`.
+    All,
+}
+
 /// One sum per independent column.
-pub(super) fn expressions(columns: &[Column], split: &IndependentColumns) -> Vec<String> {
+pub(super) fn expressions(columns: &[Column], split: &IndependentColumns, digits: Digits) -> Vec<String> {
     let mut sums: Vec<String> = split.independent.iter().map(|&column| columns[column].symbol()).collect();
     for (&dependent, factors) in split.dependent.iter().zip(split.regrouping.column_iter()) {
         let symbol = columns[dependent].symbol();
         for (sum, factor) in sums.iter_mut().zip(factors.iter()).filter(|(_, factor)| factor.abs() >= NEGLIGIBLE) {
             let sign = if *factor < 0.0 { '-' } else { '+' };
             // Writing to a string cannot fail.
-            let _ = match coefficient(factor.abs()) {
+            let _ = match coefficient(factor.abs(), digits) {
                 None => write!(sum, " {sign} {symbol}"),
                 Some(number) => write!(sum, " {sign} {number} {symbol}"),
             };
@@ -24,12 +33,15 @@ pub(super) fn expressions(columns: &[Column], split: &IndependentColumns) -> Vec
     sums
 }
 
-/// Six significant digits without trailing zeros; nothing for one.
-fn coefficient(value: f64) -> Option<String> {
+/// Nothing for one.
+fn coefficient(value: f64, digits: Digits) -> Option<String> {
     if (value - 1.0).abs() < NEGLIGIBLE {
         return None;
     }
-    let digits = (5 - value.log10().floor() as i32).clamp(0, 15) as usize;
-    let text = format!("{value:.digits$}");
+    let decimals = match digits {
+        Digits::Six => (5 - value.log10().floor() as i32).clamp(0, 15) as usize,
+        Digits::All => return Some(value.to_string()),
+    };
+    let text = format!("{value:.decimals$}");
     Some(if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text })
 }

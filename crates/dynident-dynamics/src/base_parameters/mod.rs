@@ -5,14 +5,17 @@
 //! Khalil 1990; Gautier 1991). The dependencies come from the robot's structure ([`structural`]); the rank of
 //! regressors at random states ([`numerical_rank`], [`numerical_rank_by_body`]) is the cross-check.
 
+mod determination;
 mod expression;
 mod numerical;
 mod one_joint_motions;
 mod structural;
 
+pub use determination::Determination;
 pub use numerical::{NumericalRank, numerical_rank};
 pub use one_joint_motions::numerical_rank_by_body;
 
+use self::expression::Digits;
 use crate::independent_columns::{IndependentColumns, split_columns};
 use crate::regressor_panels::{Column, all_columns};
 use dynident_model::Model;
@@ -104,9 +107,16 @@ impl BaseParameters {
         dependent.filter(|(d, _)| k.column(*d).amax() < expression::NEGLIGIBLE).map(|(_, &column)| column).collect()
     }
 
-    /// Readable sums, one per base parameter: `Izz1 + 0.49 m2`.
+    /// Readable sums, one per base parameter: `Izz1 + 0.49 m2`. Factors have six digits, so that the sums can serve as
+    /// names: they are the same on every processor.
     pub fn expressions(&self) -> Vec<String> {
-        expression::expressions(&self.columns, &self.split)
+        expression::expressions(&self.columns, &self.split, Digits::Six)
+    }
+
+    /// As [`expressions`](Self::expressions), with every factor in the shortest form that reads back to the same `f64`:
+    /// to calculate with. Factors below 1e-9 are left out, as rounding.
+    pub fn exact_expressions(&self) -> Vec<String> {
+        expression::expressions(&self.columns, &self.split, Digits::All)
     }
 
     /// How clear the split was: the smallest share that still counted as independent, and the largest that counted as

@@ -1,6 +1,6 @@
 //! The numerical rank of regressors at random states: the cross-check of the structural base parameters.
 
-use crate::independent_columns::independent_columns;
+use crate::independent_columns::independent_regressor_columns;
 use crate::regressor_panels::{PanelLayout, Panels, all_columns, regressor_panels};
 use crate::workspace::BatchWorkspace;
 use dynident_model::Model;
@@ -42,7 +42,7 @@ pub fn numerical_rank(model: &Model, terms: &[TorqueTerm], seed: u64, tolerance:
             stacked.view_mut((joint * samples, column), (samples, 1)).copy_from_slice(values);
         }
     }
-    let split = independent_columns(&stacked, tolerance);
+    let split = independent_regressor_columns(&stacked, tolerance);
     NumericalRank {
         independent: split.independent,
         weakest_independent: split.weakest_independent,

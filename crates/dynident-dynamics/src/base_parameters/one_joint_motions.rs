@@ -7,7 +7,7 @@
 //! fourth power for [`numerical_rank`](super::numerical_rank)).
 
 use super::NumericalRank;
-use crate::independent_columns::independent_columns;
+use crate::independent_columns::independent_regressor_columns;
 use crate::inverse_dynamics::{inertial_wrench, moved};
 use crate::states::BodyState;
 use crate::workspace::joint_transform;
@@ -57,7 +57,7 @@ pub fn numerical_rank_by_body(model: &Model, seed: u64, tolerance: f64) -> Numer
                 inward = maps[joint].parent;
             }
         }
-        let split = independent_columns(&DMatrix::from_fn(rows.len(), 10, |row, k| rows[row][k]), tolerance);
+        let split = independent_regressor_columns(&DMatrix::from_fn(rows.len(), 10, |row, k| rows[row][k]), tolerance);
         all.independent.extend(split.independent.iter().map(|k| 10 * j + k));
         all.weakest_independent = all.weakest_independent.min(split.weakest_independent);
         all.strongest_dependent = all.strongest_dependent.max(split.strongest_dependent);

@@ -122,6 +122,8 @@ pub struct PhysicalProblem {
     pub(super) triangle: DMatrix<f64>,
     pub(super) rotated: DVector<f64>,
     pub(super) total_mass_kg: Option<Limits>,
+    /// What is believed of each body's mass: its value and its standard deviation, kg.
+    pub(super) mass_beliefs: Vec<Option<[f64; 2]>>,
 }
 
 /// Least relative width of an interval: narrower, it has no inside in double precision.
@@ -148,7 +150,22 @@ impl PhysicalProblem {
         let (triangle, rotated) = (factor.regressor_triangle(), factor.rotated_torque());
         finite("an entry of the factor", triangle.as_slice())?;
         finite("an entry of the factor", rotated.as_slice())?;
-        Ok(Self { base, bodies, whitenings, scalars, triangle, rotated, total_mass_kg: None })
+        Ok(Self { base, bodies, whitenings, scalars, triangle, rotated, total_mass_kg: None, mass_beliefs: Vec::new() })
+    }
+
+    /// Adds what is believed of the masses, body by body: value and standard deviation, kg. Each counts like one more
+    /// measurement, `½((m − m₀)/σ)²` beside the data's own half squares: next to nothing where the data determine a
+    /// mass, and everything where they do not, for bodies that differ in their mass alone are all alike to a prior
+    /// that measures shapes.
+    ///
+    /// # Errors
+    /// [`PhysicalError::Mismatch`] for another number of beliefs than bodies, [`PhysicalError::NotFinite`] for one that
+    /// is no number.
+    pub fn with_mass_beliefs(mut self, beliefs: Vec<Option<[f64; 2]>>) -> Result<Self, PhysicalError> {
+        expect("beliefs of masses", self.bodies.len(), beliefs.len())?;
+        finite("a belief of a mass", &beliefs.iter().flatten().flatten().copied().collect::<Vec<_>>())?;
+        self.mass_beliefs = beliefs;
+        Ok(self)
     }
 
     /// Limits of the sum of all bodies' masses, known ones included.

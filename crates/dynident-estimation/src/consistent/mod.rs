@@ -13,6 +13,7 @@ mod conic;
 mod constraints;
 mod coordinates;
 mod description;
+mod difference;
 mod error;
 mod fit;
 mod interior_point;
@@ -24,6 +25,7 @@ mod settings;
 mod stacked;
 
 pub use description::{BaseMap, Ellipsoid, Limits, PhysicalBody, PhysicalProblem, PhysicalScalar, rough_body};
+pub use difference::ConsistencyTest;
 pub use error::PhysicalError;
 pub use fit::{PhysicalBodyFit, PhysicalFit, PhysicalStatus, physical_fit};
 pub use intervals::{ConsistentInterval, ConsistentIntervals, IntervalEnd, IntervalSettings};

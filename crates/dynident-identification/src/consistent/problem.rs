@@ -8,11 +8,14 @@ use dynident_estimation::consistent::{
     BaseMap, Ellipsoid, PhysicalBody, PhysicalFit, PhysicalProblem, PhysicalScalar, physical_fit, rough_body,
 };
 use dynident_model::terms::TorqueTerm;
-use dynident_model::{InertialParameters, Model};
+use dynident_model::{Body, InertialParameters, Model};
 
 /// A joint's noise counts as at least this share of its torque's root mean square: no model is better, and with
 /// noise-free (simulated) torque the prior would otherwise vanish beside the data in double precision.
 const LEAST_RELATIVE_SIGMA: f64 = 1.0e-4;
+
+/// Standard deviation of a description's masses, as a share of each.
+const MASS_SHARE: f64 = 0.3;
 
 /// Share of a rough body that is mixed into a description's: bodies drawn as rods or plates have no extent at all in
 /// some direction.
@@ -31,7 +34,7 @@ pub fn consistent_parameters(
     settings: &ConsistencySettings,
 ) -> Result<PhysicalFit, ConsistencyError> {
     let problem = consistency_problem(robot, problem, joint_sigma, settings)?;
-    Ok(physical_fit(&problem, &settings.fit())?)
+    Ok(physical_fit(&problem.with_mass_beliefs(mass_beliefs(robot, settings))?, &settings.fit())?)
 }
 
 /// The consistent set of parameters whose base parameters are nearest to `theta` in the data's own metric: for
@@ -47,8 +50,18 @@ pub fn nearest_consistent_parameters(
     theta: &[f64],
 ) -> Result<PhysicalFit, ConsistencyError> {
     let problem = consistency_problem(robot, problem, joint_sigma, settings)?;
-    let around = problem.around(theta)?;
+    let around = problem.around(theta)?.with_mass_beliefs(mass_beliefs(robot, settings))?;
     Ok(physical_fit(&around, &settings.fit())?)
+}
+
+/// The masses of bodies that the description gives, each with its standard deviation; none where the settings say more.
+fn mass_beliefs(robot: &ParametricModel, settings: &ConsistencySettings) -> Vec<Option<[f64; 2]>> {
+    let belief = |(index, body): (usize, &Body)| {
+        let own = &robot.nominal()[10 * index..10 * index + 10];
+        let is_stated = settings.bodies.get(body.name()).is_some_and(|own| own.prior.is_some() || own.known.is_some());
+        (body.prior().is_some() && !is_stated && consistent_body(own).0).then(|| [own[0], MASS_SHARE * own[0]])
+    };
+    robot.model().bodies().iter().enumerate().map(belief).collect()
 }
 
 /// Bodies that the description says are impossible: a rough body stands in for each as a prior unless the settings name

@@ -3,7 +3,7 @@
 use super::mistake::{Channels, Mistake};
 use super::motion_rows::MotionRows;
 use super::plausibility::is_rate_of_a_recorder;
-use core::f64::consts::{FRAC_PI_2, PI, TAU};
+use core::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI, TAU};
 use dynident_dynamics::ParametricModel;
 
 /// Single mistakes, the likelier ones first.
@@ -51,9 +51,11 @@ pub(super) fn candidates(robot: &ParametricModel, rows: &MotionRows) -> Vec<Mist
                 .map(|channels| Mistake::Order { order: order.clone(), channels }),
         );
     }
-    // Zeros a quarter or half a turn away.
+    // Zeros a quarter or half a turn away, or near where they should be.
     for joint in (0..dof).filter(|&joint| model.joints()[joint].turns()) {
-        all.extend([-FRAC_PI_2, FRAC_PI_2, PI].map(|offset_rad| Mistake::Offset { joint, offset_rad }));
+        all.extend(
+            [-FRAC_PI_2, FRAC_PI_2, PI, -FRAC_PI_6, FRAC_PI_6].map(|offset_rad| Mistake::Offset { joint, offset_rad }),
+        );
     }
     // Mounting.
     let gravity = model.gravity();

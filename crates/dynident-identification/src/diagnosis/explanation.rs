@@ -6,12 +6,14 @@ use super::nominal::left_by_nominal;
 use crate::consistent::{ConsistencySettings, consistent_parameters};
 use crate::rows::predicted_torque;
 use dynident_dynamics::{BatchWorkspace, Panels, ParametricModel, regressor_panels};
-use dynident_estimation::{
-    CovarianceMethod, EstimationError, LinearProblem, SegmentSettings, SegmentedFactor, WeightedSettings,
-    weighted_least_squares,
-};
+use dynident_estimation::{EstimationError, LinearProblem, SegmentSettings, SegmentedFactor};
 use dynident_model::terms::JointMotion;
+use nalgebra::DVector;
 
+/// Rounds of weighting; the third changes scores by less than a hundredth.
+const ROUNDS: usize = 3;
+/// Added to columns of unit length: what is not excited stays at zero.
+const RIDGE: f64 = 1.0e-10;
 /// What is left of a joint's torque counts as nothing below this share of it: noise-free simulations would otherwise
 /// be judged by their rounding.
 const FLOOR: f64 = 1.0e-2;
@@ -42,15 +44,10 @@ impl Explanation {
         consistency: Option<&ConsistencySettings>,
     ) -> Result<Self, EstimationError> {
         let (problem, alone) = problem(robot, rows)?;
-        let settings =
-            WeightedSettings { covariance: CovarianceMethod::White, tolerance: 1e-2, ..WeightedSettings::default() };
-        let estimate = weighted_least_squares(&problem, &settings)?;
-        let torque = residuals(&problem, &vec![0.0; estimate.values.len()], &[])?;
-        let free = residuals(&problem, &estimate.values, &torque)?;
-        let fit = consistency.and_then(|settings| {
-            let sigma: Vec<f64> = estimate.joint_sigma.iter().zip(&torque).map(|(s, t)| s.max(FLOOR * t)).collect();
-            consistent_parameters(robot, &problem, &sigma, settings).ok()
-        });
+        let theta = solved(&problem)?;
+        let torque = residuals(&problem, &vec![0.0; theta.len()], &[])?;
+        let free = residuals(&problem, &theta, &torque)?;
+        let fit = consistency.and_then(|settings| consistent_parameters(robot, &problem, &free, settings).ok());
         let consistent = match &fit {
             Some(fit) => residuals(&problem, &fit.base_values, &torque)?,
             None => Vec::new(),
@@ -86,6 +83,36 @@ fn score(left: &[f64], torque: &[f64]) -> f64 {
     left.iter().zip(torque).filter(|(_, torque)| **torque > 0.0).map(|(left, torque)| (left / torque).ln()).sum()
 }
 
+/// Base parameters by weighted least squares, joints weighted by what is left of their torque: what
+/// [`weighted_least_squares`](dynident_estimation::weighted_least_squares) finds, without its covariance and its
+/// account of what is excited, which a comparison of readings does not need.
+fn solved(problem: &LinearProblem) -> Result<Vec<f64>, EstimationError> {
+    let torque = residuals(problem, &vec![0.0; problem.columns().len()], &[])?;
+    let mut sigma = torque.clone();
+    let mut theta = DVector::zeros(problem.columns().len());
+    for _ in 0..ROUNDS {
+        let weights: Vec<f64> = sigma.iter().map(|sigma| if *sigma > 0.0 { sigma.recip() } else { 0.0 }).collect();
+        let factor = problem.combined(&weights)?;
+        let norms: Vec<f64> = factor.column_norms().iter().map(|norm| norm.max(f64::MIN_POSITIVE)).collect();
+        let mut triangle = factor.regressor_triangle();
+        for (mut column, norm) in triangle.column_iter_mut().zip(&norms) {
+            column /= *norm;
+        }
+        let mut gram = triangle.tr_mul(&triangle);
+        for k in 0..gram.nrows() {
+            gram[(k, k)] += RIDGE;
+        }
+        let right = triangle.tr_mul(&factor.rotated_torque());
+        let Some(cholesky) = gram.cholesky() else { break };
+        theta = cholesky.solve(&right);
+        for (value, norm) in theta.iter_mut().zip(&norms) {
+            *value /= norm;
+        }
+        sigma = residuals(problem, theta.as_slice(), &torque)?;
+    }
+    Ok(theta.as_slice().to_vec())
+}
+
 /// The torque that base parameters `theta` predict, one vector for each joint.
 pub(super) fn predicted(robot: &ParametricModel, rows: &MotionRows, theta: &[f64]) -> Vec<Vec<f64>> {
     let panels = panels(robot, rows);
@@ -112,7 +139,7 @@ fn problem(robot: &ParametricModel, rows: &MotionRows) -> Result<(LinearProblem,
     let (model, layout) = (robot.model(), robot.layout());
     let samples = rows.len();
     let mut panels = panels(robot, rows);
-    let mut problem = LinearProblem::new(robot.base().expressions().to_vec(), robot.joint_names());
+    let mut problem = LinearProblem::new(robot.base().expressions(), robot.joint_names());
     let mut alone = Vec::with_capacity(model.dof());
     for joint in 0..model.dof() {
         panels.torque_mut(joint).copy_from_slice(&rows.tau[joint]);

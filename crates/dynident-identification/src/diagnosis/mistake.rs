@@ -67,6 +67,19 @@ impl Mistake {
         }
     }
 
+    /// The joint whose torque column a joint gets if this mistake is corrected.
+    pub(super) fn torque_from(&self, joint: usize) -> usize {
+        match self {
+            Self::Order { order, channels: Channels::Torque | Channels::Both } => order[joint],
+            Self::Order { .. }
+            | Self::Sign { .. }
+            | Self::Offset { .. }
+            | Self::PositionUnit { .. }
+            | Self::TimeUnit { .. }
+            | Self::Gravity { .. } => joint,
+        }
+    }
+
     /// The motion as it was if this mistake was made.
     pub fn corrected(&self, rows: &MotionRows) -> MotionRows {
         let mut out = rows.clone();

@@ -35,7 +35,6 @@ pub use unseen_load::UnseenLoad;
 use crate::logs::Logs;
 use crate::recording::{LogError, Role};
 use crate::settings::IdentificationSettings;
-use crate::training::Training;
 use dynident_dynamics::ParametricModel;
 use dynident_estimation::EstimationError;
 use dynident_model::Model;
@@ -46,9 +45,6 @@ use thiserror::Error;
 
 /// Instants that readings are compared on; more make it slower and not surer.
 const INSTANTS: usize = 300;
-/// Per joint: what a consistent robot leaves more than parameters of each joint's own do, as a logarithm, before other
-/// readings are tried unasked. Simulated and well-described robots stay below 0.05.
-const DOUBTFUL: f64 = 0.1;
 
 /// What was found about study, robot and logs.
 #[derive(Clone, Debug)]
@@ -86,26 +82,10 @@ pub(crate) fn is_beyond_limits(model: &Model, report: &ImportReport) -> bool {
     plausibility::is_beyond(model, report)
 }
 
-/// Whether a fit's own figures give reason to try other readings: a consistent robot that leaves clearly more than
-/// parameters of each joint's own.
-pub(crate) fn is_doubtful(training: &Training, consistent: Option<&[f64]>) -> bool {
-    let Some(theta) = consistent else { return true };
-    let mut sums = vec![(0.0, 0.0, 0.0_f64); training.problem.joints().len()];
-    for equation in training.problem.equations() {
-        let factor = equation.factor.total();
-        let own: Vec<f64> = equation.columns.iter().map(|&column| theta.get(column).copied().unwrap_or(0.0)).collect();
-        let columns = equation.columns.len();
-        let sum = &mut sums[equation.joint];
-        sum.0 += factor.residual_sum_of_squares(&own).unwrap_or(f64::INFINITY);
-        sum.1 += factor.entry(columns, columns).powi(2);
-        sum.2 += factor.torque_norm().powi(2);
-    }
-    // As in an `Explanation`: below a hundredth of the torque nothing is left.
-    let log = |(left, alone, torque): &(f64, f64, f64)| {
-        let floor = 1e-4 * torque;
-        if *torque > 0.0 { 0.5 * (left.max(floor) / alone.max(floor)).ln() } else { 0.0 }
-    };
-    sums.iter().map(log).sum::<f64>() > DOUBTFUL * sums.len() as f64
+/// Whether a log has jumps that no motion makes: wrapped angles, absurd samples. Until these are mended, readings of it
+/// would mean nothing.
+pub(crate) fn has_jumps(report: &ImportReport) -> bool {
+    plausibility::has_jumps(report)
 }
 
 /// Compares readings of the recordings `training`, and looks for loads in the held-out ones beside the base parameters

@@ -4,7 +4,7 @@ use crate::logs::Logs;
 use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
 use crate::rows::motion_band_hz;
-use dynident_recording::{Decimator, MotionBlock};
+use dynident_recording::{DecimationSettings, Decimator, MotionBlock};
 
 /// Instants of a motion with its torques, all in SI and in the model's order of joints.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,28 +32,26 @@ impl MotionRows {
         let places = recording.places(model.model())?;
         let joints = places.len();
         let mut rows = Self::empty(joints);
-        let mut decimator: Option<Option<Decimator>> = None;
+        // Of a log at one rate: made with the first block; none where every sample counts.
+        let mut decimator: Option<Decimator> = None;
         let (mut segment, mut panel, mut out) = (0, Vec::new(), Vec::new());
-        let mut failure = None;
         let mut take = |block: &MotionBlock| {
-            if decimator.is_none() {
-                let mut settings = logs.filter.decimation(block.rate_hz, motion_band_hz(&logs.motion));
-                if let Some(settings) = &mut settings {
-                    settings.factor = (settings.factor / 4).max(1);
-                }
-                let settings = settings.filter(|settings| settings.factor > 1);
-                match settings.map(|settings| Decimator::new(&settings, block.rate_hz, 4 * joints)).transpose() {
-                    Ok(made) => decimator = Some(made),
-                    Err(source) => failure = Some(LogError::Filter { log: recording.name.clone(), source }),
-                }
+            if rows.rate_hz == 0.0 {
                 rows.rate_hz = block.rate_hz;
+                let settings = logs.filter.decimation(block.rate_hz, motion_band_hz(&logs.motion));
+                // Four times as many rows as a fit takes: short logs would have too few to tell readings apart.
+                let settings = settings.map(|s| DecimationSettings { factor: s.factor / 4, ..s });
+                decimator = settings
+                    .filter(|settings| settings.factor > 1)
+                    .map(|settings| Decimator::new(&settings, block.rate_hz, 4 * joints))
+                    .transpose()
+                    .map_err(|source| LogError::Filter { log: recording.name.clone(), source })?;
             }
-            let Some(decimator) = &mut decimator else { return };
             if block.segment != segment {
                 segment = block.segment;
-                decimator.iter_mut().for_each(|decimator| {
+                if let Some(decimator) = &mut decimator {
                     decimator.finish();
-                });
+                }
             }
             panel.clear();
             for values in [&block.q, &block.dq, &block.ddq, &block.tau] {
@@ -61,7 +59,7 @@ impl MotionRows {
                     panel.extend_from_slice(block.joint(values, place));
                 }
             }
-            let (count, filtered) = match decimator {
+            let (count, filtered) = match &mut decimator {
                 Some(decimator) => {
                     let count = decimator.push(&panel, block.rows, &mut out);
                     (count, &out)
@@ -73,18 +71,21 @@ impl MotionRows {
                     to.extend_from_slice(&filtered[(quantity * joints + joint) * count..][..count]);
                 }
             }
+            Ok(())
         };
         logs.pass(model, index).each_block(&mut take)?;
-        match failure {
-            Some(error) => Err(error),
-            None => Ok(rows.thinned(most)),
-        }
+        Ok(rows.thinned(most))
     }
 
     /// No instants of `joints` joints.
     pub fn empty(joints: usize) -> Self {
         let none = || vec![Vec::new(); joints];
         Self { q: none(), dq: none(), ddq: none(), tau: none(), rate_hz: 0.0 }
+    }
+
+    /// Position, velocity and acceleration of all joints at instant number `row`.
+    pub(super) fn at(&self, row: usize) -> [Vec<f64>; 3] {
+        [&self.q, &self.dq, &self.ddq].map(|values| values.iter().map(|values| values[row]).collect())
     }
 
     /// Number of instants.

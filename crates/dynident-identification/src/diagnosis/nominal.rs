@@ -4,23 +4,28 @@ use super::motion_rows::MotionRows;
 use dynident_dynamics::{ParametricModel, Workspace, inverse_dynamics};
 use nalgebra::{DMatrix, DVector};
 
+/// The torque of the nominal bodies, one vector for each joint, Nm (N); `None` while a body's inertials are unknown.
+pub(super) fn nominal_torque(robot: &ParametricModel, rows: &MotionRows) -> Option<Vec<Vec<f64>>> {
+    robot.nominal_base()?;
+    let model = robot.model();
+    let mut workspace = Workspace::new(model);
+    let mut torque = vec![Vec::with_capacity(rows.len()); model.dof()];
+    for row in 0..rows.len() {
+        let [q, dq, ddq] = rows.at(row);
+        let now = inverse_dynamics(model, &mut workspace, &q, &dq, &ddq);
+        torque.iter_mut().zip(now).for_each(|(joint, now)| joint.push(*now));
+    }
+    Some(torque)
+}
+
 /// Root mean square of what the nominal bodies leave of each joint's torque, Nm (N), beside viscous and Coulomb
 /// friction of at least zero and an offset that fit the rest best; `None` while a body's inertials are unknown.
 pub(super) fn left_by_nominal(robot: &ParametricModel, rows: &MotionRows) -> Option<Vec<f64>> {
-    robot.nominal_base()?;
-    let model = robot.model();
-    let (dof, count) = (model.dof(), rows.len());
-    let mut rest = rows.tau.clone();
-    let mut workspace = Workspace::new(model);
-    let at = |values: &[Vec<f64>], row: usize| -> Vec<f64> { values.iter().map(|values| values[row]).collect() };
-    for row in 0..count {
-        let (q, dq, ddq) = (at(&rows.q, row), at(&rows.dq, row), at(&rows.ddq, row));
-        let torque = inverse_dynamics(model, &mut workspace, &q, &dq, &ddq);
-        for joint in 0..dof {
-            rest[joint][row] -= torque[joint];
-        }
-    }
-    Some((0..dof).map(|joint| left_by_friction(&rows.dq[joint], &rest[joint])).collect())
+    let left = |(joint, nominal): (usize, Vec<f64>)| {
+        let rest: Vec<f64> = rows.tau[joint].iter().zip(nominal).map(|(tau, nominal)| tau - nominal).collect();
+        left_by_friction(&rows.dq[joint], &rest)
+    };
+    Some(nominal_torque(robot, rows)?.into_iter().enumerate().map(left).collect())
 }
 
 /// Root mean square of `tau` beside an offset and friction of at least zero.

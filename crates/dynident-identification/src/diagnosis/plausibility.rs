@@ -65,6 +65,12 @@ pub(super) fn is_beyond(model: &Model, report: &ImportReport) -> bool {
     !is_rate_of_a_recorder(report.rate_hz) || report.channels.iter().any(is_behind)
 }
 
+/// Whether a log has jumps that no motion makes: readings of it would mean nothing.
+pub(super) fn has_jumps(report: &ImportReport) -> bool {
+    let is_measured = |channel: &&ChannelReport| matches!(channel.channel, Quantity::Position | Quantity::Torque);
+    report.channels.iter().filter(is_measured).any(|channel| channel.turns > 0 || channel.lone_samples > 0)
+}
+
 /// Whether a recorder of robots has such a rate.
 pub(super) fn is_rate_of_a_recorder(rate_hz: f64) -> bool {
     (RATES_HZ[0]..=RATES_HZ[1]).contains(&rate_hz)

@@ -23,6 +23,8 @@ pub struct Reading {
     pub mistakes: Vec<Mistake>,
     /// Share of each joint's torque that no physically consistent robot explains, 0 to 1 (root mean squares).
     pub left: Vec<f64>,
+    /// The same of all joints' torque together, unweighted.
+    pub left_of_all: f64,
     /// Joints beyond their limits.
     pub beyond: Vec<BeyondLimit>,
     /// Whether the rate is one that recorders have.
@@ -82,9 +84,12 @@ impl Corrected {
         let explained = Explanation::new(&self.robot, &self.rows, consistency)?;
         let best = if explained.consistent.is_empty() { &explained.torque } else { &explained.consistent };
         let share = |(left, torque): (&f64, &f64)| if *torque > 0.0 { left / torque } else { 0.0 };
+        let norm = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>().sqrt();
+        let (left_of_all, all) = (norm(best), norm(&explained.torque));
         Ok(Reading {
             mistakes: self.mistakes.clone(),
             left: best.iter().zip(&explained.torque).map(share).collect(),
+            left_of_all: if all > 0.0 { left_of_all / all } else { 0.0 },
             beyond: beyond_limits(self.robot.model(), &self.rows),
             plausible_rate: is_rate_of_a_recorder(self.rows.rate_hz),
             consistent_score: explained.consistent_score(),

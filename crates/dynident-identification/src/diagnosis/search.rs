@@ -1,8 +1,8 @@
 //! The search for the reading that explains the samples best.
 //!
-//! Every candidate is bounded from below by the fit without physical limits, which is ten times cheaper: what cannot win
-//! is never fitted with them. A reading counts as better only by a clear margin, and those that come close to the best
-//! are named beside it.
+//! Every candidate is bounded from below by the fit without physical limits, which is ten times cheaper: what cannot
+//! win is never fitted with them. A reading counts as better only by a clear margin, and those that come close to the
+//! best are named beside it.
 
 use super::candidates::candidates;
 use super::mistake::Mistake;
@@ -14,8 +14,17 @@ use rayon::prelude::*;
 /// By how much a reading must score better before the study is doubted: as if one joint had less than 0.55 of what was
 /// left of its torque. On seven sets of real logs the best wrong reading gains 0.41.
 pub(super) const CLEARLY_BETTER: f64 = 0.6;
+/// Times what the study as written leaves of all torque that a better reading may leave.
+const NO_WORSE: f64 = 1.05;
+/// Times what was left of a joint's torque, and a share of it, that a better reading may leave.
+const SACRIFICED: f64 = 1.25;
+const LITTLE: f64 = 0.02;
 /// Readings this close to the best cannot be told from it.
 const ALIKE: f64 = 0.2;
+/// By how much a number between those tried must be better than the nearest of these.
+const WORTH_REFINING: f64 = 0.3;
+/// Readings beside the best from which a second mistake is looked for, once there is one.
+const RUNNERS_UP: usize = 3;
 /// Mistakes of one study.
 const MOST_MISTAKES: usize = 3;
 /// Other readings that are named.
@@ -45,16 +54,36 @@ pub(super) fn search(start: Corrected, consistency: &ConsistencySettings) -> Res
     let as_written = start.reading(Some(consistency))?;
     let (mut at, mut best) = (start, as_written.clone());
     let (mut alike, mut tried): (Vec<Reading>, usize) = (Vec::new(), 0);
-    for _ in 0..MOST_MISTAKES {
-        let (round, count) = one_round(&at, &best, consistency);
+    let mut runners_up: Vec<(Corrected, Reading)> = Vec::new();
+    for round in 0..MOST_MISTAKES {
+        let (fitted, count) = one_round(&at, &best, consistency);
         tried += count;
-        let Some((first, rest)) = round.split_first() else { break };
-        if first.1.score() > best.score() - CLEARLY_BETTER {
+        let Some((first, rest)) = fitted.split_first() else { break };
+        // A second mistake is rarer than the first.
+        if first.1.score() > best.score() - CLEARLY_BETTER * (round + 1) as f64 {
             break;
         }
-        let refined = refined(&at, first, consistency);
-        let (corrected, reading) = refined.unwrap_or_else(|| first.clone());
-        let close = |(_, other): &&(Corrected, Reading)| other.score() < reading.score() + ALIKE;
+        // What a second mistake is found behind, others may be found behind as well: the pair that explains most
+        // counts, for the first one was chosen with the other still made.
+        let mut first = first.clone();
+        if round == 1 {
+            for (start, reading) in &runners_up {
+                let (further, count) = one_round(start, reading, consistency);
+                tried += count;
+                if let Some(pair) = further.into_iter().next().filter(|pair| pair.1.score() < first.1.score()) {
+                    first = pair;
+                }
+            }
+        } else {
+            runners_up = rest.iter().take(RUNNERS_UP).cloned().collect();
+        }
+        let start = before_last(&first, &at, &runners_up);
+        let (corrected, reading) = refined(&start, &first, consistency).unwrap_or_else(|| first.clone());
+        // Beside the last mistake only: what was corrected before it is the same.
+        let before = reading.mistakes.len() - 1;
+        let close = |(_, other): &&(Corrected, Reading)| {
+            other.mistakes[..before] == reading.mistakes[..before] && other.score() < reading.score() + ALIKE
+        };
         alike = rest.iter().filter(close).take(MOST_ALIKE).map(|(_, other)| other.clone()).collect();
         (at, best) = (corrected, reading);
     }
@@ -62,10 +91,17 @@ pub(super) fn search(start: Corrected, consistency: &ConsistencySettings) -> Res
     Ok(Search { as_written, best: found.then_some(best), alike, tried })
 }
 
+/// Where the last mistake of a reading was corrected from.
+fn before_last(reached: &(Corrected, Reading), at: &Corrected, others: &[(Corrected, Reading)]) -> Corrected {
+    let before = &reached.0.mistakes[..reached.0.mistakes.len().saturating_sub(1)];
+    let other = others.iter().find(|(other, _)| other.mistakes == before && at.mistakes != before);
+    other.map_or_else(|| at.clone(), |(other, _)| other.clone())
+}
+
 /// The readings with one more mistake corrected that can win, best first, and how many were tried.
 fn one_round(at: &Corrected, best: &Reading, consistency: &ConsistencySettings) -> (Vec<(Corrected, Reading)>, usize) {
-    let undone = |mistake: &Mistake| at.mistakes.iter().any(|made| made == mistake);
-    let all: Vec<Mistake> = candidates(&at.robot, &at.rows).into_iter().filter(|mistake| !undone(mistake)).collect();
+    let is_new = |mistake: &Mistake| !at.mistakes.contains(mistake);
+    let all: Vec<Mistake> = candidates(&at.robot, &at.rows).into_iter().filter(is_new).collect();
     let bounded = |mistake: &Mistake| {
         let corrected = at.without(mistake);
         let bound = corrected.reading(None).ok()?.lower_bound();
@@ -86,8 +122,19 @@ fn one_round(at: &Corrected, best: &Reading, consistency: &ConsistencySettings) 
         fitted.extend(batch.par_iter().filter_map(fit).collect::<Vec<_>>());
         least = fitted.iter().map(|(_, reading)| reading.score()).fold(least, f64::min);
     }
+    // What explains a weak joint at the cost of the strong ones explains the wrong thing.
+    fitted.retain(|(_, reading)| reading.left_of_all <= NO_WORSE * best.left_of_all && !sacrifices(reading, best));
     fitted.sort_by(|a, b| a.1.score().total_cmp(&b.1.score()));
     (fitted, all.len())
+}
+
+/// Whether a reading leaves clearly more of some joint's torque than the one it was made from.
+fn sacrifices(reading: &Reading, from: &Reading) -> bool {
+    let last = reading.mistakes.last();
+    (0..reading.left.len()).any(|joint| {
+        let before = last.map_or(joint, |mistake| mistake.torque_from(joint));
+        reading.left[joint] > SACRIFICED * from.left[before] + LITTLE
+    })
 }
 
 /// A zero or a mounting that lies between those tried.
@@ -132,7 +179,8 @@ fn refined(
     };
     let corrected = at.without(&mistake);
     let reading = corrected.reading(Some(consistency)).ok()?;
-    (reading.score() < first.1.score()).then_some((corrected, reading))
+    // Free numbers follow the noise: the round one stays unless the exact one is clearly better.
+    (reading.score() < first.1.score() - WORTH_REFINING).then_some((corrected, reading))
 }
 
 /// Where `value` is least within `reach` of `centre`, by thirds, to a hundredth of the reach.

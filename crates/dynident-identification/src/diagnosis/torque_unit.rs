@@ -1,7 +1,8 @@
 //! Is the torque in newton metres? What the description's bodies say of each joint's column.
 
 use super::motion_rows::MotionRows;
-use dynident_dynamics::{ParametricModel, Workspace, inverse_dynamics};
+use super::nominal::nominal_torque;
+use dynident_dynamics::ParametricModel;
 use nalgebra::{DMatrix, DVector};
 
 /// Share of a joint's torque that the description's bodies, times any factor, must explain beside friction before the
@@ -19,27 +20,21 @@ pub struct TorqueUnit {
 }
 
 impl TorqueUnit {
-    /// Joints whose torque cannot be in newton metres if the description is near the truth.
+    /// Joints whose torque cannot be in newton metres if the description is near the truth; none unless most joints
+    /// that say anything agree, for single bodies may be described badly.
     pub fn joints_in_another_unit(&self) -> Vec<usize> {
         let is_far = |scale: f64| !(UNIT_FACTOR.recip()..=UNIT_FACTOR).contains(&scale);
-        (0..self.scale.len()).filter(|&joint| self.scale[joint].is_some_and(is_far)).collect()
+        let far: Vec<usize> = (0..self.scale.len()).filter(|&joint| self.scale[joint].is_some_and(is_far)).collect();
+        let telling = self.scale.iter().flatten().count();
+        if 2 * far.len() > telling { far } else { Vec::new() }
     }
 }
 
 /// Fits each joint's torque by the nominal bodies' torque times a factor, with viscous and Coulomb friction, drive
 /// inertia and an offset; `None` while a body's inertials are unknown.
 pub(super) fn torque_unit(robot: &ParametricModel, rows: &MotionRows) -> Option<TorqueUnit> {
-    robot.nominal_base()?;
-    let model = robot.model();
-    let mut workspace = Workspace::new(model);
-    let mut predicted = vec![Vec::with_capacity(rows.len()); model.dof()];
-    let at = |values: &[Vec<f64>], row: usize| -> Vec<f64> { values.iter().map(|values| values[row]).collect() };
-    for row in 0..rows.len() {
-        let (q, dq, ddq) = (at(&rows.q, row), at(&rows.dq, row), at(&rows.ddq, row));
-        let torque = inverse_dynamics(model, &mut workspace, &q, &dq, &ddq);
-        predicted.iter_mut().zip(torque).for_each(|(to, torque)| to.push(*torque));
-    }
-    let scale = (0..model.dof()).map(|joint| scale_of(rows, joint, &predicted[joint]));
+    let nominal = nominal_torque(robot, rows)?;
+    let scale = nominal.iter().enumerate().map(|(joint, nominal)| scale_of(rows, joint, nominal));
     Some(TorqueUnit { scale: scale.collect() })
 }
 

@@ -7,6 +7,8 @@ use nalgebra::{DMatrix, DVector};
 
 /// What is left of the torque must fall by this factor with a load at the last body.
 const FALLS_TO: f64 = 0.6;
+/// Added to the squares of the columns, as a share of the largest.
+const UNFELT: f64 = 1.0e-9;
 /// Standard deviations by which the mass differs from nothing.
 const CLEARLY: f64 = 5.0;
 
@@ -39,8 +41,7 @@ pub(super) fn unseen_load(robot: &ParametricModel, rows: &MotionRows, log: usize
     let mut rest = DVector::zeros(dof * count);
     let explained = predicted(robot, rows, theta);
     for row in 0..count {
-        let at = |values: &[Vec<f64>]| -> Vec<f64> { values.iter().map(|values| values[row]).collect() };
-        let (q, dq, ddq) = (at(&rows.q), at(&rows.dq), at(&rows.ddq));
+        let [q, dq, ddq] = rows.at(row);
         let regressor = torque_regressor(model, &mut workspace, &q, &dq, &ddq);
         for joint in 0..dof {
             let place = joint * count + row;
@@ -50,7 +51,10 @@ pub(super) fn unseen_load(robot: &ParametricModel, rows: &MotionRows, log: usize
             rest[place] = rows.tau[joint][row] - explained[joint][row];
         }
     }
-    let gram = matrix.transpose() * &matrix;
+    let mut gram = matrix.transpose() * &matrix;
+    // What no joint feels (a moment along all axes) stays nothing.
+    let ridge = UNFELT * gram.diagonal().max();
+    (0..4).for_each(|k| gram[(k, k)] += ridge);
     let factor = gram.cholesky()?;
     let solution = factor.solve(&(matrix.transpose() * &rest));
     let left = &rest - &matrix * &solution;

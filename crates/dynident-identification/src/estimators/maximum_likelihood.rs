@@ -17,6 +17,9 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+/// No motion repeats after more than eleven days, s.
+const MOST_PERIOD_S: f64 = 1e6;
+
 /// A motion whose periods differ by more than this share of its own size does not repeat.
 const MOST_DIFFERENCE: f64 = 0.1;
 /// A motion smaller than this counts as none, rad (m).
@@ -45,7 +48,7 @@ pub struct PeriodSettings {
 #[non_exhaustive]
 pub enum PeriodError {
     /// A period that is no time.
-    #[error("period_s = {period_s}: give the seconds after which the motion repeats")]
+    #[error("period_s = {period_s:?}: give the seconds after which the motion repeats, at most {MOST_PERIOD_S:e}")]
     Period {
         /// What was given.
         period_s: f64,
@@ -70,7 +73,7 @@ impl PeriodSettings {
     /// # Errors
     /// The first number that is impossible.
     pub fn validate(&self) -> Result<(), PeriodError> {
-        if let Some(period_s) = self.period_s.filter(|period| !(*period > 0.0 && period.is_finite())) {
+        if let Some(period_s) = self.period_s.filter(|period| !(*period > 0.0 && *period <= MOST_PERIOD_S)) {
             return Err(PeriodError::Period { period_s });
         }
         if !(self.skip_s >= 0.0 && self.skip_s.is_finite()) {
@@ -252,7 +255,7 @@ fn mean_period(
     let channels = at_phases(&channels, skipped, period_s * rate_hz / samples as f64);
     let views: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
     let length = views.first().map_or(0, |channel| channel.len());
-    if length < 2 * samples {
+    if length / 2 < samples {
         return Err(wrong(format!(
             "{:.2} s are left, fewer than two periods of {period_s} s: record at least two, better ten; or give the true period_s",
             length as f64 / rate_hz

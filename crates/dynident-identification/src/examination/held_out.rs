@@ -117,7 +117,7 @@ pub struct ModelUnderTest<'a> {
     pub physical: Option<&'a [f64]>,
     /// What the band of the predicted torque is made from.
     pub uncertainty: Option<&'a Uncertainty>,
-    /// Whether the torque over time is kept.
+    /// Whether the torque over time is kept: of the physically consistent set where there is one.
     pub traced: bool,
 }
 
@@ -161,7 +161,7 @@ pub(crate) fn tested_on(
         prior: nominal.map(|nominal| (nominal, Validation::new(joints.clone()))),
         evidence: nominal.map(|nominal| Evidence::new(columns, nominal)),
         delay: DelayCheck::new(model, theta),
-        trace: traced.then(|| TraceConsumer::new(model, theta)),
+        trace: traced.then(|| TraceConsumer::new(model, physical.unwrap_or(theta))),
         buffer: Vec::new(),
     };
     let reader_thread = alone && logs.execution.parallel();

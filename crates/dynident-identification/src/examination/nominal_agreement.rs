@@ -21,6 +21,14 @@ pub struct PriorAgreement {
     pub reversed_joints: Vec<String>,
 }
 
+impl PriorAgreement {
+    /// Whether the torque as a whole, or that of some joint, fits far better with the opposite sign.
+    pub fn is_reversed(&self) -> bool {
+        let whole = self.residual_percent.zip(self.residual_percent_if_reversed);
+        whole.is_some_and(|(given, other)| other < CLEARLY_BETTER * given) || !self.reversed_joints.is_empty()
+    }
+}
+
 #[derive(Clone, Copy, Default)]
 struct Products {
     measured: f64,

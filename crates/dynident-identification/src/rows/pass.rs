@@ -141,22 +141,37 @@ impl LogPass<'_> {
         })
     }
 
-    /// Gives the motion to `take`, block by block and without its regressor: as it was kept, or read once more.
-    pub(crate) fn each_block(&self, take: &mut dyn FnMut(&MotionBlock)) -> Result<(), LogError> {
+    /// Gives the motion to `take`, block by block and without its regressor: as it was kept, or read once and kept if
+    /// it fits. Returns what the importer found; `None` for a motion that was made already.
+    pub(crate) fn each_block(
+        &self,
+        take: &mut dyn FnMut(&MotionBlock) -> Result<(), LogError>,
+    ) -> Result<Option<ImportReport>, LogError> {
         let Recording { name, samples, .. } = self.recording;
         match (samples, self.kept.and_then(OnceLock::get)) {
-            (Samples::Motion(record), _) => take(&record.motion),
-            (_, Some(kept)) => kept.blocks.iter().for_each(take),
+            (Samples::Motion(record), _) => take(&record.motion).map(|()| None),
+            (_, Some(kept)) => {
+                kept.blocks.iter().try_for_each(take)?;
+                Ok(Some(kept.report.clone()))
+            }
             _ => {
                 let stream = self.recording.open(self.model.model(), self.motion)?;
                 let mut stream = stream.ok_or_else(|| LogError::NoSamples { log: name.clone() })?;
+                let mut keeper = BlockCache { blocks: self.kept.is_some().then(Vec::new), numbers: 0 };
                 let mut block = MotionBlock::default();
                 while stream.next_block(&mut block).map_err(|source| LogError::recording(name, source))? {
-                    take(&block);
+                    take(&block)?;
+                    self.progress.advance(block.rows as u64);
+                    block = keeper.keep(block).unwrap_or_default();
                 }
+                let report = stream.report();
+                if let (Some(kept), Some(blocks)) = (self.kept, keeper.blocks) {
+                    // Another thread may have kept the same meanwhile.
+                    let _ = kept.set(KeptLog { blocks, rate_hz: stream.rate_hz(), report: report.clone() });
+                }
+                Ok(Some(report))
             }
         }
-        Ok(())
     }
 
     fn take(

@@ -5,6 +5,9 @@
 
 mod inertials;
 mod joints;
+mod slips;
+
+pub use slips::{Correction, Slip, SlipKind, Slips, slips};
 
 use crate::tree::Model;
 

@@ -39,6 +39,11 @@ pub struct Coupling {
     pub effect: CouplingEffect,
 }
 
+impl Coupling {
+    /// Sizes that a ratio may have: gears turn by less, and products of two stay far inside the range of `f64`.
+    pub const RATIOS: core::ops::RangeInclusive<f64> = 1e-6..=1e6;
+}
+
 impl TermKind for Coupling {
     fn label(&self) -> TermLabel {
         let (letters, unit) = match self.effect {

@@ -1,7 +1,7 @@
 //! From links and joints to the tree of moving bodies.
 
 use super::elements::{JointElement, LinkElement};
-use super::{UrdfError, UrdfFault, fault_at};
+use super::{UrdfError, UrdfFault, UrdfIrregularity, fault_at};
 use crate::joint::Joint;
 use crate::place::Located;
 use crate::spatial::Transform;
@@ -37,7 +37,7 @@ pub(super) fn model(
         joints_under[parent].push(index);
         child_of.push(child);
     }
-    check_mimics(joints)?;
+    refuse_own_mimics(joints)?;
 
     let mut roots = (0..links.len()).filter(|&link| parent_joint[link].is_none());
     let root = match (roots.next(), roots.next()) {
@@ -103,15 +103,23 @@ pub(super) fn model(
 }
 
 /// A joint may follow any other joint of the file; chains of followers do not matter, since each counts as free.
-fn check_mimics(joints: &[JointElement<'_, '_>]) -> Result<(), UrdfError> {
-    let names: std::collections::HashSet<&str> = joints.iter().map(|joint| joint.name).collect();
-    for joint in joints {
-        if let Some(mimic) = &joint.mimic
-            && (mimic.source == joint.name || !names.contains(mimic.source.as_str()))
-        {
-            let fault = UrdfFault::UnknownMimic { joint: joint.name.to_owned(), source_joint: mimic.source.clone() };
-            return Err(fault_at(joint.node, fault));
-        }
+fn refuse_own_mimics(joints: &[JointElement<'_, '_>]) -> Result<(), UrdfError> {
+    match joints.iter().find(|joint| joint.mimic.as_ref().is_some_and(|mimic| mimic.source == joint.name)) {
+        None => Ok(()),
+        Some(joint) => Err(fault_at(joint.node, UrdfFault::OwnMimic { joint: joint.name.to_owned() })),
     }
-    Ok(())
+}
+
+/// Joints that follow one the document does not hold: a part of a robot often keeps what referred to the rest.
+pub(super) fn unknown_mimics(joints: &[JointElement<'_, '_>]) -> Vec<UrdfIrregularity> {
+    let names: std::collections::HashSet<&str> = joints.iter().map(|joint| joint.name).collect();
+    let unknown = joints.iter().filter_map(|joint| {
+        let source = &joint.mimic.as_ref()?.source;
+        (!names.contains(source.as_str())).then(|| UrdfIrregularity::UnknownMimic {
+            line: joint.node.document().text_pos_at(joint.node.range().start).row,
+            joint: joint.name.to_owned(),
+            source_joint: source.clone(),
+        })
+    });
+    unknown.collect()
 }

@@ -1,7 +1,7 @@
 //! `<collision>` of a link.
 
 use super::UrdfError;
-use super::elements::origin;
+use super::origin::origin;
 use super::values::{child, numbers, required_number};
 use crate::collision::{CollisionGeometry, CollisionShape};
 use roxmltree::Node;
@@ -41,5 +41,5 @@ fn shape(node: Node<'_, '_>) -> Result<Option<CollisionShape>, UrdfError> {
         },
         _ => return Ok(None),
     };
-    Ok(Some(CollisionShape { placement: origin(node)?, geometry }))
+    Ok(Some(CollisionShape { placement: origin(node, || "a collision shape".to_owned())?, geometry }))
 }

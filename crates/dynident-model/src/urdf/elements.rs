@@ -1,6 +1,8 @@
 //! The elements `<link>` and `<joint>`, before the tree is built.
 
 use super::collision;
+use super::origin::origin;
+use super::stated::stated_moments;
 use super::values::{child, name, number, numbers, required_child, required_number};
 use super::{MAX_MOVING_JOINTS, UrdfError, UrdfFault, UrdfRobot, fault_at};
 use crate::collision::CollisionShape;
@@ -113,7 +115,7 @@ fn joint<'a, 'input>(node: Node<'a, 'input>) -> Result<JointElement<'a, 'input>,
     };
     let parent = name(required_child(node, joint, "joint", "parent", "")?, "link")?;
     let child_link = name(required_child(node, joint, "joint", "child", "")?, "link")?;
-    let origin = origin(node)?;
+    let origin = origin(node, || format!("joint `{joint}`"))?;
     let mut element = JointElement {
         node,
         name: joint,
@@ -163,27 +165,15 @@ fn joint<'a, 'input>(node: Node<'a, 'input>) -> Result<JointElement<'a, 'input>,
 /// `<inertial>`: mass, centre of mass, and inertia about it in axes turned by the origin's rpy.
 fn inertial(node: Node<'_, '_>, link: &str) -> Result<InertialParameters, UrdfError> {
     const HINT: &str = ", or delete <inertial> so that the link counts as unknown";
-    let link_from_com = origin(node)?;
+    let link_from_com = origin(node, || format!("the inertial of link `{link}`"))?;
     let mass = required_number(required_child(node, link, "inertial", "mass", HINT)?, "value")?;
     let element = required_child(node, link, "inertial", "inertia", HINT)?;
-    let mut moments = [0.0; 6];
-    for (moment, attribute) in moments.iter_mut().zip(["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]) {
-        *moment = required_number(element, attribute)?;
-    }
-    let [xx, xy, xz, yy, yz, zz] = moments;
+    let [xx, xy, xz, yy, yz, zz] = stated_moments(element)?;
     let at_com = Mat3([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]);
     let r = &link_from_com.rotation;
     // Exact numbers stay exact where nothing turns.
     let turned = if *r == Mat3::IDENTITY { at_com } else { r.mul_mat(&at_com).mul_mat(&r.transpose()) };
     Ok(InertialParameters::from_centre_of_mass(mass, link_from_com.translation, &turned))
-}
-
-/// `<origin xyz rpy>`; the identity where it is missing.
-pub(super) fn origin(node: Node<'_, '_>) -> Result<Transform, UrdfError> {
-    let Some(origin) = child(node, "origin") else { return Ok(Transform::IDENTITY) };
-    let [roll, pitch, yaw] = numbers(origin, "rpy")?.unwrap_or_default();
-    let translation = Vec3(numbers(origin, "xyz")?.unwrap_or_default());
-    Ok(Transform { rotation: Mat3::from_roll_pitch_yaw(roll, pitch, yaw), translation })
 }
 
 fn refuse_duplicate<'a, 'input>(

@@ -7,6 +7,13 @@ const MAX_ATTRIBUTES: usize = 1000;
 /// Most namespace declarations in a document.
 const MAX_NAMESPACES: usize = 5000;
 
+/// Where text begins with a comment, a CDATA section or an instruction: its length, all of the text if it never ends.
+pub(super) fn length_beside_elements(rest: &str) -> Option<usize> {
+    let kinds = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")];
+    let (open, close) = kinds.into_iter().find(|(open, _)| rest.starts_with(open))?;
+    Some(rest[open.len()..].find(close).map_or(rest.len(), |end| open.len() + end + close.len()))
+}
+
 /// The byte at which a document becomes a flood, if it does. One pass, no memory; malformed markup is left to the
 /// parser.
 pub(super) fn flood(text: &str) -> Option<usize> {
@@ -16,10 +23,8 @@ pub(super) fn flood(text: &str) -> Option<usize> {
     let mut at = 0;
     while let Some(start) = text[at..].find('<').map(|next| at + next) {
         let rest = &text[start..];
-        let skipped =
-            [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")].into_iter().find(|(open, _)| rest.starts_with(open));
-        if let Some((open, close)) = skipped {
-            at = start + open.len() + rest[open.len()..].find(close)? + close.len();
+        if let Some(length) = length_beside_elements(rest) {
+            at = start + length;
             continue;
         }
         let (mut quote, mut attributes, mut length) = (None, 0, rest.len());

@@ -3,7 +3,7 @@
 //! Read are links with `<inertial>`, and joints of type revolute, continuous, prismatic and fixed on a fixed base.
 //! Fixed joints are lumped: [`Body::links`](crate::Body) keeps every link with its frame. A link without `<inertial>`
 //! is unknown, never zero. `mimic` is kept, and the joint counts as free. Joints stand depth first, in the order of the
-//! document under each link.
+//! document under each link. A rotation of `<origin>` is `rpy` or, as in URDF 1.1, `quat_xyzw`.
 //!
 //! ```
 //! let text = r#"<robot name="pendulum">
@@ -27,9 +27,13 @@ mod assemble;
 mod collision;
 mod elements;
 mod flood;
+mod origin;
+mod prefixes;
+mod stated;
 mod values;
 mod write;
 
+pub use stated::{MOMENT_NAMES, StatedInertial, rewrite_inertials, stated_inertials};
 pub use write::{JointChange, LinkChange, UrdfWriteError, link_changes, rewrite_urdf};
 
 use crate::error::ModelError;
@@ -56,6 +60,8 @@ pub struct UrdfRobot {
     /// Elements inside links, inertials and joints that were not read, because URDF does not define them (often a
     /// misspelling) or because they repeat an earlier one, which counts. At most [`UrdfRobot::MAX_UNREAD`] are kept.
     pub unread: Vec<UnreadElement>,
+    /// What is against the rules of XML or URDF and yet leaves no doubt about the robot, in the order of the document.
+    pub irregularities: Vec<UrdfIrregularity>,
 }
 
 impl UrdfRobot {
@@ -74,6 +80,27 @@ pub struct UnreadElement {
     pub element: String,
     /// Name of the element around it.
     pub parent: String,
+}
+
+/// Something against the rules that leaves no doubt about the robot: other readers of URDF pass over it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum UrdfIrregularity {
+    /// Names with a namespace prefix that the document does not declare.
+    UndeclaredPrefix {
+        /// Line of the first of them, from 1.
+        line: u32,
+        /// The prefix.
+        prefix: String,
+    },
+    /// A joint follows a joint that the document does not hold. It counts as free, as every follower does.
+    UnknownMimic {
+        /// Line of the joint, from 1.
+        line: u32,
+        /// The joint.
+        joint: String,
+        /// The joint it should follow.
+        source_joint: String,
+    },
 }
 
 /// Why a URDF could not be read, with line and column.
@@ -193,15 +220,27 @@ pub enum UrdfFault {
         /// The name of the link.
         link: String,
     },
-    /// A joint follows one that does not exist, or itself.
-    #[error(
-        "joint `{joint}` mimics `{source_joint}`, which is no other joint of this robot: fix the name or delete <mimic>"
-    )]
-    UnknownMimic {
+    /// A joint follows itself.
+    #[error("joint `{joint}` mimics itself: fix the name or delete <mimic>")]
+    OwnMimic {
         /// The joint.
         joint: String,
-        /// The joint it should follow.
-        source_joint: String,
+    },
+    /// A rotation that is given in two ways.
+    #[error("<origin> of {owner} has both `rpy` and `quat_xyzw`: keep one of them")]
+    TwoRotations {
+        /// What the origin belongs to.
+        owner: String,
+    },
+    /// A quaternion that is no rotation.
+    #[error(
+        "`quat_xyzw` of <origin> of {owner} has length {norm:.3e}: give a unit quaternion x y z w, such as `0 0 0 1`"
+    )]
+    NoRotation {
+        /// What the origin belongs to.
+        owner: String,
+        /// Its length.
+        norm: f64,
     },
     /// A link that is the child of two joints.
     #[error(
@@ -267,13 +306,22 @@ pub enum UrdfFault {
 /// # Errors
 /// If the text is malformed XML, no URDF, or describes no tree of links on one fixed base; with line and column.
 pub fn read_urdf(text: &str) -> Result<UrdfRobot, UrdfError> {
-    let document = parse(text)?;
+    let (regular, undeclared) = prefixes::without_undeclared(text);
+    let document = parse(&regular)?;
     let root = document.root_element();
     let mut unread = Vec::new();
     let links = elements::links(root, &mut unread)?;
     let joints = elements::joints(root, &mut unread)?;
     let name = root.attribute("name").unwrap_or("robot");
     let model = assemble::model(name, &links, &joints)?;
+    let mut irregularities: Vec<UrdfIrregularity> = undeclared
+        .into_iter()
+        .map(|found| UrdfIrregularity::UndeclaredPrefix {
+            line: line_and_column(text, found.at).0,
+            prefix: found.prefix.to_owned(),
+        })
+        .collect();
+    irregularities.extend(assemble::unknown_mimics(&joints));
     let unread = unread
         .iter()
         .map(|node| {
@@ -287,10 +335,10 @@ pub fn read_urdf(text: &str) -> Result<UrdfRobot, UrdfError> {
             }
         })
         .collect();
-    Ok(UrdfRobot { model, unread })
+    Ok(UrdfRobot { model, unread, irregularities })
 }
 
-/// The XML tree of a URDF, if it is one.
+/// The XML tree of a URDF, if it is one, whose prefixes are all declared.
 fn parse(text: &str) -> Result<Document<'_>, UrdfError> {
     if let Some(at) = flood::flood(text) {
         return Err(Located::at(text, at, UrdfFault::Flood));

@@ -5,7 +5,8 @@
 //! them: [`link_changes`] gives the whole body to the joint's own link, takes the `<inertial>` from the links fixed to
 //! it, and says so in a comment.
 
-use super::{UrdfError, parse};
+use super::prefixes::without_undeclared;
+use super::{MAX_MAGNITUDE, UrdfError, parse};
 use crate::inertial::InertialParameters;
 use crate::tree::Model;
 use roxmltree::Node;
@@ -88,6 +89,16 @@ pub enum UrdfWriteError {
         /// The link.
         link: String,
     },
+    /// A value that no reader would take.
+    #[error(
+        "the new values of link `{link}` hold {value:e}, beyond the {MAX_MAGNITUDE:e} that a description may hold: check its lengths and masses"
+    )]
+    TooLarge {
+        /// The link.
+        link: String,
+        /// The value.
+        value: f64,
+    },
     /// As many parameter sets as moving bodies are needed.
     #[error("{found} parameter sets for {expected} moving bodies")]
     Counts {
@@ -143,7 +154,9 @@ pub fn link_changes(model: &Model, inertials: &[InertialParameters]) -> Result<V
 /// If the original is no URDF, a link or joint is unknown or named twice, a value is not finite, or a link has moments
 /// without mass.
 pub fn rewrite_urdf(original: &str, links: &[LinkChange], joints: &[JointChange]) -> Result<String, UrdfWriteError> {
-    let document = parse(original)?;
+    // Of the same length, so that its places are the original's.
+    let (regular, _) = without_undeclared(original);
+    let document = parse(&regular)?;
     let robot = document.root_element();
     let source = Source { text: original, eol: if original.contains("\r\n") { "\r\n" } else { "\n" } };
     let mut nodes = HashMap::new();
@@ -183,8 +196,13 @@ pub fn rewrite_urdf(original: &str, links: &[LinkChange], joints: &[JointChange]
         source.friction(node, change, &mut edits)?;
     }
 
+    Ok(edited(original, edits))
+}
+
+/// `original` with pieces of it replaced; the pieces do not overlap, every other byte stays.
+pub(super) fn edited(original: &str, mut edits: Vec<(Range<usize>, String)>) -> String {
     edits.sort_by_key(|(range, _)| range.start);
-    let mut text = String::with_capacity(original.len() + 256 * edits.len());
+    let mut text = String::with_capacity(original.len() + edits.iter().map(|(_, new)| new.len()).sum::<usize>());
     let mut done = 0;
     for (range, new) in edits {
         text += &original[done..range.start];
@@ -192,7 +210,7 @@ pub fn rewrite_urdf(original: &str, links: &[LinkChange], joints: &[JointChange]
         done = range.end;
     }
     text += &original[done..];
-    Ok(text)
+    text
 }
 
 /// A line of a new element, with its depth below the element's own indentation.
@@ -209,6 +227,14 @@ fn inertial_lines(link: &str, inertial: &InertialParameters, note: Option<&str>)
     };
     if com.0.iter().chain(inertia.0.iter().flatten()).any(|x| !x.is_finite()) {
         return Err(UrdfWriteError::NoMass { link: link.to_owned() });
+    }
+    let largest = com
+        .0
+        .iter()
+        .chain(inertia.0.iter().flatten())
+        .fold(inertial.mass_kg(), |a, b| if b.abs() > a.abs() { *b } else { a });
+    if largest.abs() > MAX_MAGNITUDE {
+        return Err(UrdfWriteError::TooLarge { link: link.to_owned(), value: largest });
     }
     let ([x, y, z], i) = (com.0, inertia.0);
     let mut lines = vec![(0, "<inertial>".to_owned())];

@@ -6,5 +6,6 @@ mod broken;
 mod common;
 mod dh;
 mod friction_laws;
+mod slips;
 mod urdf;
 mod urdf_write;

@@ -1,7 +1,7 @@
 //! The URDF reader: against totals from Pinocchio, and by hand.
 
 use crate::common::{ARM, foreign_urdfs};
-use dynident_model::{JointKind, Vec3, audit, load_robot, read_urdf, rewrite_urdf};
+use dynident_model::{JointKind, LinkChange, Vec3, audit, load_robot, read_urdf, rewrite_urdf};
 
 /// Degrees of freedom and mass of the moving bodies in kg, as Pinocchio 4.1.0 reads the same files
 /// (`robots/README.md`).
@@ -141,4 +141,52 @@ fn elements_nested_a_hundred_thousand_deep_are_read_without_recursion() {
 fn a_byte_order_mark_and_carriage_returns_do_not_matter() {
     let text = format!("\u{feff}{}", ARM.replace('\n', "\r\n"));
     assert_eq!(read_urdf(&text).unwrap().model, read_urdf(ARM).unwrap().model);
+}
+
+#[test]
+fn a_quaternion_turns_as_its_angles_do() {
+    // 0.6 about z and then half a turn less 0.2 about x, as rpy and as the product of two half-angle quaternions;
+    // printed with another length, as some exporters do.
+    let (a, b) = (0.3_f64, 0.5 * (core::f64::consts::PI - 0.2));
+    let (z, x) = ([a.sin(), a.cos()], [b.sin(), b.cos()]);
+    let quaternion = [z[1] * x[0], z[0] * x[0], z[0] * x[1], z[1] * x[1]].map(|c| 1.01 * c);
+    let words = quaternion.map(|c| format!("{c:?}")).join(" ");
+    let angles = format!("rpy=\"{:?} 0 {:?}\"", 2.0 * b, 2.0 * a);
+    for (place, body) in
+        [(r#"<origin xyz="0.2 0 0.01""#, "the inertial"), (r#"<origin xyz="0 0 0.04""#, "a link fixed to the joint's")]
+    {
+        assert_eq!(ARM.matches(place).count(), 1, "{body}");
+        let by_angles = read_urdf(&ARM.replace(place, &format!("{place} {angles}"))).unwrap().model;
+        let by_quaternion = read_urdf(&ARM.replace(place, &format!("{place} quat_xyzw=\"{words}\""))).unwrap().model;
+        assert_ne!(by_angles, read_urdf(ARM).unwrap().model, "{body}");
+        for (one, other) in by_angles.inertials().iter().zip(by_quaternion.inertials()) {
+            for (one, other) in one.0.iter().zip(&other.0) {
+                // Some twenty roundings of numbers below one.
+                assert!((one - other).abs() < 1e-14, "{body}: {one} {other}");
+            }
+        }
+    }
+}
+
+#[test]
+fn undeclared_prefixes_and_lost_mimics_are_read_with_a_warning() {
+    let regular = read_urdf(ARM).unwrap();
+    assert!(regular.irregularities.is_empty());
+    let text = ARM
+        .replace("<link name=\"tip\"/>", "<link name=\"tip\"/>\n  <gazebo:plugin drake:kind='a:b'/>")
+        .replace(r#"velocity="0.5" effort="600"/>"#, r#"velocity="0.5" effort="600"/><mimic joint="ghost"/>"#);
+    let robot = read_urdf(&text).unwrap();
+    let found: Vec<String> = robot.irregularities.iter().map(|one| format!("{one:?}")).collect();
+    assert_eq!(found.len(), 3, "{found:?}");
+    assert!(found[0].contains("UndeclaredPrefix") && found[0].contains("gazebo"), "{found:?}");
+    assert!(found[1].contains("drake"), "{found:?}");
+    assert!(found[2].contains("UnknownMimic") && found[2].contains("ghost"), "{found:?}");
+    assert_eq!(robot.model.inertials(), regular.model.inertials());
+    // The file keeps its own names when it is written.
+    assert_eq!(rewrite_urdf(&text, &[], &[]).unwrap(), text);
+    let removed = rewrite_urdf(&text, &[LinkChange::Remove { link: "tool".to_owned() }], &[]).unwrap();
+    assert!(removed.contains("<gazebo:plugin drake:kind='a:b'/>") && removed.len() < text.len());
+    // An undeclared prefix in front of one of URDF's own names is none of them.
+    let other = ARM.replace("<link name=\"tip\"/>", "<link name=\"tip\"/><x:link name=\"tip\"/>");
+    assert_eq!(read_urdf(&other).unwrap().model, regular.model);
 }

@@ -161,6 +161,14 @@ fn what_urdf_cannot_say_is_refused() {
     assert!(link_changes(&read_urdf(ARM).unwrap().model, &[]).is_err());
 }
 
+/// A tool 65 km away makes a body whose moments no reader would take: found by mutated descriptions.
+#[test]
+fn what_could_not_be_read_again_is_refused() {
+    let model = read_urdf(&ARM.replace("<origin xyz=\"0.3 0 0\"", "<origin xyz=\"65536 0 0\"")).unwrap().model;
+    let error = rewrite_urdf(ARM, &link_changes(&model, model.inertials()).unwrap(), &[]).unwrap_err();
+    assert!(error.to_string().contains("beyond the 1e9"), "{error}");
+}
+
 #[test]
 fn the_lumped_links_are_named_in_a_comment() {
     let model = read_urdf(ARM).unwrap().model;

@@ -365,9 +365,9 @@ impl LogFormat {
                 let fix = "give samples per second, above 0 and at most 1e7";
                 return wrong("rate_hz", &format!("{rate} is not a rate"), fix);
             }
-            (Some(time), None) if !(time.scale.is_finite() && time.scale > 0.0) => {
-                let problem = format!("{} is not a positive factor", time.scale);
-                return wrong("time.scale", &problem, "give seconds per tick, or leave it out");
+            (Some(time), None) if !(1e-15..=1e6).contains(&time.scale) => {
+                let problem = format!("{:?} is no length of a tick", time.scale);
+                return wrong("time.scale", &problem, "give 1e-15 to 1e6 units per tick, or leave it out");
             }
             _ => {}
         }
@@ -501,16 +501,16 @@ impl ChannelGroup {
             }
             let bad = values.values().iter().find(|value| match name {
                 "sign" => value.abs() != 1.0,
-                "scale" => !value.is_finite() || **value == 0.0,
-                _ => !value.is_finite(),
+                "scale" => !(1e-15..=1e15).contains(&value.abs()),
+                _ => value.is_nan() || value.abs() > 1e15,
             });
             if let Some(value) = bad {
                 let fix = match name {
                     "sign" => "write 1 or -1",
-                    "scale" => "give a finite factor other than zero",
-                    _ => "give a finite number",
+                    "scale" => "give a factor of 1e-15 to 1e15 in size",
+                    _ => "give a number of at most 1e15 in size",
                 };
-                return Err(FormatError::new(at(name), format!("{value} is not allowed"), fix));
+                return Err(FormatError::new(at(name), format!("{value:?} is not allowed"), fix));
             }
         }
         if let Some(matrix) = &self.matrix {

@@ -1,5 +1,6 @@
 //! Lines of a text table: capped in length, counted, comments and blanks left out.
 
+use super::foreign::{Foreign, recognised};
 use crate::error::RecordingError;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -28,13 +29,12 @@ impl Lines {
         if file.metadata().map_err(refused)?.is_dir() {
             return Err(refused(std::io::Error::from(std::io::ErrorKind::IsADirectory)));
         }
-        Ok(Self {
-            path: path.to_owned(),
-            reader: BufReader::with_capacity(1 << 18, file),
-            buffer: Vec::new(),
-            number: 0,
-            complete: true,
-        })
+        let mut reader = BufReader::with_capacity(1 << 18, file);
+        if let Some(foreign) = recognised(reader.fill_buf().map_err(refused)?) {
+            let Foreign { format, fix, .. } = foreign;
+            return Err(RecordingError::OtherFormat { file: path.to_owned(), format, fix });
+        }
+        Ok(Self { path: path.to_owned(), reader, buffer: Vec::new(), number: 0, complete: true })
     }
 
     pub(super) fn number(&self) -> u64 {

@@ -9,6 +9,7 @@
 
 mod column_pattern;
 mod columns;
+mod foreign;
 mod format;
 mod lines;
 mod mapping;

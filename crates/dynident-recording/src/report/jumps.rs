@@ -143,7 +143,8 @@ mod tests {
     fn a_channel_at_rest_with_single_flickers_of_its_last_digit_is_not_absurd() {
         let check = seen(
             None,
-            (0..2000).map(|i| 5.0 * (i as f64 * 0.01).sin().clamp(-0.2, 0.2) + if i % 97 == 0 { 1e-3 } else { 0.0 }),
+            (0..2000)
+                .map(|i| 5.0 * (f64::from(i) * 0.01).sin().clamp(-0.2, 0.2) + if i % 97 == 0 { 1e-3 } else { 0.0 }),
         );
         assert_eq!(check.lone(), (0, None));
     }

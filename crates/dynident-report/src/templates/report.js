@@ -2,31 +2,39 @@
 (() => {
   const root = document.documentElement;
   const dark = matchMedia("(prefers-color-scheme: dark)");
-  const colours = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8930b", "#56b4e9", "#9a63d8", "#808890"];
+  // Samples up to which each is marked, as in the still pictures.
+  const marked = 250;
   const theme = (name) => { root.dataset.theme = name; };
   theme(dark.matches ? "dark" : "light");
 
   // A column is sorted by its numbers if all its cells are numbers, else by its letters.
   for (const table of document.querySelectorAll("table")) {
-    table.querySelectorAll("th").forEach((head, column) => head.addEventListener("click", () => {
-      const body = table.tBodies[0];
-      const down = head.dataset.sorted !== "up";
-      table.querySelectorAll("th").forEach((other) => delete other.dataset.sorted);
-      head.dataset.sorted = down ? "up" : "down";
-      const key = (row) => row.cells[column].textContent.trim().replace("−", "-");
-      const value = head.classList.contains("number") ? (row) => parseFloat(key(row)) : key;
-      const order = (a, b) => {
-        const [x, y] = [value(a), value(b)];
-        if (typeof x === "string") return x.localeCompare(y);
-        return Number.isNaN(x) ? 1 : Number.isNaN(y) ? -1 : x - y;
-      };
-      const rows = [...body.rows].sort(order);
-      body.append(...(down ? rows : rows.reverse()));
-    }));
+    table.querySelectorAll("th").forEach((head, column) => {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.append(...head.childNodes);
+      head.append(button);
+      button.addEventListener("click", () => {
+        const body = table.tBodies[0];
+        const down = head.getAttribute("aria-sort") !== "ascending";
+        table.querySelectorAll("th").forEach((other) => other.removeAttribute("aria-sort"));
+        head.setAttribute("aria-sort", down ? "ascending" : "descending");
+        const key = (row) => row.cells[column].textContent.trim().replace("−", "-");
+        const value = head.classList.contains("number") ? (row) => parseFloat(key(row)) : key;
+        const order = (a, b) => {
+          const [x, y] = [value(a), value(b)];
+          if (typeof x === "string") return x.localeCompare(y);
+          return Number.isNaN(x) ? 1 : Number.isNaN(y) ? -1 : x - y;
+        };
+        const rows = [...body.rows].sort(order);
+        body.append(...(down ? rows : rows.reverse()));
+      });
+    });
   }
 
   const short = (value) => (value == null ? "–" : Math.abs(value) >= 1e5 || (value !== 0 && Math.abs(value) < 1e-3) ? (+value.toPrecision(4)).toExponential() : String(+value.toPrecision(5)));
   const style = (name) => getComputedStyle(root).getPropertyValue(name).trim();
+  const colour = (number) => style(`--c${number % 8}`);
 
   // Error bars, drawn over the curves.
   const whiskers = (curves) => (plot) => {
@@ -37,7 +45,7 @@
     pen.clip();
     curves.forEach((curve, number) => {
       if (!curve.bars || !plot.series[number + 1].show) return;
-      pen.strokeStyle = colours[number % colours.length];
+      pen.strokeStyle = colour(number);
       pen.lineWidth = 1.5 * devicePixelRatio;
       pen.beginPath();
       plot.data[0].forEach((x, i) => {
@@ -56,21 +64,25 @@
   };
 
   const plots = [];
+  const width = (holder) => Math.max(holder.clientWidth, 280);
+  // The curves, and below them the strip with their difference; both zoom together.
   const draw = (entry) => {
     const { holder, data } = entry;
     const shown = entry.plot ? entry.plot.series.slice(1).map((series) => series.show) : [];
-    if (entry.plot) entry.plot.destroy();
+    [entry.plot, entry.strip].forEach((plot) => plot && plot.destroy());
     const [ink, line] = [style("--ink"), style("--line")];
     const axis = (label, extra) => ({ label, labelSize: 22, stroke: ink, grid: { stroke: line, width: 1 }, ticks: { stroke: line }, ...extra });
+    const numbers = (_, values) => values.map((value) => (value == null ? "" : short(value)));
+    const points = (fill) => (data.x.length <= marked ? { show: true, size: 5, fill, stroke: fill } : { show: false });
     const series = data.curves.map((curve, number) => {
-      const colour = colours[number % colours.length];
+      const own = colour(number);
       return {
         label: curve.name,
-        stroke: colour,
-        width: curve.points && !data.counts ? 0 : 1.5,
+        stroke: curve.broad ? own + "bf" : own,
+        width: curve.points ? 0 : curve.broad ? 4.5 : 1.3,
         dash: curve.dashed ? [7, 4] : undefined,
-        points: curve.points || data.counts ? { show: true, size: 5, fill: colour } : { show: false },
-        paths: curve.points && !data.counts ? () => null : undefined,
+        points: curve.points ? { show: true, size: 5, fill: own } : curve.broad ? { show: false } : points(own),
+        paths: curve.points ? () => null : undefined,
         value: (_, value) => short(value),
         show: shown[number] ?? true,
       };
@@ -81,26 +93,80 @@
     const span = bars.length && !data.log
       ? { range: (_, low, high) => uPlot.rangeNum(Math.min(low, ...bars), Math.max(high, ...bars), 0.1, true) }
       : {};
+    const cursor = { drag: { x: true, y: false }, sync: { key: holder.id } };
+    const x = { label: data.x_label || "x", value: (_, value) => short(value) };
     entry.plot = new uPlot(
       {
-        width: Math.max(holder.clientWidth, 280),
+        width: width(holder),
         height: Math.round(Math.min(360, Math.max(240, holder.clientWidth * 0.45))),
         scales: { x: { time: false, ...room }, y: data.log ? { distr: 3 } : span },
-        axes: [axis(data.x_label, whole), axis(data.y_label, { size: 64, values: (_, values) => values.map((value) => (value == null ? "" : short(value))) })],
-        series: [{ label: data.x_label || "x", value: (_, value) => short(value) }, ...series],
-        cursor: { drag: { x: true, y: false } },
+        axes: [axis(data.x_label, whole), axis(data.y_label, { size: 64, values: numbers })],
+        series: [x, ...series],
+        cursor,
         hooks: { draw: [whiskers(data.curves)] },
       },
       [data.x, ...data.curves.map((curve) => curve.y)],
       holder,
     );
+    if (data.strip) {
+      const [of, less] = data.strip.of.map((number) => data.curves[number].y);
+      const own = colour(data.curves.length);
+      entry.strip = new uPlot(
+        {
+          width: width(holder),
+          height: 150,
+          scales: { x: { time: false } },
+          axes: [axis("", { size: 30, labelSize: 0 }), axis("difference", { size: 64, values: numbers, space: 22 })],
+          series: [x, { label: data.strip.name, stroke: own, width: 1.2, points: points(own), value: (_, value) => short(value) }],
+          cursor,
+        },
+        [data.x, of.map((value, i) => (value == null || less[i] == null ? null : value - less[i]))],
+        holder,
+      );
+    }
+    // A legend's entry switches its curve, by key as by click.
+    holder.querySelectorAll(".u-legend .u-series th").forEach((head) => {
+      head.tabIndex = 0;
+      head.setAttribute("role", "button");
+      head.addEventListener("keydown", (event) => {
+        if (event.key !== "Enter" && event.key !== " ") return;
+        event.preventDefault();
+        head.click();
+      });
+    });
+    holder.classList.add("live");
+  };
+
+  // Arrows move the stretch that is shown, + and - zoom, 0 or Escape shows all.
+  const steer = (entry) => (event) => {
+    if (event.target !== entry.holder || !entry.plot) return;
+    const all = entry.data.x;
+    const { min, max } = entry.plot.scales.x;
+    const [span, middle] = [max - min, (min + max) / 2];
+    const moves = {
+      ArrowLeft: [min - span / 5, max - span / 5],
+      ArrowRight: [min + span / 5, max + span / 5],
+      "+": [middle - span / 3, middle + span / 3],
+      "-": [middle - span, middle + span],
+      0: [all[0], all[all.length - 1]],
+      Escape: [all[0], all[all.length - 1]],
+    };
+    const to = moves[event.key === "=" ? "+" : event.key];
+    if (!to || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    [entry.plot, entry.strip].forEach((plot) => plot && plot.setScale("x", { min: Math.max(to[0], all[0]), max: Math.min(to[1], all[all.length - 1]) }));
   };
 
   for (const script of document.querySelectorAll("script[data-plot]")) {
     const holder = document.getElementById(script.dataset.plot);
     const data = JSON.parse(script.textContent);
     if (!data.x.length || !data.curves.length) { holder.textContent = "no data"; continue; }
-    plots.push({ holder, data });
+    const entry = { holder, data };
+    holder.tabIndex = 0;
+    holder.setAttribute("role", "group");
+    holder.setAttribute("aria-label", `${holder.dataset.words}. Keys: arrows move, + and - zoom, 0 shows all.`);
+    holder.addEventListener("keydown", steer(entry));
+    plots.push(entry);
   }
   // Only what comes into view is drawn: a long page opens at once.
   const seen = new IntersectionObserver((entries) => {
@@ -110,12 +176,11 @@
     }
   }, { rootMargin: "400px" });
   plots.forEach((entry) => seen.observe(entry.holder));
-  addEventListener("beforeprint", () => plots.filter((entry) => !entry.plot).forEach(draw));
 
   let waiting;
   addEventListener("resize", () => {
     clearTimeout(waiting);
-    waiting = setTimeout(() => plots.filter((entry) => entry.plot && Math.abs(entry.plot.width - Math.max(entry.holder.clientWidth, 280)) > 1).forEach(draw), 120);
+    waiting = setTimeout(() => plots.filter((entry) => entry.plot && Math.abs(entry.plot.width - width(entry.holder)) > 1).forEach(draw), 120);
   });
   const again = (name) => { theme(name); plots.filter((entry) => entry.plot).forEach(draw); };
   document.getElementById("theme").addEventListener("click", () => again(root.dataset.theme === "dark" ? "light" : "dark"));

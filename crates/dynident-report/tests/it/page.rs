@@ -68,3 +68,56 @@ fn a_million_samples_make_a_small_page() {
     // 1200 columns, six samples each at most, three numbers of up to 14 letters; the library is 51 kB.
     assert!(report.html().unwrap().len() < 60_000 + 1200 * 6 * 3 * 15);
 }
+
+/// The value of a style's variable in the part of the style sheet that begins with `scope`.
+fn variable(style: &str, scope: &str, name: &str) -> [f64; 3] {
+    let part = style.split_once(scope).unwrap().1.split_once('}').unwrap().0;
+    let value = part.split_once(&format!("--{name}: #")).unwrap().1.split_once(';').unwrap().0.trim();
+    let digits: String = if value.len() == 3 { value.chars().flat_map(|c| [c, c]).collect() } else { value.to_owned() };
+    [0, 2, 4].map(|at| f64::from(u8::from_str_radix(&digits[at..at + 2], 16).unwrap()) / 255.0)
+}
+
+/// Contrast ratio of two colours (WCAG 2.2, relative luminance).
+fn contrast(one: [f64; 3], other: [f64; 3]) -> f64 {
+    let linear = |c: f64| if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) };
+    let luminance = |[r, g, b]: [f64; 3]| 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
+    let (one, other) = (luminance(one), luminance(other));
+    (one.max(other) + 0.05) / (one.min(other) + 0.05)
+}
+
+/// WCAG 2.2: 4.5 to one for text (1.4.3), three to one for what is drawn (1.4.11); in light, in dark and on paper.
+#[test]
+fn text_and_curves_stand_out_from_the_paper() {
+    let style = include_str!("../../src/templates/report.css");
+    for scope in [":root {", ":root[data-theme=\"dark\"] {", ":root, :root[data-theme] {"] {
+        let of = |name: &str| variable(style, scope, name);
+        for text in ["ink", "faint", "good", "warning", "bad"] {
+            for paper in ["paper", "panel"] {
+                let ratio = contrast(of(text), of(paper));
+                assert!(ratio >= 4.5, "{scope} {text} on {paper}: {ratio:.2}");
+            }
+        }
+        for number in 0..8 {
+            let ratio = contrast(of(&format!("c{number}")), of("paper"));
+            assert!(ratio >= 3.0, "{scope} curve {number}: {ratio:.2}");
+        }
+        // The broad curve below others, of the first colour at three quarters of its strength (`line_plot.svg`).
+        let (own, paper) = (of("c0"), of("paper"));
+        let pale = [0, 1, 2].map(|k| 0.75 * own[k] + 0.25 * paper[k]);
+        assert!(contrast(pale, paper) >= 3.0, "{scope} broad curve: {:.2}", contrast(pale, paper));
+    }
+}
+
+/// Without its script, and on paper, a page shows every plot; and says it to who does not see it.
+#[test]
+fn every_plot_is_a_picture_with_words_before_any_script_runs() {
+    let page = page_of("name");
+    let pictures = page.matches("<svg").count();
+    assert_eq!(pictures, 4, "two plots, bars, a map");
+    assert_eq!(page.matches("role=\"img\" aria-label=\"name: ").count(), pictures);
+    for plot in page.split("class=\"chart\"").skip(1) {
+        let before = plot.split_once("<script").unwrap().0;
+        assert!(before.contains("<svg") && before.contains("<path"), "{before}");
+    }
+    assert!(page.contains("name: 1 to 2"), "ranges of the curves in words");
+}

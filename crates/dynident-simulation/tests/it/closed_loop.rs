@@ -160,6 +160,24 @@ fn perfect_sensors_record_the_truth() {
     assert!(csv.starts_with("t_s,q1,q2,tau1,tau2\n0,") && csv.lines().count() == 10_002);
 }
 
+/// Settings may be of any size, a record's numbers are finite.
+#[test]
+fn a_record_that_would_not_be_finite_is_refused() {
+    for (position_std, torque_std, torque_step) in [(0.0, 1e308, None), (1e308, 0.0, None), (0.0, 0.0, Some(1e-320))] {
+        let sensors = SensorSettings {
+            position_std: position_std.into(),
+            torque_std: torque_std.into(),
+            torque_step: torque_step.map(Into::into),
+            // Other instants than the controller's, whose own readings have no noise here.
+            record_rate_hz: Some(2000.0),
+            ..SensorSettings::default()
+        };
+        let (plant, run, _) = sine_run(SensorSettings::default());
+        let error = sensors.record(plant.model(), &run).unwrap_err().to_string();
+        assert!(error.contains("sizes that a sensor can have"), "{error}");
+    }
+}
+
 #[test]
 fn encoders_quantise_and_noise_has_its_size() {
     let sensors = SensorSettings {

@@ -93,6 +93,14 @@ pub enum Error {
         /// What is wrong, and the fix.
         message: String,
     },
+    /// An output that would take the place of an input.
+    #[error("{}: would overwrite {}, which this command reads; nothing was written: give another --out", output.display(), input.display())]
+    Overwrite {
+        /// What would be written.
+        output: PathBuf,
+        /// What is read.
+        input: PathBuf,
+    },
     /// An output that cannot be written. What was there before is untouched.
     #[error("{}: cannot be written: {source}; nothing that was there has changed", path.display())]
     Output {

@@ -1,20 +1,77 @@
 //! What a robot description says, and what is wrong with it.
 
 use crate::error::Error;
-use crate::result::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary};
+use crate::result::{
+    AuditEntry, BaseSummary, BodySummary, CorrectionEntry, INSPECTION_SCHEMA, Inspection, JointSummary, SlipEntry,
+};
 use dynident_dynamics::{BaseParameterSettings, BaseParameters, numerical_rank_by_body};
-use dynident_model::{InertialParameters, audit, load_robot};
+use dynident_model::{
+    DescriptionFormat, InertialParameters, ReadError, Robot, Slip, Slips, UrdfIrregularity, audit, load_robot,
+    rewrite_inertials, slips,
+};
 use std::path::Path;
+
+/// What is known of the robot beside its description.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct InspectSettings {
+    /// What all masses, the base's with them, should add up to, kg; by default what a comment of the file says.
+    pub total_mass_kg: Option<f64>,
+}
 
 /// Reads and audits a robot description.
 ///
 /// # Errors
 /// If the description cannot be read.
 pub fn inspect(path: &Path) -> Result<Inspection, Error> {
+    inspect_with(path, &InspectSettings::default())
+}
+
+/// What became of a description's slips.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MendedDescription {
+    /// The URDF with all corrections made and every other byte as it was.
+    Urdf(String),
+    /// No slip was found whose numbers can be known.
+    NothingToMend,
+    /// A D-H table, in which no slips are looked for.
+    NoUrdf,
+}
+
+/// A URDF with the corrections made that [`inspect_with`] names.
+///
+/// # Errors
+/// If the description cannot be read.
+pub fn mended(path: &Path, settings: &InspectSettings) -> Result<MendedDescription, Error> {
     let robot = load_robot(path)?;
+    let Some(slips) = slips_of(&robot, settings)? else { return Ok(MendedDescription::NoUrdf) };
+    if slips.stated == slips.corrected {
+        return Ok(MendedDescription::NothingToMend);
+    }
+    rewrite_inertials(&robot.text, &slips.stated, &slips.corrected)
+        .map(MendedDescription::Urdf)
+        .map_err(|error| Error::Result { path: path.to_owned(), message: error.to_string() })
+}
+
+/// The slips of a URDF; none for a D-H table.
+fn slips_of(robot: &Robot, settings: &InspectSettings) -> Result<Option<Slips>, Error> {
+    if robot.format != DescriptionFormat::Urdf {
+        return Ok(None);
+    }
+    let found = slips(&robot.text, &robot.model, settings.total_mass_kg);
+    let fault = |source| ReadError::Urdf { path: robot.path.clone(), source: Box::new(source) };
+    Ok(Some(found.map_err(fault)?))
+}
+
+/// As [`inspect`], with what is known beside the description.
+///
+/// # Errors
+/// If the description cannot be read.
+pub fn inspect_with(path: &Path, settings: &InspectSettings) -> Result<Inspection, Error> {
+    let robot = load_robot(path)?;
+    let slips = slips_of(&robot, settings)?.map_or_else(Vec::new, |slips| slips.found);
     let model = &robot.model;
-    let settings = BaseParameterSettings::default();
-    let base = BaseParameters::new(model, &[], &settings);
+    let base_settings = BaseParameterSettings::default();
+    let base = BaseParameters::new(model, &[], &base_settings);
     let (weakest, strongest) = base.gap();
     let joints = model.joints().iter().map(|joint| JointSummary {
         name: joint.name.clone(),
@@ -50,6 +107,7 @@ pub fn inspect(path: &Path) -> Result<Inspection, Error> {
         place: format!("line {}", unread.line),
         what: format!("<{}> under <{}> was not read: misspelt, or given twice", unread.element, unread.parent),
     }));
+    entries.extend(robot.irregularities.iter().map(irregularity));
     Ok(Inspection {
         schema: INSPECTION_SCHEMA.to_owned(),
         name: model.name().to_owned(),
@@ -61,11 +119,48 @@ pub fn inspect(path: &Path) -> Result<Inspection, Error> {
         bodies: bodies.collect(),
         base_parameters: BaseSummary {
             count: base.count(),
-            expressions: base.expressions(),
+            expressions: base.exact_expressions(),
             unidentifiable: base.unidentifiable().iter().map(|&column| base.all_columns()[column].symbol()).collect(),
-            numerical_rank: numerical_rank_by_body(model, 1, settings.tolerance).independent.len(),
+            numerical_rank: numerical_rank_by_body(model, 1, base_settings.tolerance).independent.len(),
             gap: [weakest, strongest],
         },
         audit: entries,
+        slips: slips.iter().map(slip_entry).collect(),
     })
+}
+
+fn slip_entry(slip: &Slip) -> SlipEntry {
+    let corrections = slip.corrections.iter().map(|one| CorrectionEntry {
+        link: one.link.clone(),
+        number: one.number.to_owned(),
+        from: one.from,
+        to: one.to,
+    });
+    SlipEntry {
+        slip: slip.kind.name().to_owned(),
+        links: slip.links.clone(),
+        what: slip.message.clone(),
+        evidence: slip.evidence.clone(),
+        corrections: corrections.collect(),
+    }
+}
+
+fn irregularity(found: &UrdfIrregularity) -> AuditEntry {
+    let (check, line, what) = match found {
+        UrdfIrregularity::UndeclaredPrefix { line, prefix } => (
+            "undeclared-prefix",
+            line,
+            format!(
+                "names begin with `{prefix}:`, which no xmlns:{prefix} declares: they are passed over; strict XML readers refuse the file"
+            ),
+        ),
+        UrdfIrregularity::UnknownMimic { line, joint, source_joint } => (
+            "unknown-mimic",
+            line,
+            format!(
+                "joint `{joint}` mimics `{source_joint}`, which is no joint of this robot, and counts as free: fix the name or delete <mimic>"
+            ),
+        ),
+    };
+    AuditEntry { level: "warning".to_owned(), check: check.to_owned(), place: format!("line {line}"), what }
 }

@@ -8,5 +8,6 @@ pub(crate) mod inspect;
 pub(crate) mod iterate;
 mod log_summary;
 pub(crate) mod options;
+pub(crate) mod provenance;
 pub(crate) mod simulate;
 pub(crate) mod validate;

@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::jobs::iterate::Trajectory;
 use crate::jobs::options::{RunOptions, study_name};
+use crate::jobs::provenance::motion_provenance;
 use crate::result::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};
 use crate::study::{Folders, Study, StudyRobot};
 use core::ops::ControlFlow;
@@ -63,6 +64,7 @@ pub fn simulate_study(
     let file = SimulationFile {
         schema: SIMULATION_SCHEMA.to_owned(),
         name: study_name(study, study_path),
+        provenance: Some(motion_provenance(study, study_path, options.data.as_deref(), &[])?),
         controller: controller.name().to_owned(),
         done: run.status.is_done(),
         status: run.status,

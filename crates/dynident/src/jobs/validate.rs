@@ -3,9 +3,10 @@
 use crate::error::Error;
 use crate::jobs::log_summary::held_out_summary;
 use crate::jobs::options::{RunOptions, study_name};
+use crate::jobs::provenance::seen_from;
 use crate::result::{ResultFile, VALIDATION_SCHEMA, ValidationFile};
 use crate::study::{Folders, Study, StudyRobot};
-use dynident_identification::examination::{ModelUnderTest, examine_held_out};
+use dynident_identification::examination::{HeldOutExamination, ModelUnderTest, examine_held_out};
 use dynident_identification::{Logs, Role};
 use std::path::Path;
 
@@ -50,10 +51,16 @@ pub fn validate(
     });
     let tested = tested.map_err(Error::identification(study_path))?;
     let joints = model.joint_names();
+    let folder = study_path.parent().unwrap_or(Path::new(""));
+    let summary = |log: &HeldOutExamination| {
+        let mut summary = held_out_summary(&recordings[log.index], log, &joints);
+        summary.import.file = seen_from(folder, Path::new(&summary.import.file));
+        summary
+    };
     Ok(ValidationFile {
         schema: VALIDATION_SCHEMA.to_owned(),
         name: study_name(study, study_path),
-        logs: tested.iter().map(|log| held_out_summary(&recordings[log.index], log, &joints)).collect(),
+        logs: tested.iter().map(summary).collect(),
         validation: tested.into_iter().map(|log| log.validation).collect(),
     })
 }

@@ -1,7 +1,8 @@
 //! `report.html` of an identification.
 
 use crate::error::Error;
-use crate::result::{BaseParameterResult, LogSummary, ResultFile};
+use crate::result::{BaseParameterResult, LogSummary, ResultFile, TermResult};
+use dynident_estimation::ValidationReport;
 use dynident_estimation::consistent::IntervalEnd;
 use dynident_identification::Role;
 use dynident_identification::consistent::ParameterInterval;
@@ -22,13 +23,21 @@ pub(crate) fn identification_report(r: &ResultFile, traces: &[LogTrace]) -> Resu
         r.method.estimator,
         r.method.covariance
     ));
+    if !r.problems.is_empty() {
+        let mut against = Text::new("What speaks against loading this model into a robot:");
+        for problem in &r.problems {
+            against = against.point(Tone::Bad, problem);
+        }
+        page.add(against);
+    }
     page.add(figures(r));
+    page.add(judged_model(r));
     page.add(Heading::new("Torque"));
     page.add(errors(r));
     for log in &r.validation {
         page.add(held_out(log));
     }
-    torques(&mut page, &r.robot.joints, traces);
+    torques(&mut page, &r.robot.joints, traces, r.validation.iter().any(|log| log.physical.is_some()));
     page.add(Heading::new("Parameters"));
     parameters(&mut page, r);
     page.add(Heading::new("Friction and drives"));
@@ -40,7 +49,8 @@ pub(crate) fn identification_report(r: &ResultFile, traces: &[LogTrace]) -> Resu
     for log in &r.logs {
         page.add(log_text(log));
     }
-    page.add(Heading::new("Time"));
+    page.add(Heading::new("Origin and time"));
+    super::provenance::origin(&mut page, r);
     let t = &r.timings_s;
     let steps = [
         ("robot and base parameters", t.robot),
@@ -62,33 +72,82 @@ fn unit(unit: &str) -> String {
 }
 
 fn percent(value: Option<f64>) -> String {
-    value.map_or_else(|| "–".to_owned(), |value| format!("{} %", short(value, 3)))
+    value.map_or_else(|| "–".to_owned(), |value| format!("{}\u{a0}%", short(value, 3)))
 }
 
 fn figures(r: &ResultFile) -> KeyFigures {
     let mut figures = KeyFigures::new();
     for log in r.validation.iter().take(3) {
         let prior = log.prior.as_ref().and_then(|prior| prior.relative_error_percent);
-        let note =
-            prior.map_or_else(|| log.log.clone(), |prior| format!("{}; description {}", log.log, percent(Some(prior))));
-        figures = figures.figure("held-out torque error", percent(log.model.relative_error_percent), note);
+        let mut note = log.log.clone();
+        if log.physical.is_some() {
+            note = format!("{note}; free fit {}", percent(log.model.relative_error_percent));
+        }
+        if prior.is_some() {
+            note = format!("{note}; description {}", percent(prior));
+        }
+        figures = figures.figure("held-out torque error", percent(written(log).relative_error_percent), note);
     }
     if r.validation.is_empty() {
         figures = figures.judged("held-out torque error", "–", "no log was held out", Tone::Warning);
     }
+    // A tick beside a problem would be read as all being well.
+    let good = if r.problems.is_empty() && r.method.is_settled() { Tone::Good } else { Tone::Plain };
+    let all = r.base_parameters.len();
+    let within = |percent: f64| {
+        let bar = |p: &&BaseParameterResult| p.relative_half_width_percent().is_some_and(|bar| bar <= percent);
+        r.base_parameters.iter().filter(bar).count()
+    };
     let excited = r.base_parameters.iter().filter(|parameter| parameter.excited).count();
-    let physical = if r.physical.consistent { ("yes", Tone::Good) } else { ("no", Tone::Bad) };
+    let vague = excited - within(100.0).min(excited);
+    let mut known = vec![format!("{} to 10 %", within(10.0))];
+    if vague > 0 {
+        known.push(format!("{vague} with bars above their values"));
+    }
+    if excited < all {
+        known.push(format!("{} not excited", all - excited));
+    }
+    if !r.method.is_settled() {
+        known.push("NOT settled".to_owned());
+    }
+    let tone = if vague > 0 || excited < all || !r.method.is_settled() { Tone::Warning } else { good };
+    let physical = if r.physical.consistent { ("yes", good) } else { ("no", Tone::Bad) };
+    let fit = r.training.physical.as_ref().map_or(r.training.relative_error_percent, |own| own.relative_error_percent);
     figures
-        .figure("error of the fit", percent(r.training.relative_error_percent), format!("{} rows", r.training.samples))
-        .judged(
-            "parameters identified",
-            format!("{excited} of {}", r.base_parameters.len()),
-            r.method.status.clone(),
-            if excited == r.base_parameters.len() { Tone::Good } else { Tone::Warning },
-        )
+        .figure("error of the fit", percent(fit), format!("{} rows", r.training.samples))
+        .judged("parameters known to 30 %", format!("{} of {all}", within(30.0)), known.join("; "), tone)
         .figure("condition number", short(r.method.condition_number_scaled, 3), "columns of unit length")
         .judged("physically consistent", physical.0, "", physical.1)
         .figure("time", format!("{} s", short(r.timings_s.total, 3)), "")
+}
+
+/// What is written is judged: the consistent set where there is one, else the estimate.
+fn written(log: &LogValidation) -> &ValidationReport {
+    log.physical.as_ref().unwrap_or(&log.model)
+}
+
+/// Which model the figures are of, and whether the logs tell it apart from the free fit.
+fn judged_model(r: &ResultFile) -> Text {
+    let Some(fit) = &r.physical.fit else {
+        return Text::new("All figures are those of the estimate; no physically consistent set stands beside it.");
+    };
+    let figures = "Figures and plots of held-out logs are those of the physically consistent model, which is the one \
+                   that is written; the free fit stands beside it.";
+    let Some(test) = fit.difference else { return Text::new(figures) };
+    let [parameters, rest] = test.degrees_of_freedom;
+    let numbers = format!(
+        "F({}, {}) = {}, p = {}",
+        short(parameters, 4),
+        short(rest, 4),
+        short(test.f, 3),
+        short(test.p_value, 2)
+    );
+    let (tone, says) = if test.is_significant {
+        (Tone::Warning, "The logs tell the two apart: what is consistent does not explain all that they show")
+    } else {
+        (Tone::Plain, "The logs do not tell the two apart")
+    };
+    Text::new(figures).point(tone, format!("{says} ({numbers})."))
 }
 
 /// Errors of the torque by joint, training and held-out logs side by side.
@@ -100,10 +159,11 @@ fn errors(r: &ResultFile) -> Table {
     let number = |value: Option<f64>| Cell::from(value.map_or_else(|| "–".to_owned(), |value| short(value, 3)));
     let mut table = Table::new("Torque error by joint", columns)
         .note("root mean square of measured less predicted filtered torque, and as part of the measured torque");
-    for (j, joint) in r.training.joints.iter().enumerate() {
+    let joints = r.training.physical.as_ref().map_or(&r.training.joints, |own| &own.joints);
+    for (j, joint) in joints.iter().enumerate() {
         let mut row = vec![Cell::from(&joint.name), number(Some(joint.rmse_nm)), number(joint.relative_error_percent)];
         for log in &r.validation {
-            let joint = &log.model.joints[j];
+            let joint = &written(log).joints[j];
             row.extend([number(Some(joint.rmse_nm)), number(joint.relative_error_percent)]);
         }
         table = table.rows([row]);
@@ -114,9 +174,9 @@ fn errors(r: &ResultFile) -> Table {
 /// One held-out log: the estimate, the consistent set and the description.
 fn held_out(log: &LogValidation) -> Table {
     let sets = [
-        ("base parameters", Some(&log.model)),
-        ("base parameters, unfiltered torque", Some(&log.raw)),
-        ("consistent set", log.physical.as_ref()),
+        ("consistent set, as written", log.physical.as_ref()),
+        ("free fit", Some(&log.model)),
+        ("free fit, unfiltered torque", Some(&log.raw)),
         ("the description's own", log.prior.as_ref()),
     ];
     let rows = sets.into_iter().filter_map(|(set, report)| {
@@ -134,27 +194,27 @@ fn held_out(log: &LogValidation) -> Table {
         .rows(rows)
 }
 
-fn torques(page: &mut Report, joints: &[String], traces: &[LogTrace]) {
+fn torques(page: &mut Report, joints: &[String], traces: &[LogTrace], is_consistent: bool) {
     for trace in traces.iter().rev() {
         let role = if trace.role == Role::Validate { "held out" } else { "fitted to" };
         let part = if trace.cut || trace.role == Role::Identify { "; the first samples" } else { "" };
+        let is_written = trace.role == Role::Validate && is_consistent;
+        let predicted_by = if is_written { "predicted" } else { "predicted by the free fit" };
         let rows = trace.joints.iter().map(|joint| joint.measured_nm.len()).min().unwrap_or(0);
         let time: Vec<f64> = (0..rows).map(|row| row as f64 / trace.rate_hz).collect();
-        let mut residuals =
-            LinePlot::new(format!("Residual: {} ({role})", trace.log), "t, s", "torque, Nm (N)", time.clone())
-                .note("measured less predicted; gaps of the log are closed up");
         for (name, joint) in joints.iter().zip(&trace.joints) {
             let (measured, predicted) = (joint.measured_nm[..rows].to_vec(), joint.predicted_nm[..rows].to_vec());
-            let residual = measured.iter().zip(&predicted).map(|(measured, predicted)| measured - predicted).collect();
-            residuals = residuals.line(name, residual);
             page.add(
                 LinePlot::new(format!("{name}: {} ({role})", trace.log), "t, s", "torque, Nm (N)", time.clone())
-                    .note(format!("filtered at {} Hz{part}", short(trace.rate_hz, 4)))
+                    .note(format!(
+                        "filtered, {} rows a second{part}; gaps of the log are closed up",
+                        short(trace.rate_hz, 4)
+                    ))
+                    .broad(predicted_by, predicted)
                     .line("measured", measured)
-                    .line("predicted", predicted),
+                    .difference("measured less predicted", 1, 0),
             );
         }
-        page.add(residuals);
     }
 }
 
@@ -178,20 +238,20 @@ fn parameters(page: &mut Report, r: &ResultFile) {
     }
     let optional = |value: Option<f64>| Cell::from(value.map_or_else(String::new, |value| short(value, 5)));
     let row = |p: &BaseParameterResult| {
-        let relative = p.relative_std_percent.unwrap_or(f64::INFINITY);
-        let tone = if relative > 30.0 { Tone::Warning } else { Tone::Plain };
-        let relative = p.relative_std_percent.map_or_else(String::new, |value| short(value, 3));
+        let relative = p.relative_half_width_percent();
+        let tone = if relative.is_none_or(|relative| relative > 30.0) { Tone::Warning } else { Tone::Plain };
+        let relative = relative.map_or_else(String::new, |value| short(value, 3));
         vec![
             Cell::from(&p.expression),
             short(p.value, 6).into(),
-            short(p.std, 3).into(),
+            short(p.half_width_95, 3).into(),
             Cell::judged(relative, if p.excited { tone } else { Tone::Bad }),
             optional(p.physical),
             optional(p.prior),
             Cell::from(unit(&p.unit)),
         ]
     };
-    let columns = ["expression", "value", "std", "std, %", "consistent set", "description", "unit"];
+    let columns = ["expression", "free fit", "± (95 %)", "± in %", "consistent set", "description", "unit"];
     page.add(Table::new("Base parameters", columns).rows(r.base_parameters.iter().map(row)));
     if !r.method.not_excited.is_empty() {
         let text = format!("Not excited by the logs: {}", r.method.not_excited.join(", "));
@@ -204,18 +264,28 @@ fn parameters(page: &mut Report, r: &ResultFile) {
         let values = (0..n).map(|i| (0..n).map(|j| value(i, j)).collect()).collect();
         let names = || r.base_parameters.iter().map(|parameter| parameter.symbol.clone());
         page.add(HeatMap::new("Correlation of the base parameters", names(), names(), values).limit(1.0));
+        let strongest = r.correlations.iter().map(|pair| {
+            let [first, second] = &pair.parameters;
+            vec![Cell::from(first), Cell::from(second), Cell::from(short(pair.correlation, 4))]
+        });
+        page.add(Table::new("Strongest correlations", ["parameter", "and", "correlation"]).rows(strongest));
     }
 }
 
 fn friction(page: &mut Report, r: &ResultFile) {
-    let mut table = Table::new("", ["joint", "parameter", "value", "std", "unit"])
-        .note("of the consistent set where there is one; a deviation where the parameter is identified on its own");
+    let mut table = Table::new("", ["joint", "parameter", "value", "± (95 %)", "unit"])
+        .note("of the consistent set where there is one; an error bar where the parameter is identified on its own");
+    // A term that is identified on its own is a base parameter, which has the bar.
+    let bar = |term: &TermResult| {
+        let base = r.base_parameters.iter().find(|p| Some(&p.expression) == term.base_parameter.as_ref());
+        base.filter(|p| term.std.is_some() && p.excited).map_or_else(String::new, |p| short(p.half_width_95, 3))
+    };
     let owned = r.joints.iter().map(|joint| (joint.name.as_str(), &joint.terms[..]));
     let coupled = [("coupling", &r.couplings[..])];
     for (name, terms) in owned.chain(coupled) {
         for term in terms {
-            let std = term.std.map_or_else(String::new, |std| short(std, 3));
-            table = table.row([name.to_owned(), term.symbol.clone(), short(term.value, 5), std, unit(&term.unit)]);
+            table =
+                table.row([name.to_owned(), term.symbol.clone(), short(term.value, 5), bar(term), unit(&term.unit)]);
         }
     }
     page.add(table);
@@ -234,14 +304,9 @@ fn lags(page: &mut Report, r: &ResultFile) {
         let lag = joint.torque_lag?;
         let ms = |seconds: f64| Cell::from(short(1e3 * seconds, 3));
         let tone = if lag.matters { Tone::Warning } else { Tone::Plain };
-        Some(vec![
-            Cell::from(&joint.name),
-            Cell::judged(short(1e3 * lag.lag_s, 3), tone),
-            ms(lag.std_s),
-            ms(lag.half_width_95_s),
-        ])
+        Some(vec![Cell::from(&joint.name), Cell::judged(short(1e3 * lag.lag_s, 3), tone), ms(lag.half_width_95_s)])
     });
-    let table = Table::new("Lag of the torque behind the motion", ["joint", "lag, ms", "std, ms", "95 %, ± ms"])
+    let table = Table::new("Lag of the torque behind the motion", ["joint", "lag, ms", "± (95 %), ms"])
         .note("estimated together with the model, log by log; marked where it moves more torque than the model leaves unexplained")
         .rows(rows);
     page.add(table);
@@ -250,7 +315,8 @@ fn lags(page: &mut Report, r: &ResultFile) {
 fn bodies(page: &mut Report, r: &ResultFile) {
     let mut verdict = Text::new(format!("The verdict is {}.", r.physical.note));
     if r.physical.consistent {
-        verdict = verdict.point(Tone::Good, "every body, friction and drive is physically consistent");
+        let tone = if r.problems.is_empty() && r.method.is_settled() { Tone::Good } else { Tone::Plain };
+        verdict = verdict.point(tone, "every body, friction and drive is physically consistent");
     }
     let failure = r.physical.failure.iter().map(|reason| format!("no consistent set: {reason}"));
     for violation in r.physical.violations.iter().cloned().chain(failure) {
@@ -260,32 +326,24 @@ fn bodies(page: &mut Report, r: &ResultFile) {
         verdict = verdict.point(Tone::Warning, format!("no identified.urdf: {reason}"));
     }
     page.add(verdict);
-    let columns = [
-        "body",
-        "mass, kg",
-        "description, kg",
-        "x, m",
-        "y, m",
-        "z, m",
-        "Ixx",
-        "Ixy",
-        "Ixz",
-        "Iyy",
-        "Iyz",
-        "Izz",
-        "least eigenvalue",
-    ];
     let rows = r.bodies.iter().map(|body| {
         let prior = body.prior.map_or_else(String::new, |prior| short(prior[0], 4));
         let mut row = vec![Cell::from(&body.name), short(body.mass_kg, 4).into(), prior.into()];
         row.extend((0..3).map(|k| Cell::from(body.com_m.map_or_else(String::new, |com| short(com[k], 4)))));
-        row.extend(body.inertia_at_origin_kgm2.iter().map(|value| Cell::from(short(*value, 4))));
         let least = body.pseudo_inertia_min_eigenvalue;
         row.push(Cell::judged(short(least, 3), if least > 0.0 { Tone::Plain } else { Tone::Bad }));
         row
     });
-    let note = "centre of mass and inertia (kg m²) in the body's own frame, inertia about its origin; least eigenvalue of the pseudo-inertia";
+    let note = "centre of mass in the body's own frame; least eigenvalue of the pseudo-inertia";
+    let columns = ["body", "mass, kg", "description, kg", "x, m", "y, m", "z, m", "least eigenvalue"];
     page.add(Table::new("Bodies", columns).note(note).rows(rows));
+    let rows = r.bodies.iter().map(|body| {
+        let inertia = body.inertia_at_origin_kgm2.iter().map(|value| Cell::from(short(*value, 4)));
+        [Cell::from(&body.name)].into_iter().chain(inertia).collect()
+    });
+    let note = "kg m², in the body's own frame, about its origin";
+    let columns = ["body", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
+    page.add(Table::new("Inertia of the bodies", columns).note(note).rows(rows));
     if let Some(found) = &r.possible_intervals {
         page.add(intervals(found));
     }

@@ -4,3 +4,4 @@ pub(crate) mod design;
 pub(crate) mod identification;
 pub(crate) mod iteration;
 mod payloads;
+mod provenance;

@@ -1,5 +1,6 @@
 //! What `check` prints, and `identify` keeps in its result: whether study, robot and logs fit together.
 
+use core::fmt::Write;
 use dynident_recording::Level;
 use serde::{Deserialize, Serialize};
 
@@ -94,10 +95,10 @@ impl CheckFinding {
     pub fn sentence(&self) -> String {
         let mut text = format!("{}: {}", self.what, self.evidence);
         for change in &self.write {
-            text += &format!("; under {} write `{}`", change.place(), change.line);
+            let _ = write!(text, "; under {} write `{}`", change.place(), change.line);
         }
         if !self.or.is_empty() {
-            text += &format!("; these logs cannot tell it from: {}", self.or.join("; or "));
+            let _ = write!(text, "; these logs cannot tell it from: {}", self.or.join("; or "));
         }
         text
     }

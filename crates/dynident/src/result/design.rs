@@ -1,5 +1,6 @@
 //! What `design.json` holds.
 
+use super::provenance::Provenance;
 use crate::study::{FamilyChoice, WindowedProblem};
 use dynident_excitation::check::LimitReport;
 use dynident_excitation::step_wise::StrokeQuantity;
@@ -16,6 +17,9 @@ pub struct DesignFile {
     pub schema: String,
     /// Name of the study.
     pub name: String,
+    /// Where it comes from; none in files of before it was written.
+    #[serde(default)]
+    pub provenance: Option<Provenance>,
     /// Joints in the order of all vectors.
     pub joints: Vec<String>,
     /// The family; `given` for a trajectory or log that was only looked at.

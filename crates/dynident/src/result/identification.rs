@@ -2,7 +2,9 @@
 
 use super::check::StudyCheck;
 use super::numbers::{number, rows};
+use super::provenance::Provenance;
 use crate::study::JointDrive;
+use dynident_estimation::consistent::ConsistencyTest;
 use dynident_estimation::{CorrelatedPair, EssentialReport};
 use dynident_identification::Role;
 use dynident_identification::consistent::ParameterInterval;
@@ -24,6 +26,13 @@ pub struct ResultFile {
     pub schema: String,
     /// Name of the study.
     pub name: String,
+    /// Everything that speaks against loading the model that was written into a robot, a sentence each; empty where
+    /// nothing does.
+    #[serde(default)]
+    pub problems: Vec<String>,
+    /// Where it comes from; none in results of before 0.1.
+    #[serde(default)]
+    pub provenance: Option<Provenance>,
     /// The robot.
     pub robot: RobotSummary,
     /// How the fit was made.
@@ -105,7 +114,7 @@ pub struct ResultFile {
 pub struct RobotSummary {
     /// Its name.
     pub name: String,
-    /// The description.
+    /// The description, seen from the study's folder.
     pub file: String,
     /// Degrees of freedom.
     pub dof: usize,
@@ -196,6 +205,13 @@ pub struct BaseParameterResult {
     pub excited: bool,
 }
 
+impl BaseParameterResult {
+    /// `100 half_width_95 / |value|`; none for a value of zero and for what the data do not excite.
+    pub fn relative_half_width_percent(&self) -> Option<f64> {
+        (self.excited && self.value != 0.0).then(|| 100.0 * self.half_width_95 / self.value.abs())
+    }
+}
+
 /// One body of the full set.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -216,6 +232,22 @@ pub struct BodyResult {
     pub prior: Option<[f64; 10]>,
     /// Smallest eigenvalue of the pseudo-inertia: positive for a consistent body.
     pub pseudo_inertia_min_eigenvalue: f64,
+    /// For each of the ten whether torque told it; none in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sources: Option<[ValueSource; 10]>,
+}
+
+/// Where a body's value comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "lowercase")]
+pub enum ValueSource {
+    /// Torque tells it by itself.
+    Measured,
+    /// Torque tells sums of it with others; shared out so that it stays near the description's.
+    Partly,
+    /// Torque does not tell it: near the description's, as far as a consistent body allows.
+    Nominal,
 }
 
 /// A parameter of a term.
@@ -282,6 +314,19 @@ pub struct TrainingResult {
     pub relative_error_percent: Option<f64>,
     /// Joint by joint.
     pub joints: Vec<TrainingJoint>,
+    /// The same of the physically consistent set, which is what is written; none without one.
+    #[serde(default)]
+    pub physical: Option<TrainingErrors>,
+}
+
+/// Errors of a set of parameters on the logs that were fitted to.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct TrainingErrors {
+    /// `100 ‖τ - τ̂‖ / ‖τ‖`, filtered, all joints stacked.
+    pub relative_error_percent: Option<f64>,
+    /// Joint by joint.
+    pub joints: Vec<TrainingJoint>,
 }
 
 /// One joint of [`TrainingResult`].
@@ -341,6 +386,9 @@ pub struct PhysicalFitResult {
     pub moved_sigma: f64,
     /// The largest move of a base parameter in units of its reported standard deviation.
     pub largest_move_std: Option<f64>,
+    /// Whether the logs contradict the consistent set: the distance tested; none where it cannot be.
+    #[serde(default)]
+    pub difference: Option<ConsistencyTest>,
     /// Limits that hold with equality and push: friction or drive inertia at zero.
     #[serde(default)]
     pub active: Vec<String>,
@@ -395,10 +443,13 @@ pub struct LogSummary {
     pub model_findings: Vec<Finding>,
 }
 
-/// Where the time went, in seconds.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+/// When it was made, and where the time went, in seconds: all that is not the same when it is made again.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Timings {
+    /// When it was made, by the computer's clock, in universal time: `2026-11-22T10:30:13Z`.
+    #[serde(default)]
+    pub made_at: String,
     /// Reading the robot, base parameters.
     #[serde(rename = "machine")]
     pub robot: f64,

@@ -29,6 +29,40 @@ pub struct Inspection {
     pub base_parameters: BaseSummary,
     /// Findings of the audit.
     pub audit: Vec<AuditEntry>,
+    /// Slips that explain what is wrong with the inertials; `inspect --fix` makes their corrections.
+    #[serde(default)]
+    pub slips: Vec<SlipEntry>,
+}
+
+/// One slip in the inertials of a URDF.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct SlipEntry {
+    /// `negated-moments`, `negated-products`, `row-major`, `lower-triangle`, `units`, `about-origin`, `defaults`,
+    /// `total-mass`, `twins`, or `unexplained` where none or several of them would explain the numbers.
+    pub slip: String,
+    /// The links it concerns.
+    pub links: Vec<String>,
+    /// What it is, and what to do.
+    pub what: String,
+    /// Why it is believed, in numbers.
+    pub evidence: String,
+    /// The numbers that were meant; empty where they cannot be known.
+    pub corrections: Vec<CorrectionEntry>,
+}
+
+/// One number of one `<inertial>`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct CorrectionEntry {
+    /// The link.
+    pub link: String,
+    /// `mass`, `x`, `y` or `z` of the centre of mass, `ixx`, `ixy`, `ixz`, `iyy`, `iyz` or `izz`.
+    pub number: String,
+    /// As it stands.
+    pub from: f64,
+    /// As it was meant.
+    pub to: f64,
 }
 
 /// One joint.
@@ -74,7 +108,7 @@ pub struct BodySummary {
 pub struct BaseSummary {
     /// How many.
     pub count: usize,
-    /// What each sums.
+    /// What each sums, every factor in the shortest form that reads back to the same number.
     pub expressions: Vec<String>,
     /// Parameters that no motion can determine.
     pub unidentifiable: Vec<String>,

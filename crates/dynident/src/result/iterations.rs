@@ -1,5 +1,6 @@
 //! What `iterations.json` holds.
 
+use super::provenance::Provenance;
 use serde::{Deserialize, Serialize};
 
 /// Schema of `iterations.json`.
@@ -13,6 +14,9 @@ pub struct IterationsFile {
     pub schema: String,
     /// Name of the study.
     pub name: String,
+    /// Where it comes from; none in files of before it was written.
+    #[serde(default)]
+    pub provenance: Option<Provenance>,
     /// Whether tracking and parameters have settled.
     pub converged: bool,
     /// `converged`, `runs-used-up`, `refused` or `waiting`.

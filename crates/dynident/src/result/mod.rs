@@ -9,6 +9,7 @@ mod inspection;
 mod iterations;
 mod numbers;
 mod problems;
+mod provenance;
 mod simulation;
 pub(crate) mod stored;
 mod validation;
@@ -21,10 +22,13 @@ pub use evaluation::{EVALUATION_SCHEMA, EvaluationFile};
 pub use identification::{
     BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, LogSummary, MethodSummary,
     PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, TermResult,
-    Timings, TrainingJoint, TrainingResult,
+    Timings, TrainingErrors, TrainingJoint, TrainingResult, ValueSource,
 };
-pub use inspection::{AuditEntry, BaseSummary, BodySummary, INSPECTION_SCHEMA, Inspection, JointSummary};
+pub use inspection::{
+    AuditEntry, BaseSummary, BodySummary, CorrectionEntry, INSPECTION_SCHEMA, Inspection, JointSummary, SlipEntry,
+};
 pub use iterations::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile};
+pub use provenance::{InputFile, Provenance};
 pub use simulation::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};
 // What the files hold of the crates below.
 pub use dynident_excitation::check::LimitReport;

@@ -1,7 +1,6 @@
 //! What speaks against loading a result's model into a robot.
 
 use super::{ResultFile, StudyCheck};
-use dynident_identification::examination::LogValidation;
 use dynident_recording::Level;
 
 /// Times the estimate's error that the consistent set may have on a held-out log. On the real logs that Dynident is
@@ -14,63 +13,92 @@ const LEAST_SHARE: f64 = 1.0e-3;
 
 impl ResultFile {
     /// Everything that speaks against loading the model that was written into a robot, a sentence each; empty where
-    /// nothing does. Problems of the logs, an estimator that did not settle, and a consistent set (which is what is
-    /// written) that predicts clearly worse than the estimate it was made from.
-    pub fn problems(&self) -> Vec<String> {
-        let mut problems: Vec<String> = self.check.iter().flat_map(StudyCheck::problems).collect();
+    /// nothing does: [`problems_of_the_model`](Self::problems_of_the_model), then the problems of the logs.
+    pub(crate) fn found_problems(&self) -> Vec<String> {
+        let mut problems = self.problems_of_the_model();
         for log in &self.logs {
             let findings = log.import.findings.iter().chain(&log.model_findings);
             for finding in findings.filter(|finding| finding.level == Level::Problem) {
                 problems.push(format!("log `{}`, {}: {}", log.log, finding.channel, finding.message));
             }
         }
+        problems
+    }
+
+    /// Of [`problems`](Self::problems) those that no single log's findings name: what the examiner of studies found, an
+    /// estimator that did not settle, and a consistent set (which is what is written) that predicts clearly worse than
+    /// the estimate it was made from; on the held-out logs, or, where none was held out, on the rows that were fitted
+    /// to if the logs tell the two apart.
+    pub fn problems_of_the_model(&self) -> Vec<String> {
+        let mut problems: Vec<String> = self.check.iter().flat_map(StudyCheck::problems).collect();
         if !self.method.is_settled() {
             problems.push(format!(
                 "the estimator {} did not settle: its values are those of its last iteration",
                 self.method.estimator
             ));
         }
-        problems.extend(self.validation.iter().filter_map(worse_when_consistent));
+        let tested = self.validation.iter().filter_map(|log| {
+            let [free, written] = [&log.model, log.physical.as_ref()?].map(|report| Errors {
+                relative_percent: report.relative_error_percent,
+                joints: report.joints.iter().map(|j| (&j.name[..], j.rmse_nm, j.relative_error_percent)).collect(),
+            });
+            worse_when_consistent(&format!("log `{}`", log.log), &free, &written)
+        });
+        problems.extend(tested);
+        // On the rows that it was fitted to the estimate is the better by itself: only what is more than chance counts.
+        let difference = self.physical.fit.as_ref().and_then(|fit| fit.difference);
+        let is_tested = self.validation.is_empty() && difference.is_none_or(|test| test.is_significant);
+        if let (true, Some(physical)) = (is_tested, &self.training.physical) {
+            let pairs = [
+                (self.training.relative_error_percent, &self.training.joints),
+                (physical.relative_error_percent, &physical.joints),
+            ];
+            let [free, written] = pairs.map(|(relative_percent, joints)| Errors {
+                relative_percent,
+                joints: joints.iter().map(|j| (&j.name[..], j.rmse_nm, j.relative_error_percent)).collect(),
+            });
+            problems.extend(worse_when_consistent("logs that were fitted to", &free, &written));
+        }
         problems
     }
 }
 
-/// The consistent set beside the estimate on one held-out log, where it is clearly worse.
-fn worse_when_consistent(log: &LogValidation) -> Option<String> {
-    let consistent = log.physical.as_ref()?;
-    let largest = log.model.joints.iter().map(torque_norm).fold(0.0, f64::max);
+/// Errors of one set of parameters.
+struct Errors<'a> {
+    relative_percent: Option<f64>,
+    /// Joint, root mean square, relative error in percent.
+    joints: Vec<(&'a str, f64, Option<f64>)>,
+}
+
+/// The consistent set beside the estimate on the same rows, where it is clearly worse.
+fn worse_when_consistent(place: &str, free: &Errors<'_>, written: &Errors<'_>) -> Option<String> {
+    let largest = free.joints.iter().map(torque_norm).fold(0.0, f64::max);
     let times = |before: f64, after: f64| if before > 0.0 { after / before } else { 1.0 };
-    let joints = log.model.joints.iter().zip(&consistent.joints);
-    let joints = joints.filter(|(free, _)| torque_norm(free) > LEAST_SHARE * largest);
+    let joints = free.joints.iter().zip(&written.joints);
     let worst = joints
-        .map(|(free, held)| (times(free.rmse_nm, held.rmse_nm), free, held))
+        .filter(|(free, _)| torque_norm(free) > LEAST_SHARE * largest)
+        .map(|(free, held)| (times(free.1, held.1), free, held))
         .filter(|(ratio, ..)| *ratio > MOST_TIMES_OF_JOINT)
         .max_by(|a, b| a.0.total_cmp(&b.0));
     let percent = |value: Option<f64>| value.map_or_else(|| "?".to_owned(), |value| format!("{value:.2}"));
-    let cause = "no physically consistent robot moves as this log says: a reversed or exchanged channel, a wrong unit, \
-                 or a wrong description";
-    if let Some((_, free, held)) = worst {
-        return Some(format!(
-            "log `{}`, joint `{}`: the consistent set that is written leaves {} % of the torque, the estimate alone {} %; {cause}",
-            log.log,
-            free.name,
-            percent(held.relative_error_percent),
-            percent(free.relative_error_percent)
-        ));
-    }
-    (times(log.model.rmse_nm, consistent.rmse_nm) > MOST_TIMES_OF_ALL).then(|| {
+    let sentence = |place: String, before: Option<f64>, after: Option<f64>| {
         format!(
-            "log `{}`: the consistent set that is written leaves {} % of the torque, the estimate alone {} %; {cause}",
-            log.log,
-            percent(consistent.relative_error_percent),
-            percent(log.model.relative_error_percent)
+            "{place}: the consistent set that is written leaves {} % of the torque, the estimate alone {} %; no \
+             physically consistent robot moves as this log says: a reversed or exchanged channel, a wrong unit, or a \
+             wrong description",
+            percent(after),
+            percent(before)
         )
-    })
+    };
+    if let Some((_, free, held)) = worst {
+        return Some(sentence(format!("{place}, joint `{}`", free.0), free.2, held.2));
+    }
+    // All joints together: on the same rows the errors' ratio is that of the root mean squares.
+    let ratio = free.relative_percent.zip(written.relative_percent).map(|(before, after)| times(before, after));
+    (ratio? > MOST_TIMES_OF_ALL).then(|| sentence(place.to_owned(), free.relative_percent, written.relative_percent))
 }
 
 /// Root mean square of a joint's measured torque.
-fn torque_norm(joint: &dynident_estimation::diagnostics::JointValidation) -> f64 {
-    joint
-        .relative_error_percent
-        .map_or(0.0, |percent| if percent > 0.0 { 100.0 * joint.rmse_nm / percent } else { 0.0 })
+fn torque_norm((_, rmse_nm, relative): &(&str, f64, Option<f64>)) -> f64 {
+    relative.map_or(0.0, |percent| if percent > 0.0 { 100.0 * rmse_nm / percent } else { 0.0 })
 }

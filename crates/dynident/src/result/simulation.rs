@@ -1,5 +1,6 @@
 //! What `simulate` writes as `truth.json`.
 
+use super::provenance::Provenance;
 use dynident_iteration::RobotStatus;
 use serde::{Deserialize, Serialize};
 
@@ -14,6 +15,9 @@ pub struct SimulationFile {
     pub schema: String,
     /// Name of the study.
     pub name: String,
+    /// Where it comes from; none in files of before it was written.
+    #[serde(default)]
+    pub provenance: Option<Provenance>,
     /// The controller.
     pub controller: String,
     /// How the run ended.

@@ -4,6 +4,7 @@ use super::arrays::two;
 use super::friction::{FrictionChoice, FrictionTerm};
 use crate::error::{Expected, StudyError};
 use dynident_identification::{GainChoice, OffsetChoice};
+use dynident_model::terms::Coupling;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -142,8 +143,12 @@ impl DriveSection {
 
 impl CouplingSection {
     pub(crate) fn validate(&self) -> Result<(), StudyError> {
-        if self.ratios.iter().any(|ratio| !ratio.is_finite() || *ratio == 0.0) {
-            return Err(StudyError::conflict("ratios", "ratios must be finite and not zero"));
+        if self.ratios.iter().any(|ratio| !Coupling::RATIOS.contains(&ratio.abs())) {
+            return Err(StudyError::Numbers {
+                key: "ratios".to_owned(),
+                values: self.ratios.to_vec(),
+                expected: "numbers of 1e-6 to 1e6 in size, positive or negative",
+            });
         }
         if self.joints[0] == self.joints[1] {
             return Err(StudyError::conflict("joints", "name two different joints"));

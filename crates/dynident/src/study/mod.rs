@@ -7,6 +7,7 @@ mod estimator;
 mod folders;
 mod friction;
 mod friction_keys;
+mod inputs;
 mod iteration;
 mod log;
 mod overlap;

@@ -2,7 +2,6 @@
 //! alone; essential parameters and the torque's band.
 use crate::common::{Job, Motion, Random, Truth, format, header, plain, recordings, repository, write_log};
 use dynident::model::load_robot;
-use dynident::recording::Level;
 use dynident::{IdentificationOutcome, RunOptions, Silent, Study, identify};
 use std::path::Path;
 
@@ -147,12 +146,7 @@ fn bare(path: &Path) -> String {
 /// Whether the logs of a result are called reversed by physical consistency.
 fn called_reversed(found: &IdentificationOutcome) -> bool {
     let sign = found.result.physical.sign.unwrap();
-    let said = found.result.logs.iter().filter(|log| log.role.name() == "identify").all(|log| {
-        log.model_findings.iter().any(|finding| {
-            finding.level == Level::Problem
-                && finding.message.contains("opposite sign of any physically consistent robot")
-        })
-    });
+    let said = found.result.problems.iter().any(|problem| problem.contains("opposite sign"));
     assert_eq!(said, sign.is_reversed(), "{sign:?}");
     said
 }

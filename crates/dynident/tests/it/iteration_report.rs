@@ -96,6 +96,6 @@ fn a_refused_iteration_says_why_run_by_run() {
         "limits = { tracking_error = 1e-3 }\n[iteration]\ntrajectory = \"motion.csv\"\nmodel_free = { kind = \"joint-pd\", kp = 1.0, kd = 1.0 }",
     );
     assert_eq!(file.status, "refused");
-    assert_eq!(page.matches("run 1: ").count(), 1);
+    assert_eq!(page.matches("run 1: stopped").count(), 1);
     assert!(page.contains("No run determines the parameters") && page.contains("rejected") && page.contains("stiffer"));
 }

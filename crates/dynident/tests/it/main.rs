@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
 mod book;
+mod check_mistakes;
 mod common;
 mod consistent_intervals;
 mod consistent_parameters;

@@ -30,6 +30,9 @@ fn a_robot_that_failed_and_a_motion_that_is_not_finite_read_back() {
     let report = r#"{"kind":"speed","joint":"elbow","worst_ratio":null,"at_s":1.0,"violated":true}"#;
     let read: LimitReport = serde_json::from_str(report).unwrap();
     assert!(read.worst_ratio == f64::INFINITY);
+    // JSON knows no infinity: a number, so that `>` and sorting work for whoever reads it.
+    let written = serde_json::to_value(&read).unwrap();
+    assert_eq!(written["worst_ratio"].as_f64(), Some(f64::MAX));
     assert_reads_back(&read);
 }
 

@@ -207,8 +207,8 @@ fn a_reversed_sign_is_found_and_fixed() {
     for (text, reversed) in [(&as_logged, true), (&fixed, false)] {
         let job = Job::new(folder.path(), text);
         let found = job.identify();
-        let findings = &found.result.logs[0].model_findings;
-        let seen = findings.iter().any(|f| f.message.contains("opposite sign") && f.message.contains("sign = -1"));
+        let findings = &found.result.problems;
+        let seen = findings.iter().any(|f| f.contains("opposite sign") && f.contains("sign = -1"));
         assert_eq!(seen, reversed, "{findings:?}");
         if !reversed {
             assert_recovered(&found, &truth.base_values(&job.robot()), NOISE_FREE);

@@ -5,7 +5,7 @@ use super::super::error::LimitError;
 use super::super::pairs::{arm_length_m, neutral_posture, random_postures};
 use super::super::self_collision_shapes::LinkShape;
 use super::super::solids::LinkSolid;
-use super::ShapesOfLinks;
+use super::shapes::ShapesOfLinks;
 use dynident_dynamics::{Workspace, body_placements};
 use dynident_model::{Model, Transform};
 

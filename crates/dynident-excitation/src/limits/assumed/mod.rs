@@ -4,6 +4,7 @@
 
 mod floor;
 mod shapes;
+mod words;
 
 pub use shapes::ShapesOfLinks;
 
@@ -13,6 +14,7 @@ use super::pairs::arm_length_m;
 use super::self_collision_shapes::SelfCollision;
 use dynident_model::{Joint, Model};
 use serde::{Deserialize, Serialize};
+use words::listed;
 
 /// Which limits are assumed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -220,13 +222,4 @@ fn joint_gaps(model: &Model, limits: &Limits) -> Vec<String> {
         }
     }
     gaps
-}
-
-/// Names, of many only the first.
-pub(super) fn listed(names: &[String]) -> String {
-    const SHOWN: usize = 8;
-    match names.len().checked_sub(SHOWN) {
-        Some(more) if more > 0 => format!("{} and {more} more", names[..SHOWN].join(", ")),
-        _ => names.join(", "),
-    }
 }

@@ -2,7 +2,7 @@
 
 use super::super::pairs::arm_length_m;
 use super::super::self_collision_shapes::{LinkShape, body_capsules};
-use super::listed;
+use super::words::listed;
 use dynident_model::Model;
 use std::path::Path;
 

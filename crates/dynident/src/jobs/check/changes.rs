@@ -42,10 +42,10 @@ impl<'a> StudyFormat<'a> {
     pub(super) fn changes(&self, mistake: &Mistake) -> Vec<StudyChange> {
         match mistake {
             Mistake::Sign { joints, channels } => {
-                self.groups(*channels).into_iter().map(|torque| self.signs(torque, joints)).collect()
+                Self::groups(*channels).into_iter().map(|torque| self.signs(torque, joints)).collect()
             }
             Mistake::Order { order, channels } => {
-                self.groups(*channels).into_iter().filter_map(|torque| self.order(torque, order)).collect()
+                Self::groups(*channels).into_iter().filter_map(|torque| self.order(torque, order)).collect()
             }
             Mistake::Offset { joint, offset_rad } => vec![self.offset(*joint, *offset_rad)],
             Mistake::PositionUnit { factor } => vec![self.position_unit(*factor)],
@@ -80,7 +80,8 @@ impl<'a> StudyFormat<'a> {
         StudyChange { table, line: format!("scale = {}", list(&values)) }
     }
 
-    fn groups(&self, channels: Channels) -> Vec<bool> {
+    /// Whether it is the torque's group, for each group that the channels stand for.
+    fn groups(channels: Channels) -> Vec<bool> {
         match channels {
             Channels::Position => vec![false],
             Channels::Torque => vec![true],
@@ -215,7 +216,7 @@ mod tests {
     #[test]
     fn numbers_are_toml_floats_without_needless_digits() {
         assert_eq!(
-            [number(1.5707963, 4), number(0.0, 4), number(-9.81, 4), number(-1e-9, 4)],
+            [number(PI / 2.0, 4), number(0.0, 4), number(-9.81, 4), number(-1e-9, 4)],
             ["1.5708", "0.0", "-9.81", "0.0"]
         );
         assert_eq!([significant(13.61234), significant(0.001234), significant(1234.5)], ["13.6", "0.00123", "1234.5"]);

@@ -4,6 +4,7 @@ use super::changes::StudyFormat;
 use crate::result::{CheckFinding, ReadingResult, StudyChange, StudyCheck};
 use crate::study::{Study, StudyRobot};
 use core::f64::consts::PI;
+use core::fmt::Write;
 use dynident_identification::Role;
 use dynident_identification::diagnosis::{BeyondLimit, Channels, Diagnosis, Mistake, Reading, UnseenLoad};
 use dynident_identification::{GainChoice, IdentificationSettings};
@@ -205,7 +206,8 @@ fn evidence(mistake: &Mistake, (before, after): (&Reading, &Reading), joints: &[
     );
     if before.beyond.len() > after.beyond.len() {
         let worst = &before.beyond[0];
-        text += &format!(
+        let _ = write!(
+            text,
             "; as written, the {} of `{}` reaches {:.4} where its limit is {:.4}",
             worst.quantity, joints[worst.joint], worst.value, worst.limit
         );

@@ -14,7 +14,7 @@ use findings::{currents_without_scale, study_check};
 use std::path::Path;
 
 /// Equations for each parameter below which a fit proves nothing.
-const EQUATIONS_PER_PARAMETER: usize = 2;
+const EQUATIONS_PER_PARAMETER: usize = 3;
 
 /// Examines a study against its robot and its logs: channels, clock and samples of every log, and which reading of the
 /// training logs a robot that can exist explains best. Nothing is written.
@@ -31,7 +31,10 @@ pub fn check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Resu
     study.check_overlap(&study.log_files(&folders)?).map_err(Error::study(study_path))?;
     let examined = examine_study(&task, options.execution()).map_err(in_study)?;
 
-    let mut check = diagnosis_check((study, &robot), &task.settings, &examined.diagnosis);
+    let mut check = examined.diagnosis.as_ref().map_or_else(
+        || StudyCheck { joints: robot.parametric.joint_names(), ..StudyCheck::default() },
+        |diagnosis| diagnosis_check((study, &robot), &task.settings, diagnosis),
+    );
     for (index, import) in &examined.imports {
         check.findings.extend(import.iter().flat_map(|import| import_findings(&study.log_name(*index), import)));
     }

@@ -7,6 +7,7 @@ use super::setup::{DesignSetup, MotionInformation};
 use super::{DesignOutcome, table};
 use crate::error::{Error, StudyError};
 use crate::jobs::options::RunOptions;
+use crate::jobs::provenance::seen_from;
 use crate::study::{Folders, Study, StudyRobot};
 use dynident_excitation::check::CHECK_RATE_HZ;
 use dynident_excitation::families::Given;
@@ -57,8 +58,17 @@ pub fn check_trajectory(
     let rate_hz = setup.section.search.rate_hz;
     let times = grid(duration_s, (duration_s * rate_hz).round() as usize + 1);
     let information = setup.information(&times, &motion_at);
-    let origin = MotionOrigin::given(&setup, trajectory.display().to_string(), given, &information);
-    Ok(DesignOutcome::new(setup, origin, MotionReview { duration_s, rate_hz, information, check }))
+    // A path of this computer says nothing elsewhere.
+    let name = match study_path.parent().filter(|_| trajectory.is_absolute()) {
+        Some(folder) => seen_from(folder, trajectory),
+        None => trajectory.display().to_string(),
+    };
+    let origin = MotionOrigin::given(&setup, name, given, &information);
+    DesignOutcome::new(setup, origin, MotionReview { duration_s, rate_hz, information, check }).with_provenance(
+        (study, study_path),
+        options,
+        &[("trajectory", trajectory)],
+    )
 }
 
 /// Judges a log of the study, by its name or its file: what the finished run says about each parameter.
@@ -104,7 +114,11 @@ pub fn check_log(
         .fold(0, |best, piece| if pieces[piece].duration_s() > pieces[best].duration_s() { piece } else { best });
     let information = MotionInformation { plain, weighted };
     let origin = MotionOrigin::given(&setup, study.log_name(index), pieces.swap_remove(longest), &information);
-    Ok(DesignOutcome::new(setup, origin, MotionReview { duration_s, rate_hz, information, check }))
+    DesignOutcome::new(setup, origin, MotionReview { duration_s, rate_hz, information, check }).with_provenance(
+        (study, study_path),
+        options,
+        &[("log", &file)],
+    )
 }
 
 /// Which log is meant: by its name in reports, or by its file.

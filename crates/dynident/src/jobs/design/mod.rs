@@ -72,7 +72,7 @@ pub fn design_study(
     let information = setup.information(&times, &motion_at);
     let review = MotionReview { duration_s, rate_hz, information, check };
     let origin = MotionOrigin::search(&setup, found);
-    Ok(DesignOutcome::new(setup, origin, review))
+    DesignOutcome::new(setup, origin, review).with_provenance((study, study_path), options, &[])
 }
 
 /// What a windowed design leaves to the check.

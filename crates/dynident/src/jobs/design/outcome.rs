@@ -6,9 +6,11 @@ use super::search::SearchResult;
 use super::setup::{DesignSetup, MotionInformation};
 use crate::cpu_time::cpu_seconds;
 use crate::error::Error;
+use crate::jobs::options::RunOptions;
+use crate::jobs::provenance::motion_provenance;
 use crate::pages::design as pictures;
 use crate::result::{DESIGN_SCHEMA, DesignFile, WindowedFile};
-use crate::study::{FamilyChoice, StudyRobot};
+use crate::study::{FamilyChoice, Study, StudyRobot};
 use dynident_dynamics::{Workspace, inverse_dynamics};
 use dynident_excitation::criteria::{ConditionNumber, Criterion, DOptimal};
 use dynident_excitation::families::Given;
@@ -16,6 +18,7 @@ use dynident_excitation::limits::Limits;
 use dynident_excitation::optimisers::Generation;
 use dynident_excitation::{Family, Motion};
 use nalgebra::DMatrix;
+use std::path::Path;
 use std::time::Instant;
 
 /// Rate of the pictures, Hz.
@@ -133,6 +136,7 @@ impl DesignOutcome {
         let file = DesignFile {
             schema: DESIGN_SCHEMA.to_owned(),
             name: setup.name,
+            provenance: None,
             joints: setup.robot.parametric.joint_names(),
             family: origin.family,
             family_settings: origin.family_settings,
@@ -168,6 +172,17 @@ impl DesignOutcome {
         };
         let (robot, limits) = (setup.robot, setup.limits);
         Self { file, robot, limits, history: origin.history, family: origin.motion }
+    }
+
+    /// The outcome with what it comes from: of the study, and of further files that were read.
+    pub(super) fn with_provenance(
+        mut self,
+        (study, study_path): (&Study, &Path),
+        options: &RunOptions<'_>,
+        further: &[(&'static str, &Path)],
+    ) -> Result<Self, Error> {
+        self.file.provenance = Some(motion_provenance(study, study_path, options.data.as_deref(), further)?);
+        Ok(self)
     }
 
     /// The family of the motion; its parameters are the file's.

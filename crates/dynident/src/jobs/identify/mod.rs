@@ -7,7 +7,8 @@ use crate::error::Error;
 use crate::jobs::check::diagnosis_check;
 use crate::jobs::log_summary::{held_out_summary, training_summary};
 use crate::jobs::options::{RunOptions, study_name};
-use crate::result::{LogSummary, PhysicalVerdict, RESULT_SCHEMA, ResultFile, Timings, TrainingResult};
+use crate::jobs::provenance::{beside, now, provenance, seen_from};
+use crate::result::{LogSummary, PhysicalVerdict, Provenance, RESULT_SCHEMA, ResultFile, Timings, TrainingResult};
 use crate::study::{ArmSection, EstimatorMethod, Folders, Study, StudyRobot};
 use dynident_estimation::{Estimate, strongest_correlations};
 use dynident_identification::estimators::{Findings, InstrumentSource};
@@ -17,13 +18,14 @@ use dynident_identification::{
     identify_with_instruments as identify_task_with_instruments,
 };
 use dynident_model::InertialParameters;
+use dynident_recording::Level;
 use sections::{
     base_parameters, bodies, friction_results, joint_results, method_summary, offset_results, physical_fit_result,
-    robot_summary, term_results, training_result, verdict,
+    robot_summary, sources, term_results, training_result, verdict,
 };
 use std::path::Path;
 use std::time::Instant;
-use urdf::written_urdf;
+use urdf::{with_provenance, written_urdf};
 
 /// Correlations that a result lists.
 const CORRELATIONS: usize = 10;
@@ -100,36 +102,59 @@ fn identified(
     let settings = study.settings(study_path, &robot)?;
     settings.check_names(&robot.parametric).map_err(|error| in_study(IdentificationError::Consistency(error)))?;
     let task = study.task_with(settings, &robot, &folders)?;
-    study.check_overlap(&study.log_files(&folders)?).map_err(Error::study(study_path))?;
+    let files = study.log_files(&folders)?;
+    study.check_overlap(&files).map_err(Error::study(study_path))?;
+    let mut read = vec![("robot", robot.robot.path.clone())];
+    read.extend(files.into_iter().map(|file| ("log", file)));
+    read.extend(arm.iter().map(|(path, _)| ("result", path.clone())));
     let mut timings = Timings { robot: start.elapsed().as_secs_f64(), ..Timings::default() };
 
     // The identification itself.
     let execution = options.execution();
-    let found = match (&arm, &study.arm, source) {
-        (Some((path, stored)), Some(section), _) => {
-            let arm = stored.known_arm(path, &robot.parametric, section.refit)?;
-            identify_payload(&task, &arm, execution)
-        }
-        (_, _, Some(source)) => identify_task_with_instruments(&task, source, execution),
-        _ => identify_task(&task, execution),
+    let identification = || -> Result<_, Error> {
+        let found = match (&arm, &study.arm, source) {
+            (Some((path, stored)), Some(section), _) => {
+                let arm = stored.known_arm(path, &robot.parametric, section.refit)?;
+                identify_payload(&task, &arm, execution)
+            }
+            (_, _, Some(source)) => identify_task_with_instruments(&task, source, execution),
+            _ => identify_task(&task, execution),
+        };
+        found.map_err(&in_study)
     };
-    let found = found.map_err(&in_study)?;
+    let hashes = || provenance(study, study_path, &read);
+    let (provenance, found) = beside(options.threads, hashes, identification);
+    let (found, provenance) = (found?, provenance?);
     timings.logs = found.times.logs_s;
     timings.estimation = found.times.estimation_s;
     timings.validation = found.times.examination_s;
     timings.total = start.elapsed().as_secs_f64();
+    timings.made_at = now();
 
     // What is written.
     let inertials = found.inertials();
     let verdict = physical_verdict(study, &task, &found, &inertials);
     let (urdf, no_urdf) = match exported_urdf(&robot, &task, &found, &verdict, arm.is_some()) {
-        Ok(urdf) => (Some(urdf), None),
+        Ok(urdf) => (Some(with_provenance(&urdf, &provenance)), None),
         Err(reason) => (None, Some(reason)),
     };
     let training = training_result(&found, &task.recordings).map_err(|error| in_study(error.into()))?;
-    let parts =
-        Parts { name: study_name(study, study_path), timings, verdict, no_urdf, inertials: &inertials, training };
-    let result = result_file(study, &robot, &task, &found, parts);
+    let parts = Parts {
+        name: study_name(study, study_path),
+        timings,
+        provenance,
+        verdict,
+        no_urdf,
+        inertials: &inertials,
+        training,
+    };
+    let mut result = result_file(study, &robot, &task, &found, parts);
+    result.problems = result.found_problems();
+    let folder = study_path.parent().unwrap_or(Path::new(""));
+    result.robot.file = seen_from(folder, &robot.robot.path);
+    for log in &mut result.logs {
+        log.import.file = seen_from(folder, Path::new(&log.import.file));
+    }
     let mut traces = found.examination.traces;
     traces.extend(found.held_out.into_iter().filter_map(|log| log.trace));
     Ok(IdentificationOutcome { result, estimate: found.estimation.estimate, inertials, urdf, traces })
@@ -187,13 +212,16 @@ fn exported_urdf(
             "the bodies are not physically possible: {reason} (estimator.physical = false writes them as they are)"
         ));
     }
-    written_urdf(robot, &found.model().parametric, &found.inertials(), &found.consistent.parameters)
+    let sources = sources(found.model(), found.estimate());
+    let values = (&found.inertials()[..], &found.consistent.parameters[..]);
+    written_urdf(robot, &found.model().parametric, values, &sources)
 }
 
 /// What the result has beside the identification itself.
 struct Parts<'a> {
     name: String,
     timings: Timings,
+    provenance: Provenance,
     verdict: PhysicalVerdict,
     no_urdf: Option<String>,
     inertials: &'a [InertialParameters],
@@ -226,6 +254,8 @@ fn result_file(
     ResultFile {
         schema: RESULT_SCHEMA.to_owned(),
         name: parts.name,
+        problems: Vec::new(),
+        provenance: Some(parts.provenance),
         robot: robot_summary(robot),
         method: method_summary(found, study.estimator.method.name()),
         noise_in_regressor: found.estimation.noise_in_regressor.clone(),
@@ -237,7 +267,7 @@ fn result_file(
         simulated,
         base_parameters: base_parameters(model, estimate, found.consistent_base_values()),
         base_parameter_covariance: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
-        bodies: bodies(model, parts.inertials),
+        bodies: bodies(model, parts.inertials, &sources(model, estimate)),
         possible_intervals: found.consistent.intervals.clone(),
         essential: found.essential.clone(),
         correlations: strongest_correlations(estimate, CORRELATIONS),
@@ -269,5 +299,13 @@ fn log_summaries(task: &IdentificationTask, found: &Identification) -> Vec<LogSu
         summary
     });
     let held_out = found.held_out.iter().map(|log| held_out_summary(&task.recordings[log.index], log, &joints));
-    training.chain(held_out).collect()
+    // Another reading names the mistake; signs seen joint by joint are its consequences, and would name others.
+    let is_explained = found.diagnosis.as_ref().is_some_and(|diagnosis| diagnosis.search.best.is_some());
+    let mut all: Vec<LogSummary> = training.chain(held_out).collect();
+    if is_explained {
+        for log in &mut all {
+            log.model_findings.retain(|finding| finding.level != Level::Problem);
+        }
+    }
+    all
 }

@@ -2,9 +2,11 @@
 
 use crate::result::{
     BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, MethodSummary, PhysicalBodyResult,
-    PhysicalFitResult, PhysicalVerdict, RobotSummary, TermResult, TrainingJoint, TrainingResult,
+    PhysicalFitResult, PhysicalVerdict, RobotSummary, TermResult, TrainingErrors, TrainingJoint, TrainingResult,
+    ValueSource,
 };
 use crate::study::{JointDrive, StudyRobot};
+use dynident_dynamics::Determination;
 use dynident_estimation::consistent::{PhysicalFit, PhysicalStatus};
 use dynident_estimation::{Estimate, EstimateStatus};
 use dynident_identification::examination::TorqueLag;
@@ -77,13 +79,30 @@ pub(super) fn base_parameters(
         .collect()
 }
 
-pub(super) fn bodies(model: &RegressorModel, inertials: &[InertialParameters]) -> Vec<BodyResult> {
+/// For each body its ten values' sources; base parameters that the logs do not excite count as not measured.
+pub(super) fn sources(model: &RegressorModel, estimate: &Estimate) -> Vec<[ValueSource; 10]> {
+    let fixed: Vec<usize> = estimate.rank.fixed.iter().map(|fixed| fixed.column).collect();
+    let all = model.base().determination(&fixed);
+    let source = |determination: Determination| match determination {
+        Determination::Measured => ValueSource::Measured,
+        Determination::Partly => ValueSource::Partly,
+        Determination::Nominal => ValueSource::Nominal,
+    };
+    (0..model.dof()).map(|body| core::array::from_fn(|k| source(all[10 * body + k]))).collect()
+}
+
+pub(super) fn bodies(
+    model: &RegressorModel,
+    inertials: &[InertialParameters],
+    sources: &[[ValueSource; 10]],
+) -> Vec<BodyResult> {
     model
         .model()
         .bodies()
         .iter()
         .zip(inertials)
-        .map(|(body, inertial)| BodyResult {
+        .zip(sources)
+        .map(|((body, inertial), sources)| BodyResult {
             name: body.name().to_owned(),
             links: body.links.iter().map(|link| link.name.clone()).collect(),
             mass_kg: inertial.mass_kg(),
@@ -92,6 +111,7 @@ pub(super) fn bodies(model: &RegressorModel, inertials: &[InertialParameters]) -
             parameters: inertial.0,
             prior: body.prior().map(|prior| prior.0),
             pseudo_inertia_min_eigenvalue: inertial.pseudo_inertia().symmetric_eigenvalues().min(),
+            sources: Some(*sources),
         })
         .collect()
 }
@@ -179,11 +199,31 @@ pub(super) fn training_result(
     identification: &Identification,
     recordings: &[Recording],
 ) -> Result<TrainingResult, dynident_estimation::EstimationError> {
-    let (problem, estimate) = (&identification.training.problem, identification.estimate());
+    let values = &identification.estimate().values;
+    let base = identification.training.columns.base();
+    let (samples, estimate) = training_errors(identification, values)?;
+    // Offsets of single logs and payloads are those of the estimate.
+    let written = identification.consistent_base_values().map(|written| [written, &values[base..]].concat());
+    let physical = written.map(|written| training_errors(identification, &written)).transpose()?;
+    Ok(TrainingResult {
+        logs: identification.training.logs.iter().map(|log| recordings[log.index].name.clone()).collect(),
+        samples,
+        relative_error_percent: estimate.relative_error_percent,
+        joints: estimate.joints,
+        physical: physical.map(|(_, errors)| errors),
+    })
+}
+
+/// Rows of each joint, and the errors of parameters on them.
+fn training_errors(
+    identification: &Identification,
+    values: &[f64],
+) -> Result<(usize, TrainingErrors), dynident_estimation::EstimationError> {
+    let problem = &identification.training.problem;
     let names = identification.model().joint_names();
     let mut sums = vec![(0_usize, 0.0, 0.0); names.len()];
     for equation in problem.equations() {
-        let theta: Vec<f64> = equation.columns.iter().map(|&column| estimate.values[column]).collect();
+        let theta: Vec<f64> = equation.columns.iter().map(|&column| values[column]).collect();
         let factor = equation.factor.total();
         let sum = &mut sums[equation.joint];
         sum.0 += factor.rows();
@@ -192,9 +232,8 @@ pub(super) fn training_result(
     }
     let percent = |error: f64, torque: f64| (torque > 0.0).then(|| 100.0 * (error / torque).sqrt());
     let (error, torque) = sums.iter().fold((0.0, 0.0), |(e, t), sum| (e + sum.1, t + sum.2));
-    Ok(TrainingResult {
-        logs: identification.training.logs.iter().map(|log| recordings[log.index].name.clone()).collect(),
-        samples: sums.iter().map(|sum| sum.0).max().unwrap_or(0),
+    let samples = sums.iter().map(|sum| sum.0).max().unwrap_or(0);
+    let errors = TrainingErrors {
         relative_error_percent: percent(error, torque),
         joints: names
             .into_iter()
@@ -205,7 +244,8 @@ pub(super) fn training_result(
                 relative_error_percent: percent(error, torque),
             })
             .collect(),
-    })
+    };
+    Ok((samples, errors))
 }
 
 pub(super) fn verdict(model: &RegressorModel, inertials: &[InertialParameters], parameters: &[f64]) -> PhysicalVerdict {
@@ -253,6 +293,7 @@ pub(super) fn physical_fit_result(fit: &PhysicalFit, estimate: &Estimate) -> Phy
             .moves_in_std(&estimate.values, &estimate.std)
             .ok()
             .and_then(|moves| moves.into_iter().flatten().map(f64::abs).max_by(f64::total_cmp)),
+        difference: fit.difference(estimate),
         active: fit.active.clone(),
         bodies: fit
             .bodies

@@ -1,22 +1,27 @@
 //! The user's own URDF with the identified values.
 
+use crate::result::{Provenance, ValueSource};
 use crate::study::StudyRobot;
+use core::fmt::Write;
 use dynident_dynamics::ParametricModel;
 use dynident_model::terms::JointProperty;
-use dynident_model::{DescriptionFormat, InertialParameters, JointChange, LinkChange, link_changes, rewrite_urdf};
+use dynident_model::{
+    DescriptionFormat, INERTIAL_NAMES, InertialParameters, JointChange, LinkChange, link_changes, rewrite_urdf,
+};
 
 /// The user's URDF with the new values; joints that were locked keep theirs. Otherwise the reason why there is none.
 pub(super) fn written_urdf(
     robot: &StudyRobot,
     model: &ParametricModel,
-    inertials: &[InertialParameters],
-    parameters: &[f64],
+    (inertials, parameters): (&[InertialParameters], &[f64]),
+    sources: &[[ValueSource; 10]],
 ) -> Result<String, String> {
     if robot.robot.format != DescriptionFormat::Urdf {
         return Err("the robot's description is no URDF".to_owned());
     }
     let mut links = link_changes(model.model(), inertials).map_err(|error| error.to_string())?;
     note_locked(robot, &mut links);
+    note_sources(model, parameters, sources, &mut links);
     let mut joints: Vec<JointChange> = Vec::new();
     let terms = model.terms().iter().zip(&parameters[10 * model.model().dof()..]);
     for (term, &value) in terms {
@@ -34,6 +39,75 @@ pub(super) fn written_urdf(
         joints[place].friction = friction.or(joints[place].friction);
     }
     rewrite_urdf(&robot.robot.text, &links, &joints).map_err(|error| error.to_string())
+}
+
+/// Says in a body's comment which of its values torque told, and what of its joint's drive no URDF holds.
+fn note_sources(
+    model: &ParametricModel,
+    parameters: &[f64],
+    sources: &[[ValueSource; 10]],
+    changes: &mut [LinkChange],
+) {
+    for (index, (body, sources)) in model.model().bodies().iter().zip(sources).enumerate() {
+        let of = |which: ValueSource| -> String {
+            let names = (0..10).filter(|&k| sources[k] == which).map(|k| INERTIAL_NAMES[k]);
+            let names: Vec<&str> = names.collect();
+            if names.is_empty() { "none".to_owned() } else { names.join(" ") }
+        };
+        let mut text = format!(
+            "about the link's frame, measured: {}; partly, in sums with others: {}; not measured, near the description: {}",
+            of(ValueSource::Measured),
+            of(ValueSource::Partly),
+            of(ValueSource::Nominal)
+        );
+        let terms = model.terms().iter().zip(&parameters[10 * model.dof()..]);
+        let lost = terms.filter(|(term, _)| term.own_joint() == Some(index) && term.property().is_none());
+        let lost: Vec<String> =
+            lost.map(|(term, value)| format!("{} = {value:.4} {}", term.symbol(), term.unit())).collect();
+        if !lost.is_empty() {
+            let _ = write!(text, "; of this joint's drive URDF does not hold {}", lost.join(", "));
+        }
+        let set = changes.iter_mut().find_map(|change| match change {
+            LinkChange::Set { link, note, .. } if link == body.name() => Some(note),
+            _ => None,
+        });
+        if let Some(note) = set {
+            *note = Some(note.take().map_or(text.clone(), |note| format!("{note}; {text}")));
+        }
+    }
+}
+
+/// What the comment of a description that this program has written begins with.
+const SIGNATURE: &str = "<!-- dynident ";
+
+/// The description with a comment that says where its values come from, before everything but the XML declaration; that
+/// of an earlier identification gives way.
+pub(super) fn with_provenance(urdf: &str, provenance: &Provenance) -> String {
+    let robot = provenance.inputs.iter().find(|input| input.what == "robot");
+    let named = |input: Option<&crate::result::InputFile>| {
+        // No comment holds two hyphens in a row, nor a line's end; the second time for what the first one joins.
+        input.map_or_else(
+            || "in memory".to_owned(),
+            |input| input.file.replace("--", "- -").replace("--", "- -").replace(char::is_control, " "),
+        )
+    };
+    let comment = format!(
+        "{SIGNATURE}{}, identity {}: identified from the study {} and the description {}; result.json has the rest -->",
+        provenance.version,
+        provenance.identity,
+        named(provenance.study.as_ref()),
+        named(robot)
+    );
+    let declared = urdf.find("<?xml").and_then(|from| urdf[from..].find("?>").map(|length| from + length + 2));
+    let mark = if urdf.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { 0 };
+    let (head, rest) = urdf.split_at(declared.filter(|_| urdf[mark..].starts_with("<?xml")).unwrap_or(mark));
+    let start = rest.trim_start();
+    let earlier = start.strip_prefix(SIGNATURE).and_then(|rest| rest.split_once("-->")).map(|(_, rest)| rest);
+    let line = if head.len() > mark { "\n" } else { "" };
+    match earlier {
+        Some(rest) => format!("{head}{line}{comment}{rest}"),
+        None => format!("{head}{line}{comment}{}{rest}", if rest.starts_with(['\n', '\r']) { "" } else { "\n" }),
+    }
 }
 
 /// Says in a body's comment which of its links are not fixed but stood behind locked joints: its values hold while
@@ -55,5 +129,49 @@ fn note_locked(robot: &StudyRobot, changes: &mut [LinkChange]) {
             let locked = format!("holds with the joints locked behind which stand: {}", behind.join(", "));
             *note = Some(note.take().map_or(locked.clone(), |note| format!("{note}; {locked}")));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_comment_stands_first_and_once() {
+        let of = |identity: &str| Provenance { identity: identity.to_owned(), ..Provenance::default() };
+        for (urdf, head) in [
+            ("<robot name=\"a\"/>", ""),
+            ("<?xml version=\"1.0\"?>\n<!-- mine -->\n<robot/>", "<?xml version=\"1.0\"?>\n"),
+            ("\u{feff}<?xml version=\"1.0\"?><robot/>", "\u{feff}<?xml version=\"1.0\"?>\n"),
+        ] {
+            let once = with_provenance(urdf, &of("one"));
+            assert!(once.starts_with(&format!("{head}<!-- dynident ")) && once.contains("identity one"), "{once}");
+            let rest = |text: &str| text.split_once("-->").unwrap().1.trim_start().to_owned();
+            assert!(urdf.ends_with(&rest(&once)), "{once}");
+            let twice = with_provenance(&once, &of("two"));
+            assert_eq!(twice, once.replace("identity one", "identity two"));
+        }
+    }
+
+    #[test]
+    fn a_hostile_name_does_not_end_the_comment() {
+        let file = |what: &str| crate::result::InputFile {
+            what: what.to_owned(),
+            file: "a-->\n<robot name=\"evil\"/>---".to_owned(),
+            bytes: 0,
+            sha256: String::new(),
+        };
+        let provenance =
+            Provenance { study: Some(file("study")), inputs: vec![file("robot")], ..Provenance::default() };
+        let urdf = with_provenance("<robot name=\"a\"/>", &provenance);
+        assert_eq!(roxmltree_names(&urdf), ["a"]);
+    }
+
+    /// Names of the elements, by the reader of robots' descriptions: a comment that ended early would add one.
+    fn roxmltree_names(urdf: &str) -> Vec<String> {
+        let inside = urdf.split_once("<!--").unwrap().1;
+        let (comment, rest) = inside.split_once("-->").unwrap();
+        assert!(!comment.contains("--"), "{comment}");
+        rest.split("name=\"").skip(1).map(|part| part.split('"').next().unwrap().to_owned()).collect()
     }
 }

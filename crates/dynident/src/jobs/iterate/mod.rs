@@ -9,7 +9,9 @@ pub(super) use trajectory::Trajectory;
 
 use crate::error::{Error, StudyError};
 use crate::jobs::options::RunOptions;
+use crate::jobs::provenance::motion_provenance;
 use crate::output::write_whole;
+use crate::output_set::OutputSet;
 use crate::pages::iteration::{RunName, RunTrace, TimeSpent, iteration_report};
 use crate::result::IterationsFile;
 use crate::study::{Folders, PriorChoice, RobotChoice, Study, StudyRobot};
@@ -74,6 +76,10 @@ pub fn iterate_study(
     let stages = section.stages();
     let one = stages.len() == 1;
     let folder = |stage: usize| if one { out.to_owned() } else { out.join(format!("leg_{}", stage + 1)) };
+    // What an earlier call found goes before its runs do.
+    if !resume {
+        OutputSet::new(out).absent(ITERATIONS).absent(PAGE).absent(TRAJECTORY).write()?;
+    }
     // All of them first: with --fresh no run of an earlier call may be left in any.
     let stores = (0..stages.len())
         .map(|stage| IterationStore::open(&folder(stage), &fingerprint, resume))
@@ -81,7 +87,7 @@ pub fn iterate_study(
         .map_err(in_iteration)?;
     let rate_hz = simulation.rate_hz;
     let make = || legs::trajectories(study, study_path, &robot, rate_hz, options, watch.design);
-    let trajectories = kept(&out.join("trajectory.json"), &fingerprint, resume, make)?;
+    let trajectories = kept(&out.join(TRAJECTORY), &fingerprint, resume, make)?;
 
     // What is believed of the robot, what it runs, and what the file says of it.
     let iterated = match section.prior {
@@ -98,12 +104,12 @@ pub fn iterate_study(
     let report = IterationReport {
         study,
         study_path,
+        provenance: motion_provenance(study, study_path, options.data.as_deref(), &[])?,
         robot: &robot,
         duration_s: legs.iter().map(|leg| leg.reference().duration_s()).sum(),
         truth: truth.map(|truth| truth.base_values),
         bound: if one && simulated { bound::cramer_rao(&robot, &legs, &simulation.sensors) } else { None },
     };
-    let target = out.join("iterations.json");
     let before_runs_s = begin.elapsed().as_secs_f64();
 
     // The stages, each with what those before it have found held.
@@ -135,7 +141,7 @@ pub fn iterate_study(
                     let (robot, records) = (&*robot, &so_far[..]);
                     let now = report.file(&Stage { leg, robot, records, status: &status, known_std: &known_std });
                     let all: Vec<IterationsFile> = files.iter().cloned().chain([now]).collect();
-                    joined(all).and_then(|file| write_file(&target, &file).err())
+                    joined(all).and_then(|file| write_set(out, &file, None).err())
                 }
                 Err(error) => Some(in_iteration(error)),
             };
@@ -174,17 +180,27 @@ pub fn iterate_study(
     // All stages as one.
     let mut file = joined(files).ok_or_else(|| in_section(StudyError::missing("leg", "there is none")))?;
     file.converged &= file.runs.last().is_some_and(|run| run.leg.is_none_or(|leg| leg == stages.len()));
-    write_file(&target, &file)?;
     let time = TimeSpent { before_runs_s, all_s: begin.elapsed().as_secs_f64(), runs: made };
-    write_whole(&out.join("report.html"), iteration_report(&file, &traces, &time)?.as_bytes())?;
+    write_set(out, &file, Some(iteration_report(&file, &traces, &time)?))?;
     Ok(file)
 }
 
-fn write_file(path: &Path, file: &IterationsFile) -> Result<(), Error> {
+/// The file and its page; while runs are still being made there is no page, and none of an earlier call.
+fn write_set(out: &Path, file: &IterationsFile, page: Option<String>) -> Result<(), Error> {
     let bytes = serde_json::to_vec_pretty(file)
-        .map_err(|error| Error::Result { path: path.to_owned(), message: error.to_string() })?;
-    write_whole(path, &bytes)
+        .map_err(|error| Error::Result { path: out.join(ITERATIONS), message: error.to_string() })?;
+    let set = OutputSet::new(out).file(ITERATIONS, bytes);
+    match page {
+        Some(page) => set.file(PAGE, page),
+        None => set.absent(PAGE),
+    }
+    .write()
 }
+
+/// The files of an iteration as a whole.
+const ITERATIONS: &str = "iterations.json";
+const TRAJECTORY: &str = "trajectory.json";
+const PAGE: &str = "report.html";
 
 /// Everything that runs depend on, in one number: study, robot, and the version of the program (FNV-1a, 64 bits).
 fn fingerprint(study: &Study, robot: &StudyRobot, options: &RunOptions<'_>) -> String {

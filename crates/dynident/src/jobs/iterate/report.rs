@@ -1,7 +1,7 @@
 //! From records to what `iterations.json` holds.
 
 use crate::jobs::options::study_name;
-use crate::result::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile};
+use crate::result::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, Provenance};
 use crate::study::{Study, StudyRobot};
 use dynident_dynamics::ParametricModel;
 use dynident_iteration::{IterationStatus, RunEstimate, RunRecord};
@@ -21,6 +21,7 @@ fn model_of_run(record: &RunRecord, records: &[RunRecord]) -> Option<usize> {
 pub(super) struct IterationReport<'a> {
     pub(super) study: &'a Study,
     pub(super) study_path: &'a Path,
+    pub(super) provenance: Provenance,
     pub(super) robot: &'a StudyRobot,
     /// Length of a run with all its legs, s.
     pub(super) duration_s: f64,
@@ -99,6 +100,7 @@ impl IterationReport<'_> {
         IterationsFile {
             schema: ITERATIONS_SCHEMA.to_owned(),
             name: study_name(self.study, self.study_path),
+            provenance: Some(self.provenance.clone()),
             converged: status.is_converged(),
             status: match status {
                 IterationStatus::Converged => "converged",

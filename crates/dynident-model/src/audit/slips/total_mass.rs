@@ -1,0 +1,140 @@
+//! Masses that do not add up to a stated total.
+
+use super::{Search, SlipKind, shifted, trace};
+use crate::urdf::StatedInertial;
+
+/// A total is stated to some digits, and screws are left out.
+const NEAR: f64 = 0.015;
+/// One explanation among many must fit better than that.
+const EXACT: f64 = 0.003;
+
+/// Units of a total, and the power of ten that makes kilograms.
+const UNITS: [(&str, i32); 2] = [("kg", 0), ("g", -3)];
+
+/// Compares the sum with the total that the caller or a comment of the file states.
+pub(super) fn look(search: &mut Search, text: &str, total_kg: Option<f64>) {
+    let Some(total) = total_kg.or_else(|| commented(text)).filter(|total| *total > 0.0 && total.is_finite()) else {
+        return;
+    };
+    let sum: f64 = search.now.iter().map(|one| one.mass_kg).sum();
+    let near = |sum: f64, share: f64| (sum - total).abs() <= share * total;
+    if near(sum, NEAR) {
+        return;
+    }
+    let evidence = format!("masses add up to {sum} kg, the stated total is {total} kg");
+    // All in another unit.
+    if let Some(power) = [-3, 3].into_iter().find(|&power| near(shifted(sum, power), NEAR)) {
+        let all: Vec<(usize, StatedInertial)> = (0..search.now.len())
+            .map(|place| (place, scaled(&search.now[place], power)))
+            .filter(|(place, new)| search.now[*place] != *new)
+            .collect();
+        let unit = if power < 0 { "grams" } else { "tonnes" };
+        let message = format!("masses are in {unit}: write kilograms");
+        search.note(SlipKind::TotalMass, message, evidence, all);
+        return;
+    }
+    // One of them with the point in another place.
+    let mut ways: Vec<(usize, i32)> = Vec::new();
+    for (place, one) in search.now.iter().enumerate().filter(|(_, one)| one.mass_kg > 0.0) {
+        let powers = [-3, -2, -1, 1, 2, 3];
+        ways.extend(
+            powers
+                .into_iter()
+                .filter(|&power| near(sum - one.mass_kg + shifted(one.mass_kg, power), EXACT))
+                .filter(|&power| nearer_to_the_others(search, place, power))
+                .map(|power| (place, power)),
+        );
+    }
+    // One that stands there twice.
+    let twice: Vec<usize> = (0..search.now.len())
+        .filter(|&place| {
+            let one = &search.now[place];
+            one.mass_kg > 0.0
+                && near(sum - one.mass_kg, EXACT)
+                && search.now[..place].iter().any(|other| (other.mass_kg, other.moments) == (one.mass_kg, one.moments))
+        })
+        .collect();
+    match (&ways[..], &twice[..]) {
+        (&[(place, power)], []) => {
+            let new = scaled(&search.now[place], power);
+            let message = format!(
+                "the mass of {} has its decimal point in the wrong place: {} kg instead of {} kg makes the total",
+                new.link, new.mass_kg, search.now[place].mass_kg
+            );
+            search.note(SlipKind::TotalMass, message, evidence, vec![(place, new)]);
+        }
+        ([], &[place]) => {
+            let message = format!(
+                "{} has the mass and moments of another link, and without it the masses make the total: it seems to be counted twice; delete its <inertial> if so",
+                search.now[place].link
+            );
+            search.name(SlipKind::TotalMass, &[place], message, evidence);
+        }
+        _ => {
+            let several = ways.len() + twice.len();
+            let why = if several == 0 { "no single mass explains it" } else { "several masses would explain it" };
+            let message = format!("masses do not add up to the stated total, and {why}: weigh the parts");
+            search.name(SlipKind::TotalMass, &[], message, evidence);
+        }
+    }
+}
+
+/// Whether the radius of gyration over the link's length comes nearer to that of the other links: among some ten links
+/// and six powers one fits a total by chance often enough.
+fn nearer_to_the_others(search: &Search, place: usize, power: i32) -> bool {
+    let Some(lengths) = &search.lengths else { return true };
+    let figure = |place: usize| {
+        let one = &search.now[place];
+        (0.5 * trace(&one.moments) / one.mass_kg).sqrt().log10() - lengths[place].log10()
+    };
+    let mut others: Vec<f64> = search.with_mass().into_iter().filter(|&other| other != place).map(figure).collect();
+    others.sort_by(f64::total_cmp);
+    let Some(&middle) = others.get(others.len() / 2) else { return true };
+    let before = figure(place) - middle;
+    // The radius goes with the root of the mass.
+    (before - 0.5 * f64::from(power)).abs() < before.abs()
+}
+
+fn scaled(stated: &StatedInertial, power: i32) -> StatedInertial {
+    StatedInertial { mass_kg: shifted(stated.mass_kg, power), ..stated.clone() }
+}
+
+/// The total that a comment states: `total mass` or `total weight`, then a number and its unit.
+fn commented(text: &str) -> Option<f64> {
+    let mut rest = text;
+    while let Some(start) = rest.find("<!--") {
+        let comment = &rest[start + 4..];
+        let end = comment.find("-->")?;
+        if let Some(total) = total_in(&comment[..end].to_lowercase()) {
+            return Some(total);
+        }
+        rest = &comment[end + 3..];
+    }
+    None
+}
+
+fn total_in(comment: &str) -> Option<f64> {
+    let after =
+        ["total mass", "total weight"].iter().find_map(|key| Some(&comment[comment.find(key)? + key.len()..]))?;
+    let number = after.find(|c: char| c.is_ascii_digit()).filter(|&at| at <= 30)?;
+    let end = after[number..].find(|c: char| !(c.is_ascii_digit() || c == '.')).map_or(after.len(), |end| number + end);
+    let value = after[number..end].trim_end_matches('.').parse::<f64>().ok()?;
+    let unit: String = after[end..].trim_start().chars().take_while(char::is_ascii_alphabetic).collect();
+    let (_, power) = UNITS.iter().find(|(name, _)| *name == unit)?;
+    Some(shifted(value, *power))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::commented;
+
+    #[test]
+    fn a_total_is_read_from_a_comment() {
+        assert_eq!(commented("<a/><!-- arm --><!-- Total mass: 12.5 kg, with cables -->"), Some(12.5));
+        assert_eq!(commented("<!-- total weight of the arm = 900 g -->"), Some(0.9));
+        for none in ["<!-- total mass unknown -->", "total mass 3 kg", "<!-- total mass 3 -->", "<!-- total mass 3 lb"]
+        {
+            assert_eq!(commented(none), None, "{none}");
+        }
+    }
+}

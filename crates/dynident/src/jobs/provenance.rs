@@ -1,0 +1,147 @@
+//! What was read for a result, and one short name for it all.
+
+use crate::error::Error;
+use crate::result::{InputFile, Provenance};
+use crate::study::{Folders, Study};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeSet;
+use std::fmt::Write;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Component, Path, PathBuf};
+use std::time::SystemTime;
+
+/// Hexadecimal digits of an identity.
+const DIGITS: usize = 12;
+/// Read at once.
+const BLOCK: usize = 1 << 16;
+
+/// The provenance of a result of `study`: `read` are what else was read and what it is, a file twice or once.
+///
+/// # Errors
+/// [`Error::File`] for one that cannot be read again.
+pub(crate) fn provenance(
+    study: &Study,
+    study_path: &Path,
+    read: &[(&'static str, PathBuf)],
+) -> Result<Provenance, Error> {
+    let folder = study_path.parent().unwrap_or(Path::new(""));
+    let mut known = BTreeSet::new();
+    let mut inputs = Vec::new();
+    for (what, path) in read.iter().filter(|(_, path)| known.insert(path)) {
+        inputs.push(input(what, path, folder)?);
+    }
+    // A study may have been put together in memory, where the path is a name only.
+    let own = if study_path.is_file() { Some(input("study", study_path, folder)?) } else { None };
+    let version = env!("CARGO_PKG_VERSION");
+    let mut identity = Sha256::new();
+    identity.update(version);
+    identity.update(format!("{study:?}"));
+    for input in &inputs {
+        identity.update(format!("\n{} {}", input.what, input.sha256));
+    }
+    let mut identity = hexadecimal(&identity.finalize());
+    identity.truncate(DIGITS);
+    Ok(Provenance { identity, version: version.to_owned(), command: None, study: own, inputs })
+}
+
+/// [`provenance()`] of a motion that is designed, simulated or iterated, with further files that were read.
+///
+/// # Errors
+/// As [`provenance()`].
+pub(crate) fn motion_provenance(
+    study: &Study,
+    study_path: &Path,
+    data: Option<&Path>,
+    further: &[(&'static str, &Path)],
+) -> Result<Provenance, Error> {
+    let mut read = study.motion_inputs(&Folders::new(study, study_path, data));
+    read.extend(further.iter().map(|(what, path)| (*what, path.to_path_buf())));
+    provenance(study, study_path, &read)
+}
+
+/// [`provenance()`] beside a job, on a thread of its own if there may be more than one.
+pub(crate) fn beside<R>(
+    threads: usize,
+    provenance: impl FnOnce() -> Result<Provenance, Error> + Send,
+    job: impl FnOnce() -> R,
+) -> (Result<Provenance, Error>, R) {
+    if threads < 2 {
+        let done = job();
+        return (provenance(), done);
+    }
+    std::thread::scope(|scope| {
+        let provenance = scope.spawn(provenance);
+        let done = job();
+        (provenance.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), done)
+    })
+}
+
+/// Now, by the computer's clock: `2026-11-22T10:30:13Z`.
+pub(crate) fn now() -> String {
+    humantime::format_rfc3339_seconds(SystemTime::now()).to_string()
+}
+
+fn input(what: &str, path: &Path, folder: &Path) -> Result<InputFile, Error> {
+    let cannot = |source| Error::File { path: path.to_owned(), source };
+    let mut file = File::open(path).map_err(cannot)?;
+    let (mut hash, mut block, mut bytes) = (Sha256::new(), vec![0; BLOCK], 0);
+    loop {
+        let length = file.read(&mut block).map_err(cannot)?;
+        if length == 0 {
+            break;
+        }
+        hash.update(&block[..length]);
+        bytes += length as u64;
+    }
+    let sha256 = hexadecimal(&hash.finalize());
+    Ok(InputFile { what: what.to_owned(), file: seen_from(folder, path), bytes, sha256 })
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+/// The way from a folder to a file, with `/`; the file's name alone where there is none (another drive).
+pub(crate) fn seen_from(folder: &Path, path: &Path) -> String {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let name = || path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let (Ok(from), Ok(to)) = (folder.canonicalize(), path.canonicalize()) else { return name() };
+    let parts = |path: &Path| -> Vec<String> {
+        path.components().map(|part| part.as_os_str().to_string_lossy().into_owned()).collect()
+    };
+    let drive = |path: &Path| match path.components().next() {
+        Some(Component::Prefix(prefix)) => Some(prefix.as_os_str().to_owned()),
+        _ => None,
+    };
+    if drive(&from) != drive(&to) {
+        return name();
+    }
+    let (from, to) = (parts(&from), parts(&to));
+    let common = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
+    let up = std::iter::repeat_n("..".to_owned(), from.len() - common);
+    up.chain(to[common..].iter().cloned()).collect::<Vec<_>>().join("/")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hashes_are_those_of_the_standard_and_paths_are_seen_from_the_study() {
+        let folder = tempfile::tempdir().unwrap();
+        let study = folder.path().join("studies");
+        std::fs::create_dir(&study).unwrap();
+        let file = folder.path().join("abc.csv");
+        std::fs::write(&file, "abc").unwrap();
+        // FIPS 180-2, appendix B.1.
+        let found = input("log", &file, &study).unwrap();
+        assert_eq!(found.sha256, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+        assert_eq!((found.bytes, found.file.as_str()), (3, "../abc.csv"));
+        assert_eq!(seen_from(folder.path(), &file), "abc.csv");
+    }
+}

@@ -1,0 +1,416 @@
+//! The files of one result change together, or not at all: `docs/decisions/0017-output-sets.md`.
+
+use crate::error::Error;
+use std::fs::{self, File};
+use std::io;
+use std::path::{Component, Path, PathBuf};
+use std::time::Duration;
+
+/// What the hidden folder of a set on its way begins with.
+const STAGE: &str = ".dynident-set-";
+/// Inside of it: the new files, the old ones, and what stands for either at its place in the end.
+const NEW: &str = "new";
+const OLD: &str = "old";
+const PLACE_NEW: &str = "place-new";
+const PLACE_OLD: &str = "place-old";
+/// The links that lead from a file's place through [`CURRENT`].
+const LINKS: &str = "links";
+/// A link to [`OLD`], then to [`NEW`]: the one step in which all files change.
+const CURRENT: &str = "current";
+const NEXT: &str = "next";
+/// The names of the set, one a line.
+const NAMES: &str = "names";
+/// Where there are no links: the old files on their way out, and that all of them are, so that the new ones follow.
+const MOVED: &str = "moved";
+const DECIDED: &str = "decided";
+
+/// How long another program may take with its own set in the same folder.
+const PATIENCE: Duration = Duration::from_secs(20);
+const PAUSE: Duration = Duration::from_millis(20);
+
+/// The files that belong together, and the folder in which they stand. Other files there are left alone.
+///
+/// Who opens them by their names finds, at every moment, after a kill at any moment and with a full disk, the files of
+/// one set, the old or the new one. On a file system without links (FAT; Windows without the right to make them) a kill
+/// leaves a part of one set and never parts of two; the next set that is written clears that up.
+#[derive(Clone, Debug)]
+pub struct OutputSet {
+    folder: PathBuf,
+    files: Vec<(String, Option<Vec<u8>>)>,
+}
+
+impl OutputSet {
+    /// An empty set in a folder, which need not exist yet.
+    pub fn new(folder: &Path) -> Self {
+        Self { folder: folder.to_owned(), files: Vec::new() }
+    }
+
+    /// A file of the set; `name` may name folders below (`study/arm.toml`).
+    #[must_use]
+    pub fn file(mut self, name: &str, contents: impl Into<Vec<u8>>) -> Self {
+        self.files.push((name.to_owned(), Some(contents.into())));
+        self
+    }
+
+    /// A file that other sets of this kind have and this one does not: an older one is removed.
+    #[must_use]
+    pub fn absent(mut self, name: &str) -> Self {
+        self.files.push((name.to_owned(), None));
+        self
+    }
+
+    /// Puts the set in the place of the old one.
+    ///
+    /// # Errors
+    /// [`Error::Output`] with the system's reason; all files are then as they were.
+    pub fn write(&self) -> Result<(), Error> {
+        let cannot = |(path, source): Failed| Error::Output { path, source };
+        fs::create_dir_all(&self.folder).map_err(|source| cannot((self.folder.clone(), source)))?;
+        let lock = locked(&self.folder).map_err(cannot)?;
+        if lock.is_some() {
+            settle_interrupted(&self.folder);
+        }
+        let stage = Stage::fill(self).map_err(cannot)?;
+        let done = if stage.has_links() { stage.exchange() } else { stage.put() };
+        done.map_err(cannot)
+    }
+}
+
+/// What failed where.
+type Failed = (PathBuf, io::Error);
+
+fn at(path: &Path) -> impl FnOnce(io::Error) -> Failed {
+    move |source| (path.to_owned(), source)
+}
+
+/// The folder, locked against other programs that write a set into it; none where the system has no such lock.
+fn locked(folder: &Path) -> Result<Option<File>, Failed> {
+    let Ok(file) = File::open(folder) else { return Ok(None) };
+    for _ in 0..PATIENCE.as_millis() / PAUSE.as_millis() {
+        match file.try_lock() {
+            Ok(()) => return Ok(Some(file)),
+            Err(fs::TryLockError::WouldBlock) => std::thread::sleep(PAUSE),
+            Err(fs::TryLockError::Error(_)) => return Ok(None),
+        }
+    }
+    Err((folder.to_owned(), io::Error::new(io::ErrorKind::WouldBlock, "another program holds the folder locked")))
+}
+
+/// A set on its way, in a hidden folder beside the files' places.
+struct Stage {
+    folder: PathBuf,
+    path: PathBuf,
+    names: Vec<String>,
+}
+
+impl Stage {
+    /// Writes the new files, all the way to the disk. On failure nothing is left.
+    fn fill(set: &OutputSet) -> Result<Self, Failed> {
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(STAGE);
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            // Readers go through this folder while files change; the user's mask applies.
+            builder.permissions(fs::Permissions::from_mode(0o777));
+        }
+        let temporary = builder.tempdir_in(&set.folder).map_err(at(&set.folder))?;
+        let names: Vec<String> = set.files.iter().map(|(name, _)| name.clone()).collect();
+        let path = temporary.path().to_owned();
+        for folder in [NEW, OLD, PLACE_NEW, PLACE_OLD, LINKS] {
+            fs::create_dir(path.join(folder)).map_err(at(&path))?;
+        }
+        for (name, contents) in &set.files {
+            let place = set.folder.join(name);
+            if fs::symlink_metadata(&place).is_ok_and(|found| found.is_dir()) {
+                return Err((place, io::Error::new(io::ErrorKind::IsADirectory, "a folder has this name")));
+            }
+            if let Some(contents) = contents {
+                write_synced(&path.join(NEW).join(name), contents).map_err(|source| (place.clone(), source))?;
+            }
+            if let Some(above) = place.parent() {
+                fs::create_dir_all(above).map_err(at(above))?;
+            }
+        }
+        write_synced(&path.join(NAMES), names.join("\n").as_bytes()).map_err(at(&path))?;
+        let stage = Self { folder: set.folder.clone(), path: temporary.keep(), names };
+        stage.synced(&[NEW]).map_err(|failed| stage.given_up(failed))?;
+        Ok(stage)
+    }
+
+    /// Whether the file system has both kinds of links. That the disk is full is no answer: the exchange will say so.
+    fn has_links(&self) -> bool {
+        let (soft, hard) = (self.path.join("soft"), self.path.join("hard"));
+        let full = |error: io::Error| matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded);
+        let made = soft_link(Path::new(NAMES), &soft).and_then(|()| fs::hard_link(self.path.join(NAMES), &hard));
+        let has = made.is_ok() || made.is_err_and(full);
+        let _ = (fs::remove_file(soft), fs::remove_file(hard));
+        has
+    }
+
+    /// Lets every name lead to its old file through one link, turns that link to the new files, and puts these in the
+    /// links' places. All that needs room on the disk comes before the first file's place is touched.
+    fn exchange(self) -> Result<(), Failed> {
+        self.prepare().map_err(|failed| self.given_up(failed))?;
+        for name in &self.names {
+            let (link, place) = (self.path.join(LINKS).join(name), self.folder.join(name));
+            if fs::symlink_metadata(&link).is_ok() {
+                fs::rename(&link, &place).map_err(at(&place)).map_err(|failed| self.given_up(failed))?;
+            }
+        }
+        self.places_synced().map_err(|failed| self.given_up(failed))?;
+        let turned = fs::rename(self.path.join(NEXT), self.path.join(CURRENT)).map_err(at(&self.path));
+        turned.map_err(|failed| self.given_up(failed))?;
+        // From here on the new set is what everybody reads; what cannot be cleared up now, the next set will.
+        if self.synced(&[""]).is_ok() {
+            self.settle();
+        }
+        Ok(())
+    }
+
+    /// Everything of the exchange that takes room on the disk.
+    fn prepare(&self) -> Result<(), Failed> {
+        let of = |part: &str, name: &str| self.path.join(part).join(name);
+        for name in &self.names {
+            let place = self.folder.join(name);
+            for part in [OLD, PLACE_NEW, PLACE_OLD, LINKS] {
+                if let Some(above) = of(part, name).parent() {
+                    fs::create_dir_all(above).map_err(at(above))?;
+                }
+            }
+            let is_new = of(NEW, name).is_file();
+            if is_new {
+                fs::hard_link(of(NEW, name), of(PLACE_NEW, name)).map_err(at(&place))?;
+            }
+            let found = fs::symlink_metadata(&place).ok();
+            if let Some(found) = &found {
+                keep_old(&place, found.is_symlink(), &of(OLD, name), &of(PLACE_OLD, name)).map_err(at(&place))?;
+            }
+            if is_new || found.is_some() {
+                soft_link(&self.link_of(name), &of(LINKS, name)).map_err(at(&place))?;
+            }
+        }
+        soft_link(Path::new(OLD), &self.path.join(CURRENT)).map_err(at(&self.path))?;
+        soft_link(Path::new(NEW), &self.path.join(NEXT)).map_err(at(&self.path))?;
+        self.synced(&[OLD, PLACE_OLD, PLACE_NEW, LINKS, ""])
+    }
+
+    /// What the link at a file's place says: the way to the stage, relative, so that a folder can be moved or copied.
+    fn link_of(&self, name: &str) -> PathBuf {
+        let depth = Path::new(name).components().count() - 1;
+        let up: PathBuf = std::iter::repeat_n("..", depth).collect();
+        up.join(self.path.file_name().unwrap_or_default()).join(CURRENT).join(name)
+    }
+
+    /// Puts files in the places of the links, those of the set in force, and removes the stage. Needs no room on
+    /// the disk. What cannot be done stays as it is: the links lead to the same files.
+    fn settle(&self) {
+        let in_force = fs::read_link(self.path.join(CURRENT)).unwrap_or_default();
+        let places = if in_force == Path::new(NEW) { PLACE_NEW } else { PLACE_OLD };
+        let mut settled = true;
+        for name in &self.names {
+            let place = self.folder.join(name);
+            if fs::read_link(&place).is_ok_and(|link| link == self.link_of(name)) {
+                let file = self.path.join(places).join(name);
+                let there = fs::symlink_metadata(&file).is_ok();
+                settled &= if there { fs::rename(file, &place) } else { fs::remove_file(&place) }.is_ok();
+            }
+        }
+        if settled && self.places_synced().is_ok() {
+            // A stage that stays is only rubbish.
+            let _ = fs::remove_dir_all(&self.path);
+        }
+    }
+
+    /// Back to the old files after a failure.
+    fn given_up(&self, failed: Failed) -> Failed {
+        self.settle();
+        failed
+    }
+
+    /// Without links: all old files go before the first new one comes, so that never two sets stand beside each other.
+    fn put(self) -> Result<(), Failed> {
+        for name in &self.names {
+            let (place, old) = (self.folder.join(name), self.path.join(MOVED).join(name));
+            let moved = old.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| match fs::rename(&place, &old) {
+                Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+                moved => moved,
+            });
+            moved.map_err(at(&place)).map_err(|failed| self.put_back(failed))?;
+        }
+        let decided = self.path.join(DECIDED);
+        write_synced(&decided, b"").map_err(at(&self.path)).map_err(|failed| self.put_back(failed))?;
+        self.put_rest().map_err(|failed| {
+            for name in &self.names {
+                let place = self.folder.join(name);
+                if !self.path.join(MOVED).join(name).exists() {
+                    let _ = fs::remove_file(place);
+                }
+            }
+            let _ = fs::remove_file(&decided);
+            self.put_back(failed)
+        })
+    }
+
+    /// The old files in their places again.
+    fn put_back(&self, failed: Failed) -> Failed {
+        let back = |name: &String| {
+            let old = self.path.join(MOVED).join(name);
+            !old.exists() || fs::rename(old, self.folder.join(name)).is_ok()
+        };
+        if self.names.iter().all(back) {
+            let _ = fs::remove_dir_all(&self.path);
+        }
+        failed
+    }
+
+    /// The new files that are not in their places yet.
+    fn put_rest(&self) -> Result<(), Failed> {
+        for name in &self.names {
+            let (file, place) = (self.path.join(NEW).join(name), self.folder.join(name));
+            if file.is_file() {
+                fs::rename(&file, &place).map_err(at(&place))?;
+            }
+        }
+        // A stage that stays is only rubbish.
+        let _ = fs::remove_dir_all(&self.path);
+        Ok(())
+    }
+
+    /// Folders of the stage reach the disk.
+    fn synced(&self, parts: &[&str]) -> Result<(), Failed> {
+        for part in parts {
+            let base = self.path.join(part);
+            sync_folder(&base).map_err(at(&base))?;
+            for below in self.folders_below() {
+                let path = base.join(below);
+                if !part.is_empty() && path.is_dir() {
+                    sync_folder(&path).map_err(at(&path))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The folders of the files' places reach the disk.
+    fn places_synced(&self) -> Result<(), Failed> {
+        sync_folder(&self.folder).map_err(at(&self.folder))?;
+        for below in self.folders_below() {
+            let path = self.folder.join(below);
+            sync_folder(&path).map_err(at(&path))?;
+        }
+        Ok(())
+    }
+
+    /// Folders below that names of the set name.
+    fn folders_below(&self) -> std::collections::BTreeSet<&Path> {
+        let above = self.names.iter().flat_map(|name| Path::new(name).ancestors().skip(1));
+        above.filter(|path| !path.as_os_str().is_empty()).collect()
+    }
+}
+
+/// Clears up after a program that was killed: links give way to the files of the set that is in force.
+fn settle_interrupted(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for entry in entries.flatten().filter(|entry| entry.file_name().to_string_lossy().starts_with(STAGE)) {
+        let names = fs::read_to_string(entry.path().join(NAMES)).unwrap_or_default();
+        let inside = |name: &&str| Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
+        let names = names.lines().filter(inside).map(str::to_owned).collect();
+        let stage = Stage { folder: folder.to_owned(), path: entry.path(), names };
+        if stage.path.join(DECIDED).exists() {
+            let _ = stage.put_rest();
+        } else if stage.path.join(MOVED).exists() {
+            stage.put_back((folder.to_owned(), io::ErrorKind::Interrupted.into()));
+        } else {
+            stage.settle();
+        }
+    }
+}
+
+/// Keeps what stands at a place under two names: one to be read, one to be put back. A link of the user's own leads
+/// elsewhere, and is put back as the link that it is.
+fn keep_old(place: &Path, is_link: bool, read: &Path, back: &Path) -> io::Result<()> {
+    if is_link {
+        let target =
+            fs::canonicalize(place).or_else(|_| std::path::absolute(place).map(|path| path.join("nowhere")))?;
+        soft_link(&target, read)?;
+        return soft_link(&fs::read_link(place)?, back);
+    }
+    // Another user's file may refuse to be linked: its contents are what counts.
+    for kept in [read, back] {
+        fs::hard_link(place, kept).or_else(|_| fs::copy(place, kept).and_then(|_| File::open(kept)?.sync_all()))?;
+    }
+    Ok(())
+}
+
+#[cfg(unix)]
+fn soft_link(to: &Path, path: &Path) -> io::Result<()> {
+    std::os::unix::fs::symlink(to, path)
+}
+
+#[cfg(not(unix))]
+fn soft_link(_: &Path, _: &Path) -> io::Result<()> {
+    Err(io::ErrorKind::Unsupported.into())
+}
+
+fn write_synced(path: &Path, contents: &[u8]) -> io::Result<()> {
+    if let Some(above) = path.parent() {
+        fs::create_dir_all(above)?;
+    }
+    let mut file = File::create(path)?;
+    io::Write::write_all(&mut file, contents)?;
+    file.sync_all()
+}
+
+/// Names in a folder reach the disk with the folder itself, where the system knows such a thing.
+fn sync_folder(path: &Path) -> io::Result<()> {
+    if cfg!(unix) { File::open(path)?.sync_all() } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(folder: &Path, name: &str) -> String {
+        fs::read_to_string(folder.join(name)).unwrap_or_default()
+    }
+
+    /// The way for file systems without links, on one that has them.
+    #[test]
+    fn without_links_a_set_still_replaces_a_set() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path();
+        let first = OutputSet::new(path).file("a", "1").file("below/b", "1").absent("c");
+        Stage::fill(&first).unwrap().put().unwrap();
+        assert_eq!([read(path, "a"), read(path, "below/b"), read(path, "c")], ["1", "1", ""]);
+        let second = OutputSet::new(path).file("a", "2").absent("below/b").file("c", "2");
+        Stage::fill(&second).unwrap().put().unwrap();
+        assert_eq!([read(path, "a"), read(path, "below/b"), read(path, "c")], ["2", "", "2"]);
+        assert_eq!(fs::read_dir(path).unwrap().count(), 3);
+    }
+
+    /// Killed while the old files go, and while the new ones come.
+    #[test]
+    fn without_links_an_interrupted_set_is_cleared_up() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path();
+        let old = OutputSet::new(path).file("a", "1").file("b", "1");
+        old.write().unwrap();
+        let new = OutputSet::new(path).file("a", "2").file("b", "2");
+        let stage = Stage::fill(&new).unwrap();
+        fs::create_dir(stage.path.join(MOVED)).unwrap();
+        fs::rename(path.join("a"), stage.path.join(MOVED).join("a")).unwrap();
+        settle_interrupted(path);
+        assert_eq!([read(path, "a"), read(path, "b")], ["1", "1"]);
+        let stage = Stage::fill(&new).unwrap();
+        fs::create_dir(stage.path.join(MOVED)).unwrap();
+        for name in ["a", "b"] {
+            fs::rename(path.join(name), stage.path.join(MOVED).join(name)).unwrap();
+        }
+        fs::write(stage.path.join(DECIDED), "").unwrap();
+        fs::rename(stage.path.join(NEW).join("b"), path.join("b")).unwrap();
+        settle_interrupted(path);
+        assert_eq!([read(path, "a"), read(path, "b")], ["2", "2"]);
+        assert_eq!(fs::read_dir(path).unwrap().count(), 2);
+    }
+}

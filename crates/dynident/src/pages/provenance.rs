@@ -1,0 +1,19 @@
+//! Where a result comes from, on its page.
+
+use crate::result::ResultFile;
+use dynident_report::{Report, Table, Text};
+
+/// Version, identity, command and the files that were read.
+pub(super) fn origin(page: &mut Report, r: &ResultFile) {
+    let Some(provenance) = &r.provenance else { return };
+    let command = provenance.command.as_ref().map_or_else(String::new, |command| format!(" by `{command}`"));
+    page.add(Text::new(format!(
+        "Made by dynident {}{command} on {}. Identity {}: result.json and identified.urdf of this run carry the same, and \
+         so does every run of this program on the same files.",
+        provenance.version, r.timings_s.made_at, provenance.identity
+    )));
+    let rows = provenance.study.iter().chain(&provenance.inputs).map(|input| {
+        [input.what.clone(), input.file.clone(), input.bytes.to_string(), input.sha256.clone()].map(Into::into).into()
+    });
+    page.add(Table::new("Files", ["what", "file", "bytes", "SHA-256"]).note("seen from the study's folder").rows(rows));
+}

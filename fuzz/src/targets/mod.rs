@@ -1,0 +1,36 @@
+//! What is run: one target for each parser, and the small commands on a folder of files.
+
+mod jobs;
+mod parsers;
+
+use std::io;
+
+/// Something that takes an input.
+pub(crate) trait Run {
+    /// Whether `input` was accepted; `seed` is the name of the file that it was made from.
+    fn run(&mut self, seed: &str, input: &[u8]) -> bool;
+}
+
+/// A target.
+pub(crate) struct Target {
+    /// Its name, and that of its folder in `corpus`.
+    pub(crate) name: &'static str,
+    /// Executions in a round.
+    pub(crate) repetitions: u64,
+    /// Makes what runs it; each thread has its own.
+    pub(crate) new: fn() -> io::Result<Box<dyn Run>>,
+}
+
+/// All targets.
+pub(crate) const TARGETS: [Target; 10] = [
+    Target { name: "urdf", repetitions: 10, new: parsers::urdf },
+    Target { name: "dh", repetitions: 20, new: parsers::dh },
+    Target { name: "study", repetitions: 20, new: parsers::study },
+    Target { name: "log", repetitions: 10, new: parsers::log },
+    Target { name: "states", repetitions: 20, new: parsers::states },
+    Target { name: "result", repetitions: 10, new: parsers::result },
+    Target { name: "design", repetitions: 20, new: parsers::design },
+    Target { name: "iterations", repetitions: 10, new: parsers::iterations },
+    Target { name: "protocol", repetitions: 40, new: parsers::protocol },
+    Target { name: "jobs", repetitions: 1, new: jobs::jobs },
+];

@@ -1,0 +1,222 @@
+//! One target for each format that is read.
+
+use super::Run;
+use dynident::iteration::IterationStore;
+use dynident::iteration::robot::{ToHost, read_log_table};
+use dynident::model::{
+    AuditFinding, Model, audit, link_changes, read_dh, read_urdf, rewrite_inertials, rewrite_urdf, slips,
+};
+use dynident::recording::log::{ChannelGroup, ColumnRef, Columns, TimeColumn};
+use dynident::recording::{LogFormat, MotionBlock, MotionSettings, MotionStream};
+use dynident::{DesignFile, Quantity, ResultFile, Study};
+use std::io;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// A target without memory.
+struct Plain(fn(&[u8]) -> bool);
+
+impl Run for Plain {
+    fn run(&mut self, _: &str, input: &[u8]) -> bool {
+        self.0(input)
+    }
+}
+
+/// A target that reads a file.
+struct OfFile {
+    folder: TempDir,
+    file: &'static str,
+    read: fn(&Path) -> bool,
+}
+
+impl Run for OfFile {
+    fn run(&mut self, _: &str, input: &[u8]) -> bool {
+        let path = self.folder.path().join(self.file);
+        std::fs::write(&path, input).is_ok() && (self.read)(&path)
+    }
+}
+
+#[allow(clippy::unnecessary_wraps, reason = "the shape of all targets")]
+fn plain(run: fn(&[u8]) -> bool) -> io::Result<Box<dyn Run>> {
+    Ok(Box::new(Plain(run)))
+}
+
+fn of_file(file: &'static str, read: fn(&Path) -> bool) -> io::Result<Box<dyn Run>> {
+    let folder = tempfile::tempdir()?;
+    if let Some(parent) = folder.path().join(file).parent() {
+        std::fs::create_dir_all(parent)?;
+    }
+    Ok(Box::new(OfFile { folder, file, read }))
+}
+
+/// A message that a person can be shown: one that says something.
+fn said(message: &impl ToString) -> bool {
+    assert!(!message.to_string().trim().is_empty(), "an empty message");
+    false
+}
+
+fn sound(model: &Model) {
+    let findings: Vec<AuditFinding> = audit(model);
+    assert!(findings.iter().all(|finding| !finding.message.is_empty()));
+    assert!(model.inertials().iter().all(|inertial| inertial.0.iter().all(|x| x.is_finite())), "not finite");
+}
+
+/// URDF: reading, audit, slips, writing back.
+pub(crate) fn urdf() -> io::Result<Box<dyn Run>> {
+    plain(|input| {
+        let Ok(text) = core::str::from_utf8(input) else { return false };
+        let robot = match read_urdf(text) {
+            Ok(robot) => robot,
+            Err(error) => return said(&error),
+        };
+        sound(&robot.model);
+        assert_eq!(rewrite_urdf(text, &[], &[]).as_deref(), Ok(text));
+        if let Ok(changes) = link_changes(&robot.model, robot.model.inertials())
+            && let Ok(written) = rewrite_urdf(text, &changes, &[])
+        {
+            assert!(read_urdf(&written).is_ok(), "what was written is not read");
+        }
+        match slips(text, &robot.model, None) {
+            Ok(found) => match rewrite_inertials(text, &found.stated, &found.corrected) {
+                Ok(mended) => assert!(read_urdf(&mended).is_ok(), "what was mended is not read"),
+                Err(error) => return said(&error),
+            },
+            Err(error) => return said(&error),
+        }
+        true
+    })
+}
+
+/// D-H table.
+pub(crate) fn dh() -> io::Result<Box<dyn Run>> {
+    plain(|input| {
+        let Ok(text) = core::str::from_utf8(input) else { return false };
+        match read_dh(text) {
+            Ok(model) => {
+                sound(&model);
+                true
+            }
+            Err(error) => said(&error),
+        }
+    })
+}
+
+/// Study: reading, and the names and formats of its logs.
+pub(crate) fn study() -> io::Result<Box<dyn Run>> {
+    plain(|input| {
+        let Ok(text) = core::str::from_utf8(input) else { return false };
+        match Study::parse(text, Path::new("study.toml")) {
+            Ok(study) => {
+                for log in 0..study.log.len() {
+                    assert!(!study.log_name(log).is_empty());
+                    let _ = study.format_of(log).validate(&["a".to_owned(), "b".to_owned()]);
+                }
+                true
+            }
+            Err(error) => said(&error),
+        }
+    })
+}
+
+fn two_joints() -> Vec<String> {
+    ["shoulder", "elbow"].map(str::to_owned).to_vec()
+}
+
+/// Text tables of samples, through clock and differentiator; and a robot program's table.
+pub(crate) fn log() -> io::Result<Box<dyn Run>> {
+    of_file("log.csv", |path| {
+        let time = TimeColumn::seconds(ColumnRef::Name("t".to_owned()));
+        let group = |name: &str| ChannelGroup::new(Columns::Pattern(format!("{name}{{1..2}}")));
+        let format = LogFormat::with_time(time, group("q"), group("tau"));
+        if let Err(error) = read_log_table(path, &two_joints(), 100.0) {
+            said(&error);
+        }
+        let mut stream = match MotionStream::open(&format, path, &two_joints(), &MotionSettings::default()) {
+            Ok(stream) => stream,
+            Err(error) => return said(&error),
+        };
+        let mut block = MotionBlock::default();
+        loop {
+            match stream.next_block(&mut block) {
+                Ok(true) => {
+                    let numbers = block.q.iter().chain(&block.dq).chain(&block.ddq).chain(&block.tau);
+                    assert!(numbers.into_iter().all(|x| x.is_finite()), "not finite");
+                }
+                Ok(false) => return true,
+                Err(error) => return said(&error),
+            }
+        }
+    })
+}
+
+/// The arm of the small commands.
+fn arm() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus/jobs/arm.urdf")
+}
+
+/// Tables of states.
+pub(crate) fn states() -> io::Result<Box<dyn Run>> {
+    of_file("states.csv", |path| {
+        let Ok(robot) = dynident::model::load_robot(arm()) else { return false };
+        let quantities = [
+            Quantity::InverseDynamics,
+            Quantity::ForwardDynamics,
+            Quantity::MassMatrix,
+            Quantity::Gravity,
+            Quantity::Regressor,
+        ];
+        let mut accepted = false;
+        for quantity in quantities {
+            match dynident::evaluate(&robot.model, path, quantity, &mut io::sink()) {
+                Ok(_) => accepted = true,
+                Err(error) => {
+                    said(&error);
+                }
+            }
+        }
+        accepted
+    })
+}
+
+/// `result.json`.
+pub(crate) fn result() -> io::Result<Box<dyn Run>> {
+    of_file("result.json", |path| match ResultFile::read(path) {
+        Ok(_) => true,
+        Err(error) => said(&error),
+    })
+}
+
+/// `design.json`.
+pub(crate) fn design() -> io::Result<Box<dyn Run>> {
+    plain(|input| match serde_json::from_slice::<DesignFile>(input) {
+        Ok(file) => serde_json::to_string(&file).is_ok(),
+        Err(error) => said(&error),
+    })
+}
+
+/// `run.json` of an iteration's folder.
+pub(crate) fn iterations() -> io::Result<Box<dyn Run>> {
+    of_file("runs/run_1/run.json", |path| {
+        let Some(folder) = path.ancestors().nth(3) else { return false };
+        match IterationStore::open(folder, "fuzz", true).and_then(|store| store.records()) {
+            Ok(records) => !records.is_empty(),
+            Err(error) => said(&error),
+        }
+    })
+}
+
+/// Lines of a robot program.
+pub(crate) fn protocol() -> io::Result<Box<dyn Run>> {
+    plain(|input| {
+        let mut accepted = false;
+        for line in input.split(|byte| *byte == b'\n') {
+            match serde_json::from_slice::<ToHost>(line) {
+                Ok(message) => accepted |= !message.kind().is_empty(),
+                Err(error) => {
+                    said(&error);
+                }
+            }
+        }
+        accepted
+    })
+}

@@ -1,0 +1,85 @@
+//! Catches panics and reports hangs, with the input that caused them.
+
+use std::cell::RefCell;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+/// No input of the corpus takes a tenth of it.
+const HANG: Duration = Duration::from_secs(60);
+
+thread_local! {
+    /// What the last panic of this thread said.
+    static PANIC: RefCell<String> = const { RefCell::new(String::new()) };
+}
+
+/// What a thread is running.
+struct Running {
+    target: &'static str,
+    input: Vec<u8>,
+    since: Instant,
+}
+
+/// Watches some threads.
+pub(crate) struct Watch {
+    found: PathBuf,
+    running: Arc<Vec<Mutex<Option<Running>>>>,
+}
+
+impl Watch {
+    /// Inputs that fail go to `found`. An input that hangs ends the program, after it was kept.
+    pub(crate) fn new(found: &Path, threads: usize) -> Self {
+        std::panic::set_hook(Box::new(|panic| PANIC.set(panic.to_string())));
+        let running: Arc<Vec<Mutex<Option<Running>>>> = Arc::new((0..threads).map(|_| Mutex::new(None)).collect());
+        let (watched, folder) = (Arc::clone(&running), found.to_owned());
+        std::thread::spawn(move || {
+            loop {
+                std::thread::sleep(Duration::from_secs(1));
+                for slot in watched.iter() {
+                    let Ok(slot) = slot.lock() else { continue };
+                    if let Some(running) = slot.as_ref().filter(|running| running.since.elapsed() > HANG) {
+                        keep(&folder, running.target, &running.input, "takes more than a minute");
+                        std::process::exit(1);
+                    }
+                }
+            }
+        });
+        Self { found: found.to_owned(), running }
+    }
+
+    /// Whether the input was accepted, and whether it failed.
+    pub(crate) fn run(
+        &self,
+        thread: usize,
+        target: &'static str,
+        input: &[u8],
+        run: &mut dyn FnMut() -> bool,
+    ) -> (bool, bool) {
+        self.set(thread, Some(Running { target, input: input.to_vec(), since: Instant::now() }));
+        let outcome = catch_unwind(AssertUnwindSafe(run));
+        self.set(thread, None);
+        if let Ok(accepted) = outcome {
+            return (accepted, false);
+        }
+        keep(&self.found, target, input, &PANIC.take());
+        (false, true)
+    }
+
+    fn set(&self, thread: usize, now: Option<Running>) {
+        if let Some(Ok(mut slot)) = self.running.get(thread).map(Mutex::lock) {
+            *slot = now;
+        }
+    }
+}
+
+/// Keeps an input and says why.
+fn keep(folder: &Path, target: &str, input: &[u8], why: &str) {
+    let mut hasher = DefaultHasher::new();
+    input.hash(&mut hasher);
+    let path = folder.join(format!("{target}-{:016x}", hasher.finish()));
+    let kept = std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&path, input));
+    let place = if kept.is_ok() { path.display().to_string() } else { "an input that could not be kept".to_owned() };
+    crate::say(&format!("FAILED {target}: {place}: {why}"));
+}
