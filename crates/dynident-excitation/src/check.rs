@@ -67,7 +67,7 @@ enum Probe {
     Floor { point: Point, height_m: f64 },
     FloorLink { link: Link, height_m: f64, length_m: f64 },
     Column { point: Point, x: f64, y: f64, radius_m: f64, top_m: f64 },
-    Pair(Pair),
+    Pair(Box<Pair>),
 }
 
 struct Point {
@@ -201,7 +201,7 @@ fn probes(limits: &Limits, model: &Model) -> Result<Vec<(Probe, LimitReport)>, L
                 Link::new(solid.body, hulls.collect())
             });
             let name = solids.map(|solid| solid.link.as_str()).join(" / ");
-            add(LimitKind::SelfCollision, name, Probe::Pair(Pair::new(links, pair.clearance_m, pair.size_m)));
+            add(LimitKind::SelfCollision, name, Probe::Pair(Box::new(Pair::new(links, pair.clearance_m, pair.size_m))));
         }
     }
     Ok(probes)

@@ -267,7 +267,7 @@ mod tests {
             let share = (-point.dot(step) / step.dot(step)).clamp(0.0, shares[worst]);
             shares[worst] -= share;
             shares[best] += share;
-            point = point + step.scale(share);
+            point += step.scale(share);
         }
         [below, point.norm()]
     }

@@ -71,13 +71,12 @@ impl LinkSolid {
             let (body, placement) = link_place(model, &shape.link, what)?;
             let corners = shape.corners_m.iter().map(|corner| placement.point(Vec3(*corner))).collect();
             let shape_on_body = BodyShape::new(corners, shape.radius_m);
-            match solids.iter_mut().find(|solid| solid.link == shape.link) {
-                Some(solid) => solid.shapes.push(shape_on_body),
-                None => {
-                    let link = shape.link.clone();
-                    let shapes = vec![shape_on_body];
-                    solids.push(Self { body, link, shapes, centre: Vec3::ZERO, reach_m: 0.0 });
-                }
+            if let Some(solid) = solids.iter_mut().find(|solid| solid.link == shape.link) {
+                solid.shapes.push(shape_on_body);
+            } else {
+                let link = shape.link.clone();
+                let shapes = vec![shape_on_body];
+                solids.push(Self { body, link, shapes, centre: Vec3::ZERO, reach_m: 0.0 });
             }
         }
         for solid in &mut solids {

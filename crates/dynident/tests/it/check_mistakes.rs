@@ -364,6 +364,7 @@ fn write_noisy(path: &Path, truth: &Truth, seed: u64) {
 
 /// The study of a robot and logs in its folder, the second one held out.
 fn study_of(description: &Path, dof: usize, logs: &[&str]) -> String {
+    let description = description.display().to_string();
     let mut study = format!(
         "[robot]\nfile = {description:?}\n[format]\ntime = {{ column = \"t\" }}\nposition = {{ columns = \"q{{1..{dof}}}\" }}\ntorque = {{ columns = \"tau{{1..{dof}}}\" }}\n"
     );
