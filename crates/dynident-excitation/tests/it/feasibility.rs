@@ -156,9 +156,9 @@ fn case(index: usize) -> Case {
 
 fn small(index: usize) -> DesignSettings {
     DesignSettings {
-        starts: 2,
-        rounds: 1,
-        evaluations_per_start: 30,
+        starts: Some(2),
+        rounds: Some(1),
+        evaluations_per_start: Some(30),
         polish_evaluations: 40,
         search_samples: Some(40),
         rate_hz: 20.0,

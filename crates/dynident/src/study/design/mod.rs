@@ -247,9 +247,9 @@ impl DesignSection {
         within("search.rate_hz", search.rate_hz, 1.0, 1e5)?;
         within("duration_s times search.rate_hz", self.duration_s * search.rate_hz, 0.0, MAX_SAMPLES)?;
         for (key, value, least) in [
-            ("search.starts", search.starts, 1),
-            ("search.rounds", search.rounds, 0),
-            ("search.evaluations_per_start", search.evaluations_per_start, 1),
+            ("search.starts", search.starts.unwrap_or(1), 1),
+            ("search.rounds", search.rounds.unwrap_or(0), 0),
+            ("search.evaluations_per_start", search.evaluations_per_start.unwrap_or(1), 1),
             ("search.polish_evaluations", search.polish_evaluations, 1),
         ] {
             within(key, value as f64, f64::from(least), MAX_COUNT as f64)?;
