@@ -243,10 +243,12 @@ fn identified(
     let held_out = held_out?;
     // Where something does not fit: what the recordings would be under another study.
     let theta = consistent.fit.as_ref().map(|fit| &fit.base_values[..]);
+    let agreements = || training.logs.iter().filter_map(|log| log.nominal_agreement.as_ref());
     let is_doubted = || {
         is_doubtful(&training, theta)
             || examination.friction_signs.iter().any(FrictionSign::is_reversed)
-            || training.logs.iter().any(|log| log.nominal_agreement.as_ref().is_some_and(PriorAgreement::is_reversed))
+            || agreements().any(PriorAgreement::is_reversed)
+            || agreements().any(PriorAgreement::is_poor)
             || examination.sign.as_ref().is_some_and(TorqueSignCheck::is_reversed)
             || break_limits(&training, robot.model())
             || held_out.iter().any(|log| is_far_worse(&log.validation, &estimation.estimate.joint_sigma))

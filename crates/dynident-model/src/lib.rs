@@ -15,7 +15,8 @@
 //! | other ones in their place | [`Model::with_inertials`] |
 //! | friction, drive inertia, offsets of every joint | [`terms::terms_per_joint`]; one by one: [`terms::TorqueTerm`] |
 //! | can these bodies be real? | [`audit()`], [`InertialParameters::pseudo_inertia`] |
-//! | new inertials into the user's own URDF | [`link_changes`], [`rewrite_urdf`] |
+//! | new inertials into the user's own description | [`link_changes`], [`rewrite_urdf`], [`rewrite_dh`] |
+//! | a URDF of any model | [`write_urdf`] |
 //!
 //! ```
 //! use dynident_model::terms::{CoulombShape, DriveChoice, terms_per_joint};
@@ -64,7 +65,7 @@ mod tree;
 pub mod urdf;
 
 pub use audit::{AuditFinding, AuditLevel, Correction, Slip, SlipKind, Slips, audit, slips};
-pub use dh::{DhError, DhFault, read_dh};
+pub use dh::{DhError, DhFault, DhWriteError, read_dh, rewrite_dh};
 pub use error::ModelError;
 pub use inertial::{INERTIAL_NAMES, InertialParameters};
 pub use joint::{Joint, JointKind, JointLimits, JointMap, Mimic};
@@ -74,7 +75,7 @@ pub use spatial::{Mat3, Transform, Vec3};
 pub use tree::{Body, Link, Model, STANDARD_GRAVITY};
 pub use urdf::{
     JointChange, LinkChange, StatedInertial, UnreadElement, UrdfError, UrdfFault, UrdfIrregularity, UrdfRobot,
-    UrdfWriteError, link_changes, read_urdf, rewrite_inertials, rewrite_urdf, stated_inertials,
+    UrdfWriteError, link_changes, read_urdf, rewrite_inertials, rewrite_urdf, stated_inertials, write_urdf,
 };
 
 #[cfg(doctest)]

@@ -7,6 +7,8 @@ use std::path::PathBuf;
 
 /// The user's description with the new values.
 const URDF: &str = "identified.urdf";
+/// The same as a D-H table, where the user's is one.
+const TABLE: &str = "identified.toml";
 /// Problems on standard error; the others stand in the file.
 const PROBLEMS_SHOWN: usize = 8;
 
@@ -15,7 +17,7 @@ const PROBLEMS_SHOWN: usize = 8;
 pub(crate) struct Options {
     /// The study file.
     study: PathBuf,
-    /// Folder for result.json, report.html and identified.urdf.
+    /// Folder for result.json, report.html and identified.urdf (of a D-H table identified.toml as well).
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Folder of the recordings, in place of the study's own.
@@ -28,7 +30,7 @@ pub(crate) struct Options {
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
     let study = Study::load(&options.study).map_err(message_of)?;
-    let out = (&*options.out, &[URDF, "report.html", "result.json"][..]);
+    let out = (&*options.out, &[URDF, TABLE, "report.html", "result.json"][..]);
     let of_study = (&study, &*options.study, options.data.as_deref());
     refuse_overwriting(out, of_study, &["robot", "log", "arm", "format", "motion", "estimator"], &[])?;
     check_writable(&options.out).map_err(message_of)?;
@@ -39,18 +41,22 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         provenance.command = Some(command(options));
     }
     let result = &identification.result;
-    let set = OutputSet::new(&options.out)
+    let mut set = OutputSet::new(&options.out)
         .file("result.json", pretty_json(result)?)
         .file("report.html", identification.report().map_err(message_of)?);
-    let set = match &identification.urdf {
-        Some(urdf) => set.file(URDF, urdf.as_str()),
-        None => set.absent(URDF),
-    };
+    let mut models = Vec::new();
+    for (name, text) in [(URDF, &identification.urdf), (TABLE, &identification.table)] {
+        models.extend(text.as_ref().map(|_| name));
+        set = match text {
+            Some(text) => set.file(name, text.as_str()),
+            None => set.absent(name),
+        };
+    }
     set.write().map_err(message_of)?;
     if context.json {
         terminal::print(&json(result)?)?;
     } else if !context.quiet {
-        terminal::print(&summary::identification(result, &options.out, identification.urdf.is_some()))?;
+        terminal::print(&summary::identification(result, &options.out, &models))?;
     }
     let problems = &result.problems;
     for problem in problems.iter().take(PROBLEMS_SHOWN) {

@@ -21,8 +21,8 @@ const COLUMNS: usize = 5;
 /// Columns that are left for an expression.
 const EXPRESSION: usize = 44;
 
-/// What was found, proved and written.
-pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
+/// What was found, proved and written, the files of the model among it.
+pub(crate) fn identification(r: &ResultFile, out: &Path, models: &[&str]) -> String {
     let mut text = wrapped(&r.name, 2);
     let _ = writeln!(
         text,
@@ -63,13 +63,8 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, urdf: bool) -> String {
     for log in &r.logs {
         text += &wrapped(&data(log), 4);
     }
-    let _ = writeln!(
-        text,
-        "\nwrote {}{} in {:.2} s",
-        out.join("result.json").display(),
-        if urdf { ", report.html and identified.urdf" } else { " and report.html" },
-        r.timings_s.total
-    );
+    let others = [&["report.html"], models].concat().join(", ");
+    let _ = writeln!(text, "\nwrote {}, {others} in {:.2} s", out.join("result.json").display(), r.timings_s.total);
     if let Some(reason) = &r.no_urdf {
         text += &wrapped(&format!("no identified.urdf: {reason}"), 2);
     }

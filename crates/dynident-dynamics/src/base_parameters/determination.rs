@@ -1,8 +1,10 @@
 //! What base parameters say of a single parameter.
 
 use super::BaseParameters;
+use crate::regressor_panels::Column;
 
-/// Entries of the regrouping below this are rounding, of descriptions too: `1.5708` for π/2 leaves 4e-6.
+/// Entries of the regrouping below this, of the unit that the robot's size gives them, are rounding, of descriptions
+/// too: `1.5708` for π/2 leaves 4e-6.
 const NOTHING: f64 = 1.0e-4;
 
 /// Whether torque tells a parameter.
@@ -21,10 +23,22 @@ impl BaseParameters {
     /// them that `fixed` names by their number not counted.
     ///
     /// With `θ = π_i + R π_d` a parameter is determined alone if it is independent and no dependent one has a share in
-    /// its row of `R`; it is not in any torque if its column of `R` is zero.
-    pub fn determination(&self, fixed: &[usize]) -> Vec<Determination> {
+    /// its row of `R`; it is not in any torque if its column of `R` is zero. `length_m` is a length that the robot's
+    /// links have: entries of `R` are powers of lengths, and what counts as zero grows with them.
+    pub fn determination(&self, fixed: &[usize], length_m: f64) -> Vec<Determination> {
         let mut all = vec![Determination::Nominal; self.all_columns().len()];
-        let regrouping = self.regrouping();
+        let size = |column: usize| match &self.all_columns()[column] {
+            Column::Body { parameter: 0, .. } => 1.0,
+            Column::Body { parameter: 1..=3, .. } => length_m,
+            // Drive inertia stands beside moments of inertia; nothing else of a drive is regrouped.
+            Column::Body { .. } | Column::Term(_) => length_m * length_m,
+        };
+        let mut regrouping = self.regrouping().clone();
+        for (place, &column) in self.dependent().iter().enumerate() {
+            for (row, &independent) in self.independent().iter().enumerate() {
+                regrouping[(row, place)] *= size(column) / size(independent);
+            }
+        }
         let counts = |row: usize| !fixed.contains(&row);
         for (row, &column) in self.independent().iter().enumerate() {
             let is_alone = regrouping.row(row).iter().all(|share| share.abs() < NOTHING);
@@ -57,11 +71,11 @@ mod tests {
             <parent link="b"/><child link="r"/><axis xyz="0 1 0"/></joint></robot>"#;
         let model = dynident_model::read_urdf(text).unwrap().model;
         let base = BaseParameters::new(&model, &[], &BaseParameterSettings::default());
-        let all = base.determination(&[]);
+        let all = base.determination(&[], 1.0);
         let of = |which: Determination| -> Vec<usize> { (0..10).filter(|&k| all[k] == which).collect() };
         // m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz.
         assert_eq!(of(Determination::Measured), [1, 3, 7]);
         assert_eq!(of(Determination::Nominal), [0, 2, 4, 5, 6, 8, 9]);
-        assert_eq!(base.determination(&[2])[7], Determination::Nominal);
+        assert_eq!(base.determination(&[2], 1.0)[7], Determination::Nominal);
     }
 }

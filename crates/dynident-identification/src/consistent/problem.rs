@@ -85,7 +85,10 @@ pub fn inconsistent_nominal_bodies(robot: &ParametricModel, settings: &Consisten
 fn consistent_body(own: &[f64]) -> (bool, f64) {
     let stated = InertialParameters(core::array::from_fn(|k| own[k]));
     let least = stated.pseudo_inertia().symmetric_eigenvalues().min();
-    (stated.mass_kg() > 0.0 && least >= -1.0e-9 * stated.mass_kg(), least)
+    // Rounding of the moments, and of the mass beside them.
+    let moments = stated.inertia_at_origin();
+    let rounding = 1.0e-9 * (0..3).map(|k| moments.0[k][k].abs()).sum::<f64>() + 1.0e-15 * stated.mass_kg();
+    (stated.mass_kg() > 0.0 && least >= -rounding, least)
 }
 
 /// What is asked of the robot's bodies and terms: what [`consistent_parameters`] solves.
@@ -187,8 +190,14 @@ fn term_sizes(robot: &ParametricModel, problem: &LinearProblem) -> Vec<f64> {
     robot.terms().iter().enumerate().map(|term| size(term).unwrap_or(1.0)).collect()
 }
 
-/// A length that the robot's links have: the mean distance between successive joints, at least a centimetre.
+/// A length that the robot's links have: the mean distance between successive joints; where all axes meet in one point,
+/// of the described centres of mass from their joints, and a metre where there are none.
 pub fn typical_length_m(model: &Model) -> f64 {
-    let lengths: Vec<f64> = model.joints().iter().map(|joint| joint.placement.translation.norm()).collect();
-    (lengths.iter().sum::<f64>() / lengths.len().max(1) as f64).max(0.01)
+    let mean = |lengths: Vec<f64>| {
+        let mean = lengths.iter().sum::<f64>() / lengths.len().max(1) as f64;
+        (mean > 0.0).then_some(mean)
+    };
+    let joints = model.joints().iter().map(|joint| joint.placement.translation.norm());
+    let centres = model.inertials().iter().filter_map(|body| Some(body.com_m()?.norm()));
+    mean(joints.collect()).or_else(|| mean(centres.collect())).unwrap_or(1.0)
 }

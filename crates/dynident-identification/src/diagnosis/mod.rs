@@ -11,9 +11,10 @@
 //! | `mistake`, `candidates` | mistakes of studies, and which to try |
 //! | `explanation`, `nominal`, `plausibility` | the witnesses: best robots, the description, limits |
 //! | `reading`, `search` | their sum, and the reading with the best |
-//! | `torque_unit`, `unseen_load` | what no reading of single columns covers: units of torque, payloads |
+//! | `description_fit`, `unseen_load` | what no reading of single columns covers: units of torque, another robot, payloads |
 
 mod candidates;
+mod description_fit;
 mod explanation;
 mod mistake;
 mod motion_rows;
@@ -21,15 +22,14 @@ mod nominal;
 mod plausibility;
 mod reading;
 mod search;
-mod torque_unit;
 mod unseen_load;
 
+pub use description_fit::DescriptionFit;
 pub use mistake::{Channels, Mistake};
 pub use motion_rows::MotionRows;
 pub use plausibility::BeyondLimit;
 pub use reading::Reading;
 pub use search::Search;
-pub use torque_unit::TorqueUnit;
 pub use unseen_load::UnseenLoad;
 
 use crate::logs::Logs;
@@ -51,8 +51,8 @@ const INSTANTS: usize = 300;
 pub struct Diagnosis {
     /// The readings that were compared.
     pub search: Search,
-    /// What the description says of the torque's unit, in the best reading; none while its bodies are unknown.
-    pub torque_unit: Option<TorqueUnit>,
+    /// What the description's bodies say of the torque, in the best reading; none while they are unknown.
+    pub description_fit: Option<DescriptionFit>,
     /// Loads that held-out logs carry and training logs do not, or the other way round.
     pub unseen_loads: Vec<UnseenLoad>,
 }
@@ -61,7 +61,7 @@ impl Diagnosis {
     /// Whether even the best reading leaves far more than each joint's own parameters do: the description is not this
     /// robot's, or several mistakes were made at once.
     pub fn is_unexplained(&self) -> bool {
-        self.search.best.as_ref().unwrap_or(&self.search.as_written).is_unexplained()
+        self.search.believed().is_unexplained()
     }
 }
 
@@ -113,7 +113,7 @@ pub fn diagnose(
         best_rows = mistake.corrected(&best_rows);
         best_robot = mistake.corrected_robot(&best_robot).unwrap_or(best_robot);
     }
-    let torque_unit = torque_unit::torque_unit(&best_robot, &best_rows);
+    let description_fit = description_fit::description_fit(&best_robot, &best_rows, &search.believed().left);
     let mut unseen_loads = Vec::new();
     if let (Some(theta), None) = (theta, &search.best) {
         for index in logs.of_role(Role::Validate) {
@@ -121,5 +121,5 @@ pub fn diagnose(
             unseen_loads.extend(unseen_load::unseen_load(robot, &rows, index, theta));
         }
     }
-    Ok(Diagnosis { search, torque_unit, unseen_loads })
+    Ok(Diagnosis { search, description_fit, unseen_loads })
 }

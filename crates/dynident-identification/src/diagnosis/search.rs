@@ -43,6 +43,13 @@ pub struct Search {
     pub tried: usize,
 }
 
+impl Search {
+    /// The better reading, where there is one, or the study as it is.
+    pub fn believed(&self) -> &Reading {
+        self.best.as_ref().unwrap_or(&self.as_written)
+    }
+}
+
 /// A consistent robot to the accuracy that a comparison of readings needs: a hundredth of its score.
 pub(super) fn rough_consistency(settings: Option<&ConsistencySettings>) -> ConsistencySettings {
     let known = settings.cloned().unwrap_or_default();

@@ -9,6 +9,9 @@ use serde::{Deserialize, Serialize};
 /// The other sign counts as right when it leaves less than this share of what the given sign leaves.
 const CLEARLY_BETTER: f64 = 0.5;
 
+/// Percent of the torque that a description of the robot at hand hardly ever leaves; torque without friction is less.
+const POOR_PERCENT: f64 = 50.0;
+
 /// How well the prior model explains the torque as given and with the opposite sign.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -26,6 +29,11 @@ impl PriorAgreement {
     pub fn is_reversed(&self) -> bool {
         let whole = self.residual_percent.zip(self.residual_percent_if_reversed);
         whole.is_some_and(|(given, other)| other < CLEARLY_BETTER * given) || !self.reversed_joints.is_empty()
+    }
+
+    /// Whether the prior model leaves so much of the torque that its bodies may be another robot's.
+    pub fn is_poor(&self) -> bool {
+        self.residual_percent.is_some_and(|left| left > POOR_PERCENT)
     }
 }
 

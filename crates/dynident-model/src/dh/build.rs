@@ -42,7 +42,7 @@ pub(super) fn model(text: &str, table: &Table) -> Result<Model, DhError> {
         }
         let (link, link_at) = match &row.link {
             Some(link) => (source.name("link", link)?.to_owned(), link.span().start),
-            None => (format!("{name}_link"), row.name.span().start),
+            None => (default_link(name), row.name.span().start),
         };
         if places.contains_key(&link) {
             return Err(source.fault(link_at, DhFault::DuplicateName { what: "link", name: link }));
@@ -92,6 +92,30 @@ pub(super) fn model(text: &str, table: &Table) -> Result<Model, DhError> {
     let gravity = gravity.map_or(STANDARD_GRAVITY, Vec3);
     let model = Model::new(&table.name, Body { links: vec![base_link] }, joints, bodies);
     model.and_then(|model| model.with_gravity(gravity)).map_err(|error| source.fault(0, DhFault::Model(error)))
+}
+
+/// A row's names and where its D-H frame stands.
+pub(super) struct RowFrame {
+    pub(super) joint: String,
+    pub(super) link: String,
+    /// D-H frame i in body frame i.
+    pub(super) body_from_dh: Transform,
+}
+
+/// Names and frames of all rows of a table that [`model`] accepts.
+pub(super) fn rows(text: &str, table: &Table) -> Result<Vec<RowFrame>, DhError> {
+    let source = Source { text };
+    let of = |entry: &Spanned<Row>| {
+        let row = entry.get_ref();
+        let joint = row.name.get_ref().clone();
+        let link = row.link.as_ref().map_or_else(|| default_link(&joint), |link| link.get_ref().clone());
+        Ok(RowFrame { joint, link, body_from_dh: source.frames(table.convention, row)?.body_from_dh })
+    };
+    table.joints.iter().map(of).collect()
+}
+
+fn default_link(joint: &str) -> String {
+    format!("{joint}_link")
 }
 
 /// Where a row puts the body frame and the D-H frame.

@@ -53,6 +53,9 @@
 
 mod build;
 mod table;
+mod write;
+
+pub use write::{DhWriteError, rewrite_dh};
 
 use crate::error::ModelError;
 use crate::place::Located;
@@ -150,11 +153,20 @@ pub enum DhFault {
 /// # Errors
 /// If the text is no TOML, holds unknown keys or unusable values, or describes no tree; with line and column.
 pub fn read_dh(text: &str) -> Result<Model, DhError> {
-    // A byte order mark is no part of the table; positions are counted after it, as editors do.
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let table: table::Table = toml::from_str(text).map_err(|error| {
-        let reason = error.message().lines().next().unwrap_or_default().to_owned();
-        Located::at(text, error.span().map_or(0, |span| span.start), DhFault::Toml { reason })
-    })?;
+    let (text, table) = parsed(text)?;
     build::model(text, &table)
+}
+
+/// The text without a byte order mark, which is no part of the table (positions are counted after it, as editors do),
+/// and its keys.
+fn parsed(text: &str) -> Result<(&str, table::Table), DhError> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let table = toml::from_str(text)
+        .map_err(|error| toml_fault(text, error.span().map_or(0, |span| span.start), error.message()))?;
+    Ok((text, table))
+}
+
+fn toml_fault(text: &str, at: usize, message: &str) -> DhError {
+    let reason = message.lines().next().unwrap_or_default().to_owned();
+    Located::at(text, at, DhFault::Toml { reason })
 }

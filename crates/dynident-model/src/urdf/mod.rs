@@ -27,12 +27,14 @@ mod assemble;
 mod collision;
 mod elements;
 mod flood;
+mod from_model;
 mod origin;
 mod prefixes;
 mod stated;
 mod values;
 mod write;
 
+pub use from_model::write_urdf;
 pub use stated::{MOMENT_NAMES, StatedInertial, rewrite_inertials, stated_inertials};
 pub use write::{JointChange, LinkChange, UrdfWriteError, link_changes, rewrite_urdf};
 

@@ -5,6 +5,7 @@ mod audit;
 mod broken;
 mod common;
 mod dh;
+mod dh_write;
 mod friction_laws;
 mod slips;
 mod urdf;

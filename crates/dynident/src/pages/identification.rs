@@ -1,7 +1,7 @@
 //! `report.html` of an identification.
 
 use crate::error::Error;
-use crate::result::{BaseParameterResult, LogSummary, ResultFile, TermResult};
+use crate::result::{BaseParameterResult, BodyResult, LogSummary, ResultFile, TermResult, ValueSource};
 use dynident_estimation::ValidationReport;
 use dynident_estimation::consistent::IntervalEnd;
 use dynident_identification::Role;
@@ -32,6 +32,9 @@ pub(crate) fn identification_report(r: &ResultFile, traces: &[LogTrace]) -> Resu
     }
     page.add(figures(r));
     page.add(judged_model(r));
+    if let Some(check) = &r.check {
+        super::check::examination(&mut page, check);
+    }
     page.add(Heading::new("Torque"));
     page.add(errors(r));
     for log in &r.validation {
@@ -312,6 +315,18 @@ fn lags(page: &mut Report, r: &ResultFile) {
     page.add(table);
 }
 
+/// What the marks behind values of bodies mean.
+const MARKS: &str = "~: only in sums with others; =: not in any torque, as described";
+
+/// The mark of a body's value, in the order of the ten parameters.
+fn mark(body: &BodyResult, parameter: usize) -> &'static str {
+    match body.sources.map(|sources| sources[parameter]) {
+        Some(ValueSource::Partly) => "\u{a0}~",
+        Some(ValueSource::Nominal) => "\u{a0}=",
+        Some(ValueSource::Measured) | None => "",
+    }
+}
+
 fn bodies(page: &mut Report, r: &ResultFile) {
     let mut verdict = Text::new(format!("The verdict is {}.", r.physical.note));
     if r.physical.consistent {
@@ -328,20 +343,22 @@ fn bodies(page: &mut Report, r: &ResultFile) {
     page.add(verdict);
     let rows = r.bodies.iter().map(|body| {
         let prior = body.prior.map_or_else(String::new, |prior| short(prior[0], 4));
-        let mut row = vec![Cell::from(&body.name), short(body.mass_kg, 4).into(), prior.into()];
-        row.extend((0..3).map(|k| Cell::from(body.com_m.map_or_else(String::new, |com| short(com[k], 4)))));
+        let marked = |text: String, k: usize| Cell::from(text + mark(body, k));
+        let mut row = vec![Cell::from(&body.name), marked(short(body.mass_kg, 4), 0), prior.into()];
+        row.extend((0..3).map(|k| body.com_m.map_or_else(|| Cell::from(""), |com| marked(short(com[k], 4), k + 1))));
         let least = body.pseudo_inertia_min_eigenvalue;
         row.push(Cell::judged(short(least, 3), if least > 0.0 { Tone::Plain } else { Tone::Bad }));
         row
     });
-    let note = "centre of mass in the body's own frame; least eigenvalue of the pseudo-inertia";
+    let note = format!("centre of mass in the body's own frame; least eigenvalue of the pseudo-inertia; {MARKS}");
     let columns = ["body", "mass, kg", "description, kg", "x, m", "y, m", "z, m", "least eigenvalue"];
     page.add(Table::new("Bodies", columns).note(note).rows(rows));
     let rows = r.bodies.iter().map(|body| {
-        let inertia = body.inertia_at_origin_kgm2.iter().map(|value| Cell::from(short(*value, 4)));
+        let inertia = body.inertia_at_origin_kgm2.iter().enumerate();
+        let inertia = inertia.map(|(k, value)| Cell::from(short(*value, 4) + mark(body, k + 4)));
         [Cell::from(&body.name)].into_iter().chain(inertia).collect()
     });
-    let note = "kg m², in the body's own frame, about its origin";
+    let note = format!("kg m², in the body's own frame, about its origin; {MARKS}");
     let columns = ["body", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
     page.add(Table::new("Inertia of the bodies", columns).note(note).rows(rows));
     if let Some(found) = &r.possible_intervals {

@@ -1,6 +1,6 @@
 //! Robots whose parameters are known are identified: noise-free logs give the truth back, however they are written.
 use crate::common::{Job, Motion, Random, Truth, assert_recovered, format, header, plain, repository, write_log};
-use dynident::model::load_robot;
+use dynident::model::{Model, load_robot, read_dh, read_urdf};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -151,7 +151,17 @@ fn a_denavit_hartenberg_table() {
     let found = job.identify();
     assert_eq!(found.result.base_parameters.len(), 6 + 6);
     assert_recovered(&found, &truth.base_values(&job.robot()), NOISE_FREE);
-    assert!(found.urdf.is_none() && found.result.no_urdf.unwrap().contains("no URDF"));
+    // The table with the new values, and a URDF of it: the bodies of the result, to the rounding of frames.
+    let table = read_dh(found.table.as_ref().unwrap()).unwrap();
+    let urdf = read_urdf(found.urdf.as_ref().unwrap()).unwrap().model;
+    for model in [&table, &urdf] {
+        for (body, expected) in model.inertials().iter().zip(&found.inertials) {
+            assert!(body.0.iter().zip(&expected.0).all(|(a, b)| (a - b).abs() < 1e-12), "{body:?} {expected:?}");
+        }
+    }
+    let friction = |model: &Model| -> Vec<_> { model.joints().iter().map(|j| (j.damping, j.friction)).collect() };
+    assert!(friction(&table) == friction(&urdf) && table.joints()[0].damping.is_some());
+    assert!(found.table.unwrap().starts_with("# dynident ") && found.urdf.unwrap().contains("<!-- gravity"));
 }
 
 #[test]

@@ -6,7 +6,9 @@ use crate::study::{Study, StudyRobot};
 use core::f64::consts::PI;
 use core::fmt::Write;
 use dynident_identification::Role;
-use dynident_identification::diagnosis::{BeyondLimit, Channels, Diagnosis, Mistake, Reading, UnseenLoad};
+use dynident_identification::diagnosis::{
+    BeyondLimit, Channels, DescriptionFit, Diagnosis, Mistake, Reading, UnseenLoad,
+};
 use dynident_identification::{GainChoice, IdentificationSettings};
 use dynident_recording::Level;
 use dynident_recording::log::OneOrMany;
@@ -29,7 +31,14 @@ pub(super) fn study_check(
     // Another reading, one finding for each of its mistakes; what cannot be told from it stands with the last.
     // A reading that explains nothing is no advice.
     let best = search.best.as_ref().filter(|best| !best.is_unexplained());
-    if let Some(best) = best {
+    let foreign = diagnosis.description_fit.as_ref().filter(|fit| fit.is_of_another_robot());
+    if let Some(fit) = foreign {
+        let mut found = another_robot(fit, &joints);
+        // Some mistake of the study always makes a little less of it.
+        let others = best.iter().flat_map(|best| &best.mistakes);
+        found.or = others.map(|mistake| alternative(mistake, &joints, format.as_ref())).collect();
+        findings.push(found);
+    } else if let Some(best) = best {
         for (number, mistake) in best.mistakes.iter().enumerate() {
             let mut found = finding(
                 kind(mistake),
@@ -47,7 +56,7 @@ pub(super) fn study_check(
         findings.extend(search.as_written.beyond.iter().map(|beyond| behind_limit(beyond, &joints)));
     }
     let is_stated = settings.gains == GainChoice::Stated;
-    if let Some(unit) = diagnosis.torque_unit.as_ref().filter(|_| is_stated) {
+    if let Some(unit) = diagnosis.description_fit.as_ref().filter(|_| is_stated && foreign.is_none()) {
         let far = unit.joints_in_another_unit();
         if !far.is_empty() {
             let factors = far.iter().map(|&joint| format!("{} {:.3}", joints[joint], unit.scale[joint].unwrap_or(1.0)));
@@ -216,6 +225,21 @@ fn evidence(mistake: &Mistake, (before, after): (&Reading, &Reading), joints: &[
         text += "; as written, no recorder has such a rate";
     }
     text
+}
+
+/// The description's bodies explain no joint, and other bodies do.
+fn another_robot(fit: &DescriptionFit, joints: &[String]) -> CheckFinding {
+    let best = fit.best_explained().map_or_else(String::new, |(joint, share)| {
+        format!("{:.0} % of that of `{}`, which is the most of all joints", 100.0 * share, joints[joint])
+    });
+    finding(
+        "description",
+        "the description is of another robot, or its masses are placeholders".to_owned(),
+        format!(
+            "friction and drive inertia aside, its bodies, scaled as suits each joint, explain {best}, where bodies that could be explain nearly all of it: \
+             compare `file` under [robot] with the robot; where nobody knows a body, leave its <inertial> element out"
+        ),
+    )
 }
 
 fn behind_limit(beyond: &BeyondLimit, joints: &[String]) -> CheckFinding {

@@ -1,7 +1,7 @@
 //! Logs to a model: the main job.
 
+mod model_files;
 mod sections;
-mod urdf;
 
 use crate::error::Error;
 use crate::jobs::check::diagnosis_check;
@@ -19,13 +19,13 @@ use dynident_identification::{
 };
 use dynident_model::InertialParameters;
 use dynident_recording::Level;
+use model_files::{ModelFiles, model_files};
 use sections::{
     base_parameters, bodies, friction_results, joint_results, method_summary, offset_results, physical_fit_result,
     robot_summary, sources, term_results, training_result, verdict,
 };
 use std::path::Path;
 use std::time::Instant;
-use urdf::{with_provenance, written_urdf};
 
 /// Correlations that a result lists.
 const CORRELATIONS: usize = 10;
@@ -39,8 +39,11 @@ pub struct IdentificationOutcome {
     pub estimate: Estimate,
     /// Inertial parameters of the bodies, as in `result.bodies`.
     pub inertials: Vec<InertialParameters>,
-    /// The user's own URDF with the new values; without it, [`ResultFile::no_urdf`] says why.
+    /// The user's own URDF with the new values, or one of the robot that a D-H table describes; without it,
+    /// [`ResultFile::no_urdf`] says why.
     pub urdf: Option<String>,
+    /// The user's own D-H table with the new values, where the description is one.
+    pub table: Option<String>,
     /// Measured and predicted torque over time, training logs first: at most the first 20 000 samples of a log that was
     /// fitted to, the first 100 000 filtered rows of a held-out one.
     pub traces: Vec<LogTrace>,
@@ -134,10 +137,11 @@ fn identified(
     // What is written.
     let inertials = found.inertials();
     let verdict = physical_verdict(study, &task, &found, &inertials);
-    let (urdf, no_urdf) = match exported_urdf(&robot, &task, &found, &verdict, arm.is_some()) {
-        Ok(urdf) => (Some(with_provenance(&urdf, &provenance)), None),
+    let (files, no_urdf) = match exported_model(&robot, &task, &found, &verdict, arm.is_some()) {
+        Ok(files) => (Some(files.with_provenance(&provenance)), None),
         Err(reason) => (None, Some(reason)),
     };
+    let (urdf, table) = files.map_or((None, None), |files| (Some(files.urdf), files.table));
     let training = training_result(&found, &task.recordings).map_err(|error| in_study(error.into()))?;
     let parts = Parts {
         name: study_name(study, study_path),
@@ -157,7 +161,7 @@ fn identified(
     }
     let mut traces = found.examination.traces;
     traces.extend(found.held_out.into_iter().filter_map(|log| log.trace));
-    Ok(IdentificationOutcome { result, estimate: found.estimation.estimate, inertials, urdf, traces })
+    Ok(IdentificationOutcome { result, estimate: found.estimation.estimate, inertials, urdf, table, traces })
 }
 
 /// The earlier result of an arm, and where it lies.
@@ -196,13 +200,13 @@ fn physical_verdict(
 }
 
 /// Parameters that URDF cannot express leave a result without one; it is no reason to lose the result.
-fn exported_urdf(
+fn exported_model(
     robot: &StudyRobot,
     task: &IdentificationTask,
     found: &Identification,
     verdict: &PhysicalVerdict,
     is_payload: bool,
-) -> Result<String, String> {
+) -> Result<ModelFiles, String> {
     if is_payload {
         return Err(verdict.failure.clone().unwrap_or_default());
     }
@@ -214,7 +218,7 @@ fn exported_urdf(
     }
     let sources = sources(found.model(), found.estimate());
     let values = (&found.inertials()[..], &found.consistent.parameters[..]);
-    written_urdf(robot, &found.model().parametric, values, &sources)
+    model_files(robot, &found.model().parametric, values, &sources)
 }
 
 /// What the result has beside the identification itself.

@@ -9,6 +9,7 @@ use crate::study::{JointDrive, StudyRobot};
 use dynident_dynamics::Determination;
 use dynident_estimation::consistent::{PhysicalFit, PhysicalStatus};
 use dynident_estimation::{Estimate, EstimateStatus};
+use dynident_identification::consistent::typical_length_m;
 use dynident_identification::examination::TorqueLag;
 use dynident_identification::friction::JointFriction;
 use dynident_identification::{Identification, Recording, RegressorModel};
@@ -82,7 +83,7 @@ pub(super) fn base_parameters(
 /// For each body its ten values' sources; base parameters that the logs do not excite count as not measured.
 pub(super) fn sources(model: &RegressorModel, estimate: &Estimate) -> Vec<[ValueSource; 10]> {
     let fixed: Vec<usize> = estimate.rank.fixed.iter().map(|fixed| fixed.column).collect();
-    let all = model.base().determination(&fixed);
+    let all = model.base().determination(&fixed, typical_length_m(model.model()));
     let source = |determination: Determination| match determination {
         Determination::Measured => ValueSource::Measured,
         Determination::Partly => ValueSource::Partly,

@@ -57,6 +57,19 @@ impl Truth {
         Self { model: model.with_inertials(&inertials).unwrap(), drive }
     }
 
+    /// A robot that can exist: masses up to 30 % from the description's, centres of mass up to a tenth nearer or farther.
+    pub(crate) fn other(description: &Path, random: &mut Random) -> Self {
+        let mut truth = Self::near(description, 0.0, false);
+        let mut other = |body: &InertialParameters| {
+            let (mass, distance) = (1.0 + 0.3 * random.next(), 1.0 + 0.1 * random.next());
+            let (com, inertia) = (body.com_m().unwrap(), body.inertia_at_com().unwrap());
+            InertialParameters::from_centre_of_mass(mass * body.mass_kg(), com.scale(distance), &inertia.scale(mass))
+        };
+        let bodies: Vec<InertialParameters> = truth.model.inertials().iter().map(&mut other).collect();
+        truth.model = truth.model.with_inertials(&bodies).unwrap();
+        truth
+    }
+
     pub(crate) fn torque(&self, workspace: &mut Workspace, q: &[f64], dq: &[f64], ddq: &[f64]) -> Vec<f64> {
         let bodies = inverse_dynamics(&self.model, workspace, q, dq, ddq);
         let drives = self.drive.iter().enumerate().map(|(j, [inertia, viscous, coulomb, offset])| {

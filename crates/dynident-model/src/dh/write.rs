@@ -1,0 +1,168 @@
+//! Writing identified values back into the user's own D-H table.
+//!
+//! Only `inertial` and the two friction values of `dynamics` change; comments, order and spacing of everything else
+//! stay.
+
+use super::build::rows;
+use super::{DhError, parsed, toml_fault};
+use crate::inertial::InertialParameters;
+use crate::urdf::{JointChange, LinkChange};
+use thiserror::Error;
+use toml_edit::{Array, DocumentMut, InlineTable, Item, TableLike, Value};
+
+/// The keys of an `inertial`.
+const KEYS: [&str; 5] = ["mass_kg", "com_m", "inertia_at_com", "inertia_at_origin", "parameters"];
+/// What a comment of this program begins with; that of an earlier identification gives way to the next one's.
+const SIGNATURE: &str = "# identified: ";
+
+/// Why a D-H table could not be rewritten.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum DhWriteError {
+    /// The original is not readable.
+    #[error(transparent)]
+    Original(#[from] DhError),
+    /// A change to something that the original does not hold.
+    #[error("the D-H table has no {kind} `{name}`: write into the file that the model was read from")]
+    Unknown {
+        /// `link` or `joint`.
+        kind: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// A value that is not finite.
+    #[error("the new values of {kind} `{name}` are not all finite numbers")]
+    NotFinite {
+        /// `link` or `joint`.
+        kind: &'static str,
+        /// The name.
+        name: String,
+    },
+}
+
+/// `original` with the changes made: inertials, which the changes give in the **body** frames, are written in the D-H
+/// frames of the rows (see the [module](crate::dh)) as `mass_kg`, `com_m` and `inertia_at_com` or, where there is no
+/// centre of mass, as `parameters`. Every number stands in the shortest form that reads back to the same `f64`. Notes
+/// become comments before the row's `inertial`.
+///
+/// # Errors
+/// If the original is no D-H table, a link or joint is unknown, or a value is not finite.
+pub fn rewrite_dh(original: &str, links: &[LinkChange], joints: &[JointChange]) -> Result<String, DhWriteError> {
+    let (text, table) = parsed(original)?;
+    let rows = rows(text, &table)?;
+    let mut document: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| {
+        toml_fault(text, error.span().map_or(0, |span| span.start), error.message())
+    })?;
+    let has_lines = document.get("joint").is_some_and(Item::is_array_of_tables);
+    let unknown = |kind: &'static str, name: &str| DhWriteError::Unknown { kind, name: name.to_owned() };
+    for change in links {
+        let (LinkChange::Set { link, .. } | LinkChange::Remove { link }) = change;
+        let place = rows.iter().position(|row| row.link == *link).ok_or_else(|| unknown("link", link))?;
+        let row = row_mut(&mut document, place).ok_or_else(|| unknown("link", link))?;
+        match change {
+            LinkChange::Set { inertial, note, .. } => {
+                let inertial = inertial.expressed_in(&rows[place].body_from_dh.inverse());
+                if inertial.0.iter().any(|x| !x.is_finite()) {
+                    return Err(DhWriteError::NotFinite { kind: "link", name: link.clone() });
+                }
+                set_inertial(row, &inertial);
+                // A row on one line has no place for a comment.
+                if let Some(note) = note.as_ref().filter(|_| has_lines) {
+                    set_note(row, note);
+                }
+            }
+            LinkChange::Remove { .. } => drop(row.remove("inertial")),
+        }
+    }
+    for JointChange { joint, damping, friction } in joints {
+        let place = rows.iter().position(|row| row.joint == *joint).ok_or_else(|| unknown("joint", joint))?;
+        let row = row_mut(&mut document, place).ok_or_else(|| unknown("joint", joint))?;
+        for (key, number) in [("damping", damping), ("friction", friction)] {
+            let Some(number) = *number else { continue };
+            if !number.is_finite() {
+                return Err(DhWriteError::NotFinite { kind: "joint", name: joint.clone() });
+            }
+            if let Some(dynamics) = child(row, "dynamics") {
+                put(dynamics, key, number.into());
+            }
+        }
+    }
+    let mark = &original[..original.len() - text.len()];
+    Ok(format!("{mark}{document}"))
+}
+
+/// A row of the table as tables of either kind hold it: `[[joint]]`, or an element of `joint = [..]`.
+fn row_mut(document: &mut DocumentMut, index: usize) -> Option<&mut dyn TableLike> {
+    match document.get_mut("joint")? {
+        Item::ArrayOfTables(rows) => rows.get_mut(index).map(|row| row as &mut dyn TableLike),
+        Item::Value(Value::Array(rows)) => {
+            rows.get_mut(index)?.as_inline_table_mut().map(|row| row as &mut dyn TableLike)
+        }
+        Item::None | Item::Value(_) | Item::Table(_) => None,
+    }
+}
+
+/// The table `key` of a row, made where there is none.
+fn child<'r>(row: &'r mut dyn TableLike, key: &str) -> Option<&'r mut dyn TableLike> {
+    if !row.get(key).is_some_and(Item::is_table_like) {
+        row.insert(key, Item::Value(Value::InlineTable(InlineTable::new())));
+    }
+    row.get_mut(key)?.as_table_like_mut()
+}
+
+/// Sets a value in its place; the spacing and the comment around the old one stay.
+fn put(table: &mut dyn TableLike, key: &str, mut value: Value) {
+    match table.get_mut(key) {
+        Some(item) => {
+            if let Some(old) = item.as_value() {
+                *value.decor_mut() = old.decor().clone();
+            }
+            *item = Item::Value(value);
+        }
+        None => drop(table.insert(key, Item::Value(value))),
+    }
+}
+
+fn set_inertial(row: &mut dyn TableLike, inertial: &InertialParameters) {
+    let Some(table) = child(row, "inertial") else { return };
+    let known: Vec<(&str, Value)> = match (inertial.com_m(), inertial.inertia_at_com()) {
+        (Some(com), Some(i)) => {
+            let six = [i.0[0][0], i.0[0][1], i.0[0][2], i.0[1][1], i.0[1][2], i.0[2][2]];
+            vec![
+                (KEYS[0], inertial.mass_kg().into()),
+                (KEYS[1], Value::Array(Array::from_iter(com.0))),
+                (KEYS[2], Value::Array(Array::from_iter(six))),
+            ]
+        }
+        _ => vec![(KEYS[4], Value::Array(Array::from_iter(inertial.0)))],
+    };
+    for key in KEYS.iter().filter(|key| known.iter().all(|(kept, _)| kept != *key)) {
+        table.remove(key);
+    }
+    for (key, value) in known {
+        put(table, key, value);
+    }
+}
+
+/// The note as a comment on a line of its own before `inertial`.
+fn set_note(row: &mut dyn TableLike, note: &str) {
+    let line = format!("{SIGNATURE}{}\n", note.replace(char::is_control, " "));
+    let with_note = |before: Option<&str>| -> String {
+        let others =
+            before.unwrap_or("").split_inclusive('\n').filter(|line| !line.trim_start().starts_with(SIGNATURE));
+        others.collect::<String>() + &line
+    };
+    match row.get_mut("inertial") {
+        Some(Item::Table(table)) if !table.is_dotted() => {
+            let before = table.decor().prefix().and_then(|prefix| prefix.as_str()).map(str::to_owned);
+            table.decor_mut().set_prefix(with_note(before.as_deref()));
+        }
+        Some(_) => {
+            if let Some(mut key) = row.key_mut("inertial") {
+                let before = key.leaf_decor().prefix().and_then(|prefix| prefix.as_str()).map(str::to_owned);
+                key.leaf_decor_mut().set_prefix(with_note(before.as_deref()));
+            }
+        }
+        None => {}
+    }
+}

@@ -1,0 +1,162 @@
+//! A URDF of a model that was read from something else, a D-H table say.
+
+use crate::inertial::InertialParameters;
+use crate::joint::{Joint, JointKind};
+use crate::spatial::{Mat3, Transform};
+use crate::tree::{Body, Model, STANDARD_GRAVITY};
+use core::fmt::Write;
+
+/// The model as URDF: links, joints with placement, axis, limits and friction, and the inertials of links that have
+/// any. Reading it gives the model again, with these differences: URDF holds no gravity; a revolute joint without stops
+/// becomes `continuous`, for readers of URDF take stops that are not there for zero; a velocity or effort that nobody
+/// knows is written as 0 where the format demands one, with a comment.
+///
+/// Angles are the fixed-axis roll, pitch and yaw of the placement, `R = Rz(yaw) Ry(pitch) Rx(roll)`, in rad.
+pub fn write_urdf(model: &Model) -> String {
+    let mut text = format!("<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n", attribute(model.name()));
+    if model.gravity() != STANDARD_GRAVITY {
+        let [x, y, z] = model.gravity().0;
+        let _ =
+            writeln!(text, "  <!-- gravity in the base frame, which URDF does not hold: {x:?} {y:?} {z:?} m/s² -->");
+    }
+    write_links(&mut text, model.base(), true);
+    for (joint, body) in model.joints().iter().zip(model.bodies()) {
+        write_links(&mut text, body, false);
+        let parent = joint.parent.map_or(model.base(), |parent| &model.bodies()[parent]);
+        write_joint(&mut text, joint, parent.name(), body.name());
+    }
+    text + "</robot>\n"
+}
+
+/// The links of a body; those fixed to the first one hang on it by fixed joints. Of the base the first link carries
+/// what does not move.
+fn write_links(text: &mut String, body: &Body, is_base: bool) {
+    for (number, link) in body.links.iter().enumerate() {
+        let name = attribute(&link.name);
+        let inertial = link.inertial.filter(|_| !is_base).and_then(|inertial| inertial_element(&inertial));
+        let _ = match inertial {
+            Some(inertial) => writeln!(text, "  <link name=\"{name}\">\n{inertial}  </link>"),
+            None => writeln!(text, "  <link name=\"{name}\"/>"),
+        };
+        if number > 0 {
+            let _ = writeln!(
+                text,
+                "  <joint name=\"{name}_fixed\" type=\"fixed\">\n    {}\n    <parent link=\"{}\"/>\n    <child link=\"{name}\"/>\n  </joint>",
+                origin(&link.placement),
+                attribute(body.name())
+            );
+        }
+    }
+}
+
+fn write_joint(text: &mut String, joint: &Joint, parent: &str, child: &str) {
+    let limits = &joint.limits;
+    let stops = limits.lower.zip(limits.upper);
+    let kind = match (joint.kind, stops) {
+        (JointKind::Revolute | JointKind::Continuous, None) => JointKind::Continuous,
+        (kind, _) => kind,
+    };
+    let [x, y, z] = joint.axis.0;
+    let _ = writeln!(
+        text,
+        "  <joint name=\"{}\" type=\"{}\">\n    {}\n    <parent link=\"{}\"/>\n    <child link=\"{}\"/>\n    <axis xyz=\"{x:?} {y:?} {z:?}\"/>",
+        attribute(&joint.name),
+        kind.name(),
+        origin(&joint.placement),
+        attribute(parent),
+        attribute(child),
+    );
+    let needs_limit = kind != JointKind::Continuous || limits.velocity.is_some() || limits.effort.is_some();
+    if needs_limit {
+        let unknown = [("velocity", limits.velocity), ("effort", limits.effort)];
+        let unknown: Vec<&str> = unknown.iter().filter(|(_, value)| value.is_none()).map(|(name, _)| *name).collect();
+        if !unknown.is_empty() {
+            let _ = writeln!(text, "    <!-- 0: {} not known -->", unknown.join(" and "));
+        }
+        let stops = stops.filter(|_| kind != JointKind::Continuous);
+        let stops = stops.map_or(String::new(), |(lower, upper)| format!("lower=\"{lower:?}\" upper=\"{upper:?}\" "));
+        let _ = writeln!(
+            text,
+            "    <limit {stops}velocity=\"{:?}\" effort=\"{:?}\"/>",
+            limits.velocity.unwrap_or(0.0),
+            limits.effort.unwrap_or(0.0)
+        );
+    }
+    let friction: Vec<String> = [("damping", joint.damping), ("friction", joint.friction)]
+        .iter()
+        .filter_map(|(name, value)| value.map(|value| format!(" {name}=\"{value:?}\"")))
+        .collect();
+    if !friction.is_empty() {
+        let _ = writeln!(text, "    <dynamics{}/>", friction.concat());
+    }
+    *text += "  </joint>\n";
+}
+
+/// `None` for moments without mass, which URDF cannot say.
+fn inertial_element(inertial: &InertialParameters) -> Option<String> {
+    let ([x, y, z], i) = (inertial.com_m()?.0, inertial.inertia_at_com()?.0);
+    Some(format!(
+        "    <inertial>\n      <origin xyz=\"{x:?} {y:?} {z:?}\" rpy=\"0 0 0\"/>\n      <mass value=\"{:?}\"/>\n      \
+         <inertia ixx=\"{:?}\" ixy=\"{:?}\" ixz=\"{:?}\" iyy=\"{:?}\" iyz=\"{:?}\" izz=\"{:?}\"/>\n    </inertial>\n",
+        inertial.mass_kg(),
+        i[0][0],
+        i[0][1],
+        i[0][2],
+        i[1][1],
+        i[1][2],
+        i[2][2]
+    ))
+}
+
+fn origin(placement: &Transform) -> String {
+    let ([x, y, z], [roll, pitch, yaw]) = (placement.translation.0, roll_pitch_yaw(&placement.rotation));
+    format!("<origin xyz=\"{x:?} {y:?} {z:?}\" rpy=\"{roll:?} {pitch:?} {yaw:?}\"/>")
+}
+
+/// The angles of [`Mat3::from_roll_pitch_yaw`]; where pitch is a right angle, only the sum of the two others counts and
+/// roll is zero.
+fn roll_pitch_yaw(r: &Mat3) -> [f64; 3] {
+    let r = &r.0;
+    let level = r[0][0].hypot(r[1][0]);
+    let pitch = (-r[2][0]).atan2(level);
+    // Below this the sines of roll and yaw are rounding.
+    if level < 1e-12 {
+        return [0.0, pitch, (-r[0][1]).atan2(r[1][1])];
+    }
+    [r[2][1].atan2(r[2][2]), pitch, r[1][0].atan2(r[0][0])]
+}
+
+/// A name as the value of an attribute in double quotes. XML has no way to say control characters.
+fn attribute(name: &str) -> String {
+    let mut text = String::with_capacity(name.len());
+    for c in name.chars() {
+        match c {
+            '&' => text += "&amp;",
+            '<' => text += "&lt;",
+            '>' => text += "&gt;",
+            '"' => text += "&quot;",
+            c if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') => text.push(' '),
+            c => text.push(c),
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_give_the_rotation_back() {
+        for roll in [-3.0, -1.2, 0.0, 0.4, 2.5] {
+            for pitch in [-core::f64::consts::FRAC_PI_2, -1.0, 0.0, 0.7, core::f64::consts::FRAC_PI_2] {
+                for yaw in [-2.9, 0.0, 1.1, core::f64::consts::PI] {
+                    let given = Mat3::from_roll_pitch_yaw(roll, pitch, yaw);
+                    let [roll, pitch, yaw] = roll_pitch_yaw(&given);
+                    let back = Mat3::from_roll_pitch_yaw(roll, pitch, yaw) - given;
+                    assert!(back.0.iter().flatten().all(|x| x.abs() < 1e-14));
+                }
+            }
+        }
+    }
+}

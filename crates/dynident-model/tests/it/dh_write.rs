@@ -1,0 +1,150 @@
+//! Identified values in D-H tables, and such tables as URDF: what is read back is what was written, and nothing else
+//! has changed.
+
+use core::fmt::Write;
+use dynident_model::{
+    InertialParameters, JointChange, JointKind, LinkChange, Mat3, Model, Vec3, link_changes, read_dh, read_urdf,
+    rewrite_dh, write_urdf,
+};
+use proptest::prelude::*;
+
+/// A table with every way to write a row's tables, and comments.
+const TABLE: &str = r#"# my arm
+name = "arm"   # of the cell
+convention = "standard"
+
+[[joint]]
+name = "a"
+d_m = 0.3
+alpha_deg = 90
+# measured on a scale
+inertial = { mass_kg = 3.0, com_m = [0.2, 0, 0], inertia_at_origin = [0.01, 0, 0, 0.14, 0, 0.14] }
+dynamics = { damping = 0.5 } # by the maker
+
+[[joint]]
+name = "b"   # the elbow
+a_m = 0.4
+limits = { lower_deg = -120, upper_deg = 120, velocity_deg_s = 90, effort_nm = 50 }
+[joint.inertial]
+parameters = [1.0, 0, 0, 0, 0.1, 0, 0, 0.1, 0, 0.1]   # all ten
+
+[[joint]]
+name = "c"
+kind = "prismatic"
+sign = -1
+"#;
+
+fn inertial(mass: f64) -> InertialParameters {
+    let inertia = Mat3([[0.02, 0.001, 0.002], [0.001, 0.03, -0.003], [0.002, -0.003, 0.025]]);
+    InertialParameters::from_centre_of_mass(mass, Vec3([0.1, -0.2, 0.05]), &inertia)
+}
+
+/// Largest difference of two models in inertials, kg, m, kg m².
+fn assert_same_inertials(a: &Model, b: &[InertialParameters], tolerance: f64) {
+    for (a, b) in a.inertials().iter().zip(b) {
+        assert!(a.0.iter().zip(&b.0).all(|(a, b)| (a - b).abs() <= tolerance), "{a:?}\n{b:?}");
+    }
+}
+
+#[test]
+fn only_inertials_and_friction_change() {
+    let model = read_dh(TABLE).unwrap();
+    let new: Vec<InertialParameters> = [2.5, 1.25, 0.75].map(inertial).to_vec();
+    let mut links = link_changes(&model, &new).unwrap();
+    for change in &mut links {
+        if let LinkChange::Set { note, .. } = change {
+            *note = Some("measured: mass".to_owned());
+        }
+    }
+    let joints = vec![
+        JointChange { joint: "a".to_owned(), damping: Some(0.75), friction: Some(2.0) },
+        JointChange { joint: "c".to_owned(), damping: None, friction: Some(1.5) },
+    ];
+    let text = rewrite_dh(TABLE, &links, &joints).unwrap();
+    let back = read_dh(&text).unwrap();
+    // Into the D-H frames and back: rounding of numbers below one.
+    assert_same_inertials(&back, &new, 1e-14);
+    let friction: Vec<_> = back.joints().iter().map(|joint| (joint.damping, joint.friction)).collect();
+    assert_eq!(friction, [(Some(0.75), Some(2.0)), (None, None), (None, Some(1.5))]);
+    for kept in [
+        "# my arm\n",
+        "name = \"arm\"   # of the cell\n",
+        "# measured on a scale\n",
+        "# by the maker\n",
+        "name = \"b\"   # the elbow\n",
+        "limits = { lower_deg = -120, upper_deg = 120, velocity_deg_s = 90, effort_nm = 50 }\n",
+    ] {
+        assert!(text.contains(kept), "{kept}\n{text}");
+    }
+    assert!(!text.contains("inertia_at_origin") && !text.contains("parameters"), "{text}");
+    assert_eq!(text.matches("# identified: measured: mass\n").count(), 3, "{text}");
+    // A second identification replaces the comments of the first.
+    assert_eq!(rewrite_dh(&text, &links, &joints).unwrap(), text);
+}
+
+#[test]
+fn rows_on_one_line_and_a_byte_order_mark_stay() {
+    let table = "\u{feff}convention = \"modified\"\njoint = [{ name = \"a\" }, { name = \"b\", a_m = 0.3 }]\n";
+    let model = read_dh(table).unwrap();
+    let new = [inertial(2.0), InertialParameters([0.0, 0.1, 0.0, 0.0, 0.01, 0.0, 0.0, 0.02, 0.0, 0.02])];
+    let text = rewrite_dh(table, &link_changes(&model, &new).unwrap(), &[]).unwrap();
+    assert!(text.starts_with('\u{feff}') && text.contains("parameters"), "{text}");
+    assert_same_inertials(&read_dh(&text).unwrap(), &new, 1e-15);
+}
+
+#[test]
+fn what_the_table_does_not_hold_is_refused() {
+    let link = LinkChange::Set { link: "d".to_owned(), inertial: inertial(1.0), note: None };
+    assert!(rewrite_dh(TABLE, &[link], &[]).unwrap_err().to_string().contains("no link `d`"));
+    let nan = InertialParameters([f64::NAN; 10]);
+    let link = LinkChange::Set { link: "a_link".to_owned(), inertial: nan, note: None };
+    assert!(rewrite_dh(TABLE, &[link], &[]).unwrap_err().to_string().contains("finite"));
+    assert!(rewrite_dh("name = ", &[], &[]).unwrap_err().to_string().contains("1:"));
+}
+
+#[test]
+fn hostile_names_stay_inside_their_attributes() {
+    let table = "name = \"<a & \\\"b\\\">\"\nconvention = \"modified\"\n[[joint]]\nname = \"j<&>\\\"'\"\n";
+    let model = read_dh(table).unwrap();
+    let back = read_urdf(&write_urdf(&model)).unwrap().model;
+    assert_eq!((back.name(), &back.joints()[0].name), (model.name(), &model.joints()[0].name));
+}
+
+proptest! {
+    /// A D-H table, its model as URDF, that read again: the same motion and the same bodies.
+    #[test]
+    fn urdf_of_a_table_is_the_same_robot(
+        rows in prop::collection::vec((-1.0..1.0_f64, -3.2..3.2_f64, -1.0..1.0_f64, -3.2..3.2_f64, 0..3_usize), 1..6),
+        standard in any::<bool>(),
+        q in prop::collection::vec(-3.0..3.0_f64, 6),
+    ) {
+        let mut table = format!("convention = \"{}\"\n[base]\nrpy_deg = [90, 0, 45]\n", if standard { "standard" } else { "modified" });
+        for (i, (a, alpha, d, theta, kind)) in rows.iter().enumerate() {
+            let limits = ["lower_rad = -2, upper_rad = 2, effort_nm = 3", "velocity_rad_s = 4", "lower_m = -1, upper_m = 1"][*kind];
+            let _ = write!(
+                table,
+                "[[joint]]\nname = \"j{i}\"\nkind = \"{}\"\na_m = {a:?}\nalpha_rad = {alpha:?}\nd_m = {d:?}\ntheta_rad = {theta:?}\n\
+                 limits = {{ {limits} }}\ndynamics = {{ damping = 0.1 }}\ninertial = {{ mass_kg = 1.5, com_m = [0.1, 0.2, -0.3], \
+                 inertia_at_com = [0.02, 0.001, 0.002, 0.03, -0.003, 0.025] }}\n",
+                ["revolute", "continuous", "prismatic"][*kind]
+            );
+        }
+        let model = read_dh(&table).unwrap();
+        let text = write_urdf(&model);
+        let back = read_urdf(&text).unwrap().model;
+        // Angles of a rotation and back lose half the digits' square root only near right angles of pitch; 1e-12 m.
+        for (joint, (a, b)) in model.joints().iter().zip(back.joints()).enumerate() {
+            prop_assert_eq!(&a.name, &b.name);
+            prop_assert_eq!((a.kind, a.damping, a.parent), (b.kind, b.damping, b.parent));
+            let (mine, theirs) = (a.transform(q[joint]), b.transform(q[joint]));
+            let rotation = mine.rotation - theirs.rotation;
+            prop_assert!(rotation.0.iter().flatten().all(|x| x.abs() < 1e-12), "{:?}", rotation);
+            let shift = mine.translation - theirs.translation;
+            prop_assert!(shift.norm() < 1e-12);
+            if a.kind == JointKind::Revolute {
+                prop_assert_eq!((a.limits.lower, a.limits.upper, a.limits.effort), (b.limits.lower, b.limits.upper, b.limits.effort));
+            }
+        }
+        assert_same_inertials(&back, model.inertials(), 1e-14);
+    }
+}
