@@ -8,6 +8,7 @@
 
 use clap::Parser;
 use core::ops::ControlFlow;
+use dynident::excitation::limits::AssumedLimits;
 use dynident::study::{CriterionChoice, FamilyChoice, OptimiserChoice};
 use dynident::{DesignFile, RunOptions, Study, design_study};
 use std::path::{Path, PathBuf};
@@ -101,8 +102,10 @@ fn best(path: &Path, family: &str, choice: &CriterionChoice, options: &Options) 
     section.family = toml::from_str::<FamilyChoice>(family).map_err(|error| error.to_string())?;
     section.criterion = choice.clone();
     section.optimiser = OptimiserChoice::Gradient;
-    section.search.starts = options.starts;
-    section.search.rounds = options.rounds;
+    section.search.starts = Some(options.starts);
+    section.search.rounds = Some(options.rounds);
+    // Only what the table's page names.
+    section.defaults = AssumedLimits::none();
     let run = RunOptions { data: None, threads: 1, progress: &dynident::Silent };
     let begun = clock();
     let (mut found, mut evaluations, mut designs): (Option<DesignFile>, usize, u64) = (None, 0, 0);

@@ -2,11 +2,14 @@
 //! optimiser's.
 //!
 //! Plain loops over the description: names are looked up here, torques come from single-sample inverse dynamics,
-//! distances of capsules from a search that knows no closed form. Only the choice of fitted capsules and their pairs,
-//! which is part of what the limit *is*, comes from [`SelfCollision`](crate::limits::SelfCollision).
+//! distances of links from another algorithm than the search's. Only the choice of shapes and their pairs, which is
+//! part of what the limit *is*, comes from [`SelfCollision`](crate::limits::SelfCollision).
 
-use crate::limits::{JointLimit, LimitError, LimitKind, Limits, LinkPoint};
+mod apart;
+
+use crate::limits::{JointLimit, LimitError, LimitKind, Limits, LinkPoint, LinkShape};
 use crate::motion::Motion;
+use apart::{Hull, Link, Pair};
 use dynident_dynamics::{Workspace, body_placements, inverse_dynamics};
 use dynident_model::{Body, Model, Transform, Vec3};
 use serde::{Deserialize, Serialize};
@@ -31,9 +34,10 @@ pub struct LimitReport {
     pub kind: LimitKind,
     /// The joint; for places the point, for self-collision the pair of links.
     pub joint: String,
-    /// 1 on the limit, above it in violation: `|x - middle| / half range`, `|x| / limit`; for distances `2 - distance /
-    /// least`, for the floor 1 plus the metres below it. Infinite if the motion is not finite: in JSON the largest
-    /// number, 1.8e308.
+    /// 1 on the limit, above it in violation: `|x - middle| / half range`, `|x| / limit`; for a column `2 - distance /
+    /// least`, for two links 1 plus the lack of distance as a share of their radii and clearance (of 5 % of the arm's
+    /// length at least), for the floor 1 plus the metres below it (for shapes: arm's lengths). Infinite if the motion
+    /// is not finite: in JSON the largest number, 1.8e308.
     #[serde(serialize_with = "largest_for_infinite", deserialize_with = "infinite_for_largest")]
     #[cfg_attr(feature = "schema", schemars(with = "f64"))]
     pub worst_ratio: f64,
@@ -61,19 +65,15 @@ enum Probe {
     Power { joint: usize, limit: f64 },
     Axis { point: Point, axis: usize, lower: f64, upper: f64 },
     Floor { point: Point, height_m: f64 },
-    Column { point: Point, x: f64, y: f64, radius_m: f64 },
-    Pair { first: Rod, second: Rod, least_m: f64 },
+    FloorLink { link: Link, height_m: f64, length_m: f64 },
+    Column { point: Point, x: f64, y: f64, radius_m: f64, top_m: f64 },
+    Pair(Box<Pair>),
 }
 
 struct Point {
     body: Option<usize>,
     at: Vec3,
     radius_m: f64,
-}
-
-struct Rod {
-    body: Option<usize>,
-    ends: [Vec3; 2],
 }
 
 /// Checks all limits from 0 to `duration_s` at `rate_hz` ([`CHECK_RATE_HZ`]), the end included. `motion` gives the
@@ -173,24 +173,35 @@ fn probes(limits: &Limits, model: &Model) -> Result<Vec<(Probe, LimitReport)>, L
         }
     }
     if let Some(floor) = &limits.floor {
-        for (name, point) in points(model, &floor.points) {
-            add(LimitKind::Floor, name, Probe::Floor { point, height_m: floor.height_m });
+        if floor.shapes.is_empty() || !floor.points.is_empty() {
+            for (name, point) in points(model, &floor.points) {
+                add(LimitKind::Floor, name, Probe::Floor { point, height_m: floor.height_m });
+            }
+        }
+        let length_m = arm_length_m(model);
+        for (name, link) in links(model, &floor.shapes) {
+            let height_m = floor.height_m - floor.lowered_m.get(&name).copied().unwrap_or(0.0);
+            add(LimitKind::Floor, name, Probe::FloorLink { link, height_m, length_m });
         }
     }
     if let Some(column) = &limits.column {
         let [x, y] = column.axis_xy_m;
         for (name, point) in points(model, &column.points) {
-            add(LimitKind::Column, name, Probe::Column { point, x, y, radius_m: column.radius_m });
+            let top_m = column.height_m.unwrap_or(f64::INFINITY);
+            add(LimitKind::Column, name, Probe::Column { point, x, y, radius_m: column.radius_m, top_m });
         }
     }
     if let Some(limit) = &limits.self_collision {
         let resolved = limit.resolve(model)?;
-        for [first, second] in resolved.pairs {
-            let (a, b) = (&resolved.capsules[first], &resolved.capsules[second]);
-            let [first, second] = [a, b].map(|capsule| Rod { body: capsule.body, ends: capsule.ends });
-            let least_m = limit.clearance_m + a.radius_m + b.radius_m;
-            let name = format!("{} / {}", a.link, b.link);
-            add(LimitKind::SelfCollision, name, Probe::Pair { first, second, least_m });
+        for pair in resolved.pairs {
+            let solids = pair.of.map(|place| &resolved.solids[place]);
+            let links = solids.map(|solid| {
+                let hull = |corners: &Vec<Vec3>, radius_m| Hull { corners: corners.clone(), radius_m };
+                let hulls = solid.shapes.iter().map(|shape| hull(&shape.corners, shape.radius_m));
+                Link::new(solid.body, hulls.collect())
+            });
+            let name = solids.map(|solid| solid.link.as_str()).join(" / ");
+            add(LimitKind::SelfCollision, name, Probe::Pair(Box::new(Pair::new(links, pair.clearance_m, pair.size_m))));
         }
     }
     Ok(probes)
@@ -224,6 +235,37 @@ fn points(model: &Model, points: &[LinkPoint]) -> Vec<(String, Point)> {
     found
 }
 
+/// The longest chain of joints and frames from the base, m.
+fn arm_length_m(model: &Model) -> f64 {
+    let stroke = |body: usize| {
+        let limits = model.joints()[body].limits;
+        let ends = limits.lower.zip(limits.upper).filter(|_| !model.joints()[body].turns());
+        ends.map_or(0.0, |(lower, upper)| lower.abs().max(upper.abs()))
+    };
+    let to = |body: usize| -> f64 {
+        model.path(body).iter().map(|&joint| model.joints()[joint].placement.translation.norm() + stroke(joint)).sum()
+    };
+    let frames = |body: usize| model.bodies()[body].links.iter().map(|link| link.placement.translation.norm());
+    (0..model.dof()).map(|body| to(body) + frames(body).fold(0.0, f64::max)).fold(1e-9, f64::max)
+}
+
+/// Links with shapes, in the order of the description's.
+fn links(model: &Model, shapes: &[LinkShape]) -> Vec<(String, Link)> {
+    let mut found: Vec<(String, Option<usize>, Vec<Hull>)> = Vec::new();
+    for shape in shapes {
+        let bodies = core::iter::once((None, model.base())).chain((0..).map(Some).zip(model.bodies()));
+        let mut all = bodies.flat_map(|(body, of)| of.links.iter().map(move |link| (body, link)));
+        let Some((body, link)) = all.find(|(_, link)| link.name == shape.link) else { continue };
+        let place = |corner: &[f64; 3]| link.placement.rotation.mul_vec(Vec3(*corner)) + link.placement.translation;
+        let hull = Hull { corners: shape.corners_m.iter().map(place).collect(), radius_m: shape.radius_m };
+        match found.iter_mut().find(|(name, ..)| *name == shape.link) {
+            Some((.., hulls)) => hulls.push(hull),
+            None => found.push((shape.link.clone(), body, vec![hull])),
+        }
+    }
+    found.into_iter().map(|(name, body, hulls)| (name, Link::new(body, hulls))).collect()
+}
+
 /// Where a point of a body stands in the base frame.
 fn place(placements: &[Transform], body: Option<usize>, at: Vec3) -> Vec3 {
     body.map_or(at, |body| placements[body].rotation.mul_vec(at) + placements[body].translation)
@@ -237,51 +279,27 @@ fn band(x: f64, lower: f64, upper: f64) -> f64 {
 
 impl Probe {
     /// The ratio at one sample. A pair that cannot reach the `worst` ratio so far gives that one.
-    fn ratio(&self, state: &[Vec<f64>], tau: &[f64], placements: &[Transform], worst: f64) -> f64 {
+    fn ratio(&mut self, state: &[Vec<f64>], tau: &[f64], placements: &[Transform], worst: f64) -> f64 {
         let at = |point: &Point| place(placements, point.body, point.at);
         match self {
             Self::Band { array, joint, lower, upper } => band(state[*array][*joint], *lower, *upper),
-            Self::Torque { joint, limit } => tau[*joint].abs() / limit,
-            Self::Power { joint, limit } => (tau[*joint] * state[1][*joint]).abs() / limit,
+            Self::Torque { joint, limit } => tau[*joint].abs() / *limit,
+            Self::Power { joint, limit } => (tau[*joint] * state[1][*joint]).abs() / *limit,
             Self::Axis { point, axis, lower, upper } => {
-                band(at(point)[*axis], lower + point.radius_m, upper - point.radius_m)
+                band(at(point)[*axis], *lower + point.radius_m, *upper - point.radius_m)
             }
-            Self::Floor { point, height_m } => 1.0 + (height_m - (at(point)[2] - point.radius_m)),
-            Self::Column { point, x, y, radius_m } => {
+            Self::Floor { point, height_m } => 1.0 + (*height_m - (at(point)[2] - point.radius_m)),
+            Self::FloorLink { link, height_m, length_m } => {
+                1.0 + link.below_m(placements, *height_m, (worst - 1.0) * *length_m) / *length_m
+            }
+            Self::Column { point, x, y, radius_m, top_m } => {
                 let at = at(point);
-                let distance = ((at[0] - x) * (at[0] - x) + (at[1] - y) * (at[1] - y)).sqrt();
-                2.0 - distance / (radius_m + point.radius_m)
+                let distance = ((at[0] - *x) * (at[0] - *x) + (at[1] - *y) * (at[1] - *y)).sqrt();
+                let least = *radius_m + point.radius_m;
+                // Beside the column or above it, whichever is farther.
+                (2.0 - distance / least).min(1.0 + (*top_m + point.radius_m - at[2]) / least)
             }
-            Self::Pair { first, second, least_m } => {
-                let a = first.ends.map(|end| place(placements, first.body, end));
-                let b = second.ends.map(|end| place(placements, second.body, end));
-                // Spheres around both rods are at least this far apart.
-                let centre = |ends: [Vec3; 2]| (ends[0] + ends[1]).scale(0.5);
-                let apart = (centre(a) - centre(b)).norm() - (a[1] - a[0]).norm() / 2.0 - (b[1] - b[0]).norm() / 2.0;
-                if 2.0 - apart / least_m <= worst { worst } else { 2.0 - rods_apart(a, b) / least_m }
-            }
+            Self::Pair(pair) => pair.ratio(placements, worst),
         }
     }
-}
-
-/// Distance of two rods: the distance of a point from the second is convex along the first, so thirds of an interval
-/// close in on it.
-fn rods_apart(a: [Vec3; 2], b: [Vec3; 2]) -> f64 {
-    let from_second = |s: f64| {
-        let p = a[0] + (a[1] - a[0]).scale(s);
-        let along = b[1] - b[0];
-        let length2 = along.dot(along);
-        let t = if length2 > 0.0 { ((p - b[0]).dot(along) / length2).clamp(0.0, 1.0) } else { 0.0 };
-        (p - (b[0] + along.scale(t))).norm()
-    };
-    let (mut from, mut to) = (0.0, 1.0);
-    let mut least = from_second(0.0).min(from_second(1.0));
-    // (2/3)^45 = 1e-8 of the rod; the distance is flat there, or its slope is at most 1 per metre.
-    for _ in 0..45 {
-        let (left, right) = (from + (to - from) / 3.0, to - (to - from) / 3.0);
-        let (at_left, at_right) = (from_second(left), from_second(right));
-        least = least.min(at_left).min(at_right);
-        if at_left <= at_right { to = right } else { from = left }
-    }
-    least
 }

@@ -61,7 +61,7 @@
 //!     torque_std_nm: &[0.5, 0.5],
 //!     prior: None,
 //! };
-//! let settings = DesignSettings { starts: 2, rounds: 0, evaluations_per_start: 300, ..DesignSettings::default() };
+//! let settings = DesignSettings { starts: Some(2), rounds: Some(0), evaluations_per_start: Some(300), ..DesignSettings::default() };
 //! let best = design(&task, &settings, |_| ControlFlow::Continue(()))?;
 //!
 //! // Every limit, 10,000 times a second.
@@ -96,7 +96,7 @@ mod predicted_covariance;
 pub mod step_wise;
 
 pub use derivative_free::{DerivativeFree, design_without_gradients};
-pub use design::{Design, DesignProgress, DesignSettings, DesignTask, design, grid};
+pub use design::{Design, DesignProgress, DesignSettings, DesignTask, design, grid, single_changes};
 pub use family::Family;
 pub use information::Information;
 pub use motion::{Motion, MotionAdjoint};

@@ -51,6 +51,7 @@
 #![forbid(unsafe_code)]
 
 pub mod audit;
+pub mod collision;
 pub mod dh;
 mod error;
 mod inertial;

@@ -73,7 +73,7 @@ fn plain_joint(name: String, kind: JointKind, parent: Option<usize>, placement: 
 }
 
 fn plain_body(name: String, inertial: Option<InertialParameters>) -> Body {
-    Body { links: vec![Link { name, placement: Transform::IDENTITY, inertial }] }
+    Body { links: vec![Link { name, placement: Transform::IDENTITY, inertial, collision: Vec::new() }] }
 }
 
 /// A random tree of `dof` joints: turning and sliding (one in four), general axes and placements, branches, sometimes

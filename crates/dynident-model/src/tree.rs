@@ -1,5 +1,6 @@
 //! The link tree: an immutable model of the robot.
 
+use crate::collision::CollisionShape;
 use crate::error::ModelError;
 use crate::inertial::InertialParameters;
 use crate::joint::{Joint, JointMap};
@@ -17,6 +18,8 @@ pub struct Link {
     pub placement: Transform,
     /// Inertial parameters in the **link's** frame; `None` when the description gives none (unknown, not zero).
     pub inertial: Option<InertialParameters>,
+    /// Shapes for collision checking in the **link's** frame; empty where the description gives none.
+    pub collision: Vec<CollisionShape>,
 }
 
 /// A body: everything that moves with one joint, lumped.

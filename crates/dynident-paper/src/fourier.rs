@@ -43,6 +43,13 @@ joints = [
     { joint = "joint2", position = [0.0, 3.141592653589793], speed = 0.5235987755982988, acceleration = 0.20943951023931953 },
 ]
 boxes = [{ y_m = [0.0, 2.5], points = [{ link = "link2", at_m = [1.0, 0.0, 0.0] }] }]
+
+# The paper's limits and no others.
+[design.defaults]
+floor = false
+self_collision = false
+acceleration = false
+stop_margin_percent = 0.0
 "#;
 
 /// Its name among the outputs, and its text.

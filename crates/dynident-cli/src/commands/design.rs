@@ -6,10 +6,11 @@ use crate::{Verdict, summary, terminal};
 use clap::ValueEnum;
 use dynident::excitation::DesignProgress;
 use dynident::excitation::export::{
-    Sampled, UrScriptSettings, fitness_csv, ros2_joint_trajectory, trajectory_csv, urscript, waypoints_csv,
+    ExportError, Sampled, UrScriptSettings, fitness_csv, ros2_joint_trajectory, trajectory_csv, urscript, waypoints_csv,
 };
 use dynident::{
-    DesignOutcome, OutputSet, RunOptions, Study, check_log, check_trajectory, check_writable, design_study,
+    DesignOutcome, Folders, OutputSet, RunOptions, Study, StudyRobot, check_log, check_trajectory, check_writable,
+    design_study,
 };
 use std::path::PathBuf;
 
@@ -90,6 +91,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let of_study = (&study, &*options.study, options.data.as_deref());
     refuse_overwriting((&options.out, &names), of_study, sections, &further)?;
     check_writable(&options.out).map_err(message_of)?;
+    writable_formats(options, &study)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let search = Search::new(context);
@@ -128,6 +130,23 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     Ok(if outcome.file.feasible { Verdict::Good } else { Verdict::Negative })
 }
 
+/// That every format asked for can be written, before anything is searched.
+fn writable_formats(options: &Options, study: &Study) -> Result<(), String> {
+    if !options.to.contains(&Format::Urscript) {
+        return Ok(());
+    }
+    let mut settings = UrScriptSettings::default();
+    settings.rate_hz = options.rate_hz.unwrap_or(settings.rate_hz);
+    settings.validate().map_err(|error| format!("--to urscript: {error}"))?;
+    let folders = Folders::new(study, &options.study, options.data.as_deref());
+    let robot = StudyRobot::new(study, &options.study, &folders).map_err(known_in(&options.study))?;
+    let joints = robot.model().dof();
+    if joints == UR_JOINTS { Ok(()) } else { Err(format!("--to urscript: {}", ExportError::SixJoints { joints })) }
+}
+
+/// Joints that a URScript program moves.
+const UR_JOINTS: usize = 6;
+
 /// The files beside design.json, all made before the first is written.
 fn files(outcome: &DesignOutcome, options: &Options) -> Result<Vec<(&'static str, Vec<u8>)>, String> {
     let file = &outcome.file;
@@ -136,7 +155,7 @@ fn files(outcome: &DesignOutcome, options: &Options) -> Result<Vec<(&'static str
         write(&Sampled { joints: &file.joints, times_s: &times_s, motion: &motion }).map(String::into_bytes)
     };
     let rate_hz = options.rate_hz.unwrap_or(file.rate_hz);
-    let plain = |write: fn(&Sampled<'_>) -> Result<String, dynident::excitation::export::ExportError>| {
+    let plain = |write: fn(&Sampled<'_>) -> Result<String, ExportError>| {
         at(rate_hz, &|sampled| write(sampled).map_err(|error| error.to_string()))
     };
     let mut files = vec![

@@ -44,12 +44,16 @@ pub(crate) fn design(d: &DesignFile, out: &Path, files: &[&str]) -> String {
     let khz = format!("{:.4}", d.check_rate_hz / 1000.0);
     let khz = khz.trim_end_matches('0').trim_end_matches('.');
     if d.feasible {
-        let _ = writeln!(text, "feasible: every limit is kept, checked at {khz} kHz\n");
+        let _ = writeln!(text, "feasible: every limit is kept, checked at {khz} kHz");
+        text += &items("NOT checked:", &d.not_checked);
+        text += &items("assumed:", &d.assumed);
+        text.push('\n');
     } else {
         let _ = writeln!(text, "NOT FEASIBLE, checked at {khz} kHz:");
         for sentence in &d.diagnosis {
             text += &wrapped(&format!("  {sentence}"), 4);
         }
+        text += &items("assumed:", &d.assumed);
         text.push('\n');
     }
     text += &limits(d);
@@ -63,6 +67,15 @@ pub(crate) fn design(d: &DesignFile, out: &Path, files: &[&str]) -> String {
     }
     text += &wrapped(&format!("wrote {}, {}", out.join("design.json").display(), files.join(", ")), 2);
     text
+}
+
+/// A heading with one line for each item; nothing without items.
+fn items(heading: &str, items: &[String]) -> String {
+    if items.is_empty() {
+        return String::new();
+    }
+    let lines = items.iter().map(|item| wrapped(&format!("  {item}"), 4));
+    core::iter::once(format!("{heading}\n")).chain(lines).collect()
 }
 
 /// The strokes of a windowed design and how far they are from the best ones.

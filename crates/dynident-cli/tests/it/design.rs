@@ -8,13 +8,17 @@ use std::path::Path;
 const SMALL: &str =
     "search = { starts = 3, rounds = 0, evaluations_per_start = 60, polish_evaluations = 150, search_samples = 81 }";
 
+/// No limits but those that are given.
+const NO_DEFAULTS: &str =
+    "[design.defaults]\nfloor = false\nself_collision = false\nacceleration = false\nstop_margin_percent = 0\n";
+
 /// A study on the UR10 with the keys of `[design]` given, in `folder`.
 fn study(folder: &Path, design: &str, acceleration: f64) {
     let robot = repository("robots/ur10.urdf").canonicalize().unwrap();
     let joints = ["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"]
         .map(|joint| format!("{{ joint = \"{joint}_joint\", acceleration = {acceleration:?} }}"));
     let text = format!(
-        "[robot]\nfile = {:?}\n[drive]\ncoulomb = \"sign\"\n[design]\n{design}\n[design.limits]\njoints = [{}]\n",
+        "[robot]\nfile = {:?}\n[drive]\ncoulomb = \"sign\"\n[design]\n{design}\n{NO_DEFAULTS}[design.limits]\njoints = [{}]\n",
         robot.display().to_string(),
         joints.join(", ")
     );
@@ -174,4 +178,33 @@ fn torque_limits_need_inertial_parameters() {
     let ran = run(folder.path(), &[]);
     assert_eq!(ran.status, 2, "{}", ran.stderr);
     assert!(ran.stderr.contains("torque limit") && ran.stderr.contains("are unknown"), "{}", ran.stderr);
+}
+
+#[test]
+fn a_format_that_cannot_be_written_is_refused_before_the_search() {
+    let folder = tempfile::tempdir().unwrap();
+    study(folder.path(), "search = { starts = 100000 }", 10.0);
+    let ran = run(folder.path(), &["--to", "urscript", "--rate-hz", "1000"]);
+    assert_eq!(ran.status, 2, "{}", ran.stderr);
+    assert!(ran.stderr.contains("urscript") && ran.stderr.contains("500"), "{}", ran.stderr);
+    let text = std::fs::read_to_string(folder.path().join("study.toml")).unwrap();
+    let locked = text.replace("[drive]", "lock = { wrist_3_joint = 0.0 }\n[drive]");
+    let joint = "{ joint = \"wrist_3_joint\", acceleration = 10.0 }";
+    std::fs::write(folder.path().join("study.toml"), locked.replace(joint, "")).unwrap();
+    let ran = run(folder.path(), &["--to", "urscript"]);
+    assert_eq!(ran.status, 2, "{}", ran.stderr);
+    assert!(ran.stderr.contains("urscript") && ran.stderr.contains("the robot has 5"), "{}", ran.stderr);
+    assert!(!folder.path().join("out/design.json").exists());
+}
+
+#[test]
+fn what_was_not_checked_stands_beside_feasible() {
+    let folder = tempfile::tempdir().unwrap();
+    study(folder.path(), SMALL, 10.0);
+    let ran = run(folder.path(), &[]);
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    assert!(ran.stdout.contains("NOT checked:\n  floor (defaults.floor is off)"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("self-collision") && !ran.stdout.contains("assumed:"), "{}", ran.stdout);
+    let file = written(folder.path());
+    assert!(file["not_checked"].as_array().unwrap().len() >= 3 && file["assumed"].as_array().unwrap().is_empty());
 }

@@ -10,6 +10,9 @@ file = ROBOT
 coulomb = "none"
 [design]
 search = { starts = 2, rounds = 0, evaluations_per_start = 60, polish_evaluations = 150, search_samples = 81 }
+[design.defaults]
+floor = false
+self_collision = false
 [design.limits]
 joints = [
     { joint = "shoulder_pan_joint", acceleration = ACCELERATION },

@@ -41,6 +41,10 @@ impl Criterion for ConditionNumber {
         if self.scaled { "condition-number-scaled" } else { "condition-number" }
     }
 
+    fn has_many_optima(&self) -> bool {
+        true
+    }
+
     fn value_and_derivative(&self, information: &DMatrix<f64>) -> ValueAndGradient {
         let (matrix, scale) = self.scaling(information)?;
         let eigen = SymmetricEigen::new(matrix);

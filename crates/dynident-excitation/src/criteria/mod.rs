@@ -33,6 +33,11 @@ pub trait Criterion: core::fmt::Debug + Send + Sync {
         1.0
     }
 
+    /// Whether many short searches find more than few long ones.
+    fn has_many_optima(&self) -> bool {
+        false
+    }
+
     /// The figure to report: the criterion itself, without smoothing.
     fn figure(&self, information: &DMatrix<f64>) -> Option<f64>;
 

@@ -49,7 +49,7 @@ pub(crate) fn assess(
 }
 
 /// The largest value of every limit's row, refined between samples.
-fn extremes(task: &DesignTask<'_>, parameters: &[f64], times: &[f64]) -> Vec<f64> {
+pub(super) fn extremes(task: &DesignTask<'_>, parameters: &[f64], times: &[f64]) -> Vec<f64> {
     let mut workspace = task.limits.workspace();
     let found = peaks(task.limits, &mut workspace, times, PeakSettings::default(), |times, out| {
         task.family.motion(parameters, times, out);

@@ -23,7 +23,7 @@ const MARGIN: f64 = 0.003;
 
 /// Nothing to be gained but the limits.
 #[derive(Debug)]
-struct Anything;
+pub(super) struct Anything;
 
 impl Criterion for Anything {
     fn name(&self) -> &'static str {

@@ -7,6 +7,9 @@ use crate::motion::Motion;
 /// Places of the first look, and golden-section steps after it (each 0.618 of the last: 1e-5 of a first step).
 const PLACES: usize = 24;
 const STEPS: usize = 24;
+
+/// A slower run is part of a change from this share on.
+const LEAST_SLOWING: f64 = 1e-3;
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// A run slower by a factor s with every limit that is then still broken made just wide enough, the factor chosen for
@@ -52,6 +55,10 @@ pub(super) fn smallest_combination(set: &LimitSet, times_s: &[f64], motion: &Mot
                 }
             }
         }
+    }
+    // A run that is hardly slower is no change worth making: its share goes to the limits.
+    if best.1 - 1.0 < LEAST_SLOWING {
+        best = at(1.0);
     }
     let (_, factor, broken) = best;
     let duration_s = times_s.last().zip(times_s.first()).map_or(0.0, |(last, first)| last - first);

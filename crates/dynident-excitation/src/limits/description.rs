@@ -1,8 +1,9 @@
 //! What a user says about limits: plain numbers by joint and link name.
 
-use super::capsules::SelfCollision;
+use super::self_collision_shapes::{LinkShape, SelfCollision};
 use dynident_model::Model;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Every limit of an experiment. What is absent does not limit.
 ///
@@ -108,18 +109,28 @@ pub struct BoxLimit {
 pub struct FloorLimit {
     /// Height of the floor in the base frame, m.
     pub height_m: f64,
-    /// The points; none: the origins of all moving bodies.
+    /// The points; none: the shapes below, and without these the origins of all moving bodies.
     #[serde(default)]
     pub points: Vec<LinkPoint>,
+    /// Shapes of links that must stay above it.
+    #[serde(default)]
+    pub shapes: Vec<LinkShape>,
+    /// By how much the floor is lower for the shapes of single links, m: what stands lower in every posture.
+    #[serde(default)]
+    pub lowered_m: BTreeMap<String, f64>,
 }
 
-/// An endless cylinder about a line parallel to the base frame's z that points (with their radius) must stay out of.
+/// A cylinder about a line parallel to the base frame's z that points (with their radius) must stay out of: from far
+/// below up to `height_m`, endless without it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ColumnLimit {
     /// Radius of the cylinder, m.
     pub radius_m: f64,
+    /// Where it ends, z in the base frame, m; by default nowhere: it is endlessly high.
+    #[serde(default)]
+    pub height_m: Option<f64>,
     /// Where its axis stands: x and y in the base frame, m.
     #[serde(default)]
     pub axis_xy_m: [f64; 2],

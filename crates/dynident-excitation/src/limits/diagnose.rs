@@ -42,6 +42,13 @@ pub enum Relaxation {
         /// What to change.
         changes: Vec<LimitChange>,
     },
+    /// Other values of the limits of one kind, with which another motion is possible.
+    OtherMotion {
+        /// The kind.
+        kind: LimitKind,
+        /// What to change.
+        changes: Vec<LimitChange>,
+    },
     /// Several changes at once, where no single one would do: those with the smallest sum of relative changes.
     Combined {
         /// Factor on the duration; 1 if a slower run is no part of it.
@@ -61,6 +68,25 @@ pub struct Diagnosis {
     /// Single changes that would do, the smallest first (by relative change). Where limits of several kinds are broken
     /// that no slower run fixes, the smallest combination instead; empty only where the motion is not finite.
     pub relaxations: Vec<Relaxation>,
+}
+
+/// A row of a [`LimitSet`] and how much wider it must be, in its constraint's value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Widened {
+    pub(crate) row: usize,
+    pub(crate) by: f64,
+}
+
+/// The change of limits that such widenings, all of one kind, come to; none without any.
+pub(crate) fn relaxation(set: &LimitSet, widened: &[Widened]) -> Option<Relaxation> {
+    let kind = set.constraints().get(widened.first()?.row)?.kind;
+    let broken = widened.iter().map(|widened| BrokenLimit {
+        constraint: set.constraints()[widened.row].clone(),
+        value: widened.by,
+        at_s: 0.0,
+    });
+    let changes = broken.map(|broken| change(&broken)).collect();
+    Some(Relaxation::OtherMotion { kind, changes })
 }
 
 /// Looks at a motion on a dense grid of times (1 kHz or so) that includes both ends.
@@ -119,7 +145,7 @@ pub(super) fn broken_limits(
 pub(super) fn change(broken: &BrokenLimit) -> LimitChange {
     let Constraint { kind, subject, middle, size, unit } = &broken.constraint;
     let needed = broken.constraint.quantity(broken.value);
-    let now = if *kind == LimitKind::Floor { *middle } else { *size };
+    let now = if matches!(kind, LimitKind::Floor | LimitKind::SelfCollision) { *middle } else { *size };
     (subject.clone(), now, needed, unit)
 }
 
@@ -165,14 +191,24 @@ pub(super) fn amount(constraint: &Constraint, c: f64) -> String {
             format!("{found:.4} {unit} from the middle {middle:.4} of a range that allows {size:.4}")
         }
         LimitKind::Floor => format!("{found:.4} {unit} high where at least {middle:.4} is asked for"),
-        LimitKind::Column | LimitKind::SelfCollision => {
-            format!("{found:.4} {unit} apart where at least {size:.4} is asked for")
+        LimitKind::SelfCollision if found <= 0.0 => {
+            format!("the two overlap where at least {middle:.4} {unit} between them is asked for")
         }
+        LimitKind::SelfCollision => format!("{found:.4} {unit} apart where at least {middle:.4} is asked for"),
+        LimitKind::Column => format!("{found:.4} {unit} apart where at least {size:.4} is asked for"),
         _ => format!("{found:.4} {unit} where {size:.4} is allowed"),
     }
 }
 
 impl Diagnosis {
+    /// Takes in changes of a single limit that a search found: they stand before combinations, which are then needless.
+    pub fn take_single(&mut self, found: Vec<Relaxation>) {
+        if !found.is_empty() {
+            self.relaxations.retain(|known| !matches!(known, Relaxation::Combined { .. }));
+            self.relaxations.extend(found);
+        }
+    }
+
     /// The diagnosis in sentences: one per broken limit, then the relaxations, or that there is no single one.
     pub fn sentences(&self) -> Vec<String> {
         let mut sentences: Vec<String> = self
@@ -186,16 +222,27 @@ impl Diagnosis {
         for relaxation in &self.relaxations {
             sentences.push(match relaxation {
                 Relaxation::Stretch { factor, duration_s } => {
-                    format!("The same path would do if run {factor:.4} times as long, in {duration_s:.3} s.")
+                    format!(
+                        "The same path would do if run {} times as long, in {duration_s:.3} s.",
+                        factor_in_words(*factor)
+                    )
                 }
                 Relaxation::Limits { kind, changes } => {
                     let changes: Vec<String> = changes.iter().map(|changed| in_words(*kind, changed)).collect();
                     format!("It would do to relax {kind} alone: {}.", changes.join(", "))
                 }
+                Relaxation::OtherMotion { kind, changes } => {
+                    let changes: Vec<String> = changes.iter().map(|changed| in_words(*kind, changed)).collect();
+                    format!(
+                        "It would do to relax {kind} alone, for another motion: {} (the smallest found).",
+                        changes.join(", ")
+                    )
+                }
                 Relaxation::Combined { factor, duration_s, changes } => {
                     let mut parts = Vec::new();
                     if *factor > 1.0 {
-                        parts.push(format!("run the same path {factor:.4} times as long, in {duration_s:.3} s"));
+                        let times = factor_in_words(*factor);
+                        parts.push(format!("run the same path {times} times as long, in {duration_s:.3} s"));
                     }
                     parts.extend(changes.iter().map(|(kind, changed)| format!("{kind}: {}", in_words(*kind, changed))));
                     format!(
@@ -212,12 +259,21 @@ impl Diagnosis {
     }
 }
 
+/// A factor above 1 with four decimals, which must not read 1.
+fn factor_in_words(factor: f64) -> String {
+    format!("{:.4}", factor.max(1.0001))
+}
+
 /// One limit's change, with its factor where the limit is a magnitude.
 fn in_words(kind: LimitKind, (subject, now, needed, unit): &LimitChange) -> String {
     let what = match kind {
         LimitKind::Position | LimitKind::Box => "half range",
         LimitKind::Floor => return format!("`{subject}` height {needed:.4} {unit} instead of {now:.4}"),
-        LimitKind::Column | LimitKind::SelfCollision => "distance",
+        LimitKind::SelfCollision if *needed <= 0.0 => {
+            return format!("`{subject}` would have to touch (clearance {now:.4} {unit})");
+        }
+        LimitKind::SelfCollision => return format!("`{subject}` clearance {needed:.4} {unit} instead of {now:.4}"),
+        LimitKind::Column => "distance",
         _ => "limit",
     };
     format!("`{subject}` {what} {needed:.4} {unit} instead of {now:.4} (times {:.3})", needed / now)

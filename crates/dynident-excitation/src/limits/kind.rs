@@ -67,14 +67,15 @@ impl fmt::Display for LimitKind {
 /// One limit: a row of constraint values over the samples.
 ///
 /// Its value `c` is at most 0 when the limit holds: `|x - middle| / size - 1` for magnitudes and ranges, `1 - distance
-/// / size` for clearances, and for the floor `(height + radius - z) / 1 m`.
+/// / size` for a column, `(clearance - distance) / size` between links (at least -0.25), and for the floor `(height +
+/// radius - z) / 1 m`, or per arm's length for shapes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Constraint {
     /// What is limited.
     pub kind: LimitKind,
     /// Where: a joint, a point of a link, or a pair of links.
     pub subject: String,
-    /// Middle of the range; zero for magnitudes and clearances, the height for the floor.
+    /// Middle of the range; zero for magnitudes and a column, the height for the floor, the clearance between links.
     pub middle: f64,
     /// Half width of the range, largest magnitude, or least distance: what `c` is measured by.
     pub size: f64,
@@ -87,7 +88,7 @@ impl Constraint {
     /// above the floor.
     pub fn quantity(&self, c: f64) -> f64 {
         match self.kind {
-            LimitKind::Floor => self.middle - c * self.size,
+            LimitKind::Floor | LimitKind::SelfCollision => self.middle - c * self.size,
             kind if kind.is_clearance() => (1.0 - c) * self.size,
             _ => (1.0 + c) * self.size,
         }

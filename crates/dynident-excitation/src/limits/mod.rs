@@ -6,30 +6,38 @@
 //! [`diagnose()`] says what binds and what would help. The final word has [`check`](crate::check), which shares none of
 //! this.
 
-mod capsules;
+mod assumed;
 mod combined;
+mod convex;
 mod description;
 mod diagnose;
 mod error;
 mod feasibility;
+mod floor_shapes;
+mod hull;
 mod joint_motion;
 mod kind;
 mod link_points;
+mod pairs;
 mod peaks;
 mod place;
 mod power;
 mod segments;
 mod self_collision;
+mod self_collision_shapes;
 mod set;
+mod solids;
 mod term;
 mod torque;
 mod validate;
 mod wrench;
 
-pub use capsules::{LinkCapsule, SelfCollision};
+pub use assumed::{AssumedLimits, LimitsInForce, ShapesOfLinks};
 pub use description::{BoxLimit, ColumnLimit, FloorLimit, JointLimit, Limits, LinkPoint};
 pub use diagnose::{BrokenLimit, Diagnosis, LimitChange, Relaxation, diagnose};
+pub(crate) use diagnose::{Widened, relaxation};
 pub use error::LimitError;
 pub use kind::{Constraint, LimitKind};
 pub use peaks::{Peak, PeakSettings, peaks};
+pub use self_collision_shapes::{LinkCapsule, LinkShape, SelfCollision};
 pub use set::{LimitSet, LimitWorkspace};

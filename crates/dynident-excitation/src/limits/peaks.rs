@@ -79,7 +79,9 @@ pub fn peaks(
         for (sample, &value) in values.iter().enumerate() {
             let before = sample.saturating_sub(1);
             let after = (sample + 1).min(samples - 1);
-            if value.is_finite() && value >= worth && value >= values[before] && value >= values[after] {
+            // Nothing stands out of a flat stretch.
+            let stands_out = value > values[before] || value > values[after];
+            if value.is_finite() && stands_out && value >= worth && value >= values[before] && value >= values[after] {
                 let (from, to) = (times_s[before], times_s[after]);
                 let inner = [(to - GOLDEN * (to - from), f64::NAN), (from + GOLDEN * (to - from), f64::NAN)];
                 brackets.push(Bracket { row, from, to, inner, best: (value, times_s[sample]) });

@@ -15,20 +15,24 @@ enum Room {
     Slab { axis: usize, middle: f64, half: f64 },
     /// `lowest - p_z`, per metre.
     Above { lowest: f64 },
-    /// `1 - |p_xy - axis| / least`.
-    Outside { axis: [f64; 2], least: f64 },
+    /// `1 - |p_xy - axis| / least`, or `(top - p_z) / least` where that is less: beside a column or above it.
+    Outside { axis: [f64; 2], least: f64, top: f64 },
 }
 
 impl Room {
     /// The place on the straight way from `here` to `next` that counts, and its share of the way: nearest to the axis
     /// of a column, and `here` itself for everything that is not thin.
     fn nearest(&self, here: Vec3, next: Option<Vec3>) -> (Vec3, f64) {
-        let (Self::Outside { axis, .. }, Some(next)) = (self, next) else { return (here, 0.0) };
+        let (Self::Outside { axis, least, top }, Some(next)) = (self, next) else { return (here, 0.0) };
         let (x, y) = (here[0] - axis[0], here[1] - axis[1]);
         let (dx, dy) = (next[0] - here[0], next[1] - here[1]);
         let length = dx * dx + dy * dy;
         let share = if length > 0.0 { (-(x * dx + y * dy) / length).clamp(0.0, 1.0) } else { 0.0 };
-        (Vec3([here[0] + share * dx, here[1] + share * dy, here[2] + share * (next[2] - here[2])]), share)
+        // As high as its lower end: whether that is above the column decides for the whole way.
+        let place = Vec3([here[0] + share * dx, here[1] + share * dy, here[2].min(next[2])]);
+        let beside = 1.0 - (place[0] - axis[0]).hypot(place[1] - axis[1]) / least;
+        let above = (top - place[2]) / least;
+        (place, if beside <= above { share } else { f64::from(u8::from(next[2] < here[2])) })
     }
 
     /// The constraint's value at a place, and its gradient.
@@ -43,13 +47,18 @@ impl Room {
                 gradient[2] = -1.0;
                 lowest - place[2]
             }
-            Self::Outside { axis, least } => {
+            Self::Outside { axis, least, top } => {
                 let (x, y) = (place[0] - axis[0], place[1] - axis[1]);
                 let distance = x.hypot(y);
                 // On the axis itself every way out is as good: take x.
                 let (nx, ny) = if distance > 0.0 { (x / distance, y / distance) } else { (1.0, 0.0) };
-                gradient = Vec3([-nx / least, -ny / least, 0.0]);
-                1.0 - distance / least
+                let (beside, above) = (1.0 - distance / least, (top - place[2]) / least);
+                gradient = if beside <= above {
+                    Vec3([-nx / least, -ny / least, 0.0])
+                } else {
+                    Vec3([0.0, 0.0, -1.0 / least])
+                };
+                beside.min(above)
             }
         };
         (value, gradient)
@@ -86,6 +95,9 @@ impl PlaceLimits {
 
     /// A floor: one row per point.
     pub(crate) fn floor(model: &Model, limit: &FloorLimit) -> Result<Self, LimitError> {
+        if limit.points.is_empty() && !limit.shapes.is_empty() {
+            return Ok(Self(Vec::new()));
+        }
         let row = |point: BodyPoint| {
             let lowest = limit.height_m + point.radius_m;
             let subject = point.name.clone();
@@ -101,7 +113,8 @@ impl PlaceLimits {
             let least = limit.radius_m + point.radius_m;
             let subject = point.name.clone();
             let constraint = Constraint { kind: LimitKind::Column, subject, middle: 0.0, size: least, unit: "m" };
-            (point, Room::Outside { axis: limit.axis_xy_m, least }, constraint)
+            let top = limit.height_m.map_or(f64::INFINITY, |height| height + point.radius_m);
+            (point, Room::Outside { axis: limit.axis_xy_m, least, top }, constraint)
         };
         Ok(Self(body_points(model, &limit.points, "the column")?.into_iter().map(row).collect()))
     }

@@ -2,6 +2,7 @@
 
 use super::description::Limits;
 use super::error::LimitError;
+use super::floor_shapes::FloorShapes;
 use super::joint_motion::{JointBand, JointMotionLimits};
 use super::kind::Constraint;
 use super::place::PlaceLimits;
@@ -72,6 +73,7 @@ impl LimitSet {
         }
         if let Some(limit) = &limits.floor {
             terms.push(Box::new(PlaceLimits::floor(model, limit)?));
+            terms.push(Box::new(FloorShapes::new(model, limit)?));
         }
         if let Some(limit) = &limits.column {
             terms.push(Box::new(PlaceLimits::column(model, limit)?));

@@ -35,9 +35,17 @@ impl Limits {
         if let Some(floor) = &self.floor {
             finite("height of the floor", floor.height_m)?;
             validate_points(&floor.points, "the floor", model)?;
+            floor.shapes.iter().try_for_each(|shape| shape.validate(model, "a shape above the floor"))?;
+            for (link, lowered) in &floor.lowered_m {
+                link_place(model, link, "the lowered floor")?;
+                finite(&format!("lowered floor of link `{link}`"), *lowered)?;
+            }
         }
         if let Some(column) = &self.column {
             positive("radius of the column", column.radius_m)?;
+            if let Some(height) = column.height_m {
+                finite("height of the column", height)?;
+            }
             for value in column.axis_xy_m {
                 finite("axis of the column", value)?;
             }

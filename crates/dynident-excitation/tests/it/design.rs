@@ -24,9 +24,9 @@ fn ur10() -> (Model, Limits) {
 
 fn small() -> DesignSettings {
     DesignSettings {
-        starts: 3,
-        rounds: 0,
-        evaluations_per_start: 500,
+        starts: Some(3),
+        rounds: Some(0),
+        evaluations_per_start: Some(500),
         polish_evaluations: 300,
         search_samples: Some(64),
         ..DesignSettings::default()

@@ -80,7 +80,7 @@ fn around(model: &Model, family: &dyn Family, parameters: &[f64], floor: bool) -
     };
     let mut limits = Limits {
         joints: model.joints().iter().map(|joint| unit(&joint.name)).collect(),
-        floor: floor.then(|| FloorLimit { height_m: 0.0, points: Vec::new() }),
+        floor: floor.then(|| FloorLimit { height_m: 0.0, ..Default::default() }),
         ..Limits::default()
     };
     let reports = check_limits(&limits, model, family.duration_s(), 2000.0, |times, out| {
@@ -129,8 +129,8 @@ fn anyhow(model: &Model, index: usize, random: &mut Random) -> Limits {
     });
     let joints = joints.collect();
     let floor = match index % 8 {
-        0 => Some(FloorLimit { height_m: OUT_OF_REACH_M, points: Vec::new() }),
-        1 | 2 => some(0.01, 1.0, 1.0).map(|depth| FloorLimit { height_m: -depth, points: Vec::new() }),
+        0 => Some(FloorLimit { height_m: OUT_OF_REACH_M, ..Default::default() }),
+        1 | 2 => some(0.01, 1.0, 1.0).map(|depth| FloorLimit { height_m: -depth, ..Default::default() }),
         _ => None,
     };
     Limits { joints, floor, ..Limits::default() }
@@ -156,9 +156,9 @@ fn case(index: usize) -> Case {
 
 fn small(index: usize) -> DesignSettings {
     DesignSettings {
-        starts: 2,
-        rounds: 1,
-        evaluations_per_start: 30,
+        starts: Some(2),
+        rounds: Some(1),
+        evaluations_per_start: Some(30),
         polish_evaluations: 40,
         search_samples: Some(40),
         rate_hz: 20.0,

@@ -67,7 +67,14 @@ fn torque_limits_need_a_prior_of_what_the_joint_carries() {
     for link in &mut bodies[3].links {
         link.inertial = None;
     }
-    let base = Body { links: vec![Link { name: "floor".to_owned(), placement: Transform::IDENTITY, inertial: None }] };
+    let base = Body {
+        links: vec![Link {
+            name: "floor".to_owned(),
+            placement: Transform::IDENTITY,
+            inertial: None,
+            collision: Vec::new(),
+        }],
+    };
     let model = Model::new("ur10 without one prior", base, robot.joints().to_vec(), bodies).unwrap();
     let limits = Limits::from_model(&model);
     let error = limits.validate(&model).unwrap_err();
@@ -288,7 +295,7 @@ proptest! {
                 torque_margin: numbers[6].unwrap_or(0.0),
                 power_w: numbers[7],
             }],
-            floor: Some(dynident_excitation::limits::FloorLimit { height_m: height, points: Vec::new() }),
+            floor: Some(dynident_excitation::limits::FloorLimit { height_m: height, ..Default::default() }),
             self_collision: Some(SelfCollision { radius_m: radius, ..SelfCollision::default() }),
             ..Limits::default()
         };

@@ -86,6 +86,7 @@ fn a_column_is_seen_between_two_samples() {
     let column = ColumnLimit {
         radius_m: 0.3,
         axis_xy_m: [0.0, 0.0],
+        height_m: None,
         points: vec![LinkPoint { link: "wrist_3_link".to_owned(), at_m: [0.0; 3], radius_m: 0.0 }],
     };
     let set = LimitSet::new(&Limits { column: Some(column), ..Limits::default() }, &model).unwrap();
@@ -135,8 +136,11 @@ fn check_agrees_with_the_values_and_peaks_bound_both() {
         assert_eq!(sampled.keys().collect::<Vec<_>>(), checked.keys().collect::<Vec<_>>());
         for (key, c) in &sampled {
             // The re-check's search for the distance of rods closes to 1e-8 of a rod's length; the rest is rounding.
-            let tolerance = if key.0 == LimitKind::SelfCollision { 1e-6 } else { 1e-10 };
-            assert!((checked[key] - 1.0 - c).abs() < tolerance * (1.0 + c.abs()), "{key:?}: {} {c}", checked[key]);
+            let links = key.0 == LimitKind::SelfCollision;
+            let tolerance = if links { 1e-6 } else { 1e-10 };
+            // Links that are far apart are all alike to a search.
+            let expected = if links { (checked[key] - 1.0).max(-0.25) } else { checked[key] - 1.0 };
+            assert!((expected - c).abs() < tolerance * (1.0 + c.abs()), "{key:?}: {} {c}", checked[key]);
         }
         let found = peaks(&set, &mut workspace, &grid(1.0, 100), PeakSettings::default(), |times, out| {
             family.motion(times, out);

@@ -7,3 +7,4 @@ mod feasibility;
 mod information;
 mod limit_messages;
 mod limits;
+mod single_change;

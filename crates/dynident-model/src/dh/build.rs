@@ -80,12 +80,15 @@ pub(super) fn model(text: &str, table: &Table) -> Result<Model, DhError> {
             .as_ref()
             .map(|inertial| Ok(source.inertial(inertial)?.expressed_in(&frames.body_from_dh)))
             .transpose()?;
-        bodies.push(Body { links: vec![Link { name: link.clone(), placement: Transform::IDENTITY, inertial }] });
+        bodies.push(Body {
+            links: vec![Link { name: link.clone(), placement: Transform::IDENTITY, inertial, collision: Vec::new() }],
+        });
         places.insert(link.clone(), (Some(bodies.len() - 1), frames.body_from_dh));
         previous = link;
     }
 
-    let base_link = Link { name: base_name.to_owned(), placement: Transform::IDENTITY, inertial: None };
+    let base_link =
+        Link { name: base_name.to_owned(), placement: Transform::IDENTITY, inertial: None, collision: Vec::new() };
     let gravity = gravity.map_or(STANDARD_GRAVITY, Vec3);
     let model = Model::new(&table.name, Body { links: vec![base_link] }, joints, bodies);
     model.and_then(|model| model.with_gravity(gravity)).map_err(|error| source.fault(0, DhFault::Model(error)))

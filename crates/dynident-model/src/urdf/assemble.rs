@@ -57,6 +57,7 @@ pub(super) fn model(
         name: links[index].name.to_owned(),
         placement,
         inertial: links[index].inertial,
+        collision: links[index].collision.clone(),
     };
     let mut base = Body { links: vec![link_at(root, Transform::IDENTITY)] };
     let (mut tree_joints, mut bodies) = (Vec::new(), Vec::<Body>::new());

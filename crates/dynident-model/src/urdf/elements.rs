@@ -1,8 +1,11 @@
 //! The elements `<link>` and `<joint>`, before the tree is built.
 
-use super::stated::MOMENT_NAMES;
+use super::collision;
+use super::origin::origin;
+use super::stated::stated_moments;
 use super::values::{child, name, number, numbers, required_child, required_number};
 use super::{MAX_MOVING_JOINTS, UrdfError, UrdfFault, UrdfRobot, fault_at};
+use crate::collision::CollisionShape;
 use crate::inertial::InertialParameters;
 use crate::joint::{JointKind, JointLimits, Mimic};
 use crate::spatial::{Mat3, Transform, Vec3};
@@ -15,6 +18,8 @@ pub(super) struct LinkElement<'a, 'input> {
     pub(super) name: &'a str,
     /// In the link's frame.
     pub(super) inertial: Option<InertialParameters>,
+    /// In the link's frame.
+    pub(super) collision: Vec<CollisionShape>,
 }
 
 /// A `<joint>`.
@@ -63,7 +68,9 @@ pub(super) fn links<'a, 'input>(
             }
             None => None,
         };
-        links.push(LinkElement { node, name, inertial });
+        let (collision, faulty) = collision::shapes(node);
+        unread.extend(faulty.into_iter().take(UrdfRobot::MAX_UNREAD.saturating_sub(unread.len())));
+        links.push(LinkElement { node, name, inertial, collision });
     }
     Ok(links)
 }
@@ -167,38 +174,6 @@ fn inertial(node: Node<'_, '_>, link: &str) -> Result<InertialParameters, UrdfEr
     // Exact numbers stay exact where nothing turns.
     let turned = if *r == Mat3::IDENTITY { at_com } else { r.mul_mat(&at_com).mul_mat(&r.transpose()) };
     Ok(InertialParameters::from_centre_of_mass(mass, link_from_com.translation, &turned))
-}
-
-/// The six moments of `<inertia>`, in the order of the names.
-pub(super) fn stated_moments(element: Node<'_, '_>) -> Result<[f64; 6], UrdfError> {
-    let mut moments = [0.0; 6];
-    for (moment, attribute) in moments.iter_mut().zip(MOMENT_NAMES) {
-        *moment = required_number(element, attribute)?;
-    }
-    Ok(moments)
-}
-
-/// `<origin xyz rpy>` or, as URDF 1.1 has it, `<origin xyz quat_xyzw>`; the identity where it is missing. Both at once
-/// are refused, as the reference parser does.
-pub(super) fn origin(node: Node<'_, '_>, owner: impl Fn() -> String) -> Result<Transform, UrdfError> {
-    let Some(origin) = child(node, "origin") else { return Ok(Transform::IDENTITY) };
-    let translation = Vec3(numbers(origin, "xyz")?.unwrap_or_default());
-    let rotation = match (numbers(origin, "rpy")?, numbers::<4>(origin, "quat_xyzw")?) {
-        (Some(_), Some(_)) => return Err(fault_at(origin, UrdfFault::TwoRotations { owner: owner() })),
-        (None, Some(quaternion)) => {
-            let norm = quaternion.iter().map(|x| x * x).sum::<f64>().sqrt();
-            // Digits of a unit quaternion are lost in print, not a tenth of its length.
-            if (norm - 1.0).abs() > 0.1 {
-                return Err(fault_at(origin, UrdfFault::NoRotation { owner: owner(), norm }));
-            }
-            Mat3::from_quaternion(quaternion.map(|x| x / norm))
-        }
-        (rpy, None) => {
-            let [roll, pitch, yaw] = rpy.unwrap_or_default();
-            Mat3::from_roll_pitch_yaw(roll, pitch, yaw)
-        }
-    };
-    Ok(Transform { rotation, translation })
 }
 
 fn refuse_duplicate<'a, 'input>(

@@ -24,9 +24,11 @@
 //! ```
 
 mod assemble;
+mod collision;
 mod elements;
 mod flood;
 mod from_model;
+mod origin;
 mod prefixes;
 mod stated;
 mod values;

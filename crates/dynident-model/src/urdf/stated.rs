@@ -1,6 +1,6 @@
 //! `<inertial>` as it stands in a URDF, number by number, and single numbers of it changed in place.
 
-use super::elements::{origin, stated_moments};
+use super::origin::origin;
 use super::prefixes::without_undeclared;
 use super::values::{child, required_child, required_number};
 use super::write::edited;
@@ -33,6 +33,15 @@ impl StatedInertial {
         let [xx, xy, xz, yy, yz, zz] = self.moments;
         Mat3([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     }
+}
+
+/// The six moments of `<inertia>`, in the order of the names.
+pub(super) fn stated_moments(element: Node<'_, '_>) -> Result<[f64; 6], UrdfError> {
+    let mut moments = [0.0; 6];
+    for (moment, attribute) in moments.iter_mut().zip(MOMENT_NAMES) {
+        *moment = required_number(element, attribute)?;
+    }
+    Ok(moments)
 }
 
 /// All `<inertial>` elements of a URDF, in the order of the document.

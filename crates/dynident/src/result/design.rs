@@ -79,6 +79,12 @@ pub struct DesignFile {
     pub seed: u64,
     /// Why nothing feasible was found, and what would help; empty for a feasible motion.
     pub diagnosis: Vec<String>,
+    /// Limits that were assumed where study and description are silent, and the key that changes each.
+    #[serde(default)]
+    pub assumed: Vec<String>,
+    /// What no limit looks at: `feasible` says nothing about it.
+    #[serde(default)]
+    pub not_checked: Vec<String>,
     /// What was assumed where the study is silent.
     pub notes: Vec<String>,
 }

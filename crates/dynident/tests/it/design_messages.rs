@@ -10,7 +10,7 @@ fn text(design: &str) -> String {
     let joints = ["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"]
         .map(|joint| format!("{{ joint = \"{joint}_joint\", acceleration = 10.0 }}"));
     format!(
-        "[robot]\nfile = {:?}\n[design]\n{design}\n[design.limits]\njoints = [{}]\n",
+        "[robot]\nfile = {:?}\n[design]\n{design}\n[design.defaults]\nfloor = false\nself_collision = false\n[design.limits]\njoints = [{}]\n",
         repository("robots/ur10.urdf").canonicalize().unwrap().display().to_string(),
         joints.join(", ")
     )

@@ -9,12 +9,12 @@ use std::path::Path;
 const SMALL: &str =
     "search = { starts = 4, rounds = 0, evaluations_per_start = 1000, polish_evaluations = 500, search_samples = 64 }";
 
-/// The first three joints of a UR10: small and quick.
+/// The first three joints of a UR10, whose limits are the description's and none assumed: small and quick.
 fn job(folder: &Path, design: &str, further: &str) -> Job {
     let joints = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint"];
     let limits = joints.map(|joint| format!("{{ joint = \"{joint}\", acceleration = 10.0 }}"));
     let text = format!(
-        "[robot]\nfile = {:?}\njoints = {joints:?}\n[design]\n{SMALL}\n{design}\n[design.limits]\njoints = [{}]\n{further}",
+        "[robot]\nfile = {:?}\njoints = {joints:?}\n[design]\n{SMALL}\n{design}\n[design.defaults]\nfloor = false\nself_collision = false\nstop_margin_percent = 0\n[design.limits]\njoints = [{}]\n{further}",
         repository("robots/ur10.urdf").canonicalize().unwrap().display().to_string(),
         limits.join(", ")
     );

@@ -6,6 +6,7 @@ mod check_mistakes;
 mod common;
 mod consistent_intervals;
 mod consistent_parameters;
+mod design_contact;
 mod design_messages;
 mod design_tasks;
 mod differentiators;

@@ -36,8 +36,8 @@ pub(crate) fn all_limits(model: &Model) -> Limits {
             points: points.clone(),
             ..BoxLimit::default()
         }],
-        floor: Some(FloorLimit { height_m: 0.1, points: Vec::new() }),
-        column: Some(ColumnLimit { radius_m: 0.2, axis_xy_m: [0.02, -0.03], points }),
+        floor: Some(FloorLimit { height_m: 0.1, ..Default::default() }),
+        column: Some(ColumnLimit { radius_m: 0.2, axis_xy_m: [0.02, -0.03], points, height_m: Some(0.6) }),
         self_collision: Some(SelfCollision::default()),
     }
 }

@@ -54,7 +54,7 @@ pub fn check_trajectory(
     setup.notes.extend(table.note);
     setup.notes.extend(not_at_rest(&given, &joints));
     let motion_at = |times: &[f64], out: &mut Motion| given.motion(&[], times, out);
-    let check = LimitCheck::of(&setup, study_path, duration_s, CHECK_RATE_HZ, SPLINE, &motion_at)?;
+    let check = LimitCheck::of(&setup, study_path, duration_s, CHECK_RATE_HZ, SPLINE, &motion_at, &|| Ok(Vec::new()))?;
     let rate_hz = setup.section.search.rate_hz;
     let times = grid(duration_s, (duration_s * rate_hz).round() as usize + 1);
     let information = setup.information(&times, &motion_at);
@@ -85,7 +85,7 @@ pub fn check_log(
 ) -> Result<DesignOutcome, Error> {
     study.require_log(study_path)?;
     let index = log_called(study, name).map_err(Error::study(study_path))?;
-    let mut setup = DesignSetup::for_check(study, study_path, options)?;
+    let mut setup = DesignSetup::for_log(study, study_path, options)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let file = folders.find(&study.log[index].file, study.source.as_deref())?;
     let (mut pieces, rate_hz) = pieces(study, study_path, (&setup.robot, &folders), index, &file)?;
@@ -101,7 +101,10 @@ pub fn check_log(
     let mut duration_s = 0.0;
     for piece in &pieces {
         let motion_at = |times: &[f64], out: &mut Motion| piece.motion(&[], times, out);
-        check.append(LimitCheck::of(&setup, study_path, piece.duration_s(), rate_hz, SAMPLES, &motion_at)?, duration_s);
+        check.append(
+            LimitCheck::of(&setup, study_path, piece.duration_s(), rate_hz, SAMPLES, &motion_at, &|| Ok(Vec::new()))?,
+            duration_s,
+        );
         let part = setup.information(piece.times_s(), &motion_at);
         plain += part.plain;
         weighted += part.weighted;

@@ -3,7 +3,7 @@
 use super::setup::DesignSetup;
 use crate::error::Error;
 use dynident_excitation::check::{LimitReport, VIOLATION, check_limits};
-use dynident_excitation::limits::{LimitSet, diagnose};
+use dynident_excitation::limits::{LimitSet, Relaxation, diagnose};
 use dynident_excitation::{Motion, grid};
 use std::path::Path;
 
@@ -23,7 +23,8 @@ pub(super) struct LimitCheck {
 }
 
 impl LimitCheck {
-    /// Looks at the motion `rate_hz` times a second.
+    /// Looks at the motion `rate_hz` times a second. If it breaks a limit, `single` looks for changes of one limit that
+    /// would make another motion possible.
     ///
     /// # Errors
     /// Limits that make no sense for the robot.
@@ -34,11 +35,13 @@ impl LimitCheck {
         rate_hz: f64,
         of: &'static str,
         motion_at: &dyn Fn(&[f64], &mut Motion),
+        single: &dyn Fn() -> Result<Vec<Relaxation>, Error>,
     ) -> Result<Self, Error> {
         let reports = check_limits(&setup.limits, setup.robot.model(), duration_s, rate_hz, motion_at)
             .map_err(Error::section(study_path, "design.limits"))?;
         let broken = reports.iter().any(|report| report.violated);
-        let diagnosis = if broken { sentences(&setup.set, duration_s, &reports, motion_at) } else { Vec::new() };
+        let diagnosis =
+            if broken { sentences(&setup.set, duration_s, &reports, motion_at, single()?) } else { Vec::new() };
         Ok(Self { reports, rate_hz, of, diagnosis })
     }
 
@@ -69,11 +72,14 @@ fn sentences(
     duration_s: f64,
     reports: &[LimitReport],
     motion_at: &dyn Fn(&[f64], &mut Motion),
+    single: Vec<Relaxation>,
 ) -> Vec<String> {
     let times = grid(duration_s, (duration_s * DIAGNOSIS_RATE_HZ).ceil() as usize + 1);
     let mut motion = Motion::default();
     motion_at(&times, &mut motion);
-    let sentences = diagnose(set, &times, &motion).sentences();
+    let mut diagnosis = diagnose(set, &times, &motion);
+    diagnosis.take_single(single);
+    let sentences = diagnosis.sentences();
     if !sentences.is_empty() {
         return sentences;
     }

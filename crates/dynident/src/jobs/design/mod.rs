@@ -24,7 +24,7 @@ use dynident_excitation::check::CHECK_RATE_HZ;
 use dynident_excitation::{DesignProgress, Motion, grid};
 use limit_check::LimitCheck;
 use outcome::{MotionOrigin, MotionReview};
-use search::search;
+use search::{changes, search};
 use setup::DesignSetup;
 use std::path::Path;
 use step_wise::step_wise;
@@ -60,7 +60,12 @@ pub fn design_study(
     // Its limits, by a check that shares nothing with the search, and what it says about the parameters.
     let duration_s = found.family.duration_s();
     let motion_at = |times: &[f64], out: &mut Motion| found.family.motion(&found.parameters, times, out);
-    let mut check = LimitCheck::of(&setup, study_path, duration_s, CHECK_RATE_HZ, "the motion itself", &motion_at)?;
+    let single = || match found.windowed {
+        Some(_) => Ok(Vec::new()),
+        None => changes(&setup, study_path, &found),
+    };
+    let mut check =
+        LimitCheck::of(&setup, study_path, duration_s, CHECK_RATE_HZ, "the motion itself", &motion_at, &single)?;
     check.diagnosis.extend(found.windowed.iter().flat_map(WindowedFile::sentences));
     let rate_hz = setup.section.search.rate_hz;
     let times = grid(duration_s, (duration_s * rate_hz).round() as usize + 1);

@@ -26,7 +26,7 @@ const PICTURES_HZ: f64 = 100.0;
 
 /// What a job has cost so far.
 pub(super) struct Stopwatch {
-    started: Instant,
+    pub(super) started: Instant,
     cpu_s: Option<f64>,
 }
 
@@ -166,6 +166,8 @@ impl DesignOutcome {
             seconds: origin.seconds,
             seed: setup.section.search.seed,
             diagnosis: review.check.diagnosis,
+            assumed: setup.assumed,
+            not_checked: setup.not_checked,
             notes: setup.notes,
         };
         let (robot, limits) = (setup.robot, setup.limits);

@@ -6,8 +6,9 @@ use crate::result::WindowedFile;
 use core::ops::ControlFlow;
 use dynident_excitation::criteria::Criterion;
 use dynident_excitation::families::StartingAt;
+use dynident_excitation::limits::Relaxation;
 use dynident_excitation::optimisers::{Generation, OptimiserError};
-use dynident_excitation::{DesignProgress, DesignTask, Family, design, design_without_gradients};
+use dynident_excitation::{DesignProgress, DesignTask, Family, design, design_without_gradients, single_changes};
 use std::path::Path;
 
 /// The displacement, rad or m, that every joint must at least have the time for.
@@ -39,7 +40,7 @@ pub(super) fn search(
     study_path: &Path,
     watch: impl Fn(&DesignProgress) -> ControlFlow<()> + Sync,
 ) -> Result<SearchResult, Error> {
-    let DesignSetup { section, robot, limits, set, .. } = setup;
+    let DesignSetup { section, robot, limits, .. } = setup;
     let model = robot.model();
     limits
         .check_duration(model, section.duration_s, LEAST_DISPLACEMENT)
@@ -53,14 +54,7 @@ pub(super) fn search(
         family = Box::new(starting.map_err(Error::section(study_path, "design"))?);
     }
     let criteria: Vec<&dyn Criterion> = setup.criteria.iter().map(|criterion| &**criterion).collect();
-    let task = DesignTask {
-        family: &*family,
-        criteria: &criteria,
-        limits: set,
-        layout: robot.layout(),
-        torque_std_nm: setup.counted_std_nm(),
-        prior: setup.prior.as_ref(),
-    };
+    let task = task(setup, &*family, &criteria);
     let (best, history) = match section.optimiser.derivative_free() {
         Some(optimiser) => design_without_gradients(&task, &section.search, &optimiser, watch),
         None => design(&task, &section.search, watch).map(|best| (best, Vec::new())),
@@ -82,4 +76,25 @@ pub(super) fn search(
         seconds: best.seconds,
         family,
     })
+}
+
+fn task<'a>(setup: &'a DesignSetup, family: &'a dyn Family, criteria: &'a [&'a dyn Criterion]) -> DesignTask<'a> {
+    DesignTask {
+        family,
+        criteria,
+        limits: &setup.set,
+        layout: setup.robot.layout(),
+        torque_std_nm: setup.counted_std_nm(),
+        prior: setup.prior.as_ref(),
+    }
+}
+
+/// Changes of a single limit with which another motion than the one found would be possible; within the time limit's
+/// own length where there is one.
+pub(super) fn changes(setup: &DesignSetup, study_path: &Path, found: &SearchResult) -> Result<Vec<Relaxation>, Error> {
+    let criteria: Vec<&dyn Criterion> = setup.criteria.iter().map(|criterion| &**criterion).collect();
+    let settings = &setup.section.search;
+    let over = || settings.time_limit_s.is_some_and(|limit| setup.stopwatch.started.elapsed().as_secs_f64() > limit);
+    single_changes(&task(setup, &*found.family, &criteria), settings, &found.parameters, &over)
+        .map_err(Error::section(study_path, "design"))
 }

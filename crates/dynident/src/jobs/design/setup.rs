@@ -6,7 +6,7 @@ use crate::error::{Error, StudyError};
 use crate::jobs::options::{RunOptions, study_name};
 use crate::study::{CoulombChoice, CriterionChoice, DesignSection, Folders, Study, StudyRobot, TorqueNoise};
 use dynident_excitation::criteria::{Criterion, DOptimal, Prediction};
-use dynident_excitation::limits::{LimitSet, Limits};
+use dynident_excitation::limits::{AssumedLimits, LimitError, LimitSet, Limits, LimitsInForce, ShapesOfLinks};
 use dynident_excitation::{Family, Information, Motion};
 use nalgebra::DMatrix;
 use std::path::Path;
@@ -34,6 +34,9 @@ pub(super) struct DesignSetup {
     pub(super) torque_std_nm: Vec<f64>,
     ones: Vec<f64>,
     pub(super) notes: Vec<String>,
+    /// What limits were assumed, and what none looks at.
+    pub(super) assumed: Vec<String>,
+    pub(super) not_checked: Vec<String>,
     pub(super) stopwatch: Stopwatch,
 }
 
@@ -41,23 +44,38 @@ impl DesignSetup {
     /// For a search: terms are smooth, and something bounds how fast each joint moves.
     pub(super) fn for_search(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Self, Error> {
         let mut notes = Vec::new();
-        let setup = Self::new(&smooth(study, &mut notes), study_path, options, notes)?;
+        let setup = Self::new(&smooth(study, &mut notes), study_path, options, notes, true)?;
         bounded(&setup.robot, &setup.limits).map_err(Error::section(study_path, "design.limits"))?;
         Ok(setup)
     }
 
     /// For a motion that is there already: terms as the study has them.
     pub(super) fn for_check(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Self, Error> {
-        Self::new(study, study_path, options, Vec::new())
+        Self::new(study, study_path, options, Vec::new(), true)
     }
 
-    fn new(study: &Study, study_path: &Path, options: &RunOptions<'_>, mut notes: Vec<String>) -> Result<Self, Error> {
+    /// For a log: what the robot did needs no assumption of what it may do.
+    pub(super) fn for_log(study: &Study, study_path: &Path, options: &RunOptions<'_>) -> Result<Self, Error> {
+        Self::new(study, study_path, options, Vec::new(), false)
+    }
+
+    fn new(
+        study: &Study,
+        study_path: &Path,
+        options: &RunOptions<'_>,
+        mut notes: Vec<String>,
+        assume: bool,
+    ) -> Result<Self, Error> {
         let stopwatch = Stopwatch::start();
         let section = study.design.clone().unwrap_or_default();
         section.validate().map_err(Error::section(study_path, "design"))?;
         let folders = Folders::new(study, study_path, options.data.as_deref());
         let robot = StudyRobot::new(study, study_path, &folders)?;
-        let limits = Limits::from_model(robot.model()).overlaid(&section.limits);
+        let in_limits = |error| Error::section(study_path, "design.limits")(error);
+        section.limits.validate(robot.model()).map_err(in_limits)?;
+        let settings = if assume { section.defaults.clone() } else { AssumedLimits::none() };
+        let LimitsInForce { limits, assumed, not_checked } =
+            in_force(&robot, &settings, &section.limits).map_err(in_limits)?;
         let set = LimitSet::new(&limits, robot.model()).map_err(Error::section(study_path, "design.limits"))?;
         let torque_std_nm = torque_std(&section, &robot, &mut notes).map_err(Error::section(study_path, "design"))?;
         let prior = prior::information(&section.prior, &robot, study_path, &folders, &mut notes)?;
@@ -87,6 +105,8 @@ impl DesignSetup {
             prior,
             torque_std_nm,
             notes,
+            assumed,
+            not_checked,
             stopwatch,
         })
     }
@@ -117,6 +137,14 @@ impl DesignSetup {
             None => criterion.figure(weighted),
         }
     }
+}
+
+/// The limits of a robot: the description's, those assumed, and the study's.
+fn in_force(robot: &StudyRobot, settings: &AssumedLimits, given: &Limits) -> Result<LimitsInForce, LimitError> {
+    let with_shapes = settings.floor || (settings.self_collision && given.self_collision.is_none());
+    let folder = robot.robot.path.parent().unwrap_or(Path::new(""));
+    let shapes = if with_shapes { ShapesOfLinks::of(robot.model(), folder) } else { ShapesOfLinks::default() };
+    LimitsInForce::new(robot.model(), &shapes, settings, given)
 }
 
 /// Information of a motion at `times`, a block at a time.

@@ -20,7 +20,7 @@ use dynident_excitation::families::{
     LogisticStrokes, LogisticStrokesSettings, Multisine, MultisineSettings, Quintic, QuinticSettings, SplicedLogistic,
     SplicedLogisticSettings, StaticPostures, StaticPosturesSettings,
 };
-use dynident_excitation::limits::Limits;
+use dynident_excitation::limits::{AssumedLimits, Limits};
 use dynident_excitation::{DesignSettings, Family};
 use name_or_table::name_or_table;
 use serde::{Deserialize, Serialize};
@@ -31,6 +31,9 @@ const MAX_DURATION_S: f64 = 3600.0;
 
 /// Most samples of a search grid, and of the log that is planned.
 const MAX_SAMPLES: f64 = 1e6;
+
+/// Largest margin to stops, percent.
+const MOST_STOP_MARGIN: f64 = 90.0;
 
 /// Most starts, rounds and evaluations of one start.
 const MAX_COUNT: usize = 1_000_000;
@@ -81,6 +84,8 @@ pub struct DesignSection {
     pub search: DesignSettings,
     /// Limits, laid over those of the description.
     pub limits: Limits,
+    /// Limits that are assumed where neither `limits` nor the description says anything.
+    pub defaults: AssumedLimits,
 }
 
 impl Default for DesignSection {
@@ -96,6 +101,7 @@ impl Default for DesignSection {
             torque_std_nm: None,
             search: DesignSettings::default(),
             limits: Limits::default(),
+            defaults: AssumedLimits::default(),
         }
     }
 }
@@ -241,9 +247,9 @@ impl DesignSection {
         within("search.rate_hz", search.rate_hz, 1.0, 1e5)?;
         within("duration_s times search.rate_hz", self.duration_s * search.rate_hz, 0.0, MAX_SAMPLES)?;
         for (key, value, least) in [
-            ("search.starts", search.starts, 1),
-            ("search.rounds", search.rounds, 0),
-            ("search.evaluations_per_start", search.evaluations_per_start, 1),
+            ("search.starts", search.starts.unwrap_or(1), 1),
+            ("search.rounds", search.rounds.unwrap_or(0), 0),
+            ("search.evaluations_per_start", search.evaluations_per_start.unwrap_or(1), 1),
             ("search.polish_evaluations", search.polish_evaluations, 1),
         ] {
             within(key, value as f64, f64::from(least), MAX_COUNT as f64)?;
@@ -254,6 +260,7 @@ impl DesignSection {
         if let Some(limit) = search.time_limit_s {
             within("search.time_limit_s", limit, 1e-3, 1e7)?;
         }
+        within("defaults.stop_margin_percent", self.defaults.stop_margin_percent, 0.0, MOST_STOP_MARGIN)?;
         self.prior.validate()?;
         if !self.prior.is_empty() && self.criterion.of_regressor() {
             let fix = "a condition number is of the motion's regressor alone; choose the criterion \"d-optimal\", \"a-optimal\", \"e-optimal\" or prediction";

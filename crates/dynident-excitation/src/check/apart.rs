@@ -1,0 +1,162 @@
+//! The distance of two links by an algorithm that the search does not know.
+//!
+//! The nearest points of two hulls are weighted means of their corners. Weight goes from the corner that is worst to
+//! the one that is best (Mitchell, Demyanov and Malozemov, SIAM J. Control 12(1), 1974) until what is left to gain is
+//! nothing; the plane between the two certifies from below how far apart they are, and only what is certified counts.
+
+use dynident_model::{Transform, Vec3};
+
+/// Corners and the radius about their hull, in a body's frame.
+pub(super) struct Hull {
+    pub(super) corners: Vec<Vec3>,
+    pub(super) radius_m: f64,
+}
+
+/// A link: its body and its hulls.
+pub(super) struct Link {
+    pub(super) body: Option<usize>,
+    pub(super) hulls: Vec<Hull>,
+    /// No point is farther from the body's origin, m.
+    far_m: f64,
+}
+
+/// Two links and what is known of their distance.
+pub(super) struct Pair {
+    pub(super) links: [Link; 2],
+    pub(super) clearance_m: f64,
+    pub(super) size_m: f64,
+    /// Where both stood when their distance was last found, and that distance.
+    known: Option<([Transform; 2], f64)>,
+}
+
+/// Exchanges of weight at most.
+const EXCHANGES: usize = 4000;
+
+/// A distance is found when its bounds are so near, as a share of the pair's size.
+const NEAR: f64 = 1e-7;
+
+impl Pair {
+    pub(super) fn new(links: [Link; 2], clearance_m: f64, size_m: f64) -> Self {
+        Self { links, clearance_m, size_m, known: None }
+    }
+
+    /// 1 at the clearance, more where it is missing; where the ratio cannot reach the `worst` so far, that one.
+    pub(super) fn ratio(&mut self, placements: &[Transform], worst: f64) -> f64 {
+        let at = [0, 1].map(|k| self.links[k].body.map_or(Transform::IDENTITY, |body| placements[body]));
+        let ratio = |apart: f64| 1.0 + (self.clearance_m - apart) / self.size_m;
+        // No point of a link has gone farther than its frame, and its distance from it turned.
+        if let Some((then, apart)) = &self.known {
+            let gone: f64 = (0..2).map(|k| self.links[k].farthest_gone(&then[k], &at[k])).sum();
+            if ratio(apart - gone) <= worst {
+                return worst;
+            }
+        }
+        // Below this distance the pair matters.
+        let matters = self.clearance_m - (worst - 1.0) * self.size_m;
+        let mut apart = f64::INFINITY;
+        for first in &self.links[0].hulls {
+            for second in &self.links[1].hulls {
+                let [a, b] = [(first, &at[0]), (second, &at[1])].map(|(hull, at)| {
+                    let place = |corner: &Vec3| at.rotation.mul_vec(*corner) + at.translation;
+                    hull.corners.iter().map(place).collect::<Vec<_>>()
+                });
+                let radii = first.radius_m + second.radius_m;
+                apart = apart.min(certified_m(&a, &b, matters + radii, NEAR * self.size_m) - radii);
+            }
+        }
+        self.known = Some((at, apart));
+        ratio(apart).max(worst)
+    }
+}
+
+impl Link {
+    pub(super) fn new(body: Option<usize>, hulls: Vec<Hull>) -> Self {
+        let far = |hull: &Hull| {
+            hull.corners
+                .iter()
+                .map(|corner| corner.norm())
+                .fold(hull.radius_m, |far, corner| far.max(corner + hull.radius_m))
+        };
+        let far_m = hulls.iter().map(far).fold(0.0, f64::max);
+        Self { body, hulls, far_m }
+    }
+
+    /// How much lower than `height_m` the lowest point is, m; `worst_m` where that cannot be more.
+    pub(super) fn below_m(&self, placements: &[Transform], height_m: f64, worst_m: f64) -> f64 {
+        let at = self.body.map_or(Transform::IDENTITY, |body| placements[body]);
+        if height_m - (at.translation[2] - self.far_m) <= worst_m {
+            return worst_m;
+        }
+        let up = Vec3(at.rotation.0[2]);
+        let mut lowest = f64::INFINITY;
+        for hull in &self.hulls {
+            for corner in &hull.corners {
+                lowest = lowest.min(up.dot(*corner) + at.translation[2] - hull.radius_m);
+            }
+        }
+        height_m - lowest
+    }
+
+    /// A bound of how far any point of the link has gone from one place to another.
+    fn farthest_gone(&self, then: &Transform, now: &Transform) -> f64 {
+        let turned: f64 = (0..3)
+            .flat_map(|row| (0..3).map(move |column| (row, column)))
+            .map(|(row, column)| (now.rotation.0[row][column] - then.rotation.0[row][column]).powi(2))
+            .sum();
+        (now.translation - then.translation).norm() + self.far_m * turned.sqrt()
+    }
+}
+
+/// A lower bound of the distance of two hulls, as near to it as `near`, or above `enough`; zero where they overlap.
+fn certified_m(first: &[Vec3], second: &[Vec3], enough: f64, near: f64) -> f64 {
+    let mut shares = [vec![0.0; first.len()], vec![0.0; second.len()]];
+    shares[0][0] = 1.0;
+    shares[1][0] = 1.0;
+    let mut apart = first[0] - second[0];
+    let mut certified = 0.0_f64;
+    for _ in 0..EXCHANGES {
+        let length = apart.norm();
+        if length <= near {
+            return 0.0;
+        }
+        // The first hull's corners are best where lowest along `apart`, the second's where highest.
+        let mut exchange: Option<(f64, usize, usize, usize, Vec3)> = None;
+        let mut reach = 0.0;
+        for (side, corners) in [first, second].into_iter().enumerate() {
+            let sign = if side == 0 { 1.0 } else { -1.0 };
+            let along = |k: usize| sign * corners[k].dot(apart);
+            let (mut best, mut worst) = (0, None);
+            let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
+            for k in 0..corners.len() {
+                let value = along(k);
+                if value < lowest {
+                    (lowest, best) = (value, k);
+                }
+                if shares[side][k] > 0.0 && value > highest {
+                    (highest, worst) = (value, Some(k));
+                }
+            }
+            reach += lowest;
+            let Some(worst) = worst else { continue };
+            let step = (corners[best] - corners[worst]).scale(sign);
+            let gain = highest - lowest;
+            if exchange.as_ref().is_none_or(|known| gain > known.0) {
+                exchange = Some((gain, side, best, worst, step));
+            }
+        }
+        certified = certified.max(reach / length);
+        if certified > enough || length - certified <= near {
+            break;
+        }
+        let Some((_, side, best, worst, step)) = exchange else { break };
+        let square = step.dot(step);
+        if square <= 0.0 {
+            break;
+        }
+        let share = (-apart.dot(step) / square).clamp(0.0, shares[side][worst]);
+        shares[side][worst] -= share;
+        shares[side][best] += share;
+        apart += step.scale(share);
+    }
+    certified
+}

@@ -1,0 +1,89 @@
+//! Few corners in place of many.
+
+use super::convex::{Placed, hull_distance};
+use super::self_collision_shapes::LinkShape;
+use dynident_model::collision::Solid;
+use dynident_model::{Transform, Vec3};
+
+/// Corners of a shape beyond which it is replaced by a coarser one that holds it.
+const MOST_CORNERS: usize = 32;
+
+/// Directions in which corners are looked for.
+const DIRECTIONS: usize = 40;
+
+impl LinkShape {
+    /// The solid on a link. One with many corners, such as a mesh, becomes the hull of its corners farthest out in 40
+    /// directions, with a radius that holds all others: it is never smaller than the solid.
+    pub fn holding(link: &str, solid: &Solid) -> Self {
+        let Solid { corners_m, radius_m } = solid;
+        let (corners, gap_m) = if corners_m.len() <= MOST_CORNERS {
+            (corners_m.clone(), 0.0)
+        } else {
+            let corners = outermost(corners_m);
+            let gap_m = farthest_from(&corners, corners_m);
+            (corners, gap_m)
+        };
+        Self {
+            link: link.to_owned(),
+            corners_m: corners.iter().map(|corner| corner.0).collect(),
+            radius_m: radius_m + gap_m,
+        }
+    }
+}
+
+/// The corners farthest out in evenly spread directions (a spiral on the sphere), each once.
+fn outermost(corners: &[Vec3]) -> Vec<Vec3> {
+    let golden = core::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    let mut found: Vec<usize> = Vec::new();
+    for k in 0..DIRECTIONS {
+        let z = 1.0 - (2.0 * k as f64 + 1.0) / DIRECTIONS as f64;
+        let (sin, cos) = (golden * k as f64).sin_cos();
+        let across = (1.0 - z * z).sqrt();
+        let direction = Vec3([across * cos, across * sin, z]);
+        let mut best = (f64::NEG_INFINITY, 0);
+        for (index, corner) in corners.iter().enumerate() {
+            let along = corner.dot(direction);
+            if along > best.0 {
+                best = (along, index);
+            }
+        }
+        if !found.contains(&best.1) {
+            found.push(best.1);
+        }
+    }
+    found.into_iter().map(|index| corners[index]).collect()
+}
+
+/// The largest distance of a point from a hull.
+fn farthest_from(hull: &[Vec3], points: &[Vec3]) -> f64 {
+    let at = Transform::IDENTITY;
+    let mut farthest = 0.0_f64;
+    for point in points {
+        let one = core::slice::from_ref(point);
+        let hulls = [Placed { corners: hull, at: &at }, Placed { corners: one, at: &at }];
+        farthest = farthest.max(hull_distance(hulls[0], hulls[1], f64::INFINITY, &mut Vec3::ZERO.clone()).distance_m);
+    }
+    farthest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynident_model::sample::Random;
+
+    #[test]
+    fn a_coarser_shape_holds_the_finer_one() {
+        let mut random = Random::new(5);
+        // Points on an ellipsoid: all of them corners.
+        let corners_m: Vec<Vec3> = (0..2000)
+            .map(|_| {
+                let [x, y, z] = random.direction().0;
+                Vec3([0.05 * x, 0.08 * y, 0.3 * z + 0.1])
+            })
+            .collect();
+        let shape = LinkShape::holding("rod", &Solid { corners_m: corners_m.clone(), radius_m: 0.0 });
+        assert!(shape.corners_m.len() <= DIRECTIONS && shape.radius_m < 0.02, "{}", shape.radius_m);
+        let hull: Vec<Vec3> = shape.corners_m.iter().map(|corner| Vec3(*corner)).collect();
+        assert!(farthest_from(&hull, &corners_m) <= shape.radius_m);
+    }
+}

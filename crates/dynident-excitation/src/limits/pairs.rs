@@ -1,0 +1,200 @@
+//! Which links must stay apart, and how far.
+
+use super::error::LimitError;
+use super::self_collision_shapes::SelfCollision;
+use super::solids::{LinkSolid, solid_distance};
+use dynident_dynamics::{Workspace, body_placements};
+use dynident_model::sample::Random;
+use dynident_model::{Model, Transform};
+
+/// The links of a robot as solids and which of them must stay apart.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct SolidPairs {
+    pub solids: Vec<LinkSolid>,
+    pub pairs: Vec<SolidPair>,
+    /// Pairs of links that are not checked although they are no neighbours and nobody ignores them, because their
+    /// shapes stand in each other: give shapes of their own to links that can really touch.
+    pub left_out: Vec<[String; 2]>,
+    /// Pairs that are always nearer than the clearance and touch in no posture tried: they run close by each other by
+    /// design, and are not checked either.
+    pub close: Vec<[String; 2]>,
+}
+
+/// Two solids that must stay apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SolidPair {
+    /// Places among the solids.
+    pub of: [usize; 2],
+    /// Least distance from surface to surface, m.
+    pub clearance_m: f64,
+    /// What a lack of distance is measured by, m.
+    pub size_m: f64,
+}
+
+/// Postures tried to find links that stand in each other.
+const POSTURES: usize = 256;
+
+/// Share of the postures in which links must touch, beside the neutral one, to be left out.
+const MOSTLY: f64 = 0.5;
+
+/// A lack of distance is measured by this share of the arm's length at least.
+const LEAST_SIZE: f64 = 0.05;
+
+/// The longest chain of joints from the base, m: what lengths of a machine are measured by.
+pub(crate) fn arm_length_m(model: &Model) -> f64 {
+    let mut lengths: Vec<f64> = Vec::with_capacity(model.dof());
+    for joint in model.joints() {
+        let stroke = if joint.turns() {
+            0.0
+        } else {
+            joint.limits.lower.zip(joint.limits.upper).map_or(0.0, |(lower, upper)| lower.abs().max(upper.abs()))
+        };
+        lengths.push(joint.parent.map_or(0.0, |parent| lengths[parent]) + joint.placement.translation.norm() + stroke);
+    }
+    let tip = |(body, length): (usize, f64)| {
+        let links = model.bodies()[body].links.iter().map(|link| link.placement.translation.norm());
+        length + links.fold(0.0, f64::max)
+    };
+    lengths.into_iter().enumerate().map(tip).fold(0.0, f64::max)
+}
+
+/// Every joint at zero, or as near to it as the description's limits allow.
+pub(crate) fn neutral_posture(model: &Model) -> Vec<f64> {
+    let nearest = |joint: &dynident_model::Joint| {
+        let (lower, upper) = (joint.limits.lower.unwrap_or(0.0), joint.limits.upper.unwrap_or(0.0));
+        if lower <= upper { 0.0_f64.max(lower).min(upper.max(lower)) } else { 0.0 }
+    };
+    model.joints().iter().map(nearest).collect()
+}
+
+/// Seeded postures within the description's limits: a joint without any turns all the way, or slides half a metre.
+pub(crate) fn random_postures(model: &Model, count: usize) -> Vec<Vec<f64>> {
+    let mut random = Random::new(1);
+    let mut posture = || {
+        let position = |joint: &dynident_model::Joint| {
+            let reach = if joint.turns() { core::f64::consts::PI } else { 0.5 };
+            let (lower, upper) = joint.limits.lower.zip(joint.limits.upper).unwrap_or((-reach, reach));
+            random.uniform(lower, upper)
+        };
+        model.joints().iter().map(position).collect()
+    };
+    (0..count).map(|_| posture()).collect()
+}
+
+impl SelfCollision {
+    /// The shapes on their bodies and the pairs to keep apart: all but those on one body, on neighbours (parent and
+    /// child) and those ignored. Of **fitted** capsules also those are left out that overlap in each of 256 seeded
+    /// postures within the position limits of the description; with `leave_out_touching` those that it describes.
+    ///
+    /// # Errors
+    /// As [`validate`](SelfCollision::validate).
+    pub(crate) fn resolve(&self, model: &Model) -> Result<SolidPairs, LimitError> {
+        self.validate(model)?;
+        let solids = LinkSolid::gather(model, &self.all_shapes(model), "a shape of the self-collision limit")?;
+        let is_neighbour = |a: Option<usize>, b: Option<usize>| {
+            let parent = |body: Option<usize>| body.map(|body| model.joints()[body].parent);
+            a == b || parent(a) == Some(b) || parent(b) == Some(a)
+        };
+        let is_ignored = |a: &str, b: &str| {
+            self.ignored.iter().any(|[first, second]| (first == a && second == b) || (first == b && second == a))
+        };
+        let least_size = LEAST_SIZE * arm_length_m(model);
+        let mut pairs = Vec::new();
+        for (second, b) in solids.iter().enumerate() {
+            for (first, a) in solids[..second].iter().enumerate() {
+                if !is_neighbour(a.body, b.body) && !is_ignored(&a.link, &b.link) {
+                    let thinnest = |solid: &LinkSolid| {
+                        solid.shapes.iter().map(|shape| shape.radius_m).fold(f64::INFINITY, f64::min)
+                    };
+                    let size_m = (thinnest(a) + thinnest(b) + self.clearance_m).max(least_size).max(1e-9);
+                    pairs.push(SolidPair { of: [first, second], clearance_m: self.clearance_m, size_m });
+                }
+            }
+        }
+        let mut resolved = SolidPairs { solids, pairs, left_out: Vec::new(), close: Vec::new() };
+        if self.fitted() || self.leave_out_touching {
+            resolved.leave_out(model, self.leave_out_touching);
+        }
+        Ok(resolved)
+    }
+
+    /// Pairs of links that are not kept apart although they are no neighbours, because their shapes stand in each
+    /// other.
+    ///
+    /// # Errors
+    /// As [`validate`](SelfCollision::validate).
+    pub fn left_out(&self, model: &Model) -> Result<Vec<[String; 2]>, LimitError> {
+        Ok(self.resolve(model)?.left_out)
+    }
+}
+
+impl SolidPairs {
+    /// Leaves out pairs that stand in each other, and lets those that cannot have their clearance have less.
+    fn leave_out(&mut self, model: &Model, touching: bool) {
+        let mut workspace = Workspace::new(model);
+        // For each pair: whether it touches in the neutral posture, in how many others, and the farthest apart.
+        let mut seen = vec![(false, 0_usize, f64::NEG_INFINITY); self.pairs.len()];
+        let postures = core::iter::once(neutral_posture(model)).chain(random_postures(model, POSTURES));
+        for (number, q) in postures.enumerate() {
+            let placements = body_placements(model, &mut workspace, &q);
+            for (pair, (neutral, touched, farthest)) in self.pairs.iter().zip(&mut seen) {
+                let [a, b] = pair.of.map(|place| {
+                    let solid = &self.solids[place];
+                    (solid, solid.body.map_or(Transform::IDENTITY, |body| placements[body]))
+                });
+                let beyond = 2.0 * pair.clearance_m;
+                let apart = solid_distance((a.0, &a.1), (b.0, &b.1), beyond, &mut Vec::new()).surface_m;
+                let short = if touching { apart <= 0.0 } else { apart < pair.clearance_m };
+                if number == 0 {
+                    *neutral = short;
+                } else {
+                    *touched += usize::from(short);
+                }
+                *farthest = farthest.max(apart);
+            }
+        }
+        let mut kept = Vec::with_capacity(self.pairs.len());
+        for (pair, (neutral, touched, farthest)) in self.pairs.iter().zip(seen) {
+            let always = touched == POSTURES;
+            if always || (touching && neutral && touched as f64 > MOSTLY * POSTURES as f64) {
+                self.left_out.push(pair.of.map(|place| self.solids[place].link.clone()));
+            } else if touching && farthest < pair.clearance_m {
+                // They run close by each other by design: where some posture brings them together they must not touch.
+                if neutral || touched > 0 {
+                    kept.push(SolidPair { clearance_m: 0.0, ..*pair });
+                } else {
+                    self.close.push(pair.of.map(|place| self.solids[place].link.clone()));
+                }
+            } else {
+                kept.push(*pair);
+            }
+        }
+        self.pairs = kept;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fitted_capsules_keep_the_forearm_from_the_shoulder_and_leave_out_the_wrist() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/ur10.urdf");
+        let model = dynident_model::load_robot(path).unwrap().model;
+        let fitted = SelfCollision::default().resolve(&model).unwrap();
+        let names: Vec<[&str; 2]> =
+            fitted.pairs.iter().map(|pair| pair.of.map(|index| fitted.solids[index].link.as_str())).collect();
+        assert!(names.contains(&["shoulder_link", "forearm_link"]), "{names:?}");
+        assert!(names.contains(&["upper_arm_link", "wrist_3_link"]), "{names:?}");
+        // The wrist's axes are 0.115 m apart, less than two radii, in every posture.
+        assert!(
+            fitted.left_out.iter().any(|[a, b]| a == "forearm_link" && b == "wrist_2_link"),
+            "{:?}",
+            fitted.left_out
+        );
+        for pair in &fitted.pairs {
+            let parent = |index: usize| fitted.solids[index].body.map(|body| model.joints()[body].parent);
+            assert_ne!(parent(pair.of[1]), Some(fitted.solids[pair.of[0]].body), "neighbours are no pair");
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! From the name of a mesh in a description to its vertices.
+
+use super::{mesh_text, stl};
+use crate::spatial::Vec3;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Largest mesh that is read, bytes: five million triangles.
+const MAX_MESH_BYTES: u64 = 256 << 20;
+
+/// Largest coordinate, m before scaling: beyond it the file is no link.
+const MAX_COORDINATE: f64 = 1e9;
+
+/// How far above the description's folder a package is looked for.
+const LEVELS: usize = 8;
+
+/// Why a mesh gave no vertices.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum MeshError {
+    /// No such file.
+    #[error("mesh `{name}` is not there (looked beside and above {})", folder.display())]
+    Missing {
+        /// The name in the description.
+        name: String,
+        /// Where the description stands.
+        folder: PathBuf,
+    },
+    /// The file cannot be read.
+    #[error("{}: cannot be read: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file is no STL or OBJ.
+    #[error("{}: {fault}; STL (binary or text) and OBJ are read", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        fault: &'static str,
+    },
+}
+
+/// The file of a mesh that a description in `folder` calls `name`: `package://NAME/rest` beside or up to eight levels
+/// above the folder (as `NAME/rest`, or as `rest` in a folder called `NAME`, or as `rest`), else a path, relative ones
+/// from the folder.
+pub fn find_mesh(folder: &Path, name: &str) -> Option<PathBuf> {
+    let there = |path: PathBuf| path.is_file().then_some(path);
+    let Some(of_package) = name.strip_prefix("package://").or_else(|| name.strip_prefix("model://")) else {
+        return there(folder.join(name.strip_prefix("file://").unwrap_or(name)));
+    };
+    let (package, rest) = of_package.split_once('/')?;
+    let absolute = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    let above = || absolute.ancestors().take(LEVELS);
+    let named = |at: &Path| at.file_name().is_some_and(|name| name == package);
+    above()
+        .find_map(|at| there(at.join(package).join(rest)))
+        .or_else(|| above().filter(|at| named(at)).find_map(|at| there(at.join(rest))))
+        .or_else(|| above().find_map(|at| there(at.join(rest))))
+}
+
+/// The vertices of a mesh, each once, in the file's unit and frame.
+///
+/// # Errors
+/// If the file is not found, cannot be read, or is no STL or OBJ with at least one vertex.
+pub fn mesh_vertices(folder: &Path, name: &str) -> Result<Vec<Vec3>, MeshError> {
+    let missing = || MeshError::Missing { name: name.to_owned(), folder: folder.to_owned() };
+    let path = find_mesh(folder, name).ok_or_else(missing)?;
+    let mut bytes = Vec::new();
+    File::open(&path)
+        .and_then(|file| file.take(MAX_MESH_BYTES + 1).read_to_end(&mut bytes))
+        .map_err(|source| MeshError::File { path: path.clone(), source })?;
+    let faulty = |fault| MeshError::Content { path: path.clone(), fault };
+    if bytes.len() as u64 > MAX_MESH_BYTES {
+        return Err(faulty("larger than 256 MiB"));
+    }
+    let vertices = parse(&bytes).map_err(faulty)?;
+    let mut ordered: Vec<[u64; 3]> = vertices.iter().map(|v| v.0.map(|x| (x + 0.0).to_bits())).collect();
+    ordered.sort_unstable();
+    ordered.dedup();
+    Ok(ordered.into_iter().map(|bits| Vec3(bits.map(f64::from_bits))).collect())
+}
+
+/// The vertices of an STL or OBJ, told apart by their content.
+fn parse(bytes: &[u8]) -> Result<Vec<Vec3>, &'static str> {
+    let vertices = if stl::is_binary(bytes) {
+        stl::binary(bytes)
+    } else {
+        let text = core::str::from_utf8(bytes).map_err(|_| "neither a whole binary STL nor text")?;
+        let word = if text.trim_start().starts_with("solid") { "vertex" } else { "v" };
+        mesh_text::vertices(text, word).ok_or("a vertex without three numbers")?
+    };
+    if vertices.is_empty() {
+        return Err("no vertices");
+    }
+    let finite = |v: &Vec3| v.0.iter().all(|x| x.abs() <= MAX_COORDINATE);
+    if vertices.iter().all(finite) { Ok(vertices) } else { Err("a vertex that is not finite") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two triangles over four corners of which two are shared.
+    const TEXT: &str = "solid part\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 1 0 0\n   vertex 0 1e0 0\n  endloop\n endfacet\n facet normal 0 0 1\n  outer loop\n   vertex 1 0 0\n   vertex 0 1 0\n   vertex 0 0 -2.5\n  endloop\n endfacet\nendsolid part\n";
+
+    fn binary(head: &[u8; 80], corners: &[[f32; 3]]) -> Vec<u8> {
+        let mut bytes = head.to_vec();
+        bytes.extend((corners.len() as u32 / 3).to_le_bytes());
+        for triangle in corners.chunks_exact(3) {
+            bytes.extend([0_u8; 12]);
+            bytes.extend(triangle.iter().flatten().flat_map(|x| x.to_le_bytes()));
+            bytes.extend([0_u8; 2]);
+        }
+        bytes
+    }
+
+    #[test]
+    fn text_binary_and_obj_give_the_same_vertices() {
+        let folder = tempfile_folder("same");
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let corners = [&corners[..], &[[0.0, 0.0, -2.5]]].concat();
+        // A binary head may begin as text does.
+        let mut head = [b' '; 80];
+        head[..5].copy_from_slice(b"solid");
+        std::fs::write(folder.join("a.stl"), TEXT).unwrap();
+        std::fs::write(folder.join("b.stl"), binary(&head, &corners)).unwrap();
+        std::fs::write(folder.join("c.obj"), "o x\nv 0 0 0\nv 1 0 0\nvn 0 0 1\nv 0 1 0\nv 0 0 -2.5\nf 1 2 3\n")
+            .unwrap();
+        let [a, b, c] = ["a.stl", "b.stl", "c.obj"].map(|name| mesh_vertices(&folder, name).unwrap());
+        assert_eq!(a.len(), 4);
+        assert_eq!((&a, &a), (&b, &c));
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn faulty_meshes_are_refused_and_never_take_memory_by_their_count() {
+        let folder = tempfile_folder("faulty");
+        let mut lying = binary(&[0; 80], &[[0.0; 3]; 3]);
+        lying[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
+        for (name, bytes) in [
+            ("lying.stl", lying),
+            ("short.stl", vec![0; 40]),
+            ("word.stl", b"solid\nvertex a b c\n".to_vec()),
+            ("nan.obj", b"v nan 0 0\n".to_vec()),
+            ("collada.dae", b"<COLLADA/>".to_vec()),
+        ] {
+            std::fs::write(folder.join(name), bytes).unwrap();
+            let error = mesh_vertices(&folder, name).unwrap_err().to_string();
+            assert!(error.contains(name), "{error}");
+        }
+        assert!(matches!(mesh_vertices(&folder, "package://x/absent.stl"), Err(MeshError::Missing { .. })));
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_package_is_found_beside_and_above() {
+        let folder = tempfile_folder("package");
+        let (urdf, meshes) = (folder.join("arm_description/urdf"), folder.join("arm_description/meshes"));
+        for path in [&urdf, &meshes] {
+            std::fs::create_dir_all(path).unwrap();
+        }
+        std::fs::write(meshes.join("a.stl"), TEXT).unwrap();
+        for name in ["package://arm_description/meshes/a.stl", "../meshes/a.stl", "package://other/meshes/a.stl"] {
+            assert!(find_mesh(&urdf, name).is_some(), "{name}");
+        }
+        assert!(find_mesh(&urdf, "package://arm_description/meshes/b.stl").is_none());
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    fn tempfile_folder(name: &str) -> PathBuf {
+        let folder = std::env::temp_dir().join(format!("dynident-mesh-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        folder
+    }
+}

@@ -1,0 +1,68 @@
+//! A convex solid that holds a shape: a few corners and a radius about their hull.
+
+use super::{CollisionGeometry, CollisionShape, MeshError, mesh_vertices};
+use crate::spatial::{Transform, Vec3};
+use std::path::Path;
+
+/// All points within `radius_m` of the convex hull of `corners_m`: the frame is the caller's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solid {
+    /// Corners of the hull, m; at least one.
+    pub corners_m: Vec<Vec3>,
+    /// What is laid about the hull, m.
+    pub radius_m: f64,
+}
+
+/// Sides of the prism that stands about a cylinder: 2 % wider at its corners.
+const SIDES: usize = 16;
+
+impl CollisionShape {
+    /// A solid in the link's frame that holds the shape: exact for boxes, spheres and capsules, a prism of 16 sides
+    /// about a cylinder, and of a mesh all its vertices (their hull, as simulators take it too). `folder` is where the
+    /// description stands.
+    ///
+    /// # Errors
+    /// A mesh that cannot be found or read.
+    pub fn solid(&self, folder: &Path) -> Result<Solid, MeshError> {
+        let (mut corners_m, radius_m) = match &self.geometry {
+            CollisionGeometry::Box { size_m } => {
+                let corner = |index: usize| {
+                    Vec3(core::array::from_fn(|axis| if index >> axis & 1 == 0 { -0.5 } else { 0.5 } * size_m[axis]))
+                };
+                ((0..8).map(corner).collect(), 0.0)
+            }
+            CollisionGeometry::Cylinder { radius_m, length_m } => {
+                let outer = radius_m / (core::f64::consts::PI / SIDES as f64).cos();
+                let corner = |side: usize, z: f64| {
+                    let (sin, cos) = (core::f64::consts::TAU * side as f64 / SIDES as f64).sin_cos();
+                    Vec3([outer * cos, outer * sin, z])
+                };
+                let ends = [-0.5 * length_m, 0.5 * length_m];
+                (ends.into_iter().flat_map(|z| (0..SIDES).map(move |side| corner(side, z))).collect::<Vec<_>>(), 0.0)
+            }
+            CollisionGeometry::Sphere { radius_m } => (vec![Vec3::ZERO], *radius_m),
+            CollisionGeometry::Capsule { radius_m, length_m } => {
+                ([-0.5, 0.5].map(|share| Vec3([0.0, 0.0, share * length_m])).to_vec(), *radius_m)
+            }
+            CollisionGeometry::Mesh { file, scale } => {
+                let scaled = |v: Vec3| Vec3(core::array::from_fn(|axis| scale[axis] * v.0[axis]));
+                (mesh_vertices(folder, file)?.into_iter().map(scaled).collect(), 0.0)
+            }
+        };
+        for corner in &mut corners_m {
+            *corner = self.placement.point(*corner);
+        }
+        Ok(Solid { corners_m, radius_m })
+    }
+}
+
+impl Solid {
+    /// The same solid seen from another frame: `to_from_here` places it there.
+    #[must_use]
+    pub fn placed(&self, to_from_here: &Transform) -> Self {
+        Self {
+            corners_m: self.corners_m.iter().map(|corner| to_from_here.point(*corner)).collect(),
+            radius_m: self.radius_m,
+        }
+    }
+}
