@@ -246,7 +246,7 @@ impl Diagnosis {
                     }
                     parts.extend(changes.iter().map(|(kind, changed)| format!("{kind}: {}", in_words(*kind, changed))));
                     format!(
-                        "No single change would do. The smallest together, by the sum of their shares: {}.",
+                        "No single change was found that would do. The smallest together, by the sum of their shares: {}.",
                         parts.join("; ")
                     )
                 }

@@ -10,7 +10,8 @@ const MOST_TIMES_OF_ALL: f64 = 1.5;
 /// The same for a single joint, of which some have little torque to be judged by: 0.6 to 1.7, dead channels at 5.2.
 const MOST_TIMES_OF_JOINT: f64 = 2.5;
 /// Times what the fit leaves of the joints' torque (root mean square over the joints) that the written model may leave
-/// of a held-out log's. On ten real data sets it lies between 0.9 and 2.4; a fit of 58 parameters to three seconds has 6.
+/// of a held-out log's. On ten real data sets it lies between 0.9 and 2.4; a fit of 58 parameters to three seconds
+/// has 6.
 const MOST_TIMES_OF_FIT: f64 = 4.0;
 /// Percent of a held-out log's torque below which a model is good, however much better the fit may be.
 const GOOD_PERCENT: f64 = 1.0;

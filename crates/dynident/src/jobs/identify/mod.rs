@@ -14,8 +14,8 @@ use dynident_estimation::{Estimate, strongest_correlations};
 use dynident_identification::estimators::{Findings, InstrumentSource};
 use dynident_identification::examination::{LogTrace, friction_sign_findings, sign_findings};
 use dynident_identification::{
-    Identification, IdentificationError, IdentificationTask, identify as identify_task, identify_payload,
-    identify_with_instruments as identify_task_with_instruments,
+    DiagnosisChoice, Identification, IdentificationError, IdentificationTask, identify as identify_task,
+    identify_payload, identify_with_instruments as identify_task_with_instruments,
 };
 use dynident_model::InertialParameters;
 use dynident_recording::Level;
@@ -102,7 +102,9 @@ fn identified(
     let robot = StudyRobot::new(study, study_path, &folders)?;
     let in_study = Error::identification::<IdentificationError>(study_path);
     // Names first: no log is read for a study that is wrong.
-    let settings = study.settings(study_path, &robot)?;
+    // Whoever reads the result may load its model: the study is examined whether the fit looks doubtful or not.
+    let mut settings = study.settings(study_path, &robot)?;
+    settings.diagnosis = DiagnosisChoice::Always;
     settings.check_names(&robot.parametric).map_err(|error| in_study(IdentificationError::Consistency(error)))?;
     let task = study.task_with(settings, &robot, &folders)?;
     let files = study.log_files(&folders)?;

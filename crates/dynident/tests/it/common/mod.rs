@@ -57,7 +57,8 @@ impl Truth {
         Self { model: model.with_inertials(&inertials).unwrap(), drive }
     }
 
-    /// A robot that can exist: masses up to 30 % from the description's, centres of mass up to a tenth nearer or farther.
+    /// A robot that can exist: masses up to 30 % from the description's, centres of mass up to a tenth nearer or
+    /// farther.
     pub(crate) fn other(description: &Path, random: &mut Random) -> Self {
         let mut truth = Self::near(description, 0.0, false);
         let mut other = |body: &InertialParameters| {
