@@ -2,7 +2,7 @@
 
 use super::mistake::{Channels, Mistake};
 use super::motion_rows::MotionRows;
-use super::plausibility::is_rate_of_a_recorder;
+use super::plausibility::{beyond_limits, is_rate_of_a_recorder};
 use core::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI, TAU};
 use dynident_dynamics::ParametricModel;
 
@@ -17,10 +17,12 @@ pub(super) fn candidates(robot: &ParametricModel, rows: &MotionRows) -> Vec<Mist
     if model.joints().iter().any(dynident_model::Joint::turns) {
         all.extend([PI / 180.0, TAU, 180.0 / PI, TAU.recip()].map(|factor| Mistake::PositionUnit { factor }));
     }
-    // Units of time, where the rate looks like another one.
+    // Units of time, where the rate looks like another one or the robot would be too fast.
+    let is_odd = !is_rate_of_a_recorder(rows.rate_hz)
+        || beyond_limits(model, rows).iter().any(|beyond| beyond.quantity == "velocity");
     for factor in [1e-3, 1e-6, 1e-9, 1e3, 1e6, 1e9] {
         // Stamps that are a factor too large make a rate that is as much too low.
-        if !is_rate_of_a_recorder(rows.rate_hz) && is_rate_of_a_recorder(rows.rate_hz / factor) {
+        if is_odd && is_rate_of_a_recorder(rows.rate_hz / factor) {
             all.push(Mistake::TimeUnit { factor });
         }
     }

@@ -16,13 +16,15 @@ use rayon::prelude::*;
 pub(super) const CLEARLY_BETTER: f64 = 0.6;
 /// Times what the study as written leaves of all torque that a better reading may leave.
 const NO_WORSE: f64 = 1.05;
-/// Times what was left of a joint's torque, and a share of it, that a better reading may leave.
+/// Times what was left of a joint's torque, and a share of it, that a better reading may leave; more only where its
+/// logarithm is a small share of what all joints gain together.
 const SACRIFICED: f64 = 1.25;
 const LITTLE: f64 = 0.02;
+const SHARE_OF_GAIN: f64 = 0.1;
 /// Readings this close to the best cannot be told from it.
 const ALIKE: f64 = 0.2;
-/// By how much a number between those tried must be better than the nearest of these.
-const WORTH_REFINING: f64 = 0.3;
+/// By how much a number between those tried must be better than the nearest of these: as much as a mistake.
+const WORTH_REFINING: f64 = CLEARLY_BETTER;
 /// Readings beside the best from which a second mistake is looked for, once there is one.
 const RUNNERS_UP: usize = 3;
 /// Mistakes of one study.
@@ -138,9 +140,11 @@ fn one_round(at: &Corrected, best: &Reading, consistency: &ConsistencySettings) 
 /// Whether a reading leaves clearly more of some joint's torque than the one it was made from.
 fn sacrifices(reading: &Reading, from: &Reading) -> bool {
     let last = reading.mistakes.last();
+    let gain = (from.consistent_score - reading.consistent_score).max(0.0);
+    let factor = SACRIFICED.max((SHARE_OF_GAIN * gain).exp());
     (0..reading.left.len()).any(|joint| {
         let before = last.map_or(joint, |mistake| mistake.torque_from(joint));
-        reading.left[joint] > SACRIFICED * from.left[before] + LITTLE
+        reading.left[joint] > factor * from.left[before] + LITTLE
     })
 }
 

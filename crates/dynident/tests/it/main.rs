@@ -21,6 +21,7 @@ mod modules;
 mod mutated_studies;
 mod payload;
 mod real_logs;
+mod real_mistakes;
 mod report;
 mod result_files;
 mod reversed_torque;
