@@ -32,7 +32,7 @@ pub struct RobotSection {
 }
 
 /// Largest component of gravity: beyond it the unit must be wrong, and numbers run away.
-const MAX_GRAVITY_M_S2: f64 = 1e9;
+const MAX_GRAVITY_M_S2: f64 = 1000.0;
 
 impl RobotSection {
     pub(crate) fn validate(&self) -> Result<(), StudyError> {
@@ -42,7 +42,7 @@ impl RobotSection {
             return Err(StudyError::Numbers {
                 key: "robot.gravity_m_s2".to_owned(),
                 values: gravity.to_vec(),
-                expected: "finite numbers in m/s^2, at most 1e9 in size",
+                expected: "finite numbers in m/s^2, at most 1000 in size",
             });
         }
         if self.base_rpy_rad.is_some() && self.base_rpy_deg.is_some() {
