@@ -1,6 +1,6 @@
 //! A URDF of a model that was read from something else, a D-H table say.
 
-use crate::inertial::InertialParameters;
+use super::write::inertial_lines;
 use crate::joint::{Joint, JointKind};
 use crate::spatial::{Mat3, Transform};
 use crate::tree::{Body, Model, STANDARD_GRAVITY};
@@ -33,9 +33,14 @@ pub fn write_urdf(model: &Model) -> String {
 fn write_links(text: &mut String, body: &Body, is_base: bool) {
     for (number, link) in body.links.iter().enumerate() {
         let name = attribute(&link.name);
-        let inertial = link.inertial.filter(|_| !is_base).and_then(|inertial| inertial_element(&inertial));
-        let _ = match inertial {
-            Some(inertial) => writeln!(text, "  <link name=\"{name}\">\n{inertial}  </link>"),
+        // What URDF cannot say, moments without mass for one, is left unknown.
+        let inertial = link.inertial.filter(|_| !is_base);
+        let lines = inertial.and_then(|inertial| inertial_lines(&link.name, &inertial, None).ok());
+        let _ = match lines {
+            Some(lines) => {
+                let inside = lines.iter().map(|(depth, line)| format!("    {}{line}\n", "  ".repeat(*depth)));
+                writeln!(text, "  <link name=\"{name}\">\n{}  </link>", inside.collect::<Vec<_>>().concat())
+            }
             None => writeln!(text, "  <link name=\"{name}\"/>"),
         };
         if number > 0 {
@@ -90,22 +95,6 @@ fn write_joint(text: &mut String, joint: &Joint, parent: &str, child: &str) {
         let _ = writeln!(text, "    <dynamics{}/>", friction.concat());
     }
     *text += "  </joint>\n";
-}
-
-/// `None` for moments without mass, which URDF cannot say.
-fn inertial_element(inertial: &InertialParameters) -> Option<String> {
-    let ([x, y, z], i) = (inertial.com_m()?.0, inertial.inertia_at_com()?.0);
-    Some(format!(
-        "    <inertial>\n      <origin xyz=\"{x:?} {y:?} {z:?}\" rpy=\"0 0 0\"/>\n      <mass value=\"{:?}\"/>\n      \
-         <inertia ixx=\"{:?}\" ixy=\"{:?}\" ixz=\"{:?}\" iyy=\"{:?}\" iyz=\"{:?}\" izz=\"{:?}\"/>\n    </inertial>\n",
-        inertial.mass_kg(),
-        i[0][0],
-        i[0][1],
-        i[0][2],
-        i[1][1],
-        i[1][2],
-        i[2][2]
-    ))
 }
 
 fn origin(placement: &Transform) -> String {

@@ -216,7 +216,12 @@ pub(super) fn edited(original: &str, mut edits: Vec<(Range<usize>, String)>) -> 
 /// A line of a new element, with its depth below the element's own indentation.
 type Line = (usize, String);
 
-fn inertial_lines(link: &str, inertial: &InertialParameters, note: Option<&str>) -> Result<Vec<Line>, UrdfWriteError> {
+/// An `<inertial>` about the centre of mass, in axes parallel to the link's.
+pub(super) fn inertial_lines(
+    link: &str,
+    inertial: &InertialParameters,
+    note: Option<&str>,
+) -> Result<Vec<Line>, UrdfWriteError> {
     if inertial.0.iter().any(|x| !x.is_finite()) {
         return Err(UrdfWriteError::NotFinite { kind: "link", name: link.to_owned() });
     }
