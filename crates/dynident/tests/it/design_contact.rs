@@ -247,23 +247,17 @@ fn faults(name: &str, description: &str) -> Vec<String> {
     faults
 }
 
+/// One arm, SCARA and leg every day; fifteen arms, five of long reach, five SCARAs and five legs in a long run.
 #[test]
 fn motions_touch_neither_floor_nor_arm() {
-    let faults: Vec<String> = [("arm", arm(1, 1.0)), ("scara", scara(1)), ("leg", leg(1))]
-        .iter()
-        .flat_map(|(name, description)| faults(name, description))
-        .collect();
-    assert!(faults.is_empty(), "{faults:#?}");
-}
-
-/// `cargo test --release -p dynident --test it thirty_arms -- --ignored`: some minutes.
-#[test]
-#[ignore = "thirty designs: some minutes"]
-fn thirty_arms_touch_neither_floor_nor_themselves() {
-    let mut arms: Vec<(String, String)> = (0..15).map(|seed| (format!("arm {seed}"), arm(seed, 1.0))).collect();
+    let mut arms =
+        vec![("arm 1".to_owned(), arm(1, 1.0)), ("scara 1".to_owned(), scara(1)), ("leg 1".to_owned(), leg(1))];
+    let others = |seed: &u64| *seed != 1;
+    arms.extend((0..15).filter(others).map(|seed| (format!("arm {seed}"), arm(seed, 1.0))));
     arms.extend((20..25).map(|seed| (format!("long reach {seed}"), arm(seed, 4.0))));
-    arms.extend((0..5).map(|seed| (format!("scara {seed}"), scara(seed))));
-    arms.extend((0..5).map(|seed| (format!("leg {seed}"), leg(seed))));
+    arms.extend((0..5).filter(others).map(|seed| (format!("scara {seed}"), scara(seed))));
+    arms.extend((0..5).filter(others).map(|seed| (format!("leg {seed}"), leg(seed))));
+    arms.truncate(dynident_testing::count(3, arms.len()));
     let faults: Vec<String> = arms.iter().flat_map(|(name, description)| faults(name, description)).collect();
     assert!(faults.is_empty(), "{faults:#?}");
 }
