@@ -7,6 +7,7 @@ use super::build::rows;
 use super::{DhError, parsed, toml_fault};
 use crate::inertial::InertialParameters;
 use crate::urdf::{JointChange, LinkChange};
+use std::collections::HashSet;
 use thiserror::Error;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, TableLike, Value};
 
@@ -30,6 +31,14 @@ pub enum DhWriteError {
         /// The name.
         name: String,
     },
+    /// Two changes to one link or joint.
+    #[error("two changes to {kind} `{name}`: give one")]
+    Repeated {
+        /// `link` or `joint`.
+        kind: &'static str,
+        /// The name.
+        name: String,
+    },
     /// A value that is not finite.
     #[error("the new values of {kind} `{name}` are not all finite numbers")]
     NotFinite {
@@ -46,7 +55,7 @@ pub enum DhWriteError {
 /// become comments before the row's `inertial`.
 ///
 /// # Errors
-/// If the original is no D-H table, a link or joint is unknown, or a value is not finite.
+/// If the original is no D-H table, a link or joint is unknown or named twice, or a value is not finite.
 pub fn rewrite_dh(original: &str, links: &[LinkChange], joints: &[JointChange]) -> Result<String, DhWriteError> {
     let (text, table) = parsed(original)?;
     let rows = rows(text, &table)?;
@@ -55,8 +64,14 @@ pub fn rewrite_dh(original: &str, links: &[LinkChange], joints: &[JointChange]) 
     })?;
     let has_lines = document.get("joint").is_some_and(Item::is_array_of_tables);
     let unknown = |kind: &'static str, name: &str| DhWriteError::Unknown { kind, name: name.to_owned() };
+    let mut seen = HashSet::new();
+    let mut once = |kind: &'static str, name: &str| {
+        let repeated = || DhWriteError::Repeated { kind, name: name.to_owned() };
+        seen.insert((kind, name.to_owned())).then_some(()).ok_or_else(repeated)
+    };
     for change in links {
         let (LinkChange::Set { link, .. } | LinkChange::Remove { link }) = change;
+        once("link", link)?;
         let place = rows.iter().position(|row| row.link == *link).ok_or_else(|| unknown("link", link))?;
         let row = row_mut(&mut document, place).ok_or_else(|| unknown("link", link))?;
         match change {
@@ -75,6 +90,7 @@ pub fn rewrite_dh(original: &str, links: &[LinkChange], joints: &[JointChange]) 
         }
     }
     for JointChange { joint, damping, friction } in joints {
+        once("joint", joint)?;
         let place = rows.iter().position(|row| row.joint == *joint).ok_or_else(|| unknown("joint", joint))?;
         let row = row_mut(&mut document, place).ok_or_else(|| unknown("joint", joint))?;
         for (key, number) in [("damping", damping), ("friction", friction)] {

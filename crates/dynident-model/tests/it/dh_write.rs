@@ -96,6 +96,9 @@ fn rows_on_one_line_and_a_byte_order_mark_stay() {
 fn what_the_table_does_not_hold_is_refused() {
     let link = LinkChange::Set { link: "d".to_owned(), inertial: inertial(1.0), note: None };
     assert!(rewrite_dh(TABLE, &[link], &[]).unwrap_err().to_string().contains("no link `d`"));
+    let twice =
+        [1.0, 2.0].map(|mass| LinkChange::Set { link: "a_link".to_owned(), inertial: inertial(mass), note: None });
+    assert!(rewrite_dh(TABLE, &twice, &[]).unwrap_err().to_string().contains("two changes to link `a_link`"));
     let nan = InertialParameters([f64::NAN; 10]);
     let link = LinkChange::Set { link: "a_link".to_owned(), inertial: nan, note: None };
     assert!(rewrite_dh(TABLE, &[link], &[]).unwrap_err().to_string().contains("finite"));
