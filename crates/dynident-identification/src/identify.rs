@@ -1,5 +1,6 @@
 //! The whole way from recordings to an identified model, stage by stage.
 
+use crate::bandwidth::{CutoffByError, choose_cutoff};
 use crate::consistent::{
     ConsistencyError, ParameterInterval, consistent_intervals, consistent_with_estimate, inconsistent_nominal_bodies,
     inertials, nearest_to_nominal,
@@ -75,6 +76,8 @@ pub struct TrainingExamination {
 pub struct Identification {
     /// The motion settings in force, with one cut-off for all recordings.
     pub motion: MotionSettings,
+    /// How the cut-off was chosen; none where it was given or the recordings are too short to try any.
+    pub cutoff: Option<CutoffByError>,
     /// The training recordings as factors, the model with the friction that was chosen, payload columns, gains.
     pub training: Training,
     /// The estimate and what its estimator can determine.
@@ -192,6 +195,12 @@ fn identified(
     // Rows and factors, with the filters in force and the friction that the logs choose.
     let cutoff_hz = job.arm().and_then(KnownArm::cutoff_hz);
     let logs = Logs::new(robot.model(), recordings, settings.filters(), &chosen, cutoff_hz, execution)?;
+    let first = RegressorModel::from(robot.clone());
+    let cutoff = choose_cutoff((&logs, settings), &first, &chosen)?;
+    let logs = match &cutoff {
+        Some(choice) if choice.cutoff_hz != choice.motion_hz => logs.with_cutoff(&settings.motion, choice.cutoff_hz),
+        _ => logs,
+    };
     let refit = job.arm().map(KnownArm::refit);
     let training = training_rows((&logs, settings), robot.clone().into(), &chosen, payloads, refit)?;
     let model = &training.model;
@@ -269,6 +278,7 @@ fn identified(
     Ok(Identification {
         payloads: payload_results((recordings, payloads), &chosen, &training.columns, &estimation.estimate),
         motion: logs.motion.clone(),
+        cutoff,
         training,
         estimation,
         essential: dropped,
@@ -286,7 +296,8 @@ const FAR_WORSE: f64 = 1.7;
 
 /// Whether a held-out log is far worse explained than the training logs, joints in units of their own noise.
 fn is_far_worse(log: &LogValidation, sigma: &[f64]) -> bool {
-    let joints = log.model.joints.iter().zip(sigma).filter(|(_, sigma)| **sigma > 0.0);
+    let in_fit_band = log.in_fit_band.as_ref().unwrap_or(&log.model);
+    let joints = in_fit_band.joints.iter().zip(sigma).filter(|(_, sigma)| **sigma > 0.0);
     let squares: Vec<f64> = joints.map(|(joint, sigma)| (joint.rmse_nm / sigma).powi(2)).collect();
     squares.iter().sum::<f64>() > FAR_WORSE * FAR_WORSE * squares.len() as f64
 }

@@ -115,6 +115,7 @@
 
 #![forbid(unsafe_code)]
 
+mod bandwidth;
 mod check;
 pub mod consistent;
 pub mod diagnosis;
@@ -135,6 +136,7 @@ mod settings;
 mod task;
 mod training;
 
+pub use bandwidth::{CutoffByError, CutoffCandidate, choose_cutoff};
 pub use check::{StudyExamination, examine_study};
 pub use error::IdentificationError;
 pub use estimators::EstimationSettings;

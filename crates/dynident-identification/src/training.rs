@@ -3,19 +3,22 @@
 use crate::error::IdentificationError;
 use crate::estimators::{EstimationSettings, Estimator, TrainingRows};
 use crate::examination::{Evidence, PriorAgreement};
+use crate::execution::Execution;
 use crate::friction::{JointFriction, candidate_columns, choose_friction, chosen_model};
 use crate::logs::Logs;
 use crate::payload::{DriveGain, Gains, LoadColumns, Payload, Refit, drive_gains, known_loads};
-use crate::recording::LogError;
+use crate::recording::{LogError, MotionRecord, Recording};
 use crate::regressor_model::RegressorModel;
-use crate::rows::{JointRows, LogPass, LogStatistics, RowConsumer};
+use crate::rows::{JointRows, LogPass, LogStatistics, ParallelFilterSettings, RowConsumer};
 use crate::settings::{GainChoice, IdentificationSettings};
 use dynident_dynamics::Column;
 use dynident_estimation::{
     Estimate, EstimationError, LinearProblem, SegmentedFactor, ordinary_least_squares, weighted_least_squares,
 };
+use dynident_recording::{MotionBlock, MotionSettings};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// How closely given values are held, as a share of the largest of them.
@@ -89,6 +92,34 @@ pub fn training_rows(
         fitted.gains = Some((estimate, of_joints));
     }
     Ok(fitted)
+}
+
+/// Weighted least squares (ordinary where the study asks for it) with the stated terms on pieces of a motion.
+///
+/// # Errors
+/// Rows that do not carry an estimate.
+pub(crate) fn plain_fit(
+    model: RegressorModel,
+    pieces: Vec<MotionBlock>,
+    filter: &ParallelFilterSettings,
+    settings: &IdentificationSettings,
+) -> Result<Estimate, IdentificationError> {
+    let recordings: Vec<Recording> = pieces.into_iter().map(of_piece).collect();
+    let all: Vec<usize> = (0..recordings.len()).collect();
+    let alone = Execution { threads: 1, ..Execution::default() };
+    let motion = MotionSettings::default();
+    let logs = Logs::new(model.model(), &recordings, (&motion, filter), &[], None, alone)?;
+    let job = Job { logs: &logs, settings, training: &all, payloads: &[], known_arm: None };
+    let rows = job.rows_once(model)?;
+    Ok(plain_estimate(&settings.estimation, &rows.problem)?)
+}
+
+/// A piece of a motion as a recording.
+fn of_piece(motion: MotionBlock) -> Recording {
+    let label = "a piece of a motion".to_owned();
+    let record =
+        MotionRecord { label: label.clone(), motion: Arc::new(motion), usable: Vec::new(), windows: None, raw: None };
+    Recording::of_motion(label, record)
 }
 
 struct Job<'a> {

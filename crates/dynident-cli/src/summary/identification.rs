@@ -6,6 +6,7 @@ use super::text::{WIDTH, listed, name, percent, shortened, table, with_deviation
 use super::validation::{residuals, written};
 use core::fmt::Write;
 use dynident::ResultFile;
+use dynident::identification::CutoffCandidate;
 use dynident::identification::consistent::ParameterInterval;
 use dynident::identification::examination::LogValidation;
 use dynident::identification::friction::FrictionCandidate;
@@ -105,7 +106,28 @@ fn headline(r: &ResultFile) -> String {
             2,
         );
     }
+    text += &bands(r);
     text + &beside(r)
+}
+
+/// Which torque the figures are for, where the fit has another band than the motion.
+fn bands(r: &ResultFile) -> String {
+    let Some(choice) = r.method.cutoff.as_ref().filter(|choice| choice.cutoff_hz != choice.motion_hz) else {
+        return String::new();
+    };
+    let error = |candidate: &CutoffCandidate| format!("{:.2}\u{a0}%", candidate.predicted_error_percent);
+    let of = |hz: f64| choice.candidates.iter().find(|candidate| candidate.cutoff_hz == hz).map(error);
+    let predicted = of(choice.cutoff_hz).zip(of(choice.motion_hz)).map_or(String::new(), |(chosen, other)| {
+        format!(" (predicted error of the model {chosen}, with the motion's own {other})")
+    });
+    wrapped(
+        &format!(
+            "positions filtered at {:.1}\u{a0}Hz{predicted}; held-out figures: torque below {:.1}\u{a0}Hz, where the motion is",
+            choice.cutoff_hz,
+            0.7 * choice.motion_hz
+        ),
+        2,
+    )
 }
 
 /// The free fit beside the model that is written, and whether the logs tell the two apart.

@@ -6,12 +6,12 @@ use super::provenance::Provenance;
 use crate::study::JointDrive;
 use dynident_estimation::consistent::ConsistencyTest;
 use dynident_estimation::{CorrelatedPair, EssentialReport};
-use dynident_identification::Role;
 use dynident_identification::consistent::ParameterInterval;
 use dynident_identification::estimators::{GrossErrors, NoiseInRegressor, PeriodicFit, SeriesFit, SimulatedFit};
 use dynident_identification::examination::{LogValidation, PriorAgreement, TorqueBand, TorqueLag, TorqueSignCheck};
 use dynident_identification::friction::FrictionCandidate;
 use dynident_identification::payload::{DriveGain, PayloadResult};
+use dynident_identification::{CutoffByError, Role};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};
 
@@ -142,6 +142,9 @@ pub struct MethodSummary {
     pub clusters: usize,
     /// From positions to accelerations, with the cut-off in force for all logs.
     pub motion: MotionSettings,
+    /// How that cut-off was chosen; none where the study states it, or the logs are too short to try any.
+    #[serde(default)]
+    pub cutoff: Option<CutoffByError>,
     /// Condition number of the weighted regressor's base columns.
     #[serde(deserialize_with = "number")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]

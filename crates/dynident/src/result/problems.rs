@@ -72,8 +72,12 @@ impl ResultFile {
 
     /// A held-out log that the written model explains far worse than the logs it was fitted to.
     fn overfit(&self, log: &LogValidation) -> Option<String> {
-        let fitted = self.training.physical.as_ref().map_or(&self.training.joints, |physical| &physical.joints);
-        let held_out = log.physical.as_ref().unwrap_or(&log.model);
+        // In one band: where figures are for the motion's own, the fit's is at hand for the unconstrained estimate.
+        let written = || self.training.physical.as_ref().map_or(&self.training.joints, |physical| &physical.joints);
+        let (fitted, held_out) = match &log.in_fit_band {
+            Some(report) => (&self.training.joints, report),
+            None => (written(), log.physical.as_ref().unwrap_or(&log.model)),
+        };
         let pairs = fitted.iter().zip(&held_out.joints).filter(|(fitted, _)| fitted.rmse_nm > 0.0);
         let squares: Vec<f64> = pairs.map(|(fitted, held)| (held.rmse_nm / fitted.rmse_nm).powi(2)).collect();
         let times = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
