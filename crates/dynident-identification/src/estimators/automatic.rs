@@ -1,0 +1,46 @@
+//! Weighted least squares where nothing speaks against it, instruments where noise in the regressor biases it.
+
+use super::exogeneity::{NoiseInRegressor, NoiseVerdict, examined};
+use super::instrumental::InstrumentSettings;
+use super::{Estimation, EstimatorError, TrainingRows};
+use dynident_estimation::{Estimate, EstimateStatus};
+
+/// The weighted estimate, or that of instruments where least squares is biased and they are strong.
+pub(super) fn automatic(
+    rows: &TrainingRows<'_>,
+    settings: &InstrumentSettings,
+    least_squares: Estimate,
+) -> Result<Estimation, EstimatorError> {
+    let Some((found, mut noise)) = examined_where_possible(rows, settings, &least_squares)? else {
+        return Ok(Estimation::plain(least_squares));
+    };
+    let is_sound = !found.instruments.weak && found.estimate.status != EstimateStatus::IterationLimit;
+    noise.instruments_taken = noise.verdict == NoiseVerdict::BiasesLeastSquares && is_sound;
+    let estimate = if noise.instruments_taken { found.estimate } else { least_squares };
+    Ok(Estimation { noise_in_regressor: Some(noise), ..Estimation::plain(estimate) })
+}
+
+/// What noise does to least squares, where that can be examined: all columns are the robot's own and free, all joints
+/// have rows, and no piece of a log is too short for a lower filter.
+///
+/// # Errors
+/// Logs that cannot be read.
+pub(super) fn examined_where_possible(
+    rows: &TrainingRows<'_>,
+    settings: &InstrumentSettings,
+    least_squares: &Estimate,
+) -> Result<Option<(dynident_estimation::InstrumentalEstimate, NoiseInRegressor)>, EstimatorError> {
+    let layout = rows.model.layout();
+    let is_plain = rows.problem.columns().len() == layout.columns().len()
+        && rows.problem.joints().len() == rows.model.dof()
+        && rows.settings.held.is_empty();
+    if !is_plain {
+        return Ok(None);
+    }
+    match examined(rows, settings, least_squares) {
+        Ok(found) => Ok(Some(found)),
+        // The estimate stands without it.
+        Err(EstimatorError::Estimation(_) | EstimatorError::Instruments { .. }) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
