@@ -7,10 +7,11 @@
 //! (Lepski, Theory Probab. Appl. 35 (1990) 454): as little noise as shows, as much of the motion as there is.
 
 use super::band_motion::regressor_cutoff_hz;
-use super::instrumental::{BandEstimate, InstrumentSettings, with_band};
+use super::instrumental::{BandEstimate, InstrumentSettings, fast_motion_problem, with_band};
 use super::{EstimatorError, TrainingRows};
 use dynident_estimation::{
-    Estimate, FastMotion, HausmanTest, InstrumentReport, InstrumentalEstimate, fast_motion, hausman_test,
+    Estimate, FastMotion, HausmanTest, HausmanVerdict, InstrumentReport, InstrumentalEstimate, fast_motion,
+    hausman_test, weighted_least_squares,
 };
 use serde::{Deserialize, Serialize};
 
@@ -23,8 +24,14 @@ const MOST_BANDS: usize = 12;
 /// Torque that follows less than this of the fast motion says that noise is a good part of it.
 const FOLLOWED: f64 = 0.75;
 /// Two estimates agree where they differ by less than this, in error bars of the one that is nearer to the truth: root
-/// mean square over the parameters, and largest.
-const AGREEMENT: [f64; 2] = [1.0, 3.0];
+/// mean square over the parameters, and largest. Two independent ones with the same bars differ by 1.4.
+const AGREEMENT: [f64; 2] = [1.5, 3.0];
+/// Where the fast motion would need less than this share of the torque, instruments of the first band show what its
+/// noise does; where more, they may hold so much of it themselves that lower ones are asked in any case.
+const LARGE_SHARE: f64 = 0.1;
+/// Noise cannot move the parameters by more error bars (root mean square) than `√(Σ_j ‖V_j θ‖² / σ_j² / p)`: below this
+/// it is no matter. Small, for where noise is large, θ and with it this bound are too.
+const LEAST_MOVE: f64 = 0.3;
 
 /// What noise in the regressor does to least squares.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -108,21 +115,21 @@ pub(super) fn examined(
     };
     let estimation = rows.settings;
     let fast = fast_motion(&first.problem, &first.found, estimation.rank, estimation.covariance)?;
-    let contrast = contrast(least_squares, &first.found.estimate);
-    let is_noise = fast.is_some_and(|fast| fast.followed + fast.half_width_95 < FOLLOWED);
-    let agrees = contrast.as_ref().is_none_or(agree);
-    let verdict = match (fast.is_some(), is_noise && !agrees) {
-        (_, true) => NoiseVerdict::BiasesLeastSquares,
-        // Weak instruments agree with least squares whatever is true.
-        (false, _) => NoiseVerdict::Undecided,
-        _ if first.found.instruments.weak => NoiseVerdict::Undecided,
-        _ => NoiseVerdict::Harmless,
+    let agrees = |band: &BandEstimate| contrast(least_squares, &band.found.estimate).as_ref().is_none_or(agree);
+    let noise = fast.filter(|fast| fast.followed + fast.half_width_95 < FOLLOWED);
+    let is_suspect = noise.is_some_and(|noise| noise.share_of_torque > LARGE_SHARE || !agrees(&first));
+    let chosen = if is_suspect && settings.cutoff_hz.is_none() && is_strong(&first, least_squares) {
+        settled_band(rows, settings, (first, least_squares))?
+    } else {
+        first
     };
-    let chosen = match (verdict, settings.cutoff_hz) {
-        (NoiseVerdict::BiasesLeastSquares, None) if is_strong(&first, least_squares) => {
-            settled_band(rows, settings, (first, least_squares))?
-        }
-        _ => first,
+    let verdict = if is_suspect && !agrees(&chosen) {
+        NoiseVerdict::BiasesLeastSquares
+    } else if fast.is_none() || chosen.found.instruments.weak {
+        // Weak instruments agree with least squares whatever is true.
+        NoiseVerdict::Undecided
+    } else {
+        NoiseVerdict::Harmless
     };
     let hausman = hausman_test(&chosen.problem, &chosen.found, &settings.hausman(estimation))?;
     let mut noise = NoiseInRegressor::of_test(chosen.found.instruments.clone(), hausman);
@@ -130,6 +137,39 @@ pub(super) fn examined(
     (noise.verdict, noise.fast_motion) = (verdict, fast);
     noise.least_squares = self::contrast(least_squares, &chosen.found.estimate);
     Ok((chosen.found, noise))
+}
+
+/// Whether noise can matter at all, from the torques alone that least squares' parameters need for the motion and for
+/// its part below half the cut-off: some milliseconds, where instruments take tens. None where they have to be asked.
+pub(super) fn harmless(
+    rows: &TrainingRows<'_>,
+    least_squares: &Estimate,
+) -> Result<Option<NoiseInRegressor>, EstimatorError> {
+    let cutoff_hz = SHARES[0] * regressor_cutoff_hz(rows)?;
+    let (problem, squares) = fast_motion_problem(rows, cutoff_hz, &least_squares.values)?;
+    let terms = squares.iter().zip(&least_squares.joint_sigma);
+    let move_squared: f64 =
+        terms.filter(|(_, sigma)| **sigma > 0.0).map(|(square, sigma)| square / sigma / sigma).sum();
+    let columns = least_squares.std.iter().filter(|std| **std > 0.0).count().max(1);
+    let settings = rows.settings.weighted();
+    let followed = weighted_least_squares(&problem, &settings).ok().filter(|fit| fit.rank.fixed.is_empty());
+    let followed = followed.map(|fit| (fit.values[0], fit.half_width_95[0]));
+    let is_motion = followed.is_none_or(|(followed, half_width)| followed + half_width > FOLLOWED);
+    if !is_motion && (move_squared / columns as f64).sqrt() > LEAST_MOVE {
+        return Ok(None);
+    }
+    let reason = "not made: torque follows the fast motion, or there is too little of it to matter".to_owned();
+    let (verdict, degrees_of_freedom) = (HausmanVerdict::Undecided, [0.0; 2]);
+    let test =
+        HausmanTest { verdict, f: None, degrees_of_freedom, p_value: None, columns: Vec::new(), reason: Some(reason) };
+    let instruments = InstrumentReport {
+        instruments: 0,
+        noisy_columns: Vec::new(),
+        weakest_f: None,
+        weakest_column: None,
+        weak: false,
+    };
+    Ok(Some(NoiseInRegressor { verdict: NoiseVerdict::Harmless, ..NoiseInRegressor::of_test(instruments, test) }))
 }
 
 /// The lowest of the shares whose instruments are strong, or the highest of them.

@@ -4,7 +4,7 @@
 use super::instruments::InstrumentSource;
 use super::{EstimatorError, TrainingRows};
 use crate::recording::{LogError, Samples};
-use crate::rows::{PANEL_SAMPLES, in_model_order, motion_band_hz};
+use crate::rows::{PANEL_SAMPLES, in_model_order, motion_band_hz, predicted_torque};
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_estimation::{EstimationError, SegmentedFactor};
 use dynident_model::terms::JointMotion;
@@ -16,8 +16,27 @@ pub(super) fn instrumented_factors(
     index: usize,
     source: &mut dyn InstrumentSource,
 ) -> Result<Vec<SegmentedFactor>, EstimatorError> {
+    made_rows(rows, index, None, source).map(|made| made.factors)
+}
+
+/// The factors of one log's `[(W − Z) θ | τ − Z θ]`, one for each joint, and each joint's `‖(W − Z) θ‖²`.
+pub(super) fn fast_motion_factors(
+    rows: &TrainingRows<'_>,
+    index: usize,
+    theta: &[f64],
+    source: &mut dyn InstrumentSource,
+) -> Result<(Vec<SegmentedFactor>, Vec<f64>), EstimatorError> {
+    made_rows(rows, index, Some(theta), source).map(|made| (made.factors, made.squares))
+}
+
+fn made_rows<'r, 'a>(
+    rows: &'r TrainingRows<'a>,
+    index: usize,
+    theta: Option<&'r [f64]>,
+    source: &mut dyn InstrumentSource,
+) -> Result<InstrumentedRows<'r, 'a>, EstimatorError> {
     let (logs, recording) = (rows.logs, &rows.logs.recordings[index]);
-    let mut builder = InstrumentedRows::new(rows, index)?;
+    let mut builder = InstrumentedRows::new(rows, index, theta)?;
     source.begin(index)?;
     if let Samples::Motion(_) = recording.samples {
         let Some(mut stream) = recording.open(rows.model.model(), &logs.motion)? else {
@@ -29,7 +48,7 @@ pub(super) fn instrumented_factors(
             builder.take(&block, source)?;
             logs.execution.progress.advance(block.rows as u64);
         }
-        return Ok(builder.factors);
+        return Ok(builder);
     }
     let mut refused = None;
     logs.pass(rows.model, index).each_block(&mut |block| {
@@ -38,7 +57,7 @@ pub(super) fn instrumented_factors(
         }
         Ok(())
     })?;
-    refused.map_or(Ok(builder.factors), Err)
+    refused.map_or(Ok(builder), Err)
 }
 
 /// Rows of both motions as they come.
@@ -47,8 +66,12 @@ struct InstrumentedRows<'r, 'a> {
     log: String,
     label: String,
     places: Vec<usize>,
-    /// Columns of each joint's `[Z | W]`.
+    /// Parameters, where only the torques of both motions are asked for.
+    theta: Option<&'r [f64]>,
+    /// Columns of each joint's rows beside the last.
     widths: Vec<usize>,
+    /// Each joint's sum of squares of its first column behind the filter.
+    squares: Vec<f64>,
     /// Made with the first block, which knows the rate.
     decimators: Option<Option<Vec<Decimator>>>,
     factors: Vec<SegmentedFactor>,
@@ -60,15 +83,18 @@ struct InstrumentedRows<'r, 'a> {
     motion: [Vec<f64>; 3],
     temperature_c: Vec<f64>,
     panel: Vec<f64>,
+    slow: Vec<f64>,
     out: Vec<f64>,
     segment: usize,
 }
 
 impl<'r, 'a> InstrumentedRows<'r, 'a> {
-    fn new(rows: &'r TrainingRows<'a>, index: usize) -> Result<Self, EstimatorError> {
+    fn new(rows: &'r TrainingRows<'a>, index: usize, theta: Option<&'r [f64]>) -> Result<Self, EstimatorError> {
         let recording = &rows.logs.recordings[index];
         let (model, layout) = (rows.model.model(), rows.model.layout());
-        let widths: Vec<usize> = (0..model.dof()).map(|joint| 2 * layout.joint_columns(joint).len()).collect();
+        let widths: Vec<usize> = (0..model.dof())
+            .map(|joint| if theta.is_some() { 1 } else { 2 * layout.joint_columns(joint).len() })
+            .collect();
         let label = recording.label();
         let factors = widths
             .iter()
@@ -81,6 +107,8 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
             log: recording.name.clone(),
             label,
             places: recording.places(model)?,
+            theta,
+            squares: vec![0.0; widths.len()],
             widths,
             decimators: None,
             factors,
@@ -91,6 +119,7 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
             motion: Default::default(),
             temperature_c: Vec::new(),
             panel: Vec::new(),
+            slow: Vec::new(),
             out: Vec::new(),
             segment: 0,
         })
@@ -151,19 +180,28 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
                 regressor_panels_following(model, &mut self.workspace, layout, &motion, history, panels);
             }
             for (joint, &place) in self.places.iter().enumerate() {
-                let width = self.widths[joint] / 2 * samples;
-                self.panel.clear();
-                for panels in &self.panels {
-                    self.panel.extend_from_slice(&panels.joint(joint)[..width]);
-                }
+                let columns = layout.joint_columns(joint);
                 let gain = self.rows.model.torque_gains.get(joint).copied().unwrap_or(1.0);
                 let torque = &measured.joint(measured.fitted_tau(), place)[from..from + samples];
-                self.panel.extend(torque.iter().map(|torque| gain * torque));
+                let [other, own] = &self.panels;
+                self.panel.clear();
+                if let Some(theta) = self.theta {
+                    predicted_torque(other.joint(joint), samples, columns, theta, &mut self.slow);
+                    predicted_torque(own.joint(joint), samples, columns, theta, &mut self.panel);
+                    self.panel.iter_mut().zip(&self.slow).for_each(|(own, slow)| *own -= slow);
+                    self.panel.extend(torque.iter().zip(&self.slow).map(|(torque, slow)| gain * torque - slow));
+                } else {
+                    let width = columns.len() * samples;
+                    self.panel.extend_from_slice(&other.joint(joint)[..width]);
+                    self.panel.extend_from_slice(&own.joint(joint)[..width]);
+                    self.panel.extend(torque.iter().map(|torque| gain * torque));
+                }
                 let (rows, panel) = match &mut decimators {
                     Some(decimators) => (decimators[joint].push(&self.panel, samples, &mut self.out), &self.out),
                     None => (samples, &self.panel),
                 };
                 if rows > 0 {
+                    self.squares[joint] += panel[..rows].iter().map(|value| value * value).sum::<f64>();
                     self.factors[joint]
                         .absorb(panel, rows)
                         .map_err(|source| LogError::Rows { log: self.label.clone(), source })?;

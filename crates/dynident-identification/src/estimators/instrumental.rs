@@ -2,13 +2,13 @@
 
 use super::band_motion::BandMotion;
 use super::exogeneity::NoiseInRegressor;
-use super::instrument_rows::instrumented_factors;
+use super::instrument_rows::{fast_motion_factors, instrumented_factors};
 use super::instruments::{InstrumentSource, SmoothedMotion};
 use super::{EstimationSettings, EstimatorError, TrainingRows};
 use crate::recording::Samples;
 use dynident_estimation::{
-    HausmanSettings, InstrumentalEstimate, InstrumentalSettings, InstrumentedProblem, SegmentedFactor, hausman_test,
-    instrumental_variables,
+    HausmanSettings, InstrumentalEstimate, InstrumentalSettings, InstrumentedProblem, LinearProblem, SegmentedFactor,
+    hausman_test, instrumental_variables,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -60,28 +60,58 @@ pub(super) struct BandEstimate {
     pub(super) found: InstrumentalEstimate,
 }
 
+/// A log's own motion below `cutoff_hz`.
+fn band_source<'r>(rows: &'r TrainingRows<'_>, index: usize, cutoff_hz: f64) -> Box<dyn InstrumentSource + 'r> {
+    match rows.logs.recordings[index].samples {
+        Samples::Log(_) => Box::new(BandMotion::new(rows, cutoff_hz)),
+        // Its raw samples, where they are at hand.
+        Samples::Motion(_) => Box::new(SmoothedMotion::new(rows.logs, rows.model.model(), cutoff_hz)),
+    }
+}
+
+/// Every training log's, side by side.
+fn of_every_log<T: Send>(
+    rows: &TrainingRows<'_>,
+    one: impl Fn(usize) -> Result<T, EstimatorError> + Sync,
+) -> Result<Vec<T>, EstimatorError> {
+    rows.begin("instruments");
+    let of_logs = if rows.logs.execution.parallel() {
+        rows.training.par_iter().map(|&index| one(index)).collect()
+    } else {
+        rows.training.iter().map(|&index| one(index)).collect()
+    };
+    rows.logs.end();
+    of_logs
+}
+
+/// `τ − Z θ = κ (W − Z) θ` with one κ, Z of the logs' own motion below `cutoff_hz`; and each joint's `‖(W − Z) θ‖²`.
+pub(super) fn fast_motion_problem(
+    rows: &TrainingRows<'_>,
+    cutoff_hz: f64,
+    theta: &[f64],
+) -> Result<(LinearProblem, Vec<f64>), EstimatorError> {
+    let logs =
+        of_every_log(rows, |index| fast_motion_factors(rows, index, theta, &mut *band_source(rows, index, cutoff_hz)))?;
+    let mut problem = LinearProblem::new(vec!["fast motion".to_owned()], rows.problem.joints().to_vec());
+    let mut squares = vec![0.0; rows.problem.joints().len()];
+    for (log, (factors, of_log)) in rows.problem.logs().iter().zip(logs) {
+        squares.iter_mut().zip(of_log).for_each(|(sum, square)| *sum += square);
+        for (joint, factor) in factors.into_iter().enumerate() {
+            problem.add(log, joint, vec![0], factor)?;
+        }
+    }
+    Ok((problem, squares))
+}
+
 /// With the logs' own motion below `cutoff_hz` as instruments.
 pub(super) fn with_band(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
     cutoff_hz: f64,
 ) -> Result<BandEstimate, EstimatorError> {
-    rows.begin("instruments");
-    let one = |&index: &usize| match rows.logs.recordings[index].samples {
-        Samples::Log(_) => instrumented_factors(rows, index, &mut BandMotion::new(rows, cutoff_hz)),
-        // Its raw samples, where they are at hand.
-        Samples::Motion(_) => {
-            let mut source = SmoothedMotion::new(rows.logs, rows.model.model(), cutoff_hz);
-            instrumented_factors(rows, index, &mut source)
-        }
-    };
-    let factors: Result<Vec<_>, _> = if rows.logs.execution.parallel() {
-        rows.training.par_iter().map(one).collect()
-    } else {
-        rows.training.iter().map(one).collect()
-    };
-    let problem = instrumented_problem(rows, factors?)?;
-    rows.logs.end();
+    let factors =
+        of_every_log(rows, |index| instrumented_factors(rows, index, &mut *band_source(rows, index, cutoff_hz)))?;
+    let problem = instrumented_problem(rows, factors)?;
     let found = instrumental_variables(&problem, &settings.instrumental(rows.settings))?;
     Ok(BandEstimate { cutoff_hz, problem, found })
 }

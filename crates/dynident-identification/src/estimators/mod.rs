@@ -9,6 +9,7 @@ mod automatic;
 mod band_motion;
 mod error;
 mod exogeneity;
+mod filtered_period;
 mod generalized;
 mod instrument_rows;
 mod instrumental;
