@@ -124,6 +124,10 @@ fn the_double_pendulum_has_a_rotor_between_its_joints() {
     assert_eq!(found.result.method.estimator, "instrumental");
     assert!(found.result.problems.is_empty(), "{:?}", found.result.problems);
     assert_published(&found, "left to itself");
+    // The cut-off follows the instruments down, so that held-out errors are about the robot.
+    let noise = found.result.noise_in_regressor.as_ref().unwrap();
+    let (before_hz, now_hz) = (noise.cutoff_before_hz.unwrap(), found.result.logs[0].motion_cutoff_hz.unwrap());
+    assert!(now_hz < 0.8 * before_hz, "{before_hz} and {now_hz} Hz");
 }
 
 /// The publishers' model 3.0 of design C.0: m2 r2 = 0.56394 * 0.32127, m1 r1 + 0.2 m2 = 0.64169 * 0.2 + 0.2 * 0.56394, I2
