@@ -23,8 +23,8 @@ const CUTOFF_OVER_INSTRUMENTS: f64 = 2.0;
 const WORTH_LOWERING: f64 = 0.8;
 
 /// The settings with the estimator that `auto` took. Where it took instruments and the cut-off was left to the data,
-/// rows and estimate are made again with a cut-off that lets less noise into the regressor: what least squares, held-out
-/// errors and delays are made from then shows the robot and not the noise.
+/// rows and estimate are made again with a cut-off that lets less noise into the regressor: what least squares,
+/// held-out errors and delays are made from then shows the robot and not the noise.
 pub(crate) fn with_less_noise<'a>(
     task: &'a IdentificationTask,
     chosen: &[usize],

@@ -24,9 +24,9 @@ pub(super) fn automatic(
     Ok(Estimation { noise_in_regressor: Some(noise), ..Estimation::plain(estimate) })
 }
 
-/// What noise does to least squares, with the instruments' estimate where these had to be asked; none where it cannot be
-/// examined: all columns are the robot's own and free, all joints
-/// have rows, and no piece of a log is too short for a lower filter.
+/// What noise does to least squares, with the instruments' estimate where these had to be asked; none where it cannot
+/// be examined: it can where all columns are the robot's own and free, all joints have rows, and no piece of a log is
+/// too short for a lower filter.
 ///
 /// # Errors
 /// Logs that cannot be read.

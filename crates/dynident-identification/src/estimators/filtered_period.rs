@@ -5,12 +5,11 @@
 //! that the filter runs around it and invents nothing.
 
 use crate::regressor_model::RegressorModel;
+use crate::rows::PANEL_SAMPLES;
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_model::terms::JointMotion;
 use dynident_recording::AveragedPeriods;
 use nalgebra::{DMatrix, DVector};
-
-use crate::rows::PANEL_SAMPLES;
 
 /// The low-pass and how many samples lie between rows.
 #[derive(Clone, Debug)]

@@ -27,8 +27,9 @@ const MOST_DIFFERENCE: f64 = 0.1;
 const NO_MOTION: f64 = 1e-4;
 /// Noise of a torque counts as at least this share of its root mean square.
 const LEAST_RELATIVE_SIGMA: f64 = 1e-4;
-/// Least steps of central differences of the regressor by position, velocity and acceleration; it is linear in the last.
-/// Where the noise of the mean period is larger, so is the step: the slope of a step of friction is that over the noise.
+/// Least steps of central differences of the regressor by position, velocity and acceleration; it is linear in the
+/// last. Where the noise of the mean period is larger, so is the step: the slope of a step of friction is that over the
+/// noise.
 const LEAST_STEPS: [f64; 3] = [1e-5, 1e-5, 1.0];
 
 /// The repeated motion.
@@ -124,8 +125,8 @@ struct MeanPeriod {
 
 /// The estimate, and what the periods give.
 ///
-/// Torque and regressor of the mean period pass the same parallel filter, and of the mean period as many instants count as
-/// it distinguishes.
+/// Torque and regressor of the mean period pass the same parallel filter, and of the mean period as many instants count
+/// as it distinguishes.
 pub(super) fn periodic(
     rows: &TrainingRows<'_>,
     periods: &PeriodSettings,

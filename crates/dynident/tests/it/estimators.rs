@@ -136,8 +136,8 @@ fn study_with_friction(method: &str, cutoff_hz: f64) -> String {
 fn periods_of_an_arm_with_dry_friction_give_its_parameters() {
     let folder = tempfile::tempdir().unwrap();
     let truth = write_periods_with_friction(folder.path(), 8, (1e-7, 1e-3));
-    // Nearly four times the motion's highest frequency, of which the two-way filter then takes nothing; friction reverses
-    // within samples, which is far faster, and must pass the same filter in torque and regressor.
+    // Nearly four times the motion's highest frequency, of which the two-way filter then takes nothing; friction
+    // reverses within samples, which is far faster, and must pass the same filter in torque and regressor.
     let text = study_with_friction("maximum-likelihood", 2.4) + &format!("periods.period_s = {PERIOD_S}");
     let job = Job::new(folder.path(), &text);
     let found = job.identify();

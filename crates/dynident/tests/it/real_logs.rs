@@ -130,8 +130,8 @@ fn the_double_pendulum_has_a_rotor_between_its_joints() {
     assert!(now_hz < 0.8 * before_hz, "{before_hz} and {now_hz} Hz");
 }
 
-/// The publishers' model 3.0 of design C.0: m2 r2 = 0.56394 * 0.32127, m1 r1 + 0.2 m2 = 0.64169 * 0.2 + 0.2 * 0.56394, I2
-/// = 0.053878 less six times Ir = 9.937e-5; the goal for this set is 5 %.
+/// The publishers' model 3.0 of design C.0: m2 r2 = 0.56394 * 0.32127, m1 r1 + 0.2 m2 = 0.64169 * 0.2 + 0.2 * 0.56394,
+/// I2 = 0.053878 less six times Ir = 9.937e-5; the goal for this set is 5 %.
 fn assert_published(found: &IdentificationOutcome, what: &str) {
     let published =
         [("mz2", -0.181_18), ("mz1 - 0.2 m2", -0.241_13), ("Iyy2 - 6 Ia_rotor", 0.053_878 - 6.0 * 9.937e-5)];
@@ -141,8 +141,8 @@ fn assert_published(found: &IdentificationOutcome, what: &str) {
     }
 }
 
-/// Noise biases least squares at every cut-off that may be chosen for the double pendulum; the estimate does not depend on
-/// which it is.
+/// Noise biases least squares at every cut-off that may be chosen for the double pendulum; the estimate does not depend
+/// on which it is.
 #[test]
 fn the_double_pendulum_is_found_at_any_cutoff() {
     let Some(data) = recordings() else { return };
