@@ -66,7 +66,8 @@ pub fn fast_motion(
     let settings = WeightedSettings { rank, covariance, ..WeightedSettings::default() };
     let Ok(fit) = weighted_least_squares(&fast, &settings) else { return Ok(None) };
     let (followed, half_width_95) = (fit.values[0], fit.half_width_95[0]);
-    if !fit.rank.fixed.is_empty() || !(followed.is_finite() && half_width_95.is_finite() && left > 0.0) {
+    let is_told = fit.rank.fixed.is_empty() && followed.is_finite() && half_width_95.is_finite() && left > 0.0;
+    if !is_told {
         return Ok(None);
     }
     Ok(Some(FastMotion { followed, half_width_95, share_of_torque: (left / (left + explained)).sqrt() }))

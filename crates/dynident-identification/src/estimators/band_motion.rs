@@ -70,7 +70,9 @@ impl InstrumentSource for BandMotion<'_, '_> {
         };
         for (order, values) in [&mut instruments.q, &mut instruments.dq, &mut instruments.ddq].into_iter().enumerate() {
             values.clear();
-            joints.iter().for_each(|joint| values.extend_from_slice(&joint[order][from..to]));
+            for joint in joints {
+                values.extend_from_slice(&joint[order][from..to]);
+            }
         }
         self.next = (piece, to);
         Ok(())

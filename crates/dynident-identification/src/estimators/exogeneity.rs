@@ -119,7 +119,7 @@ pub(super) fn examined(
     let noise = fast.filter(|fast| fast.followed + fast.half_width_95 < FOLLOWED);
     let is_suspect = noise.is_some_and(|noise| noise.share_of_torque > LARGE_SHARE || !agrees(&first));
     let chosen = if is_suspect && settings.cutoff_hz.is_none() && is_strong(&first, least_squares) {
-        settled_band(rows, settings, (first, least_squares))?
+        settled_band(rows, settings, (first, least_squares))
     } else {
         first
     };
@@ -194,7 +194,7 @@ fn settled_band(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
     (first, least_squares): (BandEstimate, &Estimate),
-) -> Result<BandEstimate, EstimatorError> {
+) -> BandEstimate {
     let mut bands = vec![first];
     while let Some(last) = bands.last().filter(|_| bands.len() <= MOST_BANDS) {
         // A piece may be too short for a low filter: the bands so far remain.
@@ -209,7 +209,7 @@ fn settled_band(
         lower.iter().all(|lower| contrast(band, &lower.found.estimate).as_ref().is_none_or(agree))
     };
     let place = (0..bands.len()).find(settles).unwrap_or(bands.len() - 1);
-    Ok(bands.swap_remove(place))
+    bands.swap_remove(place)
 }
 
 /// Whether the instruments tell all columns that least squares tells, and tell them well.

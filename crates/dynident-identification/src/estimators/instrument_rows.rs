@@ -72,8 +72,9 @@ struct InstrumentedRows<'r, 'a> {
     widths: Vec<usize>,
     /// Each joint's sum of squares of its first column behind the filter.
     squares: Vec<f64>,
-    /// Made with the first block, which knows the rate.
-    decimators: Option<Option<Vec<Decimator>>>,
+    /// Made with the first block, which knows the rate; none where every sample counts.
+    decimators: Option<Vec<Decimator>>,
+    has_begun: bool,
     factors: Vec<SegmentedFactor>,
     workspace: BatchWorkspace,
     /// What friction remembers of either motion, instruments first.
@@ -111,6 +112,7 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
             squares: vec![0.0; widths.len()],
             widths,
             decimators: None,
+            has_begun: false,
             factors,
             workspace: BatchWorkspace::new(model),
             histories: [history(), history()],
@@ -138,8 +140,8 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
     }
 
     fn take(&mut self, measured: &MotionBlock, source: &mut dyn InstrumentSource) -> Result<(), EstimatorError> {
-        if self.decimators.is_none() {
-            self.decimators = Some(self.decimators_at(measured.rate_hz)?);
+        if !self.has_begun {
+            (self.decimators, self.has_begun) = (self.decimators_at(measured.rate_hz)?, true);
         }
         source.motion(measured, &mut self.other)?;
         (self.other.rows, self.other.joints) = (measured.rows, measured.joints);
@@ -152,7 +154,7 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
                 return Err(EstimatorError::Instruments { log: self.log.clone(), message });
             }
         }
-        let mut decimators = self.decimators.as_mut().and_then(Option::as_mut);
+        let mut decimators = self.decimators.as_mut();
         if measured.segment != self.segment {
             self.segment = measured.segment;
             self.histories.iter_mut().for_each(TermHistory::restart);
