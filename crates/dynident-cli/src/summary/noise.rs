@@ -83,13 +83,11 @@ fn verdict(noise: &NoiseInRegressor, used: bool) -> String {
                 "noise of the positions would bias least squares: {followed}; instruments{band} avoid that{lowered}{figures}"
             )
         }
-        // The problems say so.
-        NoiseVerdict::BiasesLeastSquares => String::new(),
         NoiseVerdict::Harmless if used => {
             format!("instruments{band}; least squares would do: noise of the positions does not show{figures}")
         }
-        NoiseVerdict::Harmless => String::new(),
         NoiseVerdict::Undecided if used => format!("instruments{band}{figures}"),
-        NoiseVerdict::Undecided => String::new(),
+        // Nothing to say, or the problems say it.
+        NoiseVerdict::BiasesLeastSquares | NoiseVerdict::Harmless | NoiseVerdict::Undecided => String::new(),
     }
 }
