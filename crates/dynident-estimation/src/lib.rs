@@ -64,11 +64,12 @@ pub use factor::{
     TriangularFactor,
 };
 pub use linear::{
-    CrossProblem, GainProblem, GeneralizedEstimate, HausmanSettings, HausmanTest, HausmanVerdict, InstrumentReport,
-    InstrumentalEstimate, InstrumentalSettings, JointGain, KnownColumns, NoiseLevelSettings, NoiseWeightedEstimate,
-    OrdinarySettings, RobustEstimate, RobustSettings, RowBlock, RowVisitor, RowWeight, WeightedSettings,
-    generalized_least_squares, hausman_test, instrumental_variables, joint_gains, noise_weighted_least_squares,
-    ordinary_least_squares, robust_least_squares, weighted_least_squares, weighted_least_squares_with_known,
+    CrossProblem, FastMotion, GainProblem, GeneralizedEstimate, HausmanSettings, HausmanTest, HausmanVerdict,
+    InstrumentReport, InstrumentalEstimate, InstrumentalSettings, JointGain, KnownColumns, NoiseLevelSettings,
+    NoiseWeightedEstimate, OrdinarySettings, RobustEstimate, RobustSettings, RowBlock, RowVisitor, RowWeight,
+    WeightedSettings, fast_motion, generalized_least_squares, hausman_test, instrumental_variables, joint_gains,
+    noise_weighted_least_squares, ordinary_least_squares, robust_least_squares, weighted_least_squares,
+    weighted_least_squares_with_known,
 };
 pub use nonlinear::{
     ChannelNoise, ChannelRows, InstantRows, InstantVisitor, MaximumLikelihoodEstimate, MaximumLikelihoodSettings,

@@ -8,12 +8,13 @@ use crate::consistent::{
 use crate::diagnosis::{Diagnosis, diagnose};
 use crate::doubt::{break_limits, have_jumps, is_doubtful};
 use crate::error::IdentificationError;
-use crate::estimators::{Estimation, InstrumentSource, estimate};
+use crate::estimators::{Estimation, Estimator, InstrumentSource, estimate};
 use crate::examination::{
     FrictionSign, HeldOutExamination, LogTrace, LogValidation, ModelUnderTest, PriorAgreement, TorqueLag,
     TorqueSignCheck, Uncertainty, examine_training, friction_signs, pooled_delay, sign_evidence, tested_on,
 };
 use crate::execution::Execution;
+use crate::less_noise::{Estimated, with_less_noise};
 use crate::logs::{Logs, of_role};
 use crate::payload::{KnownArm, PayloadResult, payload_results};
 use crate::recording::Role;
@@ -80,6 +81,8 @@ pub struct Identification {
     pub cutoff: Option<CutoffByError>,
     /// The training recordings as factors, the model with the friction that was chosen, payload columns, gains.
     pub training: Training,
+    /// The estimator that made the estimate: of `auto` the one that it took.
+    pub estimator: Estimator,
     /// The estimate and what its estimator can determine.
     pub estimation: Estimation,
     /// What was held at zero because the data hardly determine it, if that was asked for.
@@ -192,7 +195,8 @@ fn identified(
     }
     settings.check_names(robot).map_err(IdentificationError::Consistency)?;
 
-    // Rows and factors, with the filters in force and the friction that the logs choose.
+    // Rows and factors, with the filters in force and the friction that the logs choose; then the estimate. Where noise
+    // in the regressor biases least squares, both once more with less of it.
     let cutoff_hz = job.arm().and_then(KnownArm::cutoff_hz);
     let logs = Logs::new(robot.model(), recordings, settings.filters(), &chosen, cutoff_hz, execution)?;
     let first = RegressorModel::from(robot.clone());
@@ -203,22 +207,22 @@ fn identified(
     };
     let refit = job.arm().map(KnownArm::refit);
     let training = training_rows((&logs, settings), robot.clone().into(), &chosen, payloads, refit)?;
-    let model = &training.model;
     let mut times =
         StageTimes { logs_s: training.timings_s[0], estimation_s: training.timings_s[1], examination_s: 0.0 };
-
-    // The estimate.
     let started = Instant::now();
-    let rows = training.rows((&logs, settings), &chosen);
-    let mut estimation = match job {
+    let estimation = match job {
         Job::Payload(arm) => {
-            Estimation::plain(arm.estimate(model, &training.columns, &training.problem, &settings.estimation)?)
+            let (model, columns) = (&training.model, &training.columns);
+            Estimation::plain(arm.estimate(model, columns, &training.problem, &settings.estimation)?)
         }
         Job::Model(source) => match &training.gains {
             Some((found, _)) => Estimation::plain(found.clone()),
-            None => estimate(&rows, source.take())?,
+            None => estimate(&training.rows((&logs, settings), &chosen), source.take())?,
         },
     };
+    let found = Estimated { logs, training, estimation, settings: settings.clone() };
+    let Estimated { logs, training, mut estimation, settings } = with_less_noise(task, &chosen, found)?;
+    let settings = &settings;
     let mut dropped = None;
     if let Some(essential_settings) = &settings.estimation.essential {
         let (rest, report) = essential(&estimation.estimate, essential_settings)?;
@@ -280,6 +284,7 @@ fn identified(
         motion: logs.motion.clone(),
         cutoff,
         training,
+        estimator: settings.estimation.estimator.clone(),
         estimation,
         essential: dropped,
         consistent,

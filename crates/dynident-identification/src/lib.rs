@@ -126,6 +126,7 @@ pub mod examination;
 mod execution;
 pub mod friction;
 mod identify;
+mod less_noise;
 mod logs;
 pub mod payload;
 mod progress;

@@ -37,7 +37,7 @@ pub struct ResultFile {
     pub robot: RobotSummary,
     /// How the fit was made.
     pub method: MethodSummary,
-    /// Whether noise in the regressor biases least squares; none unless the study asks for instruments.
+    /// Whether noise in the regressor biases least squares; none where that cannot be tested.
     pub noise_in_regressor: Option<NoiseInRegressor>,
     /// Rows that a robust estimator gave little weight; none for other estimators.
     pub gross_errors: Option<GrossErrors>,
@@ -130,7 +130,7 @@ pub struct RobotSummary {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct MethodSummary {
-    /// The study's `estimator.method`.
+    /// The study's `estimator.method`; of `auto` the one that it took, `weighted` or `instrumental`.
     pub estimator: String,
     /// `complete`, `not-all-excited` or `iteration-limit`.
     pub status: String,

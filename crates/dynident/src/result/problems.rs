@@ -1,6 +1,7 @@
 //! What speaks against loading a result's model into a robot.
 
 use super::{ResultFile, StudyCheck};
+use dynident_identification::estimators::{NoiseInRegressor, NoiseVerdict};
 use dynident_identification::examination::LogValidation;
 use dynident_recording::Level;
 
@@ -44,6 +45,7 @@ impl ResultFile {
                 self.method.estimator
             ));
         }
+        problems.extend(self.noise_in_regressor.as_ref().and_then(|noise| self.noise_problem(noise)));
         let tested = self.validation.iter().filter_map(|log| {
             let [free, written] = [&log.model, log.physical.as_ref()?].map(|report| Errors {
                 relative_percent: report.relative_error_percent,
@@ -68,6 +70,35 @@ impl ResultFile {
             problems.extend(worse_when_consistent("logs that were fitted to", &free, &written));
         }
         problems
+    }
+
+    /// An estimate that noise in the regressor biases by more than its error bars say, whichever estimator made it.
+    fn noise_problem(&self, noise: &NoiseInRegressor) -> Option<String> {
+        let by_instruments = self.method.estimator == "instrumental";
+        if by_instruments && noise.instruments.weak {
+            let column = noise.instruments.weakest_column.as_deref().unwrap_or("some parameter");
+            let f = noise.instruments.weakest_f.unwrap_or_default();
+            return Some(format!(
+                "the instruments are weak: they tell nearly nothing of {column} (first-stage F {f:.1}), and the estimate is biased as least squares is; \
+                 give estimator.instruments a higher cutoff_hz or leave it out, or move the robot faster"
+            ));
+        }
+        let is_plain = ["weighted", "ordinary", "generalized"].contains(&&self.method.estimator[..]);
+        if !is_plain || noise.verdict != NoiseVerdict::BiasesLeastSquares {
+            return None;
+        }
+        let followed = noise.fast_motion.map_or(0.0, |fast| 100.0 * fast.followed.clamp(0.0, 1.0));
+        let apart = noise.least_squares.as_ref().map_or(String::new(), |contrast| {
+            format!(", and instruments put {} {:.0} of their error bars away", contrast.column, contrast.largest)
+        });
+        let fix = if noise.instruments.weak {
+            "instruments of the logs' own motion are too weak to mend that: lower motion.differentiator's cutoff_hz, or record with less noise of the positions or a faster motion"
+        } else {
+            "take estimator.method = \"auto\", or lower motion.differentiator's cutoff_hz"
+        };
+        Some(format!(
+            "noise in the regressor biases least squares beyond its error bars: torque follows {followed:.0} % of the fast motion{apart}; {fix}"
+        ))
     }
 
     /// A held-out log that the written model explains far worse than the logs it was fitted to.

@@ -111,7 +111,6 @@ impl Study {
         settings.parallel_filter = self.parallel_filter.clone();
         settings.estimation = self.estimator.common();
         settings.estimation.estimator = self.estimator.estimator(|| self.simulated_loop(path, robot).map(Box::new))?;
-        settings.estimation.exogeneity_test.clone_from(&self.estimator.instruments);
         settings.consistency = self.estimator.physical.settings();
         settings.intervals = self.estimator.intervals;
         settings.friction = self.friction_searches(robot);

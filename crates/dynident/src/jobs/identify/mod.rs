@@ -138,7 +138,7 @@ fn identified(
 
     // What is written.
     let inertials = found.inertials();
-    let verdict = physical_verdict(study, &task, &found, &inertials);
+    let verdict = physical_verdict(study, &found, &inertials);
     let (files, no_urdf) = match exported_model(&robot, &task, &found, &verdict, arm.is_some()) {
         Ok(files) => (Some(files.with_provenance(&provenance)), None),
         Err(reason) => (None, Some(reason)),
@@ -173,18 +173,13 @@ fn known_arm(section: &ArmSection, folders: &Folders) -> Result<(std::path::Path
     Ok((path, stored))
 }
 
-fn physical_verdict(
-    study: &Study,
-    task: &IdentificationTask,
-    found: &Identification,
-    inertials: &[InertialParameters],
-) -> PhysicalVerdict {
+fn physical_verdict(study: &Study, found: &Identification, inertials: &[InertialParameters]) -> PhysicalVerdict {
     let consistent = &found.consistent;
     let mut verdict = verdict(found.model(), inertials, &consistent.parameters);
     if let Some(fit) = &consistent.fit {
         let arm_estimate = found.training.columns.arm_estimate(found.estimate());
         verdict.fit = Some(physical_fit_result(fit, &arm_estimate));
-        let is_fitted_to_logs = task.settings.estimation.estimator.is_plain() && study.arm.is_none();
+        let is_fitted_to_logs = found.estimator.is_plain() && study.arm.is_none();
         verdict.note = String::from(if is_fitted_to_logs {
             "of the consistent set that fits the logs best; the base parameters above it are the unconstrained estimate"
         } else {
@@ -263,7 +258,7 @@ fn result_file(
         problems: Vec::new(),
         provenance: Some(parts.provenance),
         robot: robot_summary(robot),
-        method: method_summary(found, study.estimator.method.name()),
+        method: method_summary(found, found.estimator.name()),
         noise_in_regressor: found.estimation.noise_in_regressor.clone(),
         gross_errors,
         noise_correlation,
