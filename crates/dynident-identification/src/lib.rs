@@ -116,6 +116,7 @@
 #![forbid(unsafe_code)]
 
 mod check;
+mod conditional;
 pub mod consistent;
 pub mod diagnosis;
 mod doubt;
@@ -136,6 +137,7 @@ mod task;
 mod training;
 
 pub use check::{StudyExamination, examine_study};
+pub use conditional::{Condition, Conditional, conditionals, resting_joints};
 pub use error::IdentificationError;
 pub use estimators::EstimationSettings;
 pub use execution::Execution;

@@ -82,7 +82,8 @@ pub(super) fn with_instruments(
 ) -> Result<(InstrumentalEstimate, NoiseInRegressor), EstimatorError> {
     let (problem, estimation) = (rows.problem, rows.settings);
     let mut instrumented = InstrumentedProblem::new(problem.columns().to_vec(), problem.joints().to_vec())
-        .with_fallback(problem.fallback().to_vec())?;
+        .with_fallback(problem.fallback().to_vec())?
+        .with_unexcited(problem.unexcited().clone())?;
     rows.begin("instruments");
     for (place, &index) in rows.training.iter().enumerate() {
         let factors = instrumented_factors(rows, index, source)?;

@@ -262,7 +262,8 @@ impl LoadColumns {
     /// A problem of other columns.
     pub fn arm_problem(&self, problem: &LinearProblem, x: &[f64]) -> Result<LinearProblem, EstimationError> {
         let mut arm = LinearProblem::new(problem.columns()[..self.base].to_vec(), problem.joints().to_vec())
-            .with_fallback(problem.fallback()[..self.base].to_vec())?;
+            .with_fallback(problem.fallback()[..self.base].to_vec())?
+            .with_unexcited(problem.unexcited().renumbered(|column| (column < self.base).then_some(column)))?;
         for equation in problem.equations() {
             let columns: Vec<usize> = equation.columns.iter().copied().filter(|&column| column < self.base).collect();
             let mut map = DMatrix::zeros(equation.columns.len() + 1, columns.len() + 1);

@@ -6,11 +6,13 @@
 mod builder;
 mod filter;
 mod mask;
+mod motion_noise;
 mod pass;
 mod reader;
 
 pub use builder::RowBuilder;
 pub(crate) use builder::in_model_order;
+pub(crate) use motion_noise::noise_factors;
 pub use filter::{ParallelFilterError, ParallelFilterSettings, motion_band_hz};
 pub use pass::{KeptLog, LogPass, LogStatistics};
 

@@ -1,6 +1,5 @@
 //! Samples that are left out of a block.
 
-use super::block::MotionBlock;
 use core::ops::Range;
 
 /// The runs of rows of a block that no mark touches. Marks (in any order, overlapping or not) count in a window whose
@@ -25,28 +24,6 @@ pub(crate) fn kept_runs(marked: &[Range<usize>], first: usize, rows: usize) -> V
     runs
 }
 
-/// Some rows of a block.
-pub(crate) fn part(block: &MotionBlock, run: &Range<usize>) -> MotionBlock {
-    let some = |values: &[f64]| -> Vec<f64> {
-        if values.is_empty() {
-            return Vec::new();
-        }
-        (0..block.joints).flat_map(|joint| block.joint(values, joint)[run.clone()].iter().copied()).collect()
-    };
-    MotionBlock {
-        rate_hz: block.rate_hz,
-        segment: block.segment,
-        first_time_s: block.first_time_s + run.start as f64 / block.rate_hz,
-        rows: run.len(),
-        joints: block.joints,
-        q: some(&block.q),
-        dq: some(&block.dq),
-        ddq: some(&block.ddq),
-        tau: some(&block.tau),
-        tau_smooth: some(&block.tau_smooth),
-        temperature_c: some(&block.temperature_c),
-    }
-}
 
 #[cfg(test)]
 mod tests {

@@ -12,6 +12,7 @@ mod design_tasks;
 mod differentiators;
 mod drive_gains;
 mod estimators;
+mod excitation;
 mod friction_choice;
 mod instruments;
 mod iteration_legs;
