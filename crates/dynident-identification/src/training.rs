@@ -187,7 +187,11 @@ impl Job<'_> {
             log.noise = noise_factors(&self.logs.pass(model, log.index), model, &log.statistics)?;
             Ok(())
         };
-        if self.logs.execution.parallel() { logs.par_iter_mut().try_for_each(one) } else { logs.iter_mut().try_for_each(one) }
+        if self.logs.execution.parallel() {
+            logs.par_iter_mut().try_for_each(one)
+        } else {
+            logs.iter_mut().try_for_each(one)
+        }
     }
 
     fn problem(

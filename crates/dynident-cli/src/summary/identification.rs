@@ -272,8 +272,11 @@ fn conditional(r: &ResultFile) -> String {
         } else {
             "their bars hold only if those are right, and nothing is known of them"
         };
-        let words =
-            format!("{} estimates hang on parameters held at the prior: {}; {bars}", hanging.len(), listed(&all, SHOWN));
+        let words = format!(
+            "{} estimates hang on parameters held at the prior: {}; {bars}",
+            hanging.len(),
+            listed(&all, SHOWN)
+        );
         text += &wrapped(&words, 2);
     }
     if !r.method.resting_joints.is_empty() {

@@ -41,7 +41,12 @@ impl InstrumentedProblem {
     /// A problem without data: names of the columns (parameters) and of the joints.
     pub fn new(columns: Vec<String>, joints: Vec<String>) -> Self {
         let both = columns.iter().map(|name| format!("instrument of {name}")).chain(columns.iter().cloned()).collect();
-        Self { fallback: vec![0.0; columns.len()], unexcited: Unexcited::default(), names: columns, rows: LinearProblem::new(both, joints) }
+        Self {
+            fallback: vec![0.0; columns.len()],
+            unexcited: Unexcited::default(),
+            names: columns,
+            rows: LinearProblem::new(both, joints),
+        }
     }
 
     /// Adds the rows of joint number `joint` in the log called `log`. The factor has the instruments first, one for
@@ -112,10 +117,9 @@ impl InstrumentedProblem {
     /// # Errors
     /// None that the construction has not ruled out.
     pub fn regressors(&self) -> Result<LinearProblem, EstimationError> {
-        let mut problem =
-            LinearProblem::new(self.names.clone(), self.joints().to_vec())
-                .with_fallback(self.fallback.clone())?
-                .with_unexcited(self.unexcited.clone())?;
+        let mut problem = LinearProblem::new(self.names.clone(), self.joints().to_vec())
+            .with_fallback(self.fallback.clone())?
+            .with_unexcited(self.unexcited.clone())?;
         for equation in self.rows.equations() {
             let count = equation.columns.len() / 2;
             let mut choice = DMatrix::zeros(2 * count + 1, count + 1);

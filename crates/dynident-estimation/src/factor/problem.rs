@@ -56,7 +56,15 @@ impl LinearProblem {
     /// A problem without data: names of the columns (parameters) and of the joints.
     pub fn new(columns: Vec<String>, joints: Vec<String>) -> Self {
         let fallback = vec![0.0; columns.len()];
-        Self { columns, joints, logs: Vec::new(), equations: Vec::new(), fallback, unexcited: Unexcited::default(), prior: None }
+        Self {
+            columns,
+            joints,
+            logs: Vec::new(),
+            equations: Vec::new(),
+            fallback,
+            unexcited: Unexcited::default(),
+            prior: None,
+        }
     }
 
     /// Adds the rows of joint number `joint` in the log called `log`; `columns` gives for every column of the factor
@@ -207,8 +215,8 @@ impl LinearProblem {
     }
 
     /// As [`combined`](Self::combined), where of each [unexcited](Self::with_unexcited) column only what the other
-    /// columns explain is left: `W_H` becomes `W_F (W_FᵀW_F)⁻¹W_FᵀW_H`, and nothing of a silent one. So the rows say what they know of the sums that
-    /// the held parameters stand in, and nothing that only noise says of them.
+    /// columns explain is left, `W_H` becomes `W_F (W_FᵀW_F)⁻¹W_FᵀW_H`, and nothing of a silent one. So the rows say
+    /// what they know of the sums that the held parameters stand in, and nothing that only noise says of them.
     ///
     /// # Errors
     /// As [`combined`](Self::combined); [`EstimationError::Overflow`] when the other columns are not independent.

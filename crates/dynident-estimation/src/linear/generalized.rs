@@ -76,7 +76,14 @@ impl CrossProblem {
                 }
             }
         }
-        Ok(Self { fallback: vec![0.0; columns.len()], unexcited: Unexcited::default(), columns, joints, joint_columns, logs: Vec::new() })
+        Ok(Self {
+            fallback: vec![0.0; columns.len()],
+            unexcited: Unexcited::default(),
+            columns,
+            joints,
+            joint_columns,
+            logs: Vec::new(),
+        })
     }
 
     /// Columns of a log's factor beside its last one (the last joint's torque): those of all joints, and the torques of
@@ -170,8 +177,9 @@ impl CrossProblem {
             block
         };
         let blocks: Vec<DMatrix<f64>> = (0..self.joints.len()).map(block).collect();
-        let mut problem =
-            LinearProblem::new(self.columns.clone(), vec!["all joints".into()]).with_fallback(self.fallback.clone())?.with_unexcited(self.unexcited.clone())?;
+        let mut problem = LinearProblem::new(self.columns.clone(), vec!["all joints".into()])
+            .with_fallback(self.fallback.clone())?
+            .with_unexcited(self.unexcited.clone())?;
         for (log, factor) in &self.logs {
             problem.add(log, 0, (0..count).collect(), factor.transformed(&blocks))?;
         }

@@ -181,7 +181,8 @@ fn linearised(
     let rows = problem.rows;
     let count = rows.columns().len();
     let names = rows.columns().iter().cloned().chain(rows.joints().iter().map(|joint| format!("1/gain {joint}")));
-    let mut linear = LinearProblem::new(names.collect(), rows.joints().to_vec()).with_fallback(x.to_vec())?
+    let mut linear = LinearProblem::new(names.collect(), rows.joints().to_vec())
+        .with_fallback(x.to_vec())?
         .with_unexcited(rows.unexcited().clone())?;
     for (number, equation) in rows.equations().iter().enumerate() {
         let (own, k) = (equation.columns.len(), x[count + equation.joint]);

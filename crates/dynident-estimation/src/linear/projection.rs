@@ -1,7 +1,9 @@
 //! The first stage of two: what the instruments explain of the regressor.
 
 use crate::error::EstimationError;
-use crate::factor::{FactorWorkspace, InstrumentedProblem, RankSettings, StackedProblem, TriangularFactor, Unexcited, split};
+use crate::factor::{
+    FactorWorkspace, InstrumentedProblem, RankSettings, StackedProblem, TriangularFactor, Unexcited, split,
+};
 use nalgebra::DMatrix;
 
 /// `W = Z Π + V` with `ZᵀV = 0`, over the weighted rows of all joints, from the triangle of `[Z | W | τ]`.

@@ -90,9 +90,8 @@ fn neither_order_nor_units_matter() {
     let (rows, made, _) = at_rest();
     let plain = found(&rows, &made, None).columns;
     let order = [4, 2, 0, 5, 3, 1];
-    let turned = |all: &[DMatrix<f64>]| -> Vec<DMatrix<f64>> {
-        all.iter().map(|rows| rows.select_columns(&order)).collect()
-    };
+    let turned =
+        |all: &[DMatrix<f64>]| -> Vec<DMatrix<f64>> { all.iter().map(|rows| rows.select_columns(&order)).collect() };
     let mut other: Vec<usize> =
         found(&turned(&rows), &turned(&made), None).columns.iter().map(|&column| order[column]).collect();
     other.sort_unstable();
@@ -114,6 +113,13 @@ fn without_noise_nothing_but_dependence_is_held() {
     let (rows, made, _) = at_rest();
     let none: Vec<DMatrix<f64>> = made.iter().map(|rows| rows * 0.0).collect();
     assert_eq!(found(&rows, &none, None).columns, [5]);
-    assert!(unexcited_columns(&problem(&rows, &[DVector::zeros(ROWS), DVector::zeros(ROWS)]),
-        &LinearProblem::new(vec!["p".into()], vec!["a".into(), "b".into()]), &[1.0; 2], None).is_err());
+    assert!(
+        unexcited_columns(
+            &problem(&rows, &[DVector::zeros(ROWS), DVector::zeros(ROWS)]),
+            &LinearProblem::new(vec!["p".into()], vec!["a".into(), "b".into()]),
+            &[1.0; 2],
+            None
+        )
+        .is_err()
+    );
 }

@@ -3,10 +3,10 @@
 use super::error::ConsistencyError;
 use super::settings::{ConsistencySettings, EllipsoidSettings};
 use dynident_dynamics::ParametricModel;
-use dynident_estimation::{LinearProblem, RankSettings};
 use dynident_estimation::consistent::{
     BaseMap, Ellipsoid, PhysicalBody, PhysicalFit, PhysicalProblem, PhysicalScalar, physical_fit, rough_body,
 };
+use dynident_estimation::{LinearProblem, RankSettings};
 use dynident_model::terms::TorqueTerm;
 use dynident_model::{Body, InertialParameters, Model};
 

@@ -6,10 +6,10 @@ use nalgebra::{DMatrix, DVector};
 
 /// The estimate with the error of the joints' gains in the covariance of its payloads.
 ///
-/// An estimate is linear in torque, `x = Σ_j x_j` with `x_j = (Σ_k W_kᵀW_k/σ_k²)⁻¹ W_jᵀ(τ_j − W_j θ_held)/σ_j²` the part
-/// that joint j's torque makes. A gain that is off by the share ε_j makes x_j larger by it, and the arm with it: of an arm
-/// that is held (`held`, found with the same gains) the torque is taken off first. With independent gains of standard
-/// deviation `share` the payload's covariance grows by `share² Σ_j x_j x_jᵀ`.
+/// An estimate is linear in torque, `x = Σ_j x_j` with `x_j = (Σ_k W_kᵀW_k/σ_k²)⁻¹ W_jᵀ(τ_j − W_j θ_held)/σ_j²` the
+/// part that joint j's torque makes. A gain that is off by the share ε_j makes x_j larger by it, and the arm with it:
+/// of an arm that is held (`held`, found with the same gains) the torque is taken off first. With independent gains of
+/// standard deviation `share` the payload's covariance grows by `share² Σ_j x_j x_jᵀ`.
 ///
 /// # Errors
 /// An estimate of other columns.
@@ -21,8 +21,7 @@ pub(crate) fn with_gain_error(
 ) -> Result<Estimate, EstimationError> {
     let mut wider = estimate.clone();
     let count = problem.columns().len();
-    let payload: Vec<usize> =
-        columns.payloads.iter().flat_map(|own| own.first..own.first + own.kept.len()).collect();
+    let payload: Vec<usize> = columns.payloads.iter().flat_map(|own| own.first..own.first + own.kept.len()).collect();
     if share <= 0.0 || payload.is_empty() {
         return Ok(wider);
     }

@@ -12,8 +12,8 @@ mod reader;
 
 pub use builder::RowBuilder;
 pub(crate) use builder::in_model_order;
-pub(crate) use motion_noise::noise_factors;
 pub use filter::{ParallelFilterError, ParallelFilterSettings, motion_band_hz};
+pub(crate) use motion_noise::noise_factors;
 pub use pass::{KeptLog, LogPass, LogStatistics};
 
 use crate::recording::LogError;

@@ -24,7 +24,6 @@ pub(crate) fn kept_runs(marked: &[Range<usize>], first: usize, rows: usize) -> V
     runs
 }
 
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -257,9 +257,13 @@ fn parameters(page: &mut Report, r: &ResultFile) {
     let columns = ["expression", "free fit", "± (95 %)", "± in %", "consistent set", "description", "unit"];
     page.add(Table::new("Base parameters", columns).rows(r.base_parameters.iter().map(row)));
     if !r.method.not_excited.is_empty() {
-        let mut points = vec![(Tone::Warning, format!("Not excited by the logs, held at the description's values: {}", r.method.not_excited.join(", ")))];
+        let mut points = vec![(
+            Tone::Warning,
+            format!("Not excited by the logs, held at the description's values: {}", r.method.not_excited.join(", ")),
+        )];
         if !r.method.resting_joints.is_empty() {
-            let text = format!("Not moved above the noise of the encoder by any log: {}", r.method.resting_joints.join(", "));
+            let text =
+                format!("Not moved above the noise of the encoder by any log: {}", r.method.resting_joints.join(", "));
             points.push((Tone::Warning, text));
         }
         page.add(Text { paragraphs: Vec::new(), points });
@@ -297,7 +301,13 @@ fn hanging(page: &mut Report, r: &ResultFile) {
     if rows.is_empty() {
         return;
     }
-    let columns = ["parameter", "free fit", "± (95 %) if these are right", "± (95 %) with what they may be wrong by", "held at the description's value"];
+    let columns = [
+        "parameter",
+        "free fit",
+        "± (95 %) if these are right",
+        "± (95 %) with what they may be wrong by",
+        "held at the description's value",
+    ];
     page.add(Table::new("Estimates that hang on parameters not excited", columns).rows(rows));
 }
 

@@ -6,12 +6,12 @@ use super::provenance::Provenance;
 use crate::study::JointDrive;
 use dynident_estimation::consistent::ConsistencyTest;
 use dynident_estimation::{CorrelatedPair, EssentialReport};
-use dynident_identification::{Condition, Role};
 use dynident_identification::consistent::ParameterInterval;
 use dynident_identification::estimators::{GrossErrors, NoiseInRegressor, PeriodicFit, SeriesFit, SimulatedFit};
 use dynident_identification::examination::{LogValidation, PriorAgreement, TorqueBand, TorqueLag, TorqueSignCheck};
 use dynident_identification::friction::FrictionCandidate;
 use dynident_identification::payload::{DriveGain, PayloadResult};
+use dynident_identification::{Condition, Role};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};
 
@@ -160,8 +160,8 @@ pub struct MethodSummary {
     /// Joints that no training log moves above the noise of their positions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub resting_joints: Vec<String>,
-    /// How well stated gains are known, one standard deviation in percent, as the bars of payloads hold it; none where they
-    /// count as exact.
+    /// How well stated gains are known, one standard deviation in percent, as the bars of payloads hold it; none where
+    /// they count as exact.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain_std_percent: Option<f64>,
     /// With load-dependent friction: the base parameters, by the estimate without it, whose torque is the load.

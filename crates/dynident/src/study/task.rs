@@ -75,6 +75,7 @@ impl Study {
             name: section.name.clone(),
             link: section.link.clone(),
             known: section.known(),
+            known_mass_kg: section.known_mass_kg(),
         };
         self.payload.iter().map(payload).collect()
     }

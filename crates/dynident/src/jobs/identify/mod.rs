@@ -8,7 +8,9 @@ use crate::jobs::check::diagnosis_check;
 use crate::jobs::log_summary::{held_out_summary, training_summary};
 use crate::jobs::options::{RunOptions, study_name};
 use crate::jobs::provenance::{beside, now, provenance, seen_from};
-use crate::result::{LogSummary, MethodSummary, PhysicalVerdict, Provenance, RESULT_SCHEMA, ResultFile, Timings, TrainingResult};
+use crate::result::{
+    LogSummary, MethodSummary, PhysicalVerdict, Provenance, RESULT_SCHEMA, ResultFile, Timings, TrainingResult,
+};
 use crate::study::{ArmSection, EstimatorMethod, Folders, Study, StudyRobot};
 use dynident_estimation::{Estimate, strongest_correlations};
 use dynident_identification::estimators::{Findings, InstrumentSource};
