@@ -7,8 +7,8 @@ const PIECE_SAMPLES: usize = 1 << 12;
 
 /// For every joint the standard deviation of white noise, one sample of its position, that has the density which the
 /// uniformly sampled positions `q` have between the cut-off and four times that, the lower quartile there: the noise
-/// that also stands below the cut-off, where the motion covers it. Zero for a joint whose position never changes, and where there are too few
-/// samples to tell.
+/// that also stands below the cut-off, where the motion covers it. Zero for a joint whose position never changes, and
+/// where there are too few samples to tell.
 ///
 /// A motion that the cut-off was made for has faded there: what is left of it would be a noise of far less than a
 /// hundredth of the acceleration below the cut-off. So a joint that moves is never taken for noise; and positions that
