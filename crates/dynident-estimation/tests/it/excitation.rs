@@ -2,8 +2,8 @@
 
 use crate::common::Random;
 use dynident_estimation::{
-    EstimateStatus, LinearProblem, SegmentSettings, SegmentedFactor, Unexcited, WeightedSettings, unexcited_columns,
-    weighted_least_squares,
+    EstimateStatus, LinearProblem, RankSettings, SegmentSettings, SegmentedFactor, Unexcited, WeightedSettings,
+    unexcited_columns, weighted_least_squares,
 };
 use nalgebra::{DMatrix, DVector};
 
@@ -23,9 +23,11 @@ fn problem(rows: &[DMatrix<f64>], tau: &[DVector<f64>]) -> LinearProblem {
     problem
 }
 
+type Rows = Vec<DMatrix<f64>>;
+
 /// Rows, what noise adds to them, torque. Columns: 0 and 1 are motion with a little noise; 2 is noise alone; 3 is
 /// constant, and so is 4 but for noise; 5 is zero.
-fn at_rest() -> (Vec<DMatrix<f64>>, Vec<DMatrix<f64>>, Vec<DVector<f64>>) {
+fn at_rest() -> (Rows, Rows, Vec<DVector<f64>>) {
     let mut random = Random::new(5);
     let noise = [0.01, 0.02, 0.3, 0.0, 0.05, 0.0];
     let (mut rows, mut made, mut torques) = (Vec::new(), Vec::new(), Vec::new());
@@ -79,7 +81,7 @@ fn what_noise_makes_is_held() {
     assert!((answers(4)[3] + 2.0).abs() < 0.05 && answers(4)[0].abs() < 0.05, "{:?}", answers(4));
     assert_eq!((answers(2), answers(5)), (vec![0.0; 6], vec![0.0; 6]));
     // Consistent bodies hear of the sum and not of the noise.
-    let factor = problem.combined_without_noise(&[1.0; JOINTS], &Default::default()).unwrap();
+    let factor = problem.combined_without_noise(&[1.0; JOINTS], &RankSettings::default()).unwrap();
     let norms = factor.column_norms();
     assert_eq!((norms[2], norms[5]), (0.0, 0.0));
     assert!((norms[4] - 2.0 * norms[3]).abs() < 0.05 * norms[3]);

@@ -26,7 +26,8 @@ pub(crate) fn kept_runs(marked: &[Range<usize>], first: usize, rows: usize) -> V
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::kept_runs;
+    use crate::MotionBlock;
 
     #[test]
     fn runs_are_what_the_marks_leave() {
@@ -45,7 +46,7 @@ mod tests {
             q: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
             ..MotionBlock::default()
         };
-        let part = part(&block, &(1..3));
+        let part = block.part(1..3);
         assert_eq!((part.rows, &part.q[..], part.tau.len()), (2, &[2.0, 3.0, 5.0, 6.0][..], 0));
         assert!((part.first_time_s - 0.1).abs() < 1e-15);
     }
