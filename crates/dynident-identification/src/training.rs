@@ -201,7 +201,8 @@ impl Job<'_> {
         logs: &[LogFactors],
     ) -> Result<LinearProblem, EstimationError> {
         let problem = self.stated_problem(model, columns, logs)?;
-        if logs.iter().all(|log| log.noise.is_none()) {
+        // Of an arm that is known nothing is estimated that the payload could be taken for.
+        if self.known_arm.is_some() || logs.iter().all(|log| log.noise.is_none()) {
             return Ok(problem);
         }
         let noise = self.rows_of(model, columns, logs, |log| log.noise.as_ref())?;

@@ -68,7 +68,8 @@ pub fn unexcited_columns(
         made.column_mut(column).unscale_mut(*norm);
     }
     let of_noise: Vec<f64> = made.column_iter().map(|column| column.norm_squared()).collect();
-    let worth = |column: usize| scales.map(|scales| scales[column] * norms[column]).filter(|worth| *worth > 0.0);
+    // A column without a scale is taken last: where nothing is known of it, others are estimated before it.
+    let worth = |column: usize| scales.map_or(f64::INFINITY, |scales| scales[column] * norms[column]);
     let mut left: Vec<usize> = (0..count).filter(|&column| norms[column] > 0.0).collect();
     loop {
         let mut next: Option<(usize, [f64; 2])> = None;
@@ -80,7 +81,7 @@ pub fn unexcited_columns(
             }
             // Rounding in place of no noise at all: a column that is exact comes before none that is exact too.
             let clear = own / threshold.max(DEPENDENT * DEPENDENT);
-            let rank = [worth(column).map_or(f64::INFINITY, |worth| own.sqrt() * worth), clear];
+            let rank = [own.sqrt() * worth(column), clear];
             if next.as_ref().is_none_or(|(_, best)| rank > *best) {
                 next = Some((place, rank));
             }
