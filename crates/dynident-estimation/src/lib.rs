@@ -61,7 +61,7 @@ pub use diagnostics::{
 pub use error::EstimationError;
 pub use factor::{
     InstrumentedProblem, JointRows, LinearProblem, Prior, RankSettings, SegmentSettings, SegmentedFactor,
-    TriangularFactor,
+    TriangularFactor, Unexcited, unexcited_columns,
 };
 pub use linear::{
     CrossProblem, FastMotion, GainProblem, GeneralizedEstimate, HausmanSettings, HausmanTest, HausmanVerdict,

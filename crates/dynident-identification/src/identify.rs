@@ -16,10 +16,10 @@ use crate::examination::{
 use crate::execution::Execution;
 use crate::less_noise::{Estimated, with_less_noise};
 use crate::logs::{Logs, of_role};
-use crate::payload::{KnownArm, PayloadResult, payload_results};
+use crate::payload::{KnownArm, PayloadResult, payload_results, with_gain_error};
 use crate::recording::Role;
 use crate::regressor_model::RegressorModel;
-use crate::settings::{DiagnosisChoice, IdentificationSettings};
+use crate::settings::{DiagnosisChoice, GainChoice, IdentificationSettings};
 use crate::task::IdentificationTask;
 use crate::training::{Training, training_rows};
 use dynident_estimation::consistent::PhysicalFit;
@@ -279,8 +279,12 @@ fn identified(
     };
     times.estimation_s += estimation_s;
     times.examination_s = started.elapsed().as_secs_f64() - estimation_s;
+    let of_arm = job.arm().map_or_else(Vec::new, |arm| arm.held(&training.model, &training.columns));
+    let gain_std = if settings.gains == GainChoice::Stated { settings.gain_std } else { 0.0 };
+    let estimated = (&estimation.estimate, &of_arm[..]);
+    let with_gains = with_gain_error(&training.problem, &training.columns, estimated, gain_std)?;
     Ok(Identification {
-        payloads: payload_results((recordings, payloads), &chosen, &training.columns, &estimation.estimate),
+        payloads: payload_results((recordings, payloads), &chosen, &training.columns, &with_gains),
         motion: logs.motion.clone(),
         cutoff,
         training,

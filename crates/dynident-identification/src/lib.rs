@@ -117,6 +117,7 @@
 
 mod bandwidth;
 mod check;
+mod conditional;
 pub mod consistent;
 pub mod diagnosis;
 mod doubt;
@@ -139,6 +140,7 @@ mod training;
 
 pub use bandwidth::{CutoffByError, CutoffCandidate, choose_cutoff};
 pub use check::{StudyExamination, examine_study};
+pub use conditional::{Condition, Conditional, conditionals, resting_joints};
 pub use error::IdentificationError;
 pub use estimators::EstimationSettings;
 pub use execution::Execution;

@@ -10,7 +10,7 @@ use dynident::identification::CutoffCandidate;
 use dynident::identification::consistent::ParameterInterval;
 use dynident::identification::examination::LogValidation;
 use dynident::identification::friction::FrictionCandidate;
-use dynident::result::LogSummary;
+use dynident::result::{BaseParameterResult, LogSummary};
 use std::path::Path;
 
 /// Base parameters shown with their error bars; the rest stand in the file.
@@ -248,7 +248,7 @@ fn parameters(r: &ResultFile) -> String {
     );
     let rows = order.iter().take(SHOWN).map(|&index| {
         let p = &r.base_parameters[index];
-        let [value, half_width] = with_deviation(p.value, p.half_width_95);
+        let [value, half_width] = with_deviation(p.value, p.bar_95());
         vec![value, half_width, p.unit.clone(), shortened(&p.expression, EXPRESSION)]
     });
     let header = ["value", "+- (95 %)", "unit", "base parameter"].map(str::to_owned);
@@ -273,6 +273,42 @@ fn parameters(r: &ResultFile) -> String {
         let names: Vec<&str> = r.method.not_excited.iter().map(String::as_str).collect();
         let held = format!("not excited by these logs, held at the prior: {}", listed(&names, 2 * SHOWN));
         text += &wrapped(&held, 2);
+        text += &conditional(r);
+    }
+    text
+}
+
+/// What the estimates hang on that stayed at the prior, and what would tell it.
+fn conditional(r: &ResultFile) -> String {
+    let hanging: Vec<_> = r.base_parameters.iter().filter(|p| !p.conditional_on.is_empty()).collect();
+    let mut text = String::new();
+    if !hanging.is_empty() {
+        let one = |p: &&BaseParameterResult| {
+            let on: Vec<&str> = p.conditional_on.iter().map(|condition| condition.on.as_str()).collect();
+            format!("{} on {}", p.symbol, listed(&on, 2))
+        };
+        let all: Vec<String> = hanging.iter().map(one).collect();
+        let all: Vec<&str> = all.iter().map(String::as_str).collect();
+        let bars = if hanging.iter().any(|p| p.half_width_95_with_nominal.is_some()) {
+            "their bars hold what a description may be wrong by (masses by 30\u{a0}%)"
+        } else {
+            "their bars hold only if those are right, and nothing is known of them"
+        };
+        let words = format!(
+            "{} estimates hang on parameters held at the prior: {}; {bars}",
+            hanging.len(),
+            listed(&all, SHOWN)
+        );
+        text += &wrapped(&words, 2);
+    }
+    if !r.method.resting_joints.is_empty() {
+        let joints: Vec<&str> = r.method.resting_joints.iter().map(String::as_str).collect();
+        let words = format!(
+            "no log moves {} above the noise of the encoder: record a motion of all joints (`dynident design` makes \
+             one; with `prior.result = \"result.json\"` in its [design] it looks for what these logs do not tell)",
+            listed(&joints, SHOWN)
+        );
+        text += &wrapped(&words, 2);
     }
     text
 }

@@ -139,7 +139,8 @@ fn instrumented_problem(
 ) -> Result<InstrumentedProblem, EstimatorError> {
     let problem = rows.problem;
     let mut instrumented = InstrumentedProblem::new(problem.columns().to_vec(), problem.joints().to_vec())
-        .with_fallback(problem.fallback().to_vec())?;
+        .with_fallback(problem.fallback().to_vec())?
+        .with_unexcited(problem.unexcited().clone())?;
     for (log, factors) in problem.logs().iter().zip(factors) {
         for (joint, factor) in factors.into_iter().enumerate() {
             instrumented.add(log, joint, rows.model.layout().joint_columns(joint), factor)?;

@@ -6,12 +6,14 @@
 mod builder;
 mod filter;
 mod mask;
+mod motion_noise;
 mod pass;
 mod reader;
 
 pub use builder::RowBuilder;
 pub(crate) use builder::in_model_order;
 pub use filter::{ParallelFilterError, ParallelFilterSettings, motion_band_hz};
+pub(crate) use motion_noise::noise_factors;
 pub use pass::{KeptLog, LogPass, LogStatistics};
 
 use crate::recording::LogError;

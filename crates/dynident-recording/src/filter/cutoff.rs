@@ -172,7 +172,7 @@ fn previous_power_of_two(n: usize) -> usize {
 
 /// Welch's power spectrum: bin k is the variance per bin of white noise of unit variance being one.
 /// Source: Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70.
-fn welch(signal: &[f64], length: usize) -> Option<Vec<f64>> {
+pub(crate) fn welch(signal: &[f64], length: usize) -> Option<Vec<f64>> {
     let transform = RealFftPlanner::<f64>::new().plan_fft_forward(length);
     let window: Vec<f64> =
         (0..length).map(|i| 0.5 - 0.5 * (core::f64::consts::TAU * (i as f64 + 0.5) / length as f64).cos()).collect();

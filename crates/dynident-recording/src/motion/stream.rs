@@ -1,12 +1,13 @@
 //! From a log file to q, dq, ddq and torque on a uniform clock, block by block.
 
 use super::block::{MotionBlock, MotionSettings};
-use super::marks::{kept_runs, part};
+use super::marks::kept_runs;
 use crate::clock::segments::Segmenter;
 use crate::clock::{Clock, clock};
 use crate::derivative::{Derivatives, Differentiator, Place};
 use crate::error::{FilterError, RecordingError};
 use crate::filter::cutoff::{CUTOFF_SAMPLES, CutoffChoice, cutoff};
+use crate::filter::position_noise;
 use crate::log::{Log, LogFormat, LogReader, Quantity, RawBlock};
 use crate::reference::Reference;
 use crate::report::ImportReport;
@@ -33,6 +34,7 @@ pub struct MotionStream {
     joints: Vec<String>,
     clock: Clock,
     cutoff: CutoffChoice,
+    position_noise: Vec<f64>,
     differentiator: Box<dyn Differentiator>,
     smooth_torque: bool,
     trim: usize,
@@ -146,7 +148,10 @@ impl MotionStream {
                 .map_err(|reason| RecordingError::NoRate { log: log.source().label(), column: time_label, reason })?,
         };
         let segmenter = Segmenter::new(&clock, format.max_gap_steps, 2 * joints.len());
-        let cutoff = cutoff(&longest_segment(segmenter, &prefix), clock.rate_hz);
+        let longest = longest_segment(segmenter, &prefix);
+        let cutoff = cutoff(&longest, clock.rate_hz);
+        let in_force_hz = settings.differentiator.cutoff_hz().unwrap_or(cutoff.cutoff_hz);
+        let position_noise = position_noise(&longest, clock.rate_hz, in_force_hz);
         let differentiator = build(&cutoff)?;
         let mut checks = Vec::new();
         for (quantity, _) in format.groups() {
@@ -178,6 +183,7 @@ impl MotionStream {
             time_check: TimeCheck::new(clock.median_step_s),
             clock,
             cutoff,
+            position_noise,
             differentiator,
             smooth_torque: settings.smooth_torque,
             uniform: vec![Vec::new(); channels],
@@ -405,7 +411,7 @@ impl MotionStream {
         for run in &runs {
             // A run at the block's start goes on with the piece before it.
             self.cuts += usize::from(run.start > 0 || self.in_cut);
-            let mut kept = part(block, run);
+            let mut kept = block.part(run.clone());
             kept.segment = self.segments + self.cuts;
             self.waiting.push_back(kept);
             self.in_cut = run.end < block.rows;
@@ -434,6 +440,7 @@ impl MotionStream {
             velocity: self.velocity.iter().map(|c| c.report(self.clock.rate_hz)).collect(),
             acceleration: self.acceleration.iter().map(|c| c.report(self.clock.rate_hz)).collect(),
             cutoff: self.cutoff.clone(),
+            position_noise: self.position_noise.clone(),
             findings: Vec::new(),
         };
         report.find();

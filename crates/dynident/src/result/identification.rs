@@ -11,7 +11,7 @@ use dynident_identification::estimators::{GrossErrors, NoiseInRegressor, Periodi
 use dynident_identification::examination::{LogValidation, PriorAgreement, TorqueBand, TorqueLag, TorqueSignCheck};
 use dynident_identification::friction::FrictionCandidate;
 use dynident_identification::payload::{DriveGain, PayloadResult};
-use dynident_identification::{CutoffByError, Role};
+use dynident_identification::{Condition, CutoffByError, Role};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};
 
@@ -160,6 +160,13 @@ pub struct MethodSummary {
     /// Base parameters that the data do not excite; they were held at the prior (or zero).
     #[serde(default)]
     pub not_excited: Vec<String>,
+    /// Joints that no training log moves above the noise of their positions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub resting_joints: Vec<String>,
+    /// How well stated gains are known, one standard deviation in percent, as the bars of payloads hold it; none where
+    /// they count as exact.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain_std_percent: Option<f64>,
     /// With load-dependent friction: the base parameters, by the estimate without it, whose torque is the load.
     pub load_parameters: Option<Vec<f64>>,
 }
@@ -204,14 +211,29 @@ pub struct BaseParameterResult {
     /// Of the physically consistent set in `bodies` and `joints`; none when that was not asked for.
     #[serde(default)]
     pub physical: Option<f64>,
+    /// The parameters at nominal that its value hangs on, the strongest first: right only if they are. Empty for one
+    /// that the logs tell on its own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub conditional_on: Vec<Condition>,
+    /// Half the width of the 95 % interval with what those may be wrong by (masses by 30 %, and so on); of one that is
+    /// not excited, what its nominal value may be wrong by. None where the logs tell it on their own, and where there
+    /// are no nominal values.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub half_width_95_with_nominal: Option<f64>,
     /// False when the data do not excite it; value is then the prior's and std means nothing.
     pub excited: bool,
 }
 
 impl BaseParameterResult {
-    /// `100 half_width_95 / |value|`; none for a value of zero and for what the data do not excite.
+    /// `100 bar_95 / |value|`; none for a value of zero and for what the data do not excite.
     pub fn relative_half_width_percent(&self) -> Option<f64> {
-        (self.excited && self.value != 0.0).then(|| 100.0 * self.half_width_95 / self.value.abs())
+        (self.excited && self.value != 0.0).then(|| 100.0 * self.bar_95() / self.value.abs())
+    }
+
+    /// Half the width of the 95 % interval that holds whatever the parameters at nominal are, as far as a description
+    /// can be wrong.
+    pub fn bar_95(&self) -> f64 {
+        self.half_width_95_with_nominal.unwrap_or(self.half_width_95)
     }
 }
 

@@ -75,6 +75,7 @@ impl Study {
             name: section.name.clone(),
             link: section.link.clone(),
             known: section.known(),
+            known_mass_kg: section.known_mass_kg(),
         };
         self.payload.iter().map(payload).collect()
     }
@@ -115,6 +116,7 @@ impl Study {
         settings.intervals = self.estimator.intervals;
         settings.friction = self.friction_searches(robot);
         (settings.offsets, settings.gains) = (self.drive.offsets, self.drive.gains);
+        settings.gain_std = 0.01 * self.drive.gain_std_percent.unwrap_or(0.0);
         Ok(settings)
     }
 

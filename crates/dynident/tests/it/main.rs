@@ -13,6 +13,7 @@ mod differentiators;
 mod drive_gains;
 mod estimators;
 mod exogeneity;
+mod excitation;
 mod friction_choice;
 mod instruments;
 mod iteration_legs;
