@@ -79,6 +79,8 @@ pub struct Identification {
     pub motion: MotionSettings,
     /// How the cut-off was chosen; none where it was given or the recordings are too short to try any.
     pub cutoff: Option<CutoffByError>,
+    /// The cut-off whose band held-out figures are for, where the fit has another.
+    pub motion_hz: Option<f64>,
     /// The training recordings as factors, the model with the friction that was chosen, payload columns, gains.
     pub training: Training,
     /// The estimator that made the estimate: of `auto` the one that it took.
@@ -287,6 +289,7 @@ fn identified(
         payloads: payload_results((recordings, payloads), &chosen, &training.columns, &with_gains),
         motion: logs.motion.clone(),
         cutoff,
+        motion_hz: logs.motion_hz(),
         training,
         estimator: settings.estimation.estimator.clone(),
         estimation,

@@ -47,7 +47,8 @@ pub(crate) fn with_less_noise<'a>(
         return Ok(found);
     }
     let execution = found.logs.execution;
-    let logs = Logs::new(robot.model(), recordings, settings.filters(), chosen, Some(lower_hz), execution)?;
+    let logs = Logs::new(robot.model(), recordings, settings.filters(), chosen, Some(lower_hz), execution)?
+        .with_motion_band(found.logs.motion_hz());
     let training = training_rows((&logs, &found.settings), robot.clone().into(), chosen, payloads, None)?;
     let mut estimation = estimate(&training.rows((&logs, &found.settings), chosen), None)?;
     if let Some(again) = &mut estimation.noise_in_regressor {

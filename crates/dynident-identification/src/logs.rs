@@ -16,8 +16,10 @@ pub(crate) struct LogSpectrum {
     pub(crate) index: usize,
     /// Samples a second.
     pub(crate) rate_hz: f64,
-    /// The cut-off that they suggest, and noise joint by joint, in the log's order of joints.
+    /// The cut-off that they suggest.
     pub(crate) choice: CutoffChoice,
+    /// Standard deviation of the noise of one sample, in the log's order of joints.
+    pub(crate) position_noise: Vec<f64>,
 }
 
 /// The recordings of a task and the filters in force. A log that fits into memory is read and
@@ -62,7 +64,8 @@ impl<'a> Logs<'a> {
             for &index in deciding {
                 if let Some(stream) = recordings[index].open(model, settings)? {
                     let (rate_hz, choice) = (stream.rate_hz(), stream.cutoff().clone());
-                    spectra.push(LogSpectrum { index, rate_hz, choice });
+                    let position_noise = stream.position_noise().to_vec();
+                    spectra.push(LogSpectrum { index, rate_hz, choice, position_noise });
                 }
             }
             let highest = spectra.iter().map(|log| log.choice.cutoff_hz).fold(0.0, f64::max);

@@ -112,19 +112,18 @@ fn headline(r: &ResultFile) -> String {
 
 /// Which torque the figures are for, where the fit has another band than the motion.
 fn bands(r: &ResultFile) -> String {
-    let Some(choice) = r.method.cutoff.as_ref().filter(|choice| choice.cutoff_hz != choice.motion_hz) else {
-        return String::new();
-    };
+    let in_force = r.method.motion.differentiator.cutoff_hz();
+    let (Some(motion_hz), Some(cutoff_hz)) = (r.method.motion_hz, in_force) else { return String::new() };
+    let candidates = r.method.cutoff.as_ref().map_or(&[][..], |choice| &choice.candidates);
     let error = |candidate: &CutoffCandidate| format!("{:.2}\u{a0}%", candidate.predicted_error_percent);
-    let of = |hz: f64| choice.candidates.iter().find(|candidate| candidate.cutoff_hz == hz).map(error);
-    let predicted = of(choice.cutoff_hz).zip(of(choice.motion_hz)).map_or(String::new(), |(chosen, other)| {
-        format!(" (predicted error of the model {chosen}, with the motion's own {other})")
+    let of = |hz: f64| candidates.iter().find(|candidate| candidate.cutoff_hz == hz).map(error);
+    let predicted = of(cutoff_hz).zip(of(motion_hz)).map_or(String::new(), |(chosen, other)| {
+        format!(" (predicted error of the model {chosen}, at the motion's own {motion_hz:.1}\u{a0}Hz {other})")
     });
     wrapped(
         &format!(
-            "positions filtered at {:.1}\u{a0}Hz{predicted}; held-out figures: torque below {:.1}\u{a0}Hz, where the motion is",
-            choice.cutoff_hz,
-            0.7 * choice.motion_hz
+            "positions filtered at {cutoff_hz:.1}\u{a0}Hz{predicted}; held-out figures: torque below {:.1}\u{a0}Hz, where the motion is",
+            0.7 * motion_hz
         ),
         2,
     )

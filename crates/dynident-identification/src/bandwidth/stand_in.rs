@@ -92,7 +92,7 @@ impl StandIn {
         let mut measured: Vec<MotionBlock> = Vec::new();
         let (mut noise_squares, mut reference_hz) = (vec![0.0_f64; dof], vec![0.0_f64; dof]);
         let (mut used, mut seen) = (0_u64, 0_u64);
-        for LogSpectrum { index, rate_hz, choice: spectrum } in bare {
+        for LogSpectrum { index, rate_hz, choice: spectrum, position_noise } in bare {
             let (recording, rate_hz) = (&logs.recordings[*index], *rate_hz);
             let Samples::Log(log) = &recording.samples else { continue };
             let places = recording.places(model.model())?;
@@ -130,7 +130,7 @@ impl StandIn {
             seen += recording.estimated_rows().unwrap_or(samples as u64).max(samples as u64);
             for (joint, &place) in places.iter().enumerate() {
                 reference_hz[joint] = reference_hz[joint].max(faded[place].unwrap_or(asked).min(highest_hz));
-                let noise = spectrum.position_noise.get(place).copied().unwrap_or(0.0);
+                let noise = position_noise.get(place).copied().unwrap_or(0.0);
                 noise_squares[joint] = noise_squares[joint].max(noise * noise);
             }
             measured.extend(pieces.finished());

@@ -28,10 +28,6 @@ pub struct CutoffChoice {
     /// Where each joint's motion has faded into the noise of its position; `None` for a joint that does not move.
     #[serde(default)]
     pub faded_hz: Vec<Option<f64>>,
-    /// Standard deviation of the position noise of one sample, joint by joint, rad (m): what is left of the spectrum
-    /// above the motion, taken for white.
-    #[serde(default)]
-    pub position_noise: Vec<f64>,
     /// The choice in a sentence.
     pub evidence: String,
 }
@@ -60,21 +56,17 @@ pub fn cutoff<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> CutoffChoice {
     let leading = leading.max_by(|a, b| a.1.power_hz.total_cmp(&b.1.power_hz));
     let joints_hz = joints.iter().map(|content| content.as_ref().map(asked)).collect();
     let faded_hz = joints.iter().map(|content| content.as_ref().map(|content| content.valley_hz)).collect();
-    let noise = |spectrum: &Option<Spectrum>| spectrum.as_ref().map_or(0.0, |spectrum| spectrum.floor.sqrt());
-    let position_noise = spectra.iter().map(noise).collect();
     match leading {
         None => CutoffChoice {
             cutoff_hz: 0.1 * rate_hz,
             joints_hz,
             faded_hz,
-            position_noise,
             evidence: "no joint moves above its noise: a tenth of the sampling rate".to_owned(),
         },
         Some((joint, content)) => CutoffChoice {
             cutoff_hz: asked(content),
             joints_hz,
             faded_hz,
-            position_noise,
             evidence: format!(
                 "joint {} (0-based) reaches highest: its acceleration fades into the noise ({:.1e} per sample of position) at {:.3} Hz, \
                  and 99.99 % of its power below that lies below {:.3} Hz; times {MARGIN}, at most {HIGHEST} of the rate",

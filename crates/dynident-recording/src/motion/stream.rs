@@ -216,6 +216,12 @@ impl MotionStream {
         &self.cutoff
     }
 
+    /// Standard deviation of the white noise of one sample of each joint's position: see
+    /// [`position_noise()`](crate::position_noise()).
+    pub fn position_noise(&self) -> &[f64] {
+        &self.position_noise
+    }
+
     /// Fills `block` with the next samples; false (and an empty block) at the end.
     ///
     /// # Errors

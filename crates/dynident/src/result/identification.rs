@@ -145,6 +145,10 @@ pub struct MethodSummary {
     /// How that cut-off was chosen; none where the study states it, or the logs are too short to try any.
     #[serde(default)]
     pub cutoff: Option<CutoffByError>,
+    /// Held-out figures are for the torque below 0.7 of this, the cut-off that the motion's spectrum asks for; none
+    /// where they are for the fit's own band.
+    #[serde(default)]
+    pub motion_hz: Option<f64>,
     /// Condition number of the weighted regressor's base columns.
     #[serde(deserialize_with = "number")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]

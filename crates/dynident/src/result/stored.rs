@@ -67,10 +67,9 @@ impl ResultFile {
         self.method.motion.differentiator.cutoff_hz()
     }
 
-    /// The motion's own band, where the fit's cut-off is another.
+    /// The cut-off whose band its held-out figures are for, where the fit has another.
     pub(crate) fn motion_hz(&self) -> Option<f64> {
-        let choice = self.method.cutoff.as_ref().filter(|choice| choice.cutoff_hz != choice.motion_hz)?;
-        Some(choice.motion_hz)
+        self.method.motion_hz
     }
 
     /// Its base parameters, which must be those of `model`.

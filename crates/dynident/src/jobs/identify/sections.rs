@@ -47,6 +47,7 @@ pub(super) fn method_summary(identification: &Identification, estimator: &str) -
         clusters: estimate.clusters,
         motion: motion.clone(),
         cutoff: identification.cutoff.clone(),
+        motion_hz: identification.motion_hz,
         condition_number: estimate.condition_number_raw,
         condition_number_scaled: estimate.condition_number_scaled,
         base_columns: "from the robot's structure: columns from base to tip, bodies then laws; a column that depends on earlier ones is regrouped into them"
