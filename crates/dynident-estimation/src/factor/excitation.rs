@@ -35,7 +35,8 @@ impl Unexcited {
     }
 }
 
-/// The columns that are not excited: nothing but noise and other columns.
+/// The columns that are not excited: nothing but noise and other columns. Columns that depend on others exactly are not
+/// among them: which of those are held is for the rank decision.
 ///
 /// `noise` is a problem of the same columns whose rows are what noise in the motion adds to the rows of `problem`, so
 /// that `NᵀN` is what it adds to `WᵀW`; `weights` are those of the joints, 1/σ. `scales`, where they are known, say how
@@ -96,6 +97,8 @@ pub fn unexcited_columns(
             made.column_mut(column).axpy(-share, &noise, 1.0);
         }
     }
+    // A column that others explain to the last digit is not the noise's business: rank decides which of them is held.
+    left.retain(|&column| rows.column(column).norm_squared() > DEPENDENT * DEPENDENT);
     // What the others explain of a column of noise is chance, and no larger than noise either.
     let is_noise = |column: &usize| 1.0 - rows.column(*column).norm_squared() <= ABOVE_NOISE * of_noise[*column];
     let mut silent: Vec<usize> = left.iter().copied().filter(is_noise).collect();

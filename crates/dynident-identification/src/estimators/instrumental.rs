@@ -8,7 +8,7 @@ use super::{EstimationSettings, EstimatorError, TrainingRows};
 use crate::recording::Samples;
 use dynident_estimation::{
     HausmanSettings, InstrumentalEstimate, InstrumentalSettings, InstrumentedProblem, LinearProblem, SegmentedFactor,
-    hausman_test, instrumental_variables,
+    Unexcited, hausman_test, instrumental_variables,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -124,7 +124,9 @@ pub(super) fn with_instruments(
 ) -> Result<(InstrumentalEstimate, NoiseInRegressor), EstimatorError> {
     rows.begin("instruments");
     let factors = rows.training.iter().map(|&index| instrumented_factors(rows, index, source));
-    let problem = instrumented_problem(rows, factors.collect::<Result<Vec<_>, _>>()?)?;
+    // Instruments from outside have no noise of these positions: they alone say what the logs excite.
+    let problem =
+        instrumented_problem(rows, factors.collect::<Result<Vec<_>, _>>()?)?.with_unexcited(Unexcited::default())?;
     rows.logs.end();
     let found = instrumental_variables(&problem, &settings.instrumental(rows.settings))?;
     let hausman = hausman_test(&problem, &found, &settings.hausman(rows.settings))?;

@@ -12,6 +12,8 @@ const MOST_TIMES_OF_ALL: f64 = 1.5;
 const MOST_TIMES_OF_JOINT: f64 = 2.5;
 /// Times what the fit leaves of the joints' torque (root mean square over the joints) that the written model may leave
 /// of a held-out log's. On ten real data sets it lies between 0.9 and 2.4; a fit of 58 parameters to three seconds
+/// Share of the fitted torque, percent, that no model worth writing leaves.
+const MOST_LEFT_PERCENT: f64 = 60.0;
 /// has 6.
 const MOST_TIMES_OF_FIT: f64 = 4.0;
 /// Percent of a held-out log's torque below which a model is good, however much better the fit may be.
@@ -46,6 +48,7 @@ impl ResultFile {
             ));
         }
         problems.extend(self.noise_in_regressor.as_ref().and_then(|noise| self.noise_problem(noise)));
+        problems.extend(self.unexplained());
         let tested = self.validation.iter().filter_map(|log| {
             let [free, written] = [&log.model, log.physical.as_ref()?].map(|report| Errors {
                 relative_percent: report.relative_error_percent,
@@ -99,6 +102,18 @@ impl ResultFile {
         Some(format!(
             "noise in the regressor biases least squares beyond its error bars: torque follows {followed:.0} % of the fast motion{apart}; {fix}"
         ))
+    }
+
+    /// A written model that leaves most of the torque that it was fitted to.
+    fn unexplained(&self) -> Option<String> {
+        let physical = self.training.physical.as_ref().map(|physical| physical.relative_error_percent);
+        let percent = physical.unwrap_or(self.training.relative_error_percent)?;
+        (percent > MOST_LEFT_PERCENT).then(|| {
+            format!(
+                "the model leaves {percent:.0} % of the torque that it was fitted to: the study does not describe this robot or these logs, or noise of \
+                 the positions covers the motion; run `dynident check`, and see `position_noise` of the logs"
+            )
+        })
     }
 
     /// A held-out log that the written model explains far worse than the logs it was fitted to.
