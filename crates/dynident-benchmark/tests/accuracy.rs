@@ -66,9 +66,9 @@ fn unknown_names_and_no_runs_are_reported() {
     assert!(matches!(none.validate(), Err(BenchmarkError::Runs { runs: 0 })));
 }
 
-/// The cut-off is chosen by what it does to the parameters, not by the motion's power: a slow motion with quiet encoders
-/// gains by a higher one than the spectrum asks for, and the default takes it. Two runs, so bounds are wider than the
-/// 1.15 that many runs are held to.
+/// The cut-off is chosen by what it does to the parameters, not by the motion's power: a slow motion with quiet
+/// encoders gains by a higher one than the spectrum asks for, and the default takes it. Two runs, so bounds are wider
+/// than the 1.15 that many runs are held to.
 #[test]
 fn a_slow_motion_gets_the_cutoff_that_its_parameters_need() -> Result<(), Box<dyn std::error::Error>> {
     let slow = CUTOFF_CELLS.iter().find(|cell| cell.robot == "Panda" && cell.position_noise_rad == 1e-4);

@@ -40,8 +40,8 @@ const ALIKE: f64 = 1.1;
 pub struct CutoffCandidate {
     /// The cut-off of the positions.
     pub cutoff_hz: f64,
-    /// Predicted error of the fitted model's torque on motion like the recordings', root mean square over joints, each in
-    /// percent of its torque's spread.
+    /// Predicted error of the fitted model's torque on motion like the recordings', root mean square over joints, each
+    /// in percent of its torque's spread.
     pub predicted_error_percent: f64,
 }
 
@@ -62,7 +62,8 @@ pub struct CutoffByError {
 /// not left to the data, or where the recordings are too short for a copy to say anything.
 ///
 /// The error of a candidate is that of the torque `W (θ̂ - θ)`, each joint in units of its torque's spread, over a
-/// motion that the fit has not seen: the recordings' own without noise, each joint at another time. Payloads do not count: recordings with one are passed over.
+/// motion that the fit has not seen: the recordings' own without noise, each joint at another time. Payloads do not
+/// count: recordings with one are passed over.
 ///
 /// # Errors
 /// Recordings that cannot be read.

@@ -181,14 +181,16 @@ impl StandIn {
         for piece in &mut self.pieces {
             let rows = piece.motion.rows;
             for (values, left) in piece.noise.chunks_exact_mut(rows).zip(&left) {
-                values.iter_mut().for_each(|value| *value *= left);
+                for value in values {
+                    *value *= left;
+                }
             }
         }
         Ok(())
     }
 
-    /// A piece's motion with fresh noise, `scale` times the recordings', through a differentiator; `None` where that does
-    /// not apply.
+    /// A piece's motion with fresh noise, `scale` times the recordings', through a differentiator; `None` where that
+    /// does not apply.
     fn noisy_motion(
         &self,
         piece: &Piece,
@@ -261,7 +263,7 @@ impl StandIn {
             let mut block = self.noisy_motion(piece, differentiator.as_ref(), (seed, 1.0))?;
             let rows = block.rows;
             let shift = (SHIFTS[copy % SHIFTS.len()] * rows as f64) as usize;
-            let sign = if copy % 2 == 0 { 1.0 } else { -1.0 };
+            let sign = if copy.is_multiple_of(2) { 1.0 } else { -1.0 };
             for (tau, noise) in block.tau.chunks_exact_mut(rows).zip(piece.noise.chunks_exact(rows)) {
                 for (row, tau) in tau.iter_mut().enumerate() {
                     *tau += sign * self.scale * noise[(row + shift) % rows];

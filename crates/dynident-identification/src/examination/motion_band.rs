@@ -41,9 +41,9 @@ impl<'a> MotionBand<'a> {
         let Some((_, segment, decimators)) = &mut self.filter else { return Ok(()) };
         if *segment != samples.segment {
             *segment = samples.segment;
-            decimators.iter_mut().for_each(|decimator| {
+            for decimator in decimators.iter_mut() {
                 decimator.finish();
-            });
+            }
         }
         let rows = samples.panels.samples();
         for (joint, decimator) in decimators.iter_mut().enumerate() {

@@ -165,7 +165,7 @@ fn intervals_from_periods_hold_the_truth_with_dry_friction() {
         }
     }
     // 95 % of a hundred: below 86 % by four deviations.
-    let share = inside as f64 / all as f64;
+    let share = inside as f64 / f64::from(all);
     assert!(share >= 0.86, "{inside} of {all}");
 }
 
