@@ -9,6 +9,7 @@
 //! error, filter bias and noise alike.
 
 mod stand_in;
+mod thinned;
 
 use crate::error::IdentificationError;
 use crate::logs::Logs;
@@ -28,8 +29,6 @@ const STEP: f64 = core::f64::consts::SQRT_2;
 const SPAN: [f64; 2] = [0.7, 6.0];
 /// No candidate comes closer to the sampling rate than this part of it.
 const HIGHEST: f64 = 0.4;
-/// Simulated copies of the recordings for each candidate.
-const COPIES: usize = 4;
 /// Candidates whose predicted error is within this factor of the least count: what a copy cannot hold (friction that is
 /// not as modelled, elasticity) makes smaller differences mean little.
 const ALIKE: f64 = 1.1;
@@ -49,7 +48,8 @@ pub struct CutoffCandidate {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CutoffByError {
-    /// The cut-off in force.
+    /// The cut-off that was chosen. Where noise biases least squares all the same, `auto` lowers it afterwards with its
+    /// instruments ([`NoiseInRegressor::cutoff_before_hz`](crate::estimators::NoiseInRegressor)).
     pub cutoff_hz: f64,
     /// What the positions' spectra alone ask for: twice the highest frequency of the motion. Held-out figures are for
     /// the torque below 0.7 of it, whatever cut-off the fit has.
@@ -94,13 +94,13 @@ pub fn choose_cutoff(
         .par_iter()
         .map(|&cutoff_hz| {
             let filter = filter_of_copy(&stand_in, cutoff_hz);
-            let mut sum = 0.0;
-            for copy in 0..COPIES {
-                let pieces = stand_in.copy(&settings.motion, cutoff_hz, copy)?;
-                let estimate = plain_fit(model.clone(), pieces, &filter, &plain).ok()?;
-                sum += stand_in.error(model, &estimate.values).powi(2);
+            let (mut sum, mut copies) = (0.0, 0.0);
+            for pieces in stand_in.copies(&settings.motion, cutoff_hz).ok()? {
+                let estimate = plain_fit(model.clone(), pieces?, &filter, &plain).ok()?;
+                sum += stand_in.square_error(model, &estimate.values);
+                copies += 1.0;
             }
-            Some((sum / COPIES as f64).sqrt()).filter(|error| error.is_finite())
+            Some(f64::sqrt(sum / copies)).filter(|error| error.is_finite())
         })
         .collect();
     let candidates: Vec<CutoffCandidate> = ladder

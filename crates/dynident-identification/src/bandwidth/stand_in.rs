@@ -1,5 +1,6 @@
 //! Recordings that stand in for themselves: their motion without its noise, a first fit's torque, and their noise.
 
+use super::thinned::Thinned;
 use crate::error::IdentificationError;
 use crate::logs::{LogSpectrum, Logs};
 use crate::recording::{LogError, Samples};
@@ -13,16 +14,18 @@ use dynident_recording::{
     DecimationSettings, Decimator, Derivatives, Differentiator, FilterError, MotionBlock, MotionSettings, MotionStream,
     Place, SampleRanges,
 };
-use std::sync::Arc;
+use nalgebra::{DMatrix, DMatrixView, DVector};
 
 /// Samples a second of the copy, in units of the highest candidate.
 const RATE: f64 = 4.0;
 /// Samples of all pieces together, at most: enough to tell errors apart, and milliseconds.
 const MOST_SAMPLES: usize = 4096;
+/// Simulated copies of the recordings.
+const COPIES: usize = 4;
 /// Shortest piece that counts.
 const SHORTEST: usize = 32;
 /// Of each copy, how far along its piece the torque's noise is moved.
-const SHIFTS: [f64; 4] = [0.29, 0.53, 0.83, 0.11];
+const SHIFTS: [f64; COPIES] = [0.29, 0.53, 0.83, 0.11];
 /// Part of the torque's noise that is kept where the noise of the positions seems to make all of it.
 const LEAST_LEFT: f64 = 1.0e-4;
 /// Periods of the slowest cut-off within which an end is felt.
@@ -34,21 +37,29 @@ const SEED: u64 = 0x005E_ED0F_7157;
 /// One uninterrupted piece.
 struct Piece {
     /// The motion without its noise and the torque that the first fit makes of it.
-    motion: Arc<MotionBlock>,
+    motion: MotionBlock,
     /// What the first fit leaves of the measured torque.
     noise: Vec<f64>,
+}
+
+/// What encoders and torque sensors say of a piece in one copy, joint-major.
+struct Measured {
+    q: Vec<f64>,
+    tau: Vec<f64>,
 }
 
 /// The recordings' motion and noise, and parameters that are known for once.
 pub(super) struct StandIn {
     pieces: Vec<Piece>,
-    /// The same motions with each joint at another time: postures and velocities that no fit has seen together.
-    unseen: Vec<MotionBlock>,
+    /// Copy by copy, piece by piece.
+    copies: Vec<Vec<Measured>>,
+    /// Joint by joint `WᵀW` over the same motions with each joint at another time (postures and velocities that no fit
+    /// has seen together), in units of the torque's spread; none for a joint without torque.
+    unseen: Vec<Option<DMatrix<f64>>>,
     theta: Vec<f64>,
     position_noise: Vec<f64>,
     /// What the noise of the torque is multiplied by, so that a part of the recordings is as uncertain as the whole.
     scale: f64,
-    spread: Vec<f64>,
     log_rate_hz: f64,
     thinning: usize,
 }
@@ -118,7 +129,7 @@ impl StandIn {
             let filter = DecimationSettings { factor: thinning, ..DecimationSettings::default() };
             let in_filter = |source| LogError::Filter { log: recording.name.clone(), source };
             let decimator = || Decimator::new(&filter, rate_hz, 1).map_err(in_filter);
-            let mut pieces = Thinned { thinning, dof, ..Thinned::default() };
+            let mut pieces = Thinned::new(thinning, dof);
             let mut block = MotionBlock::default();
             let mut samples = 0;
             while samples < each * thinning && stream.next_block(&mut block).map_err(named)? {
@@ -154,6 +165,7 @@ impl StandIn {
         if let Ok(reference) = reference {
             stand_in.take_motion_noise(model, &JointByJoint(reference))?;
         }
+        stand_in.copies = (0..COPIES).map(|copy| stand_in.measured(copy)).collect();
         Ok(Some(stand_in))
     }
 
@@ -164,8 +176,9 @@ impl StandIn {
         for (number, piece) in self.pieces.iter().enumerate() {
             // Both through the same filter: what it does to the ends is no noise.
             let seed = SEED ^ !(number as u64);
-            let of = |scale: f64| self.noisy_motion(piece, reference, (seed, scale));
-            let (Some(noisy), Some(clean)) = (of(1.0), of(0.0)) else { return Ok(()) };
+            let of = |q: &[f64]| differentiated(&piece.motion, q, reference);
+            let noisy = of(&self.noisy_positions(piece, seed));
+            let (Some(noisy), Some(clean)) = (noisy, of(&piece.motion.q)) else { return Ok(()) };
             let (with_noise, without) = (torque(model, &noisy, &self.theta)?, torque(model, &clean, &self.theta)?);
             for (joint, (all, of_motion)) in all.iter_mut().zip(&mut of_motion).enumerate() {
                 let squares = |x: &mut dyn Iterator<Item = f64>| x.map(|x| x * x).sum::<f64>();
@@ -189,27 +202,27 @@ impl StandIn {
         Ok(())
     }
 
-    /// A piece's motion with fresh noise, `scale` times the recordings', through a differentiator; `None` where that
-    /// does not apply.
-    fn noisy_motion(
-        &self,
-        piece: &Piece,
-        differentiator: &dyn Differentiator,
-        (seed, scale): (u64, f64),
-    ) -> Option<MotionBlock> {
-        let (rows, mut block) = (piece.motion.rows, MotionBlock::clone(&piece.motion));
-        let (mut random, mut noisy) = (Random::new(seed), vec![0.0; rows]);
-        for joint in 0..block.joints {
-            let own = joint * rows..(joint + 1) * rows;
-            for (noisy, q) in noisy.iter_mut().zip(&piece.motion.q[own.clone()]) {
-                *noisy = q + scale * self.position_noise[joint] * random.normal();
+    /// A piece's positions with fresh noise.
+    fn noisy_positions(&self, piece: &Piece, seed: u64) -> Vec<f64> {
+        let mut random = Random::new(seed);
+        let joints = piece.motion.q.chunks_exact(piece.motion.rows).zip(&self.position_noise);
+        joints.flat_map(|(q, noise)| q.iter().map(|q| q + noise * random.normal()).collect::<Vec<_>>()).collect()
+    }
+
+    /// Copy number `copy` of all pieces: fresh noise on the positions, the torque's own at another time.
+    fn measured(&self, copy: usize) -> Vec<Measured> {
+        let sign = if copy.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let one = |(number, piece): (usize, &Piece)| {
+            let (rows, mut tau) = (piece.motion.rows, piece.motion.tau.clone());
+            let shift = (SHIFTS[copy] * rows as f64) as usize;
+            for (tau, noise) in tau.chunks_exact_mut(rows).zip(piece.noise.chunks_exact(rows)) {
+                for (row, tau) in tau.iter_mut().enumerate() {
+                    *tau += sign * self.scale * noise[(row + shift) % rows];
+                }
             }
-            let out =
-                Derivatives { q: &mut block.q[own.clone()], dq: &mut block.dq[own.clone()], ddq: &mut block.ddq[own] };
-            let place = Place { joint, ..Place::start(block.rate_hz) };
-            differentiator.differentiate_at(place, &noisy, out).ok()?;
-        }
-        Some(block)
+            Measured { q: self.noisy_positions(piece, SEED ^ ((copy as u64) << 32) ^ number as u64), tau }
+        };
+        self.pieces.iter().enumerate().map(one).collect()
     }
 
     /// The first fit, its torque and what it leaves.
@@ -237,11 +250,11 @@ impl StandIn {
             let torque = torque(model, &block, &theta)?;
             let noise = block.tau.iter().zip(&torque).map(|(measured, torque)| measured - torque).collect();
             block.tau = torque;
-            pieces.push(Piece { motion: Arc::new(block), noise });
+            pieces.push(Piece { motion: block, noise });
         }
-        let unseen = pieces.iter().map(|piece| shifted(&piece.motion)).collect();
-        let spread = (0..model.dof()).map(|joint| spread(&pieces, joint)).collect();
-        Ok(Some(Self { pieces, unseen, theta, position_noise: Vec::new(), scale: 1.0, spread, log_rate_hz, thinning }))
+        let unseen = unseen_rows(model, &pieces)?;
+        let (copies, position_noise) = (Vec::new(), Vec::new());
+        Ok(Some(Self { pieces, copies, unseen, theta, position_noise, scale: 1.0, log_rate_hz, thinning }))
     }
 
     /// Samples a second of the recordings.
@@ -254,58 +267,55 @@ impl StandIn {
         self.thinning
     }
 
-    /// Copy number `copy` of the recordings as a fit with this cut-off sees them; `None` where the filter does not
-    /// apply.
-    pub(super) fn copy(&self, settings: &MotionSettings, cutoff_hz: f64, copy: usize) -> Option<Vec<MotionBlock>> {
-        let differentiator = settings.differentiator.clone().with_cutoff(cutoff_hz).build(cutoff_hz).ok()?;
-        let one = |(number, piece): (usize, &Piece)| {
-            let seed = SEED ^ ((copy as u64) << 32) ^ number as u64;
-            let mut block = self.noisy_motion(piece, differentiator.as_ref(), (seed, 1.0))?;
-            let rows = block.rows;
-            let shift = (SHIFTS[copy % SHIFTS.len()] * rows as f64) as usize;
-            let sign = if copy.is_multiple_of(2) { 1.0 } else { -1.0 };
-            for (tau, noise) in block.tau.chunks_exact_mut(rows).zip(piece.noise.chunks_exact(rows)) {
-                for (row, tau) in tau.iter_mut().enumerate() {
-                    *tau += sign * self.scale * noise[(row + shift) % rows];
-                }
-            }
-            Some(block)
-        };
-        self.pieces.iter().enumerate().map(one).collect()
+    /// The copies of the recordings as a fit with this cut-off sees them, one after another; `None` for one to which the
+    /// filter does not apply.
+    pub(super) fn copies(
+        &self,
+        settings: &MotionSettings,
+        cutoff_hz: f64,
+    ) -> Result<impl Iterator<Item = Option<Vec<MotionBlock>>>, FilterError> {
+        let differentiator = settings.differentiator.clone().with_cutoff(cutoff_hz).build(cutoff_hz)?;
+        Ok(self.copies.iter().map(move |copy| {
+            let one = |(piece, Measured { q, tau }): (&Piece, &Measured)| {
+                let motion = differentiated(&piece.motion, q, differentiator.as_ref())?;
+                Some(MotionBlock { tau: tau.clone(), ..motion })
+            };
+            self.pieces.iter().zip(copy).map(one).collect()
+        }))
     }
 
-    /// Root mean square over joints of the torque that parameters `values` predict beside that of the first fit's, on
-    /// motion without noise that the fit has not seen, each in units of its spread.
-    pub(super) fn error(&self, model: &RegressorModel, values: &[f64]) -> f64 {
-        let difference: Vec<f64> = self.theta.iter().zip(values).map(|(known, found)| found - known).collect();
-        let dof = model.dof();
-        let (mut squares, mut rows) = (vec![0.0; dof], 0);
-        for motion in &self.unseen {
-            let Ok(torque) = torque(model, motion, &difference) else { return f64::INFINITY };
-            rows += motion.rows;
-            for (joint, square) in squares.iter_mut().enumerate() {
-                *square += motion.joint(&torque, joint).iter().map(|x| x * x).sum::<f64>();
-            }
-        }
-        let moving: Vec<f64> = squares
-            .iter()
-            .zip(&self.spread)
-            .filter(|(_, spread)| **spread > 0.0)
-            .map(|(square, spread)| square / (rows as f64 * spread * spread))
-            .collect();
-        (moving.iter().sum::<f64>() / moving.len().max(1) as f64).sqrt()
+    /// Mean square over joints of the torque that parameters `values` predict beside that of the first fit's, on motion
+    /// without noise that the fit has not seen, each in units of its spread.
+    pub(super) fn square_error(&self, model: &RegressorModel, values: &[f64]) -> f64 {
+        let of_joint = |(joint, squares): (usize, &Option<DMatrix<f64>>)| {
+            let columns = model.layout().joint_columns(joint).iter();
+            let difference =
+                DVector::from_iterator(columns.len(), columns.map(|&column| values[column] - self.theta[column]));
+            squares.as_ref().map(|squares| (squares * &difference).dot(&difference).max(0.0))
+        };
+        let joints: Vec<f64> = self.unseen.iter().enumerate().filter_map(of_joint).collect();
+        joints.iter().sum::<f64>() / joints.len().max(1) as f64
     }
+}
+
+/// A motion with positions `q` (joint-major) and their derivatives in place of its own; `None` where the differentiator
+/// does not apply.
+fn differentiated(motion: &MotionBlock, q: &[f64], differentiator: &dyn Differentiator) -> Option<MotionBlock> {
+    let (rows, mut block) = (motion.rows, motion.clone());
+    for (joint, q) in q.chunks_exact(rows).enumerate() {
+        let own = joint * rows..(joint + 1) * rows;
+        let out =
+            Derivatives { q: &mut block.q[own.clone()], dq: &mut block.dq[own.clone()], ddq: &mut block.ddq[own] };
+        let place = Place { joint, ..Place::start(block.rate_hz) };
+        differentiator.differentiate_at(place, q, out).ok()?;
+    }
+    Some(block)
 }
 
 /// A motion without so many samples at both ends, but at least its middle half.
 fn inside(motion: &MotionBlock, ends: usize) -> MotionBlock {
     let ends = ends.min(motion.rows / 4);
-    let rows = motion.rows - 2 * ends;
-    let part = |values: &[f64]| -> Vec<f64> {
-        values.chunks_exact(motion.rows.max(1)).flat_map(|joint| &joint[ends..ends + rows]).copied().collect()
-    };
-    let MotionBlock { q, dq, ddq, tau, .. } = motion;
-    MotionBlock { rows, q: part(q), dq: part(dq), ddq: part(ddq), tau: part(tau), ..motion.clone() }
+    motion.part(ends..motion.rows - ends)
 }
 
 /// The same motion with each joint at another time; each goes on at its start behind its end.
@@ -330,69 +340,38 @@ fn spread(pieces: &[Piece], joint: usize) -> f64 {
     (values().map(|x| (x - mean) * (x - mean)).sum::<f64>() / count).sqrt()
 }
 
-/// A log's blocks at a lower rate, piece by piece, joints in the model's order.
-#[derive(Default)]
-struct Thinned {
-    thinning: usize,
-    dof: usize,
-    pieces: Vec<MotionBlock>,
-    segment: Option<usize>,
-    decimators: Vec<Decimator>,
-    columns: [Vec<Vec<f64>>; 4],
-    out: Vec<f64>,
-    rate_hz: f64,
+/// What [`StandIn::unseen`] holds.
+fn unseen_rows(model: &RegressorModel, pieces: &[Piece]) -> Result<Vec<Option<DMatrix<f64>>>, LogError> {
+    struct Squares<'a>(&'a RegressorModel, Vec<DMatrix<f64>>);
+    impl RowConsumer for Squares<'_> {
+        fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
+            let columns = self.0.layout().joint_columns(rows.joint).len();
+            let panel = DMatrixView::from_slice(&rows.panel[..columns * rows.rows], rows.rows, columns);
+            self.1[rows.joint].gemm_tr(1.0, &panel, &panel, 1.0);
+            Ok(())
+        }
+    }
+    let empty = |joint| {
+        let columns = model.layout().joint_columns(joint).len();
+        DMatrix::zeros(columns, columns)
+    };
+    let mut squares = Squares(model, (0..model.dof()).map(empty).collect());
+    for piece in pieces {
+        every_sample(model, &shifted(&piece.motion), &mut squares)?;
+    }
+    let rows: usize = pieces.iter().map(|piece| piece.motion.rows).sum();
+    let in_spreads = |(joint, squares): (usize, DMatrix<f64>)| {
+        let spread = spread(pieces, joint);
+        (spread > 0.0).then(|| squares / (rows as f64 * spread * spread))
+    };
+    Ok(squares.1.into_iter().enumerate().map(in_spreads).collect())
 }
 
-impl Thinned {
-    fn take(
-        &mut self,
-        block: &MotionBlock,
-        places: &[usize],
-        rows: usize,
-        decimator: &dyn Fn() -> Result<Decimator, LogError>,
-    ) -> Result<(), LogError> {
-        if self.segment != Some(block.segment) {
-            self.close();
-            self.segment = Some(block.segment);
-            self.rate_hz = block.rate_hz;
-            self.decimators = (0..self.dof).map(|_| decimator()).collect::<Result<_, _>>()?;
-            self.columns = core::array::from_fn(|_| vec![Vec::new(); self.dof]);
-        }
-        for (joint, &place) in places.iter().enumerate() {
-            for (column, source) in self.columns.iter_mut().zip([&block.q, &block.dq, &block.ddq]) {
-                column[joint].extend_from_slice(&block.joint(source, place)[..rows]);
-            }
-            self.decimators[joint].push(&block.joint(&block.tau, place)[..rows], rows, &mut self.out);
-            self.columns[3][joint].extend_from_slice(&self.out);
-        }
-        Ok(())
-    }
-
-    /// Ends a piece.
-    fn close(&mut self) {
-        let Some(decimator) = self.decimators.first() else { return };
-        let (rows, first) = (self.columns[3].first().map_or(0, Vec::len), decimator.half_length());
-        let thinned = |columns: &[Vec<f64>]| -> Vec<f64> {
-            columns.iter().flat_map(|x| (0..rows).map(|row| x[first + row * self.thinning])).collect()
-        };
-        let [q, dq, ddq, tau] = &self.columns;
-        self.pieces.push(MotionBlock {
-            rate_hz: self.rate_hz / self.thinning as f64,
-            rows,
-            joints: self.dof,
-            q: thinned(q),
-            dq: thinned(dq),
-            ddq: thinned(ddq),
-            tau: tau.concat(),
-            ..MotionBlock::default()
-        });
-        self.decimators.clear();
-    }
-
-    fn finished(mut self) -> Vec<MotionBlock> {
-        self.close();
-        self.pieces
-    }
+/// Sends the unfiltered rows of a motion to a consumer.
+fn every_sample(model: &RegressorModel, block: &MotionBlock, consumer: &mut dyn RowConsumer) -> Result<(), LogError> {
+    let places: Vec<usize> = (0..model.dof()).collect();
+    let in_filter = |source| LogError::Filter { log: "a simulated copy".to_owned(), source };
+    RowBuilder::new(model, &places, block.rate_hz, None).map_err(in_filter)?.take(block, consumer)
 }
 
 /// Torque of the base parameters `theta` on a motion, joint-major.
@@ -411,10 +390,7 @@ fn torque(model: &RegressorModel, block: &MotionBlock, theta: &[f64]) -> Result<
             Ok(())
         }
     }
-    let places: Vec<usize> = (0..model.dof()).collect();
-    let in_filter = |source| LogError::Filter { log: String::new(), source };
-    let mut builder = RowBuilder::new(model, &places, block.rate_hz, None).map_err(in_filter)?;
     let mut predicted = Predicted { model, theta, joints: vec![Vec::new(); model.dof()], buffer: Vec::new() };
-    builder.take(block, &mut predicted)?;
+    every_sample(model, block, &mut predicted)?;
     Ok(predicted.joints.concat())
 }
