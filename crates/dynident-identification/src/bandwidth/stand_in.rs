@@ -262,13 +262,13 @@ impl StandIn {
         self.log_rate_hz
     }
 
-    /// Samples of the recordings for each of the copy.
+    /// Samples of the recordings for each sample of the copy.
     pub(super) fn thinning(&self) -> usize {
         self.thinning
     }
 
-    /// The copies of the recordings as a fit with this cut-off sees them, one after another; `None` for one to which the
-    /// filter does not apply.
+    /// The copies of the recordings as a fit with this cut-off sees them, one after another; `None` for one to which
+    /// the filter does not apply.
     pub(super) fn copies(
         &self,
         settings: &MotionSettings,
