@@ -247,6 +247,8 @@ pub enum ClockRule {
     Uniform,
     /// Samples were taken at the stamps; they are interpolated onto a uniform grid.
     Stamps,
+    /// Samples were taken at a rate that changes slowly; single stamps jitter and are smoothed.
+    Smoothed,
 }
 
 /// A log, described: part of the study file.
@@ -312,6 +314,14 @@ pub struct LogFormat {
     /// A step longer than this many median steps splits the log; 1.5 to 1000, 5 by default.
     #[serde(default = "default_max_gap_steps")]
     pub max_gap_steps: f64,
+    /// Whether a longer gap is filled where it is short against the motion (a fifth of the cut-off's period); what stands
+    /// in it counts as no row. True by default.
+    #[serde(default = "yes")]
+    pub bridge_gaps: bool,
+}
+
+fn yes() -> bool {
+    true
 }
 
 fn default_max_gap_steps() -> f64 {
@@ -337,6 +347,7 @@ impl LogFormat {
             missing: Missing::default(),
             clock: ClockRule::default(),
             max_gap_steps: default_max_gap_steps(),
+            bridge_gaps: yes(),
         }
     }
 

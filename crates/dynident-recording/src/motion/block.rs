@@ -16,6 +16,10 @@ pub struct MotionSettings {
     /// Seconds left out at both ends of every uninterrupted piece, where a zero-phase filter has to invent
     /// samples; 0 to 60, 0 by default.
     pub trim_s: f64,
+    /// Leave everything as it was logged: by default single torque samples far from their neighbours and torque that is
+    /// repeated while its joint moves do not count, and lone spikes of a position are replaced; see
+    /// [`SetAside`](crate::SetAside).
+    pub keep_outliers: bool,
 }
 
 impl MotionSettings {
@@ -54,6 +58,9 @@ pub struct MotionBlock {
     pub tau_smooth: Vec<f64>,
     /// Temperatures of the joints on the uniform clock, unfiltered (°C); empty without a `temperature` group.
     pub temperature_c: Vec<f64>,
+    /// Whether a sample's torque does not count (outlier, held, hole that was filled), laid out as the torques; empty if
+    /// all count. What stands in its place is a straight line; a fit leaves the sample out of torque and regressor alike.
+    pub set_aside: Vec<bool>,
 }
 
 impl MotionBlock {

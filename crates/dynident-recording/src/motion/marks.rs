@@ -33,7 +33,7 @@ pub(crate) fn part(block: &MotionBlock, run: &Range<usize>) -> MotionBlock {
         }
         (0..block.joints).flat_map(|joint| block.joint(values, joint)[run.clone()].iter().copied()).collect()
     };
-    MotionBlock {
+    let mut part = MotionBlock {
         rate_hz: block.rate_hz,
         segment: block.segment,
         first_time_s: block.first_time_s + run.start as f64 / block.rate_hz,
@@ -45,7 +45,13 @@ pub(crate) fn part(block: &MotionBlock, run: &Range<usize>) -> MotionBlock {
         tau: some(&block.tau),
         tau_smooth: some(&block.tau_smooth),
         temperature_c: some(&block.temperature_c),
+        set_aside: Vec::new(),
+    };
+    if !block.set_aside.is_empty() {
+        let of = |joint: usize| &block.set_aside[joint * block.rows..][run.clone()];
+        part.set_aside = (0..block.joints).flat_map(|joint| of(joint).iter().copied()).collect();
     }
+    part
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ pub use comparison::DerivativeComparison;
 pub use jumps::LoneSample;
 pub use lag::{Lag, best_lag};
 
+use crate::cleaning::{Reason, SetAside};
 use crate::clock::Clock;
 use crate::filter::CutoffChoice;
 use crate::log::{LinesDropped, Quantity};
@@ -32,6 +33,9 @@ pub enum Level {
     /// Harms the result.
     Problem,
 }
+
+/// Share of samples set aside below which they are good to know and no more.
+const FEW: f64 = 1e-3;
 
 /// One thing that was found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -103,6 +107,12 @@ pub struct ImportReport {
     pub short_segments: [u64; 2],
     /// Samples left out because the differentiator does not apply there.
     pub unmapped_samples: u64,
+    /// Samples whose torque does not count, and positions that were replaced, by joint.
+    #[serde(default)]
+    pub set_aside: Vec<SetAside>,
+    /// Gaps that were filled because they are short against the motion, and the samples in them, which count as no rows.
+    #[serde(default)]
+    pub bridged: [u64; 2],
     /// Every channel of every joint.
     pub channels: Vec<ChannelReport>,
     /// Logged velocities against the derivative of the position.
@@ -134,6 +144,13 @@ impl ImportReport {
         if self.segments > 1 {
             add(Level::Info, "time", format!("split at gaps into {} pieces", self.segments));
         }
+        if self.bridged[0] > 0 {
+            let [gaps, samples] = self.bridged;
+            let message = format!(
+                "{gaps} gaps, short against the motion, were bridged; the {samples} samples in them count as no rows"
+            );
+            add(Level::Info, "time", message);
+        }
         if self.short_segments[0] > 0 {
             let [pieces, samples] = self.short_segments;
             let message = format!("{pieces} pieces too short for the filter were left out ({samples} samples)");
@@ -164,6 +181,11 @@ impl ImportReport {
         if let Some(place) = &self.dropped.truncated {
             add(Level::Info, "rows", format!("the cut-off last line was left out ({place})"));
         }
+        for found in &self.set_aside {
+            let name = format!("{} {}", found.channel.key(), found.joint);
+            let few = found.share < FEW && found.reason != Reason::Held;
+            add(if few { Level::Info } else { Level::Warning }, &name, found.sentence());
+        }
         // Each channel by itself.
         for channel in &self.channels {
             let name = format!("{} {}", channel.channel.key(), channel.joint);
@@ -191,7 +213,12 @@ impl ImportReport {
                 );
                 add(Level::Problem, &name, message);
             }
-            if let Some(worst) = &channel.worst_lone_sample {
+            let is_set_aside = |found: &SetAside| {
+                found.channel == channel.channel && found.joint == channel.joint && found.reason != Reason::Held
+            };
+            if let Some(worst) = &channel.worst_lone_sample
+                && !self.set_aside.iter().any(is_set_aside)
+            {
                 let message = format!(
                     "{} samples stand alone, the worst in row {} of those used: {:.6e} after {:.6e}; empty the field \
                      and write `missing = \"drop\"`",

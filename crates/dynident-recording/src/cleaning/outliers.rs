@@ -1,0 +1,195 @@
+//! Single torque samples far from those around them.
+
+use crate::quantisation::quantisation_step;
+
+/// Samples of a group of which the median is taken.
+const GROUP: usize = 5;
+/// Samples to either side that a judgement needs: two groups.
+pub(super) const REACH: usize = 2 * GROUP;
+/// Samples over which the noise is taken to be alike.
+const NOISE_SPAN: usize = 512;
+/// Robust standard deviations that a sample has to stand off. Normal noise does so once in 10¹⁵ samples.
+const TIMES_NOISE: f64 = 8.0;
+/// Least distance as a share of the spread of the torque: less does not matter to any fit.
+const SHARE_OF_SPREAD: f64 = 0.005;
+/// Least distance in steps of a quantised channel.
+const QUANTA: f64 = 3.5;
+/// With more samples apart than this they are the nature of the signal.
+const LARGEST_SHARE: f64 = 0.15;
+/// Fewest samples to judge by.
+const FEWEST: usize = 64;
+
+/// Standard deviations in one median of absolute deviations of normal noise.
+const NORMAL: f64 = 1.4826;
+
+/// Places of outliers in `own` (a part of `x`), which stands among its neighbours in `x`.
+///
+/// Before and behind a sample stand two groups of five; a group's median does not care for two outliers in it. The
+/// cubic through the four medians is where a smooth torque would be; the nearer two, and the lines through those before
+/// and those behind, are the torque on either side of a step (friction reversed, contact made). A sample is an outlier
+/// if it lies outside of all of these by more than eight robust standard deviations of samples from their cubics nearby, half a percent of the torque's spread, and three
+/// steps of a quantised channel. Source of the rule by medians: Hampel, J. Am. Stat. Assoc. 69 (1974) 383; Davies and
+/// Gather, J. Am. Stat. Assoc. 88 (1993) 782. Groups beside the sample and the step are this project's own.
+pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> Vec<usize> {
+    let n = x.len();
+    if n < FEWEST {
+        return Vec::new();
+    }
+    // The ends are mirrored: a sample there is judged by what is inside.
+    let padded: Vec<f64> = (1..=REACH).rev().map(|k| x[k]).chain(x.iter().copied()).collect();
+    let padded: Vec<f64> = padded.into_iter().chain((2..REACH + 2).map(|k| x[n - k])).collect();
+    let medians: Vec<f64> = padded.windows(GROUP).map(median_of_five).collect();
+    let around = |i: usize| {
+        let place = i + REACH;
+        [place - 2 * GROUP, place - GROUP, place + 1, place + 1 + GROUP].map(|from| medians[from])
+    };
+    // The cubic through values at -8, -3, 3 and 8, at 0.
+    let smooth = |[far, before, behind, beyond]: [f64; 4]| 32.0 / 55.0 * (before + behind) - 9.0 / 110.0 * (far + beyond);
+    let off: Vec<f64> = (0..n).map(|i| x[i] - smooth(around(i))).collect();
+    let mut distances: Vec<f64> = off.iter().map(|off| off.abs()).collect();
+    let overall = NORMAL * middle(&mut distances);
+    let mut found = Vec::new();
+    let half = NOISE_SPAN / 2;
+    let mut from = own.start;
+    while from < own.end {
+        let to = (from + half).min(own.end);
+        let (low, high) = (from.saturating_sub(half / 2), (to + half / 2).min(n));
+        let mut distances: Vec<f64> = off[low..high].iter().map(|off| off.abs()).collect();
+        let noise = f64::max(NORMAL * middle(&mut distances), 0.5 * overall);
+        let least = f64::max(TIMES_NOISE * noise, SHARE_OF_SPREAD * spread);
+        for i in from..to {
+            if off[i].abs() > least {
+                let usual = usual_range(around(i), x[i] - off[i]);
+                if f64::max(x[i] - usual.end, usual.start - x[i]) > least {
+                    found.push(i);
+                }
+            }
+        }
+        from = to;
+    }
+    if found.is_empty() || found.len() as f64 > LARGEST_SHARE * own.len() as f64 {
+        return Vec::new();
+    }
+    if let Some(step) = quantisation_step(x) {
+        found.retain(|&i| {
+            let usual = usual_range(around(i), x[i] - off[i]);
+            f64::max(x[i] - usual.end, usual.start - x[i]) > QUANTA * step
+        });
+    }
+    found
+}
+
+/// From the least to the largest of what the medians at -8, -3, 3 and 8 suggest at 0: the nearer ones themselves, the
+/// lines through those before and those behind, the cubic through all.
+fn usual_range([far, before, behind, beyond]: [f64; 4], smooth: f64) -> core::ops::Range<f64> {
+    let suggested = [before, behind, before + 0.6 * (before - far), behind + 0.6 * (behind - beyond), smooth];
+    let low = suggested.iter().fold(f64::INFINITY, |low, value| low.min(*value));
+    low..suggested.iter().fold(f64::NEG_INFINITY, |high, value| high.max(*value))
+}
+
+/// What stands in place of outliers: the line between the nearest samples that are none.
+pub(super) fn bridged(x: &mut [f64], marked: &[usize]) {
+    let mut at = 0;
+    while at < marked.len() {
+        let mut last = at;
+        while last + 1 < marked.len() && marked[last + 1] == marked[last] + 1 {
+            last += 1;
+        }
+        let (first, end) = (marked[at], marked[last] + 1);
+        let before = first.checked_sub(1).map(|k| x[k]);
+        let behind = x.get(end).copied();
+        let (from, to) = (before.or(behind).unwrap_or(0.0), behind.or(before).unwrap_or(0.0));
+        let steps = (end - first + 1) as f64;
+        for (k, value) in x[first..end].iter_mut().enumerate() {
+            *value = from + (to - from) * (k + 1) as f64 / steps;
+        }
+        at = last + 1;
+    }
+}
+
+/// The middle value; zero of none.
+pub(super) fn middle(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let half = values.len() / 2;
+    *values.select_nth_unstable_by(half, f64::total_cmp).1
+}
+
+fn median_of_five(x: &[f64]) -> f64 {
+    let (a, b) = (x[0].min(x[1]), x[0].max(x[1]));
+    let (c, d) = (x[2].min(x[3]), x[2].max(x[3]));
+    // The smaller of the two minima and the larger of the two maxima are not the middle.
+    let (low, high) = (a.max(c), b.min(d));
+    low.min(high).max(low.max(high).min(x[4]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::derivative::test_signals::normal;
+
+    fn found(x: &[f64]) -> Vec<usize> {
+        let mut sorted = x.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let spread = sorted[19 * x.len() / 20] - sorted[x.len() / 20];
+        outliers(x, 0..x.len(), spread)
+    }
+
+    /// Torque with gravity, inertia and dry friction.
+    fn torque(i: usize) -> f64 {
+        let t = i as f64 * 0.004;
+        30.0 * (0.7 * t).sin() + 5.0 * (3.1 * t).cos() + 4.0 * (1.3 * t).sin().signum()
+    }
+
+    #[test]
+    fn the_middle_of_five() {
+        for order in [[1.0, 2.0, 3.0, 4.0, 5.0], [5.0, 1.0, 4.0, 2.0, 3.0], [3.0, 5.0, 1.0, 4.0, 2.0]] {
+            assert_eq!(median_of_five(&order), 3.0, "{order:?}");
+        }
+        assert_eq!(median_of_five(&[2.0, 2.0, 2.0, 9.0, -9.0]), 2.0);
+    }
+
+    #[test]
+    fn twenty_sigma_is_found_and_nothing_else() {
+        let n = 20_000;
+        let noise = normal(7, n);
+        let clean: Vec<f64> = (0..n).map(|i| torque(i) + 0.1 * noise[i]).collect();
+        // Two normal samples in ten million stand off by eight deviations of the whole rule.
+        assert!(found(&clean).is_empty(), "{:?}", found(&clean));
+        let pick = normal(8, n);
+        // The upper twentieth of a normal sample.
+        let spoilt: Vec<usize> = (0..n).filter(|i| pick[*i] > 1.645).collect();
+        let mut x = clean;
+        for &i in &spoilt {
+            x[i] += if i % 2 == 0 { 2.0 } else { -2.0 };
+        }
+        let found = found(&x);
+        assert!(found.iter().all(|i| spoilt.contains(i)), "{} of {}", found.len(), spoilt.len());
+        // Three of five neighbours are outliers themselves in a thousandth of the groups.
+        assert!(found.len() as f64 > 0.97 * spoilt.len() as f64, "{} of {}", found.len(), spoilt.len());
+    }
+
+    #[test]
+    fn coloured_noise_exact_torque_steps_and_steps_of_a_current_are_none() {
+        let n = 20_000;
+        let noise = normal(3, n);
+        let mut last = 0.0;
+        let coloured = |share: f64, last: &mut f64| -> Vec<f64> {
+            (0..n)
+                .map(|i| {
+                    *last = share * *last + noise[i];
+                    torque(i) + 0.1 * *last
+                })
+                .collect()
+        };
+        for share in [0.5, 0.95, -0.7] {
+            assert!(found(&coloured(share, &mut last)).is_empty(), "{share}");
+        }
+        assert!(found(&(0..n).map(torque).collect::<Vec<f64>>()).is_empty());
+        let quantised: Vec<f64> = (0..n).map(|i| ((torque(i) + 0.02 * noise[i]) / 0.5).round() * 0.5).collect();
+        assert!(found(&quantised).is_empty());
+        let blunt: Vec<f64> = (0..n).map(|i| torque(i) + 8.0 * (i as f64 * 0.02).sin().powi(40)).collect();
+        assert!(found(&blunt).is_empty(), "peaks over some samples");
+    }
+}
