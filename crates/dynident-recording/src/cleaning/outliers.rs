@@ -14,6 +14,11 @@ const TIMES_NOISE: f64 = 8.0;
 const SHARE_OF_SPREAD: f64 = 0.005;
 /// Least distance in steps of a quantised channel.
 const QUANTA: f64 = 3.5;
+/// Times the usual distance of its nearest neighbours that a sample has to stand off: a peak over several samples takes
+/// them along.
+const TIMES_NEIGHBOURS: f64 = 5.0;
+/// Nearest neighbours to either side.
+const NEIGHBOURS: usize = 8;
 /// With more samples apart than this they are the nature of the signal.
 const LARGEST_SHARE: f64 = 0.15;
 /// Fewest samples to judge by.
@@ -60,6 +65,9 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
         for i in from..to {
             if off[i].abs() > least {
                 let usual = usual_range(around(i), x[i] - off[i]);
+                let nearby = &off[i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(n)];
+                let mut nearby: Vec<f64> = nearby.iter().map(|off| off.abs()).collect();
+                let least = least.max(TIMES_NEIGHBOURS * middle(&mut nearby));
                 if f64::max(x[i] - usual.end, usual.start - x[i]) > least {
                     found.push(i);
                 }

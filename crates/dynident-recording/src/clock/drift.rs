@@ -101,13 +101,14 @@ fn with_jumps(place: &[f64], stamp: &[f64], begins: &[bool]) -> Vec<bool> {
     let mut cut = begins.to_vec();
     for i in 1..n {
         let jump = off[i] - off[i - 1];
-        if cut[i] || jump.abs() < LEAST_JUMP {
+        // Rows can be missing; stamps that fall back only catch up.
+        if cut[i] || jump < LEAST_JUMP {
             continue;
         }
         let from = (i.saturating_sub(AGREEING)..i).rev().find(|k| begins[*k]).unwrap_or(i.saturating_sub(AGREEING));
         let to = (i + 1..n.min(i + AGREEING)).find(|k| begins[*k]).unwrap_or(n.min(i + AGREEING));
         let lasting = median(&off[i..to]) - median(&off[from..i]);
-        cut[i] = lasting * jump > 0.0 && lasting.abs() > f64::max(LEAST_JUMP, 0.7 * jump.abs());
+        cut[i] = lasting > f64::max(LEAST_JUMP, 0.7 * jump);
     }
     cut
 }

@@ -289,7 +289,7 @@ mod tests {
     #[test]
     fn jitter_and_late_packets_on_an_even_grid_stay_even() {
         let even = |i: usize| i as f64;
-        let late = |i: usize| if i % 50 < 4 { 4.0 - (i % 50) as f64 } else { 0.0 };
+        let late = |i: usize| (3.6 - 0.8 * (i % 50) as f64).max(0.0);
         for sigma in [0.0, 1e-6, 1e-4] {
             let jittered = decided_in(1.0, sigma, even, |i| even(i) + jitter(i));
             assert_eq!(jittered.spacing(), Spacing::Even, "{sigma}: {jittered:?}");
