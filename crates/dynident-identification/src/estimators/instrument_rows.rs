@@ -4,7 +4,7 @@
 use super::instruments::InstrumentSource;
 use super::{EstimatorError, TrainingRows};
 use crate::recording::LogError;
-use crate::rows::{PANEL_SAMPLES, in_model_order, motion_band_hz};
+use crate::rows::{PANEL_SAMPLES, in_model_order, motion_band_hz, set_aside};
 use dynident_dynamics::{BatchWorkspace, Panels, regressor_panels};
 use dynident_estimation::{EstimationError, SegmentedFactor};
 use dynident_model::terms::JointMotion;
@@ -78,6 +78,12 @@ pub(super) fn instrumented_factors(
                 panel.extend_from_slice(&instruments.joint(joint)[..width]);
                 panel.extend_from_slice(&regressors.joint(joint)[..width]);
                 panel.extend_from_slice(&measured.joint(measured.fitted_tau(), place)[from..from + samples]);
+                // What does not count is left out of all columns alike, before the filter.
+                for (sample, _) in
+                    set_aside(&measured, place, from, samples).iter().enumerate().filter(|(_, left_out)| **left_out)
+                {
+                    panel.chunks_exact_mut(samples).for_each(|column| column[sample] = 0.0);
+                }
                 let (rows, panel) = match &mut decimators {
                     Some(decimators) => (decimators[joint].push(&panel, samples, &mut out), &out),
                     None => (samples, &panel),

@@ -22,11 +22,13 @@ struct VisitorConsumer<'a, 'b> {
     log: usize,
     visit: &'a mut RowVisitor<'b>,
     refused: Option<EstimationError>,
+    counted: Vec<f64>,
 }
 
 impl RowConsumer for VisitorConsumer<'_, '_> {
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         if self.refused.is_none() {
+            let rows = rows.counted(&mut self.counted);
             let block = RowBlock { log: self.log, joint: rows.joint, rows: rows.rows, panel: rows.panel };
             self.refused = (self.visit)(&block).err();
         }
@@ -47,7 +49,7 @@ impl From<Stop> for EstimatorError {
 pub(super) fn every_row(rows: &TrainingRows<'_>, visit: &mut RowVisitor<'_>) -> Result<(), Stop> {
     rows.begin("reweighting rows");
     for (log, &index) in rows.training.iter().enumerate() {
-        let mut consumer = VisitorConsumer { log, visit: &mut *visit, refused: None };
+        let mut consumer = VisitorConsumer { log, visit: &mut *visit, refused: None, counted: Vec::new() };
         rows.logs.pass(rows.model, index).run(&mut consumer).map_err(|error| Stop::Log(error.into()))?;
         if let Some(refused) = consumer.refused {
             return Err(refused.into());

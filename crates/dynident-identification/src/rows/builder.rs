@@ -1,5 +1,6 @@
 //! Blocks of a motion into rows of regressor and torque.
 
+use super::coverage::{Coverage, set_aside};
 use super::mask::RowMask;
 use super::{JointRows, PANEL_SAMPLES, RawSamples, RowConsumer};
 use crate::recording::LogError;
@@ -34,6 +35,8 @@ pub struct RowBuilder<'a> {
     history: TermHistory,
     decimators: Option<Vec<Decimator>>,
     mask: Option<RowMask<'a>>,
+    coverage: Coverage,
+    set_aside: Vec<Vec<bool>>,
     temperature_c: Vec<f64>,
     segment: usize,
     motion: [Vec<f64>; 3],
@@ -69,6 +72,8 @@ impl<'a> RowBuilder<'a> {
             history: TermHistory::new(model.load_parameters.clone()),
             decimators,
             mask: None,
+            coverage: Coverage::new(model.dof(), rate_hz, filter)?,
+            set_aside: Vec::new(),
             temperature_c: Vec::new(),
             segment: 0,
             motion: [Vec::new(), Vec::new(), Vec::new()],
@@ -112,6 +117,7 @@ impl<'a> RowBuilder<'a> {
         if block.segment != self.segment {
             self.segment = block.segment;
             self.history.restart();
+            self.coverage.restart();
             self.decimators.iter_mut().flatten().for_each(|decimator| {
                 decimator.finish();
             });
@@ -148,28 +154,52 @@ impl<'a> RowBuilder<'a> {
                     }
                 }
             }
-            consumer.raw(&RawSamples { segment: block.segment, rate_hz: block.rate_hz, panels: &self.panels })?;
+            // A record of a motion says itself which of its samples can be used.
+            let counts_all = block.set_aside.is_empty() || self.mask.is_some();
+            self.set_aside.clear();
+            if !counts_all {
+                let of_joints = self.places.iter().map(|&place| set_aside(block, place, from, samples).to_vec());
+                self.set_aside.extend(of_joints);
+            }
+            consumer.raw(&RawSamples {
+                segment: block.segment,
+                rate_hz: block.rate_hz,
+                panels: &self.panels,
+                set_aside: &self.set_aside,
+                settled: settled(block, from, samples),
+            })?;
             let mut rows = samples;
             for joint in 0..model.dof() {
-                let panel = self.panels.joint(joint);
-                let panel = match &mut self.decimators {
-                    Some(decimators) => {
-                        rows = decimators[joint].push(panel, samples, &mut self.out);
-                        &self.out[..]
+                let left_out = self.set_aside.get(joint).map_or(&[][..], Vec::as_slice);
+                let panel = self.coverage.mask(joint, self.panels.joint(joint), samples, left_out);
+                match &mut self.decimators {
+                    Some(decimators) => rows = decimators[joint].push(panel, samples, &mut self.out),
+                    None => {
+                        self.out.clear();
+                        self.out.extend_from_slice(panel);
                     }
-                    None => panel,
-                };
+                }
+                let coverage = self.coverage.divide(joint, rows, &mut self.out);
                 let (counted, panel) = match &mut self.mask {
-                    Some(mask) if rows > 0 => mask.apply(joint, rows, panel),
-                    _ => (rows, panel),
+                    Some(mask) if rows > 0 => mask.apply(joint, rows, &self.out),
+                    _ => (rows, &self.out[..]),
                 };
                 if counted > 0 {
-                    consumer.filtered(&JointRows { joint, rows: counted, panel })?;
+                    consumer.filtered(&JointRows { joint, rows: counted, panel, coverage })?;
                 }
             }
+            self.coverage.advance(samples);
             self.filtered_rows += rows as u64;
             self.samples += samples as u64;
         }
         Ok(())
     }
+}
+
+/// The samples of a panel whose motion does not rest on samples invented at the ends of a piece.
+fn settled(block: &MotionBlock, from: usize, samples: usize) -> core::ops::Range<usize> {
+    let [begin, end] = block.unsettled;
+    let inside = begin..block.rows.saturating_sub(end);
+    let clamped = |row: usize| row.clamp(from, from + samples) - from;
+    clamped(inside.start)..clamped(inside.end).max(clamped(inside.start))
 }

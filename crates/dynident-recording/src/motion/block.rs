@@ -61,6 +61,9 @@ pub struct MotionBlock {
     /// Whether a sample's torque does not count (outlier, held, hole that was filled), laid out as the torques; empty if
     /// all count. What stands in its place is a straight line; a fit leaves the sample out of torque and regressor alike.
     pub set_aside: Vec<bool>,
+    /// Rows at the begin and at the end whose motion rests on samples that the filter had to invent at the ends of a
+    /// piece: one and a half periods of the cut-off, as far as the filter reaches and at most a quarter of the piece.
+    pub unsettled: [usize; 2],
 }
 
 impl MotionBlock {

@@ -46,6 +46,10 @@ pub(crate) fn part(block: &MotionBlock, run: &Range<usize>) -> MotionBlock {
         tau_smooth: some(&block.tau_smooth),
         temperature_c: some(&block.temperature_c),
         set_aside: Vec::new(),
+        unsettled: [
+            block.unsettled[0].saturating_sub(run.start).min(run.len()),
+            (block.unsettled[1] + run.end).saturating_sub(block.rows).min(run.len()),
+        ],
     };
     if !block.set_aside.is_empty() {
         let of = |joint: usize| &block.set_aside[joint * block.rows..][run.clone()];

@@ -20,6 +20,9 @@ use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::Arc;
 
+/// Periods of the cut-off at an end of a piece after which what the filter invented beyond it has faded: the slowest
+/// poles of a Butterworth filter of order 4 leave 3 % there.
+const UNSETTLED_PERIODS: f64 = 1.5;
 /// Longest hole that is filled, as a share of the cut-off's period: a tenth of the period of the motion's highest
 /// frequency. A polynomial of degree 5 through both sides misses a sinusoid of that frequency by less than 1e-4 there.
 const BRIDGED_PERIODS: f64 = 0.2;
@@ -42,6 +45,8 @@ pub struct MotionStream {
     differentiator: Box<dyn Differentiator>,
     smooth_torque: bool,
     trim: usize,
+    /// Samples at the ends of a piece that rest on invented ones.
+    unsettled: usize,
     /// Samples on either side of a chunk that enter it; `None`: the whole segment.
     context: Option<usize>,
     segmenter: Segmenter,
@@ -192,6 +197,11 @@ impl MotionStream {
             joints: joints.clone(),
             trim: (settings.trim_s * clock.rate_hz).round() as usize,
             context: differentiator.context_samples(clock.rate_hz),
+            unsettled: {
+                let cutoff_hz = settings.differentiator.cutoff_hz().unwrap_or(cutoff.cutoff_hz);
+                let reach = differentiator.context_samples(clock.rate_hz).unwrap_or(0);
+                ((UNSETTLED_PERIODS * clock.rate_hz / cutoff_hz) as usize).min(reach)
+            },
             segmenter: Segmenter::new(channels),
             time_check: TimeCheck::new(clock.median_step_s),
             clock,
@@ -387,6 +397,14 @@ impl MotionStream {
             values.clear();
         }
         block.set_aside.clear();
+        let total = (self.passed as usize + self.uniform[0].len()).max(1);
+        let settled_from = if last { self.unsettled.min(total / 4) } else { self.unsettled };
+        let first = self.passed as usize + from;
+        block.unsettled = [settled_from.saturating_sub(first).min(rows), 0];
+        if last {
+            let settled_to = total - settled_from;
+            block.unsettled[1] = (first + rows).saturating_sub(settled_to).min(rows);
+        }
         let mut marked = Vec::new();
         if rows > 0 {
             let first = self.passed + from as u64;
