@@ -18,7 +18,7 @@ const QUANTA: f64 = 3.5;
 /// them along.
 const TIMES_NEIGHBOURS: f64 = 5.0;
 /// Nearest neighbours to either side.
-const NEIGHBOURS: usize = 8;
+const NEIGHBOURS: usize = 3;
 /// With more samples apart than this they are the nature of the signal.
 const LARGEST_SHARE: f64 = 0.15;
 /// Fewest samples to judge by.
@@ -51,6 +51,11 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
     // The cubic through values at -8, -3, 3 and 8, at 0.
     let smooth = |[far, before, behind, beyond]: [f64; 4]| 32.0 / 55.0 * (before + behind) - 9.0 / 110.0 * (far + beyond);
     let off: Vec<f64> = (0..n).map(|i| x[i] - smooth(around(i))).collect();
+    // How far a sample lies outside of all that is suggested for it.
+    let outside = |i: usize| {
+        let usual = usual_range(around(i), x[i] - off[i]);
+        f64::max(x[i] - usual.end, usual.start - x[i]).max(0.0)
+    };
     let mut distances: Vec<f64> = off.iter().map(|off| off.abs()).collect();
     let overall = NORMAL * middle(&mut distances);
     let mut found = Vec::new();
@@ -64,11 +69,9 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
         let least = f64::max(TIMES_NOISE * noise, SHARE_OF_SPREAD * spread);
         for i in from..to {
             if off[i].abs() > least {
-                let usual = usual_range(around(i), x[i] - off[i]);
-                let nearby = &off[i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(n)];
-                let mut nearby: Vec<f64> = nearby.iter().map(|off| off.abs()).collect();
-                let least = least.max(TIMES_NEIGHBOURS * middle(&mut nearby));
-                if f64::max(x[i] - usual.end, usual.start - x[i]) > least {
+                let nearby = i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(n);
+                let mut nearby: Vec<f64> = nearby.map(outside).collect();
+                if outside(i) > least.max(TIMES_NEIGHBOURS * middle(&mut nearby)) {
                     found.push(i);
                 }
             }
@@ -79,10 +82,7 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
         return Vec::new();
     }
     if let Some(step) = quantisation_step(x) {
-        found.retain(|&i| {
-            let usual = usual_range(around(i), x[i] - off[i]);
-            f64::max(x[i] - usual.end, usual.start - x[i]) > QUANTA * step
-        });
+        found.retain(|&i| outside(i) > QUANTA * step);
     }
     found
 }

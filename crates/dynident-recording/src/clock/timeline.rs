@@ -7,6 +7,9 @@ use crate::log::RawBlock;
 /// Rows before and after a block that its places depend on.
 const AROUND: usize = MARGIN;
 
+/// Rows within which late packets have caught up.
+const LATE_ROWS: usize = 32;
+
 /// The places of a block's rows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Places {
@@ -54,7 +57,8 @@ impl Timeline {
                 Some((last_row, last_s, last_place)) => {
                     let (rows, time) = ((row - last_row) as f64, time_s - last_s);
                     let hole = f64::max(rows, time * rate);
-                    let is_gap = time > self.longest_step_s || rows > self.longest_step_rows;
+                    let is_gap = rows > self.longest_step_rows
+                        || time > self.longest_step_s && !self.catches_up((last_row, last_s), (block, index), next);
                     if time < 0.0 || (is_gap && hole > self.bridged_steps) {
                         places.begins[index] = true;
                     } else if is_gap {
@@ -73,6 +77,24 @@ impl Timeline {
         }
         self.last = before;
         places
+    }
+
+    /// Whether a stamp that comes late is followed by ones that make up for it: a packet that was late, not a gap.
+    fn catches_up(
+        &self,
+        (last_row, last_s): (u64, f64),
+        (block, index): (&RawBlock, usize),
+        next: Option<&RawBlock>,
+    ) -> bool {
+        if self.clock.spacing() == Spacing::Stamps {
+            return false;
+        }
+        let own = block.row[index..].iter().zip(&block.time_s[index..]);
+        let further = next.into_iter().flat_map(|next| next.row.iter().zip(&next.time_s));
+        own.chain(further).skip(1).take(LATE_ROWS).any(|(&row, &time_s)| {
+            let late = (time_s - last_s) * self.clock.rate_hz - (row - last_row) as f64;
+            time_s >= last_s && late < 1.0
+        })
     }
 
     fn smooth(&mut self, block: &RawBlock, next: Option<&RawBlock>, places: &mut Places) {

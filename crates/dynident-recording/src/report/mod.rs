@@ -178,6 +178,9 @@ impl ImportReport {
         if self.dropped.missing > 0 {
             add(Level::Warning, "rows", format!("{} rows with missing values were left out", self.dropped.missing));
         }
+        if self.dropped.by_rule > 0 {
+            add(Level::Info, "rows", format!("{} rows were left out as asked", self.dropped.by_rule));
+        }
         if let Some(place) = &self.dropped.truncated {
             add(Level::Info, "rows", format!("the cut-off last line was left out ({place})"));
         }
@@ -237,22 +240,20 @@ impl ImportReport {
             for comparison in comparisons {
                 let name = format!("{quantity} {}", comparison.joint);
                 let difference = 100.0 * comparison.relative_rms_difference;
-                match &comparison.lag {
-                    Some(lag) if lag.correlation < -0.5 => {
-                        let message = "the logged signal has the opposite sign of the position's derivative";
-                        add(Level::Problem, &name, message.to_owned());
-                    }
-                    Some(lag) if difference > 20.0 => {
-                        let message = format!(
-                            "differs from the position's derivative by {difference:.1} % RMS (correlation {:.3})",
-                            lag.correlation_unshifted
-                        );
-                        add(Level::Warning, &name, message);
-                    }
-                    Some(lag) if lag.matters() && lag.samples.abs() > 0.5 => {
-                        add(Level::Info, &name, format!("comes {:.4} s after the position's derivative", lag.seconds));
-                    }
-                    _ => {}
+                if comparison.correlation < -0.5 {
+                    let message = "the logged signal has the opposite sign of the position's derivative";
+                    add(Level::Problem, &name, message.to_owned());
+                } else if difference > 20.0 && comparison.lag.is_some() {
+                    let message = format!(
+                        "differs from the position's derivative by {difference:.1} % RMS (correlation {:.3})",
+                        comparison.correlation
+                    );
+                    add(Level::Warning, &name, message);
+                } else if let Some(lag) = &comparison.lag
+                    && lag.matters()
+                    && lag.samples.abs() > 0.5
+                {
+                    add(Level::Info, &name, format!("comes {:.4} s after the position's derivative", lag.seconds));
                 }
             }
         }
