@@ -113,8 +113,7 @@ impl RowConsumer for Test<'_> {
             let set_aside = samples.set_aside.get(joint);
             let counts = |row: &usize| set_aside.is_none_or(|set_aside| !set_aside[*row]);
             let kept = samples.settled.clone().filter(counts);
-            let (measured, predicted): (Vec<f64>, Vec<f64>) =
-                kept.map(|row| (measured[row], self.buffer[row])).unzip();
+            let (measured, predicted): (Vec<f64>, Vec<f64>) = kept.map(|row| (measured[row], self.buffer[row])).unzip();
             let added = self.raw.add_joint(joint, &measured, &predicted);
             added.map_err(|source| self.failed(source))?;
         }

@@ -33,7 +33,9 @@ fn polynomial(known: &[f64], values: &[f64], places: &[f64]) -> Vec<f64> {
             }
         }
         let norm = next[..count].iter().map(|p| p * p).sum::<f64>().sqrt();
-        next.iter_mut().for_each(|p| *p /= norm);
+        for p in &mut next {
+            *p /= norm;
+        }
         let share: f64 = next[..count].iter().zip(values).map(|(p, value)| p * (value - origin)).sum();
         for (out, p) in out.iter_mut().zip(&next[count..]) {
             *out += share * p;
@@ -83,22 +85,22 @@ fn empty_like(block: &RawBlock) -> RawBlock {
     }
 }
 
-/// A block with its holes filled; `filled` are the places of the rows that were not measured.
+/// A block with its holes filled; `invented` are the places of the rows that were not measured.
 pub(super) struct Filled {
     pub(super) raw: RawBlock,
     pub(super) places: Places,
-    pub(super) filled: Vec<usize>,
+    pub(super) invented: Vec<usize>,
     /// For every row of the block as it came its place in this one.
     pub(super) moved: Vec<usize>,
 }
 
 /// Fills the holes of a block, positions by one polynomial of degree 5 through the rows on either side (twice as many
 /// as are missing, 6 to 64), all else by straight lines. A hole with too few rows beside it begins a new piece instead.
-pub(super) fn fill(before: &Before, block: &RawBlock, places: Places, next: Option<&RawBlock>) -> Filled {
+pub(super) fn fill(before: &Before, block: &RawBlock, places: &Places, next: Option<&RawBlock>) -> Filled {
     let mut out = Filled {
         raw: empty_like(block),
         places: Places::default(),
-        filled: Vec::new(),
+        invented: Vec::new(),
         moved: Vec::with_capacity(block.rows()),
     };
     let mut done = 0;
@@ -112,19 +114,16 @@ pub(super) fn fill(before: &Before, block: &RawBlock, places: Places, next: Opti
     for &hole in &places.holes {
         take(&mut out, done, hole);
         let shift = out.raw.rows();
-        match across(before, block, &places, next, hole) {
-            Some(rows) => {
-                let count = rows.raw.rows();
-                append(&mut out.raw, &rows.raw, 0..count);
-                out.places.steps.extend_from_slice(&rows.places.steps);
-                out.places.begins.extend_from_slice(&rows.places.begins);
-                out.filled.extend(shift..shift + count);
-                take(&mut out, hole, hole + 1);
-            }
-            None => {
-                take(&mut out, hole, hole + 1);
-                out.places.begins[shift] = true;
-            }
+        if let Some(rows) = across(before, block, places, next, hole) {
+            let count = rows.raw.rows();
+            append(&mut out.raw, &rows.raw, 0..count);
+            out.places.steps.extend_from_slice(&rows.places.steps);
+            out.places.begins.extend_from_slice(&rows.places.begins);
+            out.invented.extend(shift..shift + count);
+            take(&mut out, hole, hole + 1);
+        } else {
+            take(&mut out, hole, hole + 1);
+            out.places.begins[shift] = true;
         }
         done = hole + 1;
     }
@@ -133,13 +132,7 @@ pub(super) fn fill(before: &Before, block: &RawBlock, places: Places, next: Opti
 }
 
 /// The rows of one hole; `None` with too few rows beside it.
-fn across(
-    before: &Before,
-    block: &RawBlock,
-    places: &Places,
-    next: Option<&RawBlock>,
-    hole: usize,
-) -> Option<Before> {
+fn across(before: &Before, block: &RawBlock, places: &Places, next: Option<&RawBlock>, hole: usize) -> Option<Before> {
     let earlier = before.raw.rows();
     let joined = |k: usize| if k < earlier { (&before.raw, &before.places, k) } else { (block, places, k - earlier) };
     let step_of = |k: usize| {

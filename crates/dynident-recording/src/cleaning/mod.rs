@@ -101,12 +101,12 @@ impl CleanRows {
             CleanBlock { raw, places, marked }
         } else {
             let holes = places.holes.len() as u64;
-            let Filled { raw, places, filled, moved } = fill(&self.before, &raw, places, next);
+            let Filled { raw, places, invented, moved } = fill(&self.before, &raw, &places, next);
             // A hole that could not be filled begins a piece.
-            self.bridged[0] += if filled.is_empty() { 0 } else { holes };
-            self.bridged[1] += filled.len() as u64;
+            self.bridged[0] += if invented.is_empty() { 0 } else { holes };
+            self.bridged[1] += invented.len() as u64;
             let marked = marked.into_iter().map(|marked| {
-                let mut rows: Vec<usize> = marked.into_iter().map(|row| moved[row]).chain(filled.clone()).collect();
+                let mut rows: Vec<usize> = marked.into_iter().map(|row| moved[row]).chain(invented.clone()).collect();
                 rows.sort_unstable();
                 rows
             });

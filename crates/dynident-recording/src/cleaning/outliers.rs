@@ -49,7 +49,8 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
         [place - 2 * GROUP, place - GROUP, place + 1, place + 1 + GROUP].map(|from| medians[from])
     };
     // The cubic through values at -8, -3, 3 and 8, at 0.
-    let smooth = |[far, before, behind, beyond]: [f64; 4]| 32.0 / 55.0 * (before + behind) - 9.0 / 110.0 * (far + beyond);
+    let smooth =
+        |[far, before, behind, beyond]: [f64; 4]| 32.0 / 55.0 * (before + behind) - 9.0 / 110.0 * (far + beyond);
     let off: Vec<f64> = (0..n).map(|i| x[i] - smooth(around(i))).collect();
     // How far a sample lies outside of all that is suggested for it.
     let outside = |i: usize| {

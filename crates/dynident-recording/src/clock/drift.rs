@@ -62,7 +62,8 @@ impl Drift {
             count += 1.0;
         }
         // Jumps within a piece are missing rows: the rate of an even grid is wrong by the whole step there.
-        let jumps = (1..place.len()).filter(|&i| begins[i]).map(|i| stamp[i] - stamp[i - 1] - (place[i] - place[i - 1]));
+        let jumps =
+            (1..place.len()).filter(|&i| begins[i]).map(|i| stamp[i] - stamp[i - 1] - (place[i] - place[i - 1]));
         let jumps: f64 = jumps.filter(|jump| jump.abs() < AGREEING as f64).map(|jump| jump * jump).sum();
         let variation = (square / f64::max(count, 1.0) + jumps / place.len() as f64).sqrt();
         Self { half, steps: high - low, variation }

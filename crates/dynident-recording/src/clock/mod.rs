@@ -133,12 +133,11 @@ pub(crate) fn clock(
     let smoothing_rows = drift.map_or(0, |drift| 2 * drift.half + 1);
     let stamps_predict_better = stamps.partial_cmp(&((1.0 - CLEARLY) * uniform)) == Some(core::cmp::Ordering::Less);
     (result.uniform, result.smoothing_rows) = match rule {
-        ClockRule::Uniform => (true, 0),
         ClockRule::Stamps => (false, 0),
         ClockRule::Smoothed => (false, smoothing_rows),
         ClockRule::Auto if stamps_predict_better => (false, 0),
         ClockRule::Auto if drift.is_some_and(|drift| drift.matters()) => (false, smoothing_rows),
-        ClockRule::Auto => (true, 0),
+        ClockRule::Uniform | ClockRule::Auto => (true, 0),
     };
     let believed = match result.spacing() {
         Spacing::Even => "even spacing".to_owned(),

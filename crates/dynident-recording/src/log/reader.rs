@@ -278,7 +278,8 @@ impl LogReader {
         self.next_row += 1;
         if let Some(index) = missing {
             let values = &self.tables[0].values;
-            let since = |stamp: f64| (stamp - self.first_stamp_s.unwrap_or(stamp)) * self.time.map_or(0.0, |time| time.1);
+            let since =
+                |stamp: f64| (stamp - self.first_stamp_s.unwrap_or(stamp)) * self.time.map_or(0.0, |time| time.1);
             let time_s = self.time.map_or(row as f64 * self.period_s, |(slot, _)| since(values[slot]));
             // Rows that are left out may hold anything.
             if self.rules.drops(row, time_s, values) {

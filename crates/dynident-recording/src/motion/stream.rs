@@ -10,9 +10,9 @@ use crate::derivative::{Derivatives, Differentiator, Place};
 use crate::error::{FilterError, RecordingError};
 use crate::filter::cutoff::{CUTOFF_SAMPLES, CutoffChoice, cutoff};
 use crate::log::{Log, LogFormat, LogReader, Quantity, RawBlock};
+use crate::quantisation::quantisation_step;
 use crate::reference::Reference;
 use crate::report::ImportReport;
-use crate::quantisation::quantisation_step;
 use crate::report::channels::ChannelCheck;
 use crate::report::comparison::Comparison;
 use crate::report::steps::TimeCheck;
@@ -318,14 +318,12 @@ impl MotionStream {
                     check.see(values);
                 }
             };
-            match rows_in.next_block(&mut read)? {
-                Some(next) => self.clean = next,
-                None => {
-                    self.clean = CleanBlock::default();
-                    self.ended = true;
-                    self.segmenter.close(&mut self.uniform);
-                    return Ok(());
-                }
+            let next = rows_in.next_block(&mut read)?;
+            self.ended = next.is_none();
+            self.clean = next.unwrap_or_default();
+            if self.ended {
+                self.segmenter.close(&mut self.uniform);
+                return Ok(());
             }
         }
         let CleanBlock { raw, places, marked } = &self.clean;
@@ -411,7 +409,8 @@ impl MotionStream {
             while self.set_aside.front().is_some_and(|(sample, _)| *sample < first) {
                 self.set_aside.pop_front();
             }
-            while let Some((sample, joint)) = self.set_aside.front().copied().filter(|(sample, _)| *sample < first + rows as u64)
+            while let Some((sample, joint)) =
+                self.set_aside.front().copied().filter(|(sample, _)| *sample < first + rows as u64)
             {
                 block.set_aside.resize(joints * rows, false);
                 block.set_aside[joint * rows + (sample - first) as usize] = true;

@@ -100,8 +100,7 @@ mod tests {
     fn a_piece_at_constant_velocity_does_not_speak_for_the_log() {
         let wobble = |i: usize| 1e-3 * (i as f64 * 0.7).sin();
         let steady: (Vec<f64>, Vec<f64>) = (0..357).map(|i| (0.5 + wobble(i), 0.5 - wobble(i))).unzip();
-        let swing: (Vec<f64>, Vec<f64>) =
-            (0..5000).map(|i| (i as f64 * 0.01).sin()).map(|x| (x, x + 0.02)).unzip();
+        let swing: (Vec<f64>, Vec<f64>) = (0..5000).map(|i| (i as f64 * 0.01).sin()).map(|x| (x, x + 0.02)).unzip();
         let found = compared(&[steady.clone(), swing.clone()]);
         assert!(found.correlation > 0.99 && found.lag.is_some_and(|lag| lag.correlation > 0.99), "{found:?}");
         // Alone it says the same, and its mirror the opposite.

@@ -126,7 +126,14 @@ fn a_short_gap_is_bridged_and_counts_as_no_rows() {
     let mut left_out = Vec::new();
     for block in found.iter().filter(|block| !block.set_aside.is_empty()) {
         let first = (block.first_time_s * 1000.0).round() as usize;
-        left_out.extend(block.set_aside.iter().enumerate().filter(|(_, aside)| **aside).map(|(k, _)| (k / block.rows, first + k % block.rows)));
+        left_out.extend(
+            block
+                .set_aside
+                .iter()
+                .enumerate()
+                .filter(|(_, aside)| **aside)
+                .map(|(k, _)| (k / block.rows, first + k % block.rows)),
+        );
     }
     let expected: Vec<(usize, usize)> = (0..2).flat_map(|joint| (5001..=5007).map(move |row| (joint, row))).collect();
     assert_eq!(left_out, expected);
@@ -206,7 +213,9 @@ fn rows_are_left_out_by_number_time_and_status() {
     };
     std::fs::write(&file, "t,q,tau,fault\n".to_owned() + &(0..400).map(line).collect::<String>()).unwrap();
     let read = |keys: &str| {
-        let text = format!("time = {{ column = \"t\" }}\nposition = {{ columns = [\"q\"] }}\ntorque = {{ columns = [\"tau\"] }}\n{keys}");
+        let text = format!(
+            "time = {{ column = \"t\" }}\nposition = {{ columns = [\"q\"] }}\ntorque = {{ columns = [\"tau\"] }}\n{keys}"
+        );
         let format: dynident_recording::LogFormat = toml::from_str(&text).unwrap();
         let mut stream = MotionStream::open(&format, &file, &names, &MotionSettings::default())?;
         let mut block = MotionBlock::default();
