@@ -18,8 +18,9 @@
 //! | the mean period of a periodic record and its noise | [`averaged_periods`] |
 //!
 //! The life of a log: [`LogSource`] → [`LogReader`] (units, signs, gears, ranges, missing values) → [`RawBlock`]s →
-//! outliers and held samples marked ([`SetAside`]) → pieces on a uniform clock ([`clock`]) → [`Differentiator`] → [`MotionBlock`]s. Memory does not grow with the log.
-//! Joints are known by name only; what moves them is the business of other crates.
+//! outliers and held samples marked ([`SetAside`]) → pieces on a uniform clock ([`clock`]) → [`Differentiator`] →
+//! [`MotionBlock`]s. Memory does not grow with the log. Joints are known by name only; what moves them is the business
+//! of other crates.
 //!
 //! # A file
 //!

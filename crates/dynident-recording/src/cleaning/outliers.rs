@@ -32,9 +32,10 @@ const NORMAL: f64 = 1.4826;
 /// Before and behind a sample stand two groups of five; a group's median does not care for two outliers in it. The
 /// cubic through the four medians is where a smooth torque would be; the nearer two, and the lines through those before
 /// and those behind, are the torque on either side of a step (friction reversed, contact made). A sample is an outlier
-/// if it lies outside of all of these by more than eight robust standard deviations of samples from their cubics nearby, half a percent of the torque's spread, and three
-/// steps of a quantised channel. Source of the rule by medians: Hampel, J. Am. Stat. Assoc. 69 (1974) 383; Davies and
-/// Gather, J. Am. Stat. Assoc. 88 (1993) 782. Groups beside the sample and the step are this project's own.
+/// if it lies outside of all of these by more than eight robust standard deviations of samples from their cubics
+/// nearby, half a percent of the torque's spread, and three steps of a quantised channel. Source of the rule by
+/// medians: Hampel, J. Am. Stat. Assoc. 69 (1974) 383; Davies and Gather, J. Am. Stat. Assoc. 88 (1993) 782. Groups
+/// beside the sample and the step are this project's own.
 pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> Vec<usize> {
     let n = x.len();
     if n < FEWEST {

@@ -1,8 +1,8 @@
 //! From rows with stamps to pieces of samples on a uniform clock.
 //!
 //! [`Clock`] is the decision about the rate, and whether the stamps, the stamps smoothed (`drift`) or the even spacing
-//! are to be believed. The `Timeline` gives each row its place by it, the `Segmenter` cuts a stream of rows at gaps, and
-//! its `Resampler` puts each piece on a grid of its own.
+//! are to be believed. The `Timeline` gives each row its place by it, the `Segmenter` cuts a stream of rows at gaps,
+//! and its `Resampler` puts each piece on a grid of its own.
 
 mod drift;
 mod resampler;
@@ -74,9 +74,9 @@ impl Clock {
 
 /// Decides on the clock from the stamps `time_s` and positions `q` (one slice for each joint) of the first rows.
 ///
-/// Rule: with a jitter below [`NEGLIGIBLE_JITTER`] spacing is even. Otherwise two questions. *Do single stamps tell when
-/// their samples were taken?* Every sample is predicted from its four neighbours by the cubic through them, once at even
-/// spacing and once at the stamps; where sampling was regular and only the stamps jitter (a time taken after
+/// Rule: with a jitter below [`NEGLIGIBLE_JITTER`] spacing is even. Otherwise two questions. *Do single stamps tell
+/// when their samples were taken?* Every sample is predicted from its four neighbours by the cubic through them, once
+/// at even spacing and once at the stamps; where sampling was regular and only the stamps jitter (a time taken after
 /// transmission), the first predicts better, and the other way round. Stamps are believed if they predict at least 10 %
 /// better. *Does the rate change slowly?* No cubic over five samples can tell, and noise of the position hides jitter
 /// besides; but stamps that stray ever further from an even grid do. Where they stray by more than a step, and the rate
@@ -160,9 +160,9 @@ pub(crate) fn clock(
     Ok(result)
 }
 
-/// How far the stamps stray from an even grid; smoothed over as many rows as predict left-out stamps best, and over more
-/// as long as positions follow from their neighbours clearly worse than at even spacing: jitter that lasts for several
-/// rows (packets that come late together) is none of the rate.
+/// How far the stamps stray from an even grid; smoothed over as many rows as predict left-out stamps best, and over
+/// more as long as positions follow from their neighbours clearly worse than at even spacing: jitter that lasts for
+/// several rows (packets that come late together) is none of the rate.
 fn drift((time_s, row): (&[f64], &[u64]), q: &[Vec<f64>], rate_hz: f64, longest_step_s: f64) -> Option<Drift> {
     let place: Vec<f64> = row.iter().map(|row| *row as f64).collect();
     let stamp: Vec<f64> = time_s.iter().map(|time_s| time_s * rate_hz).collect();

@@ -327,8 +327,8 @@ pub struct LogFormat {
     /// A step longer than this many median steps splits the log; 1.5 to 1000, 5 by default.
     #[serde(default = "default_max_gap_steps")]
     pub max_gap_steps: f64,
-    /// Whether a longer gap is filled where it is short against the motion (a fifth of the cut-off's period); what stands
-    /// in it counts as no row. True by default.
+    /// Whether a longer gap is filled where it is short against the motion (a fifth of the cut-off's period); what
+    /// stands in it counts as no row. True by default.
     #[serde(default = "yes")]
     pub bridge_gaps: bool,
 }

@@ -58,8 +58,9 @@ pub struct MotionBlock {
     pub tau_smooth: Vec<f64>,
     /// Temperatures of the joints on the uniform clock, unfiltered (°C); empty without a `temperature` group.
     pub temperature_c: Vec<f64>,
-    /// Whether a sample's torque does not count (outlier, held, hole that was filled), laid out as the torques; empty if
-    /// all count. What stands in its place is a straight line; a fit leaves the sample out of torque and regressor alike.
+    /// Whether a sample's torque does not count (outlier, held, hole that was filled), laid out as the torques; empty
+    /// if all count. What stands in its place is a straight line; a fit leaves the sample out of torque and regressor
+    /// alike.
     pub set_aside: Vec<bool>,
     /// Rows at the begin and at the end whose motion rests on samples that the filter had to invent at the ends of a
     /// piece: one and a half periods of the cut-off, as far as the filter reaches and at most a quarter of the piece.

@@ -14,9 +14,9 @@ pub struct DerivativeComparison {
     pub joint: String,
     /// RMS of the difference over the RMS of the derivative of the position.
     pub relative_rms_difference: f64,
-    /// `Σ a b / √(Σ a² Σ b²)` of derivative a and logged signal b over the whole log, -1 to 1: close to -1 if the sign is
-    /// reversed. Not centred, so that a joint at constant velocity says as much as one that swings, and samples count by
-    /// how fast they are. Zero where either signal is.
+    /// `Σ a b / √(Σ a² Σ b²)` of derivative a and logged signal b over the whole log, -1 to 1: close to -1 if the sign
+    /// is reversed. Not centred, so that a joint at constant velocity says as much as one that swings, and samples
+    /// count by how fast they are. Zero where either signal is.
     #[serde(default)]
     pub correlation: f64,
     /// Shift of the logged signal behind the derivative, where the derivative varies most.

@@ -110,7 +110,8 @@ pub struct ImportReport {
     /// Samples whose torque does not count, and positions that were replaced, by joint.
     #[serde(default)]
     pub set_aside: Vec<SetAside>,
-    /// Gaps that were filled because they are short against the motion, and the samples in them, which count as no rows.
+    /// Gaps that were filled because they are short against the motion, and the samples in them, which count as no
+    /// rows.
     #[serde(default)]
     pub bridged: [u64; 2],
     /// Every channel of every joint.
