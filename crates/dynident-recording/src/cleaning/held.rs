@@ -1,5 +1,6 @@
 //! Torque that stands still while its joint moves.
 
+use super::outliers::middle;
 use crate::quantisation::quantisation_step;
 
 /// Shortest run of one value that is looked at, samples.
@@ -12,7 +13,7 @@ const TIMES_NEARBY: usize = 5;
 const VALUES_NEARBY: usize = 6;
 /// Least motion during the run as a share of the motion nearby in as many samples.
 const SHARE_OF_MOTION: f64 = 0.1;
-/// Least motion in steps of a quantised encoder.
+/// Least motion in steps of a quantised encoder, and least usual change of a quantised torque over as many samples.
 const QUANTA: f64 = 4.0;
 
 /// A run of one value; its first sample was measured, those from `from + 1` to `to` (exclusive) are repeated.
@@ -49,10 +50,12 @@ fn is_held(tau: &[f64], q: &[f64], run: Run) -> bool {
     let length = run.to - run.from;
     let around = length.clamp(5 * SHORTEST, AROUND);
     let sides = [run.from.saturating_sub(around)..run.from, run.to..(run.to + around).min(tau.len())];
+    let mut changes = Vec::new();
     let (mut longest, mut values, mut samples, mut path) = (0, 0, 0, 0.0);
     for side in sides {
         let (tau, q) = (&tau[side.clone()], &q[side]);
         samples += tau.len();
+        changes.extend(tau.windows(length.min(tau.len()).max(1)).map(|run| (run[run.len() - 1] - run[0]).abs()));
         values += tau.windows(2).filter(|pair| pair[0] != pair[1]).count();
         path += q.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum::<f64>();
         let mut current = 0;
@@ -61,11 +64,14 @@ fn is_held(tau: &[f64], q: &[f64], run: Run) -> bool {
             longest = longest.max(current);
         }
     }
+    let step = quantisation_step(&tau[run.from.saturating_sub(around)..(run.to + around).min(tau.len())]);
+    let changes_enough = step.is_none_or(|step| middle(&mut changes) > QUANTA * step);
     let moved = q[run.from..run.to].windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum::<f64>();
     let net = (q[run.to - 1] - q[run.from]).abs();
     let expected = path * length as f64 / samples.max(1) as f64;
     samples >= 2 * SHORTEST
         && values >= VALUES_NEARBY
+        && changes_enough
         && length >= TIMES_NEARBY * longest
         && moved > SHARE_OF_MOTION * expected
         && net > SHARE_OF_MOTION * moved

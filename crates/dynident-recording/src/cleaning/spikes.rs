@@ -1,6 +1,6 @@
 //! Single positions that no motion makes.
 
-use super::outliers::middle;
+use super::outliers::{limit_of, middle};
 use crate::quantisation::quantisation_step;
 
 /// Samples to either side that a judgement needs.
@@ -39,7 +39,8 @@ pub(crate) fn replace_spikes(x: &mut [f64], own: core::ops::Range<usize>) -> Vec
     let all: Vec<f64> = (2..n - 2).map(|i| fourth(x, i)).collect();
     let mut sizes: Vec<f64> = all.iter().map(|c| c.abs()).collect();
     let overall = NORMAL * middle(&mut sizes);
-    let mut found: Vec<(usize, f64)> = Vec::new();
+    // Place, size, distance in units of the least, and whether it is the pattern of a spike.
+    let mut apart: Vec<(usize, f64, f64, bool)> = Vec::new();
     let inside = own.start.max(REACH)..own.end.min(n - REACH);
     let half = NOISE_SPAN / 2;
     let mut from = inside.start;
@@ -53,17 +54,20 @@ pub(crate) fn replace_spikes(x: &mut [f64], own: core::ops::Range<usize>) -> Vec
             let peak = at(2);
             let size = peak.abs();
             // A rounded sum of doubles is no spike.
-            if size <= least || size <= 1e-12 * x[i].abs() {
+            if size <= 0.5 * least || size <= 1e-12 * x[i].abs() || (0..5).any(|k| at(k).abs() > size) {
                 continue;
             }
             let rest = [at(0) - peak / 6.0, at(1) + peak / 1.5, at(3) + peak / 1.5, at(4) - peak / 6.0];
             let rest = (0.25 * rest.iter().map(|rest| rest * rest).sum::<f64>()).sqrt();
-            if rest < f64::max(ALIKE * size, (3.0 / TIMES_NOISE * least).min(ALIKE_IN_NOISE * size)) {
-                found.push((i, peak / 6.0));
-            }
+            let is_lone = rest < f64::max(ALIKE * size, (3.0 / TIMES_NOISE * least).min(ALIKE_IN_NOISE * size));
+            apart.push((i, peak / 6.0, size / least, is_lone));
         }
         from = to.max(from + 1);
     }
+    // Other roughness as large as that speaks against spikes: a motion with noise of long tails.
+    let limit = limit_of(apart.iter().map(|(_, _, times, is_lone)| if *is_lone { *times } else { times.min(1.0) }));
+    let lone = apart.into_iter().filter(|(_, _, times, is_lone)| *is_lone && *times > limit);
+    let mut found: Vec<(usize, f64)> = lone.map(|(i, size, ..)| (i, size)).collect();
     if found.is_empty() || found.len() as f64 > LARGEST_SHARE * own.len() as f64 {
         return Vec::new();
     }

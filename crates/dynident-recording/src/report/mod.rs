@@ -35,7 +35,7 @@ pub enum Level {
 }
 
 /// Share of samples set aside below which they are good to know and no more.
-const FEW: f64 = 1e-3;
+const FEW: f64 = 5e-3;
 
 /// One thing that was found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
