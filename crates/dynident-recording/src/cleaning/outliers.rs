@@ -21,6 +21,10 @@ const TIMES_NEIGHBOURS: f64 = 5.0;
 const NEIGHBOURS: usize = 3;
 /// With more samples apart than this they are the nature of the signal.
 const LARGEST_SHARE: f64 = 0.15;
+/// Share of outliers that follow one another directly above which they are pulses of the torque, and fewest of them to
+/// say so.
+const LARGEST_BESIDE: f64 = 0.2;
+const FEWEST_PULSES: usize = 10;
 /// Fewest samples to judge by.
 const FEWEST: usize = 64;
 
@@ -68,7 +72,9 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
         let (low, high) = (from.saturating_sub(half / 2), (to + half / 2).min(n));
         let mut distances: Vec<f64> = off[low..high].iter().map(|off| off.abs()).collect();
         let noise = f64::max(NORMAL * middle(&mut distances), 0.5 * overall);
-        let least = f64::max(TIMES_NOISE * noise, SHARE_OF_SPREAD * spread);
+        // Where most samples lie on a line there is no noise to go by, only the spread of the whole.
+        let share = if noise > 0.0 { SHARE_OF_SPREAD } else { 2.0 };
+        let least = f64::max(TIMES_NOISE * noise, share * spread).max(f64::MIN_POSITIVE);
         for i in from..to {
             if off[i].abs() > 0.5 * least {
                 let nearby = i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(n);
@@ -81,6 +87,11 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
     let limit = limit_of(apart.iter().map(|(_, times)| *times));
     let mut found: Vec<usize> = apart.into_iter().filter(|(_, times)| *times > limit).map(|(i, _)| i).collect();
     if found.is_empty() || found.len() as f64 > LARGEST_SHARE * own.len() as f64 {
+        return Vec::new();
+    }
+    // Errors come one by one; what lasts for some samples again and again is a torque.
+    let beside = (1..found.len()).filter(|&k| found[k] == found[k - 1] + 1).count();
+    if found.len() >= FEWEST_PULSES && beside as f64 > LARGEST_BESIDE * found.len() as f64 {
         return Vec::new();
     }
     if let Some(step) = quantisation_step(x) {
