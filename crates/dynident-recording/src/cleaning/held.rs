@@ -8,7 +8,7 @@ const SHORTEST: usize = 10;
 /// Samples to either side that a run is held against, at most.
 pub(super) const AROUND: usize = 512;
 /// Times the longest run nearby that a held one has to last.
-const TIMES_NEARBY: usize = 10;
+const TIMES_NEARBY: usize = 6;
 /// Different values that the torque has to take nearby: a torque that hardly changes repeats by its quantisation.
 const VALUES_NEARBY: usize = 6;
 /// Least motion during the run as a share of the motion nearby in as many samples.
@@ -24,7 +24,7 @@ pub(super) struct Run {
 }
 
 /// Runs of one and the same torque in `tau` while the position `q` moves on, longer than the quantisation explains: at
-/// least ten samples, ten times the longest run nearby, where the torque takes several values. A torque at `extremes`
+/// least ten samples, six times the longest run nearby, where the torque takes several values. A torque at `extremes`
 /// of the channel is saturated, not held.
 pub(super) fn held_runs(tau: &[f64], q: &[f64], extremes: [f64; 2]) -> Vec<Run> {
     let mut held = Vec::new();

@@ -64,6 +64,7 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
     };
     let mut distances: Vec<f64> = off.iter().map(|off| off.abs()).collect();
     let overall = NORMAL * middle(&mut distances);
+    let mostly_repeats = 2 * x.windows(2).filter(|pair| pair[0] == pair[1]).count() > n;
     let mut apart = Vec::new();
     let half = NOISE_SPAN / 2;
     let mut from = own.start;
@@ -73,7 +74,7 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
         let mut distances: Vec<f64> = off[low..high].iter().map(|off| off.abs()).collect();
         let noise = f64::max(NORMAL * middle(&mut distances), 0.5 * overall);
         // Where most samples lie on a line there is no noise to go by, only the spread of the whole.
-        let share = if noise > 0.0 { SHARE_OF_SPREAD } else { 2.0 };
+        let share = if noise > 0.0 && !mostly_repeats { SHARE_OF_SPREAD } else { 2.0 };
         let least = f64::max(TIMES_NOISE * noise, share * spread).max(f64::MIN_POSITIVE);
         for i in from..to {
             if off[i].abs() > 0.5 * least {
