@@ -104,11 +104,12 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
 /// Where outliers begin, for distances in units of the least that one can have: at one, or twice as far, and so on,
 /// until more lie behind the limit than between it and its half. What errors of the recorder do stands apart from the
 /// noise; a noise with long tails thins out.
-pub(super) fn limit_of(distances: impl Iterator<Item = f64> + Clone) -> f64 {
+pub(super) fn limit_of(distances: impl Iterator<Item = f64>) -> f64 {
+    let distances: Vec<f64> = distances.collect();
     let mut limit = 1.0;
     loop {
-        let beyond = distances.clone().filter(|distance| *distance > limit).count();
-        let below = distances.clone().filter(|distance| *distance > 0.5 * limit && *distance <= limit).count();
+        let beyond = distances.iter().filter(|distance| **distance > limit).count();
+        let below = distances.iter().filter(|distance| **distance > 0.5 * limit && **distance <= limit).count();
         if beyond == 0 || beyond > below {
             return limit;
         }
