@@ -172,12 +172,11 @@ impl<'a> RowBuilder<'a> {
             for joint in 0..model.dof() {
                 let left_out = self.set_aside.get(joint).map_or(&[][..], Vec::as_slice);
                 let panel = self.coverage.mask(joint, self.panels.joint(joint), samples, left_out);
-                match &mut self.decimators {
-                    Some(decimators) => rows = decimators[joint].push(panel, samples, &mut self.out),
-                    None => {
-                        self.out.clear();
-                        self.out.extend_from_slice(panel);
-                    }
+                if let Some(decimators) = &mut self.decimators {
+                    rows = decimators[joint].push(panel, samples, &mut self.out);
+                } else {
+                    self.out.clear();
+                    self.out.extend_from_slice(panel);
                 }
                 let coverage = self.coverage.divide(joint, rows, &mut self.out);
                 let (counted, panel) = match &mut self.mask {

@@ -21,7 +21,7 @@ pub(crate) struct Coverage {
     /// Of each joint: the samples left out that later rows still see, and the rows so far.
     joints: Vec<(Vec<usize>, usize)>,
     panel: Vec<f64>,
-    coverage: Vec<f64>,
+    shares: Vec<f64>,
 }
 
 impl Coverage {
@@ -33,7 +33,7 @@ impl Coverage {
             samples: 0,
             joints: vec![(Vec::new(), 0); dof],
             panel: Vec::new(),
-            coverage: Vec::new(),
+            shares: Vec::new(),
         })
     }
 
@@ -76,7 +76,7 @@ impl Coverage {
     /// Divides the next rows of a joint by their coverage, which it returns; empty where all of it is left.
     pub(crate) fn divide(&mut self, joint: usize, rows: usize, panel: &mut [f64]) -> &[f64] {
         let (left_out, done) = &mut self.joints[joint];
-        self.coverage.clear();
+        self.shares.clear();
         let first = *done;
         *done += rows;
         if left_out.is_empty() || rows == 0 {
@@ -86,16 +86,16 @@ impl Coverage {
             let from = row * self.factor;
             let at = left_out.partition_point(|sample| *sample < from);
             let inside = left_out[at..].iter().take_while(|sample| **sample < from + self.taps.len());
-            self.coverage.push(1.0 - inside.map(|sample| self.taps[sample - from]).sum::<f64>());
+            self.shares.push(1.0 - inside.map(|sample| self.taps[sample - from]).sum::<f64>());
         }
         let next = *done * self.factor;
         left_out.drain(..left_out.partition_point(|sample| *sample < next));
         for column in panel.chunks_exact_mut(rows) {
-            for (value, coverage) in column.iter_mut().zip(&self.coverage) {
+            for (value, coverage) in column.iter_mut().zip(&self.shares) {
                 *value /= coverage.max(LEAST_COVERAGE);
             }
         }
-        &self.coverage
+        &self.shares
     }
 }
 
