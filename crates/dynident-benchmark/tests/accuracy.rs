@@ -1,6 +1,7 @@
 //! The Monte Carlo benchmark: seeds, threads, and figures that are what they must be.
 
 use dynident_benchmark::accuracy::{BenchmarkError, BenchmarkFile, BenchmarkSettings, benchmark};
+use dynident_benchmark::cutoffs::{CUTOFF_CELLS, cutoff_figures};
 use dynident_identification::Silent;
 
 fn settings() -> BenchmarkSettings {
@@ -63,4 +64,16 @@ fn unknown_names_and_no_runs_are_reported() {
     assert!(message.is_err_and(|message| message.contains("--estimators best") && message.contains("weighted")));
     let none = BenchmarkSettings { runs: 0, ..settings() };
     assert!(matches!(none.validate(), Err(BenchmarkError::Runs { runs: 0 })));
+}
+
+/// The cut-off is chosen by what it does to the parameters, not by the motion's power: a slow motion with quiet
+/// encoders gains by a higher one than the spectrum asks for, and the default takes it. Two runs, so bounds are wider
+/// than the 1.15 that many runs are held to.
+#[test]
+fn a_slow_motion_gets_the_cutoff_that_its_parameters_need() -> Result<(), Box<dyn std::error::Error>> {
+    let slow = CUTOFF_CELLS.iter().find(|cell| cell.robot == "Panda" && cell.position_noise_rad == 1e-4);
+    let figures = cutoff_figures(slow.ok_or("no such cell")?, 2)?;
+    assert!(figures.default_over_best() < 1.3, "{figures:?}");
+    assert!(figures.of_default < 0.85 * figures.of_spectrum, "{figures:?}");
+    Ok(())
 }

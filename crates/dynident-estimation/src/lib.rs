@@ -61,14 +61,15 @@ pub use diagnostics::{
 pub use error::EstimationError;
 pub use factor::{
     InstrumentedProblem, JointRows, LinearProblem, Prior, RankSettings, SegmentSettings, SegmentedFactor,
-    TriangularFactor,
+    TriangularFactor, Unexcited, unexcited_columns,
 };
 pub use linear::{
-    CrossProblem, GainProblem, GeneralizedEstimate, HausmanSettings, HausmanTest, HausmanVerdict, InstrumentReport,
-    InstrumentalEstimate, InstrumentalSettings, JointGain, KnownColumns, NoiseLevelSettings, NoiseWeightedEstimate,
-    OrdinarySettings, RobustEstimate, RobustSettings, RowBlock, RowVisitor, RowWeight, WeightedSettings,
-    generalized_least_squares, hausman_test, instrumental_variables, joint_gains, noise_weighted_least_squares,
-    ordinary_least_squares, robust_least_squares, weighted_least_squares, weighted_least_squares_with_known,
+    CrossProblem, FastMotion, GainProblem, GeneralizedEstimate, HausmanSettings, HausmanTest, HausmanVerdict,
+    InstrumentReport, InstrumentalEstimate, InstrumentalSettings, JointGain, KnownColumns, NoiseLevelSettings,
+    NoiseWeightedEstimate, OrdinarySettings, RobustEstimate, RobustSettings, RowBlock, RowVisitor, RowWeight,
+    WeightedSettings, fast_motion, generalized_least_squares, hausman_test, instrumental_variables, joint_gains,
+    noise_weighted_least_squares, ordinary_least_squares, robust_least_squares, weighted_least_squares,
+    weighted_least_squares_with_known,
 };
 pub use nonlinear::{
     ChannelNoise, ChannelRows, InstantRows, InstantVisitor, MaximumLikelihoodEstimate, MaximumLikelihoodSettings,

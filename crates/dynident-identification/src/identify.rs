@@ -1,5 +1,6 @@
 //! The whole way from recordings to an identified model, stage by stage.
 
+use crate::bandwidth::{CutoffByError, choose_cutoff};
 use crate::consistent::{
     ConsistencyError, ParameterInterval, consistent_intervals, consistent_with_estimate, inconsistent_nominal_bodies,
     inertials, nearest_to_nominal,
@@ -7,17 +8,18 @@ use crate::consistent::{
 use crate::diagnosis::{Diagnosis, diagnose};
 use crate::doubt::{break_limits, have_jumps, is_doubtful};
 use crate::error::IdentificationError;
-use crate::estimators::{Estimation, InstrumentSource, estimate};
+use crate::estimators::{Estimation, Estimator, InstrumentSource, estimate};
 use crate::examination::{
     FrictionSign, HeldOutExamination, LogTrace, LogValidation, ModelUnderTest, PriorAgreement, TorqueLag,
     TorqueSignCheck, Uncertainty, examine_training, friction_signs, pooled_delay, sign_evidence, tested_on,
 };
 use crate::execution::Execution;
+use crate::less_noise::{Estimated, with_less_noise};
 use crate::logs::{Logs, of_role};
-use crate::payload::{KnownArm, PayloadResult, payload_results};
+use crate::payload::{KnownArm, PayloadResult, payload_results, with_gain_error};
 use crate::recording::Role;
 use crate::regressor_model::RegressorModel;
-use crate::settings::{DiagnosisChoice, IdentificationSettings};
+use crate::settings::{DiagnosisChoice, GainChoice, IdentificationSettings};
 use crate::task::IdentificationTask;
 use crate::training::{Training, training_rows};
 use dynident_estimation::consistent::PhysicalFit;
@@ -75,8 +77,14 @@ pub struct TrainingExamination {
 pub struct Identification {
     /// The motion settings in force, with one cut-off for all recordings.
     pub motion: MotionSettings,
+    /// How the cut-off was chosen; none where it was given or the recordings are too short to try any.
+    pub cutoff: Option<CutoffByError>,
+    /// The cut-off whose band held-out figures are for, where the fit has another.
+    pub motion_hz: Option<f64>,
     /// The training recordings as factors, the model with the friction that was chosen, payload columns, gains.
     pub training: Training,
+    /// The estimator that made the estimate: of `auto` the one that it took.
+    pub estimator: Estimator,
     /// The estimate and what its estimator can determine.
     pub estimation: Estimation,
     /// What was held at zero because the data hardly determine it, if that was asked for.
@@ -189,27 +197,34 @@ fn identified(
     }
     settings.check_names(robot).map_err(IdentificationError::Consistency)?;
 
-    // Rows and factors, with the filters in force and the friction that the logs choose.
+    // Rows and factors, with the filters in force and the friction that the logs choose; then the estimate. Where noise
+    // in the regressor biases least squares, both once more with less of it.
     let cutoff_hz = job.arm().and_then(KnownArm::cutoff_hz);
     let logs = Logs::new(robot.model(), recordings, settings.filters(), &chosen, cutoff_hz, execution)?;
+    let first = RegressorModel::from(robot.clone());
+    let cutoff = choose_cutoff((&logs, settings), &first, &chosen)?;
+    let logs = match &cutoff {
+        Some(choice) if choice.cutoff_hz != choice.motion_hz => logs.with_cutoff(&settings.motion, choice.cutoff_hz),
+        _ => logs,
+    };
     let refit = job.arm().map(KnownArm::refit);
     let training = training_rows((&logs, settings), robot.clone().into(), &chosen, payloads, refit)?;
-    let model = &training.model;
     let mut times =
         StageTimes { logs_s: training.timings_s[0], estimation_s: training.timings_s[1], examination_s: 0.0 };
-
-    // The estimate.
     let started = Instant::now();
-    let rows = training.rows((&logs, settings), &chosen);
-    let mut estimation = match job {
+    let estimation = match job {
         Job::Payload(arm) => {
-            Estimation::plain(arm.estimate(model, &training.columns, &training.problem, &settings.estimation)?)
+            let (model, columns) = (&training.model, &training.columns);
+            Estimation::plain(arm.estimate(model, columns, &training.problem, &settings.estimation)?)
         }
         Job::Model(source) => match &training.gains {
             Some((found, _)) => Estimation::plain(found.clone()),
-            None => estimate(&rows, source.take())?,
+            None => estimate(&training.rows((&logs, settings), &chosen), source.take())?,
         },
     };
+    let found = Estimated { logs, training, estimation, settings: settings.clone() };
+    let Estimated { logs, training, mut estimation, settings } = with_less_noise(task, &chosen, found)?;
+    let settings = &settings;
     let mut dropped = None;
     if let Some(essential_settings) = &settings.estimation.essential {
         let (rest, report) = essential(&estimation.estimate, essential_settings)?;
@@ -266,10 +281,17 @@ fn identified(
     };
     times.estimation_s += estimation_s;
     times.examination_s = started.elapsed().as_secs_f64() - estimation_s;
+    let of_arm = job.arm().map_or_else(Vec::new, |arm| arm.held(&training.model, &training.columns));
+    let gain_std = if settings.gains == GainChoice::Stated { settings.gain_std } else { 0.0 };
+    let estimated = (&estimation.estimate, &of_arm[..]);
+    let with_gains = with_gain_error(&training.problem, &training.columns, estimated, gain_std)?;
     Ok(Identification {
-        payloads: payload_results((recordings, payloads), &chosen, &training.columns, &estimation.estimate),
+        payloads: payload_results((recordings, payloads), &chosen, &training.columns, &with_gains),
         motion: logs.motion.clone(),
+        cutoff,
+        motion_hz: logs.motion_hz(),
         training,
+        estimator: settings.estimation.estimator.clone(),
         estimation,
         essential: dropped,
         consistent,
@@ -286,7 +308,8 @@ const FAR_WORSE: f64 = 1.7;
 
 /// Whether a held-out log is far worse explained than the training logs, joints in units of their own noise.
 fn is_far_worse(log: &LogValidation, sigma: &[f64]) -> bool {
-    let joints = log.model.joints.iter().zip(sigma).filter(|(_, sigma)| **sigma > 0.0);
+    let in_fit_band = log.in_fit_band.as_ref().unwrap_or(&log.model);
+    let joints = in_fit_band.joints.iter().zip(sigma).filter(|(_, sigma)| **sigma > 0.0);
     let squares: Vec<f64> = joints.map(|(joint, sigma)| (joint.rmse_nm / sigma).powi(2)).collect();
     squares.iter().sum::<f64>() > FAR_WORSE * FAR_WORSE * squares.len() as f64
 }

@@ -115,7 +115,9 @@
 
 #![forbid(unsafe_code)]
 
+mod bandwidth;
 mod check;
+mod conditional;
 pub mod consistent;
 pub mod diagnosis;
 mod doubt;
@@ -125,6 +127,7 @@ pub mod examination;
 mod execution;
 pub mod friction;
 mod identify;
+mod less_noise;
 mod logs;
 pub mod payload;
 mod progress;
@@ -135,7 +138,9 @@ mod settings;
 mod task;
 mod training;
 
+pub use bandwidth::{CutoffByError, CutoffCandidate, choose_cutoff};
 pub use check::{StudyExamination, examine_study};
+pub use conditional::{Condition, Conditional, conditionals, resting_joints};
 pub use error::IdentificationError;
 pub use estimators::EstimationSettings;
 pub use execution::Execution;

@@ -3,10 +3,24 @@
 use crate::execution::Execution;
 use crate::recording::{LogError, Recording, Role};
 use crate::regressor_model::RegressorModel;
-use crate::rows::{KeptLog, LogPass, ParallelFilterSettings};
+use crate::rows::{KeptLog, LogPass, ParallelFilterSettings, motion_band_hz};
 use dynident_model::Model;
 use dynident_recording::MotionSettings;
+use dynident_recording::filter::CutoffChoice;
 use std::sync::OnceLock;
+
+/// What the positions of one log say about its noise.
+#[derive(Clone, Debug)]
+pub(crate) struct LogSpectrum {
+    /// Number of the recording.
+    pub(crate) index: usize,
+    /// Samples a second.
+    pub(crate) rate_hz: f64,
+    /// The cut-off that they suggest.
+    pub(crate) choice: CutoffChoice,
+    /// Standard deviation of the noise of one sample, in the log's order of joints.
+    pub(crate) position_noise: Vec<f64>,
+}
 
 /// The recordings of a task and the filters in force. A log that fits into memory is read and
 /// differentiated once, however many passes there are.
@@ -21,6 +35,10 @@ pub struct Logs<'a> {
     /// How the job runs.
     pub execution: Execution<'a>,
     kept: Vec<OnceLock<KeptLog>>,
+    /// What the spectra of the deciding logs say, where the cut-off was left to them.
+    spectra: Vec<LogSpectrum>,
+    /// The cut-off of the torque's motion band, where the fit has another.
+    motion_hz: Option<f64>,
 }
 
 impl<'a> Logs<'a> {
@@ -41,19 +59,50 @@ impl<'a> Logs<'a> {
         if let Some(cutoff_hz) = cutoff_of_model_hz {
             motion.differentiator = motion.differentiator.with_cutoff(cutoff_hz);
         }
+        let mut spectra = Vec::new();
         if motion.differentiator.wants_cutoff() {
-            let mut highest = 0.0_f64;
             for &index in deciding {
                 if let Some(stream) = recordings[index].open(model, settings)? {
-                    highest = highest.max(stream.cutoff().cutoff_hz);
+                    let (rate_hz, choice) = (stream.rate_hz(), stream.cutoff().clone());
+                    let position_noise = stream.position_noise().to_vec();
+                    spectra.push(LogSpectrum { index, rate_hz, choice, position_noise });
                 }
             }
+            let highest = spectra.iter().map(|log| log.choice.cutoff_hz).fold(0.0, f64::max);
             if highest > 0.0 {
                 motion.differentiator = motion.differentiator.with_cutoff(highest);
             }
         }
         let kept = recordings.iter().map(|_| OnceLock::new()).collect();
-        Ok(Self { recordings, motion, filter, execution, kept })
+        Ok(Self { recordings, motion, filter, execution, kept, spectra, motion_hz: None })
+    }
+
+    /// The same with the cut-off `cutoff_hz` where it was left to the data; held-out figures stay those of the motion's
+    /// own band, which the cut-off so far stands for.
+    #[must_use]
+    pub fn with_cutoff(mut self, settings: &MotionSettings, cutoff_hz: f64) -> Self {
+        self.motion_hz = self.motion_hz.or_else(|| motion_band_hz(&self.motion));
+        self.motion.differentiator = settings.differentiator.clone().with_cutoff(cutoff_hz);
+        self.kept = self.recordings.iter().map(|_| OnceLock::new()).collect();
+        self
+    }
+
+    /// The same with held-out figures for the band that a motion cut-off of `motion_hz` makes; `None` for that of the
+    /// fit.
+    #[must_use]
+    pub fn with_motion_band(mut self, motion_hz: Option<f64>) -> Self {
+        self.motion_hz = motion_hz;
+        self
+    }
+
+    /// What the spectra alone ask for; none where the fit has that cut-off too.
+    pub(crate) fn motion_hz(&self) -> Option<f64> {
+        self.motion_hz
+    }
+
+    /// What the spectra of the deciding logs say; empty where the cut-off was given.
+    pub(crate) fn spectra(&self) -> &[LogSpectrum] {
+        &self.spectra
     }
 
     /// Places of the recordings with this role.

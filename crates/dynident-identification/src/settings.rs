@@ -68,6 +68,9 @@ pub struct IdentificationSettings {
     pub offsets: OffsetChoice,
     /// Whether torque is in newton metres; by default it is.
     pub gains: GainChoice,
+    /// Standard deviation of stated gains as a share of each, independent from joint to joint: it goes into the error
+    /// bars of payloads. Zero by default.
+    pub gain_std: f64,
     /// Whether other readings of the training logs are compared with the study's; where the fit gives reason to, by
     /// default.
     pub diagnosis: DiagnosisChoice,
@@ -84,6 +87,7 @@ impl Default for IdentificationSettings {
             friction: Vec::new(),
             offsets: OffsetChoice::default(),
             gains: GainChoice::default(),
+            gain_std: 0.0,
             diagnosis: DiagnosisChoice::default(),
         }
     }

@@ -1,21 +1,26 @@
 //! From training recordings to triangular factors, and the model whose terms they were made with.
 
+use crate::consistent::nominal_covariance;
 use crate::error::IdentificationError;
 use crate::estimators::{EstimationSettings, Estimator, TrainingRows};
 use crate::examination::{Evidence, PriorAgreement};
+use crate::execution::Execution;
 use crate::friction::{JointFriction, candidate_columns, choose_friction, chosen_model};
 use crate::logs::Logs;
 use crate::payload::{DriveGain, Gains, LoadColumns, Payload, Refit, drive_gains, known_loads};
-use crate::recording::LogError;
+use crate::recording::{LogError, MotionRecord, Recording};
 use crate::regressor_model::RegressorModel;
-use crate::rows::{JointRows, LogPass, LogStatistics, RowConsumer};
+use crate::rows::{JointRows, LogPass, LogStatistics, ParallelFilterSettings, RowConsumer, noise_factors};
 use crate::settings::{GainChoice, IdentificationSettings};
 use dynident_dynamics::Column;
 use dynident_estimation::{
-    Estimate, EstimationError, LinearProblem, SegmentedFactor, ordinary_least_squares, weighted_least_squares,
+    CovarianceMethod, Estimate, EstimationError, LinearProblem, SegmentedFactor, Unexcited, WeightedSettings,
+    ordinary_least_squares, unexcited_columns, weighted_least_squares,
 };
+use dynident_recording::{MotionBlock, MotionSettings};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// How closely given values are held, as a share of the largest of them.
@@ -30,6 +35,9 @@ pub struct LogFactors {
     pub factors: Vec<SegmentedFactor>,
     /// How the recording was read.
     pub statistics: LogStatistics,
+    /// What noise of the positions adds to the rows, one factor for each joint: known once the model is chosen, and
+    /// where the recording shows its noise.
+    pub noise: Option<Vec<SegmentedFactor>>,
     /// How well the nominal values explain it, where they are known and torque is in newton metres.
     pub nominal_agreement: Option<PriorAgreement>,
 }
@@ -91,6 +99,34 @@ pub fn training_rows(
     Ok(fitted)
 }
 
+/// Weighted least squares (ordinary where the study asks for it) with the stated terms on pieces of a motion.
+///
+/// # Errors
+/// Rows that do not carry an estimate.
+pub(crate) fn plain_fit(
+    model: RegressorModel,
+    pieces: Vec<MotionBlock>,
+    filter: &ParallelFilterSettings,
+    settings: &IdentificationSettings,
+) -> Result<Estimate, IdentificationError> {
+    let recordings: Vec<Recording> = pieces.into_iter().map(of_piece).collect();
+    let all: Vec<usize> = (0..recordings.len()).collect();
+    let alone = Execution { threads: 1, ..Execution::default() };
+    let motion = MotionSettings::default();
+    let logs = Logs::new(model.model(), &recordings, (&motion, filter), &[], None, alone)?;
+    let job = Job { logs: &logs, settings, training: &all, payloads: &[], known_arm: None };
+    let rows = job.rows_once(model)?;
+    Ok(plain_estimate(&settings.estimation, &rows.problem)?)
+}
+
+/// A piece of a motion as a recording.
+fn of_piece(motion: MotionBlock) -> Recording {
+    let label = "a piece of a motion".to_owned();
+    let record =
+        MotionRecord { label: label.clone(), motion: Arc::new(motion), usable: Vec::new(), windows: None, raw: None };
+    Recording::of_motion(label, record)
+}
+
 struct Job<'a> {
     logs: &'a Logs<'a>,
     settings: &'a IdentificationSettings,
@@ -129,13 +165,14 @@ impl Job<'_> {
         let factors = self.read(&wide)?;
         let read_s = first_read_s + started.elapsed().as_secs_f64();
         let started = Instant::now();
-        let wide_problem = self.problem(&wide, &self.columns(&wide)?, &factors)?;
+        let wide_problem = self.stated_problem(&wide, &self.columns(&wide)?, &factors)?;
         let equal_weights = matches!(settings.estimation.estimator, Estimator::Ordinary);
         let friction_choice =
             choose_friction(&first.model, &wide, &wide_problem, &candidates, (&plain, equal_weights))?;
         let chosen = chosen_model(&first.model.parametric, &friction_choice)?;
         let model = RegressorModel::from(chosen).with_load_of(&first.model, &plain.values);
-        let logs = factors.into_iter().map(|log| log.of(&wide, &model)).collect::<Result<Vec<_>, _>>()?;
+        let mut logs = factors.into_iter().map(|log| log.of(&wide, &model)).collect::<Result<Vec<_>, _>>()?;
+        self.add_noise(&model, &mut logs)?;
         let columns = self.columns(&model)?;
         let problem = self.problem(&model, &columns, &logs)?;
         let timings_s = [read_s, estimated_s + started.elapsed().as_secs_f64()];
@@ -147,7 +184,8 @@ impl Job<'_> {
     fn rows_once(&self, model: RegressorModel) -> Result<Training, IdentificationError> {
         let columns = self.columns(&model)?;
         let started = Instant::now();
-        let logs = self.read(&model)?;
+        let mut logs = self.read(&model)?;
+        self.add_noise(&model, &mut logs)?;
         let read_s = started.elapsed().as_secs_f64();
         let started = Instant::now();
         let problem = self.problem(&model, &columns, &logs)?;
@@ -174,11 +212,58 @@ impl Job<'_> {
         factors
     }
 
+    /// What noise adds to the rows, once it is clear which columns they have.
+    fn add_noise(&self, model: &RegressorModel, logs: &mut [LogFactors]) -> Result<(), LogError> {
+        let one = |log: &mut LogFactors| {
+            log.noise = noise_factors(&self.logs.pass(model, log.index), model, &log.statistics)?;
+            Ok(())
+        };
+        if self.logs.execution.parallel() {
+            logs.par_iter_mut().try_for_each(one)
+        } else {
+            logs.iter_mut().try_for_each(one)
+        }
+    }
+
     fn problem(
         &self,
         model: &RegressorModel,
         columns: &LoadColumns,
         logs: &[LogFactors],
+    ) -> Result<LinearProblem, EstimationError> {
+        let problem = self.stated_problem(model, columns, logs)?;
+        // Of an arm that is known nothing is estimated that the payload could be taken for.
+        if self.known_arm.is_some() || logs.iter().all(|log| log.noise.is_none()) {
+            return Ok(problem);
+        }
+        let noise = self.rows_of(model, columns, logs, |log| log.noise.as_ref())?;
+        let unexcited = self.unexcited(model, (&problem, &noise))?;
+        problem.with_unexcited(unexcited)
+    }
+
+    /// All rows, with what is known of the parameters beforehand.
+    fn stated_problem(
+        &self,
+        model: &RegressorModel,
+        columns: &LoadColumns,
+        logs: &[LogFactors],
+    ) -> Result<LinearProblem, EstimationError> {
+        let mut problem = self.rows_of(model, columns, logs, |log| Some(&log.factors))?;
+        if let Some(nominal) = model.parametric.nominal_base() {
+            let mut nominal = nominal.to_vec();
+            nominal.resize(columns.count(), 0.0);
+            problem = problem.with_fallback(nominal)?;
+        }
+        hold(problem, &self.settings.estimation.held)
+    }
+
+    /// The factors of all logs over one set of columns.
+    fn rows_of<'l>(
+        &self,
+        model: &RegressorModel,
+        columns: &LoadColumns,
+        logs: &'l [LogFactors],
+        factors: impl Fn(&'l LogFactors) -> Option<&'l Vec<SegmentedFactor>>,
     ) -> Result<LinearProblem, EstimationError> {
         let joints = joints_with_rows(logs, model.dof());
         let all_names = model.joint_names();
@@ -188,19 +273,38 @@ impl Job<'_> {
         for log in logs {
             // Two recordings may share a name; their numbers keep them apart.
             let name = format!("{} ({})", self.logs.recordings[log.index].name, log.index + 1);
+            let Some(factors) = factors(log) else { continue };
             for (place, &joint) in joints.iter().enumerate() {
-                let (own, factor) = (model.layout().joint_columns(joint), &log.factors[joint]);
+                let (own, factor) = (model.layout().joint_columns(joint), &factors[joint]);
                 if factor.rows() > 0 {
                     columns.add(&mut problem, (log.index, &name), place, (own, factor), keep_known)?;
                 }
             }
         }
-        if let Some(nominal) = model.parametric.nominal_base() {
-            let mut nominal = nominal.to_vec();
-            nominal.resize(columns.count(), 0.0);
-            problem = problem.with_fallback(nominal)?;
-        }
-        hold(problem, &self.settings.estimation.held)
+        Ok(problem)
+    }
+
+    /// The columns that are nothing but noise and other columns, by the noise that a first fit leaves in each joint.
+    fn unexcited(
+        &self,
+        model: &RegressorModel,
+        (problem, noise): (&LinearProblem, &LinearProblem),
+    ) -> Result<Unexcited, EstimationError> {
+        let first = WeightedSettings { covariance: CovarianceMethod::White, ..self.settings.estimation.weighted() };
+        let weights = match weighted_least_squares(problem, &first) {
+            Ok(first) => first.joint_sigma.iter().map(|sigma| sigma.recip()).collect(),
+            // What is wrong is said where the estimate itself is made.
+            Err(_) => vec![1.0; problem.joints().len()],
+        };
+        let robot = &model.parametric;
+        let scales = robot.nominal_base().filter(|nominal| nominal.len() == robot.base().count()).map(|_| {
+            let knowledge = self.settings.consistency.clone().unwrap_or_default();
+            let covariance = nominal_covariance(robot, problem, &knowledge);
+            let mut scales: Vec<f64> = covariance.diagonal().iter().map(|variance| variance.sqrt()).collect();
+            scales.resize(problem.columns().len(), 0.0);
+            scales
+        });
+        unexcited_columns(problem, noise, &weights, scales.as_deref())
     }
 }
 
@@ -295,5 +399,5 @@ pub fn log_factors(
     let pass = LogPass { reader_thread: alone && logs.execution.parallel(), ..logs.pass(model, index) };
     let statistics = pass.run(&mut consumer)?;
     let nominal_agreement = consumer.evidence.as_ref().map(|evidence| evidence.agreement(&model.joint_names()));
-    Ok(LogFactors { index, factors: consumer.factors, statistics, nominal_agreement })
+    Ok(LogFactors { index, factors: consumer.factors, statistics, noise: None, nominal_agreement })
 }

@@ -82,7 +82,7 @@ pub mod report;
 pub use cleaning::{Reason, SetAside};
 pub use derivative::{Derivatives, Differentiator, DifferentiatorSettings, Place, SampleRanges};
 pub use error::{FilterError, FormatError, RecordingError};
-pub use filter::{AveragedPeriods, DecimationSettings, Decimator, averaged_periods, cutoff};
+pub use filter::{AveragedPeriods, DecimationSettings, Decimator, averaged_periods, cutoff, position_noise};
 pub use log::{JointSamples, Log, LogFormat, LogReader, LogSource, LogTable, MemoryLog, RawBlock};
 pub use motion::{MotionBlock, MotionSettings, MotionStream};
 pub use place::LogPlace;

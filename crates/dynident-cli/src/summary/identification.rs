@@ -6,10 +6,11 @@ use super::text::{WIDTH, listed, name, percent, shortened, table, with_deviation
 use super::validation::{residuals, written};
 use core::fmt::Write;
 use dynident::ResultFile;
+use dynident::identification::CutoffCandidate;
 use dynident::identification::consistent::ParameterInterval;
 use dynident::identification::examination::LogValidation;
 use dynident::identification::friction::FrictionCandidate;
-use dynident::result::LogSummary;
+use dynident::result::{BaseParameterResult, LogSummary};
 use std::path::Path;
 
 /// Base parameters shown with their error bars; the rest stand in the file.
@@ -105,7 +106,27 @@ fn headline(r: &ResultFile) -> String {
             2,
         );
     }
+    text += &bands(r);
     text + &beside(r)
+}
+
+/// Which torque the figures are for, where the fit has another band than the motion.
+fn bands(r: &ResultFile) -> String {
+    let in_force = r.method.motion.differentiator.cutoff_hz();
+    let (Some(motion_hz), Some(cutoff_hz)) = (r.method.motion_hz, in_force) else { return String::new() };
+    let candidates = r.method.cutoff.as_ref().map_or(&[][..], |choice| &choice.candidates);
+    let error = |candidate: &CutoffCandidate| format!("{:.2}\u{a0}%", candidate.predicted_error_percent);
+    let of = |hz: f64| candidates.iter().find(|candidate| candidate.cutoff_hz == hz).map(error);
+    let predicted = of(cutoff_hz).zip(of(motion_hz)).map_or(String::new(), |(chosen, other)| {
+        format!(" (predicted error of the model {chosen}, at the motion's own {motion_hz:.1}\u{a0}Hz {other})")
+    });
+    wrapped(
+        &format!(
+            "positions filtered at {cutoff_hz:.1}\u{a0}Hz{predicted}; held-out figures: torque below {:.1}\u{a0}Hz, where the motion is",
+            0.7 * motion_hz
+        ),
+        2,
+    )
 }
 
 /// The free fit beside the model that is written, and whether the logs tell the two apart.
@@ -226,7 +247,7 @@ fn parameters(r: &ResultFile) -> String {
     );
     let rows = order.iter().take(SHOWN).map(|&index| {
         let p = &r.base_parameters[index];
-        let [value, half_width] = with_deviation(p.value, p.half_width_95);
+        let [value, half_width] = with_deviation(p.value, p.bar_95());
         vec![value, half_width, p.unit.clone(), shortened(&p.expression, EXPRESSION)]
     });
     let header = ["value", "+- (95 %)", "unit", "base parameter"].map(str::to_owned);
@@ -251,6 +272,42 @@ fn parameters(r: &ResultFile) -> String {
         let names: Vec<&str> = r.method.not_excited.iter().map(String::as_str).collect();
         let held = format!("not excited by these logs, held at the prior: {}", listed(&names, 2 * SHOWN));
         text += &wrapped(&held, 2);
+        text += &conditional(r);
+    }
+    text
+}
+
+/// What the estimates hang on that stayed at the prior, and what would tell it.
+fn conditional(r: &ResultFile) -> String {
+    let hanging: Vec<_> = r.base_parameters.iter().filter(|p| !p.conditional_on.is_empty()).collect();
+    let mut text = String::new();
+    if !hanging.is_empty() {
+        let one = |p: &&BaseParameterResult| {
+            let on: Vec<&str> = p.conditional_on.iter().map(|condition| condition.on.as_str()).collect();
+            format!("{} on {}", p.symbol, listed(&on, 2))
+        };
+        let all: Vec<String> = hanging.iter().map(one).collect();
+        let all: Vec<&str> = all.iter().map(String::as_str).collect();
+        let bars = if hanging.iter().any(|p| p.half_width_95_with_nominal.is_some()) {
+            "their bars hold what a description may be wrong by (masses by 30\u{a0}%)"
+        } else {
+            "their bars hold only if those are right, and nothing is known of them"
+        };
+        let words = format!(
+            "{} estimates hang on parameters held at the prior: {}; {bars}",
+            hanging.len(),
+            listed(&all, SHOWN)
+        );
+        text += &wrapped(&words, 2);
+    }
+    if !r.method.resting_joints.is_empty() {
+        let joints: Vec<&str> = r.method.resting_joints.iter().map(String::as_str).collect();
+        let words = format!(
+            "no log moves {} above the noise of the encoder: record a motion of all joints (`dynident design` makes \
+             one; with `prior.result = \"result.json\"` in its [design] it looks for what these logs do not tell)",
+            listed(&joints, SHOWN)
+        );
+        text += &wrapped(&words, 2);
     }
     text
 }

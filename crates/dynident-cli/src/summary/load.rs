@@ -11,6 +11,11 @@ pub(super) fn loads(r: &ResultFile) -> String {
         text.push('\n');
         text += &of_payload(payload);
     }
+    if !r.payloads.is_empty() && r.drive_gains.is_none() && r.method.gain_std_percent.is_none() {
+        let words = "the payload's bars take the gains of torque as exact; drive.gain_std_percent says how well \
+                     they are known, drive.gains = \"unknown\" measures them with a known weight";
+        text += &wrapped(words, 2);
+    }
     if let Some(gains) = &r.drive_gains {
         let header = ["drive gain", "Nm per logged unit", "+- (95 %)"].map(str::to_owned);
         let rows = gains.iter().map(|gain| {

@@ -2,23 +2,15 @@
 
 use super::text::{percent, wrapped};
 use dynident::ResultFile;
-use dynident::estimation::HausmanVerdict;
-use dynident::identification::estimators::NoiseInRegressor;
+use dynident::identification::estimators::{NoiseInRegressor, NoiseVerdict};
 
 /// Whether noise in the regressor shows, how many rows a robust estimator gave little weight, and what the study's
 /// estimator alone can determine; empty when that is nothing.
 pub(crate) fn noise(r: &ResultFile) -> String {
     let mut text = String::new();
     if let Some(noise) = &r.noise_in_regressor {
-        text += &wrapped(&verdict(noise, r.method.estimator == "instrumental"), 2);
-        if noise.instruments.weak {
-            let column = noise.instruments.weakest_column.as_deref().unwrap_or("some columns");
-            let f = noise.instruments.weakest_f.unwrap_or(0.0);
-            let weak = format!(
-                "weak instruments: they say little about {column} (first-stage F {f:.1}); choose a higher cut-off for them"
-            );
-            text += &wrapped(&weak, 2);
-        }
+        let sentence = verdict(noise, r.method.estimator == "instrumental");
+        text += &if sentence.is_empty() { sentence } else { wrapped(&sentence, 2) };
     }
     if let Some(gross) = &r.gross_errors
         && let Some((joint, share)) = gross.share.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))
@@ -68,27 +60,34 @@ fn loops(r: &ResultFile) -> String {
     text
 }
 
+/// What noise in the regressor does, in a sentence; nothing where it does nothing and nobody asked.
 fn verdict(noise: &NoiseInRegressor, used: bool) -> String {
     let test = &noise.hausman;
     let figures = test
         .f
         .zip(test.p_value)
         .map_or(String::new(), |(f, p)| format!(" (Durbin-Wu-Hausman test: F = {f:.1}, p = {p:.1e})"));
-    match test.verdict {
-        HausmanVerdict::RejectLeastSquares if used => {
-            format!("least squares would be biased by noise in the regressor{figures}; instruments avoid that")
-        }
-        HausmanVerdict::RejectLeastSquares => {
+    let followed = noise.fast_motion.map_or(String::new(), |fast| {
+        format!(
+            "torque follows {:.0}\u{a0}% of the fast motion, the rest is noise",
+            100.0 * fast.followed.clamp(0.0, 1.0)
+        )
+    });
+    let band = noise.instrument_cutoff_hz.map_or(String::new(), |[_, hz]| format!(" of the motion below {hz:.2} Hz"));
+    let lowered = noise
+        .cutoff_before_hz
+        .map_or(String::new(), |hz| format!("; the cut-off of the motion was lowered from {hz:.1} Hz with it"));
+    match noise.verdict {
+        NoiseVerdict::BiasesLeastSquares if used => {
             format!(
-                "least squares is rejected{figures}: noise in the regressor biases it, or the model fails in fast motion; compare method = \"instrumental\" on the held-out log"
+                "noise of the positions would bias least squares: {followed}; instruments{band} avoid that{lowered}{figures}"
             )
         }
-        HausmanVerdict::FilteringWasEnough => {
-            format!("filtering was enough: noise in the regressor does not show{figures}")
+        NoiseVerdict::Harmless if used => {
+            format!("instruments{band}; least squares would do: noise of the positions does not show{figures}")
         }
-        HausmanVerdict::Undecided => {
-            let reason = test.reason.as_deref().unwrap_or("no reason given");
-            format!("whether noise in the regressor biases least squares is undecided: {reason}")
-        }
+        NoiseVerdict::Undecided if used => format!("instruments{band}{figures}"),
+        // Nothing to say, or the problems say it.
+        NoiseVerdict::BiasesLeastSquares | NoiseVerdict::Harmless | NoiseVerdict::Undecided => String::new(),
     }
 }

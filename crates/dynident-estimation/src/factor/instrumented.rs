@@ -1,6 +1,7 @@
 //! Rows that carry instruments: `[Z | W | τ]`, where Z are the same columns from a motion that is free of the noise in
 //! W.
 
+use super::excitation::Unexcited;
 use super::problem::LinearProblem;
 use super::segmented::SegmentedFactor;
 use crate::error::EstimationError;
@@ -31,6 +32,7 @@ use nalgebra::DMatrix;
 pub struct InstrumentedProblem {
     names: Vec<String>,
     fallback: Vec<f64>,
+    unexcited: Unexcited,
     /// Columns of Z, then those of W.
     pub(crate) rows: LinearProblem,
 }
@@ -39,7 +41,12 @@ impl InstrumentedProblem {
     /// A problem without data: names of the columns (parameters) and of the joints.
     pub fn new(columns: Vec<String>, joints: Vec<String>) -> Self {
         let both = columns.iter().map(|name| format!("instrument of {name}")).chain(columns.iter().cloned()).collect();
-        Self { fallback: vec![0.0; columns.len()], names: columns, rows: LinearProblem::new(both, joints) }
+        Self {
+            fallback: vec![0.0; columns.len()],
+            unexcited: Unexcited::default(),
+            names: columns,
+            rows: LinearProblem::new(both, joints),
+        }
     }
 
     /// Adds the rows of joint number `joint` in the log called `log`. The factor has the instruments first, one for
@@ -75,6 +82,21 @@ impl InstrumentedProblem {
         Ok(self)
     }
 
+    /// Columns that are to stay at their fallback values: see [`LinearProblem::with_unexcited`].
+    ///
+    /// # Errors
+    /// As [`LinearProblem::with_unexcited`].
+    pub fn with_unexcited(mut self, unexcited: Unexcited) -> Result<Self, EstimationError> {
+        let checked = LinearProblem::new(self.names.clone(), Vec::new()).with_unexcited(unexcited)?;
+        self.unexcited = checked.unexcited().clone();
+        Ok(self)
+    }
+
+    /// Columns that are held at their fallback values.
+    pub fn unexcited(&self) -> &Unexcited {
+        &self.unexcited
+    }
+
     /// Names of the regressor's columns.
     pub fn columns(&self) -> &[String] {
         &self.names
@@ -95,8 +117,9 @@ impl InstrumentedProblem {
     /// # Errors
     /// None that the construction has not ruled out.
     pub fn regressors(&self) -> Result<LinearProblem, EstimationError> {
-        let mut problem =
-            LinearProblem::new(self.names.clone(), self.joints().to_vec()).with_fallback(self.fallback.clone())?;
+        let mut problem = LinearProblem::new(self.names.clone(), self.joints().to_vec())
+            .with_fallback(self.fallback.clone())?
+            .with_unexcited(self.unexcited.clone())?;
         for equation in self.rows.equations() {
             let count = equation.columns.len() / 2;
             let mut choice = DMatrix::zeros(2 * count + 1, count + 1);

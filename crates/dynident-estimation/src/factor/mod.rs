@@ -5,8 +5,9 @@
 //! a covariance can later ask how the segments differ. The factors of all joints and logs over one list of named
 //! columns make a [`LinearProblem`] (an [`InstrumentedProblem`] where instruments stand beside the regressor), with a
 //! [`Prior`] where there is one. [`RankSettings`] say when a column counts as excited, a [`RankReport`] what was
-//! decided.
+//! decided; [`unexcited_columns`] holds columns against the noise of the motion.
 
+mod excitation;
 mod instrumented;
 mod problem;
 mod rank;
@@ -14,6 +15,7 @@ mod reflect;
 mod segmented;
 mod triangular;
 
+pub use excitation::{Unexcited, unexcited_columns};
 pub use instrumented::InstrumentedProblem;
 pub(crate) use problem::StackedProblem;
 pub use problem::{JointRows, LinearProblem, Prior};

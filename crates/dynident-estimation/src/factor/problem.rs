@@ -1,7 +1,9 @@
 //! The linear problem that all estimators start from: which joint's rows see which columns, and what they hold.
 
+use super::excitation::{Unexcited, answer_of_free};
+use super::rank::{RankSettings, split};
 use super::segmented::SegmentedFactor;
-use super::triangular::{FactorWorkspace, TriangularFactor, check_weight};
+use super::triangular::{FactorWorkspace, TriangularFactor, check_columns, check_weight};
 use crate::error::{EstimationError, expect};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -46,6 +48,7 @@ pub struct LinearProblem {
     logs: Vec<String>,
     equations: Vec<JointRows>,
     fallback: Vec<f64>,
+    unexcited: Unexcited,
     prior: Option<Prior>,
 }
 
@@ -53,7 +56,15 @@ impl LinearProblem {
     /// A problem without data: names of the columns (parameters) and of the joints.
     pub fn new(columns: Vec<String>, joints: Vec<String>) -> Self {
         let fallback = vec![0.0; columns.len()];
-        Self { columns, joints, logs: Vec::new(), equations: Vec::new(), fallback, prior: None }
+        Self {
+            columns,
+            joints,
+            logs: Vec::new(),
+            equations: Vec::new(),
+            fallback,
+            unexcited: Unexcited::default(),
+            prior: None,
+        }
     }
 
     /// Adds the rows of joint number `joint` in the log called `log`; `columns` gives for every column of the factor
@@ -109,6 +120,21 @@ impl LinearProblem {
         Ok(self)
     }
 
+    /// Columns that are to stay at their fallback values although they are not zero: noise of the motion makes them, as
+    /// [`unexcited_columns`](super::unexcited_columns) finds. Every estimator holds them.
+    ///
+    /// # Errors
+    /// [`EstimationError::Mismatch`] for a column out of range.
+    pub fn with_unexcited(mut self, mut unexcited: Unexcited) -> Result<Self, EstimationError> {
+        for columns in [&mut unexcited.columns, &mut unexcited.silent] {
+            check_columns(columns, self.columns.len())?;
+            columns.sort_unstable();
+            columns.dedup();
+        }
+        self.unexcited = unexcited;
+        Ok(self)
+    }
+
     /// Adds a Gaussian prior with mean `mean` (one value per column) and square-root information `sqrt_information`,
     /// shape (any, columns): rows `[S | S m]` with unit noise. A diagonal S holds 1/std of each parameter.
     ///
@@ -148,6 +174,11 @@ impl LinearProblem {
         &self.fallback
     }
 
+    /// Columns that are held at their fallback values.
+    pub fn unexcited(&self) -> &Unexcited {
+        &self.unexcited
+    }
+
     /// The prior, if there is one.
     pub fn prior(&self) -> Option<&Prior> {
         self.prior.as_ref()
@@ -181,6 +212,39 @@ impl LinearProblem {
     /// negative, NaN or infinite.
     pub fn combined(&self, weights: &[f64]) -> Result<TriangularFactor, EstimationError> {
         self.stacked().combined(weights)
+    }
+
+    /// As [`combined`](Self::combined), where of each [unexcited](Self::with_unexcited) column only what the other
+    /// columns explain is left, `W_H` becomes `W_F (W_FᵀW_F)⁻¹W_FᵀW_H`, and nothing of a silent one. So the rows say
+    /// what they know of the sums that the held parameters stand in, and nothing that only noise says of them.
+    ///
+    /// # Errors
+    /// As [`combined`](Self::combined); [`EstimationError::Overflow`] when the other columns are not independent.
+    pub fn combined_without_noise(
+        &self,
+        weights: &[f64],
+        settings: &RankSettings,
+    ) -> Result<TriangularFactor, EstimationError> {
+        let full = self.combined(weights)?;
+        let Unexcited { columns: held, silent } = &self.unexcited;
+        if held.is_empty() {
+            return Ok(full);
+        }
+        let triangle = full.regressor_triangle();
+        let free = split(&full, settings, &self.unexcited).free;
+        let answer = answer_of_free(&triangle, &free, held)?;
+        let explained = triangle.select_columns(&free) * -answer;
+        let count = self.columns.len();
+        let mut without = TriangularFactor::new(count);
+        without.absorb_entries(&mut FactorWorkspace::default(), count + 1, |row, column| {
+            match held.binary_search(&column) {
+                Ok(place) if row < count && silent.binary_search(&column).is_err() => explained[(row, place)],
+                Ok(_) => 0.0,
+                Err(_) => full.entry(row, column),
+            }
+        });
+        without.count(full.rows());
+        Ok(without)
     }
 
     /// The totals of all equations, ready to be weighted again and again.

@@ -1,5 +1,6 @@
 //! Which columns the data excite, decided on scaled columns with a stated tolerance; and the solution on those.
 
+use super::excitation::{Unexcited, answer_of_free};
 use super::triangular::{FactorWorkspace, TriangularFactor};
 use crate::error::{EstimationError, within};
 use dynident_dynamics::independent_columns;
@@ -50,6 +51,13 @@ pub struct FixedColumn {
     pub name: String,
     /// The value at which it was fixed.
     pub value: f64,
+    /// Whether it differs from a sum of other columns by no more than noise of the motion; otherwise it is such a sum,
+    /// or zero.
+    pub noise: bool,
+    /// How the value of every column changes with that of this one, `∂θ/∂value`: the estimate of a column that is
+    /// measured only together with this one is right if this value is. Zero for columns that do not care.
+    #[serde(skip)]
+    pub answers: Vec<f64>,
 }
 
 /// What was decided about the rank, and on which numbers.
@@ -83,6 +91,10 @@ pub struct RankReport {
 pub(crate) struct Split {
     pub(crate) free: Vec<usize>,
     fixed: Vec<usize>,
+    /// Those of the fixed ones that stand out from the others by no more than noise.
+    noise: Vec<usize>,
+    /// Those that are nothing but noise: nothing answers to them.
+    silent: Vec<usize>,
     weakest_independent: f64,
     strongest_dependent: f64,
 }
@@ -109,13 +121,19 @@ fn scaled_triangle(triangle: &TriangularFactor, scales: &[f64]) -> DMatrix<f64> 
     DMatrix::from_fn(scales.len(), scales.len(), |row, column| triangle.entry(row, column) / scales[column])
 }
 
-/// Decides which columns of the stacked rows are excited.
-pub(crate) fn split(triangle: &TriangularFactor, settings: &RankSettings) -> Split {
+/// Decides which columns of the stacked rows are excited; those `unexcited` are not whatever the rows say.
+pub(crate) fn split(triangle: &TriangularFactor, settings: &RankSettings, unexcited: &Unexcited) -> Split {
     let scales = scales(triangle, settings);
-    let found = independent_columns(&scaled_triangle(triangle, &scales), settings.tolerance);
+    let mut scaled = scaled_triangle(triangle, &scales);
+    for &column in &unexcited.columns {
+        scaled.column_mut(column).fill(0.0);
+    }
+    let found = independent_columns(&scaled, settings.tolerance);
     Split {
         free: found.independent,
         fixed: found.dependent,
+        noise: unexcited.columns.clone(),
+        silent: unexcited.silent.clone(),
         weakest_independent: found.weakest_independent,
         strongest_dependent: found.strongest_dependent,
     }
@@ -241,13 +259,31 @@ pub(crate) fn report(
         Some(least) if split.fixed.is_empty() => largest / least,
         _ => condition(&scaled.select_columns(&split.free)),
     };
+    let answers = answer_of_free(&triangle.regressor_triangle(), &split.free, &split.fixed).ok();
+    let answers_to = |place: usize| {
+        let mut all = vec![0.0; names.len()];
+        if split.silent.contains(&split.fixed[place]) {
+            return all;
+        }
+        for (row, &column) in split.free.iter().enumerate() {
+            all[column] = answers.as_ref().map_or(0.0, |answers| answers[(row, place)]);
+        }
+        all
+    };
     RankReport {
         rank: split.free.len(),
         columns: names.len(),
         fixed: split
             .fixed
             .iter()
-            .map(|&column| FixedColumn { column, name: names[column].clone(), value: fallback[column] })
+            .enumerate()
+            .map(|(place, &column)| FixedColumn {
+                column,
+                name: names[column].clone(),
+                value: fallback[column],
+                noise: split.noise.contains(&column),
+                answers: answers_to(place),
+            })
             .collect(),
         numerical_rank: singular_values.iter().filter(|&&value| value > settings.tolerance * largest).count(),
         singular_values,

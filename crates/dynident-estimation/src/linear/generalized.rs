@@ -2,7 +2,7 @@
 
 use super::weighted::{WeightedSettings, noise_of_joints};
 use crate::error::{EstimationError, expect};
-use crate::factor::{LinearProblem, SegmentedFactor, solve, split};
+use crate::factor::{LinearProblem, SegmentedFactor, Unexcited, solve, split};
 use crate::uncertainty::{Estimate, PointEstimate};
 use nalgebra::{DMatrix, DVector};
 
@@ -36,6 +36,7 @@ pub struct CrossProblem {
     joints: Vec<String>,
     joint_columns: Vec<Vec<usize>>,
     fallback: Vec<f64>,
+    unexcited: Unexcited,
     logs: Vec<(String, SegmentedFactor)>,
 }
 
@@ -75,7 +76,14 @@ impl CrossProblem {
                 }
             }
         }
-        Ok(Self { fallback: vec![0.0; columns.len()], columns, joints, joint_columns, logs: Vec::new() })
+        Ok(Self {
+            fallback: vec![0.0; columns.len()],
+            unexcited: Unexcited::default(),
+            columns,
+            joints,
+            joint_columns,
+            logs: Vec::new(),
+        })
     }
 
     /// Columns of a log's factor beside its last one (the last joint's torque): those of all joints, and the torques of
@@ -102,6 +110,16 @@ impl CrossProblem {
     pub fn with_fallback(mut self, values: Vec<f64>) -> Result<Self, EstimationError> {
         LinearProblem::new(self.columns.clone(), self.joints.clone()).with_fallback(values.clone())?;
         self.fallback = values;
+        Ok(self)
+    }
+
+    /// Columns that are to stay at their fallback values: see [`LinearProblem::with_unexcited`].
+    ///
+    /// # Errors
+    /// As [`LinearProblem::with_unexcited`].
+    pub fn with_unexcited(mut self, unexcited: Unexcited) -> Result<Self, EstimationError> {
+        let checked = LinearProblem::new(self.columns.clone(), self.joints.clone()).with_unexcited(unexcited)?;
+        self.unexcited = checked.unexcited().clone();
         Ok(self)
     }
 
@@ -159,8 +177,9 @@ impl CrossProblem {
             block
         };
         let blocks: Vec<DMatrix<f64>> = (0..self.joints.len()).map(block).collect();
-        let mut problem =
-            LinearProblem::new(self.columns.clone(), vec!["all joints".into()]).with_fallback(self.fallback.clone())?;
+        let mut problem = LinearProblem::new(self.columns.clone(), vec!["all joints".into()])
+            .with_fallback(self.fallback.clone())?
+            .with_unexcited(self.unexcited.clone())?;
         for (log, factor) in &self.logs {
             problem.add(log, 0, (0..count).collect(), factor.transformed(&blocks))?;
         }
@@ -198,7 +217,7 @@ pub fn generalized_least_squares(
     let mut whitener = DMatrix::identity(joints, joints);
     let mut whitened = problem.whitened(&whitener)?;
     let mut triangle = whitened.stacked().combined(&[1.0])?;
-    let choice = split(&triangle, &settings.rank);
+    let choice = split(&triangle, &settings.rank, whitened.unexcited());
     let share = choice.free.len() as f64 / joints as f64;
     let degrees_of_freedom = rows as f64 - share;
     if degrees_of_freedom <= joints as f64 {

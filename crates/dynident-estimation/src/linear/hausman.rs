@@ -4,7 +4,7 @@ use super::instrumental::{InstrumentalEstimate, noisy_columns};
 use super::projection::Projection;
 use super::weighted::noise_of_joints;
 use crate::error::{EstimationError, within};
-use crate::factor::{InstrumentedProblem, RankSettings, solve, split};
+use crate::factor::{InstrumentedProblem, RankSettings, Unexcited, solve, split};
 use crate::uncertainty::{CovarianceMethod, PointEstimate, f_tail, joint_degrees_of_freedom};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -131,7 +131,7 @@ pub fn hausman_test(
     let augmented = problem.combined(all, zeros, |local| augmented_rows(&projection, local, &free, &noisy, &held))?;
     let stacked = augmented.stacked();
     let triangle = stacked.combined(&weights)?;
-    let choice = split(&triangle, &settings.rank);
+    let choice = split(&triangle, &settings.rank, &Unexcited::default());
     let tested: Vec<usize> = choice.free.iter().copied().filter(|&column| column >= free.len()).collect();
     if tested.is_empty() {
         return Ok(undecided("nothing of the regressor's noise is independent of the regressor".into(), [0.0; 2]));

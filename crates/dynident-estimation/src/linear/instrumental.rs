@@ -109,7 +109,7 @@ pub fn instrumental_variables(
     let stacked = problem.rows.stacked();
     let mut weights = vec![1.0; problem.joints().len()];
     let mut projection = Projection::new(problem, &stacked, &weights, &settings.rank)?;
-    let choice = split(&projection.explained, &settings.rank);
+    let choice = split(&projection.explained, &settings.rank, problem.unexcited());
     let degrees_of_freedom = joint_degrees_of_freedom(&stacked, choice.free.len())?;
     let mut solution = solve(&projection.explained, &choice, &settings.rank, problem.fallback());
     let mut joint_sigma;

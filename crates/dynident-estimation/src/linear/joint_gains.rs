@@ -181,7 +181,9 @@ fn linearised(
     let rows = problem.rows;
     let count = rows.columns().len();
     let names = rows.columns().iter().cloned().chain(rows.joints().iter().map(|joint| format!("1/gain {joint}")));
-    let mut linear = LinearProblem::new(names.collect(), rows.joints().to_vec()).with_fallback(x.to_vec())?;
+    let mut linear = LinearProblem::new(names.collect(), rows.joints().to_vec())
+        .with_fallback(x.to_vec())?
+        .with_unexcited(rows.unexcited().clone())?;
     for (number, equation) in rows.equations().iter().enumerate() {
         let (own, k) = (equation.columns.len(), x[count + equation.joint]);
         let mut map = DMatrix::zeros(own + 1, own + 2);
@@ -209,8 +211,13 @@ fn start(
     let (count, joints) = (rows.columns().len(), rows.joints().len());
     let names = rows.columns().iter().chain(rows.joints()).cloned().collect();
     // Parameters that are not determined are zero, gains one.
-    let fallback = (0..count + joints).map(|column| f64::from(u8::from(column >= count))).collect();
-    let mut linear = LinearProblem::new(names, rows.joints().to_vec()).with_fallback(fallback)?;
+    let mut fallback: Vec<f64> = (0..count + joints).map(|column| f64::from(u8::from(column >= count))).collect();
+    for &column in &rows.unexcited().columns {
+        fallback[column] = rows.fallback()[column];
+    }
+    let mut linear = LinearProblem::new(names, rows.joints().to_vec())
+        .with_fallback(fallback)?
+        .with_unexcited(rows.unexcited().clone())?;
     for (equation, factor) in rows.equations().iter().zip(merged) {
         let own = equation.columns.len();
         let names = equation.columns.iter().map(|&column| rows.columns()[column].clone()).collect();

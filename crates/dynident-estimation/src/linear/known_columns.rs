@@ -65,7 +65,8 @@ pub fn weighted_least_squares_with_known(
     let place = |column: usize| free.iter().position(|&c| c == column);
     let names = free.iter().map(|&column| problem.columns()[column].clone()).collect();
     let mut rest = LinearProblem::new(names, problem.joints().to_vec())
-        .with_fallback(free.iter().map(|&column| problem.fallback()[column]).collect())?;
+        .with_fallback(free.iter().map(|&column| problem.fallback()[column]).collect())?
+        .with_unexcited(problem.unexcited().renumbered(place))?;
     for equation in problem.equations() {
         let columns: Vec<usize> = equation.columns.iter().filter_map(|&column| place(column)).collect();
         let mut map = DMatrix::zeros(equation.columns.len() + 1, columns.len() + 1);

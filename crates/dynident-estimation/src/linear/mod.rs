@@ -9,11 +9,12 @@
 //! | correlated between joints | [`generalized_least_squares`] |
 //! | a level that depends on the velocity | [`noise_weighted_least_squares`] |
 //! | gross errors | [`robust_least_squares`] |
-//! | in the columns too | [`instrumental_variables`]; [`hausman_test`] says whether it matters |
+//! | in the columns too | [`instrumental_variables`]; [`hausman_test`] and [`fast_motion`] say whether it matters |
 //!
 //! A function takes a problem, its settings and, where rows are needed again, a source of rows at last: a pass over the
 //! log as often as it is called. [`joint_gains`] estimates the torque constants of the drives from the same rows.
 
+mod fast_motion;
 mod generalized;
 mod hausman;
 mod instrumental;
@@ -25,6 +26,7 @@ mod projection;
 mod robust;
 mod weighted;
 
+pub use fast_motion::{FastMotion, fast_motion};
 pub use generalized::{CrossProblem, GeneralizedEstimate, generalized_least_squares};
 pub use hausman::{HausmanColumn, HausmanSettings, HausmanTest, HausmanVerdict, hausman_test};
 pub use instrumental::{InstrumentReport, InstrumentalEstimate, InstrumentalSettings, instrumental_variables};

@@ -45,7 +45,7 @@ pub fn ordinary_least_squares(
     let stacked = problem.stacked();
     let weights = vec![1.0; problem.joints().len()];
     let triangle = stacked.combined(&weights)?;
-    let split = split(&triangle, &settings.rank);
+    let split = split(&triangle, &settings.rank, problem.unexcited());
     let degrees_of_freedom = joint_degrees_of_freedom(&stacked, split.free.len())?;
     let solution = solve(&triangle, &split, &settings.rank, problem.fallback());
     let (squares, _) = stacked.joint_squares(&solution.values)?;

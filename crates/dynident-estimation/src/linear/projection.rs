@@ -1,7 +1,9 @@
 //! The first stage of two: what the instruments explain of the regressor.
 
 use crate::error::EstimationError;
-use crate::factor::{FactorWorkspace, InstrumentedProblem, RankSettings, StackedProblem, TriangularFactor, split};
+use crate::factor::{
+    FactorWorkspace, InstrumentedProblem, RankSettings, StackedProblem, TriangularFactor, Unexcited, split,
+};
 use nalgebra::DMatrix;
 
 /// `W = Z Π + V` with `ZᵀV = 0`, over the weighted rows of all joints, from the triangle of `[Z | W | τ]`.
@@ -42,7 +44,7 @@ impl Projection {
             count,
             |row, column| if column < count { triangle.entry(row, column) } else { 0.0 },
         );
-        let kept = split(&alone, rank).free;
+        let kept = split(&alone, rank, &Unexcited::default()).free;
         let k = kept.len();
         let norms = alone.column_norms();
         // Triangular again without the dependent ones.

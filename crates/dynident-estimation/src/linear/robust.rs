@@ -273,7 +273,7 @@ pub fn robust_least_squares<E: From<EstimationError>>(
         let stacked = reweighted.stacked();
         let weights: Vec<f64> = scales.iter().map(|scale| 1.0 / scale).collect();
         let triangle = stacked.combined(&weights)?;
-        let choice = choice.get_or_insert_with(|| split(&triangle, &settings.rank));
+        let choice = choice.get_or_insert_with(|| split(&triangle, &settings.rank, problem.unexcited()));
         joint_degrees_of_freedom(&stacked, choice.free.len())?;
         let solution = solve(&triangle, choice, &settings.rank, problem.fallback());
         let scale_change = new_scales.iter().zip(&scales).map(|(new, old)| (new / old - 1.0).abs()).fold(0.0, f64::max);
@@ -364,7 +364,8 @@ pub(crate) fn with_factors(
     factors: Vec<SegmentedFactor>,
 ) -> Result<LinearProblem, EstimationError> {
     let mut new = LinearProblem::new(problem.columns().to_vec(), problem.joints().to_vec())
-        .with_fallback(problem.fallback().to_vec())?;
+        .with_fallback(problem.fallback().to_vec())?
+        .with_unexcited(problem.unexcited().clone())?;
     if let Some(prior) = problem.prior() {
         new = new.with_prior(prior.mean().to_vec(), prior.sqrt_information().clone())?;
     }

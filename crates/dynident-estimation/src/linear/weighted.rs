@@ -68,7 +68,7 @@ pub fn weighted_least_squares(
     let stacked = problem.stacked();
     let mut weights = vec![1.0; problem.joints().len()];
     let mut triangle = stacked.combined(&weights)?;
-    let split = split(&triangle, &settings.rank);
+    let split = split(&triangle, &settings.rank, problem.unexcited());
     let degrees_of_freedom = joint_degrees_of_freedom(&stacked, split.free.len())?;
     let mut solution = solved_values(&triangle, &split, &settings.rank, problem.fallback());
     let mut joint_sigma;

@@ -2,7 +2,7 @@
 //! periods of a repeated motion allow.
 
 use crate::error::{EstimationError, expect, require, within};
-use crate::factor::{FactorWorkspace, RankReport, RankSettings, TriangularFactor, report, solve, split};
+use crate::factor::{FactorWorkspace, RankReport, RankSettings, TriangularFactor, Unexcited, report, solve, split};
 use crate::uncertainty::{EstimateStatus, covariance_of_all};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use serde::Serialize;
@@ -106,7 +106,7 @@ pub fn maximum_likelihood<E: From<EstimationError>>(
     if rows == 0 {
         return Err(EstimationError::Empty.into());
     }
-    let choice = split(&now.triangle, &settings.rank);
+    let choice = split(&now.triangle, &settings.rank, &Unexcited::default());
     let free = choice.free.len();
     if rows <= free {
         let what = "all joints".to_owned();

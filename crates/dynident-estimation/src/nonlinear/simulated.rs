@@ -1,7 +1,7 @@
 //! Estimators that compare a simulation with the record: DIDIM, CLIE and CLOE, behind one seam.
 
 use crate::error::{EstimationError, expect, require, within};
-use crate::factor::{FactorWorkspace, RankReport, RankSettings, TriangularFactor, report, solve, split};
+use crate::factor::{FactorWorkspace, RankReport, RankSettings, TriangularFactor, Unexcited, report, solve, split};
 use crate::uncertainty::{EstimateStatus, covariance_of_all};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -187,7 +187,7 @@ pub fn simulated_least_squares<S: SimulatedMotion>(
         (last_jacobian, last_residual) = (jacobian, residual);
         triangle = TriangularFactor::new(columns);
         triangle.absorb_with(&mut FactorWorkspace::default(), &panel, rows)?;
-        choice = split(&triangle, &settings.rank);
+        choice = split(&triangle, &settings.rank, &Unexcited::default());
         if rows <= choice.free.len() {
             let (what, parameters) = ("all channels".to_owned(), choice.free.len() as f64);
             return Err(EstimationError::TooFewRows { what, rows, parameters }.into());

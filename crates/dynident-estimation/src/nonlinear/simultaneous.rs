@@ -209,7 +209,7 @@ pub fn simultaneous_least_squares<M: SimultaneousModel>(
     let stacked = problem.stacked();
     let weights: Vec<f64> = sigma.iter().map(|sigma| 1.0 / sigma).collect();
     let triangle = stacked.combined(&weights)?;
-    let choice = split(&triangle, &settings.rank);
+    let choice = split(&triangle, &settings.rank, problem.unexcited());
     joint_degrees_of_freedom(&stacked, choice.free.len())?;
     let solution = solve(&triangle, &choice, &settings.rank, problem.fallback());
     let noise = sigma.iter().zip(colours).map(|(&std, autoregression)| ChannelNoise { std, autoregression });

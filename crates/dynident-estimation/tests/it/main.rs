@@ -5,6 +5,7 @@ mod common;
 mod coverage;
 mod cross_validation;
 mod errors_in_variables;
+mod excitation;
 mod factor;
 mod golden;
 mod golden_robust;

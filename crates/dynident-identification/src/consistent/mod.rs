@@ -7,6 +7,7 @@
 mod error;
 mod intervals;
 mod nearest_to_nominal;
+mod nominal_spread;
 mod of_estimate;
 mod problem;
 mod settings;
@@ -14,6 +15,7 @@ mod settings;
 pub use error::ConsistencyError;
 pub use intervals::{ParameterInterval, consistent_intervals};
 pub use nearest_to_nominal::{inertials, nearest_to_nominal};
+pub use nominal_spread::nominal_covariance;
 pub use of_estimate::consistent_with_estimate;
 pub use problem::{
     consistency_problem, consistent_parameters, inconsistent_nominal_bodies, nearest_consistent_parameters,

@@ -3,10 +3,10 @@
 use super::error::ConsistencyError;
 use super::settings::{ConsistencySettings, EllipsoidSettings};
 use dynident_dynamics::ParametricModel;
-use dynident_estimation::LinearProblem;
 use dynident_estimation::consistent::{
     BaseMap, Ellipsoid, PhysicalBody, PhysicalFit, PhysicalProblem, PhysicalScalar, physical_fit, rough_body,
 };
+use dynident_estimation::{LinearProblem, RankSettings};
 use dynident_model::terms::TorqueTerm;
 use dynident_model::{Body, InertialParameters, Model};
 
@@ -15,7 +15,11 @@ use dynident_model::{Body, InertialParameters, Model};
 const LEAST_RELATIVE_SIGMA: f64 = 1.0e-4;
 
 /// Standard deviation of a description's masses, as a share of each.
-const MASS_SHARE: f64 = 0.3;
+pub(super) const MASS_SHARE: f64 = 0.3;
+
+/// Size of a term of which only noise speaks, as a share of its joint's torque: so small that the barrier of an
+/// interior-point method does not move it.
+const SILENT_SHARE: f64 = 1.0e-4;
 
 /// Share of a rough body that is mixed into a description's: bodies drawn as rods or plates have no extent at all in
 /// some direction.
@@ -117,22 +121,12 @@ pub fn consistency_problem(
             if sigma > 0.0 { 1.0 / sigma } else { 1.0 }
         })
         .collect();
-    let factor = problem.combined(&weights)?;
+    let factor = problem.combined_without_noise(&weights, &RankSettings::default())?;
     let map = BaseMap::from_regrouping(base.independent(), base.dependent(), base.regrouping())?;
-    let length = typical_length_m(model);
-    let masses: Vec<f64> = (0..model.dof()).map(|body| prior[10 * body]).filter(|&mass| mass > 0.0).collect();
-    let mean_mass = if masses.is_empty() { 1.0 } else { masses.iter().sum::<f64>() / masses.len() as f64 };
-    let bodies = model.bodies().iter().enumerate().map(|(index, body)| {
-        let own = &prior[10 * index..10 * index + 10];
+    let (length, mean_mass) = (typical_length_m(model), mean_mass(robot));
+    let references = reference_bodies(robot, settings);
+    let bodies = model.bodies().iter().zip(references).map(|(body, reference)| {
         let knowledge = settings.bodies.get(body.name()).cloned().unwrap_or_default();
-        let reference = knowledge.prior.unwrap_or_else(|| {
-            if consistent_body(own).0 {
-                let rough = rough_body(own[0], length);
-                core::array::from_fn(|k| own[k] + ROUGH_SHARE * rough[k])
-            } else {
-                rough_body(mean_mass, length)
-            }
-        });
         let inside = |ellipsoid: EllipsoidSettings| Ellipsoid {
             centre_m: ellipsoid.centre_m,
             semi_axes_m: ellipsoid.semi_axes_m,
@@ -146,7 +140,7 @@ pub fn consistency_problem(
             inside: knowledge.inside.map(inside),
         }
     });
-    let sizes = term_sizes(robot, problem);
+    let sizes = term_sizes(robot, problem, SILENT_SHARE);
     let scalars = terms.iter().zip(&prior[10 * model.dof()..]).zip(sizes).map(|((term, &value), size)| {
         let bounded = term.is_nonnegative();
         let own = settings.terms.get(&term.symbol());
@@ -167,21 +161,48 @@ pub fn consistency_problem(
     }
 }
 
+/// The body that stands for what is known of each before the data: the settings' prior, the description's with a little
+/// of a rough body in it, or a rough body.
+pub(super) fn reference_bodies(robot: &ParametricModel, settings: &ConsistencySettings) -> Vec<[f64; 10]> {
+    let (length, mean_mass) = (typical_length_m(robot.model()), mean_mass(robot));
+    let reference = |(index, body): (usize, &Body)| {
+        let own = &robot.nominal()[10 * index..10 * index + 10];
+        settings.bodies.get(body.name()).and_then(|knowledge| knowledge.prior).unwrap_or_else(|| {
+            if consistent_body(own).0 {
+                let rough = rough_body(own[0], length);
+                core::array::from_fn(|k| own[k] + ROUGH_SHARE * rough[k])
+            } else {
+                rough_body(mean_mass, length)
+            }
+        })
+    };
+    robot.model().bodies().iter().enumerate().map(reference).collect()
+}
+
+/// The mean of the described masses; a kilogram where there are none.
+fn mean_mass(robot: &ParametricModel) -> f64 {
+    let masses = (0..robot.model().dof()).map(|body| robot.nominal()[10 * body]).filter(|&mass| mass > 0.0);
+    let masses: Vec<f64> = masses.collect();
+    if masses.is_empty() { 1.0 } else { masses.iter().sum::<f64>() / masses.len() as f64 }
+}
+
 /// How large the parameter of each torque term can be at all: what it would be if it alone made the torque of its
 /// joint, `‖τ_j‖ / ‖w‖` over all rows of the joint. So the prior weighs as much for a watch as for a crane, in
-/// any units. 1 where the data do not see the term: there it stays where it is.
-fn term_sizes(robot: &ParametricModel, problem: &LinearProblem) -> Vec<f64> {
+/// any units. 1 where the data do not see the term: there it stays where it is. What only noise lets them see has a
+/// column of any size: there it is `silent` times the root mean square of the joint's torque.
+pub(super) fn term_sizes(robot: &ParametricModel, problem: &LinearProblem, silent: f64) -> Vec<f64> {
     let first = 10 * robot.model().dof();
     let size = |(index, _): (usize, &TorqueTerm)| {
         let column = robot.base().independent().iter().position(|&independent| independent == first + index)?;
         let (mut torque, mut norm) = (0.0, 0.0);
+        let is_silent = problem.unexcited().silent.contains(&column);
         for equation in problem.equations() {
             let Some(place) = equation.columns.iter().position(|&own| own == column) else { continue };
             let factor = equation.factor.total();
             let own = factor.column_norms()[place];
             if own > 0.0 {
                 torque += factor.torque_norm().powi(2);
-                norm += own * own;
+                norm += if is_silent { factor.rows() as f64 / (silent * silent) } else { own * own };
             }
         }
         let size = (torque / norm).sqrt();

@@ -45,6 +45,10 @@ use thiserror::Error;
 
 /// Instants that readings are compared on; more make it slower and not surer.
 const INSTANTS: usize = 300;
+/// Where even the believed reading leaves this share of the torque, positions may be noise more than motion.
+const MOSTLY_NOISE: f64 = 0.5;
+/// Parts of the cut-off that are tried then, where it was left to the data.
+const SLOWER: [f64; 2] = [0.5, 0.25];
 
 /// What was found about study, robot and logs.
 #[derive(Clone, Debug)]
@@ -89,11 +93,37 @@ pub(crate) fn has_jumps(report: &ImportReport) -> bool {
 }
 
 /// Compares readings of the recordings `training`, and looks for loads in the held-out ones beside the base parameters
-/// `theta`, where these are given.
+/// `theta`, where these are given. Where no reading explains half of the torque and the cut-off was left to the data,
+/// slower parts of the motion are tried: noise may cover what tells readings apart.
 ///
 /// # Errors
 /// Recordings that cannot be read, too few rows.
 pub fn diagnose(
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    robot: &ParametricModel,
+    training: &[usize],
+    theta: Option<&[f64]>,
+) -> Result<Diagnosis, DiagnosisError> {
+    let found = diagnosed((logs, settings), robot, training, theta)?;
+    let is_explained = found.search.best.is_some() || found.search.believed().left_of_all <= MOSTLY_NOISE;
+    let Some(cutoff_hz) = logs.motion.differentiator.cutoff_hz().filter(|_| !is_explained) else { return Ok(found) };
+    if !settings.motion.differentiator.wants_cutoff() {
+        return Ok(found);
+    }
+    // Noise of the positions may cover what tells the readings apart.
+    for share in SLOWER {
+        let (model, cutoff_hz) = (robot.model(), Some(share * cutoff_hz));
+        let slower = Logs::new(model, logs.recordings, settings.filters(), training, cutoff_hz, logs.execution)?;
+        let again = diagnosed((&slower, settings), robot, training, None)?;
+        if again.search.best.is_some() {
+            return Ok(again);
+        }
+    }
+    Ok(found)
+}
+
+/// [`diagnose`] on the motion as it is.
+fn diagnosed(
     (logs, settings): (&Logs<'_>, &IdentificationSettings),
     robot: &ParametricModel,
     training: &[usize],

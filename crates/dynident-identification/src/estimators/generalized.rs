@@ -33,7 +33,8 @@ pub(super) fn generalized(rows: &TrainingRows<'_>) -> Result<(Estimate, Findings
     let joints = problem.joints().len();
     let lists = (0..joints).map(|joint| model.layout().joint_columns(joint).to_vec()).collect();
     let mut cross = CrossProblem::new(problem.columns().to_vec(), problem.joints().to_vec(), lists)
-        .and_then(|cross| cross.with_fallback(problem.fallback().to_vec()))?;
+        .and_then(|cross| cross.with_fallback(problem.fallback().to_vec()))
+        .and_then(|cross| cross.with_unexcited(problem.unexcited().clone()))?;
     rows.begin("joints side by side");
     for (place, &index) in rows.training.iter().enumerate() {
         let factor = SegmentedFactor::new(cross.width(), settings.segments)?;

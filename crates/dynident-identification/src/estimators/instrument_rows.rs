@@ -3,12 +3,12 @@
 
 use super::instruments::InstrumentSource;
 use super::{EstimatorError, TrainingRows};
-use crate::recording::LogError;
-use crate::rows::{PANEL_SAMPLES, in_model_order, motion_band_hz, set_aside};
-use dynident_dynamics::{BatchWorkspace, Panels, regressor_panels};
+use crate::recording::{LogError, Samples};
+use crate::rows::{JointFilters, PANEL_SAMPLES, in_model_order, motion_band_hz, predicted_torque, set_aside};
+use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_estimation::{EstimationError, SegmentedFactor};
 use dynident_model::terms::JointMotion;
-use dynident_recording::{Decimator, MotionBlock};
+use dynident_recording::MotionBlock;
 
 /// The factors of one log's `[Z | W | τ]`, one for each joint.
 pub(super) fn instrumented_factors(
@@ -16,84 +16,193 @@ pub(super) fn instrumented_factors(
     index: usize,
     source: &mut dyn InstrumentSource,
 ) -> Result<Vec<SegmentedFactor>, EstimatorError> {
+    made_rows(rows, index, None, source).map(|made| made.factors)
+}
+
+/// The factors of one log's `[(W − Z) θ | τ − Z θ]`, one for each joint, and each joint's `‖(W − Z) θ‖²`.
+pub(super) fn fast_motion_factors(
+    rows: &TrainingRows<'_>,
+    index: usize,
+    theta: &[f64],
+    source: &mut dyn InstrumentSource,
+) -> Result<(Vec<SegmentedFactor>, Vec<f64>), EstimatorError> {
+    made_rows(rows, index, Some(theta), source).map(|made| (made.factors, made.squares))
+}
+
+fn made_rows<'r, 'a>(
+    rows: &'r TrainingRows<'a>,
+    index: usize,
+    theta: Option<&'r [f64]>,
+    source: &mut dyn InstrumentSource,
+) -> Result<InstrumentedRows<'r, 'a>, EstimatorError> {
     let (logs, recording) = (rows.logs, &rows.logs.recordings[index]);
-    let log = recording.name.clone();
-    let failed = |source| LogError::recording(&log, source);
-    let in_log = |source: EstimationError| LogError::Rows { log: recording.label(), source };
-    let (model, layout) = (rows.model.model(), rows.model.layout());
-    let places = recording.places(model)?;
-    let Some(mut stream) = recording.open(model, &logs.motion)? else {
-        let message = "a motion that is made already has no instruments: give its raw samples".to_owned();
-        return Err(EstimatorError::Instruments { log, message });
-    };
-    let settings = logs.filter.decimation(stream.rate_hz(), motion_band_hz(&logs.motion));
-    let segments = rows.settings.segments;
-    let widths: Vec<usize> = (0..model.dof()).map(|joint| 2 * layout.joint_columns(joint).len()).collect();
-    let mut decimators = settings
-        .map(|settings| {
-            let one = |width: &usize| Decimator::new(&settings, stream.rate_hz(), width + 1);
-            widths.iter().map(one).collect::<Result<Vec<_>, _>>()
-        })
-        .transpose()
-        .map_err(|source| LogError::Filter { log: log.clone(), source })?;
-    let mut factors = widths
-        .iter()
-        .map(|width| SegmentedFactor::new(*width, segments))
-        .collect::<Result<Vec<_>, _>>()
-        .map_err(in_log)?;
-    let mut workspace = BatchWorkspace::new(model);
-    let (mut instruments, mut regressors) = (Panels::default(), Panels::default());
-    let (mut measured, mut other) = (MotionBlock::default(), MotionBlock::default());
-    let (mut motion, mut panel, mut out) = ([Vec::new(), Vec::new(), Vec::new()], Vec::new(), Vec::new());
-    let mut segment = 0;
+    let mut builder = InstrumentedRows::new(rows, index, theta)?;
     source.begin(index)?;
-    while stream.next_block(&mut measured).map_err(failed)? {
-        source.motion(&measured, &mut other)?;
-        (other.rows, other.joints) = (measured.rows, measured.joints);
+    if let Samples::Motion(_) = recording.samples {
+        let Some(mut stream) = recording.open(rows.model.model(), &logs.motion)? else {
+            let message = "a motion that is made already has no instruments: give its raw samples".to_owned();
+            return Err(EstimatorError::Instruments { log: recording.name.clone(), message });
+        };
+        let mut block = MotionBlock::default();
+        while stream.next_block(&mut block).map_err(|source| LogError::recording(&recording.name, source))? {
+            builder.take(&block, source)?;
+            logs.execution.progress.advance(block.rows as u64);
+        }
+        return Ok(builder);
+    }
+    let mut refused = None;
+    logs.pass(rows.model, index).each_block(&mut |block| {
+        if refused.is_none() {
+            refused = builder.take(block, source).err();
+        }
+        Ok(())
+    })?;
+    refused.map_or(Ok(builder), Err)
+}
+
+/// Rows of both motions as they come.
+struct InstrumentedRows<'r, 'a> {
+    rows: &'r TrainingRows<'a>,
+    log: String,
+    label: String,
+    places: Vec<usize>,
+    /// Parameters, where only the torques of both motions are asked for.
+    theta: Option<&'r [f64]>,
+    /// Columns of each joint's rows beside the last.
+    widths: Vec<usize>,
+    /// Each joint's sum of squares of its first column behind the filter.
+    squares: Vec<f64>,
+    /// Made with the first block, which knows the rate.
+    filters: Option<JointFilters>,
+    factors: Vec<SegmentedFactor>,
+    workspace: BatchWorkspace,
+    /// What friction remembers of either motion, instruments first.
+    histories: [TermHistory; 2],
+    panels: [Panels; 2],
+    other: MotionBlock,
+    motion: [Vec<f64>; 3],
+    temperature_c: Vec<f64>,
+    panel: Vec<f64>,
+    slow: Vec<f64>,
+    counted: Vec<f64>,
+    segment: usize,
+}
+
+impl<'r, 'a> InstrumentedRows<'r, 'a> {
+    fn new(rows: &'r TrainingRows<'a>, index: usize, theta: Option<&'r [f64]>) -> Result<Self, EstimatorError> {
+        let recording = &rows.logs.recordings[index];
+        let (model, layout) = (rows.model.model(), rows.model.layout());
+        let widths: Vec<usize> = (0..model.dof())
+            .map(|joint| if theta.is_some() { 1 } else { 2 * layout.joint_columns(joint).len() })
+            .collect();
+        let label = recording.label();
+        let factors = widths
+            .iter()
+            .map(|width| SegmentedFactor::new(*width, rows.settings.segments))
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(|source: EstimationError| LogError::Rows { log: label.clone(), source })?;
+        let history = || TermHistory::new(rows.model.load_parameters.clone());
+        Ok(Self {
+            rows,
+            log: recording.name.clone(),
+            label,
+            places: recording.places(model)?,
+            theta,
+            squares: vec![0.0; widths.len()],
+            widths,
+            filters: None,
+            factors,
+            workspace: BatchWorkspace::new(model),
+            histories: [history(), history()],
+            panels: Default::default(),
+            other: MotionBlock::default(),
+            motion: Default::default(),
+            temperature_c: Vec::new(),
+            panel: Vec::new(),
+            slow: Vec::new(),
+            counted: Vec::new(),
+            segment: 0,
+        })
+    }
+
+    fn filters_at(&self, rate_hz: f64) -> Result<JointFilters, LogError> {
+        let logs = self.rows.logs;
+        let settings = logs.filter.decimation(rate_hz, motion_band_hz(&logs.motion));
+        let columns: Vec<usize> = self.widths.iter().map(|width| width + 1).collect();
+        JointFilters::new(&columns, rate_hz, settings.as_ref())
+            .map_err(|source| LogError::Filter { log: self.log.clone(), source })
+    }
+
+    fn take(&mut self, measured: &MotionBlock, source: &mut dyn InstrumentSource) -> Result<(), EstimatorError> {
+        source.motion(measured, &mut self.other)?;
+        (self.other.rows, self.other.joints) = (measured.rows, measured.joints);
         let numbers = measured.rows * measured.joints;
-        for (name, values) in [("q", &other.q), ("dq", &other.dq), ("ddq", &other.ddq)] {
+        for (name, values) in [("q", &self.other.q), ("dq", &self.other.dq), ("ddq", &self.other.ddq)] {
             if values.len() != numbers {
                 let found = values.len();
                 let message =
                     format!("{found} numbers for {name} where {numbers} are needed: one for each joint and row");
-                return Err(EstimatorError::Instruments { log, message });
+                return Err(EstimatorError::Instruments { log: self.log.clone(), message });
             }
         }
-        if measured.segment != segment {
-            segment = measured.segment;
-            decimators.iter_mut().flatten().for_each(|decimator| {
-                decimator.finish();
-            });
+        let filters = match self.filters.take() {
+            Some(filters) => filters,
+            None => self.filters_at(measured.rate_hz)?,
+        };
+        let filters = self.filters.insert(filters);
+        if measured.segment != self.segment {
+            self.segment = measured.segment;
+            self.histories.iter_mut().for_each(TermHistory::restart);
+            filters.restart();
         }
+        let (model, layout) = (self.rows.model.model(), self.rows.model.layout());
         for from in (0..measured.rows).step_by(PANEL_SAMPLES) {
             let samples = PANEL_SAMPLES.min(measured.rows - from);
-            for (block, panels) in [(&other, &mut instruments), (&measured, &mut regressors)] {
-                in_model_order(block, &places, from, samples, &mut motion);
-                let [q, dq, ddq] = &motion;
-                regressor_panels(model, &mut workspace, layout, &JointMotion { samples, q, dq, ddq }, panels);
-            }
-            for (joint, &place) in places.iter().enumerate() {
-                let width = widths[joint] / 2 * samples;
-                panel.clear();
-                panel.extend_from_slice(&instruments.joint(joint)[..width]);
-                panel.extend_from_slice(&regressors.joint(joint)[..width]);
-                panel.extend_from_slice(&measured.joint(measured.fitted_tau(), place)[from..from + samples]);
-                // What does not count is left out of all columns alike, before the filter.
-                for (sample, _) in
-                    set_aside(&measured, place, from, samples).iter().enumerate().filter(|(_, left_out)| **left_out)
-                {
-                    panel.chunks_exact_mut(samples).for_each(|column| column[sample] = 0.0);
+            if !measured.temperature_c.is_empty() {
+                self.temperature_c.clear();
+                for &place in &self.places {
+                    let temperature = measured.joint(&measured.temperature_c, place);
+                    self.temperature_c.extend_from_slice(&temperature[from..from + samples]);
                 }
-                let (rows, panel) = match &mut decimators {
-                    Some(decimators) => (decimators[joint].push(&panel, samples, &mut out), &out),
-                    None => (samples, &panel),
-                };
-                if rows > 0 {
-                    factors[joint].absorb(panel, rows).map_err(in_log)?;
+                self.histories.iter_mut().for_each(|history| history.set_temperature(&self.temperature_c));
+            }
+            for ((block, history), panels) in
+                [&self.other, measured].into_iter().zip(&mut self.histories).zip(&mut self.panels)
+            {
+                in_model_order(block, &self.places, from, samples, &mut self.motion);
+                let [q, dq, ddq] = &self.motion;
+                let motion = JointMotion { samples, q, dq, ddq };
+                regressor_panels_following(model, &mut self.workspace, layout, &motion, history, panels);
+            }
+            for (joint, &place) in self.places.iter().enumerate() {
+                let columns = layout.joint_columns(joint);
+                let gain = self.rows.model.torque_gains.get(joint).copied().unwrap_or(1.0);
+                let torque = &measured.joint(measured.fitted_tau(), place)[from..from + samples];
+                let [other, own] = &self.panels;
+                self.panel.clear();
+                if let Some(theta) = self.theta {
+                    predicted_torque(other.joint(joint), samples, columns, theta, &mut self.slow);
+                    predicted_torque(own.joint(joint), samples, columns, theta, &mut self.panel);
+                    self.panel.iter_mut().zip(&self.slow).for_each(|(own, slow)| *own -= slow);
+                    self.panel.extend(torque.iter().zip(&self.slow).map(|(torque, slow)| gain * torque - slow));
+                } else {
+                    let width = columns.len() * samples;
+                    self.panel.extend_from_slice(&other.joint(joint)[..width]);
+                    self.panel.extend_from_slice(&own.joint(joint)[..width]);
+                    self.panel.extend(torque.iter().map(|torque| gain * torque));
+                }
+                // What does not count is left out of both motions and the torque alike, as in the rows of a fit.
+                let left_out = set_aside(measured, place, from, samples);
+                let rows = filters.push(joint, &self.panel, samples, left_out).counted(&mut self.counted);
+                if rows.rows > 0 {
+                    self.squares[joint] += rows.panel[..rows.rows].iter().map(|value| value * value).sum::<f64>();
+                    self.factors[joint]
+                        .absorb(rows.panel, rows.rows)
+                        .map_err(|source| LogError::Rows { log: self.label.clone(), source })?;
                 }
             }
+            filters.advance(samples);
         }
-        logs.execution.progress.advance(measured.rows as u64);
+        Ok(())
     }
-    Ok(factors)
 }

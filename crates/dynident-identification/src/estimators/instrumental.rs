@@ -1,24 +1,28 @@
-//! Instrumental variables, and the test of least squares against them.
+//! Instrumental variables: settings, and the estimate with instruments from one source.
 
-use super::instrument_rows::instrumented_factors;
+use super::band_motion::BandMotion;
+use super::exogeneity::NoiseInRegressor;
+use super::instrument_rows::{fast_motion_factors, instrumented_factors};
 use super::instruments::{InstrumentSource, SmoothedMotion};
 use super::{EstimationSettings, EstimatorError, TrainingRows};
+use crate::recording::Samples;
 use dynident_estimation::{
-    HausmanSettings, HausmanTest, InstrumentReport, InstrumentalEstimate, InstrumentalSettings, InstrumentedProblem,
-    hausman_test, instrumental_variables,
+    HausmanSettings, InstrumentalEstimate, InstrumentalSettings, InstrumentedProblem, LinearProblem, SegmentedFactor,
+    Unexcited, hausman_test, instrumental_variables,
 };
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Instruments from the motion of the log itself, smoothed far more strongly than for the regressor.
+/// Instruments from the motion of the log itself, smoothed more strongly than for the regressor.
 ///
-/// Noise above this cut-off is not in the instruments; what lies below it is, and is small where the motion is slow
+/// Noise above their cut-off is not in the instruments; what lies below it is, and is small where the motion is slow
 /// against the noise.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct InstrumentSettings {
-    /// Cut-off of the zero-phase Butterworth filter of fourth order; by default a quarter of what the log suggests for
-    /// its motion, which is half of the highest frequency that stands out of the noise.
+    /// Cut-off of the zero-phase Butterworth filter of fourth order; by default found from the logs: half of the
+    /// regressor's, which holds the motion, and where noise shows, as much lower as the estimate still changes.
     pub cutoff_hz: Option<f64>,
     /// First-stage F below which instruments are called weak; 10 by default.
     pub weak_below: Option<f64>,
@@ -49,29 +53,67 @@ impl InstrumentSettings {
     }
 }
 
-/// What was found out about noise in the regressor.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct NoiseInRegressor {
-    /// Lowest and highest cut-off of the instruments over the logs, Hz; none when they do not come from a filter.
-    pub instrument_cutoff_hz: Option<[f64; 2]>,
-    /// How well the instruments explain the regressor.
-    pub instruments: InstrumentReport,
-    /// Least squares against instruments: was filtering enough?
-    pub hausman: HausmanTest,
+/// The estimate with instruments of one band.
+pub(super) struct BandEstimate {
+    pub(super) cutoff_hz: f64,
+    pub(super) problem: InstrumentedProblem,
+    pub(super) found: InstrumentalEstimate,
 }
 
-/// With the logs' own motion, smoothed far more strongly, as instruments.
-pub(super) fn with_smoothed_motion(
+/// A log's own motion below `cutoff_hz`.
+fn band_source<'r>(rows: &'r TrainingRows<'_>, index: usize, cutoff_hz: f64) -> Box<dyn InstrumentSource + 'r> {
+    match rows.logs.recordings[index].samples {
+        Samples::Log(_) => Box::new(BandMotion::new(rows, cutoff_hz)),
+        // Its raw samples, where they are at hand.
+        Samples::Motion(_) => Box::new(SmoothedMotion::new(rows.logs, rows.model.model(), cutoff_hz)),
+    }
+}
+
+/// Every training log's, side by side.
+fn of_every_log<T: Send>(
+    rows: &TrainingRows<'_>,
+    one: impl Fn(usize) -> Result<T, EstimatorError> + Sync,
+) -> Result<Vec<T>, EstimatorError> {
+    rows.begin("instruments");
+    let of_logs = if rows.logs.execution.parallel() {
+        rows.training.par_iter().map(|&index| one(index)).collect()
+    } else {
+        rows.training.iter().map(|&index| one(index)).collect()
+    };
+    rows.logs.end();
+    of_logs
+}
+
+/// `τ − Z θ = κ (W − Z) θ` with one κ, Z of the logs' own motion below `cutoff_hz`; and each joint's `‖(W − Z) θ‖²`.
+pub(super) fn fast_motion_problem(
+    rows: &TrainingRows<'_>,
+    cutoff_hz: f64,
+    theta: &[f64],
+) -> Result<(LinearProblem, Vec<f64>), EstimatorError> {
+    let logs =
+        of_every_log(rows, |index| fast_motion_factors(rows, index, theta, &mut *band_source(rows, index, cutoff_hz)))?;
+    let mut problem = LinearProblem::new(vec!["fast motion".to_owned()], rows.problem.joints().to_vec());
+    let mut squares = vec![0.0; rows.problem.joints().len()];
+    for (log, (factors, of_log)) in rows.problem.logs().iter().zip(logs) {
+        squares.iter_mut().zip(of_log).for_each(|(sum, square)| *sum += square);
+        for (joint, factor) in factors.into_iter().enumerate() {
+            problem.add(log, joint, vec![0], factor)?;
+        }
+    }
+    Ok((problem, squares))
+}
+
+/// With the logs' own motion below `cutoff_hz` as instruments.
+pub(super) fn with_band(
     rows: &TrainingRows<'_>,
     settings: &InstrumentSettings,
-) -> Result<(InstrumentalEstimate, NoiseInRegressor), EstimatorError> {
-    let mut source = SmoothedMotion::new(rows.logs, rows.model.model(), settings);
-    let (found, mut noise) = with_instruments(rows, settings, &mut source)?;
-    noise.instrument_cutoff_hz = source.cutoffs_hz.iter().fold(None, |range: Option<[f64; 2]>, &cutoff| {
-        Some(range.map_or([cutoff, cutoff], |[low, high]| [low.min(cutoff), high.max(cutoff)]))
-    });
-    Ok((found, noise))
+    cutoff_hz: f64,
+) -> Result<BandEstimate, EstimatorError> {
+    let factors =
+        of_every_log(rows, |index| instrumented_factors(rows, index, &mut *band_source(rows, index, cutoff_hz)))?;
+    let problem = instrumented_problem(rows, factors)?;
+    let found = instrumental_variables(&problem, &settings.instrumental(rows.settings))?;
+    Ok(BandEstimate { cutoff_hz, problem, found })
 }
 
 /// The instrumental estimate and the test, with instruments from any source.
@@ -80,20 +122,31 @@ pub(super) fn with_instruments(
     settings: &InstrumentSettings,
     source: &mut dyn InstrumentSource,
 ) -> Result<(InstrumentalEstimate, NoiseInRegressor), EstimatorError> {
-    let (problem, estimation) = (rows.problem, rows.settings);
-    let mut instrumented = InstrumentedProblem::new(problem.columns().to_vec(), problem.joints().to_vec())
-        .with_fallback(problem.fallback().to_vec())?;
     rows.begin("instruments");
-    for (place, &index) in rows.training.iter().enumerate() {
-        let factors = instrumented_factors(rows, index, source)?;
+    let factors = rows.training.iter().map(|&index| instrumented_factors(rows, index, source));
+    // Instruments from outside have no noise of these positions: they alone say what the logs excite.
+    let problem =
+        instrumented_problem(rows, factors.collect::<Result<Vec<_>, _>>()?)?.with_unexcited(Unexcited::default())?;
+    rows.logs.end();
+    let found = instrumental_variables(&problem, &settings.instrumental(rows.settings))?;
+    let hausman = hausman_test(&problem, &found, &settings.hausman(rows.settings))?;
+    let noise = NoiseInRegressor::of_test(found.instruments.clone(), hausman);
+    Ok((found, noise))
+}
+
+/// All logs' rows over one set of columns; one list of factors for each training log.
+fn instrumented_problem(
+    rows: &TrainingRows<'_>,
+    factors: Vec<Vec<SegmentedFactor>>,
+) -> Result<InstrumentedProblem, EstimatorError> {
+    let problem = rows.problem;
+    let mut instrumented = InstrumentedProblem::new(problem.columns().to_vec(), problem.joints().to_vec())
+        .with_fallback(problem.fallback().to_vec())?
+        .with_unexcited(problem.unexcited().clone())?;
+    for (log, factors) in problem.logs().iter().zip(factors) {
         for (joint, factor) in factors.into_iter().enumerate() {
-            let columns = rows.model.layout().joint_columns(joint);
-            instrumented.add(&problem.logs()[place], joint, columns, factor)?;
+            instrumented.add(log, joint, rows.model.layout().joint_columns(joint), factor)?;
         }
     }
-    rows.logs.end();
-    let found = instrumental_variables(&instrumented, &settings.instrumental(estimation))?;
-    let hausman = hausman_test(&instrumented, &found, &settings.hausman(estimation))?;
-    let instruments = found.instruments.clone();
-    Ok((found, NoiseInRegressor { instrument_cutoff_hz: None, instruments, hausman }))
+    Ok(instrumented)
 }

@@ -2,7 +2,6 @@
 //! first.
 
 use super::EstimatorError;
-use super::instrumental::InstrumentSettings;
 use crate::logs::Logs;
 use crate::recording::LogError;
 use dynident_model::Model;
@@ -36,17 +35,15 @@ pub struct SmoothedMotion<'a> {
     stream: Option<MotionStream>,
     block: MotionBlock,
     used: usize,
-    /// The cut-off in force in each log begun so far.
-    pub cutoffs_hz: Vec<f64>,
 }
 
 impl<'a> SmoothedMotion<'a> {
-    /// The motion of the task's logs, smoothed as `settings` say; trimmed as the regressor's.
-    pub fn new(logs: &'a Logs<'a>, model: &'a Model, settings: &InstrumentSettings) -> Self {
-        let differentiator = DifferentiatorSettings::Butterworth { order: 4, cutoff_hz: settings.cutoff_hz };
+    /// The motion of the task's logs below `cutoff_hz`; trimmed as the regressor's.
+    pub fn new(logs: &'a Logs<'a>, model: &'a Model, cutoff_hz: f64) -> Self {
+        let differentiator = DifferentiatorSettings::Butterworth { order: 4, cutoff_hz: Some(cutoff_hz) };
         let motion = MotionSettings { differentiator, smooth_torque: false, ..logs.motion.clone() };
         let block = MotionBlock::default();
-        Self { logs, model, motion, log: 0, stream: None, block, used: 0, cutoffs_hz: Vec::new() }
+        Self { logs, model, motion, log: 0, stream: None, block, used: 0 }
     }
 
     fn log_name(&self) -> String {
@@ -73,15 +70,7 @@ impl InstrumentSource for SmoothedMotion<'_> {
                 message: "a motion that is made already cannot be smoothed anew: give its raw samples".to_owned(),
             })
         };
-        let mut motion = self.motion.clone();
-        let DifferentiatorSettings::Butterworth { cutoff_hz, .. } = &mut motion.differentiator else {
-            return Err(self.unaligned());
-        };
-        if cutoff_hz.is_none() {
-            *cutoff_hz = Some(0.25 * open(&self.motion)?.cutoff().cutoff_hz);
-        }
-        self.cutoffs_hz.extend(*cutoff_hz);
-        self.stream = Some(open(&motion)?);
+        self.stream = Some(open(&self.motion)?);
         (self.block, self.used) = (MotionBlock::default(), 0);
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! Maximum likelihood for a motion that repeats: from logs to mean periods, their noise, and an estimate.
 
+use super::filtered_period::PeriodFilter;
 use super::row_pass::Stop;
 use super::simulated::torque_sigma;
 use super::{EstimatorError, TrainingRows};
@@ -12,7 +13,7 @@ use dynident_estimation::{
     MaximumLikelihoodSettings, maximum_likelihood, student_half_width,
 };
 use dynident_model::terms::JointMotion;
-use dynident_recording::{AveragedPeriods, MotionBlock, MotionSettings, averaged_periods};
+use dynident_recording::{AveragedPeriods, MotionBlock, averaged_periods};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -26,8 +27,10 @@ const MOST_DIFFERENCE: f64 = 0.1;
 const NO_MOTION: f64 = 1e-4;
 /// Noise of a torque counts as at least this share of its root mean square.
 const LEAST_RELATIVE_SIGMA: f64 = 1e-4;
-/// Steps of central differences of the regressor by position, velocity and acceleration; it is linear in the last.
-const STEPS: [f64; 3] = [1e-5, 1e-5, 1.0];
+/// Least steps of central differences of the regressor by position, velocity and acceleration; it is linear in the
+/// last. Where the noise of the mean period is larger, so is the step: the slope of a step of friction is that over the
+/// noise.
+const LEAST_STEPS: [f64; 3] = [1e-5, 1e-5, 1.0];
 
 /// The repeated motion.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
@@ -99,7 +102,7 @@ pub struct PeriodicFit {
     /// For each joint the standard deviation of a single sample's smoothed position, velocity and acceleration, rad,
     /// rad/s, rad/s² (m).
     pub motion_std: Vec<[f64; 3]>,
-    /// For each joint the standard deviation of a single sample's smoothed torque, Nm (N).
+    /// For each joint the standard deviation of a single sample's torque behind the parallel filter, Nm (N).
     pub torque_std: Vec<f64>,
     /// The likelihood's cost.
     pub cost: f64,
@@ -113,14 +116,17 @@ pub struct PeriodicFit {
 struct MeanPeriod {
     averaged: AveragedPeriods,
     samples: usize,
-    /// Every how many samples one is fitted to: between them the filters have left nothing new.
-    stride: usize,
+    /// Noise of a single sample between all channels behind the parallel filter.
+    covariance: DMatrix<f64>,
+    /// Instants that are fitted to, with regressor and torque behind the parallel filter: between them it has left
+    /// nothing new.
+    rows: Vec<(usize, DMatrix<f64>, DVector<f64>)>,
 }
 
 /// The estimate, and what the periods give.
 ///
-/// Torque passes the differentiator's smoothing as the positions do, so that both have the same noise band, and of the
-/// mean period as many instants count as that band distinguishes.
+/// Torque and regressor of the mean period pass the same parallel filter, and of the mean period as many instants count
+/// as it distinguishes.
 pub(super) fn periodic(
     rows: &TrainingRows<'_>,
     periods: &PeriodSettings,
@@ -155,7 +161,9 @@ pub(super) fn periodic(
     logs.end();
     let Some(first) = means.first() else { return Err(wrong("there is no log to fit to".to_owned())) };
     let (dof, most) = (model.model().dof(), first.averaged.periods);
-    let sample_covariance = pooled(&means);
+    let sample_covariance = pooled(&means, |mean| mean.covariance.clone());
+    // Of the motion's variables before the parallel filter.
+    let single = pooled(&means, |mean| matrix(&mean.averaged.sample_covariance));
     // Covariance of the mean of as many periods as the first log has; the other logs' rows are scaled to it.
     let mean_covariance = &sample_covariance / most as f64;
     let motion_covariance = mean_covariance.view((0, 0), (3 * dof, 3 * dof)).into_owned();
@@ -176,7 +184,10 @@ pub(super) fn periodic(
         tolerance: 1e-6,
         max_iterations: 50,
     };
-    let mut instants = Instants::new(model);
+    let std = |place: usize| single[(place, place)].max(0.0).sqrt();
+    let steps = |order: usize, joint: usize| LEAST_STEPS[order].max(std(order * dof + joint) / (most as f64).sqrt());
+    let steps: Vec<f64> = (0..3 * dof).map(|variable| steps(variable / dof, variable % dof)).collect();
+    let mut instants = Instants::new(model, steps);
     let found = maximum_likelihood::<Stop>(problem.columns(), &settings, |visit| {
         for mean in &means {
             let weight = (mean.averaged.periods as f64 / most as f64).sqrt();
@@ -184,13 +195,13 @@ pub(super) fn periodic(
         }
         Ok(())
     })?;
-    let std = |place: usize| sample_covariance[(place, place)].max(0.0).sqrt();
+    let torque_std = |joint: usize| sample_covariance[(3 * dof + joint, 3 * dof + joint)].max(0.0).sqrt();
     let fit = PeriodicFit {
         period_s: period_s.unwrap_or_default(),
         periods: means.iter().map(|mean| mean.averaged.periods).collect(),
-        instants: means.iter().map(|mean| mean.samples.div_ceil(mean.stride)).sum(),
+        instants: means.iter().map(|mean| mean.rows.len()).sum(),
         motion_std: (0..dof).map(|joint| core::array::from_fn(|order| std(order * dof + joint))).collect(),
-        torque_std: (0..dof).map(|joint| std(3 * dof + joint)).collect(),
+        torque_std: (0..dof).map(torque_std).collect(),
         cost: found.cost,
         degrees_of_freedom: found.degrees_of_freedom,
     };
@@ -198,14 +209,17 @@ pub(super) fn periodic(
     Ok((estimate, fit))
 }
 
-/// Noise of a single sample between all channels, over all logs.
-fn pooled(means: &[MeanPeriod]) -> DMatrix<f64> {
-    let channels = means.first().map_or(0, |mean| mean.averaged.sample_covariance.len());
+fn matrix(rows: &[Vec<f64>]) -> DMatrix<f64> {
+    DMatrix::from_fn(rows.len(), rows.len(), |a, b| rows[a][b])
+}
+
+/// A covariance of a single sample between all channels, over all logs.
+fn pooled(means: &[MeanPeriod], covariance: impl Fn(&MeanPeriod) -> DMatrix<f64>) -> DMatrix<f64> {
+    let channels = means.first().map_or(0, |mean| mean.averaged.mean.len());
     let (mut sum, mut degrees_of_freedom) = (DMatrix::zeros(channels, channels), 0.0);
     for mean in means {
         let own = (mean.samples * (mean.averaged.periods - 1)) as f64;
-        let covariance = &mean.averaged.sample_covariance;
-        sum += DMatrix::from_fn(channels, channels, |a, b| covariance[a][b]) * own;
+        sum += covariance(mean) * own;
         degrees_of_freedom += own;
     }
     sum / degrees_of_freedom.max(1.0)
@@ -221,13 +235,16 @@ fn mean_period(
     let TrainingRows { logs, model, .. } = *rows;
     let (motion, recording) = (&logs.motion, &logs.recordings[index]);
     let places = recording.places(model.model())?;
-    let alike = MotionSettings { smooth_torque: true, ..motion.clone() };
     let failed = |source| LogError::recording(&recording.name, source);
-    let Some(mut stream) = recording.open(model.model(), &alike)? else {
+    let Some(mut stream) = recording.open(model.model(), motion)? else {
         return Err(wrong("a motion that is made already has no periods: give its raw samples".to_owned()));
     };
     let (rate_hz, dof) = (stream.rate_hz(), model.model().dof());
-    let stride = logs.filter.decimation(rate_hz, motion_band_hz(motion)).map_or(1, |settings| settings.factor);
+    let no_filter = PeriodFilter { taps: vec![1.0], stride: 1 };
+    let filter = logs.filter.decimation(rate_hz, motion_band_hz(motion)).map_or(Ok(no_filter), |settings| {
+        settings.taps(rate_hz).map(|taps| PeriodFilter { taps, stride: settings.factor })
+    });
+    let filter = filter.map_err(|source| LogError::Filter { log: recording.name.clone(), source })?;
     let mut channels = vec![Vec::new(); 4 * dof];
     let (mut block, mut segment, mut begins_s) = (MotionBlock::default(), None, 0.0);
     while stream.next_block(&mut block).map_err(failed)? {
@@ -276,7 +293,9 @@ fn mean_period(
             )));
         }
     }
-    Ok(MeanPeriod { averaged, samples, stride })
+    let covariance = filter.covariance(&views, &averaged);
+    let rows = filter.rows(model, &averaged);
+    Ok(MeanPeriod { averaged, samples, covariance, rows })
 }
 
 /// Channels from `from` on at steps of `step` samples, so that a period is a whole number of them: cubic interpolation
@@ -307,11 +326,13 @@ struct Instants<'a> {
     model: &'a RegressorModel,
     workspace: BatchWorkspace,
     panels: Panels,
+    /// Of the central differences, variable by variable.
+    steps: Vec<f64>,
 }
 
 impl<'a> Instants<'a> {
-    fn new(model: &'a RegressorModel) -> Self {
-        Self { model, workspace: BatchWorkspace::new(model.model()), panels: Panels::default() }
+    fn new(model: &'a RegressorModel, steps: Vec<f64>) -> Self {
+        Self { model, workspace: BatchWorkspace::new(model.model()), panels: Panels::default(), steps }
     }
 
     /// Hands the instants of a mean period to `visit`. Rows of a mean over more periods count more; `weight` is the
@@ -322,34 +343,32 @@ impl<'a> Instants<'a> {
         let variables = 3 * dof;
         let samples = 1 + 2 * variables;
         let mut states = [vec![0.0; dof * samples], vec![0.0; dof * samples], vec![0.0; dof * samples]];
-        for instant in (0..mean.samples).step_by(mean.stride) {
+        for (instant, regressor, torque) in &mean.rows {
             for (order, state) in states.iter_mut().enumerate() {
                 for joint in 0..dof {
                     let own = &mut state[joint * samples..(joint + 1) * samples];
-                    own.fill(mean.averaged.mean[order * dof + joint][instant]);
+                    own.fill(mean.averaged.mean[order * dof + joint][*instant]);
                     let variable = order * dof + joint;
-                    own[1 + 2 * variable] += STEPS[order];
-                    own[2 + 2 * variable] -= STEPS[order];
+                    own[1 + 2 * variable] += self.steps[variable];
+                    own[2 + 2 * variable] -= self.steps[variable];
                 }
             }
             let [q, dq, ddq] = &states;
             let motion = JointMotion { samples, q, dq, ddq };
             let mut history = TermHistory::new(None);
             regressor_panels_following(model, &mut self.workspace, layout, &motion, &mut history, &mut self.panels);
-            let mut regressor = DMatrix::zeros(dof, columns);
             let mut by_motion = vec![DMatrix::zeros(dof, columns); variables];
             for joint in 0..dof {
                 let panel = self.panels.joint(joint);
                 for (place, &column) in layout.joint_columns(joint).iter().enumerate() {
                     let values = &panel[place * samples..(place + 1) * samples];
-                    regressor[(joint, column)] = weight * values[0];
                     for (variable, by) in by_motion.iter_mut().enumerate() {
                         by[(joint, column)] =
-                            (values[1 + 2 * variable] - values[2 + 2 * variable]) / (2.0 * STEPS[variable / dof]);
+                            (values[1 + 2 * variable] - values[2 + 2 * variable]) / (2.0 * self.steps[variable]);
                     }
                 }
             }
-            let torque = DVector::from_fn(dof, |joint, _| weight * mean.averaged.mean[3 * dof + joint][instant]);
+            let (regressor, torque) = (regressor * weight, torque * weight);
             visit(&InstantRows { regressor: &regressor, torque: &torque, regressor_by_motion: &by_motion })?;
         }
         Ok(())

@@ -5,7 +5,11 @@
 //! [`Estimate`]; a variant of [`Estimator`], which the compiler then asks for here; and its name in the study file
 //! (`study/estimator.rs` of `dynident`), where the compiler asks for the rest.
 
+mod automatic;
+mod band_motion;
 mod error;
+mod exogeneity;
+mod filtered_period;
 mod generalized;
 mod instrument_rows;
 mod instrumental;
@@ -21,7 +25,8 @@ mod simulated_loop;
 mod simultaneous;
 
 pub use error::EstimatorError;
-pub use instrumental::{InstrumentSettings, NoiseInRegressor};
+pub use exogeneity::{EstimateContrast, NoiseInRegressor, NoiseVerdict};
+pub use instrumental::InstrumentSettings;
 pub use instruments::{InstrumentSource, SmoothedMotion};
 pub use maximum_likelihood::{PeriodError, PeriodSettings, PeriodicFit};
 pub use noise_weighted::NoiseLevels;
@@ -34,9 +39,7 @@ pub use simultaneous::SeriesFit;
 use crate::consistent::ConsistencySettings;
 use crate::logs::Logs;
 use crate::regressor_model::RegressorModel;
-use dynident_estimation::{
-    Estimate, EstimationError, LinearProblem, RowWeight, ordinary_least_squares, weighted_least_squares,
-};
+use dynident_estimation::{Estimate, LinearProblem, RowWeight, ordinary_least_squares, weighted_least_squares};
 use simulated::ComparedSignal;
 
 /// How base parameters are estimated, with the settings that belong to the estimator alone.
@@ -56,6 +59,9 @@ pub enum Estimator {
     Tukey,
     /// Reweighted by the noise around every row: noisy stretches of a joint count less.
     NoiseWeighted(NoiseLevels),
+    /// Weighted least squares, or instrumental variables where noise in the regressor biases it and the instruments are
+    /// strong.
+    Auto(InstrumentSettings),
     /// Instrumental variables: noise in the regressor does not bias the estimate.
     Instrumental(InstrumentSettings),
     /// Maximum likelihood for a motion that repeats: noise of motion and torque from how the periods differ.
@@ -81,6 +87,7 @@ impl Estimator {
             Self::Huber => "huber",
             Self::Tukey => "tukey",
             Self::NoiseWeighted(_) => "noise-weighted",
+            Self::Auto(_) => "auto",
             Self::Instrumental(_) => "instrumental",
             Self::MaximumLikelihood(_) => "maximum-likelihood",
             Self::Simultaneous(_) => "simultaneous",
@@ -90,10 +97,11 @@ impl Estimator {
         }
     }
 
-    /// Whether its values are those of least squares on the rows as they are, with one weight for each joint.
+    /// Whether its values are those of least squares on the rows as they are, with one weight for each joint; of `Auto`
+    /// before it has found noise.
     pub fn is_plain(&self) -> bool {
         match self {
-            Self::Ordinary | Self::Weighted => true,
+            Self::Ordinary | Self::Weighted | Self::Auto(_) => true,
             Self::Generalized
             | Self::Huber
             | Self::Tukey
@@ -170,8 +178,8 @@ impl TrainingRows<'_> {
     }
 }
 
-/// The estimate that the settings ask for, and the test of least squares if there are instruments: those of
-/// `source`, or the settings' own.
+/// The estimate that the settings ask for, and what noise in the regressor does to least squares where that is asked:
+/// with instruments of `source`, or of the logs' own motion.
 ///
 /// # Errors
 /// Rows that do not carry an estimate, and what the estimator chosen needs and does not find.
@@ -180,25 +188,60 @@ pub fn estimate(
     source: Option<&mut dyn InstrumentSource>,
 ) -> Result<Estimation, EstimatorError> {
     let settings = rows.settings;
-    let instruments = match &settings.estimator {
-        Estimator::Instrumental(own) => Some(own),
+    if let Some(source) = source {
+        return with_source(rows, source);
+    }
+    let weighted = || weighted_least_squares(rows.problem, &settings.weighted());
+    match &settings.estimator {
+        Estimator::Instrumental(own) => {
+            let (found, noise) = exogeneity::examined(rows, own, &weighted()?)?;
+            return Ok(Estimation { noise_in_regressor: Some(noise), ..Estimation::plain(found.estimate) });
+        }
+        Estimator::Auto(own) => return automatic::automatic(rows, own, weighted()?),
+        _ => {}
+    }
+    let (estimate, findings) = without_instruments(rows)?;
+    let mut estimation = Estimation { findings, ..Estimation::plain(estimate) };
+    // What the instruments are compared with is least squares in any case.
+    let compared = if settings.estimator.is_plain() { None } else { Some(weighted) };
+    let least_squares = || compared.map_or_else(|| Ok(estimation.estimate.clone()), |weighted| weighted());
+    estimation.noise_in_regressor = match &settings.exogeneity_test {
+        Some(own) => Some(exogeneity::examined(rows, own, &least_squares()?)?.1),
+        None if settings.examine_exogeneity => {
+            let own = InstrumentSettings::default();
+            automatic::examined_where_possible(rows, &own, &least_squares()?)?.map(|(_, noise)| noise)
+        }
+        None => None,
+    };
+    Ok(estimation)
+}
+
+/// As [`estimate`] with instruments from outside.
+fn with_source(rows: &TrainingRows<'_>, source: &mut dyn InstrumentSource) -> Result<Estimation, EstimatorError> {
+    let settings = rows.settings;
+    let own = match &settings.estimator {
+        Estimator::Instrumental(own) | Estimator::Auto(own) => Some(own),
         _ => settings.exogeneity_test.as_ref(),
     };
-    let instrumented = match (source, instruments) {
-        (Some(source), own) => Some(instrumental::with_instruments(rows, &own.cloned().unwrap_or_default(), source)?),
-        (None, Some(own)) => Some(instrumental::with_smoothed_motion(rows, own)?),
-        (None, None) => None,
+    let (found, noise) = instrumental::with_instruments(rows, &own.cloned().unwrap_or_default(), source)?;
+    let (estimate, findings) = match &settings.estimator {
+        Estimator::Instrumental(_) => (found.estimate, Findings::None),
+        _ => without_instruments(rows)?,
     };
-    let (by_instruments, noise_in_regressor) = instrumented.unzip();
+    Ok(Estimation { estimate, findings, noise_in_regressor: Some(noise) })
+}
+
+/// The estimate of estimators that need no instruments; of those that can do without, theirs without.
+fn without_instruments(rows: &TrainingRows<'_>) -> Result<(Estimate, Findings), EstimatorError> {
+    let settings = rows.settings;
     let simulated = |loop_settings, compared| {
         let found = simulated::simulated(rows, loop_settings, compared);
         found.map(|(estimate, found)| (estimate, Findings::Simulated(found)))
     };
-    let (estimate, findings) = match &settings.estimator {
+    Ok(match &settings.estimator {
         Estimator::Ordinary => (ordinary_least_squares(rows.problem, &settings.ordinary())?, Findings::None),
-        Estimator::Weighted => (weighted_least_squares(rows.problem, &settings.weighted())?, Findings::None),
-        Estimator::Instrumental(_) => {
-            (by_instruments.map(|found| found.estimate).ok_or(EstimationError::Empty)?, Findings::None)
+        Estimator::Weighted | Estimator::Auto(_) | Estimator::Instrumental(_) => {
+            (weighted_least_squares(rows.problem, &settings.weighted())?, Findings::None)
         }
         Estimator::Huber => robust::robust(rows, RowWeight::huber())?,
         Estimator::Tukey => robust::robust(rows, RowWeight::tukey())?,
@@ -212,6 +255,5 @@ pub fn estimate(
         Estimator::Didim(settings) => simulated(settings, ComparedSignal::TorqueRows)?,
         Estimator::Clie(settings) => simulated(settings, ComparedSignal::Torque)?,
         Estimator::Cloe(settings) => simulated(settings, ComparedSignal::Position)?,
-    };
-    Ok(Estimation { estimate, findings, noise_in_regressor })
+    })
 }

@@ -19,6 +19,9 @@ pub struct EstimationSettings {
     pub segments: SegmentSettings,
     /// Instruments that only test whether noise in the regressor biases the estimator; none by default.
     pub exogeneity_test: Option<InstrumentSettings>,
+    /// Whether noise in the regressor is looked for where that is possible, with instruments of the logs' own motion;
+    /// one more pass over the logs, and not by default. [`Estimator::Auto`] does so in any case.
+    pub examine_exogeneity: bool,
     /// Hold parameters that the data hardly determine at zero; not by default.
     pub essential: Option<EssentialSettings>,
     /// Base columns that are held at given values (place among the base columns, value); none by default.

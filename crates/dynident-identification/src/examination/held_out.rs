@@ -1,12 +1,13 @@
 //! A model against a recording that was not used for its fit.
 
+use super::motion_band::MotionBand;
 use super::nominal_agreement::{Evidence, PriorAgreement};
 use super::residuals::{JointResiduals, JointWatch, Uncertainty};
 use super::torque_delay::{DelayCheck, TorqueLag};
 use super::torque_trace::{LogTrace, TraceConsumer};
 use crate::estimators::EstimationSettings;
 use crate::logs::Logs;
-use crate::recording::{LogError, Role};
+use crate::recording::{LogError, Role, Samples};
 use crate::regressor_model::RegressorModel;
 use crate::rows::{JointRows, LogPass, LogStatistics, RawSamples, RowConsumer, predicted_torque};
 use dynident_estimation::{Validation, ValidationReport};
@@ -18,14 +19,18 @@ use serde::{Deserialize, Serialize};
 pub struct LogValidation {
     /// The log.
     pub log: String,
-    /// On the torque as filtered for the estimation.
+    /// On the torque in the motion's own band, which does not depend on the cut-off of the fit; as filtered for the
+    /// estimation where the study states its cut-off.
     #[serde(flatten)]
     pub model: ValidationReport,
+    /// On the torque as filtered for the estimation, where that is another band.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub in_fit_band: Option<ValidationReport>,
     /// On the torque as logged.
     pub raw: ValidationReport,
-    /// The physically consistent set on the filtered torque.
+    /// The physically consistent set on the same torque as `model`.
     pub physical: Option<ValidationReport>,
-    /// The description's own model on the filtered torque.
+    /// The description's own model on the same torque.
     pub prior: Option<ValidationReport>,
     /// What the residuals look like, joint by joint.
     pub residuals: Vec<JointResiduals>,
@@ -57,6 +62,7 @@ struct Test<'a> {
     physical: Option<(&'a [f64], Validation)>,
     raw: Validation,
     prior: Option<(&'a [f64], Validation)>,
+    motion_band: Option<MotionBand<'a>>,
     evidence: Option<Evidence<'a>>,
     delay: DelayCheck<'a>,
     trace: Option<TraceConsumer<'a>>,
@@ -117,6 +123,9 @@ impl RowConsumer for Test<'_> {
             let added = self.raw.add_joint(joint, &measured, &predicted);
             added.map_err(|source| self.failed(source))?;
         }
+        if let Some(band) = &mut self.motion_band {
+            band.raw(&self.log, samples)?;
+        }
         if let Some(trace) = &mut self.trace {
             trace.raw(samples);
         }
@@ -167,7 +176,11 @@ pub(crate) fn tested_on(
     let (recording, joints) = (&logs.recordings[index], model.joint_names());
     let columns = (0..model.dof()).map(|joint| model.layout().joint_columns(joint)).collect();
     let nominal = model.parametric.nominal_base();
+    // Where samples or times are left out the rows of the fit alone know it.
+    let is_whole = matches!(recording.samples, Samples::Log(_));
+    let sets = [Some(theta), physical, nominal].into_iter().flatten().collect();
     let mut test = Test {
+        motion_band: if is_whole { MotionBand::of(logs, model, sets) } else { None },
         rows_of: model,
         log: recording.label(),
         theta,
@@ -185,15 +198,29 @@ pub(crate) fn tested_on(
     let reader_thread = alone && logs.execution.parallel();
     let statistics = LogPass { reader_thread, kept: None, ..logs.pass(model, index) }.run(&mut test)?;
     let name = &recording.name;
+    let (mut tested_model, mut tested_physical) = (test.model.report(), test.physical.map(|(_, set)| set.report()));
+    let (mut tested_prior, mut in_fit_band) = (test.prior.map(|(_, set)| set.report()), None);
+    if let Some(reports) = test.motion_band.and_then(MotionBand::reports) {
+        let mut reports = reports.into_iter();
+        if let Some(in_motion_band) = reports.next() {
+            in_fit_band = Some(core::mem::replace(&mut tested_model, in_motion_band));
+        }
+        for set in [&mut tested_physical, &mut tested_prior].into_iter().flatten() {
+            if let Some(in_motion_band) = reports.next() {
+                *set = in_motion_band;
+            }
+        }
+    }
     let residuals = test.watches.iter().zip(&joints).map(|(watch, joint)| watch.report(name, joint)).collect();
     Ok(HeldOutExamination {
         index,
         validation: LogValidation {
             log: name.clone(),
-            model: test.model.report(),
+            model: tested_model,
+            in_fit_band,
             raw: test.raw.report(),
-            physical: test.physical.map(|(_, validation)| validation.report()),
-            prior: test.prior.map(|(_, validation)| validation.report()),
+            physical: tested_physical,
+            prior: tested_prior,
             residuals,
         },
         nominal_agreement: test.evidence.as_ref().map(|evidence| evidence.agreement(&joints)),

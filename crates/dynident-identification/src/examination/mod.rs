@@ -4,6 +4,7 @@
 mod delay_rows;
 mod friction_sign;
 mod held_out;
+mod motion_band;
 mod nominal_agreement;
 mod residuals;
 mod torque_delay;

@@ -12,6 +12,8 @@ use thiserror::Error;
 /// What data leave open is taken from a body of the payload's mass with this radius of gyration about the link's
 /// origin, metres.
 const LENGTH_M: f64 = 0.1;
+/// A known mass is held to this share: a solver inside of the limits needs some room.
+const MASS_WIDTH: f64 = 1.0e-4;
 /// Least mass of that body, kg.
 const LEAST_MASS_KG: f64 = 0.01;
 /// Error bars count as at least this share of what a body of that size has: noise-free logs would leave nothing for the
@@ -72,7 +74,9 @@ pub(crate) fn nearest_consistent_body(
     let fixed = |place: &usize| estimate.rank.fixed.iter().any(|fixed| fixed.column == columns.first + place);
     let determined: Vec<usize> = (0..n).filter(|place| !fixed(place)).collect();
     let value = |place: usize| estimate.values[columns.first + place];
-    let mass = if columns.kept.first() == Some(&0) { value(0).abs() } else { 1.0 }.max(LEAST_MASS_KG);
+    let known_mass = columns.mass.as_ref().map(|(mass, _)| *mass);
+    let estimated = if columns.kept.first() == Some(&0) { value(0).abs() } else { 1.0 }.max(LEAST_MASS_KG);
+    let mass = known_mass.unwrap_or(estimated);
     let reference = rough_body(mass, LENGTH_M);
     // Both accounts of the error together: one from few segments has directions without any.
     let entry = |i: usize, j: usize| estimate.covariance[(i, j)] + estimate.covariance_white[(i, j)];
@@ -100,8 +104,8 @@ pub(crate) fn nearest_consistent_body(
     panel[n * determined.len()..].copy_from_slice(target.as_slice());
     let factor = TriangularFactor::from_rows(n, &panel, determined.len())?;
     let map = BaseMap::from_regrouping(&columns.kept, &columns.dropped, &columns.regrouping)?;
-    let body =
-        PhysicalBody { name: name.to_owned(), reference, known: None, mass_kg: None, com_box_m: None, inside: None };
+    let mass_kg = known_mass.map(|mass| [mass * (1.0 - MASS_WIDTH), mass * (1.0 + MASS_WIDTH)]);
+    let body = PhysicalBody { name: name.to_owned(), reference, known: None, mass_kg, com_box_m: None, inside: None };
     let problem = PhysicalProblem::new(map, vec![body], Vec::new(), &factor)?;
     Ok(physical_fit(&problem, &PhysicalSettings::default())?)
 }

@@ -32,6 +32,8 @@ pub struct Payload {
     pub link: String,
     /// Its ten inertial parameters, where they are known; otherwise they are estimated.
     pub known: Option<InertialParameters>,
+    /// Its mass, where only that is known: the rest is estimated.
+    pub known_mass_kg: Option<f64>,
 }
 
 /// Columns of one payload to estimate.
@@ -49,6 +51,8 @@ pub(crate) struct PayloadColumns {
     pub(crate) regrouping: DMatrix<f64>,
     /// What the kept ones add to the base parameters, shape (base, kept).
     pub(crate) change: DMatrix<f64>,
+    /// Its mass where that is known, and what it adds to the base parameters at the link's origin.
+    pub(crate) mass: Option<(f64, DVector<f64>)>,
 }
 
 /// Columns of a problem: the arm's base parameters, then payloads, then offsets of single logs.
@@ -83,7 +87,7 @@ impl LoadColumns {
         let (mut payloads, mut known) = (Vec::new(), vec![None; described.len()]);
         let training = of_role(recordings, Role::Identify);
         for (number, section) in described.iter().enumerate() {
-            let matrix = change_of_base(model, &section.link)?;
+            let mut matrix = change_of_base(model, &section.link)?;
             if let Some(parameters) = section.known {
                 known[number] = Some((&matrix * DVector::from_column_slice(&parameters.0)).as_slice().to_vec());
                 continue;
@@ -94,6 +98,12 @@ impl LoadColumns {
                     return Err(PayloadError::NotTrained { name: section.name.clone() });
                 }
                 continue;
+            }
+            // A known mass is no column; what it adds comes off the torque.
+            let mass = section.known_mass_kg.map(|mass| (mass, matrix.column(0) * mass));
+            if let Some((_, added)) = &mass {
+                known[number] = Some(added.as_slice().to_vec());
+                matrix.column_mut(0).fill(0.0);
             }
             let norms: Vec<f64> = matrix.column_iter().map(|column| column.norm()).collect();
             let unit = |k: usize| if norms[k] > 0.0 { norms[k] } else { 1.0 };
@@ -107,6 +117,7 @@ impl LoadColumns {
                 payload: number,
                 first: base + symbols.len(),
                 change: matrix.select_columns(&kept),
+                mass,
                 kept,
                 dropped,
                 regrouping,
@@ -262,7 +273,8 @@ impl LoadColumns {
     /// A problem of other columns.
     pub fn arm_problem(&self, problem: &LinearProblem, x: &[f64]) -> Result<LinearProblem, EstimationError> {
         let mut arm = LinearProblem::new(problem.columns()[..self.base].to_vec(), problem.joints().to_vec())
-            .with_fallback(problem.fallback()[..self.base].to_vec())?;
+            .with_fallback(problem.fallback()[..self.base].to_vec())?
+            .with_unexcited(problem.unexcited().renumbered(|column| (column < self.base).then_some(column)))?;
         for equation in problem.equations() {
             let columns: Vec<usize> = equation.columns.iter().copied().filter(|&column| column < self.base).collect();
             let mut map = DMatrix::zeros(equation.columns.len() + 1, columns.len() + 1);

@@ -76,8 +76,9 @@ fn drive_gain(gain: JointGain) -> DriveGain {
 }
 
 fn in_newton_metres(rows: &LinearProblem, known: &[Vec<f64>], scale: &[f64]) -> Result<LinearProblem, EstimationError> {
-    let mut problem =
-        LinearProblem::new(rows.columns().to_vec(), rows.joints().to_vec()).with_fallback(rows.fallback().to_vec())?;
+    let mut problem = LinearProblem::new(rows.columns().to_vec(), rows.joints().to_vec())
+        .with_fallback(rows.fallback().to_vec())?
+        .with_unexcited(rows.unexcited().clone())?;
     for equation in rows.equations() {
         let own = equation.columns.len();
         let mut map = DMatrix::identity(own + 1, own + 1);

@@ -60,6 +60,16 @@ impl KnownArm {
         self.cutoff_hz
     }
 
+    /// The columns that are held.
+    pub(crate) fn held(&self, model: &RegressorModel, columns: &LoadColumns) -> Vec<usize> {
+        let is_held = |column: &usize| match &model.layout().columns()[*column] {
+            Column::Term(TorqueTerm::Offset(_)) => self.refit == Refit::Nothing,
+            Column::Term(term) if term.is_joint_friction() => self.refit != Refit::Friction,
+            _ => true,
+        };
+        (0..columns.base()).filter(is_held).collect()
+    }
+
     /// Payloads, offsets per log and what is fitted again, with the arm held.
     pub(crate) fn estimate(
         &self,
@@ -68,13 +78,7 @@ impl KnownArm {
         problem: &LinearProblem,
         settings: &EstimationSettings,
     ) -> Result<Estimate, EstimationError> {
-        let held: Vec<usize> = (0..columns.base())
-            .filter(|&column| match &model.layout().columns()[column] {
-                Column::Term(TorqueTerm::Offset(_)) => self.refit == Refit::Nothing,
-                Column::Term(term) if term.is_joint_friction() => self.refit != Refit::Friction,
-                _ => true,
-            })
-            .collect();
+        let held = self.held(model, columns);
         let known = KnownColumns {
             values: held.iter().map(|&column| self.values[column]).collect(),
             covariance: self.covariance.select_rows(&held).select_columns(&held),

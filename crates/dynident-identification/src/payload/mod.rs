@@ -3,6 +3,7 @@
 mod body;
 mod columns;
 mod error;
+mod gain_error;
 mod gains;
 mod known_arm;
 mod result;
@@ -13,4 +14,5 @@ pub use gains::DriveGain;
 pub use known_arm::{KnownArm, Refit};
 pub use result::{ConsistentPayload, Measured, PayloadParameter, PayloadResult, payload_results};
 
+pub(crate) use gain_error::with_gain_error;
 pub(crate) use gains::{Gains, drive_gains, known_loads};

@@ -67,7 +67,7 @@ pub struct PayloadResult {
     pub logs: Vec<String>,
     /// What the logs say about its ten parameters about the link's origin, one by one or as sums.
     pub parameters: Vec<PayloadParameter>,
-    /// Mass, kg; none where it is not determined alone.
+    /// Mass, kg, with a bar of zero where the study says it; none where it is not determined alone.
     pub mass_kg: Option<Measured>,
     /// Centre of mass in the link's frame, m; none for coordinates that are not determined alone.
     pub com_m: [Option<Measured>; 3],
@@ -120,7 +120,8 @@ fn result(
         .filter(|p| !p.excited)
         .map(|p| format!("{}: these logs do not separate it from the arm", p.expression))
         .collect();
-    not_identified.extend(columns.dropped.iter().enumerate().map(|(place, &dropped)| {
+    let open = |(_, dropped): &(usize, &usize)| columns.mass.is_none() || **dropped != 0;
+    not_identified.extend(columns.dropped.iter().enumerate().filter(open).map(|(place, &dropped)| {
         let column = columns.regrouping.column(place);
         let homes: Vec<&str> = (0..parameters.len())
             .filter(|&row| column[row].abs() > 1.0e-9)
@@ -148,8 +149,11 @@ fn result(
         }
         Err(reason) => (None, Some(reason.to_string())),
     };
-    let added = (0..columns.change.nrows())
-        .map(|row| (0..parameters.len()).map(|place| columns.change[(row, place)] * parameters[place].value).sum());
+    let added = (0..columns.change.nrows()).map(|row| {
+        let of_mass = columns.mass.as_ref().map_or(0.0, |(_, added)| added[row]);
+        let estimated = (0..parameters.len()).map(|place| columns.change[(row, place)] * parameters[place].value);
+        of_mass + estimated.sum::<f64>()
+    });
     PayloadResult {
         name: section.name.clone(),
         link: section.link.clone(),
@@ -176,8 +180,11 @@ fn figures(columns: &PayloadColumns, estimate: &Estimate, excited: &dyn Fn(usize
         (columns.alone(place) && excited(place)).then_some(columns.first + place)
     };
     let places: [Option<usize>; 10] = core::array::from_fn(place);
-    let p: [f64; 10] = core::array::from_fn(|k| places[k].map_or(0.0, |column| estimate.values[column]));
-    let mass_known = places[0].is_some() && p[0] != 0.0;
+    let mut p: [f64; 10] = core::array::from_fn(|k| places[k].map_or(0.0, |column| estimate.values[column]));
+    if let Some((mass, _)) = columns.mass {
+        p[0] = mass;
+    }
+    let mass_known = (places[0].is_some() || columns.mass.is_some()) && p[0] != 0.0;
     let covariance = DMatrix::from_fn(10, 10, |i, j| match (places[i], places[j]) {
         (Some(i), Some(j)) => estimate.covariance[(i, j)],
         _ => 0.0,
@@ -193,7 +200,7 @@ fn figures(columns: &PayloadColumns, estimate: &Estimate, excited: &dyn Fn(usize
     let variances = (&jacobian * covariance * jacobian.transpose()).diagonal();
     core::array::from_fn(|k| {
         let determined = match k {
-            0 => places[0].is_some(),
+            0 => places[0].is_some() || columns.mass.is_some(),
             1..=3 => mass_known && places[k].is_some(),
             _ => mass_known && places[1..4].iter().all(Option::is_some) && places[k].is_some(),
         };

@@ -1,13 +1,14 @@
 //! Blocks of a motion into rows of regressor and torque.
 
-use super::coverage::{Coverage, set_aside};
+use super::coverage::set_aside;
+use super::joint_filters::JointFilters;
 use super::mask::RowMask;
 use super::{JointRows, PANEL_SAMPLES, RawSamples, RowConsumer};
 use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_model::terms::JointMotion;
-use dynident_recording::{DecimationSettings, Decimator, FilterError, MotionBlock};
+use dynident_recording::{DecimationSettings, FilterError, MotionBlock};
 
 /// Some samples of a block's positions, velocities and accelerations, joints in the model's order.
 pub(crate) fn in_model_order(
@@ -33,14 +34,12 @@ pub struct RowBuilder<'a> {
     workspace: BatchWorkspace,
     panels: Panels,
     history: TermHistory,
-    decimators: Option<Vec<Decimator>>,
+    filters: JointFilters,
     mask: Option<RowMask<'a>>,
-    coverage: Coverage,
     set_aside: Vec<Vec<bool>>,
     temperature_c: Vec<f64>,
     segment: usize,
     motion: [Vec<f64>; 3],
-    out: Vec<f64>,
     filtered_rows: u64,
     samples: u64,
 }
@@ -57,27 +56,19 @@ impl<'a> RowBuilder<'a> {
         filter: Option<&DecimationSettings>,
     ) -> Result<Self, FilterError> {
         let layout = model.layout();
-        let decimators = filter
-            .map(|settings| {
-                (0..model.dof())
-                    .map(|joint| Decimator::new(settings, rate_hz, layout.joint_columns(joint).len() + 1))
-                    .collect::<Result<Vec<_>, _>>()
-            })
-            .transpose()?;
+        let columns: Vec<usize> = (0..model.dof()).map(|joint| layout.joint_columns(joint).len() + 1).collect();
         Ok(Self {
             model,
             places: places.to_vec(),
             workspace: BatchWorkspace::new(model.model()),
             panels: Panels::default(),
             history: TermHistory::new(model.load_parameters.clone()),
-            decimators,
+            filters: JointFilters::new(&columns, rate_hz, filter)?,
             mask: None,
-            coverage: Coverage::new(model.dof(), rate_hz, filter)?,
             set_aside: Vec::new(),
             temperature_c: Vec::new(),
             segment: 0,
             motion: [Vec::new(), Vec::new(), Vec::new()],
-            out: Vec::new(),
             filtered_rows: 0,
             samples: 0,
         })
@@ -91,12 +82,12 @@ impl<'a> RowBuilder<'a> {
 
     /// Samples to either side of a filtered row that it is made from.
     pub(crate) fn reach(&self) -> usize {
-        self.decimators.as_ref().and_then(|all| all.first()).map_or(0, Decimator::half_length)
+        self.filters.reach()
     }
 
     /// Samples that the first filtered row needs.
     pub(crate) fn needed(&self) -> usize {
-        self.decimators.as_ref().and_then(|all| all.first()).map_or(1, Decimator::length)
+        self.filters.needed()
     }
 
     /// Filtered rows of each joint so far, whether they counted or not.
@@ -117,10 +108,7 @@ impl<'a> RowBuilder<'a> {
         if block.segment != self.segment {
             self.segment = block.segment;
             self.history.restart();
-            self.coverage.restart();
-            self.decimators.iter_mut().flatten().for_each(|decimator| {
-                decimator.finish();
-            });
+            self.filters.restart();
         }
         let (model, layout) = (self.model.model(), self.model.layout());
         for from in (0..block.rows).step_by(PANEL_SAMPLES) {
@@ -171,23 +159,20 @@ impl<'a> RowBuilder<'a> {
             let mut rows = samples;
             for joint in 0..model.dof() {
                 let left_out = self.set_aside.get(joint).map_or(&[][..], Vec::as_slice);
-                let panel = self.coverage.mask(joint, self.panels.joint(joint), samples, left_out);
-                if let Some(decimators) = &mut self.decimators {
-                    rows = decimators[joint].push(panel, samples, &mut self.out);
-                } else {
-                    self.out.clear();
-                    self.out.extend_from_slice(panel);
-                }
-                let coverage = self.coverage.divide(joint, rows, &mut self.out);
-                let (counted, panel) = match &mut self.mask {
-                    Some(mask) if rows > 0 => mask.apply(joint, rows, &self.out),
-                    _ => (rows, &self.out[..]),
+                let all = self.filters.push(joint, self.panels.joint(joint), samples, left_out);
+                rows = all.rows;
+                let counted = match &mut self.mask {
+                    Some(mask) if rows > 0 => {
+                        let (rows, panel) = mask.apply(joint, rows, all.panel);
+                        JointRows { rows, panel, ..all }
+                    }
+                    _ => all,
                 };
-                if counted > 0 {
-                    consumer.filtered(&JointRows { joint, rows: counted, panel, coverage })?;
+                if counted.rows > 0 {
+                    consumer.filtered(&counted)?;
                 }
             }
-            self.coverage.advance(samples);
+            self.filters.advance(samples);
             self.filtered_rows += rows as u64;
             self.samples += samples as u64;
         }

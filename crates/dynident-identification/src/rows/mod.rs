@@ -6,7 +6,9 @@
 mod builder;
 mod coverage;
 mod filter;
+mod joint_filters;
 mod mask;
+mod motion_noise;
 mod pass;
 mod reader;
 
@@ -14,6 +16,8 @@ pub use builder::RowBuilder;
 pub(crate) use builder::in_model_order;
 pub(crate) use coverage::set_aside;
 pub use filter::{ParallelFilterError, ParallelFilterSettings, motion_band_hz};
+pub(crate) use joint_filters::JointFilters;
+pub(crate) use motion_noise::noise_factors;
 pub use pass::{KeptLog, LogPass, LogStatistics};
 
 use crate::recording::LogError;

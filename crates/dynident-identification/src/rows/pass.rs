@@ -174,6 +174,44 @@ impl LogPass<'_> {
         }
     }
 
+    /// Some pieces of the motion, spread over the whole log where it was kept, else its first ones: about `samples`
+    /// samples in pieces of `piece` or less, a piece with a segment of its own each. None for a motion that was made
+    /// already. The second number is how many samples the pieces were taken from.
+    pub(crate) fn some_pieces(&self, samples: usize, piece: usize) -> Result<(Vec<MotionBlock>, usize), LogError> {
+        let piece = piece.max(1);
+        let of = |blocks: &[MotionBlock]| {
+            let mut pieces = Vec::new();
+            for block in blocks {
+                let count = block.rows.div_ceil(piece).max(1);
+                let cut = |k: usize| (block, k * block.rows / count..(k + 1) * block.rows / count);
+                pieces.extend((0..count).map(cut));
+            }
+            let wanted = samples.div_ceil(piece).clamp(1, pieces.len().max(1));
+            let chosen = (0..wanted).filter_map(|k| pieces.get((2 * k + 1) * pieces.len() / (2 * wanted)));
+            let cut = chosen.enumerate().map(|(k, (block, run))| MotionBlock { segment: k, ..block.part(run.clone()) });
+            cut.collect::<Vec<_>>()
+        };
+        let rows = |blocks: &[MotionBlock]| blocks.iter().map(|block| block.rows).sum();
+        let Recording { name, samples: source, .. } = self.recording;
+        match (source, self.kept.and_then(OnceLock::get)) {
+            (Samples::Motion(_), _) => Ok((Vec::new(), 0)),
+            (_, Some(kept)) => Ok((of(&kept.blocks), rows(&kept.blocks))),
+            _ => {
+                let stream = self.recording.open(self.model.model(), self.motion)?;
+                let mut stream = stream.ok_or_else(|| LogError::NoSamples { log: name.clone() })?;
+                let mut blocks = Vec::new();
+                while rows(&blocks) < samples {
+                    let mut block = MotionBlock::default();
+                    if !stream.next_block(&mut block).map_err(|source| LogError::recording(name, source))? {
+                        break;
+                    }
+                    blocks.push(block);
+                }
+                Ok((of(&blocks), rows(&blocks)))
+            }
+        }
+    }
+
     fn take(
         &self,
         block: &MotionBlock,

@@ -179,7 +179,7 @@ fn a_payload_that_is_known_is_taken_off() {
     // A tip of twice the mass is the arm with a payload of the same ten parameters.
     let known = Some(task.robot.model().inertials()[1]);
     let mut settings = settings(Estimator::Weighted);
-    settings.payloads = vec![Payload { name: "weight".to_owned(), link, known }];
+    settings.payloads = vec![Payload { name: "weight".to_owned(), link, known, known_mass_kg: None }];
     task.legs = vec![Leg::whole(reference()).unwrap().with_payload(Some("weight".to_owned()))];
     let record = record(&arm(2.0), shape);
     let found = identify_run(&task, std::slice::from_ref(&record), &settings).unwrap();

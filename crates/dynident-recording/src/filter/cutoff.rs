@@ -25,6 +25,9 @@ pub struct CutoffChoice {
     pub cutoff_hz: f64,
     /// What each joint alone would ask for; `None` for a joint that does not move.
     pub joints_hz: Vec<Option<f64>>,
+    /// Where each joint's motion has faded into the noise of its position; `None` for a joint that does not move.
+    #[serde(default)]
+    pub faded_hz: Vec<Option<f64>>,
     /// The choice in a sentence.
     pub evidence: String,
 }
@@ -32,8 +35,8 @@ pub struct CutoffChoice {
 /// Chooses one cut-off for all joints from uniformly sampled positions `q` (one slice for each joint; at most the first
 /// 65 536 samples are used).
 ///
-/// Per joint, from the Welch spectrum of the second difference of q (Hann window, half overlap, about eight seconds a
-/// piece):
+/// Per joint, from the Welch spectrum of the second difference of q (Hann window, half overlap, three pieces, so that
+/// nothing depends on the unit of time):
 /// * Noise in the position makes the spectrum of the acceleration rise with frequency. Behind the peak of the
 ///   velocity's spectrum, the first frequency at which the acceleration's (smoothed over a quarter octave) comes within
 ///   twice its minimum is the valley where motion has faded into noise.
@@ -44,21 +47,26 @@ pub struct CutoffChoice {
 /// rate. A joint whose spectrum nowhere stands above ten times its median over the upper half of the band does not
 /// count.
 pub fn cutoff<S: AsRef<[f64]>>(q: &[S], rate_hz: f64) -> CutoffChoice {
-    let joints: Vec<Option<Content>> = q.iter().map(|q| content(q.as_ref(), rate_hz)).collect();
+    let spectra: Vec<Option<Spectrum>> = q.iter().map(|q| spectrum(q.as_ref())).collect();
+    let joints: Vec<Option<Content>> =
+        spectra.iter().map(|spectrum| spectrum.as_ref().and_then(|spectrum| content(spectrum, rate_hz))).collect();
     let highest = HIGHEST * rate_hz;
     let asked = |content: &Content| (MARGIN * content.power_hz).min(highest);
     let leading = joints.iter().enumerate().filter_map(|(joint, content)| content.as_ref().map(|c| (joint, c)));
     let leading = leading.max_by(|a, b| a.1.power_hz.total_cmp(&b.1.power_hz));
     let joints_hz = joints.iter().map(|content| content.as_ref().map(asked)).collect();
+    let faded_hz = joints.iter().map(|content| content.as_ref().map(|content| content.valley_hz)).collect();
     match leading {
         None => CutoffChoice {
             cutoff_hz: 0.1 * rate_hz,
             joints_hz,
+            faded_hz,
             evidence: "no joint moves above its noise: a tenth of the sampling rate".to_owned(),
         },
         Some((joint, content)) => CutoffChoice {
             cutoff_hz: asked(content),
             joints_hz,
+            faded_hz,
             evidence: format!(
                 "joint {} (0-based) reaches highest: its acceleration fades into the noise ({:.1e} per sample of position) at {:.3} Hz, \
                  and 99.99 % of its power below that lies below {:.3} Hz; times {MARGIN}, at most {HIGHEST} of the rate",
@@ -75,26 +83,44 @@ struct Content {
     noise: f64,
 }
 
-fn content(q: &[f64], rate_hz: f64) -> Option<Content> {
+/// The spectrum of a joint's position and acceleration.
+struct Spectrum {
+    /// Of the second difference, bin by bin from the second on.
+    acceleration: Vec<f64>,
+    /// The same as position.
+    position: Vec<f64>,
+    /// Variance of the position noise of one sample.
+    floor: f64,
+    /// Samples of a piece.
+    length: usize,
+}
+
+/// Squared gain of the second difference at bin `k` of `length`.
+fn response(k: usize, length: usize) -> f64 {
+    (2.0 * (core::f64::consts::PI * k as f64 / length as f64).sin()).powi(4)
+}
+
+fn spectrum(q: &[f64]) -> Option<Spectrum> {
     let q = &q[..q.len().min(CUTOFF_SAMPLES)];
     let (first, rest) = q.split_first()?;
     if q.len() < 64 || rest.iter().all(|x| x == first) || q.iter().any(|x| !x.is_finite()) {
         return None;
     }
     let second: Vec<f64> = q.windows(3).map(|x| (x[2] - x[1]) - (x[1] - x[0])).collect();
-    let longest = (8.0 * rate_hz).clamp(64.0, 65536.0) as usize;
-    let length = longest.next_power_of_two().min(previous_power_of_two(second.len() / 2).max(32));
-    let spectrum = welch(&second, length)?;
-    let bins = spectrum.len();
-    let response = |k: usize| (2.0 * (core::f64::consts::PI * k as f64 / length as f64).sin()).powi(4);
-    let position: Vec<f64> = (1..bins).map(|k| spectrum[k] / response(k)).collect();
+    let length = previous_power_of_two(second.len() / 2).max(32);
+    let power = welch(&second, length)?;
+    let position: Vec<f64> = (1..power.len()).map(|k| power[k] / response(k, length)).collect();
     let mut upper = position[position.len() / 2..].to_vec();
     upper.sort_by(f64::total_cmp);
     let floor = upper[upper.len() / 2];
-    let acceleration: Vec<f64> = (1..bins).map(|k| spectrum[k]).collect();
-    let valley = valley(&acceleration);
+    Some(Spectrum { acceleration: power[1..].to_vec(), position, floor, length })
+}
+
+fn content(spectrum: &Spectrum, rate_hz: f64) -> Option<Content> {
+    let Spectrum { acceleration, position, floor, length } = spectrum;
+    let valley = valley(acceleration);
     let end = position.iter().rposition(|power| *power > ABOVE_NOISE * floor)?.min(valley);
-    let power: Vec<f64> = (0..=end).map(|k| ((position[k] - floor) * response(k + 1)).max(0.0)).collect();
+    let power: Vec<f64> = (0..=end).map(|k| ((position[k] - floor) * response(k + 1, *length)).max(0.0)).collect();
     let total: f64 = power.iter().sum();
     if position[0] <= ABOVE_NOISE * floor || total <= 0.0 {
         return None;
@@ -104,7 +130,7 @@ fn content(q: &[f64], rate_hz: f64) -> Option<Content> {
         sum += power;
         sum >= POWER_SHARE * total
     });
-    let hertz = |k: usize| (k + 1) as f64 * rate_hz / length as f64;
+    let hertz = |k: usize| (k + 1) as f64 * rate_hz / *length as f64;
     Some(Content { power_hz: hertz(last.unwrap_or(end)), valley_hz: hertz(valley), noise: floor.sqrt() })
 }
 
@@ -138,7 +164,7 @@ fn previous_power_of_two(n: usize) -> usize {
 
 /// Welch's power spectrum: bin k is the variance per bin of white noise of unit variance being one.
 /// Source: Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70.
-fn welch(signal: &[f64], length: usize) -> Option<Vec<f64>> {
+pub(crate) fn welch(signal: &[f64], length: usize) -> Option<Vec<f64>> {
     let transform = RealFftPlanner::<f64>::new().plan_fft_forward(length);
     let window: Vec<f64> =
         (0..length).map(|i| 0.5 - 0.5 * (core::f64::consts::TAU * (i as f64 + 0.5) / length as f64).cos()).collect();

@@ -2,6 +2,7 @@
 
 use crate::derivative::DifferentiatorSettings;
 use crate::error::{FilterError, require};
+use core::ops::Range;
 use serde::{Deserialize, Serialize};
 
 /// How a log becomes a motion.
@@ -76,5 +77,40 @@ impl MotionBlock {
     /// One joint's part of `values` (one of this block's own fields).
     pub fn joint<'a>(&self, values: &'a [f64], joint: usize) -> &'a [f64] {
         &values[joint * self.rows..(joint + 1) * self.rows]
+    }
+
+    /// Some of its rows.
+    ///
+    /// # Panics
+    /// If it has fewer.
+    #[must_use]
+    pub fn part(&self, run: Range<usize>) -> Self {
+        let some = |values: &[f64]| -> Vec<f64> {
+            if values.is_empty() {
+                return Vec::new();
+            }
+            (0..self.joints).flat_map(|joint| self.joint(values, joint)[run.clone()].iter().copied()).collect()
+        };
+        Self {
+            rate_hz: self.rate_hz,
+            segment: self.segment,
+            first_time_s: self.first_time_s + run.start as f64 / self.rate_hz,
+            rows: run.len(),
+            joints: self.joints,
+            q: some(&self.q),
+            dq: some(&self.dq),
+            ddq: some(&self.ddq),
+            tau: some(&self.tau),
+            tau_smooth: some(&self.tau_smooth),
+            temperature_c: some(&self.temperature_c),
+            set_aside: (0..self.joints)
+                .filter(|_| !self.set_aside.is_empty())
+                .flat_map(|joint| self.set_aside[joint * self.rows..][run.clone()].iter().copied())
+                .collect(),
+            unsettled: [
+                self.unsettled[0].saturating_sub(run.start).min(run.len()),
+                (self.unsettled[1] + run.end).saturating_sub(self.rows).min(run.len()),
+            ],
+        }
     }
 }

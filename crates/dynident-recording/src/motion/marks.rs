@@ -1,6 +1,5 @@
 //! Samples that are left out of a block.
 
-use super::block::MotionBlock;
 use core::ops::Range;
 
 /// The runs of rows of a block that no mark touches. Marks (in any order, overlapping or not) count in a window whose
@@ -25,42 +24,10 @@ pub(crate) fn kept_runs(marked: &[Range<usize>], first: usize, rows: usize) -> V
     runs
 }
 
-/// Some rows of a block.
-pub(crate) fn part(block: &MotionBlock, run: &Range<usize>) -> MotionBlock {
-    let some = |values: &[f64]| -> Vec<f64> {
-        if values.is_empty() {
-            return Vec::new();
-        }
-        (0..block.joints).flat_map(|joint| block.joint(values, joint)[run.clone()].iter().copied()).collect()
-    };
-    let mut part = MotionBlock {
-        rate_hz: block.rate_hz,
-        segment: block.segment,
-        first_time_s: block.first_time_s + run.start as f64 / block.rate_hz,
-        rows: run.len(),
-        joints: block.joints,
-        q: some(&block.q),
-        dq: some(&block.dq),
-        ddq: some(&block.ddq),
-        tau: some(&block.tau),
-        tau_smooth: some(&block.tau_smooth),
-        temperature_c: some(&block.temperature_c),
-        set_aside: Vec::new(),
-        unsettled: [
-            block.unsettled[0].saturating_sub(run.start).min(run.len()),
-            (block.unsettled[1] + run.end).saturating_sub(block.rows).min(run.len()),
-        ],
-    };
-    if !block.set_aside.is_empty() {
-        let of = |joint: usize| &block.set_aside[joint * block.rows..][run.clone()];
-        part.set_aside = (0..block.joints).flat_map(|joint| of(joint).iter().copied()).collect();
-    }
-    part
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::kept_runs;
+    use crate::MotionBlock;
 
     #[test]
     fn runs_are_what_the_marks_leave() {
@@ -79,7 +46,7 @@ mod tests {
             q: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
             ..MotionBlock::default()
         };
-        let part = part(&block, &(1..3));
+        let part = block.part(1..3);
         assert_eq!((part.rows, &part.q[..], part.tau.len()), (2, &[2.0, 3.0, 5.0, 6.0][..], 0));
         assert!((part.first_time_s - 0.1).abs() < 1e-15);
     }

@@ -1,7 +1,7 @@
 //! From a log file to q, dq, ddq and torque on a uniform clock, block by block.
 
 use super::block::{MotionBlock, MotionSettings};
-use super::marks::{kept_runs, part};
+use super::marks::kept_runs;
 use crate::cleaning::{CleanBlock, CleanRows, replace_spikes};
 use crate::clock::segments::{PlacedRows, Segmenter};
 use crate::clock::timeline::Timeline;
@@ -9,6 +9,7 @@ use crate::clock::{Clock, clock};
 use crate::derivative::{Derivatives, Differentiator, Place};
 use crate::error::{FilterError, RecordingError};
 use crate::filter::cutoff::{CUTOFF_SAMPLES, CutoffChoice, cutoff};
+use crate::filter::position_noise;
 use crate::log::{Log, LogFormat, LogReader, Quantity, RawBlock};
 use crate::quantisation::quantisation_step;
 use crate::reference::Reference;
@@ -42,6 +43,7 @@ pub struct MotionStream {
     joints: Vec<String>,
     clock: Clock,
     cutoff: CutoffChoice,
+    position_noise: Vec<f64>,
     differentiator: Box<dyn Differentiator>,
     smooth_torque: bool,
     trim: usize,
@@ -167,7 +169,10 @@ impl MotionStream {
                 .map_err(|reason| RecordingError::NoRate { log: log.source().label(), column: time_label, reason })?,
         };
         let timeline = Timeline::new(&clock, format.max_gap_steps, 0.0);
-        let cutoff = cutoff(&longest_segment(timeline, &prefix), clock.rate_hz);
+        let longest = longest_segment(timeline, &prefix);
+        let cutoff = cutoff(&longest, clock.rate_hz);
+        let in_force_hz = settings.differentiator.cutoff_hz().unwrap_or(cutoff.cutoff_hz);
+        let position_noise = position_noise(&longest, clock.rate_hz, in_force_hz);
         let bridged = if format.bridge_gaps { BRIDGED_PERIODS * clock.rate_hz / cutoff.cutoff_hz } else { 0.0 };
         let timeline = Timeline::new(&clock, format.max_gap_steps, bridged);
         let differentiator = build(&cutoff)?;
@@ -206,6 +211,7 @@ impl MotionStream {
             time_check: TimeCheck::new(clock.median_step_s),
             clock,
             cutoff,
+            position_noise,
             differentiator,
             smooth_torque: settings.smooth_torque,
             uniform: vec![Vec::new(); channels],
@@ -237,6 +243,12 @@ impl MotionStream {
     /// The cut-off that the data suggest; in force unless the settings name one.
     pub fn cutoff(&self) -> &CutoffChoice {
         &self.cutoff
+    }
+
+    /// Standard deviation of the white noise of one sample of each joint's position: see
+    /// [`position_noise()`](crate::position_noise()).
+    pub fn position_noise(&self) -> &[f64] {
+        &self.position_noise
     }
 
     /// Fills `block` with the next samples; false (and an empty block) at the end.
@@ -478,7 +490,7 @@ impl MotionStream {
         for run in &runs {
             // A run at the block's start goes on with the piece before it.
             self.cuts += usize::from(run.start > 0 || self.in_cut);
-            let mut kept = part(block, run);
+            let mut kept = block.part(run.clone());
             kept.segment = self.segments + self.cuts;
             self.waiting.push_back(kept);
             self.in_cut = run.end < block.rows;
@@ -509,6 +521,7 @@ impl MotionStream {
             velocity: self.velocity.iter().map(|c| c.report(self.clock.rate_hz)).collect(),
             acceleration: self.acceleration.iter().map(|c| c.report(self.clock.rate_hz)).collect(),
             cutoff: self.cutoff.clone(),
+            position_noise: self.position_noise.clone(),
             findings: Vec::new(),
         };
         report.find();

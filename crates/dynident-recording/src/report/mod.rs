@@ -122,6 +122,11 @@ pub struct ImportReport {
     pub acceleration: Vec<DerivativeComparison>,
     /// The cut-off that the data suggest (in force unless the settings name one).
     pub cutoff: CutoffChoice,
+    /// For every joint the standard deviation of one sample's position noise (rad, m), taken for white, as far as it
+    /// stands below the cut-off in force: see [`position_noise()`](crate::position_noise()). Zero for a channel that
+    /// never changes.
+    #[serde(default)]
+    pub position_noise: Vec<f64>,
     /// All of this as sentences, where it matters.
     pub findings: Vec<Finding>,
 }

@@ -38,7 +38,8 @@ pub fn validate(
     let execution = options.execution();
     let (recordings, settings) = (&task.recordings, &task.settings);
     let tested = execution.install(|| {
-        let logs = Logs::new(robot.model(), recordings, settings.filters(), &chosen, stored.cutoff_hz(), execution)?;
+        let logs = Logs::new(robot.model(), recordings, settings.filters(), &chosen, stored.cutoff_hz(), execution)?
+            .with_motion_band(stored.motion_hz());
         let one = |&index: &usize| {
             let carried = recordings[index].payload.as_ref();
             let theta = payloads.base_values(carried, &theta);

@@ -234,7 +234,7 @@ fn parameters(page: &mut Report, r: &ResultFile) {
             .note("with 95 % error bars")
             .reference_label("by the description");
         for p in r.base_parameters.iter().filter(|parameter| parameter.unit == of_unit) {
-            let half_width = p.excited.then_some(p.half_width_95);
+            let half_width = p.excited.then_some(p.bar_95());
             plot = plot.bar(&p.expression, if p.excited { p.value } else { f64::NAN }, half_width, p.prior);
         }
         page.add(plot);
@@ -247,7 +247,7 @@ fn parameters(page: &mut Report, r: &ResultFile) {
         vec![
             Cell::from(&p.expression),
             short(p.value, 6).into(),
-            short(p.half_width_95, 3).into(),
+            short(p.bar_95(), 3).into(),
             Cell::judged(relative, if p.excited { tone } else { Tone::Bad }),
             optional(p.physical),
             optional(p.prior),
@@ -257,8 +257,17 @@ fn parameters(page: &mut Report, r: &ResultFile) {
     let columns = ["expression", "free fit", "± (95 %)", "± in %", "consistent set", "description", "unit"];
     page.add(Table::new("Base parameters", columns).rows(r.base_parameters.iter().map(row)));
     if !r.method.not_excited.is_empty() {
-        let text = format!("Not excited by the logs: {}", r.method.not_excited.join(", "));
-        page.add(Text { paragraphs: Vec::new(), points: vec![(Tone::Warning, text)] });
+        let mut points = vec![(
+            Tone::Warning,
+            format!("Not excited by the logs, held at the description's values: {}", r.method.not_excited.join(", ")),
+        )];
+        if !r.method.resting_joints.is_empty() {
+            let text =
+                format!("Not moved above the noise of the encoder by any log: {}", r.method.resting_joints.join(", "));
+            points.push((Tone::Warning, text));
+        }
+        page.add(Text { paragraphs: Vec::new(), points });
+        hanging(page, r);
     }
     let n = r.base_parameters.len();
     if (2..=MOST_CORRELATIONS).contains(&n) && r.base_parameter_covariance.len() == n {
@@ -273,6 +282,33 @@ fn parameters(page: &mut Report, r: &ResultFile) {
         });
         page.add(Table::new("Strongest correlations", ["parameter", "and", "correlation"]).rows(strongest));
     }
+}
+
+/// Estimates that hang on parameters at nominal.
+fn hanging(page: &mut Report, r: &ResultFile) {
+    let rows = r.base_parameters.iter().filter(|p| !p.conditional_on.is_empty()).map(|p| {
+        let on = p.conditional_on.iter().map(|own| format!("{} ({} a unit)", own.on, short(own.per_unit, 3)));
+        let with = p.half_width_95_with_nominal.map_or_else(String::new, |bar| short(bar, 3));
+        vec![
+            Cell::from(&p.symbol),
+            short(p.value, 6).into(),
+            short(p.half_width_95, 3).into(),
+            Cell::from(with),
+            Cell::from(on.collect::<Vec<_>>().join(", ")),
+        ]
+    });
+    let rows: Vec<Vec<Cell>> = rows.collect();
+    if rows.is_empty() {
+        return;
+    }
+    let columns = [
+        "parameter",
+        "free fit",
+        "± (95 %) if these are right",
+        "± (95 %) with what they may be wrong by",
+        "held at the description's value",
+    ];
+    page.add(Table::new("Estimates that hang on parameters not excited", columns).rows(rows));
 }
 
 fn friction(page: &mut Report, r: &ResultFile) {

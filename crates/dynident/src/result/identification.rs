@@ -6,12 +6,12 @@ use super::provenance::Provenance;
 use crate::study::JointDrive;
 use dynident_estimation::consistent::ConsistencyTest;
 use dynident_estimation::{CorrelatedPair, EssentialReport};
-use dynident_identification::Role;
 use dynident_identification::consistent::ParameterInterval;
 use dynident_identification::estimators::{GrossErrors, NoiseInRegressor, PeriodicFit, SeriesFit, SimulatedFit};
 use dynident_identification::examination::{LogValidation, PriorAgreement, TorqueBand, TorqueLag, TorqueSignCheck};
 use dynident_identification::friction::FrictionCandidate;
 use dynident_identification::payload::{DriveGain, PayloadResult};
+use dynident_identification::{Condition, CutoffByError, Role};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};
 
@@ -37,7 +37,7 @@ pub struct ResultFile {
     pub robot: RobotSummary,
     /// How the fit was made.
     pub method: MethodSummary,
-    /// Whether noise in the regressor biases least squares; none unless the study asks for instruments.
+    /// Whether noise in the regressor biases least squares; none where that cannot be tested.
     pub noise_in_regressor: Option<NoiseInRegressor>,
     /// Rows that a robust estimator gave little weight; none for other estimators.
     pub gross_errors: Option<GrossErrors>,
@@ -130,7 +130,7 @@ pub struct RobotSummary {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct MethodSummary {
-    /// The study's `estimator.method`.
+    /// The study's `estimator.method`; of `auto` the one that it took, `weighted` or `instrumental`.
     pub estimator: String,
     /// `complete`, `not-all-excited` or `iteration-limit`.
     pub status: String,
@@ -142,6 +142,13 @@ pub struct MethodSummary {
     pub clusters: usize,
     /// From positions to accelerations, with the cut-off in force for all logs.
     pub motion: MotionSettings,
+    /// How that cut-off was chosen; none where the study states it, or the logs are too short to try any.
+    #[serde(default)]
+    pub cutoff: Option<CutoffByError>,
+    /// Held-out figures are for the torque below 0.7 of this, the cut-off that the motion's spectrum asks for; none
+    /// where they are for the fit's own band.
+    #[serde(default)]
+    pub motion_hz: Option<f64>,
     /// Condition number of the weighted regressor's base columns.
     #[serde(deserialize_with = "number")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<f64>"))]
@@ -157,6 +164,13 @@ pub struct MethodSummary {
     /// Base parameters that the data do not excite; they were held at the prior (or zero).
     #[serde(default)]
     pub not_excited: Vec<String>,
+    /// Joints that no training log moves above the noise of their positions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub resting_joints: Vec<String>,
+    /// How well stated gains are known, one standard deviation in percent, as the bars of payloads hold it; none where
+    /// they count as exact.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain_std_percent: Option<f64>,
     /// With load-dependent friction: the base parameters, by the estimate without it, whose torque is the load.
     pub load_parameters: Option<Vec<f64>>,
 }
@@ -201,14 +215,29 @@ pub struct BaseParameterResult {
     /// Of the physically consistent set in `bodies` and `joints`; none when that was not asked for.
     #[serde(default)]
     pub physical: Option<f64>,
+    /// The parameters at nominal that its value hangs on, the strongest first: right only if they are. Empty for one
+    /// that the logs tell on its own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub conditional_on: Vec<Condition>,
+    /// Half the width of the 95 % interval with what those may be wrong by (masses by 30 %, and so on); of one that is
+    /// not excited, what its nominal value may be wrong by. None where the logs tell it on their own, and where there
+    /// are no nominal values.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub half_width_95_with_nominal: Option<f64>,
     /// False when the data do not excite it; value is then the prior's and std means nothing.
     pub excited: bool,
 }
 
 impl BaseParameterResult {
-    /// `100 half_width_95 / |value|`; none for a value of zero and for what the data do not excite.
+    /// `100 bar_95 / |value|`; none for a value of zero and for what the data do not excite.
     pub fn relative_half_width_percent(&self) -> Option<f64> {
-        (self.excited && self.value != 0.0).then(|| 100.0 * self.half_width_95 / self.value.abs())
+        (self.excited && self.value != 0.0).then(|| 100.0 * self.bar_95() / self.value.abs())
+    }
+
+    /// Half the width of the 95 % interval that holds whatever the parameters at nominal are, as far as a description
+    /// can be wrong.
+    pub fn bar_95(&self) -> f64 {
+        self.half_width_95_with_nominal.unwrap_or(self.half_width_95)
     }
 }
 

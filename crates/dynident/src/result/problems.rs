@@ -1,6 +1,7 @@
 //! What speaks against loading a result's model into a robot.
 
 use super::{ResultFile, StudyCheck};
+use dynident_identification::estimators::{NoiseInRegressor, NoiseVerdict};
 use dynident_identification::examination::LogValidation;
 use dynident_recording::Level;
 
@@ -11,6 +12,8 @@ const MOST_TIMES_OF_ALL: f64 = 1.5;
 const MOST_TIMES_OF_JOINT: f64 = 2.5;
 /// Times what the fit leaves of the joints' torque (root mean square over the joints) that the written model may leave
 /// of a held-out log's. On ten real data sets it lies between 0.9 and 2.4; a fit of 58 parameters to three seconds
+/// Share of the fitted torque, percent, that no model worth writing leaves.
+const MOST_LEFT_PERCENT: f64 = 60.0;
 /// has 6.
 const MOST_TIMES_OF_FIT: f64 = 4.0;
 /// Percent of a held-out log's torque below which a model is good, however much better the fit may be.
@@ -44,6 +47,8 @@ impl ResultFile {
                 self.method.estimator
             ));
         }
+        problems.extend(self.noise_in_regressor.as_ref().and_then(|noise| self.noise_problem(noise)));
+        problems.extend(self.unexplained());
         let tested = self.validation.iter().filter_map(|log| {
             let [free, written] = [&log.model, log.physical.as_ref()?].map(|report| Errors {
                 relative_percent: report.relative_error_percent,
@@ -70,10 +75,55 @@ impl ResultFile {
         problems
     }
 
+    /// An estimate that noise in the regressor biases by more than its error bars say, whichever estimator made it.
+    fn noise_problem(&self, noise: &NoiseInRegressor) -> Option<String> {
+        let by_instruments = self.method.estimator == "instrumental";
+        if by_instruments && noise.instruments.weak {
+            let column = noise.instruments.weakest_column.as_deref().unwrap_or("some parameter");
+            let f = noise.instruments.weakest_f.unwrap_or_default();
+            return Some(format!(
+                "the instruments are weak: they tell nearly nothing of {column} (first-stage F {f:.1}), and the estimate is biased as least squares is; \
+                 give estimator.instruments a higher cutoff_hz or leave it out, or move the robot faster"
+            ));
+        }
+        let is_plain = ["weighted", "ordinary", "generalized"].contains(&&self.method.estimator[..]);
+        if !is_plain || noise.verdict != NoiseVerdict::BiasesLeastSquares {
+            return None;
+        }
+        let followed = noise.fast_motion.map_or(0.0, |fast| 100.0 * fast.followed.clamp(0.0, 1.0));
+        let apart = noise.least_squares.as_ref().map_or(String::new(), |contrast| {
+            format!(", and instruments put {} {:.0} of their error bars away", contrast.column, contrast.largest)
+        });
+        let fix = if noise.instruments.weak {
+            "instruments of the logs' own motion are too weak to mend that: lower motion.differentiator's cutoff_hz, or record with less noise of the positions or a faster motion"
+        } else {
+            "take estimator.method = \"auto\", or lower motion.differentiator's cutoff_hz"
+        };
+        Some(format!(
+            "noise in the regressor biases least squares beyond its error bars: torque follows {followed:.0} % of the fast motion{apart}; {fix}"
+        ))
+    }
+
+    /// A written model that leaves most of the torque that it was fitted to.
+    fn unexplained(&self) -> Option<String> {
+        let physical = self.training.physical.as_ref().map(|physical| physical.relative_error_percent);
+        let percent = physical.unwrap_or(self.training.relative_error_percent)?;
+        (percent > MOST_LEFT_PERCENT).then(|| {
+            format!(
+                "the model leaves {percent:.0} % of the torque that it was fitted to: the study does not describe this robot or these logs, or noise of \
+                 the positions covers the motion; run `dynident check`, and see `position_noise` of the logs"
+            )
+        })
+    }
+
     /// A held-out log that the written model explains far worse than the logs it was fitted to.
     fn overfit(&self, log: &LogValidation) -> Option<String> {
-        let fitted = self.training.physical.as_ref().map_or(&self.training.joints, |physical| &physical.joints);
-        let held_out = log.physical.as_ref().unwrap_or(&log.model);
+        // In one band: where figures are for the motion's own, the fit's is at hand for the unconstrained estimate.
+        let written = || self.training.physical.as_ref().map_or(&self.training.joints, |physical| &physical.joints);
+        let (fitted, held_out) = match &log.in_fit_band {
+            Some(report) => (&self.training.joints, report),
+            None => (written(), log.physical.as_ref().unwrap_or(&log.model)),
+        };
         let pairs = fitted.iter().zip(&held_out.joints).filter(|(fitted, _)| fitted.rmse_nm > 0.0);
         let squares: Vec<f64> = pairs.map(|(fitted, held)| (held.rmse_nm / fitted.rmse_nm).powi(2)).collect();
         let times = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();

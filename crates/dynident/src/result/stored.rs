@@ -67,6 +67,11 @@ impl ResultFile {
         self.method.motion.differentiator.cutoff_hz()
     }
 
+    /// The cut-off whose band its held-out figures are for, where the fit has another.
+    pub(crate) fn motion_hz(&self) -> Option<f64> {
+        self.method.motion_hz
+    }
+
     /// Its base parameters, which must be those of `model`.
     ///
     /// # Errors

@@ -43,6 +43,9 @@ pub struct DriveSection {
     pub offsets: OffsetChoice,
     /// Who says what a unit of logged torque is worth. The format (`"stated"`) by default.
     pub gains: GainChoice,
+    /// How well stated gains are known: one standard deviation in percent of each, independent from joint to joint. It
+    /// goes into the error bars of payloads. By default they count as exact.
+    pub gain_std_percent: Option<f64>,
     /// Further laws of friction. None by default.
     #[serde(rename = "laws")]
     pub terms: Vec<FrictionTerm>,
@@ -63,6 +66,7 @@ impl Default for DriveSection {
             offset: true,
             offsets: OffsetChoice::Shared,
             gains: GainChoice::Stated,
+            gain_std_percent: None,
             terms: Vec::new(),
             friction: FrictionChoice::Stated,
             joints: BTreeMap::new(),
@@ -122,6 +126,9 @@ impl DriveSection {
     pub(crate) fn validate(&self) -> Result<(), StudyError> {
         Expected::Positive.check("drive.coulomb_width", self.coulomb_width)?;
         Expected::NotNegative.check("drive.coulomb_dead_band", self.coulomb_dead_band)?;
+        if let Some(percent) = self.gain_std_percent {
+            Expected::Range(0.0, 100.0).check("drive.gain_std_percent", percent)?;
+        }
         for (index, term) in self.terms.iter().enumerate() {
             term.validate().map_err(StudyError::at(format!("drive.laws number {}", index + 1)))?;
         }

@@ -15,10 +15,13 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum EstimatorMethod {
+    /// Weighted least squares, or instrumental variables where noise in the regressor biases it and the logs' own
+    /// smoother motion makes strong instruments.
+    #[default]
+    Auto,
     /// Ordinary least squares: every joint's newton metre counts alike.
     Ordinary,
     /// Weighted least squares: every joint counts by its own noise.
-    #[default]
     Weighted,
     /// Generalised least squares: errors of the joints at one instant are correlated.
     Generalized,
@@ -47,6 +50,7 @@ impl EstimatorMethod {
     /// The name in the study file.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Auto => "auto",
             Self::Ordinary => "ordinary",
             Self::Weighted => "weighted",
             Self::Generalized => "generalized",
@@ -68,7 +72,7 @@ impl EstimatorMethod {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct EstimatorSection {
-    /// The method; weighted by default.
+    /// The method; `"auto"` by default.
     pub method: EstimatorMethod,
     /// The covariance that error bars come from; `"jackknife"`, which accounts for coloured residuals and judges each
     /// time segment by the fit without it, by default.
@@ -86,8 +90,8 @@ pub struct EstimatorSection {
     pub segments: SegmentSettings,
     /// Hold parameters that the data hardly determine at zero; not by default.
     pub essential: Option<EssentialSettings>,
-    /// Instruments for `method = "instrumental"`. With another method they only test whether noise in the regressor
-    /// biases it.
+    /// Instruments for `method = "auto"` and `"instrumental"`. With another method they only test whether noise in the
+    /// regressor biases least squares, which `"weighted"` and `"ordinary"` do by default.
     pub instruments: Option<InstrumentSettings>,
     /// How `method = "noise-weighted"` finds the noise around a row.
     pub noise_levels: NoiseLevels,
@@ -101,6 +105,10 @@ impl EstimatorSection {
     /// What all estimators share, with weighted least squares.
     pub(crate) fn common(&self) -> EstimationSettings {
         let mut settings = EstimationSettings::default();
+        settings.examine_exogeneity = matches!(self.method, EstimatorMethod::Ordinary | EstimatorMethod::Weighted);
+        if self.method != EstimatorMethod::Auto {
+            settings.exogeneity_test.clone_from(&self.instruments);
+        }
         (settings.rank, settings.covariance, settings.segments) = (self.rank, self.covariance, self.segments);
         settings.essential.clone_from(&self.essential);
         settings
@@ -113,6 +121,7 @@ impl EstimatorSection {
         simulated: impl FnOnce() -> Result<Box<SimulatedLoopSettings>, Error>,
     ) -> Result<Estimator, Error> {
         Ok(match self.method {
+            EstimatorMethod::Auto => Estimator::Auto(self.instruments.clone().unwrap_or_default()),
             EstimatorMethod::Ordinary => Estimator::Ordinary,
             EstimatorMethod::Weighted => Estimator::Weighted,
             EstimatorMethod::Generalized => Estimator::Generalized,
@@ -133,7 +142,8 @@ impl EstimatorSection {
         match self.method {
             EstimatorMethod::MaximumLikelihood | EstimatorMethod::Simultaneous => self.periods.period_s.is_none(),
             EstimatorMethod::Didim | EstimatorMethod::Clie | EstimatorMethod::Cloe => true,
-            EstimatorMethod::Ordinary
+            EstimatorMethod::Auto
+            | EstimatorMethod::Ordinary
             | EstimatorMethod::Weighted
             | EstimatorMethod::Generalized
             | EstimatorMethod::Huber

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// `[[payload]]`: something that some logs were recorded with, at a link of the robot. A `[[log]]` carries it by its
-/// name. Without `mass_kg` it is estimated; with it, it is known.
+/// name. Without `mass_kg` it is estimated; with `mass_kg` and `com_m` it is known; with
+/// `mass_kg` alone, as from a balance, the rest is estimated.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -47,11 +48,16 @@ pub struct ArmSection {
 const ROUNDING: f64 = 1.0e-6;
 
 impl PayloadSection {
+    /// Its mass, where that is all that is known.
+    pub(crate) fn known_mass_kg(&self) -> Option<f64> {
+        self.mass_kg.filter(|_| self.com_m.is_none())
+    }
+
     /// Its ten parameters in the link's frame, where it is known.
     pub(crate) fn known(&self) -> Option<InertialParameters> {
         let [xx, xy, xz, yy, yz, zz] = self.inertia_at_com_kgm2.unwrap_or_default();
         let inertia = Mat3([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]);
-        let com = Vec3(self.com_m.unwrap_or_default());
+        let com = Vec3(self.com_m?);
         self.mass_kg.map(|mass| InertialParameters::from_centre_of_mass(mass, com, &inertia))
     }
 
@@ -63,11 +69,12 @@ impl PayloadSection {
         }
         match (self.mass_kg, self.com_m, self.inertia_at_com_kgm2) {
             (None, None, None) => return Ok(()),
+            (Some(mass), None, None) if mass > 0.0 => return Ok(()),
             (Some(_), Some(_), _) => {}
             _ => {
                 return Err(StudyError::conflict(
                     "what is known of it",
-                    "a known payload has mass_kg and com_m (and inertia_at_com_kgm2 unless it is a point), one to estimate has none of them",
+                    "a known payload has mass_kg and com_m (and inertia_at_com_kgm2 unless it is a point), one to estimate has none of them or a positive mass_kg alone",
                 ));
             }
         }

@@ -75,6 +75,7 @@ impl Study {
             name: section.name.clone(),
             link: section.link.clone(),
             known: section.known(),
+            known_mass_kg: section.known_mass_kg(),
         };
         self.payload.iter().map(payload).collect()
     }
@@ -111,11 +112,11 @@ impl Study {
         settings.parallel_filter = self.parallel_filter.clone();
         settings.estimation = self.estimator.common();
         settings.estimation.estimator = self.estimator.estimator(|| self.simulated_loop(path, robot).map(Box::new))?;
-        settings.estimation.exogeneity_test.clone_from(&self.estimator.instruments);
         settings.consistency = self.estimator.physical.settings();
         settings.intervals = self.estimator.intervals;
         settings.friction = self.friction_searches(robot);
         (settings.offsets, settings.gains) = (self.drive.offsets, self.drive.gains);
+        settings.gain_std = 0.01 * self.drive.gain_std_percent.unwrap_or(0.0);
         Ok(settings)
     }
 

@@ -12,6 +12,8 @@ mod design_tasks;
 mod differentiators;
 mod drive_gains;
 mod estimators;
+mod excitation;
+mod exogeneity;
 mod friction_choice;
 mod instruments;
 mod iteration_legs;

@@ -8,13 +8,15 @@ use crate::jobs::check::diagnosis_check;
 use crate::jobs::log_summary::{held_out_summary, training_summary};
 use crate::jobs::options::{RunOptions, study_name};
 use crate::jobs::provenance::{beside, now, provenance, seen_from};
-use crate::result::{LogSummary, PhysicalVerdict, Provenance, RESULT_SCHEMA, ResultFile, Timings, TrainingResult};
+use crate::result::{
+    LogSummary, MethodSummary, PhysicalVerdict, Provenance, RESULT_SCHEMA, ResultFile, Timings, TrainingResult,
+};
 use crate::study::{ArmSection, EstimatorMethod, Folders, Study, StudyRobot};
 use dynident_estimation::{Estimate, strongest_correlations};
 use dynident_identification::estimators::{Findings, InstrumentSource};
 use dynident_identification::examination::{LogTrace, friction_sign_findings, sign_findings};
 use dynident_identification::{
-    DiagnosisChoice, Identification, IdentificationError, IdentificationTask, identify as identify_task,
+    DiagnosisChoice, Identification, IdentificationError, IdentificationTask, conditionals, identify as identify_task,
     identify_payload, identify_with_instruments as identify_task_with_instruments,
 };
 use dynident_model::InertialParameters;
@@ -138,7 +140,7 @@ fn identified(
 
     // What is written.
     let inertials = found.inertials();
-    let verdict = physical_verdict(study, &task, &found, &inertials);
+    let verdict = physical_verdict(study, &found, &inertials);
     let (files, no_urdf) = match exported_model(&robot, &task, &found, &verdict, arm.is_some()) {
         Ok(files) => (Some(files.with_provenance(&provenance)), None),
         Err(reason) => (None, Some(reason)),
@@ -173,18 +175,13 @@ fn known_arm(section: &ArmSection, folders: &Folders) -> Result<(std::path::Path
     Ok((path, stored))
 }
 
-fn physical_verdict(
-    study: &Study,
-    task: &IdentificationTask,
-    found: &Identification,
-    inertials: &[InertialParameters],
-) -> PhysicalVerdict {
+fn physical_verdict(study: &Study, found: &Identification, inertials: &[InertialParameters]) -> PhysicalVerdict {
     let consistent = &found.consistent;
     let mut verdict = verdict(found.model(), inertials, &consistent.parameters);
     if let Some(fit) = &consistent.fit {
         let arm_estimate = found.training.columns.arm_estimate(found.estimate());
         verdict.fit = Some(physical_fit_result(fit, &arm_estimate));
-        let is_fitted_to_logs = task.settings.estimation.estimator.is_plain() && study.arm.is_none();
+        let is_fitted_to_logs = found.estimator.is_plain() && study.arm.is_none();
         verdict.note = String::from(if is_fitted_to_logs {
             "of the consistent set that fits the logs best; the base parameters above it are the unconstrained estimate"
         } else {
@@ -255,6 +252,8 @@ fn result_file(
         Findings::Simulated(found) => simulated = Some(found),
         Findings::None => {}
     }
+    let knowledge = task.settings.consistency.clone().unwrap_or_default();
+    let conditionals = conditionals(&found.training, estimate, &knowledge);
     let held_out = found.held_out.iter();
     let bands = held_out.clone().flat_map(|log| &log.validation.residuals).filter_map(|joint| joint.band.clone());
     ResultFile {
@@ -263,7 +262,10 @@ fn result_file(
         problems: Vec::new(),
         provenance: Some(parts.provenance),
         robot: robot_summary(robot),
-        method: method_summary(found, study.estimator.method.name()),
+        method: MethodSummary {
+            gain_std_percent: study.drive.gain_std_percent,
+            ..method_summary(found, found.estimator.name())
+        },
         noise_in_regressor: found.estimation.noise_in_regressor.clone(),
         gross_errors,
         noise_correlation,
@@ -271,7 +273,7 @@ fn result_file(
         periodic,
         series,
         simulated,
-        base_parameters: base_parameters(model, estimate, found.consistent_base_values()),
+        base_parameters: base_parameters(model, estimate, found.consistent_base_values(), &conditionals),
         base_parameter_covariance: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
         bodies: bodies(model, parts.inertials, &sources(model, estimate)),
         possible_intervals: found.consistent.intervals.clone(),

@@ -12,7 +12,7 @@ use dynident_estimation::{Estimate, EstimateStatus};
 use dynident_identification::consistent::typical_length_m;
 use dynident_identification::examination::TorqueLag;
 use dynident_identification::friction::JointFriction;
-use dynident_identification::{Identification, Recording, RegressorModel};
+use dynident_identification::{Conditional, Identification, Recording, RegressorModel, resting_joints};
 use dynident_model::terms::TorqueTerm;
 use dynident_model::{INERTIAL_NAMES, InertialParameters};
 
@@ -46,12 +46,16 @@ pub(super) fn method_summary(identification: &Identification, estimator: &str) -
         },
         clusters: estimate.clusters,
         motion: motion.clone(),
+        cutoff: identification.cutoff.clone(),
+        motion_hz: identification.motion_hz,
         condition_number: estimate.condition_number_raw,
         condition_number_scaled: estimate.condition_number_scaled,
         base_columns: "from the robot's structure: columns from base to tip, bodies then laws; a column that depends on earlier ones is regrouped into them"
             .to_owned(),
         base_gap: [weakest, strongest],
         not_excited: estimate.rank.fixed.iter().map(|fixed| fixed.name.clone()).collect(),
+        resting_joints: resting_joints(&identification.training).into_iter().map(|joint| model.joint_names()[joint].clone()).collect(),
+        gain_std_percent: None,
         load_parameters: model.load_parameters.clone(),
     }
 }
@@ -60,6 +64,7 @@ pub(super) fn base_parameters(
     model: &RegressorModel,
     estimate: &Estimate,
     physical: Option<&[f64]>,
+    conditionals: &[Conditional],
 ) -> Vec<BaseParameterResult> {
     let expressions = model.base().expressions();
     let columns = model.layout().columns();
@@ -75,6 +80,8 @@ pub(super) fn base_parameters(
             relative_std_percent: estimate.relative_std_percent[index],
             prior: model.parametric.nominal_base().map(|prior| prior[index]),
             physical: physical.map(|values| values[index]),
+            conditional_on: conditionals.get(index).map_or_else(Vec::new, |own| own.on.clone()),
+            half_width_95_with_nominal: conditionals.get(index).and_then(|own| own.half_width_95),
             excited: !estimate.rank.fixed.iter().any(|fixed| fixed.column == index),
         })
         .collect()

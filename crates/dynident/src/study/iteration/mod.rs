@@ -7,6 +7,7 @@ pub use legs::{LegOrder, LegSection};
 use super::Study;
 use crate::error::StudyError;
 use dynident_identification::IdentificationSettings;
+use dynident_identification::estimators::Estimator;
 use dynident_iteration::robot::{FolderSettings, ProcessSettings};
 use dynident_iteration::{IterationSettings, RunIdentificationSettings, Scheme, SettledSettings, StartWith};
 use dynident_recording::{DecimationSettings, DifferentiatorSettings};
@@ -170,6 +171,10 @@ impl IterationSection {
         }
         // A run's estimate is made, not tested.
         (estimation.exogeneity_test, estimation.essential) = (None, None);
+        estimation.examine_exogeneity = false;
+        if let Estimator::Auto(_) = estimation.estimator {
+            estimation.estimator = Estimator::Weighted;
+        }
         let default = IterationSettings::default();
         Ok(IterationSettings {
             identification: RunIdentificationSettings {

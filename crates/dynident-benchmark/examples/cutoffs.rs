@@ -1,0 +1,37 @@
+//! The default cut-off against the best that can be had with the truth in hand, as a table: robots × motions × noise.
+//!
+//! ```text
+//! cargo run --release -p dynident-benchmark --example cutoffs -- [RUNS] [ROWS]
+//! ```
+
+#![allow(clippy::print_stdout, reason = "printing a table is what this program is for")]
+
+use dynident_benchmark::cutoffs::{CUTOFF_CELLS, cutoff_figures};
+use std::error::Error;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let runs: u64 = std::env::args().nth(1).map_or(Ok(8), |text| text.parse())?;
+    let rows: usize = std::env::args().nth(2).map_or(Ok(CUTOFF_CELLS.len()), |text| text.parse())?;
+    println!(
+        "| robot | harmonics | length, s | rate, Hz | position noise, rad | spectrum asks for, Hz | its error, % | default, % | best, % | at, times | default over best |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    for cell in CUTOFF_CELLS.iter().take(rows) {
+        let figures = cutoff_figures(cell, runs)?;
+        println!(
+            "| {} | {} | {} | {} | {:.0e} | {:.1} | {:.2} | {:.2} | {:.2} | {:.1} | {:.2} |",
+            cell.robot,
+            cell.harmonics,
+            cell.duration_s,
+            cell.rate_hz,
+            cell.position_noise_rad,
+            figures.spectrum_hz,
+            100.0 * figures.of_spectrum,
+            100.0 * figures.of_default,
+            100.0 * figures.best,
+            figures.best_multiple,
+            figures.default_over_best()
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,74 @@
+//! Is the fast part of a measured motion motion, or noise? Torque follows the one and not the other.
+
+use super::instrumental::InstrumentalEstimate;
+use super::projection::Projection;
+use super::weighted::{WeightedSettings, weighted_least_squares};
+use crate::error::EstimationError;
+use crate::factor::{InstrumentedProblem, RankSettings};
+use crate::uncertainty::CovarianceMethod;
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// How far torque follows what the instruments do not hold of the regressor.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct FastMotion {
+    /// κ: 1 where all of it is motion, 0 where all of it is noise.
+    pub followed: f64,
+    /// Half the width of its 95 % interval, from time segments.
+    pub half_width_95: f64,
+    /// Root mean square of the torque that this part would need, over that of the whole motion, joints in units of
+    /// their noise.
+    pub share_of_torque: f64,
+}
+
+/// `κ = argmin Σ_j ‖τ_j - W̃_j θ - κ V_j θ‖² / σ_j²`, with `W = W̃ + V`, `W̃ = Z(ZᵀZ)⁻¹ZᵀW` and θ the instrumental
+/// estimate.
+///
+/// One number for all that instruments of a lower band leave over: fast motion moves the robot and needs its torque (κ
+/// = 1), noise of the positions needs none (κ = 0), and between the two κ is the share of motion. Where a model merely
+/// fails in fast motion, torque still follows most of it; that is how noise is told from a wrong model, which the test
+/// of Durbin, Wu and Hausman cannot ([`hausman_test`](crate::hausman_test)): it rejects for either. As one number κ
+/// also needs no more time segments than two, however many parameters there are.
+///
+/// None where the instruments leave nothing over or the rows do not carry it.
+///
+/// # Errors
+/// [`EstimationError::Setting`] and [`EstimationError::Mismatch`] for an estimate of another problem.
+pub fn fast_motion(
+    problem: &InstrumentedProblem,
+    found: &InstrumentalEstimate,
+    rank: RankSettings,
+    covariance: CovarianceMethod,
+) -> Result<Option<FastMotion>, EstimationError> {
+    let estimate = &found.estimate;
+    crate::error::expect("joints of the estimate", problem.joints().len(), estimate.joint_sigma.len())?;
+    crate::error::expect("columns of the estimate", problem.columns().len(), estimate.values.len())?;
+    let weights: Vec<f64> = estimate.joint_sigma.iter().map(|sigma| 1.0 / sigma).collect();
+    let projection = Projection::new(problem, &problem.rows.stacked(), &weights, &rank)?;
+    let theta = nalgebra::DVector::from_column_slice(&estimate.values);
+    let names = vec!["fast motion".to_owned()];
+    let fast = problem.combined(names, vec![1.0], |local| {
+        let (fitted, left) = projection.parts(local);
+        let size = fitted.nrows();
+        let mut rows = DMatrix::zeros(size, 2);
+        rows.set_column(0, &(left * &theta));
+        let mut torque = -(fitted * &theta);
+        torque[size - 1] += 1.0;
+        rows.set_column(1, &torque);
+        rows
+    })?;
+    let square = |triangle: &crate::factor::TriangularFactor| {
+        let (rows, values) = (triangle.regressor_triangle(), &theta);
+        (rows * values).norm_squared()
+    };
+    let (left, explained) = (square(&projection.left), square(&projection.explained));
+    let settings = WeightedSettings { rank, covariance, ..WeightedSettings::default() };
+    let Ok(fit) = weighted_least_squares(&fast, &settings) else { return Ok(None) };
+    let (followed, half_width_95) = (fit.values[0], fit.half_width_95[0]);
+    let is_told = fit.rank.fixed.is_empty() && followed.is_finite() && half_width_95.is_finite() && left > 0.0;
+    if !is_told {
+        return Ok(None);
+    }
+    Ok(Some(FastMotion { followed, half_width_95, share_of_torque: (left / (left + explained)).sqrt() }))
+}

@@ -1,0 +1,396 @@
+//! Recordings that stand in for themselves: their motion without its noise, a first fit's torque, and their noise.
+
+use super::thinned::Thinned;
+use crate::error::IdentificationError;
+use crate::logs::{LogSpectrum, Logs};
+use crate::recording::{LogError, Samples};
+use crate::regressor_model::RegressorModel;
+use crate::rows::{JointRows, ParallelFilterSettings, RowBuilder, RowConsumer, predicted_torque};
+use crate::settings::IdentificationSettings;
+use crate::training::plain_fit;
+use dynident_model::sample::Random;
+use dynident_recording::derivative::ButterworthZeroPhase;
+use dynident_recording::{
+    DecimationSettings, Decimator, Derivatives, Differentiator, FilterError, MotionBlock, MotionSettings, MotionStream,
+    Place, SampleRanges,
+};
+use nalgebra::{DMatrix, DMatrixView, DVector};
+
+/// Samples a second of the copy, in units of the highest candidate.
+const RATE: f64 = 4.0;
+/// Samples of all pieces together, at most: enough to tell errors apart, and milliseconds.
+const MOST_SAMPLES: usize = 4096;
+/// Simulated copies of the recordings.
+const COPIES: usize = 4;
+/// Shortest piece that counts.
+const SHORTEST: usize = 32;
+/// Of each copy, how far along its piece the torque's noise is moved.
+const SHIFTS: [f64; COPIES] = [0.29, 0.53, 0.83, 0.11];
+/// Part of the torque's noise that is kept where the noise of the positions seems to make all of it.
+const LEAST_LEFT: f64 = 1.0e-4;
+/// Periods of the slowest cut-off within which an end is felt.
+const INVENTED: f64 = 1.5;
+/// The golden ratio.
+const GOLDEN: f64 = 1.618_033_988_749_895;
+const SEED: u64 = 0x005E_ED0F_7157;
+
+/// One uninterrupted piece.
+struct Piece {
+    /// The motion without its noise and the torque that the first fit makes of it.
+    motion: MotionBlock,
+    /// What the first fit leaves of the measured torque.
+    noise: Vec<f64>,
+}
+
+/// What encoders and torque sensors say of a piece in one copy, joint-major.
+struct Measured {
+    q: Vec<f64>,
+    tau: Vec<f64>,
+}
+
+/// The recordings' motion and noise, and parameters that are known for once.
+pub(super) struct StandIn {
+    pieces: Vec<Piece>,
+    /// Copy by copy, piece by piece.
+    copies: Vec<Vec<Measured>>,
+    /// Joint by joint `WᵀW` over the same motions with each joint at another time (postures and velocities that no fit
+    /// has seen together), in units of the torque's spread; none for a joint without torque.
+    unseen: Vec<Option<DMatrix<f64>>>,
+    theta: Vec<f64>,
+    position_noise: Vec<f64>,
+    /// What the noise of the torque is multiplied by, so that a part of the recordings is as uncertain as the whole.
+    scale: f64,
+    log_rate_hz: f64,
+    thinning: usize,
+}
+
+/// A low-pass of its own for each joint: where its motion has faded into the noise.
+#[derive(Debug)]
+struct JointByJoint(Vec<ButterworthZeroPhase>);
+
+impl Differentiator for JointByJoint {
+    fn name(&self) -> &'static str {
+        "joint-by-joint"
+    }
+
+    fn minimum_samples(&self) -> usize {
+        self.0.iter().map(Differentiator::minimum_samples).max().unwrap_or(1)
+    }
+
+    fn context_samples(&self, rate_hz: f64) -> Option<usize> {
+        self.0.iter().filter_map(|joint| joint.context_samples(rate_hz)).max()
+    }
+
+    fn differentiate_at(&self, place: Place, q: &[f64], out: Derivatives<'_>) -> Result<SampleRanges, FilterError> {
+        self.0[place.joint].differentiate_at(place, q, out)
+    }
+}
+
+impl StandIn {
+    /// Reads the recordings and fits to them; `highest_hz` is the highest candidate.
+    pub(super) fn of(
+        (logs, settings): (&Logs<'_>, &IdentificationSettings),
+        model: &RegressorModel,
+        training: &[usize],
+        highest_hz: f64,
+    ) -> Result<Option<Self>, IdentificationError> {
+        let dof = model.dof();
+        let is_bare =
+            |log: &&LogSpectrum| training.contains(&log.index) && logs.recordings[log.index].payload.is_none();
+        let bare: Vec<&LogSpectrum> = logs.spectra().iter().filter(is_bare).collect();
+        let each = MOST_SAMPLES / bare.len().max(1);
+        let (mut log_rate_hz, mut thinning) = (0.0, 1);
+        let mut measured: Vec<MotionBlock> = Vec::new();
+        let (mut noise_squares, mut reference_hz) = (vec![0.0_f64; dof], vec![0.0_f64; dof]);
+        let (mut used, mut seen) = (0_u64, 0_u64);
+        for LogSpectrum { index, rate_hz, choice: spectrum, position_noise } in bare {
+            let (recording, rate_hz) = (&logs.recordings[*index], *rate_hz);
+            let Samples::Log(log) = &recording.samples else { continue };
+            let places = recording.places(model.model())?;
+            if log_rate_hz == 0.0 {
+                log_rate_hz = rate_hz;
+                thinning = (rate_hz / (RATE * highest_hz)).floor().clamp(1.0, 1000.0) as usize;
+            } else if (rate_hz / log_rate_hz - 1.0).abs() > 0.01 {
+                continue;
+            }
+            let motion = MotionSettings { smooth_torque: false, ..settings.motion.clone() };
+            let faded = &spectrum.faded_hz;
+            let asked = spectrum.joints_hz.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+            let build = || -> Result<Box<dyn Differentiator>, FilterError> {
+                let of = |hz: &Option<f64>| {
+                    let cutoff_hz = hz.unwrap_or(asked).min(highest_hz).min(0.4 * rate_hz);
+                    ButterworthZeroPhase::new(4, cutoff_hz)
+                };
+                Ok(Box::new(JointByJoint(faded.iter().map(of).collect::<Result<_, _>>()?)))
+            };
+            let named = |source| LogError::recording(&recording.name, source);
+            let mut stream = MotionStream::with_differentiator(log, &motion, |_| build()).map_err(named)?;
+            // One filter for the torque; the motion without its noise has nothing to lose by being thinned out.
+            let filter = DecimationSettings { factor: thinning, ..DecimationSettings::default() };
+            let in_filter = |source| LogError::Filter { log: recording.name.clone(), source };
+            let decimator = || Decimator::new(&filter, rate_hz, 1).map_err(in_filter);
+            let mut pieces = Thinned::new(thinning, dof);
+            let mut block = MotionBlock::default();
+            let mut samples = 0;
+            while samples < each * thinning && stream.next_block(&mut block).map_err(named)? {
+                let rows = block.rows.min(each * thinning - samples);
+                pieces.take(&block, &places, rows, &decimator)?;
+                samples += rows;
+            }
+            used += samples as u64;
+            seen += recording.estimated_rows().unwrap_or(samples as u64).max(samples as u64);
+            for (joint, &place) in places.iter().enumerate() {
+                reference_hz[joint] = reference_hz[joint].max(faded[place].unwrap_or(asked).min(highest_hz));
+                let noise = position_noise.get(place).copied().unwrap_or(0.0);
+                noise_squares[joint] = noise_squares[joint].max(noise * noise);
+            }
+            measured.extend(pieces.finished());
+        }
+        // The filters of the reference invent what lies beyond the ends.
+        let slowest_hz = reference_hz.iter().copied().fold(f64::INFINITY, f64::min);
+        let ends = (INVENTED * log_rate_hz / thinning as f64 / slowest_hz).ceil() as usize;
+        let measured: Vec<MotionBlock> =
+            measured.iter().map(|block| inside(block, ends)).filter(|block| block.rows >= SHORTEST).collect();
+        if measured.is_empty() || used == 0 {
+            return Ok(None);
+        }
+        let fitted = Self::fitted((logs, settings), model, measured, (log_rate_hz, thinning))?;
+        let Some(mut stand_in) = fitted else { return Ok(None) };
+        // White noise of the log, thinned out below a low-pass.
+        stand_in.position_noise = noise_squares.iter().map(|square| (square / thinning as f64).sqrt()).collect();
+        stand_in.scale = (used as f64 / seen as f64).sqrt();
+        let rate_hz = log_rate_hz / thinning as f64;
+        let reference = |hz: &f64| ButterworthZeroPhase::new(4, hz.min(0.4 * rate_hz));
+        let reference = reference_hz.iter().map(reference).collect::<Result<Vec<_>, _>>();
+        if let Ok(reference) = reference {
+            stand_in.take_motion_noise(model, &JointByJoint(reference))?;
+        }
+        stand_in.copies = (0..COPIES).map(|copy| stand_in.measured(copy)).collect();
+        Ok(Some(stand_in))
+    }
+
+    /// Takes from the torque's noise what the noise of the positions alone makes: the first fit saw it in the motion,
+    /// and every copy gets it anew.
+    fn take_motion_noise(&mut self, model: &RegressorModel, reference: &JointByJoint) -> Result<(), LogError> {
+        let (mut all, mut of_motion) = (vec![0.0_f64; model.dof()], vec![0.0_f64; model.dof()]);
+        for (number, piece) in self.pieces.iter().enumerate() {
+            // Both through the same filter: what it does to the ends is no noise.
+            let seed = SEED ^ !(number as u64);
+            let of = |q: &[f64]| differentiated(&piece.motion, q, reference);
+            let noisy = of(&self.noisy_positions(piece, seed));
+            let (Some(noisy), Some(clean)) = (noisy, of(&piece.motion.q)) else { return Ok(()) };
+            let (with_noise, without) = (torque(model, &noisy, &self.theta)?, torque(model, &clean, &self.theta)?);
+            for (joint, (all, of_motion)) in all.iter_mut().zip(&mut of_motion).enumerate() {
+                let squares = |x: &mut dyn Iterator<Item = f64>| x.map(|x| x * x).sum::<f64>();
+                *all += squares(&mut piece.motion.joint(&piece.noise, joint).iter().copied());
+                let pairs = noisy.joint(&with_noise, joint).iter().zip(noisy.joint(&without, joint));
+                *of_motion += squares(&mut pairs.map(|(x, y)| x - y));
+            }
+        }
+        let left = |(all, of_motion): (&f64, &f64)| {
+            if *all > 0.0 { (1.0 - of_motion / all).max(LEAST_LEFT).sqrt() } else { 1.0 }
+        };
+        let left: Vec<f64> = all.iter().zip(&of_motion).map(left).collect();
+        for piece in &mut self.pieces {
+            let rows = piece.motion.rows;
+            for (values, left) in piece.noise.chunks_exact_mut(rows).zip(&left) {
+                for value in values {
+                    *value *= left;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A piece's positions with fresh noise.
+    fn noisy_positions(&self, piece: &Piece, seed: u64) -> Vec<f64> {
+        let mut random = Random::new(seed);
+        let joints = piece.motion.q.chunks_exact(piece.motion.rows).zip(&self.position_noise);
+        joints.flat_map(|(q, noise)| q.iter().map(|q| q + noise * random.normal()).collect::<Vec<_>>()).collect()
+    }
+
+    /// Copy number `copy` of all pieces: fresh noise on the positions, the torque's own at another time.
+    fn measured(&self, copy: usize) -> Vec<Measured> {
+        let sign = if copy.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let one = |(number, piece): (usize, &Piece)| {
+            let (rows, mut tau) = (piece.motion.rows, piece.motion.tau.clone());
+            let shift = (SHIFTS[copy] * rows as f64) as usize;
+            for (tau, noise) in tau.chunks_exact_mut(rows).zip(piece.noise.chunks_exact(rows)) {
+                for (row, tau) in tau.iter_mut().enumerate() {
+                    *tau += sign * self.scale * noise[(row + shift) % rows];
+                }
+            }
+            Measured { q: self.noisy_positions(piece, SEED ^ ((copy as u64) << 32) ^ number as u64), tau }
+        };
+        self.pieces.iter().enumerate().map(one).collect()
+    }
+
+    /// The first fit, its torque and what it leaves.
+    fn fitted(
+        (logs, settings): (&Logs<'_>, &IdentificationSettings),
+        model: &RegressorModel,
+        measured: Vec<MotionBlock>,
+        (log_rate_hz, thinning): (f64, usize),
+    ) -> Result<Option<Self>, IdentificationError> {
+        let motion_hz: f64 = logs.spectra().iter().map(|log| log.choice.cutoff_hz).fold(0.0, f64::max);
+        let rate_hz = log_rate_hz / thinning as f64;
+        let gain_half_hz = (0.7 * motion_hz).min(0.4 * rate_hz);
+        let filter = ParallelFilterSettings {
+            factor: Some(1),
+            cutoff_hz: Some(gain_half_hz),
+            transition_hz: Some(gain_half_hz.min(0.5 * rate_hz - gain_half_hz)),
+            ..ParallelFilterSettings::default()
+        };
+        let Ok(estimate) = plain_fit(model.clone(), measured.clone(), &filter, &super::plain_settings(settings)) else {
+            return Ok(None);
+        };
+        let theta = estimate.values[..model.layout().columns().len()].to_vec();
+        let mut pieces = Vec::with_capacity(measured.len());
+        for mut block in measured {
+            let torque = torque(model, &block, &theta)?;
+            let noise = block.tau.iter().zip(&torque).map(|(measured, torque)| measured - torque).collect();
+            block.tau = torque;
+            pieces.push(Piece { motion: block, noise });
+        }
+        let unseen = unseen_rows(model, &pieces)?;
+        let (copies, position_noise) = (Vec::new(), Vec::new());
+        Ok(Some(Self { pieces, copies, unseen, theta, position_noise, scale: 1.0, log_rate_hz, thinning }))
+    }
+
+    /// Samples a second of the recordings.
+    pub(super) fn log_rate_hz(&self) -> f64 {
+        self.log_rate_hz
+    }
+
+    /// Samples of the recordings for each sample of the copy.
+    pub(super) fn thinning(&self) -> usize {
+        self.thinning
+    }
+
+    /// The copies of the recordings as a fit with this cut-off sees them, one after another; `None` for one to which
+    /// the filter does not apply.
+    pub(super) fn copies(
+        &self,
+        settings: &MotionSettings,
+        cutoff_hz: f64,
+    ) -> Result<impl Iterator<Item = Option<Vec<MotionBlock>>>, FilterError> {
+        let differentiator = settings.differentiator.clone().with_cutoff(cutoff_hz).build(cutoff_hz)?;
+        Ok(self.copies.iter().map(move |copy| {
+            let one = |(piece, Measured { q, tau }): (&Piece, &Measured)| {
+                let motion = differentiated(&piece.motion, q, differentiator.as_ref())?;
+                Some(MotionBlock { tau: tau.clone(), ..motion })
+            };
+            self.pieces.iter().zip(copy).map(one).collect()
+        }))
+    }
+
+    /// Mean square over joints of the torque that parameters `values` predict beside that of the first fit's, on motion
+    /// without noise that the fit has not seen, each in units of its spread.
+    pub(super) fn square_error(&self, model: &RegressorModel, values: &[f64]) -> f64 {
+        let of_joint = |(joint, squares): (usize, &Option<DMatrix<f64>>)| {
+            let columns = model.layout().joint_columns(joint).iter();
+            let difference =
+                DVector::from_iterator(columns.len(), columns.map(|&column| values[column] - self.theta[column]));
+            squares.as_ref().map(|squares| (squares * &difference).dot(&difference).max(0.0))
+        };
+        let joints: Vec<f64> = self.unseen.iter().enumerate().filter_map(of_joint).collect();
+        joints.iter().sum::<f64>() / joints.len().max(1) as f64
+    }
+}
+
+/// A motion with positions `q` (joint-major) and their derivatives in place of its own; `None` where the differentiator
+/// does not apply.
+fn differentiated(motion: &MotionBlock, q: &[f64], differentiator: &dyn Differentiator) -> Option<MotionBlock> {
+    let (rows, mut block) = (motion.rows, motion.clone());
+    for (joint, q) in q.chunks_exact(rows).enumerate() {
+        let own = joint * rows..(joint + 1) * rows;
+        let out =
+            Derivatives { q: &mut block.q[own.clone()], dq: &mut block.dq[own.clone()], ddq: &mut block.ddq[own] };
+        let place = Place { joint, ..Place::start(block.rate_hz) };
+        differentiator.differentiate_at(place, q, out).ok()?;
+    }
+    Some(block)
+}
+
+/// A motion without so many samples at both ends, but at least its middle half.
+fn inside(motion: &MotionBlock, ends: usize) -> MotionBlock {
+    let ends = ends.min(motion.rows / 4);
+    motion.part(ends..motion.rows - ends)
+}
+
+/// The same motion with each joint at another time; each goes on at its start behind its end.
+fn shifted(motion: &MotionBlock) -> MotionBlock {
+    let mut other = motion.clone();
+    for joint in 0..motion.joints {
+        let own = joint * motion.rows..(joint + 1) * motion.rows;
+        // Multiples of the golden ratio's fraction: no two joints keep their distance in time.
+        let shift = ((GOLDEN * (joint + 1) as f64).fract() * motion.rows as f64) as usize;
+        for values in [&mut other.q, &mut other.dq, &mut other.ddq] {
+            values[own.clone()].rotate_left(shift);
+        }
+    }
+    other
+}
+
+/// Standard deviation of a joint's torque over all pieces.
+fn spread(pieces: &[Piece], joint: usize) -> f64 {
+    let values = || pieces.iter().flat_map(|piece| piece.motion.joint(&piece.motion.tau, joint));
+    let count = values().count() as f64;
+    let mean = values().sum::<f64>() / count;
+    (values().map(|x| (x - mean) * (x - mean)).sum::<f64>() / count).sqrt()
+}
+
+/// What [`StandIn::unseen`] holds.
+fn unseen_rows(model: &RegressorModel, pieces: &[Piece]) -> Result<Vec<Option<DMatrix<f64>>>, LogError> {
+    struct Squares<'a>(&'a RegressorModel, Vec<DMatrix<f64>>);
+    impl RowConsumer for Squares<'_> {
+        fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
+            let columns = self.0.layout().joint_columns(rows.joint).len();
+            let panel = DMatrixView::from_slice(&rows.panel[..columns * rows.rows], rows.rows, columns);
+            self.1[rows.joint].gemm_tr(1.0, &panel, &panel, 1.0);
+            Ok(())
+        }
+    }
+    let empty = |joint| {
+        let columns = model.layout().joint_columns(joint).len();
+        DMatrix::zeros(columns, columns)
+    };
+    let mut squares = Squares(model, (0..model.dof()).map(empty).collect());
+    for piece in pieces {
+        every_sample(model, &shifted(&piece.motion), &mut squares)?;
+    }
+    let rows: usize = pieces.iter().map(|piece| piece.motion.rows).sum();
+    let in_spreads = |(joint, squares): (usize, DMatrix<f64>)| {
+        let spread = spread(pieces, joint);
+        (spread > 0.0).then(|| squares / (rows as f64 * spread * spread))
+    };
+    Ok(squares.1.into_iter().enumerate().map(in_spreads).collect())
+}
+
+/// Sends the unfiltered rows of a motion to a consumer.
+fn every_sample(model: &RegressorModel, block: &MotionBlock, consumer: &mut dyn RowConsumer) -> Result<(), LogError> {
+    let places: Vec<usize> = (0..model.dof()).collect();
+    let in_filter = |source| LogError::Filter { log: "a simulated copy".to_owned(), source };
+    RowBuilder::new(model, &places, block.rate_hz, None).map_err(in_filter)?.take(block, consumer)
+}
+
+/// Torque of the base parameters `theta` on a motion, joint-major.
+fn torque(model: &RegressorModel, block: &MotionBlock, theta: &[f64]) -> Result<Vec<f64>, LogError> {
+    struct Predicted<'a> {
+        model: &'a RegressorModel,
+        theta: &'a [f64],
+        joints: Vec<Vec<f64>>,
+        buffer: Vec<f64>,
+    }
+    impl RowConsumer for Predicted<'_> {
+        fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
+            let columns = self.model.layout().joint_columns(rows.joint);
+            predicted_torque(rows.panel, rows.rows, columns, self.theta, &mut self.buffer);
+            self.joints[rows.joint].extend_from_slice(&self.buffer);
+            Ok(())
+        }
+    }
+    let mut predicted = Predicted { model, theta, joints: vec![Vec::new(); model.dof()], buffer: Vec::new() };
+    every_sample(model, block, &mut predicted)?;
+    Ok(predicted.joints.concat())
+}

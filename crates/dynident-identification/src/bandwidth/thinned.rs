@@ -1,0 +1,79 @@
+//! A log at a lower rate: its torque through a low-pass, its smooth motion as it is.
+
+use crate::recording::LogError;
+use dynident_recording::{Decimator, MotionBlock};
+
+/// A log's blocks at a lower rate, piece by piece, joints in the model's order.
+#[derive(Default)]
+pub(super) struct Thinned {
+    thinning: usize,
+    dof: usize,
+    pieces: Vec<MotionBlock>,
+    segment: Option<usize>,
+    decimators: Vec<Decimator>,
+    columns: [Vec<Vec<f64>>; 4],
+    out: Vec<f64>,
+    rate_hz: f64,
+}
+
+impl Thinned {
+    /// Nothing yet of a log of `dof` joints, every `thinning`-th sample of which is kept.
+    pub(super) fn new(thinning: usize, dof: usize) -> Self {
+        Self { thinning, dof, ..Self::default() }
+    }
+
+    /// Takes the first `rows` of a block; `decimator` makes the filter of one joint's torque.
+    ///
+    /// # Errors
+    /// A filter that does not exist at this rate.
+    pub(super) fn take(
+        &mut self,
+        block: &MotionBlock,
+        places: &[usize],
+        rows: usize,
+        decimator: &dyn Fn() -> Result<Decimator, LogError>,
+    ) -> Result<(), LogError> {
+        if self.segment != Some(block.segment) {
+            self.close();
+            self.segment = Some(block.segment);
+            self.rate_hz = block.rate_hz;
+            self.decimators = (0..self.dof).map(|_| decimator()).collect::<Result<_, _>>()?;
+            self.columns = core::array::from_fn(|_| vec![Vec::new(); self.dof]);
+        }
+        for (joint, &place) in places.iter().enumerate() {
+            for (column, source) in self.columns.iter_mut().zip([&block.q, &block.dq, &block.ddq]) {
+                column[joint].extend_from_slice(&block.joint(source, place)[..rows]);
+            }
+            self.decimators[joint].push(&block.joint(&block.tau, place)[..rows], rows, &mut self.out);
+            self.columns[3][joint].extend_from_slice(&self.out);
+        }
+        Ok(())
+    }
+
+    /// Ends a piece.
+    fn close(&mut self) {
+        let Some(decimator) = self.decimators.first() else { return };
+        let (rows, first) = (self.columns[3].first().map_or(0, Vec::len), decimator.half_length());
+        let thinned = |columns: &[Vec<f64>]| -> Vec<f64> {
+            columns.iter().flat_map(|x| (0..rows).map(|row| x[first + row * self.thinning])).collect()
+        };
+        let [q, dq, ddq, tau] = &self.columns;
+        self.pieces.push(MotionBlock {
+            rate_hz: self.rate_hz / self.thinning as f64,
+            rows,
+            joints: self.dof,
+            q: thinned(q),
+            dq: thinned(dq),
+            ddq: thinned(ddq),
+            tau: tau.concat(),
+            ..MotionBlock::default()
+        });
+        self.decimators.clear();
+    }
+
+    /// All pieces.
+    pub(super) fn finished(mut self) -> Vec<MotionBlock> {
+        self.close();
+        self.pieces
+    }
+}

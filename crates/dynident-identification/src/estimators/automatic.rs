@@ -1,0 +1,56 @@
+//! Weighted least squares where nothing speaks against it, instruments where noise in the regressor biases it.
+
+use super::exogeneity::{NoiseInRegressor, NoiseVerdict, examined, harmless};
+use super::instrumental::InstrumentSettings;
+use super::{Estimation, EstimatorError, TrainingRows};
+use dynident_estimation::{Estimate, EstimateStatus, InstrumentalEstimate};
+
+/// The weighted estimate, or that of instruments where least squares is biased and they are strong.
+pub(super) fn automatic(
+    rows: &TrainingRows<'_>,
+    settings: &InstrumentSettings,
+    least_squares: Estimate,
+) -> Result<Estimation, EstimatorError> {
+    let (found, mut noise) = match examined_where_possible(rows, settings, &least_squares)? {
+        Some((Some(found), noise)) => (found, noise),
+        Some((None, noise)) => {
+            return Ok(Estimation { noise_in_regressor: Some(noise), ..Estimation::plain(least_squares) });
+        }
+        None => return Ok(Estimation::plain(least_squares)),
+    };
+    let is_sound = !found.instruments.weak && found.estimate.status != EstimateStatus::IterationLimit;
+    noise.instruments_taken = noise.verdict == NoiseVerdict::BiasesLeastSquares && is_sound;
+    let estimate = if noise.instruments_taken { found.estimate } else { least_squares };
+    Ok(Estimation { noise_in_regressor: Some(noise), ..Estimation::plain(estimate) })
+}
+
+/// What noise does to least squares, with the instruments' estimate where these had to be asked; none where it cannot
+/// be examined: it can where all columns are the robot's own and free, all joints have rows, and no piece of a log is
+/// too short for a lower filter.
+///
+/// # Errors
+/// Logs that cannot be read.
+pub(super) fn examined_where_possible(
+    rows: &TrainingRows<'_>,
+    settings: &InstrumentSettings,
+    least_squares: &Estimate,
+) -> Result<Option<(Option<InstrumentalEstimate>, NoiseInRegressor)>, EstimatorError> {
+    let layout = rows.model.layout();
+    let is_plain = rows.problem.columns().len() == layout.columns().len()
+        && rows.problem.joints().len() == rows.model.dof()
+        && rows.settings.held.is_empty();
+    if !is_plain {
+        return Ok(None);
+    }
+    let first = if settings.cutoff_hz.is_none() { harmless(rows, least_squares) } else { Ok(None) };
+    let found = first.and_then(|harmless| match harmless {
+        Some(noise) => Ok((None, noise)),
+        None => examined(rows, settings, least_squares).map(|(found, noise)| (Some(found), noise)),
+    });
+    match found {
+        Ok(found) => Ok(Some(found)),
+        // The estimate stands without it.
+        Err(EstimatorError::Estimation(_) | EstimatorError::Instruments { .. }) => Ok(None),
+        Err(error) => Err(error),
+    }
+}

@@ -1,0 +1,115 @@
+//! The motion of a log through a low-pass of its own, whole: instruments that no second reading of the file is needed
+//! for.
+
+use super::instruments::InstrumentSource;
+use super::{EstimatorError, TrainingRows};
+use crate::recording::LogError;
+use dynident_recording::derivative::ButterworthZeroPhase;
+use dynident_recording::{Derivatives, Differentiator, FilterError, MotionBlock, Place, cutoff};
+
+/// Order of the low-pass, as of the differentiator's default.
+const ORDER: usize = 4;
+
+/// One uninterrupted piece: q, dq, ddq of every joint of the log.
+type Piece = Vec<[Vec<f64>; 3]>;
+
+/// The positions of a log behind the differentiator, through a zero-phase Butterworth filter.
+pub(super) struct BandMotion<'r, 'a> {
+    rows: &'r TrainingRows<'a>,
+    cutoff_hz: f64,
+    log: usize,
+    /// Numbers of the pieces of the log begun, and their motion.
+    pieces: Vec<(usize, Piece)>,
+    /// Piece and sample that come next.
+    next: (usize, usize),
+}
+
+impl<'r, 'a> BandMotion<'r, 'a> {
+    pub(super) fn new(rows: &'r TrainingRows<'a>, cutoff_hz: f64) -> Self {
+        Self { rows, cutoff_hz, log: 0, pieces: Vec::new(), next: (0, 0) }
+    }
+
+    fn refused(&self, message: String) -> EstimatorError {
+        EstimatorError::Instruments { log: self.rows.logs.recordings[self.log].name.clone(), message }
+    }
+
+    fn smoothed(&self, rate_hz: f64, q: &[f64]) -> Result<[Vec<f64>; 3], FilterError> {
+        let filter = ButterworthZeroPhase::new(ORDER, self.cutoff_hz)?;
+        let [mut smooth, mut dq, mut ddq] = [(); 3].map(|()| vec![0.0; q.len()]);
+        let out = Derivatives { q: &mut smooth, dq: &mut dq, ddq: &mut ddq };
+        filter.differentiate_at(Place::start(rate_hz), q, out)?;
+        Ok([smooth, dq, ddq])
+    }
+}
+
+impl InstrumentSource for BandMotion<'_, '_> {
+    fn begin(&mut self, log: usize) -> Result<(), EstimatorError> {
+        (self.log, self.next) = (log, (0, 0));
+        let (rate_hz, pieces) = positions(self.rows, log)?;
+        self.pieces.clear();
+        for (segment, q) in pieces {
+            let piece = q.iter().map(|q| self.smoothed(rate_hz, q)).collect::<Result<Piece, _>>();
+            let piece = piece.map_err(|problem| self.refused(format!("the instruments' filter: {problem}")))?;
+            self.pieces.push((segment, piece));
+        }
+        Ok(())
+    }
+
+    fn motion(&mut self, measured: &MotionBlock, instruments: &mut MotionBlock) -> Result<(), EstimatorError> {
+        let (mut piece, mut from) = self.next;
+        if self.pieces.get(piece).is_some_and(|(segment, _)| *segment != measured.segment) {
+            (piece, from) = (piece + 1, 0);
+        }
+        let to = from + measured.rows;
+        let found = self
+            .pieces
+            .get(piece)
+            .filter(|(segment, joints)| *segment == measured.segment && joints.iter().all(|[q, ..]| q.len() >= to));
+        let Some((_, joints)) = found else {
+            return Err(self.refused("the smoothed motion does not cover the samples of the regressor".to_owned()));
+        };
+        for (order, values) in [&mut instruments.q, &mut instruments.dq, &mut instruments.ddq].into_iter().enumerate() {
+            values.clear();
+            for joint in joints {
+                values.extend_from_slice(&joint[order][from..to]);
+            }
+        }
+        self.next = (piece, to);
+        Ok(())
+    }
+}
+
+/// Positions of a log by uninterrupted piece and joint, and their rate.
+type Positions = (f64, Vec<(usize, Vec<Vec<f64>>)>);
+
+fn positions(rows: &TrainingRows<'_>, log: usize) -> Result<Positions, LogError> {
+    let (mut rate_hz, mut pieces) = (0.0, Vec::<(usize, Vec<Vec<f64>>)>::new());
+    rows.logs.pass(rows.model, log).each_block(&mut |block| {
+        rate_hz = block.rate_hz;
+        if pieces.last().is_none_or(|(segment, _)| *segment != block.segment) {
+            pieces.push((block.segment, vec![Vec::new(); block.joints]));
+        }
+        if let Some((_, joints)) = pieces.last_mut() {
+            for (joint, values) in joints.iter_mut().enumerate() {
+                values.extend_from_slice(block.joint(&block.q, joint));
+            }
+        }
+        Ok(())
+    })?;
+    Ok((rate_hz, pieces))
+}
+
+/// The cut-off of the motion behind the regressor: that in force, or what the longest piece of a log asks for, the
+/// highest of all training logs'.
+pub(super) fn regressor_cutoff_hz(rows: &TrainingRows<'_>) -> Result<f64, LogError> {
+    if let Some(cutoff_hz) = rows.logs.motion.differentiator.cutoff_hz() {
+        return Ok(cutoff_hz);
+    }
+    let mut highest = 0.0_f64;
+    for &log in rows.training {
+        let (rate_hz, pieces) = positions(rows, log)?;
+        let longest = pieces.iter().max_by_key(|(_, joints)| joints.first().map_or(0, Vec::len));
+        highest = longest.map_or(highest, |(_, joints)| highest.max(cutoff(joints, rate_hz).cutoff_hz));
+    }
+    Ok(highest)
+}

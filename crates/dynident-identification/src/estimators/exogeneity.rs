@@ -1,0 +1,234 @@
+//! Does noise in the regressor bias least squares, and with which instruments is the estimate free of it?
+//!
+//! Instruments of half the regressor's cut-off hold the motion and hardly any of the noise of its accelerations (with
+//! white noise of the positions three hundredths of its power). Least squares is found biased where torque does not
+//! follow what these instruments leave over ([`fast_motion`]) *and* the estimates differ by more than their error bars.
+//! Then the instruments' cut-off goes down, and the highest one is taken below which the estimate no longer moves
+//! (Lepski, Theory Probab. Appl. 35 (1990) 454): as little noise as shows, as much of the motion as there is.
+
+use super::band_motion::regressor_cutoff_hz;
+use super::instrumental::{BandEstimate, InstrumentSettings, fast_motion_problem, with_band};
+use super::{EstimatorError, TrainingRows};
+use dynident_estimation::{
+    Estimate, FastMotion, HausmanTest, HausmanVerdict, InstrumentReport, InstrumentalEstimate, fast_motion,
+    hausman_test, weighted_least_squares,
+};
+use serde::{Deserialize, Serialize};
+
+/// Parts of the regressor's cut-off that are tried in turn until the instruments are strong.
+const SHARES: [f64; 3] = [0.5, core::f64::consts::FRAC_1_SQRT_2, 0.84];
+/// From band to band.
+const STEP: f64 = core::f64::consts::FRAC_1_SQRT_2;
+/// Bands below the first, at most: six octaves.
+const MOST_BANDS: usize = 12;
+/// Torque that follows less than this of the fast motion says that noise is a good part of it.
+const FOLLOWED: f64 = 0.75;
+/// Two estimates agree where they differ by less than this, in error bars of the one that is nearer to the truth: root
+/// mean square over the parameters, and largest. Two independent ones with the same bars differ by 1.4.
+const AGREEMENT: [f64; 2] = [1.5, 3.0];
+/// Where the fast motion would need less than this share of the torque, instruments of the first band show what its
+/// noise does; where more, they may hold so much of it themselves that lower ones are asked in any case.
+const LARGE_SHARE: f64 = 0.1;
+/// Noise cannot move the parameters by more error bars (root mean square) than `√(Σ_j ‖V_j θ‖² / σ_j² / p)`: below this
+/// it is no matter. Small, for where noise is large, θ and with it this bound are too.
+const LEAST_MOVE: f64 = 0.3;
+
+/// What noise in the regressor does to least squares.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum NoiseVerdict {
+    /// Nothing that matters: torque follows the fast motion too, or the estimates agree within their error bars.
+    Harmless,
+    /// It biases least squares by more than the error bars say.
+    BiasesLeastSquares,
+    /// It cannot be told, or was not asked.
+    #[default]
+    Undecided,
+}
+
+/// By how much two estimates of the same parameters differ, in error bars (standard deviations) of the second.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct EstimateContrast {
+    /// Root mean square over the parameters.
+    pub rms: f64,
+    /// The largest.
+    pub largest: f64,
+    /// The parameter with the largest.
+    pub column: String,
+}
+
+/// What was found out about noise in the regressor.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct NoiseInRegressor {
+    /// Lowest and highest cut-off of the instruments over the logs, Hz; none when they do not come from a filter.
+    pub instrument_cutoff_hz: Option<[f64; 2]>,
+    /// How well the instruments explain the regressor.
+    pub instruments: InstrumentReport,
+    /// Least squares against instruments: was filtering enough?
+    pub hausman: HausmanTest,
+    /// What follows for least squares.
+    #[serde(default)]
+    pub verdict: NoiseVerdict,
+    /// Whether torque follows the fast part of the motion, which instruments of half the regressor's cut-off leave
+    /// over; none where there is nothing to tell it by.
+    #[serde(default)]
+    pub fast_motion: Option<FastMotion>,
+    /// Least squares against instruments; none where the instruments come from elsewhere.
+    #[serde(default)]
+    pub least_squares: Option<EstimateContrast>,
+    /// Whether `method = "auto"` took the instruments' estimate.
+    #[serde(default)]
+    pub instruments_taken: bool,
+    /// The regressor's cut-off that the logs asked for, where a lower one was taken because of the noise, Hz.
+    #[serde(default)]
+    pub cutoff_before_hz: Option<f64>,
+}
+
+impl NoiseInRegressor {
+    pub(super) fn of_test(instruments: InstrumentReport, hausman: HausmanTest) -> Self {
+        Self {
+            instrument_cutoff_hz: None,
+            instruments,
+            hausman,
+            verdict: NoiseVerdict::Undecided,
+            fast_motion: None,
+            least_squares: None,
+            instruments_taken: false,
+            cutoff_before_hz: None,
+        }
+    }
+}
+
+/// Least squares examined with the logs' own motion of a lower band, and the instruments' estimate in the band that
+/// suits best.
+pub(super) fn examined(
+    rows: &TrainingRows<'_>,
+    settings: &InstrumentSettings,
+    least_squares: &Estimate,
+) -> Result<(InstrumentalEstimate, NoiseInRegressor), EstimatorError> {
+    let first = match settings.cutoff_hz {
+        Some(cutoff_hz) => with_band(rows, settings, cutoff_hz)?,
+        None => first_band(rows, settings, least_squares)?,
+    };
+    let estimation = rows.settings;
+    let fast = fast_motion(&first.problem, &first.found, estimation.rank, estimation.covariance)?;
+    let agrees = |band: &BandEstimate| contrast(least_squares, &band.found.estimate).as_ref().is_none_or(agree);
+    let noise = fast.filter(|fast| fast.followed + fast.half_width_95 < FOLLOWED);
+    let is_suspect = noise.is_some_and(|noise| noise.share_of_torque > LARGE_SHARE || !agrees(&first));
+    let chosen = if is_suspect && settings.cutoff_hz.is_none() && is_strong(&first, least_squares) {
+        settled_band(rows, settings, (first, least_squares))
+    } else {
+        first
+    };
+    let verdict = if is_suspect && !agrees(&chosen) {
+        NoiseVerdict::BiasesLeastSquares
+    } else if fast.is_none() || chosen.found.instruments.weak {
+        // Weak instruments agree with least squares whatever is true.
+        NoiseVerdict::Undecided
+    } else {
+        NoiseVerdict::Harmless
+    };
+    let hausman = hausman_test(&chosen.problem, &chosen.found, &settings.hausman(estimation))?;
+    let mut noise = NoiseInRegressor::of_test(chosen.found.instruments.clone(), hausman);
+    noise.instrument_cutoff_hz = Some([chosen.cutoff_hz; 2]);
+    (noise.verdict, noise.fast_motion) = (verdict, fast);
+    noise.least_squares = self::contrast(least_squares, &chosen.found.estimate);
+    Ok((chosen.found, noise))
+}
+
+/// Whether noise can matter at all, from the torques alone that least squares' parameters need for the motion and for
+/// its part below half the cut-off: some milliseconds, where instruments take tens. None where they have to be asked.
+pub(super) fn harmless(
+    rows: &TrainingRows<'_>,
+    least_squares: &Estimate,
+) -> Result<Option<NoiseInRegressor>, EstimatorError> {
+    let cutoff_hz = SHARES[0] * regressor_cutoff_hz(rows)?;
+    let (problem, squares) = fast_motion_problem(rows, cutoff_hz, &least_squares.values)?;
+    let terms = squares.iter().zip(&least_squares.joint_sigma);
+    let move_squared: f64 =
+        terms.filter(|(_, sigma)| **sigma > 0.0).map(|(square, sigma)| square / sigma / sigma).sum();
+    let columns = least_squares.std.iter().filter(|std| **std > 0.0).count().max(1);
+    let settings = rows.settings.weighted();
+    let followed = weighted_least_squares(&problem, &settings).ok().filter(|fit| fit.rank.fixed.is_empty());
+    let followed = followed.map(|fit| (fit.values[0], fit.half_width_95[0]));
+    let is_motion = followed.is_none_or(|(followed, half_width)| followed + half_width > FOLLOWED);
+    if !is_motion && (move_squared / columns as f64).sqrt() > LEAST_MOVE {
+        return Ok(None);
+    }
+    let reason = "not made: torque follows the fast motion, or there is too little of it to matter".to_owned();
+    let (verdict, degrees_of_freedom) = (HausmanVerdict::Undecided, [0.0; 2]);
+    let test =
+        HausmanTest { verdict, f: None, degrees_of_freedom, p_value: None, columns: Vec::new(), reason: Some(reason) };
+    let instruments = InstrumentReport {
+        instruments: 0,
+        noisy_columns: Vec::new(),
+        weakest_f: None,
+        weakest_column: None,
+        weak: false,
+    };
+    Ok(Some(NoiseInRegressor { verdict: NoiseVerdict::Harmless, ..NoiseInRegressor::of_test(instruments, test) }))
+}
+
+/// The lowest of the shares whose instruments are strong, or the highest of them.
+fn first_band(
+    rows: &TrainingRows<'_>,
+    settings: &InstrumentSettings,
+    least_squares: &Estimate,
+) -> Result<BandEstimate, EstimatorError> {
+    let cutoff_hz = regressor_cutoff_hz(rows)?;
+    let mut band = with_band(rows, settings, SHARES[0] * cutoff_hz)?;
+    for share in &SHARES[1..] {
+        if is_strong(&band, least_squares) {
+            break;
+        }
+        band = with_band(rows, settings, share * cutoff_hz)?;
+    }
+    Ok(band)
+}
+
+/// The highest band below which the estimate does not move any more.
+fn settled_band(
+    rows: &TrainingRows<'_>,
+    settings: &InstrumentSettings,
+    (first, least_squares): (BandEstimate, &Estimate),
+) -> BandEstimate {
+    let mut bands = vec![first];
+    while let Some(last) = bands.last().filter(|_| bands.len() <= MOST_BANDS) {
+        // A piece may be too short for a low filter: the bands so far remain.
+        let Ok(band) = with_band(rows, settings, STEP * last.cutoff_hz) else { break };
+        if !is_strong(&band, least_squares) {
+            break;
+        }
+        bands.push(band);
+    }
+    let settles = |place: &usize| {
+        let (band, lower) = (&bands[*place].found.estimate, &bands[place + 1..]);
+        lower.iter().all(|lower| contrast(band, &lower.found.estimate).as_ref().is_none_or(agree))
+    };
+    let place = (0..bands.len()).find(settles).unwrap_or(bands.len() - 1);
+    bands.swap_remove(place)
+}
+
+/// Whether the instruments tell all columns that least squares tells, and tell them well.
+fn is_strong(band: &BandEstimate, least_squares: &Estimate) -> bool {
+    let found = &band.found;
+    !found.instruments.weak && found.estimate.rank.fixed.len() <= least_squares.rank.fixed.len()
+}
+
+fn agree(contrast: &EstimateContrast) -> bool {
+    contrast.rms <= AGREEMENT[0] && contrast.largest <= AGREEMENT[1]
+}
+
+/// `a − b` in standard deviations of b, over the columns that both estimate.
+fn contrast(a: &Estimate, b: &Estimate) -> Option<EstimateContrast> {
+    let differences: Vec<(usize, f64)> = (0..b.values.len().min(a.values.len()))
+        .filter(|&column| a.std[column] > 0.0 && b.std[column] > 0.0)
+        .map(|column| (column, (a.values[column] - b.values[column]).abs() / b.std[column]))
+        .collect();
+    let &(place, largest) = differences.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let squares: f64 = differences.iter().map(|(_, difference)| difference * difference).sum();
+    Some(EstimateContrast { rms: (squares / differences.len() as f64).sqrt(), largest, column: b.names[place].clone() })
+}

@@ -1,0 +1,64 @@
+//! Where `auto` took instruments: the cut-off of the motion follows them down.
+
+use crate::error::IdentificationError;
+use crate::estimators::{Estimation, Estimator, InstrumentSettings, estimate};
+use crate::logs::Logs;
+use crate::settings::IdentificationSettings;
+use crate::task::IdentificationTask;
+use crate::training::{Training, training_rows};
+use dynident_estimation::EstimateStatus;
+
+/// Rows, estimate and the settings that made them.
+pub(crate) struct Estimated<'a> {
+    pub(crate) logs: Logs<'a>,
+    pub(crate) training: Training,
+    pub(crate) estimation: Estimation,
+    pub(crate) settings: IdentificationSettings,
+}
+
+/// The regressor's cut-off over that of the instruments, where both are free: positions are smoothed little inside of
+/// the instruments' band.
+const CUTOFF_OVER_INSTRUMENTS: f64 = 2.0;
+/// A cut-off that would be lowered by less is kept.
+const WORTH_LOWERING: f64 = 0.8;
+
+/// The settings with the estimator that `auto` took. Where it took instruments and the cut-off was left to the data,
+/// rows and estimate are made again with a cut-off that lets less noise into the regressor: what least squares,
+/// held-out errors and delays are made from then shows the robot and not the noise.
+pub(crate) fn with_less_noise<'a>(
+    task: &'a IdentificationTask,
+    chosen: &[usize],
+    mut found: Estimated<'a>,
+) -> Result<Estimated<'a>, IdentificationError> {
+    let Estimator::Auto(own) = found.settings.estimation.estimator.clone() else { return Ok(found) };
+    let noise = found.estimation.noise_in_regressor.as_ref().filter(|noise| noise.instruments_taken);
+    let Some(([_, cutoff_hz], noise)) = noise.and_then(|noise| Some((noise.instrument_cutoff_hz?, noise.clone())))
+    else {
+        found.settings.estimation.estimator = Estimator::Weighted;
+        return Ok(found);
+    };
+    let own = InstrumentSettings { cutoff_hz: Some(cutoff_hz), ..own };
+    found.settings.estimation.estimator = Estimator::Instrumental(own);
+    let IdentificationTask { robot, recordings, payloads, settings } = task;
+    let lower_hz = CUTOFF_OVER_INSTRUMENTS * cutoff_hz;
+    let before_hz = found.logs.motion.differentiator.cutoff_hz();
+    let is_lower = before_hz.is_some_and(|before_hz| lower_hz < WORTH_LOWERING * before_hz);
+    if !(settings.motion.differentiator.wants_cutoff() && is_lower) {
+        return Ok(found);
+    }
+    let execution = found.logs.execution;
+    let logs = Logs::new(robot.model(), recordings, settings.filters(), chosen, Some(lower_hz), execution)?
+        .with_motion_band(found.logs.motion_hz());
+    let training = training_rows((&logs, &found.settings), robot.clone().into(), chosen, payloads, None)?;
+    let mut estimation = estimate(&training.rows((&logs, &found.settings), chosen), None)?;
+    if let Some(again) = &mut estimation.noise_in_regressor {
+        if again.instruments.weak || estimation.estimate.status == EstimateStatus::IterationLimit {
+            return Ok(found);
+        }
+        // The verdict is about the rows that noise was found in.
+        (again.verdict, again.fast_motion, again.hausman) = (noise.verdict, noise.fast_motion, noise.hausman);
+        (again.least_squares, again.instruments_taken) = (noise.least_squares, true);
+        again.cutoff_before_hz = before_hz;
+    }
+    Ok(Estimated { logs, training, estimation, settings: found.settings })
+}

@@ -1,0 +1,76 @@
+//! What an error of stated drive gains does to a payload.
+
+use super::columns::LoadColumns;
+use dynident_estimation::{Estimate, EstimationError, LinearProblem, student_half_width};
+use nalgebra::{DMatrix, DVector};
+
+/// The estimate with the error of the joints' gains in the covariance of its payloads.
+///
+/// An estimate is linear in torque, `x = Σ_j x_j` with `x_j = (Σ_k W_kᵀW_k/σ_k²)⁻¹ W_jᵀ(τ_j − W_j θ_held)/σ_j²` the
+/// part that joint j's torque makes. A gain that is off by the share ε_j makes x_j larger by it, and the arm with it:
+/// of an arm that is held (`held`, found with the same gains) the torque is taken off first. With independent gains of
+/// standard deviation `share` the payload's covariance grows by `share² Σ_j x_j x_jᵀ`.
+///
+/// # Errors
+/// An estimate of other columns.
+pub(crate) fn with_gain_error(
+    problem: &LinearProblem,
+    columns: &LoadColumns,
+    (estimate, held): (&Estimate, &[usize]),
+    share: f64,
+) -> Result<Estimate, EstimationError> {
+    let mut wider = estimate.clone();
+    let count = problem.columns().len();
+    let payload: Vec<usize> = columns.payloads.iter().flat_map(|own| own.first..own.first + own.kept.len()).collect();
+    if share <= 0.0 || payload.is_empty() {
+        return Ok(wider);
+    }
+    let fixed = |column: usize| estimate.rank.fixed.iter().any(|fixed| fixed.column == column);
+    let free: Vec<usize> = (0..count).filter(|&column| !held.contains(&column) && !fixed(column)).collect();
+    let weights: Vec<f64> =
+        estimate.joint_sigma.iter().map(|sigma| if *sigma > 0.0 { sigma.recip() } else { 1.0 }).collect();
+    let mut triangle = problem.combined(&weights)?.regressor_triangle().select_columns(&free);
+    let norms: Vec<f64> = triangle.column_iter().map(|column| column.norm().max(f64::MIN_POSITIVE)).collect();
+    for (mut column, norm) in triangle.column_iter_mut().zip(&norms) {
+        column /= *norm;
+    }
+    let r = triangle.qr().r();
+    let known = DVector::from_fn(count, |column, _| if held.contains(&column) { estimate.values[column] } else { 0.0 });
+    for joint in 0..problem.joints().len() {
+        let mut score = DVector::<f64>::zeros(count);
+        for equation in problem.equations().iter().filter(|equation| equation.joint == joint) {
+            let own: Vec<f64> = equation.columns.iter().map(|&column| known[column]).collect();
+            let scores = equation.factor.scores(&own)?;
+            for of_segment in scores {
+                for (&column, value) in equation.columns.iter().zip(of_segment.iter()) {
+                    score[column] += weights[joint] * weights[joint] * value;
+                }
+            }
+        }
+        let scaled = DVector::from_fn(free.len(), |place, _| score[free[place]] / norms[place]);
+        let Some(half) = r.tr_solve_upper_triangular(&scaled) else { continue };
+        let Some(part) = r.solve_upper_triangular(&half) else { continue };
+        let mut of_joint = DVector::<f64>::zeros(count);
+        for (place, &column) in free.iter().enumerate() {
+            of_joint[column] = part[place] / norms[place];
+        }
+        add(&mut wider.covariance, &payload, &of_joint, share);
+        add(&mut wider.covariance_white, &payload, &of_joint, share);
+    }
+    let normal = student_half_width(0.95, f64::INFINITY);
+    for &column in &payload {
+        let variance = wider.covariance[(column, column)].max(0.0);
+        let of_gains = (variance - estimate.covariance[(column, column)]).max(0.0).sqrt();
+        wider.std[column] = variance.sqrt();
+        wider.half_width_95[column] = estimate.half_width_95[column].hypot(normal * of_gains);
+    }
+    Ok(wider)
+}
+
+fn add(covariance: &mut DMatrix<f64>, columns: &[usize], part: &DVector<f64>, share: f64) {
+    for &row in columns {
+        for &column in columns {
+            covariance[(row, column)] += share * share * part[row] * part[column];
+        }
+    }
+}

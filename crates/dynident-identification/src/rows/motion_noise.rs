@@ -1,0 +1,163 @@
+//! What the noise of the positions makes of the rows.
+
+use super::builder::RowBuilder;
+use super::filter::motion_band_hz;
+use super::pass::{LogPass, LogStatistics};
+use super::{JointRows, RowConsumer};
+use crate::recording::{LogError, Samples};
+use crate::regressor_model::RegressorModel;
+use dynident_estimation::{SegmentSettings, SegmentedFactor};
+use dynident_model::sample::Random;
+use dynident_recording::{Derivatives, Differentiator, MotionBlock, Place};
+
+/// Samples that are looked at: a power from so many is right within a tenth or so, which costs some milliseconds.
+const SAMPLES: usize = 4096;
+/// Most times that a short log is looked at with other noise.
+const MOST_REPEATS: usize = 8;
+/// Longest series of noise.
+const LONGEST: usize = 1 << 16;
+const SEED: u64 = 0x6e6f_6973_6521;
+
+/// For every joint of the model the rows that noise adds to those of a log: `W(m + n) − W(m)` with m the motion as it
+/// was measured and n noise of the positions that has passed the same differentiator, and both the parallel filter. Of
+/// these rows N it is `NᵀN` that matters: what noise makes of `WᵀW`. Their last column, the torque, is zero.
+///
+/// n is white noise of the standard deviation that the importer found for each joint, with a fixed seed. m has its own
+/// noise already: products of two noisy velocities come out up to twice too large, which errs to the side of noise.
+/// Long logs are looked at in pieces, short ones several times; the rows are weighted to be as many as the log has.
+///
+/// `None` where no noise is known: for a motion that was made already, and for differentiators that follow a commanded
+/// motion.
+///
+/// # Errors
+/// A log that cannot be read again.
+pub(crate) fn noise_factors(
+    pass: &LogPass<'_>,
+    model: &RegressorModel,
+    statistics: &LogStatistics,
+) -> Result<Option<Vec<SegmentedFactor>>, LogError> {
+    let Some(report) = &statistics.report else { return Ok(None) };
+    let settings = &pass.motion.differentiator;
+    let quiet = report.position_noise.iter().all(|noise| *noise == 0.0);
+    if settings.reference().is_some() || matches!(pass.recording.samples, Samples::Motion(_)) {
+        return Ok(None);
+    }
+    let columns: Vec<usize> = (0..model.dof()).map(|joint| model.layout().joint_columns(joint).len()).collect();
+    let name = &pass.recording.name;
+    let in_rows = |source| LogError::Rows { log: name.clone(), source };
+    let empty = |&columns: &usize| SegmentedFactor::new(columns, SegmentSettings::default());
+    let mut factors: Vec<SegmentedFactor> = columns.iter().map(empty).collect::<Result<_, _>>().map_err(in_rows)?;
+    if quiet {
+        return Ok(Some(factors));
+    }
+    let (rate_hz, in_filter) = (report.rate_hz, |source| LogError::Filter { log: name.clone(), source });
+    let filter = pass.filter.decimation(rate_hz, motion_band_hz(pass.motion));
+    let places = pass.recording.places(model.model())?;
+    let mut builder = RowBuilder::new(model, &places, rate_hz, filter.as_ref()).map_err(in_filter)?;
+    let (pieces, read) = pass.some_pieces(SAMPLES, (SAMPLES / 4).max(4 * builder.needed()))?;
+    let samples: usize = pieces.iter().map(|piece| piece.rows).sum();
+    let differentiator = settings.build_following(report.cutoff.cutoff_hz, None).map_err(in_filter)?;
+    let repeats = (SAMPLES / samples.max(1)).clamp(1, MOST_REPEATS);
+    let mut random = Random::new(SEED);
+    let mut difference = Difference { rows: vec![Vec::new(); model.dof()], ..Difference::default() };
+    for repeat in 0..repeats {
+        let noise = Noise::new(differentiator.as_ref(), &mut random, &report.position_noise, (rate_hz, read, samples))
+            .map_err(in_filter)?;
+        let mut from = 0;
+        for piece in &pieces {
+            // A segment of its own each time, so that no filter goes on from one to the next.
+            let segment = 2 * (piece.segment + repeat * pieces.len()) + 1;
+            difference.noisy = true;
+            builder.take(&MotionBlock { segment, ..noise.on(piece, from) }, &mut difference)?;
+            difference.noisy = false;
+            builder.take(&MotionBlock { segment: segment + 1, ..piece.clone() }, &mut difference)?;
+            difference.taken.clear();
+            from += piece.rows;
+        }
+    }
+    for ((factor, rows), &columns) in factors.iter_mut().zip(&difference.rows).zip(&columns) {
+        let count: usize = rows.iter().map(|panel| panel.len() / (columns + 1)).sum();
+        let weight = (statistics.filtered_rows as f64 / count.max(1) as f64).sqrt();
+        for panel in rows {
+            let scaled: Vec<f64> = panel.iter().map(|x| weight * x).collect();
+            factor.absorb(&scaled, panel.len() / (columns + 1)).map_err(in_rows)?;
+        }
+        *factor = factor.as_one_segment();
+    }
+    Ok(Some(factors))
+}
+
+/// Noise of all joints: of position, velocity and acceleration, joint-major.
+struct Noise {
+    length: usize,
+    derivatives: [Vec<f64>; 3],
+}
+
+impl Noise {
+    fn new(
+        differentiator: &dyn Differentiator,
+        random: &mut Random,
+        position_noise: &[f64],
+        (rate_hz, read, length): (f64, usize, usize),
+    ) -> Result<Self, dynident_recording::FilterError> {
+        // Where a sample depends on the whole piece, the piece is as long as the log.
+        let (whole, margin) = match differentiator.context_samples(rate_hz) {
+            Some(context) => (length + 2 * context, context),
+            None => (read.clamp(length, LONGEST.max(length)), 0),
+        };
+        let whole = whole.max(differentiator.minimum_samples());
+        let mut derivatives: [Vec<f64>; 3] = Default::default();
+        let mut out = [vec![0.0; whole], vec![0.0; whole], vec![0.0; whole]];
+        for &sigma in position_noise {
+            let white: Vec<f64> = (0..whole).map(|_| random.normal()).collect();
+            let [q, dq, ddq] = &mut out;
+            differentiator.differentiate_at(Place::start(rate_hz), &white, Derivatives { q, dq, ddq })?;
+            for (all, own) in derivatives.iter_mut().zip(&out) {
+                all.extend(own[margin..margin + length].iter().map(|x| sigma * x));
+            }
+        }
+        Ok(Self { length, derivatives })
+    }
+
+    /// A piece with noise on it, the piece's first sample with sample `from` of the noise.
+    fn on(&self, piece: &MotionBlock, from: usize) -> MotionBlock {
+        let mut noisy = piece.clone();
+        let [q, dq, ddq] = &self.derivatives;
+        for (values, noise) in [(&mut noisy.q, q), (&mut noisy.dq, dq), (&mut noisy.ddq, ddq)] {
+            for (joint, own) in values.chunks_exact_mut(piece.rows.max(1)).enumerate() {
+                let noise = noise[joint * self.length + from..].iter();
+                own.iter_mut().zip(noise).for_each(|(value, noise)| *value += noise);
+            }
+        }
+        noisy
+    }
+}
+
+/// Panels with noise first, from which those without are taken off.
+#[derive(Default)]
+struct Difference {
+    /// Whether panels with noise come.
+    noisy: bool,
+    /// Panels with noise of the piece at hand: the joint, and its number among the joint's panels.
+    taken: Vec<(usize, usize)>,
+    /// Differences of every joint, panel by panel.
+    rows: Vec<Vec<Vec<f64>>>,
+}
+
+impl RowConsumer for Difference {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
+        if self.noisy {
+            self.taken.push((rows.joint, self.rows[rows.joint].len()));
+            self.rows[rows.joint].push(rows.panel.to_vec());
+            return Ok(());
+        }
+        // The same samples give the same panels in the same order.
+        if let Some(place) = self.taken.iter().position(|(joint, _)| *joint == rows.joint) {
+            let (joint, number) = self.taken.remove(place);
+            for (noisy, plain) in self.rows[joint][number].iter_mut().zip(rows.panel) {
+                *noisy -= plain;
+            }
+        }
+        Ok(())
+    }
+}
