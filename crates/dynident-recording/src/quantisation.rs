@@ -10,7 +10,15 @@ pub(crate) fn quantisation_step(values: &[f64]) -> Option<f64> {
     steps.sort_by(f64::total_cmp);
     // Not the smallest as such: the rounding of the printed text makes far smaller ones.
     let least = 0.02 * steps[steps.len() / 20];
-    let candidate = *steps.iter().find(|step| **step >= least)?;
+    let mut candidate = *steps.iter().find(|step| **step >= least)?;
+    // Printed text rounds the smallest differences by a percent or so, of which a hundred steps make a whole one: the
+    // larger differences tell the step better, once it is known well enough to count how many steps they are.
+    for most in [8.0, 64.0, 512.0, 4096.0] {
+        let counted = steps.iter().map(|step| (step, (step / candidate).round()));
+        let counted = counted.filter(|(_, count)| (1.0..=most).contains(count));
+        let sums = counted.fold([0.0; 2], |[a, b], (step, count)| [a + step * count, b + count * count]);
+        candidate = if sums[1] > 0.0 { sums[0] / sums[1] } else { candidate };
+    }
     let multiples = steps.iter().filter(|step| {
         let ratio = *step / candidate;
         (ratio - ratio.round()).abs() <= 0.02
@@ -28,5 +36,11 @@ mod tests {
         let quantised: Vec<f64> = smooth.iter().map(|x| (x / 0.003).round() * 0.003).collect();
         assert!(quantisation_step(&smooth).is_none());
         assert!((quantisation_step(&quantised).unwrap() - 0.003).abs() < 1e-9);
+        // Counts of 2π/65536 printed with six digits behind the point, up to five hundred of them in a step.
+        let count = core::f64::consts::TAU / 65_536.0;
+        let counts = |i: i32| (2e4 * (f64::from(i) * 0.025).sin() + 40.0 * (f64::from(i) * 0.7).sin()).round();
+        let printed: Vec<f64> = (0..4000).map(|i| (counts(i) * count * 1e6).round() * 1e-6).collect();
+        // Half a digit of the last place in the largest step.
+        assert!((quantisation_step(&printed).unwrap() / count - 1.0).abs() < 1e-4);
     }
 }

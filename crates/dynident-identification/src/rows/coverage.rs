@@ -91,11 +91,16 @@ impl Coverage {
         let next = *done * self.factor;
         left_out.drain(..left_out.partition_point(|sample| *sample < next));
         for column in panel.chunks_exact_mut(rows) {
-            for (value, coverage) in column.iter_mut().zip(&self.shares) {
-                *value /= coverage.max(LEAST_COVERAGE);
-            }
+            divide_by_coverage(column, &self.shares);
         }
         &self.shares
+    }
+}
+
+/// Divides the values of a column by the coverage of their rows, at least by one half; nothing where that is empty.
+pub(crate) fn divide_by_coverage(column: &mut [f64], coverage: &[f64]) {
+    for (value, coverage) in column.iter_mut().zip(coverage) {
+        *value /= coverage.max(LEAST_COVERAGE);
     }
 }
 
@@ -108,6 +113,11 @@ pub(crate) fn set_aside(block: &MotionBlock, place: usize, from: usize, samples:
 }
 
 impl<'a> JointRows<'a> {
+    /// Whether a row counts: at least half of the filter's weight lies on samples that do.
+    pub fn counts(&self, row: usize) -> bool {
+        self.coverage.get(row).is_none_or(|coverage| *coverage >= LEAST_COVERAGE)
+    }
+
     /// The rows that count: those with at least half of the filter's weight on samples that do. `buffer` holds them
     /// where they are not all.
     pub fn counted<'b>(&self, buffer: &'b mut Vec<f64>) -> JointRows<'b>
@@ -115,16 +125,16 @@ impl<'a> JointRows<'a> {
         'a: 'b,
     {
         let JointRows { joint, rows, panel, coverage } = *self;
-        if coverage.iter().all(|coverage| *coverage >= LEAST_COVERAGE) {
+        let kept: Vec<usize> =
+            if coverage.is_empty() { Vec::new() } else { (0..rows).filter(|row| self.counts(*row)).collect() };
+        if coverage.is_empty() || kept.len() == rows {
             return JointRows { joint, rows, panel, coverage: &[] };
         }
         buffer.clear();
         for column in panel.chunks_exact(rows) {
-            let kept = column.iter().zip(coverage).filter(|(_, coverage)| **coverage >= LEAST_COVERAGE);
-            buffer.extend(kept.map(|(value, _)| value));
+            buffer.extend(kept.iter().map(|row| column[*row]));
         }
-        let rows = coverage.iter().filter(|coverage| **coverage >= LEAST_COVERAGE).count();
-        JointRows { joint, rows, panel: buffer, coverage: &[] }
+        JointRows { joint, rows: kept.len(), panel: buffer, coverage: &[] }
     }
 }
 

@@ -14,7 +14,7 @@ mod reader;
 
 pub use builder::RowBuilder;
 pub(crate) use builder::in_model_order;
-pub(crate) use coverage::set_aside;
+pub(crate) use coverage::{divide_by_coverage, set_aside};
 pub use filter::{ParallelFilterError, ParallelFilterSettings, motion_band_hz};
 pub(crate) use joint_filters::JointFilters;
 pub(crate) use motion_noise::noise_factors;

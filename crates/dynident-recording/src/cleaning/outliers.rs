@@ -25,6 +25,9 @@ const LARGEST_SHARE: f64 = 0.15;
 /// say so.
 const LARGEST_BESIDE: f64 = 0.2;
 const FEWEST_PULSES: usize = 10;
+/// So many side by side are a pulse of the torque (a contact, a drive that catches up), and medians of five could not
+/// tell their middle anyway.
+const SIDE_BY_SIDE: usize = 3;
 /// Fewest samples to judge by.
 const FEWEST: usize = 64;
 
@@ -45,9 +48,17 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
     if n < FEWEST {
         return Vec::new();
     }
-    // The ends are mirrored: a sample there is judged by what is inside.
-    let padded: Vec<f64> = (1..=REACH).rev().map(|k| x[k]).chain(x.iter().copied()).collect();
-    let padded: Vec<f64> = padded.into_iter().chain((2..REACH + 2).map(|k| x[n - k])).collect();
+    // The ends are mirrored in the point where the line through the two groups inside ends: a slope goes on beyond it,
+    // and the last sample itself, which may be an outlier, has no say.
+    let end = |at: &dyn Fn(usize) -> f64| {
+        let [near, far] =
+            [1, 1 + GROUP].map(|from| median_of_five(&core::array::from_fn::<f64, GROUP, _>(|k| at(from + k))));
+        near + 0.6 * (near - far)
+    };
+    let (first, last) = (end(&|k| x[k]), end(&|k| x[n - 1 - k]));
+    let before = (1..=REACH).rev().map(|k| 2.0 * first - x[k]);
+    let behind = (1..=REACH).map(|k| 2.0 * last - x[n - 1 - k]);
+    let padded: Vec<f64> = before.chain(x.iter().copied()).chain(behind).collect();
     let medians: Vec<f64> = padded.windows(GROUP).map(median_of_five).collect();
     let around = |i: usize| {
         let place = i + REACH;
@@ -67,9 +78,11 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
     let mostly_repeats = 2 * x.windows(2).filter(|pair| pair[0] == pair[1]).count() > n;
     let mut apart = Vec::new();
     let half = NOISE_SPAN / 2;
-    let mut from = own.start;
-    while from < own.end {
-        let to = (from + half).min(own.end);
+    // Beyond its own samples as far as it takes to tell how many stand side by side.
+    let judged = own.start.saturating_sub(SIDE_BY_SIDE - 1)..(own.end + SIDE_BY_SIDE - 1).min(n);
+    let mut from = judged.start;
+    while from < judged.end {
+        let to = (from + half).min(judged.end);
         let (low, high) = (from.saturating_sub(half / 2), (to + half / 2).min(n));
         let mut distances: Vec<f64> = off[low..high].iter().map(|off| off.abs()).collect();
         let noise = f64::max(NORMAL * middle(&mut distances), 0.5 * overall);
@@ -98,7 +111,8 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
     if let Some(step) = quantisation_step(x) {
         found.retain(|&i| outside(i) > QUANTA * step);
     }
-    found
+    let runs = found.chunk_by(|a, b| *b == a + 1).filter(|run| run.len() < SIDE_BY_SIDE);
+    runs.flatten().copied().filter(|i| own.contains(i)).collect()
 }
 
 /// Where outliers begin, for distances in units of the least that one can have: at one, or twice as far, and so on,
@@ -209,6 +223,19 @@ mod tests {
     }
 
     #[test]
+    fn ends_on_a_slope_are_none_and_an_outlier_at_an_end_is_found() {
+        for from in (0..4000).step_by(37) {
+            // Without the step of dry friction: of a step some samples before an end only one side is there.
+            let smooth = |i: usize| torque(i) - 4.0 * (1.3 * i as f64 * 0.004).sin().signum();
+            let mut x: Vec<f64> = (from..from + 300).map(smooth).collect();
+            assert!(found(&x).is_empty(), "{from}: {:?}", found(&x));
+            x[0] += 30.0;
+            x[299] -= 30.0;
+            assert_eq!(found(&x), [0, 299], "{from}");
+        }
+    }
+
+    #[test]
     fn long_tails_thin_out_and_outliers_stand_apart() {
         let n = 20_000;
         let (a, b) = (normal(13, n), normal(14, n));
@@ -240,6 +267,10 @@ mod tests {
         assert!(found(&(0..n).map(torque).collect::<Vec<f64>>()).is_empty());
         let quantised: Vec<f64> = (0..n).map(|i| ((torque(i) + 0.02 * noise[i]) / 0.5).round() * 0.5).collect();
         assert!(found(&quantised).is_empty());
+        // A blow that fades within some samples.
+        let blow = |i: usize| if i % 700 < 8 && i > 8 { 6.0 * (-0.3 * (i % 700) as f64).exp() } else { 0.0 };
+        let blows: Vec<f64> = (0..3000).map(|i| torque(i) + 0.02 * noise[i] + blow(i)).collect();
+        assert!(found(&blows).is_empty(), "{:?}", found(&blows));
         let blunt: Vec<f64> = (0..n).map(|i| torque(i) + 8.0 * (i as f64 * 0.02).sin().powi(40)).collect();
         assert!(found(&blunt).is_empty(), "peaks over some samples");
     }

@@ -144,19 +144,20 @@ pub(crate) fn clock(
         Spacing::Stamps => "stamps".to_owned(),
         Spacing::Smoothed => format!("stamps smoothed over {} rows", result.smoothing_rows),
     };
-    let by = match rule {
-        ClockRule::Auto if result.spacing() == Spacing::Smoothed => "decided by the drift",
-        ClockRule::Auto => "decided by the misfit of a local cubic",
-        ClockRule::Uniform | ClockRule::Stamps | ClockRule::Smoothed => "as asked",
-    };
+    let misfit = format!("misfit of a local cubic: {uniform:.3e} evenly spaced, {stamps:.3e} at the stamps ({share})");
     let strays = drift.map_or_else(String::new, |drift| {
         let Drift { steps, variation, .. } = drift;
         format!("; the stamps stray {steps:.2} steps from an even grid, the rate varies by {:.2} %", 100.0 * variation)
     });
-    result.evidence = format!(
-        "{believed}, {by}: misfit of a local cubic {uniform:.3e} evenly spaced, {stamps:.3e} at the stamps \
-         ({share}){strays}"
-    );
+    result.evidence = match rule {
+        ClockRule::Auto if result.spacing() == Spacing::Smoothed => {
+            format!("{believed}, decided by the drift{strays}; {misfit}")
+        }
+        ClockRule::Auto => format!("{believed}, decided by the {misfit}{strays}"),
+        ClockRule::Uniform | ClockRule::Stamps | ClockRule::Smoothed => {
+            format!("{believed}, as asked; {misfit}{strays}")
+        }
+    };
     Ok(result)
 }
 
