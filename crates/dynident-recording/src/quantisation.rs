@@ -26,9 +26,30 @@ pub(crate) fn quantisation_step(values: &[f64]) -> Option<f64> {
     (multiples.count() as f64 >= 0.9 * steps.len() as f64).then_some(candidate)
 }
 
+/// The usual change of a signal that repeats itself, at least one sample in ten: the step of what is quantised and
+/// slow, or at rest, wherever it stands among the digits that are printed. None for one that does not.
+pub(crate) fn usual_change(values: &[f64]) -> Option<f64> {
+    let changes = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let mut changes: Vec<f64> = changes.filter(|change| *change > 0.0).collect();
+    if 10 * changes.len() > 9 * values.len() || changes.is_empty() {
+        return None;
+    }
+    let half = changes.len() / 2;
+    Some(*changes.select_nth_unstable_by(half, f64::total_cmp).1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_repeats_has_a_usual_change() {
+        let slow: Vec<f64> = (0..100).map(|i| f64::from(i / 4) * 0.5).collect();
+        assert_eq!(usual_change(&slow), Some(0.5));
+        assert_eq!(usual_change(&(0..100).map(f64::from).collect::<Vec<f64>>()), None);
+        assert_eq!(usual_change(&[1.0; 9]), None);
+        assert_eq!(usual_change(&[]), None);
+    }
 
     #[test]
     fn quantised_and_smooth_channels_are_distinguished() {

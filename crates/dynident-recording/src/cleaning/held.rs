@@ -1,7 +1,7 @@
 //! Torque that stands still while its joint moves.
 
 use super::outliers::middle;
-use crate::quantisation::quantisation_step;
+use crate::quantisation::{quantisation_step, usual_change};
 
 /// Shortest run of one value that is looked at, samples.
 const SHORTEST: usize = 10;
@@ -76,6 +76,7 @@ fn is_held(tau: &[f64], q: &[f64], run: Run) -> bool {
         && moved > SHARE_OF_MOTION * expected
         && net > SHARE_OF_MOTION * moved
         && quantisation_step(q).is_none_or(|step| net > QUANTA * step)
+        && usual_change(&q[run.from..run.to]).is_none_or(|change| net > QUANTA * change)
 }
 
 #[cfg(test)]
@@ -119,6 +120,9 @@ mod tests {
         resting.0[1000..2000].fill(3.0);
         resting.1[1000..2000].fill(0.4);
         assert!(held_runs(&resting.0, &resting.1, [-20.5, 20.5]).is_empty());
+        // A count of the encoder now and then is no motion.
+        resting.1[1000..2000].iter_mut().enumerate().for_each(|(i, q)| *q += 2e-6 * (i / 60) as f64);
+        assert!(held_runs(&resting.0[900..1100], &resting.1[900..1100], [-20.5, 20.5]).is_empty());
         let clipped: Vec<f64> = tau.iter().map(|tau| tau.clamp(-12.0, 12.0)).collect();
         assert!(held_runs(&clipped, &q, [-12.0, 12.0]).is_empty());
     }

@@ -17,6 +17,9 @@ const QUANTA: f64 = 3.5;
 /// Times the usual distance of its nearest neighbours that a sample has to stand off: a peak over several samples takes
 /// them along.
 const TIMES_NEIGHBOURS: f64 = 5.0;
+/// Times the usual change from sample to sample nearby that a sample has to stand off near an end of the log, where only
+/// one side of it is known: a controller that settles swings from sample to sample.
+const TIMES_CHANGES: f64 = 2.0;
 /// Nearest neighbours to either side.
 const NEIGHBOURS: usize = 3;
 /// With more samples apart than this they are the nature of the signal.
@@ -25,9 +28,10 @@ const LARGEST_SHARE: f64 = 0.15;
 /// say so.
 const LARGEST_BESIDE: f64 = 0.2;
 const FEWEST_PULSES: usize = 10;
-/// So many side by side are a pulse of the torque (a contact, a drive that catches up), and medians of five could not
-/// tell their middle anyway.
+/// So many side by side, off the same way by at least this share of the one in question, are a pulse of the torque (a
+/// contact, a drive that catches up).
 const SIDE_BY_SIDE: usize = 3;
+const SHARE_OF_PULSE: f64 = 0.25;
 /// Fewest samples to judge by.
 const FEWEST: usize = 64;
 
@@ -68,21 +72,29 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
     let smooth =
         |[far, before, behind, beyond]: [f64; 4]| 32.0 / 55.0 * (before + behind) - 9.0 / 110.0 * (far + beyond);
     let off: Vec<f64> = (0..n).map(|i| x[i] - smooth(around(i))).collect();
-    // How far a sample lies outside of all that is suggested for it.
-    let outside = |i: usize| {
+    // How far a sample lies above all that is suggested for it, or below.
+    let signed = |i: usize| {
         let usual = usual_range(around(i), x[i] - off[i]);
-        f64::max(x[i] - usual.end, usual.start - x[i]).max(0.0)
+        (x[i] - usual.end).max(0.0) - (usual.start - x[i]).max(0.0)
+    };
+    let outside = |i: usize| signed(i).abs();
+    // Where one side alone is known, what swings from sample to sample is none either.
+    let at_an_end = |i: usize| {
+        if (REACH..n - REACH).contains(&i) {
+            return 0.0;
+        }
+        let nearby = i.saturating_sub(GROUP)..(i + GROUP).min(n - 1);
+        let nearby = nearby.filter(|k| *k != i && k + 1 != i);
+        TIMES_CHANGES * middle(&mut nearby.map(|k| (x[k + 1] - x[k]).abs()).collect::<Vec<f64>>())
     };
     let mut distances: Vec<f64> = off.iter().map(|off| off.abs()).collect();
     let overall = NORMAL * middle(&mut distances);
     let mostly_repeats = 2 * x.windows(2).filter(|pair| pair[0] == pair[1]).count() > n;
     let mut apart = Vec::new();
     let half = NOISE_SPAN / 2;
-    // Beyond its own samples as far as it takes to tell how many stand side by side.
-    let judged = own.start.saturating_sub(SIDE_BY_SIDE - 1)..(own.end + SIDE_BY_SIDE - 1).min(n);
-    let mut from = judged.start;
-    while from < judged.end {
-        let to = (from + half).min(judged.end);
+    let mut from = own.start;
+    while from < own.end {
+        let to = (from + half).min(own.end);
         let (low, high) = (from.saturating_sub(half / 2), (to + half / 2).min(n));
         let mut distances: Vec<f64> = off[low..high].iter().map(|off| off.abs()).collect();
         let noise = f64::max(NORMAL * middle(&mut distances), 0.5 * overall);
@@ -93,7 +105,8 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
             if off[i].abs() > 0.5 * least {
                 let nearby = i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(n);
                 let mut nearby: Vec<f64> = nearby.map(outside).collect();
-                apart.push((i, outside(i) / least.max(TIMES_NEIGHBOURS * middle(&mut nearby))));
+                let usual = (TIMES_NEIGHBOURS * middle(&mut nearby)).max(at_an_end(i));
+                apart.push((i, outside(i) / least.max(usual)));
             }
         }
         from = to;
@@ -111,8 +124,13 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
     if let Some(step) = quantisation_step(x) {
         found.retain(|&i| outside(i) > QUANTA * step);
     }
-    let runs = found.chunk_by(|a, b| *b == a + 1).filter(|run| run.len() < SIDE_BY_SIDE);
-    runs.flatten().copied().filter(|i| own.contains(i)).collect()
+    found.retain(|&i| {
+        let beside = |k: &usize| signed(*k) / signed(i) > SHARE_OF_PULSE;
+        let before = (0..i).rev().take(SIDE_BY_SIDE).take_while(beside).count();
+        let behind = (i + 1..n).take(SIDE_BY_SIDE).take_while(beside).count();
+        before + 1 + behind < SIDE_BY_SIDE
+    });
+    found
 }
 
 /// Where outliers begin, for distances in units of the least that one can have: at one, or twice as far, and so on,
@@ -267,6 +285,11 @@ mod tests {
         assert!(found(&(0..n).map(torque).collect::<Vec<f64>>()).is_empty());
         let quantised: Vec<f64> = (0..n).map(|i| ((torque(i) + 0.02 * noise[i]) / 0.5).round() * 0.5).collect();
         assert!(found(&quantised).is_empty());
+        // A controller that swings in during the first samples, as a Panda's does.
+        let swing = [-11.0, 8.0, -6.0, 5.5, -5.0, -9.0, 4.0, 1.0];
+        let swings: Vec<f64> =
+            (0..500).map(|i| 0.3 * torque(i) + swing.get(i).copied().unwrap_or(0.02 * noise[i])).collect();
+        assert!(found(&swings).is_empty(), "{:?}", found(&swings));
         // A blow that fades within some samples.
         let blow = |i: usize| if i % 700 < 8 && i > 8 { 6.0 * (-0.3 * (i % 700) as f64).exp() } else { 0.0 };
         let blows: Vec<f64> = (0..3000).map(|i| torque(i) + 0.02 * noise[i] + blow(i)).collect();

@@ -1,7 +1,7 @@
 //! Single positions that no motion makes.
 
 use super::outliers::{limit_of, middle};
-use crate::quantisation::quantisation_step;
+use crate::quantisation::{quantisation_step, usual_change};
 
 /// Samples to either side that a judgement needs.
 pub(super) const REACH: usize = 4;
@@ -74,6 +74,11 @@ pub(crate) fn replace_spikes(x: &mut [f64], own: core::ops::Range<usize>) -> Vec
     if let Some(step) = quantisation_step(x) {
         found.retain(|(_, size)| size.abs() > QUANTA * step);
     }
+    // At rest a count of the encoder to and fro is none.
+    found.retain(|(i, size)| {
+        let nearby = &x[i.saturating_sub(NOISE_SPAN / 4)..(i + NOISE_SPAN / 4).min(n)];
+        usual_change(nearby).is_none_or(|change| size.abs() > QUANTA * change)
+    });
     for &(i, _) in &found {
         x[i] = (4.0 * (x[i - 1] + x[i + 1]) - x[i - 2] - x[i + 2]) / 6.0;
     }
@@ -117,7 +122,12 @@ mod tests {
         let kink = |i: usize| motion(i) + (i as f64 - 2500.0).max(0.0) * 1e-4;
         let starts = |i: usize| (i as f64 - 2500.0).max(0.0).powi(2) * 1e-5;
         let encoder = |i: usize| (motion(i) / 1e-3).round() * 1e-3;
-        let signals: [&dyn Fn(usize) -> f64; 4] = [&jump, &kink, &starts, &encoder];
+        // A joint at rest on the edge of a count, printed with five digits.
+        let digits = |x: f64| format!("{x:.4e}").parse::<f64>().unwrap();
+        let rest = |i: usize| {
+            digits(if i < 2000 { motion(i) - motion(2000) } else { 0.0 } + if i % 13 == 0 { 1e-5 } else { 0.0 })
+        };
+        let signals: [&dyn Fn(usize) -> f64; 5] = [&jump, &kink, &starts, &encoder, &rest];
         for (which, signal) in signals.into_iter().enumerate() {
             let mut x: Vec<f64> = (0..n).map(signal).collect();
             assert_eq!(replace_spikes(&mut x, 0..n), Vec::<usize>::new(), "{which}");
