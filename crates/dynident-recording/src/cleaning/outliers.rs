@@ -17,8 +17,10 @@ const QUANTA: f64 = 3.5;
 /// Times the usual distance of its nearest neighbours that a sample has to stand off: a peak over several samples takes
 /// them along.
 const TIMES_NEIGHBOURS: f64 = 5.0;
-/// Times the usual change from sample to sample nearby that a sample has to stand off near an end of the log, where only
-/// one side of it is known: a controller that settles swings from sample to sample.
+/// Near an end of the log, where a line through ten samples has to tell what would be beyond it: times as far as
+/// elsewhere that a sample has to stand off, and times the usual change from sample to sample nearby (a controller that
+/// settles swings).
+const TIMES_AT_ENDS: f64 = 4.0;
 const TIMES_CHANGES: f64 = 2.0;
 /// Nearest neighbours to either side.
 const NEIGHBOURS: usize = 3;
@@ -72,20 +74,21 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
     let smooth =
         |[far, before, behind, beyond]: [f64; 4]| 32.0 / 55.0 * (before + behind) - 9.0 / 110.0 * (far + beyond);
     let off: Vec<f64> = (0..n).map(|i| x[i] - smooth(around(i))).collect();
-    // How far a sample lies above all that is suggested for it, or below.
-    let signed = |i: usize| {
+    // How far sample k lies above all that is suggested for sample i, or below.
+    let signed = |i: usize, k: usize| {
         let usual = usual_range(around(i), x[i] - off[i]);
-        (x[i] - usual.end).max(0.0) - (usual.start - x[i]).max(0.0)
+        (x[k] - usual.end).max(0.0) - (usual.start - x[k]).max(0.0)
     };
-    let outside = |i: usize| signed(i).abs();
-    // Where one side alone is known, what swings from sample to sample is none either.
-    let at_an_end = |i: usize| {
+    let outside = |i: usize| signed(i, i).abs();
+    // Where one side alone is known: what swings from sample to sample is none either.
+    let at_an_end = |i: usize, least: f64| {
         if (REACH..n - REACH).contains(&i) {
             return 0.0;
         }
         let nearby = i.saturating_sub(GROUP)..(i + GROUP).min(n - 1);
         let nearby = nearby.filter(|k| *k != i && k + 1 != i);
-        TIMES_CHANGES * middle(&mut nearby.map(|k| (x[k + 1] - x[k]).abs()).collect::<Vec<f64>>())
+        let changes = middle(&mut nearby.map(|k| (x[k + 1] - x[k]).abs()).collect::<Vec<f64>>());
+        f64::max(TIMES_AT_ENDS * least, TIMES_CHANGES * changes)
     };
     let mut distances: Vec<f64> = off.iter().map(|off| off.abs()).collect();
     let overall = NORMAL * middle(&mut distances);
@@ -105,7 +108,7 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
             if off[i].abs() > 0.5 * least {
                 let nearby = i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(n);
                 let mut nearby: Vec<f64> = nearby.map(outside).collect();
-                let usual = (TIMES_NEIGHBOURS * middle(&mut nearby)).max(at_an_end(i));
+                let usual = (TIMES_NEIGHBOURS * middle(&mut nearby)).max(at_an_end(i, least));
                 apart.push((i, outside(i) / least.max(usual)));
             }
         }
@@ -125,7 +128,7 @@ pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> 
         found.retain(|&i| outside(i) > QUANTA * step);
     }
     found.retain(|&i| {
-        let beside = |k: &usize| signed(*k) / signed(i) > SHARE_OF_PULSE;
+        let beside = |k: &usize| signed(i, *k) / signed(i, i) > SHARE_OF_PULSE;
         let before = (0..i).rev().take(SIDE_BY_SIDE).take_while(beside).count();
         let behind = (i + 1..n).take(SIDE_BY_SIDE).take_while(beside).count();
         before + 1 + behind < SIDE_BY_SIDE
