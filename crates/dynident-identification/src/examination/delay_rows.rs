@@ -139,7 +139,9 @@ impl Further {
             signals.extend((0..n).map(|k| at(measured, k + centre + FIRST_NODE + node)));
         }
         for column in signals.chunks_exact_mut(model.len().max(1)) {
-            left_out.iter().for_each(|sample| column[*sample] = 0.0);
+            for &sample in left_out {
+                column[sample] = 0.0;
+            }
         }
         let last_node = FIRST_NODE + NODES as isize - 1;
         let low = SLOPE_REACH.max(-(centre + FIRST_NODE)).max(0);

@@ -38,13 +38,12 @@ impl JointFilters {
     /// left out of all columns.
     pub(crate) fn push(&mut self, joint: usize, panel: &[f64], samples: usize, set_aside: &[bool]) -> JointRows<'_> {
         let panel = self.coverage.mask(joint, panel, samples, set_aside);
-        let rows = match &mut self.decimators {
-            Some(decimators) => decimators[joint].push(panel, samples, &mut self.out),
-            None => {
-                self.out.clear();
-                self.out.extend_from_slice(panel);
-                samples
-            }
+        let rows = if let Some(decimators) = &mut self.decimators {
+            decimators[joint].push(panel, samples, &mut self.out)
+        } else {
+            self.out.clear();
+            self.out.extend_from_slice(panel);
+            samples
         };
         let coverage = self.coverage.divide(joint, rows, &mut self.out);
         JointRows { joint, rows, panel: &self.out, coverage }
