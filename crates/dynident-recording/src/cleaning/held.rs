@@ -97,7 +97,9 @@ mod tests {
         for step in [0.0, 0.01, 0.1] {
             let (mut tau, q) = signals(4000);
             if step > 0.0 {
-                tau.iter_mut().for_each(|tau| *tau = (*tau / step).round() * step);
+                for tau in &mut tau {
+                    *tau = (*tau / step).round() * step;
+                }
             }
             assert!(held_runs(&tau, &q, [-20.5, 20.5]).is_empty(), "{step}");
             let value = tau[1500];

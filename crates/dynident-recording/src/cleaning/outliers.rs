@@ -43,8 +43,8 @@ const NORMAL: f64 = 1.4826;
 /// Places of outliers in `own` (a part of `x`), which stands among its neighbours in `x`.
 ///
 /// Before and behind a sample stand two groups of five; a group's median does not care for two outliers in it. The
-/// cubic through the four medians is where a smooth torque would be; the nearer two, and the lines through those before
-/// and those behind, are the torque on either side of a step (friction reversed, contact made). A sample is an outlier
+/// cubic through the four medians is where a smooth torque would be; the lines through those before and those behind
+/// are the torque on either side of a step (friction reversed, contact made). A sample is an outlier
 /// if it lies outside of all of these by more than eight robust standard deviations of samples from their cubics
 /// nearby, half a percent of the torque's spread, and three steps of a quantised channel. Source of the rule by
 /// medians: Hampel, J. Am. Stat. Assoc. 69 (1974) 383; Davies and Gather, J. Am. Stat. Assoc. 88 (1993) 782. Groups
@@ -152,8 +152,8 @@ pub(super) fn limit_of(distances: impl Iterator<Item = f64>) -> f64 {
     }
 }
 
-/// From the least to the largest of what the medians at -8, -3, 3 and 8 suggest at 0: the lines through those before and
-/// those behind, the cubic through all.
+/// From the least to the largest of what the medians at -8, -3, 3 and 8 suggest at 0: the lines through those before
+/// and those behind, the cubic through all.
 fn usual_range([far, before, behind, beyond]: [f64; 4], smooth: f64) -> core::ops::Range<f64> {
     let suggested = [before + 0.6 * (before - far), behind + 0.6 * (behind - beyond), smooth];
     let low = suggested.iter().fold(f64::INFINITY, |low, value| low.min(*value));

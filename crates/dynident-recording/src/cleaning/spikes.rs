@@ -125,7 +125,9 @@ mod tests {
         // A joint at rest on the edge of a count, printed with five digits.
         let digits = |x: f64| format!("{x:.4e}").parse::<f64>().unwrap();
         let rest = |i: usize| {
-            digits(if i < 2000 { motion(i) - motion(2000) } else { 0.0 } + if i % 13 == 0 { 1e-5 } else { 0.0 })
+            digits(
+                if i < 2000 { motion(i) - motion(2000) } else { 0.0 } + if i.is_multiple_of(13) { 1e-5 } else { 0.0 },
+            )
         };
         let signals: [&dyn Fn(usize) -> f64; 5] = [&jump, &kink, &starts, &encoder, &rest];
         for (which, signal) in signals.into_iter().enumerate() {

@@ -91,7 +91,9 @@ mod tests {
 
     fn compared(pieces: &[(Vec<f64>, Vec<f64>)]) -> DerivativeComparison {
         let mut comparison = Comparison::new("arm");
-        pieces.iter().for_each(|(derived, logged)| comparison.see(derived, logged));
+        for (derived, logged) in pieces {
+            comparison.see(derived, logged);
+        }
         comparison.report(1000.0)
     }
 
@@ -100,11 +102,11 @@ mod tests {
     fn a_piece_at_constant_velocity_does_not_speak_for_the_log() {
         let wobble = |i: usize| 1e-3 * (i as f64 * 0.7).sin();
         let steady: (Vec<f64>, Vec<f64>) = (0..357).map(|i| (0.5 + wobble(i), 0.5 - wobble(i))).unzip();
-        let swing: (Vec<f64>, Vec<f64>) = (0..5000).map(|i| (i as f64 * 0.01).sin()).map(|x| (x, x + 0.02)).unzip();
+        let swing: (Vec<f64>, Vec<f64>) = (0..5000).map(|i| (f64::from(i) * 0.01).sin()).map(|x| (x, x + 0.02)).unzip();
         let found = compared(&[steady.clone(), swing.clone()]);
         assert!(found.correlation > 0.99 && found.lag.is_some_and(|lag| lag.correlation > 0.99), "{found:?}");
         // Alone it says the same, and its mirror the opposite.
-        assert!(compared(&[steady.clone()]).correlation > 0.99);
+        assert!(compared(core::slice::from_ref(&steady)).correlation > 0.99);
         let reversed = (swing.0, swing.1.iter().map(|x| -x).collect());
         assert!(compared(&[(steady.0, steady.1.iter().map(|x| -x).collect()), reversed]).correlation < -0.99);
         assert_eq!(compared(&[]).correlation, 0.0);
