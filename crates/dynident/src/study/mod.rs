@@ -241,8 +241,8 @@ impl Study {
         if !terms.into_iter().any(|term| matches!(term, FrictionTerm::Temperature { .. })) {
             return Ok(());
         }
-        let own = self.drive.joints.values().filter_map(|own| own.friction);
-        if own.chain([self.drive.friction]).any(|choice| choice == FrictionChoice::Auto) {
+        let own = self.drive.joints.values().map(|own| own.friction);
+        if own.chain([self.drive.friction]).any(|choice| choice == Some(FrictionChoice::Auto)) {
             return Err(StudyError::conflict(
                 "drive.friction = \"auto\" with the law `temperature`",
                 "let the logs choose friction without it, then state what they chose beside it",
