@@ -169,7 +169,7 @@ mod tests {
                 // Sums of a hundred products of order one.
                 assert!((tau - 3.0 * w).abs() < 1e-12, "{tau} {w}");
                 // A mean over what is left stays near the mean over all; a row half outside of the hole by a tenth.
-                assert!((0.0..2.1).contains(&w), "{w}");
+                assert!((-0.1..2.1).contains(&w), "{w}");
             }
             from += samples;
         }
