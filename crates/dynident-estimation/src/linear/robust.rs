@@ -207,9 +207,9 @@ const SMALLEST_SCALE: f64 = 1.0e-9;
 ///
 /// Starts from [`weighted_least_squares`] on `problem`'s factors; then every pass over the rows gives residuals, scales
 /// and the factors of the reweighted rows, from which the next θ follows. The scale of a pass is that of the θ before,
-/// which has the same limit and needs one pass each, not two; after a quarter of the passes scales stay. Regressors are never
-/// stored; residuals are, one number per row, for their median. `pass` hands every row that `problem` was made of to
-/// its visitor, as often as it is called.
+/// which has the same limit and needs one pass each, not two; after a quarter of the passes scales stay. Regressors are
+/// never stored; residuals are, one number per row, for their median. `pass` hands every row that `problem` was made of
+/// to its visitor, as often as it is called.
 ///
 /// The covariance is that of the reweighted rows times `(Σw/Σψ')²`, for an outlier's weight falls when the fit bends
 /// towards it (Huber, Robust Statistics (1981), 7.6). Rows are judged one by one: behind a filter that smears an
