@@ -372,6 +372,7 @@ struct FactorConsumer<'a> {
     factors: Vec<SegmentedFactor>,
     evidence: Option<Evidence<'a>>,
     buffer: Vec<f64>,
+    counted: Vec<f64>,
 }
 
 impl RowConsumer for FactorConsumer<'_> {
@@ -379,6 +380,7 @@ impl RowConsumer for FactorConsumer<'_> {
         if let Some(evidence) = &mut self.evidence {
             evidence.filtered(rows, &mut self.buffer);
         }
+        let rows = rows.counted(&mut self.counted);
         self.factors[rows.joint]
             .absorb(rows.panel, rows.rows)
             .map_err(|source| LogError::Rows { log: self.log.clone(), source })
@@ -405,7 +407,7 @@ pub fn log_factors(
     // Torque in a unit that nobody knows says nothing about the description.
     let nominal = model.parametric.nominal_base().filter(|_| settings.gains == GainChoice::Stated);
     let evidence = nominal.map(|nominal| Evidence::new(columns, nominal));
-    let mut consumer = FactorConsumer { log, factors, evidence, buffer: Vec::new() };
+    let mut consumer = FactorConsumer { log, factors, evidence, buffer: Vec::new(), counted: Vec::new() };
     let pass = LogPass { reader_thread: alone && logs.execution.parallel(), ..logs.pass(model, index) };
     let statistics = pass.run(&mut consumer)?;
     let nominal_agreement = consumer.evidence.as_ref().map(|evidence| evidence.agreement(&model.joint_names()));

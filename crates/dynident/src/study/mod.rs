@@ -267,6 +267,8 @@ impl Study {
         if log.rows.is_some() || log.fraction.is_some() || log.time_range_s.is_some() {
             (format.rows, format.fraction, format.time_range_s) = (log.rows, log.fraction, log.time_range_s);
         }
+        format.drop_rows.extend_from_slice(&log.drop_rows);
+        format.drop_time_s.extend_from_slice(&log.drop_time_s);
         format
     }
 
