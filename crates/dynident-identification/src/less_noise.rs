@@ -47,8 +47,8 @@ pub(crate) fn with_less_noise<'a>(
         return Ok(found);
     }
     let execution = found.logs.execution;
-    let logs = Logs::new(robot.model(), recordings, settings.filters(), chosen, Some(lower_hz), execution)?
-        .with_motion_band(found.logs.motion_hz());
+    // What is above the lower cut-off is noise and no motion: held-out figures are for what is below.
+    let logs = Logs::new(robot.model(), recordings, settings.filters(), chosen, Some(lower_hz), execution)?;
     let mut training = training_rows((&logs, &found.settings), found.training.model.clone(), chosen, payloads, None)?;
     training.friction_choice.clone_from(&found.training.friction_choice);
     let mut estimation = estimate(&training.rows((&logs, &found.settings), chosen), None)?;

@@ -156,7 +156,7 @@ impl TrainingPasses<'_> {
             let plain = plain_estimate(&self.settings.estimation, &found.problem)?;
             let estimated_s = started.elapsed().as_secs_f64();
             let with_load = found.model.clone().with_load_of(&found.model, &plain.values);
-            let has_settled = load_has_settled(&found, &with_load)?;
+            let has_settled = load_has_settled(&found, &with_load);
             let [read_s, chosen_s] = found.timings_s;
             if has_settled {
                 found.timings_s[1] += estimated_s;
@@ -298,8 +298,8 @@ impl TrainingPasses<'_> {
 }
 
 /// Whether the load that `next` has hardly differs, on the rows, from the one that they were made with.
-pub(crate) fn load_has_settled(found: &Training, next: &RegressorModel) -> Result<bool, EstimationError> {
-    let (Some(before), Some(after)) = (&found.model.load_parameters, &next.load_parameters) else { return Ok(false) };
+fn load_has_settled(found: &Training, next: &RegressorModel) -> bool {
+    let (Some(before), Some(after)) = (&found.model.load_parameters, &next.load_parameters) else { return false };
     let (mut change, mut torque) = (0.0, 0.0);
     for log in &found.logs {
         for (joint, factor) in log.factors.iter().enumerate() {
@@ -307,14 +307,14 @@ pub(crate) fn load_has_settled(found: &Training, next: &RegressorModel) -> Resul
             let columns = found.model.layout().joint_columns(joint);
             let of_bodies = |&column: &usize| match found.model.layout().columns()[column] {
                 Column::Term(_) => 0.0,
-                _ => after[column] - before[column],
+                Column::Body { .. } => after[column] - before[column],
             };
             let difference = DVector::from_iterator(columns.len(), columns.iter().map(of_bodies));
             change += (total.regressor_triangle() * difference).norm_squared();
             torque += total.torque_norm().powi(2);
         }
     }
-    Ok(change <= LOAD_SETTLED * LOAD_SETTLED * torque)
+    change <= LOAD_SETTLED * LOAD_SETTLED * torque
 }
 
 /// Joints of which some recording has rows: where windows leave a joint none, it is not in the problem.

@@ -132,7 +132,7 @@ impl FrictionKind {
         let (alone, of_grid): (Vec<usize>, Vec<usize>) =
             of_kind.into_iter().partition(|&place| columns[place].grid.is_none());
         let steps: Vec<&[usize]> = of_grid.chunk_by(|&a, &b| columns[a].grid == columns[b].grid).collect();
-        let pairs = steps.windows(2).map(|pair| pair.concat());
+        let pairs = steps.windows(2).map(<[&[usize]]>::concat);
         alone.into_iter().map(|place| vec![place]).chain(pairs).collect()
     }
 }

@@ -37,15 +37,13 @@ impl Neighbourhood {
         for (number, term) in centre.iter().enumerate() {
             let own = coordinates(term);
             // Both directions of a step have one width.
-            match seen.iter().find(|(kind, coordinates, _)| *kind == term.kind_name() && *coordinates == own) {
-                Some(&(_, _, first)) => {
-                    (0..own.len()).for_each(|place| axes[first + place].terms.push(number));
-                }
-                None => {
-                    let first = axes.len();
-                    axes.extend((0..own.len()).map(|place| Axis { terms: vec![number], place }));
-                    seen.push((term.kind_name(), own, first));
-                }
+            let same = seen.iter().find(|(kind, coordinates, _)| *kind == term.kind_name() && *coordinates == own);
+            if let Some(&(_, _, first)) = same {
+                (0..own.len()).for_each(|place| axes[first + place].terms.push(number));
+            } else {
+                let first = axes.len();
+                axes.extend((0..own.len()).map(|place| Axis { terms: vec![number], place }));
+                seen.push((term.kind_name(), own, first));
             }
         }
         Self { centre, axes, step: ratio.ln() }
