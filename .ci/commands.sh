@@ -51,6 +51,7 @@ run 0 target/debug/dynident-benchmark --only rnea
 run 0 "$examples/designs" --seconds 0.2 --criteria d-optimal --families Fourier examples/design_ur10.toml
 run 0 "$examples/iterations" 1 examples/iterate_paper_2r_noise.toml
 run 0 "$examples/cutoffs" 1 1
+run 0 "$examples/friction" 1 1
 run 0 "$examples/basin" 2 601
 run 0 "$examples/logistic_against_fourier" 2 0.3
 run 0 "$examples/differentiators" 1 12
