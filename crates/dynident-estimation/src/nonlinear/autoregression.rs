@@ -10,16 +10,26 @@ use nalgebra::{DMatrix, DVector};
 pub(crate) fn autoregression(e: &[f64], most: usize) -> Vec<f64> {
     let count = e.len();
     let covariance = |lag: usize| -> f64 { e[lag..].iter().zip(e).map(|(late, early)| late * early).sum() };
-    let mut left = covariance(0);
+    let covariances: Vec<f64> = (0..=most.min(count / 4)).map(covariance).collect();
+    from_covariances(&covariances, count).0
+}
+
+/// The same from the autocovariances themselves, of lag 0 on, that `count` numbers have shown; with the variance of what
+/// is new, in units of theirs.
+pub(crate) fn from_covariances(covariances: &[f64], count: usize) -> (Vec<f64>, f64) {
+    let mut left = covariances.first().copied().unwrap_or_default();
     if left <= 0.0 || !left.is_finite() {
-        return Vec::new();
+        return (Vec::new(), 0.0);
     }
     let penalty = (count as f64).ln() / count as f64;
     let all = left;
-    let (mut a, mut best) = (Vec::new(), (0.0, Vec::new()));
-    for order in 1..=most.min(count / 4) {
-        let ahead: f64 = a.iter().enumerate().map(|(i, a)| a * covariance(order - 1 - i)).sum();
-        let reflection = (covariance(order) - ahead) / left;
+    let (mut a, mut best) = (Vec::new(), (0.0, Vec::new(), left));
+    for order in 1..covariances.len() {
+        let ahead: f64 = a.iter().enumerate().map(|(i, a)| a * covariances[order - 1 - i]).sum();
+        let reflection = (covariances[order] - ahead) / left;
+        if reflection.is_nan() || reflection.abs() >= 1.0 {
+            break;
+        }
         let turned: Vec<f64> = a.iter().zip(a.iter().rev()).map(|(a, b)| a - reflection * b).collect();
         a = turned;
         a.push(reflection);
@@ -29,10 +39,10 @@ pub(crate) fn autoregression(e: &[f64], most: usize) -> Vec<f64> {
         }
         let criterion = (left / all).ln() + order as f64 * penalty;
         if criterion < best.0 {
-            best = (criterion, a.clone());
+            best = (criterion, a.clone(), left);
         }
     }
-    best.1
+    (best.1, best.2)
 }
 
 /// `y_t − a_1 y_{t−1} − … − a_k y_{t−k}` for `t ≥ k`, the first k values being spent.

@@ -1,0 +1,136 @@
+//! Motion and parameters from one likelihood, for any log: raw positions and torques, noise of both, the motion a
+//! smoothing spline.
+
+use super::simulated::torque_sigma;
+use super::spline_torque::SplineTorque;
+use super::{EstimatorError, Findings, TrainingRows};
+use crate::recording::LogError;
+use dynident_estimation::{
+    Estimate, SplineLogFit, SplineMotionProblem, SplineMotionSettings, SplineRecord, spline_motion_least_squares,
+    weighted_least_squares,
+};
+use dynident_recording::{DifferentiatorSettings, MotionBlock, MotionSettings};
+use serde::{Deserialize, Serialize};
+
+/// Shorter pieces between two gaps are left out, samples.
+const LEAST_SAMPLES: usize = 64;
+
+/// What the fit of motion and parameters found.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct SplineFit {
+    /// Motion and noise of every training log.
+    pub logs: Vec<SplineLogFit>,
+    /// The sum of squares with the parameters of weighted least squares, the motion by the positions alone and the
+    /// noise that was found.
+    pub cost_at_start: f64,
+    /// What it came down to.
+    pub cost: f64,
+}
+
+/// The estimate, and what was found of each log's motion.
+pub(super) fn spline_motion(
+    rows: &TrainingRows<'_>,
+    settings: &SplineMotionSettings,
+) -> Result<(Estimate, Findings), EstimatorError> {
+    let TrainingRows { logs, model, problem, .. } = *rows;
+    let wrong = |message: String| EstimatorError::Requirement { method: "simultaneous", message };
+    let terms = model.terms().iter();
+    if let Some(term) = terms.clone().find(|t| t.has_memory() || t.needs_load() || t.needs_temperature()) {
+        return Err(wrong(format!(
+            "{} depends on more than the motion of one instant: leave that law out, or take another method",
+            term.symbol()
+        )));
+    }
+    let dof = model.dof();
+    if problem.columns().len() != model.layout().columns().len() || problem.joints().len() != dof {
+        return Err(wrong(
+            "payloads, parameters of single logs and joints without a row are not estimated together with the motion: take another method, or leave these logs out"
+                .to_owned(),
+        ));
+    }
+    rows.begin("motion and torque");
+    let mut records = Vec::new();
+    for (log, &index) in rows.training.iter().enumerate() {
+        records.extend(read(rows, (log, index), &wrong)?);
+    }
+    logs.end();
+    let estimation = rows.settings;
+    let start = weighted_least_squares(problem, &estimation.weighted())?;
+    let mut held = vec![false; problem.columns().len()];
+    for fixed in &start.rank.fixed {
+        held[fixed.index] = true;
+    }
+    for &(column, _) in &estimation.held {
+        held[column] = true;
+    }
+    let begun = SplineMotionProblem {
+        names: problem.columns().to_vec(),
+        joints: model.joint_names(),
+        records,
+        parameters: start.values.clone(),
+        held,
+    };
+    let settings =
+        SplineMotionSettings { rank: estimation.rank, covariance: estimation.covariance, ..settings.clone() };
+    let found = spline_motion_least_squares(&begun, &settings, &mut SplineTorque::new(model))?;
+    let mut estimate = found.estimate;
+    estimate.joint_sigma = torque_sigma(problem, &estimate.values)?;
+    // Channels are torques first; an estimate speaks of joints, by their torque.
+    for of_channels in
+        [&mut estimate.score_inflation, &mut estimate.effective_lag1, &mut estimate.segment_correlation]
+    {
+        of_channels.truncate(dof);
+    }
+    let fit = SplineFit { logs: found.logs, cost_at_start: found.cost_at_start, cost: found.cost };
+    Ok((estimate, Findings::Spline(fit)))
+}
+
+/// The pieces of recording number `index` as it was recorded.
+fn read(
+    rows: &TrainingRows<'_>,
+    (log, index): (usize, usize),
+    wrong: &dyn Fn(String) -> EstimatorError,
+) -> Result<Vec<SplineRecord>, EstimatorError> {
+    let TrainingRows { logs, model, .. } = *rows;
+    let recording = &logs.recordings[index];
+    let name = &recording.name;
+    // Central differences leave positions as they are.
+    let differentiator = DifferentiatorSettings::CentralDifferences { order: 4 };
+    let motion = MotionSettings { differentiator, smooth_torque: false, ..logs.motion.clone() };
+    let raw = "the positions of a motion that is made already are smoothed: give its raw samples, all of them";
+    let Some(whole) = recording.with_every_row() else {
+        return Err(wrong(format!("log `{name}`: {raw}")));
+    };
+    let Some(mut stream) = whole.open(model.model(), &motion)? else {
+        return Err(wrong(format!("log `{name}`: {raw}")));
+    };
+    let (rate_hz, places) = (stream.rate_hz(), recording.places(model.model())?);
+    let mut pieces: Vec<Vec<Vec<f64>>> = Vec::new();
+    let (mut block, mut segment) = (MotionBlock::default(), None);
+    while stream.next_block(&mut block).map_err(|source| LogError::recording(name, source))? {
+        if segment != Some(block.segment) {
+            segment = Some(block.segment);
+            pieces.push(vec![Vec::new(); 2 * places.len()]);
+        }
+        let Some(channels) = pieces.last_mut() else { continue };
+        for (part, values) in [&block.q, &block.tau].into_iter().enumerate() {
+            for (joint, &place) in places.iter().enumerate() {
+                let gain = if part == 0 { None } else { model.torque_gains.get(joint) }.copied().unwrap_or(1.0);
+                channels[part * places.len() + joint].extend(block.joint(values, place).iter().map(|x| gain * x));
+            }
+        }
+        logs.execution.progress.advance(block.rows as u64);
+    }
+    pieces.retain(|channels| channels.first().is_some_and(|q| q.len() >= LEAST_SAMPLES));
+    if pieces.is_empty() {
+        return Err(wrong(format!(
+            "log `{name}` has no piece of {LEAST_SAMPLES} samples without a gap: give a longer log"
+        )));
+    }
+    let record = |mut channels: Vec<Vec<f64>>| {
+        let tau = channels.split_off(places.len());
+        SplineRecord { log, rate_hz, q: channels.concat(), tau: tau.concat() }
+    };
+    Ok(pieces.into_iter().map(record).collect())
+}
