@@ -35,13 +35,6 @@ pub(super) fn spline_motion(
 ) -> Result<(Estimate, Findings), EstimatorError> {
     let TrainingRows { logs, model, problem, .. } = *rows;
     let wrong = |message: String| EstimatorError::Requirement { method: "simultaneous", message };
-    let terms = model.terms().iter();
-    if let Some(term) = terms.clone().find(|t| t.has_memory() || t.needs_load() || t.needs_temperature()) {
-        return Err(wrong(format!(
-            "{} depends on more than the motion of one instant: leave that law out, or take another method",
-            term.symbol()
-        )));
-    }
     let dof = model.dof();
     if problem.columns().len() != model.layout().columns().len() || problem.joints().len() != dof {
         return Err(wrong(
@@ -50,16 +43,19 @@ pub(super) fn spline_motion(
         ));
     }
     rows.begin("motion and torque");
-    let mut records = Vec::new();
+    let (mut records, mut temperatures_c) = (Vec::new(), Vec::new());
     for (log, &index) in rows.training.iter().enumerate() {
-        records.extend(read(rows, (log, index), &wrong)?);
+        for (record, temperature_c) in read(rows, (log, index), &wrong)? {
+            records.push(record);
+            temperatures_c.push(temperature_c);
+        }
     }
     logs.end();
     let estimation = rows.settings;
     let start = weighted_least_squares(problem, &estimation.weighted())?;
     let mut held = vec![false; problem.columns().len()];
     for fixed in &start.rank.fixed {
-        held[fixed.index] = true;
+        held[fixed.column] = true;
     }
     for &(column, _) in &estimation.held {
         held[column] = true;
@@ -73,12 +69,11 @@ pub(super) fn spline_motion(
     };
     let settings =
         SplineMotionSettings { rank: estimation.rank, covariance: estimation.covariance, ..settings.clone() };
-    let found = spline_motion_least_squares(&begun, &settings, &mut SplineTorque::new(model))?;
+    let found = spline_motion_least_squares(&begun, &settings, &mut SplineTorque::new(model, temperatures_c))?;
     let mut estimate = found.estimate;
     estimate.joint_sigma = torque_sigma(problem, &estimate.values)?;
     // Channels are torques first; an estimate speaks of joints, by their torque.
-    for of_channels in
-        [&mut estimate.score_inflation, &mut estimate.effective_lag1, &mut estimate.segment_correlation]
+    for of_channels in [&mut estimate.score_inflation, &mut estimate.effective_lag1, &mut estimate.segment_correlation]
     {
         of_channels.truncate(dof);
     }
@@ -86,12 +81,12 @@ pub(super) fn spline_motion(
     Ok((estimate, Findings::Spline(fit)))
 }
 
-/// The pieces of recording number `index` as it was recorded.
+/// The pieces of recording number `index` as it was recorded, with temperatures where they were measured.
 fn read(
     rows: &TrainingRows<'_>,
     (log, index): (usize, usize),
     wrong: &dyn Fn(String) -> EstimatorError,
-) -> Result<Vec<SplineRecord>, EstimatorError> {
+) -> Result<Vec<(SplineRecord, Vec<f64>)>, EstimatorError> {
     let TrainingRows { logs, model, .. } = *rows;
     let recording = &logs.recordings[index];
     let name = &recording.name;
@@ -111,13 +106,18 @@ fn read(
     while stream.next_block(&mut block).map_err(|source| LogError::recording(name, source))? {
         if segment != Some(block.segment) {
             segment = Some(block.segment);
-            pieces.push(vec![Vec::new(); 2 * places.len()]);
+            pieces.push(vec![Vec::new(); 3 * places.len()]);
         }
         let Some(channels) = pieces.last_mut() else { continue };
         for (part, values) in [&block.q, &block.tau].into_iter().enumerate() {
             for (joint, &place) in places.iter().enumerate() {
                 let gain = if part == 0 { None } else { model.torque_gains.get(joint) }.copied().unwrap_or(1.0);
                 channels[part * places.len() + joint].extend(block.joint(values, place).iter().map(|x| gain * x));
+            }
+        }
+        if !block.temperature_c.is_empty() {
+            for (joint, &place) in places.iter().enumerate() {
+                channels[2 * places.len() + joint].extend_from_slice(block.joint(&block.temperature_c, place));
             }
         }
         logs.execution.progress.advance(block.rows as u64);
@@ -129,8 +129,9 @@ fn read(
         )));
     }
     let record = |mut channels: Vec<Vec<f64>>| {
+        let temperature_c = channels.split_off(2 * places.len()).concat();
         let tau = channels.split_off(places.len());
-        SplineRecord { log, rate_hz, q: channels.concat(), tau: tau.concat() }
+        (SplineRecord { log, rate_hz, q: channels.concat(), tau: tau.concat() }, temperature_c)
     };
     Ok(pieces.into_iter().map(record).collect())
 }

@@ -1,19 +1,28 @@
 //! The torque of a robot and its derivatives by motion and parameters: what the spline fit asks of a robot.
 
 use crate::regressor_model::RegressorModel;
-use dynident_dynamics::{BatchWorkspace, MotionGradient, Panels, regressor_panels, regressor_panels_adjoint};
+use dynident_dynamics::{
+    BatchWorkspace, MotionGradient, Panels, TermHistory, regressor_panels, regressor_panels_adjoint,
+    regressor_panels_following,
+};
 use dynident_estimation::{EstimationError, TorqueModel, TorqueSlopes};
-use dynident_model::terms::JointMotion;
+use dynident_model::terms::{JointMotion, TorqueTerm};
 use rayon::prelude::*;
 
 /// Samples that one thread takes at a time.
 const BLOCK: usize = 128;
 
-/// Torque and its derivatives, blocks of samples side by side. Torque terms must depend on the motion of one instant
-/// alone.
-#[derive(Clone, Copy, Debug)]
+/// Torque and its derivatives, blocks of samples side by side.
+///
+/// Friction with a memory, of the load or of the temperature follows the motion, and its derivative by the motion
+/// counts as zero: the motion is not bent to please it.
+#[derive(Debug)]
 pub struct SplineTorque<'a> {
     model: &'a RegressorModel,
+    /// Temperatures of every record, joint-major; empty where none was measured.
+    temperatures_c: Vec<Vec<f64>>,
+    /// Where such friction is.
+    following: Option<(BatchWorkspace, TermHistory)>,
 }
 
 /// Some samples of a motion, joint-major.
@@ -24,11 +33,47 @@ struct Part {
 }
 
 impl<'a> SplineTorque<'a> {
-    /// Of this model; parameters are the columns of its layout.
-    pub fn new(model: &'a RegressorModel) -> Self {
-        Self { model }
+    /// Of this model; parameters are the columns of its layout. `temperatures_c` of every record, joint-major, where
+    /// friction needs them.
+    pub fn new(model: &'a RegressorModel, temperatures_c: Vec<Vec<f64>>) -> Self {
+        let follows = |term: &TorqueTerm| term.has_memory() || term.needs_load() || term.needs_temperature();
+        let following = model
+            .terms()
+            .iter()
+            .any(follows)
+            .then(|| (BatchWorkspace::new(model.model()), TermHistory::new(model.load_parameters.clone())));
+        Self { model, temperatures_c, following }
     }
 
+    /// Panels of all parts where friction follows the motion: one after another.
+    fn following(&mut self, (record, first): (usize, usize), parts: &[Part]) -> Option<Vec<Panels>> {
+        let (workspace, history) = self.following.as_mut()?;
+        if first == 0 {
+            history.restart();
+        }
+        let joints = self.model.dof();
+        let temperatures = self.temperatures_c.get(record).filter(|own| !own.is_empty());
+        let of = |part: &Part| {
+            if let Some(all) = temperatures {
+                let own = all.chunks_exact(all.len() / joints);
+                let from = first + part.first;
+                let cut: Vec<f64> = own.flat_map(|own| own[from..from + part.samples].iter().copied()).collect();
+                history.set_temperature(&cut);
+            }
+            let (model, layout, motion) = (self.model.model(), self.model.layout(), part.view());
+            let mut panels = Panels::default();
+            regressor_panels_following(model, workspace, layout, &motion, history, &mut panels);
+            panels
+        };
+        Some(parts.iter().map(of).collect())
+    }
+}
+
+/// What needs no memory, for several threads.
+#[derive(Clone, Copy)]
+struct Instants<'a>(&'a RegressorModel);
+
+impl Instants<'_> {
     fn parts(&self, motion: &JointMotion<'_>) -> Vec<Part> {
         let of = |first: usize| {
             let samples = BLOCK.min(motion.samples - first);
@@ -45,14 +90,14 @@ impl<'a> SplineTorque<'a> {
     fn panels(&self, workspace: &mut BatchWorkspace, part: &Part) -> Panels {
         let mut panels = Panels::default();
         let motion = part.view();
-        regressor_panels(self.model.model(), workspace, self.model.layout(), &motion, &mut panels);
+        regressor_panels(self.0.model(), workspace, self.0.layout(), &motion, &mut panels);
         panels
     }
 
     /// Torque of joint `joint` from its panel.
     fn torque_of(&self, joint: usize, panels: &Panels, samples: usize, parameters: &[f64]) -> Vec<f64> {
         let mut torque = vec![0.0; samples];
-        let columns = self.model.layout().joint_columns(joint);
+        let columns = self.0.layout().joint_columns(joint);
         for (&column, w) in columns.iter().zip(panels.joint(joint).chunks_exact(samples)) {
             let theta = parameters[column];
             torque.iter_mut().zip(w).for_each(|(torque, w)| *torque += theta * w);
@@ -68,8 +113,8 @@ impl<'a> SplineTorque<'a> {
         (part, adjoint): (&Part, &mut Panels),
         parameters: &[f64],
     ) -> Vec<f64> {
-        let (model, layout, samples) = (self.model.model(), self.model.layout(), part.samples);
-        let joints = self.model.dof();
+        let (model, layout, samples) = (self.0.model(), self.0.layout(), part.samples);
+        let joints = self.0.dof();
         let columns = layout.joint_columns(joint);
         for (&column, to) in columns.iter().zip(adjoint.joint_mut(joint).chunks_exact_mut(samples)) {
             to.fill(parameters[column]);
@@ -96,18 +141,25 @@ impl TorqueModel for SplineTorque<'_> {
 
     fn torque(
         &mut self,
-        _: (usize, usize),
+        place: (usize, usize),
         motion: &JointMotion<'_>,
         parameters: &[f64],
     ) -> Result<Vec<f64>, EstimationError> {
         let (joints, samples) = (self.model.dof(), motion.samples);
-        let parts = self.parts(motion);
-        let of = |workspace: &mut BatchWorkspace, part: &Part| -> Vec<Vec<f64>> {
-            let panels = self.panels(workspace, part);
-            (0..joints).map(|joint| self.torque_of(joint, &panels, part.samples, parameters)).collect()
+        let instants = Instants(self.model);
+        let parts = instants.parts(motion);
+        let known = self.following(place, &parts);
+        let of = |workspace: &mut BatchWorkspace, (number, part): (usize, &Part)| -> Vec<Vec<f64>> {
+            let torques = |panels: &Panels| {
+                (0..joints).map(|joint| instants.torque_of(joint, panels, part.samples, parameters)).collect()
+            };
+            match &known {
+                Some(known) => torques(&known[number]),
+                None => torques(&instants.panels(workspace, part)),
+            }
         };
-        let workspace = || BatchWorkspace::new(self.model.model());
-        let found: Vec<Vec<Vec<f64>>> = parts.par_iter().map_init(workspace, of).collect();
+        let workspace = || BatchWorkspace::new(instants.0.model());
+        let found: Vec<Vec<Vec<f64>>> = parts.par_iter().enumerate().map_init(workspace, of).collect();
         let mut torque = vec![0.0; joints * samples];
         for (part, own) in parts.iter().zip(&found) {
             for (joint, own) in own.iter().enumerate() {
@@ -119,24 +171,26 @@ impl TorqueModel for SplineTorque<'_> {
 
     fn slopes(
         &mut self,
-        _: (usize, usize),
+        place: (usize, usize),
         motion: &JointMotion<'_>,
         parameters: &[f64],
     ) -> Result<TorqueSlopes, EstimationError> {
         let (joints, samples, layout) = (self.model.dof(), motion.samples, self.model.layout());
-        let parts = self.parts(motion);
+        let instants = Instants(self.model);
+        let parts = instants.parts(motion);
+        let known = self.following(place, &parts);
         let of = |workspace: &mut BatchWorkspace, part: &Part| {
-            let panels = self.panels(workspace, part);
+            let panels = if known.is_none() { Some(instants.panels(workspace, part)) } else { None };
             let mut adjoint = Panels::default();
             adjoint.resize(layout, part.samples);
             (0..joints).for_each(|joint| adjoint.joint_mut(joint).fill(0.0));
             let slopes = (0..joints)
-                .map(|joint| self.slopes_of(joint, workspace, (part, &mut adjoint), parameters))
+                .map(|joint| instants.slopes_of(joint, workspace, (part, &mut adjoint), parameters))
                 .collect::<Vec<_>>();
             (panels, slopes)
         };
-        let workspace = || BatchWorkspace::new(self.model.model());
-        let found: Vec<(Panels, Vec<Vec<f64>>)> = parts.par_iter().map_init(workspace, of).collect();
+        let workspace = || BatchWorkspace::new(instants.0.model());
+        let found: Vec<(Option<Panels>, Vec<Vec<f64>>)> = parts.par_iter().map_init(workspace, of).collect();
         let columns: Vec<Vec<usize>> = (0..joints).map(|joint| layout.joint_columns(joint).to_vec()).collect();
         let mut out = TorqueSlopes {
             torque: vec![0.0; joints * samples],
@@ -144,9 +198,10 @@ impl TorqueModel for SplineTorque<'_> {
             by_parameters: columns.iter().map(|own| vec![0.0; own.len() * samples]).collect(),
             columns,
         };
-        for (part, (panels, slopes)) in parts.iter().zip(&found) {
+        for (number, (part, (own, slopes))) in parts.iter().zip(&found).enumerate() {
+            let Some(panels) = own.as_ref().or_else(|| known.as_ref()?.get(number)) else { continue };
             for (joint, slopes) in slopes.iter().enumerate() {
-                let torque = self.torque_of(joint, panels, part.samples, parameters);
+                let torque = instants.torque_of(joint, panels, part.samples, parameters);
                 out.torque[joint * samples + part.first..][..part.samples].copy_from_slice(&torque);
                 for (variable, own) in slopes.chunks_exact(part.samples).enumerate() {
                     let to = (joint * 3 * joints + variable) * samples + part.first;

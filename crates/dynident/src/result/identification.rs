@@ -7,7 +7,9 @@ use crate::study::JointDrive;
 use dynident_estimation::consistent::ConsistencyTest;
 use dynident_estimation::{CorrelatedPair, EssentialReport};
 use dynident_identification::consistent::ParameterInterval;
-use dynident_identification::estimators::{GrossErrors, NoiseInRegressor, PeriodicFit, SeriesFit, SimulatedFit, SplineFit};
+use dynident_identification::estimators::{
+    GrossErrors, NoiseInRegressor, PeriodicFit, SeriesFit, SimulatedFit, SplineFit,
+};
 use dynident_identification::examination::{LogValidation, PriorAgreement, TorqueBand, TorqueLag, TorqueSignCheck};
 use dynident_identification::friction::FrictionCandidate;
 use dynident_identification::payload::{DriveGain, PayloadResult};

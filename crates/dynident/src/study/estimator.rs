@@ -95,7 +95,8 @@ pub struct EstimatorSection {
     pub instruments: Option<InstrumentSettings>,
     /// How `method = "noise-weighted"` finds the noise around a row.
     pub noise_levels: NoiseLevels,
-    /// The repeated motion of `method = "maximum-likelihood"`; of `"simultaneous"` where the motion is a Fourier series.
+    /// The repeated motion of `method = "maximum-likelihood"`; of `"simultaneous"` where the motion is a Fourier
+    /// series.
     pub periods: PeriodSettings,
     /// The motion of `method = "simultaneous"` where it is not said to repeat.
     pub spline: SplineMotionSettings,

@@ -73,6 +73,24 @@ impl BandedArrow {
         self.right[row] += value;
     }
 
+    /// The right-hand side of the band.
+    pub(super) fn right(&self) -> &[f64] {
+        &self.right
+    }
+
+    /// `B x`.
+    pub(super) fn product(&self, x: &[f64]) -> Vec<f64> {
+        let (b, wide) = (self.bandwidth, self.bandwidth + 1);
+        let mut out = vec![0.0; self.size];
+        for i in 0..self.size {
+            let lowest = i.saturating_sub(b);
+            let row = &self.band[i * wide + lowest + b - i..i * wide + b];
+            out[i] += dot(row, &x[lowest..i]) + self.band[i * wide + b] * x[i];
+            axpy(x[i], row, &mut out[lowest..i]);
+        }
+        out
+    }
+
     /// Adds a matrix of the same bandwidth and arrow whose first unknown is `first` here.
     pub(super) fn add_part(&mut self, first: usize, part: &Self) {
         let wide = self.bandwidth + 1;
@@ -103,7 +121,7 @@ impl BandedArrow {
             }
             let pivot = own[b] - dot(&own[from..b], &own[from..b]);
             // Rounding of a sum of squares of that size.
-            if pivot.is_nan() || pivot <= 1e-14 * own[b].abs() {
+            if pivot.is_nan() || pivot <= f64::EPSILON * own[b].abs() {
                 return Err(i);
             }
             let root = pivot.sqrt();
@@ -289,6 +307,9 @@ mod tests {
             }
             let inverse = dense.clone().cholesky().unwrap().inverse();
             let expected = &inverse * &right;
+            let x: Vec<f64> = (0..size).map(|_| random.normal()).collect();
+            let product = dense.view((0, 0), (size, size)) * DVector::from_column_slice(&x);
+            assert!(matrix.product(&x).iter().zip(&product).all(|(a, b)| (a - b).abs() < 1e-9));
             let found = matrix.eliminated().unwrap();
             let theta = if arrow > 0 {
                 let schur = found.schur.clone().cholesky().unwrap();

@@ -65,16 +65,35 @@ impl Spline {
         from: usize,
         out: [&mut [f64]; 3],
     ) {
-        for (order, out) in out.into_iter().enumerate() {
-            for (k, out) in out.iter_mut().enumerate() {
-                let first = self.first(from + k);
-                let values = &self.at(from + k)[order];
-                *out = values.iter().enumerate().map(|(i, b)| b * coefficients[(first + i) * joints + joint]).sum();
+        let [q, dq, ddq] = out;
+        let end = from + q.len();
+        let mut sample = from;
+        while sample < end {
+            let interval = self.first(sample);
+            let own: [f64; ACTIVE] = core::array::from_fn(|k| coefficients[(interval + k) * joints + joint]);
+            let until = end.min((interval + 1) * self.step);
+            for at in sample..until {
+                let [values, rates, seconds] = &self.table[at - interval * self.step];
+                let sum = |b: &[f64; ACTIVE]| b.iter().zip(&own).map(|(b, c)| b * c).sum::<f64>();
+                (q[at - from], dq[at - from], ddq[at - from]) = (sum(values), sum(rates), sum(seconds));
             }
+            sample = until;
         }
     }
 
-    /// `Σ_t b(t) b(t)ᵀ` for functions `first..first + 6` of interval `first`, samples of that interval alone.
+    /// Positions less the spline's.
+    pub(super) fn residual(&self, coefficients: &[f64], (joint, joints): (usize, usize), q: &[f64]) -> Vec<f64> {
+        let mut left = Vec::with_capacity(q.len());
+        for (interval, q) in q.chunks(self.step).enumerate() {
+            let own: [f64; ACTIVE] = core::array::from_fn(|k| coefficients[(interval + k) * joints + joint]);
+            let of =
+                |(q, [b, ..]): (&f64, &[[f64; ACTIVE]; 3])| q - b.iter().zip(&own).map(|(b, c)| b * c).sum::<f64>();
+            left.extend(q.iter().zip(&self.table).map(of));
+        }
+        left
+    }
+
+    /// Samples of an interval.
     pub(super) fn interval_samples(&self, interval: usize) -> usize {
         self.samples.saturating_sub(interval * self.step).min(self.step)
     }
@@ -107,14 +126,16 @@ impl Spline {
         let mut product = vec![0.0; self.functions()];
         let mut sum = 0.0;
         for interval in 0..self.functions() + 1 - ACTIVE {
-            let own: [f64; ACTIVE] = core::array::from_fn(|k| coefficients[(interval + k) * joints + joint]);
+            // Constants cost nothing: without them no digits are lost.
+            let base = coefficients[interval * joints + joint];
+            let own: [f64; ACTIVE] = core::array::from_fn(|k| coefficients[(interval + k) * joints + joint] - base);
             for (a, row) in gram.iter().enumerate() {
                 let value: f64 = row.iter().zip(&own).map(|(p, c)| p * c).sum();
                 product[interval + a] += value;
                 sum += own[a] * value;
             }
         }
-        (sum, product)
+        (sum.max(0.0), product)
     }
 
     /// Adds `position · BᵀB + penalty · P` of one joint to the band of all, and `position · Bᵀ r − penalty · P c` to
@@ -132,7 +153,7 @@ impl Spline {
             let own = if count == self.step { full } else { self.products(count) };
             for a in 0..ACTIVE {
                 for b in 0..=a {
-                    let value = position * own[a][b] + penalty * gram[a][b];
+                    let value = position * own[a][b];
                     matrix.add((interval + a) * joints + joint, (interval + b) * joints + joint, value);
                 }
             }
@@ -140,6 +161,23 @@ impl Spline {
             for (k, r) in residual[from..from + count].iter().enumerate() {
                 for (a, b) in self.table[k][0].iter().enumerate() {
                     matrix.add_right((interval + a) * joints + joint, position * b * r);
+                }
+            }
+        }
+        self.add_roughness(matrix, (joint, joints), (penalty, gram, pulled));
+    }
+
+    /// Adds `penalty · P` of one joint to the band of all, and `−penalty · P c` to its right-hand side.
+    pub(super) fn add_roughness(
+        &self,
+        matrix: &mut BandedArrow,
+        (joint, joints): (usize, usize),
+        (penalty, gram, pulled): (f64, &[[f64; ACTIVE]; ACTIVE], &[f64]),
+    ) {
+        for interval in 0..self.functions() + 1 - ACTIVE {
+            for (a, row) in gram.iter().enumerate() {
+                for (b, value) in row.iter().enumerate().take(a + 1) {
+                    matrix.add((interval + a) * joints + joint, (interval + b) * joints + joint, penalty * value);
                 }
             }
         }

@@ -6,15 +6,14 @@ use super::bspline::ACTIVE;
 use super::noise::LogNoise;
 use super::problem::{SplineMotionProblem, SplineMotionSettings, TorqueModel};
 use super::rows::{FreeParameters, Piece};
-use super::smoothing::residual;
 use super::system::{System, torque_information};
 use crate::error::EstimationError;
 use crate::factor::{LinearProblem, SegmentSettings, SegmentedFactor, solve, split};
 use crate::uncertainty::{Estimate, PointEstimate, joint_degrees_of_freedom};
 use rayon::prelude::*;
 
-/// The estimate that the last linearisation gives: `X̃ = X_θ − X_c B⁻¹A` for the rows of torque, of positions and of the
-/// prior on the motion, whose normal matrix is the Schur complement.
+/// The estimate that the last linearisation gives: `X̃ = X_θ − X_c B⁻¹A` for the rows of torque, of positions and of
+/// the prior on the motion; their normal matrix is the Schur complement.
 pub(super) fn estimate_of<M: TorqueModel>(
     problem: &SplineMotionProblem,
     settings: &SplineMotionSettings,
@@ -48,7 +47,10 @@ pub(super) fn estimate_of<M: TorqueModel>(
         })?;
         let of_joint = |joint: usize| {
             let scale = levels.positions[joint].position_std.recip();
-            (positions(piece, own, joint, (scale, &shares, &theta)), roughness(piece, own, (joint, levels), (&shares, &theta)))
+            (
+                positions(piece, own, joint, (scale, &shares, &theta)),
+                roughness(piece, own, (joint, levels), (&shares, &theta)),
+            )
         };
         let others: Vec<(Panel, Panel)> = (0..piece.joints).into_par_iter().map(of_joint).collect();
         let (positions, roughness): (Vec<_>, Vec<_>) = others.into_iter().unzip();
@@ -136,7 +138,7 @@ fn positions(
     (scale, shares, theta): (f64, &[f64], &[f64]),
 ) -> Panel {
     let (joints, mean_of, spline) = (piece.joints, piece.mean_of, &piece.spline);
-    let left = residual(spline, coefficients, (joint, joints), piece.q(joint));
+    let left = spline.residual(coefficients, (joint, joints), piece.q(joint));
     let mut panel = Panel::new(theta.len());
     let weight = (mean_of as f64).sqrt().recip();
     for row in 0..piece.rows() {

@@ -8,10 +8,10 @@ use super::problem::{
     TorqueModel,
 };
 use super::rows::{FreeParameters, Piece};
-use super::smoothing::{residual, smoothed};
+use super::smoothing::smoothed;
 use super::system::{Paid, System, torque_information};
 use crate::error::EstimationError;
-use crate::nonlinear::autoregression::{from_covariances, whitened};
+use crate::nonlinear::autoregression::{from_covariances, shortened, whitened};
 use rayon::prelude::*;
 
 /// Longest time between knots that is tried, s, and how much closer the next one is.
@@ -24,6 +24,15 @@ const ROWS_OF_INTERVAL: usize = 6;
 const LEAST_TORQUE_SIGMA: f64 = 1e-7;
 /// Noise levels have settled when none moves by more than this share.
 const SETTLED: f64 = 0.05;
+/// However much the unknowns bend to the torque, at least this share of its noise stays in its residuals.
+const LEAST_SHARE: f64 = 0.1;
+/// What lasts longer than this in the torque's residuals is the model's error and not noise: a filter that took it away
+/// would take what slow motion says of the parameters as well.
+const LONGEST_NOISE_S: f64 = 0.1;
+/// After so many steps orders of autoregressions fall only, and after so many levels stay: what goes to and fro between
+/// two descriptions of the noise that are as good as each other comes to rest.
+const ORDERS_FALL: usize = 6;
+const LEVELS_STAY: usize = 12;
 /// How often levels are found again from one linearisation: at first, when they are far off, and later.
 const EARLY: (usize, usize) = (3, 3);
 
@@ -46,12 +55,12 @@ struct State {
 /// positions say nothing is smoothed away by as much as they are noisy, and where torque tells more of a motion than
 /// the encoder does, it counts by its own precision.
 ///
-/// Each step linearises the torque at all samples (Gauss and Newton; a step that raises the sum is halved). The motion's
-/// block of the normal equations is a band, the parameters are its arrow: the motion is eliminated by a banded Cholesky
-/// factor, parameters are solved for by the Schur complement, whose inverse is their covariance with the motion
-/// unknown. Torque rows are means of a few samples, at least six between knots. Levels follow `σ² = RSS/(N − paid)`,
-/// `λ = (rank P − paid)/(cᵀPc)` from the inverse's entries inside the band (Harville, JASA 72 (1977) 320; Wood and
-/// Fasiolo, Biometrics 73 (2017) 1071).
+/// Each step linearises the torque at all samples (Gauss and Newton; a step that raises the sum is halved). The
+/// motion's block of the normal equations is a band, the parameters are its arrow: the motion is eliminated by a banded
+/// Cholesky factor, parameters are solved for by the Schur complement, whose inverse is their covariance with the
+/// motion unknown. Torque rows are means of a few samples, at least six between knots. Levels follow `σ² = RSS/(N −
+/// paid)`, `λ = (rank P − paid)/(cᵀPc)` from the inverse's entries inside the band (Harville, JASA 72 (1977) 320; Wood
+/// and Fasiolo, Biometrics 73 (2017) 1071).
 ///
 /// Ramsay, Hooker, Campbell and Cao, J. R. Statist. Soc. B 69 (2007) 741, for fits of equations of motion to smoothed
 /// records; Wahba, Spline Models for Observational Data (1990), for the prior.
@@ -75,11 +84,12 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
     let mut residuals = all_residuals(&pieces, model, &state)?;
     for (log, own) in noise.iter_mut().enumerate() {
         let of_log = || pieces.iter().zip(&residuals).filter(move |(piece, _)| piece.record.log == log);
-        for (joint, sigma) in own.torque_std.iter_mut().enumerate() {
+        for joint in 0..own.torque_std.len() {
             let (sum, rows) = of_log().fold((0.0, 0), |(sum, rows), (_, r)| {
                 (sum + r[joint].iter().map(|x| x * x).sum::<f64>(), rows + r[joint].len())
             });
-            *sigma = (sum / rows.max(1) as f64).sqrt().max(least_sigma(&pieces, log, joint));
+            let sigma = (sum / rows.max(1) as f64).sqrt().max(least_sigma(&pieces, log, joint));
+            (own.torque_std[joint], own.torque_variance[joint]) = (sigma, sigma * sigma);
         }
     }
     let first = State { coefficients: state.coefficients.clone(), parameters: state.parameters.clone() };
@@ -103,7 +113,11 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
             let of_motion: Vec<_> = (0..pieces.len()).map(|k| system.motion_step(k, &of_parameters)).collect();
             Ok::<_, EstimationError>((system, of_parameters, of_motion, length))
         };
-        let again = if iterations <= EARLY.0 { EARLY.1 } else { 1 };
+        let again = match iterations {
+            early if early <= EARLY.0 => EARLY.1,
+            late if late > LEVELS_STAY => 0,
+            _ => 1,
+        };
         for _ in 0..again {
             let (system, _, of_motion, _) = solve(&noise)?;
             let found = Paid::new(&system, &pieces, &information, &noise, &free);
@@ -136,12 +150,8 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
         if let Some((candidate, found)) = better {
             (state, residuals) = (candidate, found);
         }
-        if let Some(paid) = &paid {
-            torque_levels(&pieces, &residuals, paid, &mut noise, settings.most_autoregression);
-        }
-        if std::env::var_os("SPLINE_DEBUG").is_some() {
-            let n = &noise[0];
-            eprintln!("{iterations} length {length:.4} share {share} cost {before:.3} -> {:.3} {:?} {:?} {:?}", cost(&pieces, &state, &residuals, &noise), n.torque_std, n.colours, n.positions);
+        if let Some(paid) = paid.as_ref().filter(|_| iterations <= LEVELS_STAY) {
+            torque_levels(&pieces, &residuals, paid, &mut noise, (settings.most_autoregression, iterations));
         }
         let change = noise.iter().zip(&before_levels).map(|(new, old)| new.change(old)).fold(0.0, f64::max);
         converged = length <= settings.tolerance && change <= SETTLED && iterations > 2;
@@ -220,6 +230,7 @@ fn begin<'a>(
         let noise = LogNoise {
             positions: found.iter().map(|found| found.smoothness).collect(),
             torque_std: vec![1.0; joints],
+            torque_variance: vec![1.0; joints],
             colours: vec![Vec::new(); joints],
         };
         Ok((noise, pieces))
@@ -256,7 +267,7 @@ fn cost(pieces: &[Piece<'_>], state: &State, residuals: &[Vec<Vec<f64>>], noise:
         for joint in 0..piece.joints {
             let at = (joint, piece.joints);
             let smoothness = own.positions[joint];
-            let left = residual(&piece.spline, coefficients, at, piece.q(joint));
+            let left = piece.spline.residual(coefficients, at, piece.q(joint));
             sum += left.iter().map(|x| x * x).sum::<f64>() / smoothness.position_std.powi(2);
             let gram = piece.spline.roughness(smoothness.order);
             sum += smoothness.penalty * piece.spline.penalty(&gram, coefficients, at).0;
@@ -280,7 +291,7 @@ fn torque_levels(
     residuals: &[Vec<Vec<f64>>],
     paid: &Paid,
     noise: &mut [LogNoise],
-    most: usize,
+    (most, iterations): (usize, usize),
 ) {
     for (log, own) in noise.iter_mut().enumerate() {
         for joint in 0..own.colours.len() {
@@ -291,13 +302,21 @@ fn torque_levels(
             // (the expectation step of Dempster, Laird and Rubin, J. R. Statist. Soc. B 39 (1977) 1).
             let rows: usize = of_joint.iter().map(|r| r.len()).sum();
             let taken = &paid.torque[log][joint];
-            let covariance = |(lag, taken): (usize, &f64)| {
-                let product = |r: &&[f64]| r.iter().zip(r.iter().skip(lag)).map(|(early, late)| early * late).sum::<f64>();
-                of_joint.iter().map(product).sum::<f64>() / rows.max(1) as f64 + taken
-            };
-            let covariances: Vec<f64> = taken.iter().enumerate().map(covariance).collect();
+            let product =
+                |r: &&[f64], lag: usize| r.iter().zip(&r[lag.min(r.len())..]).map(|(a, b)| a * b).sum::<f64>();
+            let left = |lag: usize| of_joint.iter().map(|r| product(r, lag)).sum::<f64>() / rows.max(1) as f64;
+            // What is taken grows with the noise: as large as where both agree, which is where small steps lead to.
+            let before = own.torque_variance[joint];
+            let growth = (left(0) / (before - taken[0]).max(LEAST_SHARE * before)).clamp(0.5, 2.0);
+            let covariances: Vec<f64> =
+                taken.iter().enumerate().map(|(lag, taken)| left(lag) + growth * taken).collect();
+            let most = if iterations > ORDERS_FALL { own.colours[joint].len() } else { most };
             let (colour, variance) = from_covariances(&covariances[..=most.min(rows / 4)], rows);
+            let row_s = pieces.iter().find(|piece| piece.record.log == log);
+            let row_s = row_s.map_or(1.0, |piece| piece.mean_of as f64 / piece.record.rate_hz);
+            let (colour, variance) = shortened(colour, variance, &covariances, (-row_s / LONGEST_NOISE_S).exp());
             own.colours[joint] = colour;
+            own.torque_variance[joint] = covariances[0].max(least_sigma(pieces, log, joint).powi(2));
             own.torque_std[joint] = variance.sqrt().max(least_sigma(pieces, log, joint));
         }
     }

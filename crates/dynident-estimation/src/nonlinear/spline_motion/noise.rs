@@ -10,6 +10,8 @@ pub(super) struct LogNoise {
     pub(super) positions: Vec<Smoothness>,
     /// σ of what is new in a row's torque, joint by joint, N m (N).
     pub(super) torque_std: Vec<f64>,
+    /// Variance of a row's torque noise, old and new together, joint by joint.
+    pub(super) torque_variance: Vec<f64>,
     /// Autoregression of the torque's noise from row to row, joint by joint.
     pub(super) colours: Vec<Vec<f64>>,
 }

@@ -38,7 +38,8 @@ pub trait TorqueModel {
     /// Why a torque could not be made.
     type Error: From<EstimationError>;
 
-    /// Torques, joint-major, of samples `first..first + motion.samples` of record number `record`.
+    /// Torques, joint-major, of samples `first..first + motion.samples` of record number `record`; `place` holds record
+    /// and first. Blocks of a record come in the order of time, from its first sample on.
     ///
     /// # Errors
     /// As the model says.
@@ -125,7 +126,7 @@ pub struct SplineMotionSettings {
     /// takes the torque's noise for white.
     pub most_autoregression: usize,
     /// Length of a step of the parameters, in error bars over all directions, at which the iteration ends. Default
-    /// 0.01.
+    /// 0.03.
     pub tolerance: f64,
     /// Most steps. Default 30; five to ten are usual.
     pub max_iterations: usize,
@@ -142,7 +143,7 @@ impl Default for SplineMotionSettings {
             rank: RankSettings::default(),
             covariance: CovarianceMethod::default(),
             most_autoregression: 4,
-            tolerance: 0.01,
+            tolerance: 0.03,
             max_iterations: 30,
             knot_spacing_s: None,
             max_unknowns: 60_000,
@@ -163,7 +164,12 @@ impl SplineMotionSettings {
         within("tolerance", self.tolerance, 1.0e-6..=1.0, "give a length in error bars from 1e-6 to 1")?;
         require(self.max_iterations >= 2, "max_iterations", self.max_iterations as f64, "give at least 2")?;
         let fix = "give seconds, above 0 and at most 10";
-        require(self.knot_spacing_s.is_none_or(|s| s > 0.0 && s <= 10.0), "knot_spacing_s", self.knot_spacing_s.unwrap_or_default(), fix)?;
+        require(
+            self.knot_spacing_s.is_none_or(|s| s > 0.0 && s <= 10.0),
+            "knot_spacing_s",
+            self.knot_spacing_s.unwrap_or_default(),
+            fix,
+        )?;
         require(self.max_unknowns >= 1000, "max_unknowns", self.max_unknowns as f64, "give at least 1000")
     }
 }

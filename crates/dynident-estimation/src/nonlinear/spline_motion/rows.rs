@@ -181,7 +181,13 @@ impl Piece<'_> {
     }
 
     /// Rows before whitening, windows as wide as one row's functions.
-    fn raw(&self, joint: usize, (from, rows): (usize, usize), slopes: &TorqueSlopes, free: &FreeParameters) -> JointRows {
+    fn raw(
+        &self,
+        joint: usize,
+        (from, rows): (usize, usize),
+        slopes: &TorqueSlopes,
+        free: &FreeParameters,
+    ) -> JointRows {
         let (joints, mean_of) = (self.joints, self.mean_of);
         let (count, share) = (rows * mean_of, 1.0 / mean_of as f64);
         let width = self.window(0) * joints;
@@ -204,8 +210,7 @@ impl Piece<'_> {
                     let [by_q, by_dq, by_ddq] =
                         [0, 1, 2].map(|order| share * of_joint[(order * joints + other) * count + place]);
                     for a in 0..ACTIVE {
-                        own[(moved + a) * joints + other] +=
-                            by_q * values[a] + by_dq * rates[a] + by_ddq * seconds[a];
+                        own[(moved + a) * joints + other] += by_q * values[a] + by_dq * rates[a] + by_ddq * seconds[a];
                     }
                 }
             }

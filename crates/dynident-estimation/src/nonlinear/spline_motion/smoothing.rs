@@ -1,10 +1,10 @@
 //! A motion from positions alone: smoothing splines whose smoothness the positions' own likelihood chooses.
 //!
-//! `q_t = q(t) + σ e_t` with white e and `dʳq/dtʳ` white noise of intensity 1/λ (an integrated Wiener process): the mean
-//! of q given the positions is a spline with the penalty `λ ∫ (dʳq/dtʳ)² dt`, and σ, λ and r follow from the restricted
-//! likelihood. Wahba, Ann. Statist. 13 (1985) 1378; Wecker and Ansley, JASA 78 (1983) 81.
+//! `q_t = q(t) + σ e_t` with white e and `dʳq/dtʳ` white noise of intensity 1/λ (an integrated Wiener process): the
+//! mean of q given the positions is a spline with the penalty `λ ∫ (dʳq/dtʳ)² dt`, and σ, λ and r follow from the
+//! restricted likelihood. Wahba, Ann. Statist. 13 (1985) 1378; Wecker and Ansley, JASA 78 (1983) 81.
 
-use super::banded_arrow::BandedArrow;
+use super::banded_arrow::{BandedArrow, dot};
 use super::bspline::{ACTIVE, Spline};
 use rayon::prelude::*;
 
@@ -13,11 +13,13 @@ pub(super) const ORDERS: core::ops::RangeInclusive<usize> = 2..=5;
 /// Narrower spacings are not tried once so many in a row were less likely.
 const ENOUGH: usize = 3;
 /// Decades of λσ² that are searched, in units of where both terms are alike at the highest frequency.
-const DECADES: (i32, i32) = (-6, 13);
+/// Beyond the last one double precision does not hold both.
+const DECADES: (i32, i32) = (-6, 11);
 /// Steps of the golden section after that.
 const SECTIONS: usize = 14;
-/// σ of a position never falls below this, rad (m): no encoder tells less, and noise-free data leave rounding.
-pub(super) const LEAST_SIGMA: f64 = 1e-9;
+/// σ of a position never falls below this, rad (m): an encoder of 26 bits steps by 9e-8 rad, and
+/// noise-free data leave rounding.
+pub(super) const LEAST_SIGMA: f64 = 1e-7;
 
 /// How smooth a joint's motion in a log is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,41 +42,88 @@ pub(super) struct Smoothed {
     criterion: f64,
 }
 
-/// The spacing of knots, in samples, that is likeliest for all joints together, and each joint's motion with it.
-/// `positions[joint][piece]`; `ladder` from wide to narrow.
+/// The spacing of knots, in samples, next narrower to the one that is likeliest for all joints together, and each
+/// joint's motion with it: torque tells more of an acceleration than positions do. `positions[joint][piece]`; `ladder`
+/// from wide to narrow.
 pub(super) fn smoothed(positions: &[Vec<&[f64]>], rate_hz: f64, ladder: &[usize]) -> (usize, Vec<Smoothed>) {
     let likeliest = |own: &Vec<&[f64]>, step: usize| {
-        let all = ORDERS.map(|order| of_order(own, rate_hz, step, order));
+        let pieces: Option<Vec<Rough>> = own.iter().map(|q| Rough::new(q, rate_hz, step)).collect();
+        let pieces = pieces.unwrap_or_default();
+        let all = ORDERS.map(|order| of_order(&pieces, order));
         all.min_by(|a, b| a.criterion.total_cmp(&b.criterion)).unwrap_or_else(|| empty(3))
     };
-    let mut best: Option<(f64, usize, Vec<Smoothed>)> = None;
-    let mut worse = 0;
+    let mut tried: Vec<(f64, usize, Vec<Smoothed>)> = Vec::new();
+    let mut best = 0;
     for &step in ladder {
         let found: Vec<Smoothed> = positions.par_iter().map(|own| likeliest(own, step)).collect();
-        let criterion: f64 = found.iter().map(|found| found.criterion).sum();
-        if best.as_ref().is_none_or(|(least, ..)| criterion < *least) {
-            best = Some((criterion, step, found));
-            worse = 0;
-        } else {
-            worse += 1;
+        tried.push((found.iter().map(|found| found.criterion).sum(), step, found));
+        let last = tried.len() - 1;
+        if tried[last].0 < tried[best].0 {
+            best = last;
         }
-        if worse == ENOUGH {
+        if last - best == ENOUGH {
             break;
         }
     }
-    best.map_or((2, Vec::new()), |(_, step, found)| (step, found))
+    let chosen = (best + 1).min(tried.len().saturating_sub(1));
+    if chosen < tried.len() {
+        let (_, step, found) = tried.swap_remove(chosen);
+        return (step, found);
+    }
+    (2, Vec::new())
+}
+
+/// A piece's positions about a spline that is hardly smoothed: whatever the smoothness, the rest is small numbers.
+struct Rough {
+    spline: Spline,
+    samples: usize,
+    /// Position that all others are counted from: a joint far from zero loses no digits.
+    offset: f64,
+    coefficients: Vec<f64>,
+    /// `BᵀB` with `Bᵀ r` on the right, r what that spline leaves,
+    normal: BandedArrow,
+    right: Vec<f64>,
+    /// and its sum of squares.
+    squares: f64,
+}
+
+impl Rough {
+    fn new(q: &[f64], rate_hz: f64, step: usize) -> Option<Self> {
+        let spline = Spline::new(q.len(), step, rate_hz);
+        let offset = q.first().copied().unwrap_or_default();
+        let moved: Vec<f64> = q.iter().map(|q| q - offset).collect();
+        let (count, gram) = (spline.functions(), spline.roughness(3));
+        let least = unit(&spline, &gram) * 10.0_f64.powi(DECADES.0);
+        let mut matrix = BandedArrow::new(count, ACTIVE - 1, 0);
+        spline.add_to(&mut matrix, (0, 1), (1.0, &moved), (least, &gram, &[]));
+        let coefficients = matrix.eliminated().ok()?.band_solution(&[]);
+        let left = spline.residual(&coefficients, (0, 1), &moved);
+        let mut normal = BandedArrow::new(count, ACTIVE - 1, 0);
+        spline.add_to(&mut normal, (0, 1), (1.0, &left), (0.0, &gram, &[]));
+        let right = normal.right().to_vec();
+        let squares = left.iter().map(|x| x * x).sum();
+        Some(Self { spline, samples: q.len(), offset, coefficients, normal, right, squares })
+    }
+}
+
+/// The largest λ that double precision holds beside positions of that noise.
+pub(super) fn most_penalty(spline: &Spline, gram: &[[f64; ACTIVE]; ACTIVE], position_std: f64) -> f64 {
+    unit(spline, gram) * 10.0_f64.powi(DECADES.1) / (position_std * position_std)
+}
+
+/// Where positions and roughness are alike at the highest frequency.
+fn unit(spline: &Spline, gram: &[[f64; ACTIVE]; ACTIVE]) -> f64 {
+    let trace = |matrix: &[[f64; ACTIVE]; ACTIVE]| (0..ACTIVE).map(|k| matrix[k][k]).sum::<f64>();
+    trace(&spline.products(spline.step)) / trace(gram)
 }
 
 /// The likeliest smoothness of a given order.
-fn of_order(pieces: &[&[f64]], rate_hz: f64, step: usize, order: usize) -> Smoothed {
-    let splines: Vec<Spline> = pieces.iter().map(|q| Spline::new(q.len(), step, rate_hz)).collect();
-    let Some(any) = splines.first() else { return empty(order) };
-    let gram = any.roughness(order);
-    let products = any.products(step);
-    let trace = |matrix: &[[f64; ACTIVE]; ACTIVE]| (0..ACTIVE).map(|k| matrix[k][k]).sum::<f64>();
-    let unit = trace(&products) / trace(&gram);
-    let normal = any.mean_log_roughness(order);
-    let at = |decades: f64| fitted(pieces, &splines, (unit * 10.0_f64.powf(decades), &gram, normal), order);
+fn of_order(pieces: &[Rough], order: usize) -> Smoothed {
+    let Some(any) = pieces.first() else { return empty(order) };
+    let gram = any.spline.roughness(order);
+    let unit = unit(&any.spline, &gram);
+    let normal = any.spline.mean_log_roughness(order);
+    let at = |decades: f64| fitted(pieces, (unit * 10.0_f64.powf(decades), &gram, normal), order);
     let mut best = (f64::from(DECADES.0), at(f64::from(DECADES.0)));
     for decade in DECADES.0 + 1..=DECADES.1 {
         let next = at(f64::from(decade));
@@ -107,34 +156,27 @@ fn empty(order: usize) -> Smoothed {
 }
 
 /// The spline for one ratio λσ², with twice the negative logarithm of its restricted likelihood.
-fn fitted(
-    pieces: &[&[f64]],
-    splines: &[Spline],
-    (ratio, gram, normal): (f64, &[[f64; ACTIVE]; ACTIVE], f64),
-    order: usize,
-) -> Smoothed {
+fn fitted(pieces: &[Rough], (ratio, gram, normal): (f64, &[[f64; ACTIVE]; ACTIVE], f64), order: usize) -> Smoothed {
     let (mut squares, mut rough, mut log_determinant) = (0.0, 0.0, 0.0);
     let (mut samples, mut functions, mut free) = (0, 0, 0);
     let mut coefficients = Vec::with_capacity(pieces.len());
-    for (q, spline) in pieces.iter().zip(splines) {
-        // About the first position: a joint far from zero loses no digits.
-        let offset = q.first().copied().unwrap_or_default();
-        let moved: Vec<f64> = q.iter().map(|q| q - offset).collect();
-        let count = spline.functions();
-        let mut matrix = BandedArrow::new(count, ACTIVE - 1, 0);
-        spline.add_to(&mut matrix, (0, 1), (1.0, &moved), (ratio, gram, &[]));
+    for piece in pieces {
+        let (spline, count) = (&piece.spline, piece.spline.functions());
+        let mut matrix = piece.normal.clone();
+        let (_, pulled) = spline.penalty(gram, &piece.coefficients, (0, 1));
+        spline.add_roughness(&mut matrix, (0, 1), (ratio, gram, &pulled));
         let Ok(solved) = matrix.eliminated() else { return empty(order) };
-        let own = solved.band_solution(&[]);
-        let (penalty, _) = spline.penalty(gram, &own, (0, 1));
-        let left = residual(spline, &own, (0, 1), &moved);
-        squares += left.iter().map(|x| x * x).sum::<f64>();
-        rough += penalty;
+        let step = solved.band_solution(&[]);
+        let own: Vec<f64> = piece.coefficients.iter().zip(&step).map(|(c, step)| c + step).collect();
+        rough += spline.penalty(gram, &own, (0, 1)).0;
+        let curved = dot(&step, &piece.normal.product(&step));
+        squares += (piece.squares - 2.0 * dot(&step, &piece.right) + curved).max(0.0);
         // The prior is flat over polynomials as functions, whatever the number of knots.
         log_determinant += solved.log_determinant() + order as f64 * (count as f64).ln();
-        samples += q.len();
+        samples += piece.samples;
         functions += count;
         free += order;
-        coefficients.push(own.iter().map(|c| c + offset).collect());
+        coefficients.push(own.iter().map(|c| c + piece.offset).collect());
     }
     let freedom = samples as f64 - free as f64;
     if freedom < 1.0 {
@@ -146,16 +188,6 @@ fn fitted(
         - proper * (ratio.ln() + normal);
     let smoothness = Smoothness { order, penalty: ratio / variance, position_std: variance.sqrt() };
     Smoothed { smoothness, coefficients, criterion }
-}
-
-/// Positions less the spline's.
-pub(super) fn residual(spline: &Spline, coefficients: &[f64], (joint, joints): (usize, usize), q: &[f64]) -> Vec<f64> {
-    let of = |(sample, q): (usize, &f64)| {
-        let first = spline.first(sample);
-        let values = spline.at(sample)[0].iter().enumerate();
-        q - values.map(|(k, b)| b * coefficients[(first + k) * joints + joint]).sum::<f64>()
-    };
-    q.iter().enumerate().map(of).collect()
 }
 
 /// `tr(Z BᵀB)` for a joint, by the entries of Z.
@@ -224,8 +256,9 @@ mod tests {
         let [q, dq, ddq] = &mut out;
         spline.motion(&own.coefficients[0], (0, 1), 200, [q, dq, ddq]);
         let error = dq.iter().enumerate().map(|(k, dq)| (dq - rate((200 + k) as f64 / 200.0)).powi(2)).sum::<f64>();
-        // Band of 2 Hz: σ √(2 · 2/200) · 2π 2/√3 = 2 mm/s.
-        assert!((error / 1600.0).sqrt() < 3e-3, "{}", (error / 1600.0).sqrt());
+        // A filter that lets 4 Hz through, three and a half times the highest frequency, leaves σ √(2 · 4/200) · 2π
+        // 4/√3 = 5.8 mrad/s; differences of samples 400 mrad/s.
+        assert!((error / 1600.0).sqrt() < 5.8e-3, "{}", (error / 1600.0).sqrt());
     }
 
     /// Nothing but a constant: no motion is made up, and nothing divides by zero.

@@ -5,7 +5,7 @@ use super::banded_arrow::{BandedArrow, Eliminated, InverseBand, axpy, dot};
 use super::noise::LogNoise;
 use super::problem::TorqueModel;
 use super::rows::{FreeParameters, JointRows, Piece};
-use super::smoothing::{LEAST_SIGMA, residual, rough_trace, sample_trace};
+use super::smoothing::{LEAST_SIGMA, most_penalty, rough_trace, sample_trace};
 use crate::error::EstimationError;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
@@ -84,7 +84,7 @@ impl System {
             for (joint, smoothness) in own.positions.iter().enumerate() {
                 let (joints, spline) = ((joint, piece.joints), &piece.spline);
                 let gram = spline.roughness(smoothness.order);
-                let left = residual(spline, coefficients, joints, piece.q(joint));
+                let left = spline.residual(coefficients, joints, piece.q(joint));
                 let (_, pulled) = spline.penalty(&gram, coefficients, joints);
                 let position = smoothness.position_std.powi(-2);
                 spline.add_to(&mut matrix, joints, (position, &left), (smoothness.penalty, &gram, &pulled));
@@ -271,14 +271,16 @@ impl Paid {
         for (log, own) in noise.iter_mut().enumerate() {
             for (joint, smoothness) in own.positions.iter_mut().enumerate() {
                 let (mut squares, mut samples, mut rough, mut rank) = (0.0, 0, 0.0, 0);
+                let mut most = f64::INFINITY;
                 let of_log = pieces.iter().zip(coefficients).filter(|(piece, _)| piece.record.log == log);
                 for (piece, coefficients) in of_log {
-                    let left = residual(&piece.spline, coefficients, (joint, piece.joints), piece.q(joint));
+                    let left = piece.spline.residual(coefficients, (joint, piece.joints), piece.q(joint));
                     squares += left.iter().map(|x| x * x).sum::<f64>();
                     samples += left.len();
                     let gram = piece.spline.roughness(smoothness.order);
                     rough += piece.spline.penalty(&gram, coefficients, (joint, piece.joints)).0;
                     rank += piece.spline.functions() - smoothness.order;
+                    most = most.min(most_penalty(&piece.spline, &gram, smoothness.position_std));
                 }
                 let within = |old: f64, new: f64| {
                     let new = if new.is_finite() { new } else { old };
@@ -291,6 +293,7 @@ impl Paid {
                 if rough > 0.0 {
                     smoothness.penalty = within(smoothness.penalty, moved / rough);
                 }
+                smoothness.penalty = smoothness.penalty.min(most);
             }
         }
     }
