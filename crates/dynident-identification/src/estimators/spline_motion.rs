@@ -15,6 +15,10 @@ use serde::{Deserialize, Serialize};
 /// Shorter pieces between two gaps are left out, samples.
 const LEAST_SAMPLES: usize = 64;
 
+/// Where residuals of the filtered rows are so many times those of weighted least squares, what lasts in the torque's
+/// residuals is the model's error, and the whitening filter has taken the model's own motion for noise.
+const MOST_OVER_START: f64 = 1.25;
+
 /// What the fit of motion and parameters found.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -26,6 +30,9 @@ pub struct SplineFit {
     pub cost_at_start: f64,
     /// What it came down to.
     pub cost: f64,
+    /// Residuals of the filtered rows over those of weighted least squares, root mean square over the joints. Somewhat
+    /// above one where noise of the positions biases least squares; far above, the model's error is taken for noise.
+    pub residual_over_start: f64,
 }
 
 /// The estimate, and what was found of each log's motion.
@@ -69,15 +76,30 @@ pub(super) fn spline_motion(
     };
     let settings =
         SplineMotionSettings { rank: estimation.rank, covariance: estimation.covariance, ..settings.clone() };
-    let found = spline_motion_least_squares(&begun, &settings, &mut SplineTorque::new(model, temperatures_c))?;
+    let pilot = torque_sigma(problem, &start.values)?;
+    let mut torque = SplineTorque::new(model, temperatures_c);
+    let mut fitted = |settings: &SplineMotionSettings| -> Result<_, EstimatorError> {
+        let mut found = spline_motion_least_squares(&begun, settings, &mut torque)?;
+        found.estimate.joint_sigma = torque_sigma(problem, &found.estimate.values)?;
+        let squares = found.estimate.joint_sigma.iter().zip(&pilot).map(|(own, pilot)| (own / pilot).powi(2));
+        let over_start = (squares.sum::<f64>() / dof as f64).sqrt();
+        Ok((found, over_start))
+    };
+    let (mut found, mut over_start) = fitted(&settings)?;
+    if (over_start.is_nan() || over_start > MOST_OVER_START) && settings.most_autoregression > 0 {
+        let (white, of_white) = fitted(&SplineMotionSettings { most_autoregression: 0, ..settings })?;
+        if over_start.is_nan() || over_start > of_white {
+            (found, over_start) = (white, of_white);
+        }
+    }
     let mut estimate = found.estimate;
-    estimate.joint_sigma = torque_sigma(problem, &estimate.values)?;
     // Channels are torques first; an estimate speaks of joints, by their torque.
     for of_channels in [&mut estimate.score_inflation, &mut estimate.effective_lag1, &mut estimate.segment_correlation]
     {
         of_channels.truncate(dof);
     }
-    let fit = SplineFit { logs: found.logs, cost_at_start: found.cost_at_start, cost: found.cost };
+    let (logs, cost_at_start, cost) = (found.logs, found.cost_at_start, found.cost);
+    let fit = SplineFit { logs, cost_at_start, cost, residual_over_start: over_start };
     Ok((estimate, Findings::Spline(fit)))
 }
 

@@ -136,7 +136,9 @@ impl BandedArrow {
                     value -= share * y[j];
                 }
             }
-            w_own.iter_mut().for_each(|x| *x /= root);
+            for x in w_own.iter_mut() {
+                *x /= root;
+            }
             y[i] = value / root;
         }
         let mut schur = self.corner.clone();
@@ -191,7 +193,9 @@ impl Eliminated {
             let row = &self.l[i * wide..(i + 1) * wide];
             let (before, own) = x.split_at_mut(i * count);
             let own = &mut own[..count];
-            own.iter_mut().for_each(|x| *x /= row[b]);
+            for x in own.iter_mut() {
+                *x /= row[b];
+            }
             for j in i.saturating_sub(b)..i {
                 let share = row[j + b - i];
                 if share != 0.0 {

@@ -176,11 +176,14 @@ pub fn spline_motion_least_squares<M: TorqueModel>(
     Ok(SplineMotionEstimate { estimate, motion: motion.collect(), logs, cost_at_start, cost: cost_now })
 }
 
+/// Pieces with their knots, levels of every log, and coefficients of every piece.
+type Beginning<'a> = (Vec<Piece<'a>>, Vec<LogNoise>, Vec<Vec<f64>>);
+
 /// Knots, the motion that the positions alone give, and its levels.
 fn begin<'a>(
     problem: &'a SplineMotionProblem,
     settings: &SplineMotionSettings,
-) -> Result<(Vec<Piece<'a>>, Vec<LogNoise>, Vec<Vec<f64>>), EstimationError> {
+) -> Result<Beginning<'a>, EstimationError> {
     let joints = problem.joints.len();
     let samples = |record: &SplineRecord| record.q.len() / joints;
     let logs = problem.records.iter().map(|record| record.log + 1).max().unwrap_or(0);

@@ -96,7 +96,7 @@ impl SplineMotionProblem {
                 let what = "a piece of a log".to_owned();
                 return Err(EstimationError::TooFewRows { what, rows: samples, parameters: LEAST_SAMPLES as f64 });
             }
-            if let Some(place) = record.q.iter().chain(&record.tau).position(|x| !(x.abs() <= LARGEST)) {
+            if let Some(place) = record.q.iter().chain(&record.tau).position(|x| x.is_nan() || x.abs() > LARGEST) {
                 let value = record.q.iter().chain(&record.tau).nth(place).copied().unwrap_or(f64::NAN);
                 let (row, column) = (place % samples, place / samples);
                 return Err(EstimationError::Unusable { row, column, value, limit: LARGEST });

@@ -158,7 +158,9 @@ impl Piece<'_> {
             };
             let whitened: Vec<JointRows> = carried.par_iter_mut().enumerate().map(of).collect();
             take(&whitened, &carried);
-            carried.iter_mut().for_each(|rows| rows.keep_last(lags, free.count()));
+            for rows in &mut carried {
+                rows.keep_last(lags, free.count());
+            }
         }
         Ok(())
     }

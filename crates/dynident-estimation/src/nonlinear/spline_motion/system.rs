@@ -260,7 +260,9 @@ impl Paid {
             }
         }
         for (torque, groups) in torque.iter_mut().flatten().zip(groups.iter().flatten()) {
-            torque.iter_mut().for_each(|sum| *sum /= groups.max(1.0));
+            for sum in torque.iter_mut() {
+                *sum /= groups.max(1.0);
+            }
         }
         Self { position, smoothness, torque }
     }
