@@ -15,14 +15,7 @@ struct Pendulums {
 const WIDTH: f64 = 0.05;
 
 impl Pendulums {
-    fn values(
-        &self,
-        parameters: &[f64],
-        joint: usize,
-        q: &[f64],
-        dq: &[f64],
-        ddq: &[f64],
-    ) -> (f64, [f64; 5], [f64; 3]) {
+    fn values(parameters: &[f64], joint: usize, q: &[f64], dq: &[f64], ddq: &[f64]) -> (f64, [f64; 5], [f64; 3]) {
         let own = &parameters[5 * joint..5 * joint + 5];
         let smooth = (dq[joint] / WIDTH).tanh();
         let columns = [ddq[joint], q[joint].sin(), dq[joint], smooth, 1.0];
@@ -65,7 +58,7 @@ impl TorqueModel for Pendulums {
             let (q, dq, ddq) = (at(motion.q), at(motion.dq), at(motion.ddq));
             let sum: f64 = ddq.iter().sum();
             for j in 0..n {
-                let (mut torque, columns, slopes) = self.values(parameters, j, &q, &dq, &ddq);
+                let (mut torque, columns, slopes) = Self::values(parameters, j, &q, &dq, &ddq);
                 for (k, column) in columns.iter().enumerate() {
                     out.by_parameters[j][k * samples + s] = *column;
                 }
@@ -111,7 +104,9 @@ fn record(
     }
     let motion = JointMotion { samples, q: &q, dq: &dq, ddq: &ddq };
     let mut tau = Pendulums { joints }.torque((0, 0), &motion, &truth(joints)).unwrap();
-    q.iter_mut().for_each(|q| *q += position * random.normal());
+    for q in &mut q {
+        *q += position * random.normal();
+    }
     for own in tau.chunks_exact_mut(samples) {
         let mut error = torque * random.normal();
         for tau in own {

@@ -74,7 +74,7 @@ impl<'a> SplineTorque<'a> {
 struct Instants<'a>(&'a RegressorModel);
 
 impl Instants<'_> {
-    fn parts(&self, motion: &JointMotion<'_>) -> Vec<Part> {
+    fn parts(motion: &JointMotion<'_>) -> Vec<Part> {
         let of = |first: usize| {
             let samples = BLOCK.min(motion.samples - first);
             let cut = |values: &[f64]| -> Vec<f64> {
@@ -87,7 +87,7 @@ impl Instants<'_> {
     }
 
     /// Panels of a part.
-    fn panels(&self, workspace: &mut BatchWorkspace, part: &Part) -> Panels {
+    fn panels(self, workspace: &mut BatchWorkspace, part: &Part) -> Panels {
         let mut panels = Panels::default();
         let motion = part.view();
         regressor_panels(self.0.model(), workspace, self.0.layout(), &motion, &mut panels);
@@ -95,7 +95,7 @@ impl Instants<'_> {
     }
 
     /// Torque of joint `joint` from its panel.
-    fn torque_of(&self, joint: usize, panels: &Panels, samples: usize, parameters: &[f64]) -> Vec<f64> {
+    fn torque_of(self, joint: usize, panels: &Panels, samples: usize, parameters: &[f64]) -> Vec<f64> {
         let mut torque = vec![0.0; samples];
         let columns = self.0.layout().joint_columns(joint);
         for (&column, w) in columns.iter().zip(panels.joint(joint).chunks_exact(samples)) {
@@ -107,7 +107,7 @@ impl Instants<'_> {
 
     /// Derivatives of joint `joint`'s torque by the motion: positions, velocities, accelerations.
     fn slopes_of(
-        &self,
+        self,
         joint: usize,
         workspace: &mut BatchWorkspace,
         (part, adjoint): (&Part, &mut Panels),
@@ -147,7 +147,7 @@ impl TorqueModel for SplineTorque<'_> {
     ) -> Result<Vec<f64>, EstimationError> {
         let (joints, samples) = (self.model.dof(), motion.samples);
         let instants = Instants(self.model);
-        let parts = instants.parts(motion);
+        let parts = Instants::parts(motion);
         let known = self.following(place, &parts);
         let of = |workspace: &mut BatchWorkspace, (number, part): (usize, &Part)| -> Vec<Vec<f64>> {
             let torques = |panels: &Panels| {
@@ -177,7 +177,7 @@ impl TorqueModel for SplineTorque<'_> {
     ) -> Result<TorqueSlopes, EstimationError> {
         let (joints, samples, layout) = (self.model.dof(), motion.samples, self.model.layout());
         let instants = Instants(self.model);
-        let parts = instants.parts(motion);
+        let parts = Instants::parts(motion);
         let known = self.following(place, &parts);
         let of = |workspace: &mut BatchWorkspace, part: &Part| {
             let panels = if known.is_none() { Some(instants.panels(workspace, part)) } else { None };
