@@ -20,11 +20,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         let figures = cutoff_figures(cell, runs)?;
         println!(
             "| {} | {} | {} | {} | {:.0e} | {:.1} | {:.2} | {:.2} | {:.2} | {:.1} | {:.2} | {:.2} | {:.2} | {} |",
-            cell.robot,
-            cell.harmonics,
-            cell.duration_s,
-            cell.rate_hz,
-            cell.position_noise_rad,
+            cell.robot.name,
+            cell.log.harmonics,
+            cell.log.duration_s,
+            cell.log.rate_hz,
+            cell.log.position_noise_rad,
             figures.spectrum_hz,
             100.0 * figures.of_spectrum,
             100.0 * figures.of_default,

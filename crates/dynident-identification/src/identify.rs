@@ -1,6 +1,7 @@
 //! The whole way from recordings to an identified model, stage by stage.
 
 use crate::bandwidth::{CutoffByError, choose_cutoff};
+use crate::chosen_friction::{ChosenFriction, choose_friction};
 use crate::consistent::{
     ConsistencyError, ParameterInterval, consistent_intervals, consistent_with_estimate, inconsistent_nominal_bodies,
     inertials, nearest_to_nominal,
@@ -185,6 +186,14 @@ impl Job<'_, '_> {
     }
 }
 
+/// The logs with a cut-off that was chosen.
+fn with_choice<'a>(logs: Logs<'a>, settings: &IdentificationSettings, cutoff_hz: Option<f64>) -> Logs<'a> {
+    match cutoff_hz {
+        Some(cutoff_hz) => logs.with_cutoff(&settings.motion, cutoff_hz),
+        None => logs,
+    }
+}
+
 fn identified(
     task: &IdentificationTask,
     execution: Execution<'_>,
@@ -203,14 +212,25 @@ fn identified(
     let logs = Logs::new(robot.model(), recordings, settings.filters(), &chosen, cutoff_hz, execution)?;
     let first = RegressorModel::from(robot.clone());
     let cutoff = choose_cutoff((&logs, settings), &first, &chosen)?;
-    let logs = match &cutoff {
-        Some(choice) if choice.cutoff_hz != choice.motion_hz => logs.with_cutoff(&settings.motion, choice.cutoff_hz),
-        _ => logs,
+    let started = Instant::now();
+    let (logs, cutoff, friction) = if settings.friction.is_empty() {
+        let friction = ChosenFriction { model: first, joints: Vec::new() };
+        (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
+    } else {
+        let logs = with_choice(logs, settings, cutoff.as_ref().map(CutoffByError::highest_alike_hz));
+        let friction = choose_friction((&logs, settings), robot, &chosen)?;
+        let cutoff = choose_cutoff((&logs, settings), &friction.model, &chosen)?.or(cutoff);
+        (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
     };
+    let choice_s = started.elapsed().as_secs_f64();
     let refit = job.arm().map(KnownArm::refit);
-    let training = training_rows((&logs, settings), robot.clone().into(), &chosen, payloads, refit)?;
-    let mut times =
-        StageTimes { logs_s: training.timings_s[0], estimation_s: training.timings_s[1], examination_s: 0.0 };
+    let mut training = training_rows((&logs, settings), friction.model, &chosen, payloads, refit)?;
+    training.friction_choice = friction.joints;
+    let mut times = StageTimes {
+        logs_s: training.timings_s[0],
+        estimation_s: training.timings_s[1] + choice_s,
+        examination_s: 0.0,
+    };
     let started = Instant::now();
     let estimation = match job {
         Job::Payload(arm) => {

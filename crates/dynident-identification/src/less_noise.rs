@@ -49,7 +49,8 @@ pub(crate) fn with_less_noise<'a>(
     let execution = found.logs.execution;
     let logs = Logs::new(robot.model(), recordings, settings.filters(), chosen, Some(lower_hz), execution)?
         .with_motion_band(found.logs.motion_hz());
-    let training = training_rows((&logs, &found.settings), robot.clone().into(), chosen, payloads, None)?;
+    let mut training = training_rows((&logs, &found.settings), found.training.model.clone(), chosen, payloads, None)?;
+    training.friction_choice.clone_from(&found.training.friction_choice);
     let mut estimation = estimate(&training.rows((&logs, &found.settings), chosen), None)?;
     if let Some(again) = &mut estimation.noise_in_regressor {
         if again.instruments.weak || estimation.estimate.status == EstimateStatus::IterationLimit {

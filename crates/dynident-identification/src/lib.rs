@@ -117,6 +117,7 @@
 
 mod bandwidth;
 mod check;
+mod chosen_friction;
 mod conditional;
 pub mod consistent;
 pub mod diagnosis;
@@ -140,6 +141,7 @@ mod training;
 
 pub use bandwidth::{CutoffByError, CutoffCandidate, choose_cutoff};
 pub use check::{StudyExamination, examine_study};
+pub use chosen_friction::{ChosenFriction, choose_friction};
 pub use conditional::{Condition, Conditional, conditionals, resting_joints};
 pub use error::IdentificationError;
 pub use estimators::EstimationSettings;

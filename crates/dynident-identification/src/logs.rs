@@ -81,7 +81,11 @@ impl<'a> Logs<'a> {
     /// own band, which the cut-off so far stands for.
     #[must_use]
     pub fn with_cutoff(mut self, settings: &MotionSettings, cutoff_hz: f64) -> Self {
-        self.motion_hz = self.motion_hz.or_else(|| motion_band_hz(&self.motion));
+        let motion_hz = self.motion_hz.or_else(|| motion_band_hz(&self.motion));
+        if motion_band_hz(&self.motion) == Some(cutoff_hz) {
+            return self;
+        }
+        self.motion_hz = motion_hz.filter(|motion_hz| *motion_hz != cutoff_hz);
         self.motion.differentiator = settings.differentiator.clone().with_cutoff(cutoff_hz);
         self.kept = self.recordings.iter().map(|_| OnceLock::new()).collect();
         self

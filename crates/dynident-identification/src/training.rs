@@ -5,7 +5,7 @@ use crate::error::IdentificationError;
 use crate::estimators::{EstimationSettings, Estimator, TrainingRows};
 use crate::examination::{Evidence, PriorAgreement};
 use crate::execution::Execution;
-use crate::friction::{JointFriction, candidate_columns, choose_friction, chosen_model};
+use crate::friction::JointFriction;
 use crate::logs::Logs;
 use crate::payload::{DriveGain, Gains, LoadColumns, Payload, Refit, drive_gains, known_loads};
 use crate::recording::{LogError, MotionRecord, Recording};
@@ -18,10 +18,15 @@ use dynident_estimation::{
     ordinary_least_squares, unexcited_columns, weighted_least_squares,
 };
 use dynident_recording::{MotionBlock, MotionSettings};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Instant;
+
+/// Passes that the load behind load-dependent friction takes at most, and the change from one to the next, in units of
+/// the torque, at which it has settled.
+const LOAD_PASSES: usize = 6;
+const LOAD_SETTLED: f64 = 1e-3;
 
 /// How closely given values are held, as a share of the largest of them.
 const HELD: f64 = 1e-6;
@@ -75,8 +80,9 @@ impl Training {
     }
 }
 
-/// Makes the factors of the recordings `training`; where friction is to be chosen or depends on the load, once more
-/// with what the first fit says. `known_arm` where the arm is held, with what of it is fitted again.
+/// Makes the factors of the recordings `training`; where friction depends on the load, again with what the fit before
+/// says of it. `known_arm` where the arm is held, with what of it is fitted again. Friction is the model's own:
+/// [`choose_friction`](crate::choose_friction) comes before.
 ///
 /// # Errors
 /// Recordings that cannot be read, payloads and gains that do not go together, rows that do not carry an estimate.
@@ -87,7 +93,7 @@ pub fn training_rows(
     payloads: &[Payload],
     known_arm: Option<Refit>,
 ) -> Result<Training, IdentificationError> {
-    let job = Job { logs, settings, training, payloads, known_arm };
+    let job = TrainingPasses { logs, settings, training, payloads, known_arm };
     let mut fitted = job.fit(model)?;
     if settings.gains == GainChoice::Unknown {
         let known = known_loads(&fitted.columns, training)?;
@@ -114,7 +120,7 @@ pub(crate) fn plain_fit(
     let alone = Execution { threads: 1, ..Execution::default() };
     let motion = MotionSettings::default();
     let logs = Logs::new(model.model(), &recordings, (&motion, filter), &[], None, alone)?;
-    let job = Job { logs: &logs, settings, training: &all, payloads: &[], known_arm: None };
+    let job = TrainingPasses { logs: &logs, settings, training: &all, payloads: &[], known_arm: None };
     let rows = job.rows_once(model)?;
     Ok(plain_estimate(&settings.estimation, &rows.problem)?)
 }
@@ -127,61 +133,44 @@ fn of_piece(motion: MotionBlock) -> Recording {
     Recording::of_motion(label, record)
 }
 
-struct Job<'a> {
-    logs: &'a Logs<'a>,
-    settings: &'a IdentificationSettings,
-    training: &'a [usize],
-    payloads: &'a [Payload],
-    known_arm: Option<Refit>,
+/// Passes over the training recordings.
+pub(crate) struct TrainingPasses<'a> {
+    pub(crate) logs: &'a Logs<'a>,
+    pub(crate) settings: &'a IdentificationSettings,
+    pub(crate) training: &'a [usize],
+    pub(crate) payloads: &'a [Payload],
+    pub(crate) known_arm: Option<Refit>,
 }
 
-impl Job<'_> {
+impl TrainingPasses<'_> {
+    /// The rows of this model; where friction depends on a load that is not known yet, again and again with the load
+    /// of the fit before, until it settles.
     fn fit(&self, model: RegressorModel) -> Result<Training, IdentificationError> {
-        let settings = self.settings;
-        let first = self.rows_once(model)?;
-        let candidates: Vec<_> = settings
-            .friction
-            .iter()
-            .filter_map(|search| Some((first.model.model().joint_index(&search.joint)?, search)))
-            .map(|(joint, search)| (joint, candidate_columns(search, joint)))
-            .collect();
-        if candidates.is_empty() && !first.model.needs_load() {
-            return Ok(first);
+        let load_is_known = model.load_parameters.is_some();
+        let mut found = self.rows_once(model)?;
+        if load_is_known || !found.model.needs_load() {
+            return Ok(found);
         }
-        let started = Instant::now();
-        let plain = plain_estimate(&settings.estimation, &first.problem)?;
-        let [first_read_s, estimated_s] = [first.timings_s[0], first.timings_s[1] + started.elapsed().as_secs_f64()];
-        if candidates.is_empty() {
-            let mut second = self.rows_once(first.model.clone().with_load_of(&first.model, &plain.values))?;
-            second.timings_s = [second.timings_s[0] + first_read_s, second.timings_s[1] + estimated_s];
-            return Ok(second);
+        for _ in 0..LOAD_PASSES {
+            let started = Instant::now();
+            let plain = plain_estimate(&self.settings.estimation, &found.problem)?;
+            let estimated_s = started.elapsed().as_secs_f64();
+            let with_load = found.model.clone().with_load_of(&found.model, &plain.values);
+            let has_settled = load_has_settled(&found, &with_load)?;
+            let [read_s, chosen_s] = found.timings_s;
+            if has_settled {
+                found.timings_s[1] += estimated_s;
+                break;
+            }
+            found = self.rows_once(with_load)?;
+            found.timings_s[0] += read_s;
+            found.timings_s[1] += chosen_s + estimated_s;
         }
-        // All candidates as columns of one set of factors, from which each candidate model is a selection.
-        let known = first.model.layout().columns();
-        let further = candidates.iter().flat_map(|(_, columns)| columns).map(|column| column.term.clone());
-        let further = further.filter(|term| !known.contains(&Column::Term(term.clone())));
-        let wide = first.model.with_further_columns(further).with_load_of(&first.model, &plain.values);
-        let started = Instant::now();
-        let factors = self.read(&wide)?;
-        let read_s = first_read_s + started.elapsed().as_secs_f64();
-        let started = Instant::now();
-        let wide_problem = self.stated_problem(&wide, &self.columns(&wide)?, &factors)?;
-        let equal_weights = matches!(settings.estimation.estimator, Estimator::Ordinary);
-        let friction_choice =
-            choose_friction(&first.model, &wide, &wide_problem, &candidates, (&plain, equal_weights))?;
-        let chosen = chosen_model(&first.model.parametric, &friction_choice)?;
-        let model = RegressorModel::from(chosen).with_load_of(&first.model, &plain.values);
-        let mut logs = factors.into_iter().map(|log| log.of(&wide, &model)).collect::<Result<Vec<_>, _>>()?;
-        self.add_noise(&model, &mut logs)?;
-        let columns = self.columns(&model)?;
-        let problem = self.problem(&model, &columns, &logs)?;
-        let timings_s = [read_s, estimated_s + started.elapsed().as_secs_f64()];
-        let joints = joints_with_rows(&logs, model.dof());
-        Ok(Training { model, logs, joints, problem, columns, friction_choice, gains: None, timings_s })
+        Ok(found)
     }
 
     /// The rows with this model's columns.
-    fn rows_once(&self, model: RegressorModel) -> Result<Training, IdentificationError> {
+    pub(crate) fn rows_once(&self, model: RegressorModel) -> Result<Training, IdentificationError> {
         let columns = self.columns(&model)?;
         let started = Instant::now();
         let mut logs = self.read(&model)?;
@@ -194,12 +183,12 @@ impl Job<'_> {
         Ok(Training { model, joints, logs, problem, columns, friction_choice: Vec::new(), gains: None, timings_s })
     }
 
-    fn columns(&self, model: &RegressorModel) -> Result<LoadColumns, IdentificationError> {
+    pub(crate) fn columns(&self, model: &RegressorModel) -> Result<LoadColumns, IdentificationError> {
         Ok(LoadColumns::new(self.settings, self.logs.recordings, self.payloads, model, self.known_arm)?)
     }
 
     /// Recordings side by side, or one with its reader on a second thread; results stand in their order either way.
-    fn read(&self, model: &RegressorModel) -> Result<Vec<LogFactors>, LogError> {
+    pub(crate) fn read(&self, model: &RegressorModel) -> Result<Vec<LogFactors>, LogError> {
         self.logs.begin("logs to factors", self.training);
         let alone = self.training.len() == 1;
         let one = |index: &usize| log_factors((self.logs, self.settings), model, *index, alone);
@@ -242,7 +231,7 @@ impl Job<'_> {
     }
 
     /// All rows, with what is known of the parameters beforehand.
-    fn stated_problem(
+    pub(crate) fn stated_problem(
         &self,
         model: &RegressorModel,
         columns: &LoadColumns,
@@ -308,6 +297,26 @@ impl Job<'_> {
     }
 }
 
+/// Whether the load that `next` has hardly differs, on the rows, from the one that they were made with.
+pub(crate) fn load_has_settled(found: &Training, next: &RegressorModel) -> Result<bool, EstimationError> {
+    let (Some(before), Some(after)) = (&found.model.load_parameters, &next.load_parameters) else { return Ok(false) };
+    let (mut change, mut torque) = (0.0, 0.0);
+    for log in &found.logs {
+        for (joint, factor) in log.factors.iter().enumerate() {
+            let total = factor.total();
+            let columns = found.model.layout().joint_columns(joint);
+            let of_bodies = |&column: &usize| match found.model.layout().columns()[column] {
+                Column::Term(_) => 0.0,
+                _ => after[column] - before[column],
+            };
+            let difference = DVector::from_iterator(columns.len(), columns.iter().map(of_bodies));
+            change += (total.regressor_triangle() * difference).norm_squared();
+            torque += total.torque_norm().powi(2);
+        }
+    }
+    Ok(change <= LOAD_SETTLED * LOAD_SETTLED * torque)
+}
+
 /// Joints of which some recording has rows: where windows leave a joint none, it is not in the problem.
 fn joints_with_rows(logs: &[LogFactors], dof: usize) -> Vec<usize> {
     (0..dof).filter(|&joint| logs.iter().any(|log| log.factors[joint].rows() > 0)).collect()
@@ -331,7 +340,10 @@ fn hold(problem: LinearProblem, held: &[(usize, f64)]) -> Result<LinearProblem, 
 }
 
 /// The estimate that friction is chosen and loads are taken by: least squares, whatever estimator comes in the end.
-fn plain_estimate(settings: &EstimationSettings, problem: &LinearProblem) -> Result<Estimate, EstimationError> {
+pub(crate) fn plain_estimate(
+    settings: &EstimationSettings,
+    problem: &LinearProblem,
+) -> Result<Estimate, EstimationError> {
     match settings.estimator {
         Estimator::Ordinary => ordinary_least_squares(problem, &settings.ordinary()),
         _ => weighted_least_squares(problem, &settings.weighted()),
@@ -340,7 +352,7 @@ fn plain_estimate(settings: &EstimationSettings, problem: &LinearProblem) -> Res
 
 impl LogFactors {
     /// The same rows as another model sees them, whose columns are among those of `wide`.
-    fn of(mut self, wide: &RegressorModel, model: &RegressorModel) -> Result<Self, EstimationError> {
+    pub(crate) fn of(mut self, wide: &RegressorModel, model: &RegressorModel) -> Result<Self, EstimationError> {
         for (joint, factor) in self.factors.iter_mut().enumerate() {
             let seen = wide.layout().joint_columns(joint);
             // A column that is not there gets a number out of range, which the selection refuses.
@@ -360,6 +372,7 @@ struct FactorConsumer<'a> {
     factors: Vec<SegmentedFactor>,
     evidence: Option<Evidence<'a>>,
     buffer: Vec<f64>,
+    counted: Vec<f64>,
 }
 
 impl RowConsumer for FactorConsumer<'_> {
@@ -367,6 +380,7 @@ impl RowConsumer for FactorConsumer<'_> {
         if let Some(evidence) = &mut self.evidence {
             evidence.filtered(rows, &mut self.buffer);
         }
+        let rows = rows.counted(&mut self.counted);
         self.factors[rows.joint]
             .absorb(rows.panel, rows.rows)
             .map_err(|source| LogError::Rows { log: self.log.clone(), source })
@@ -393,7 +407,7 @@ pub fn log_factors(
     // Torque in a unit that nobody knows says nothing about the description.
     let nominal = model.parametric.nominal_base().filter(|_| settings.gains == GainChoice::Stated);
     let evidence = nominal.map(|nominal| Evidence::new(columns, nominal));
-    let mut consumer = FactorConsumer { log, factors, evidence, buffer: Vec::new() };
+    let mut consumer = FactorConsumer { log, factors, evidence, buffer: Vec::new(), counted: Vec::new() };
     let pass = LogPass { reader_thread: alone && logs.execution.parallel(), ..logs.pass(model, index) };
     let statistics = pass.run(&mut consumer)?;
     let nominal_agreement = consumer.evidence.as_ref().map(|evidence| evidence.agreement(&model.joint_names()));

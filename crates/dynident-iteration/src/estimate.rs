@@ -14,7 +14,8 @@ use dynident_identification::examination::{TorqueLag, examine_training, pooled_d
 use dynident_identification::friction::JointFriction;
 use dynident_identification::rows::ParallelFilterSettings;
 use dynident_identification::{
-    EstimationSettings, Execution, IdentificationSettings, Logs, Recording, Training, consistent_stage, training_rows,
+    EstimationSettings, Execution, IdentificationSettings, Logs, Recording, Training, choose_friction,
+    consistent_stage, training_rows,
 };
 use dynident_simulation::{Record, require_length};
 use serde::{Deserialize, Serialize};
@@ -89,7 +90,9 @@ pub fn identify_run(
     let identification = identification_settings(task, settings);
     let (robot, execution) = (&task.robot, Execution::default());
     let logs = Logs::new(robot.model(), &recordings, identification.filters(), &all, None, execution)?;
-    let training = training_rows((&logs, &identification), robot.clone().into(), &all, &settings.payloads, None)?;
+    let chosen = choose_friction((&logs, &identification), robot, &all)?;
+    let mut training = training_rows((&logs, &identification), chosen.model, &all, &settings.payloads, None)?;
+    training.friction_choice = chosen.joints;
     if training.problem.joint_rows().iter().sum::<usize>() == 0 {
         let problem = "no sample counts: the differentiator applies nowhere in the windows; look at its settings and at the tracking error".to_owned();
         return Err(IterationError::Record { joints: robot.joint_names(), problem });

@@ -54,7 +54,7 @@ pub(crate) fn step_by_step(
         let (mut narrow_panel, mut wide_panel) = (Vec::new(), Vec::new());
         let model = RegressorModel::from(task.robot.clone());
         for leg in 0..task.legs.len() {
-            let visit = |JointRows { joint: of, rows, panel }: &JointRows<'_>| {
+            let visit = |JointRows { joint: of, rows, panel, .. }: &JointRows<'_>| {
                 let rows = *rows;
                 if *of != joint {
                     return Ok(());

@@ -18,8 +18,9 @@
 //! | the mean period of a periodic record and its noise | [`averaged_periods`] |
 //!
 //! The life of a log: [`LogSource`] → [`LogReader`] (units, signs, gears, ranges, missing values) → [`RawBlock`]s →
-//! pieces on a uniform clock ([`clock`]) → [`Differentiator`] → [`MotionBlock`]s. Memory does not grow with the log.
-//! Joints are known by name only; what moves them is the business of other crates.
+//! outliers and held samples marked ([`SetAside`]) → pieces on a uniform clock ([`clock`]) → [`Differentiator`] →
+//! [`MotionBlock`]s. Memory does not grow with the log. Joints are known by name only; what moves them is the business
+//! of other crates.
 //!
 //! # A file
 //!
@@ -66,6 +67,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod cleaning;
 pub mod clock;
 pub mod derivative;
 mod error;
@@ -73,9 +75,11 @@ pub mod filter;
 pub mod log;
 mod motion;
 mod place;
+mod quantisation;
 pub mod reference;
 pub mod report;
 
+pub use cleaning::{Reason, SetAside};
 pub use derivative::{Derivatives, Differentiator, DifferentiatorSettings, Place, SampleRanges};
 pub use error::{FilterError, FormatError, RecordingError};
 pub use filter::{AveragedPeriods, DecimationSettings, Decimator, averaged_periods, cutoff, position_noise};

@@ -217,17 +217,24 @@ fn lags(r: &ResultFile) -> String {
     format!("\n{}", table(&header, 1..3, rows.collect()))
 }
 
-/// What friction the training logs chose, against the plain one.
+/// What friction the training logs chose, against the plain one; and whose they did not, with the reason.
 fn friction(r: &ResultFile) -> String {
     let header = ["friction by cross-validation", "chosen Nm", "plain Nm", ""].map(str::to_owned);
-    let rows = r.friction_choice.iter().map(|joint| {
+    let (chosen, stated): (Vec<_>, Vec<_>) = r.friction_choice.iter().partition(|joint| joint.drive.is_some());
+    let rows = chosen.iter().map(|joint| {
         let error = |candidate: Option<&FrictionCandidate>| {
-            candidate.map_or_else(|| "-".to_owned(), |candidate| format!("{:.3}", candidate.cv_error_nm))
+            candidate.map_or_else(String::new, |candidate| format!("{:.3}", candidate.cv_error_nm))
         };
         let chosen = joint.candidates.iter().find(|candidate| candidate.chosen);
         vec![name(&joint.joint), error(chosen), error(joint.candidates.first()), shortened(&joint.chosen, EXPRESSION)]
     });
-    table(&header, 1..3, rows.collect())
+    let mut text = if chosen.is_empty() { String::new() } else { table(&header, 1..3, rows.collect()) };
+    // Joints with one reason in one line.
+    for same in stated.chunk_by(|a, b| a.chosen == b.chosen) {
+        let names: Vec<String> = same.iter().map(|joint| name(&joint.joint)).collect();
+        text += &wrapped(&format!("friction of {}: {}", names.join(", "), same[0].chosen), 2);
+    }
+    text
 }
 
 /// The best known base parameters, and how many are hardly known.

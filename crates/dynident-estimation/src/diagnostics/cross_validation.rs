@@ -1,8 +1,9 @@
 //! Cross-validation between models that share most of their columns, from factors alone: which of many columns should
 //! one joint have?
 //!
-//! The log's time segments are cut into K blocks. With block k left out, all other rows of all joints are reduced to
-//! one triangle whose last columns are the candidates':
+//! The log's time segments are dealt out to K blocks in turn, so that every block holds a part of all that was moved:
+//! what a fit says of a block is then not made of what the other blocks never showed. With block k left out, all other
+//! rows of all joints are reduced to one triangle whose last columns are the candidates':
 //!
 //! ```text
 //!     [ R_cc  R_cv  r_c ]   c: columns that every candidate model has, v: candidate columns
@@ -92,8 +93,7 @@ impl FoldErrors {
 }
 
 impl<'a> CrossValidation<'a> {
-    /// Cuts the problem's rows into `folds` blocks of consecutive segments, about equally many rows each, over all logs
-    /// in their order.
+    /// Deals the problem's segments out to `folds` blocks in turn, over all logs in their order.
     ///
     /// # Errors
     /// [`EstimationError::Setting`] for fewer than two blocks; [`EstimationError::TooFewSegments`] when there are fewer
@@ -103,30 +103,24 @@ impl<'a> CrossValidation<'a> {
         if problem.equations().is_empty() {
             return Err(EstimationError::Empty);
         }
-        let joint_rows = problem.joint_rows();
-        let mut before = vec![0; problem.joints().len()];
-        let mut most_segments = vec![0; problem.joints().len()];
+        let mut segments = vec![0; problem.joints().len()];
         let mut equations = Vec::with_capacity(problem.equations().len());
         for equation in problem.equations() {
-            equations.push((equation, before[equation.joint]));
-            before[equation.joint] += equation.factor.rows();
-            most_segments[equation.joint] += equation.factor.segment_rows().len();
+            equations.push((equation, segments[equation.joint]));
+            segments[equation.joint] += equation.factor.segment_rows().len();
         }
-        let part = |(equation, mut before): (&JointRows, usize)| {
+        let part = |(equation, before): (&JointRows, usize)| {
             let columns = equation.factor.columns();
             let mut own = vec![TriangularFactor::new(columns); folds];
             let mut workspace = FactorWorkspace::default();
-            for segment in equation.factor.segment_factors() {
-                let middle = before + segment.rows() / 2;
-                let fold = (middle * folds / joint_rows[equation.joint].max(1)).min(folds - 1);
-                own[fold].absorb_factor(&mut workspace, &segment);
-                before += segment.rows();
+            for (number, segment) in equation.factor.segment_factors().iter().enumerate() {
+                own[(before + number) % folds].absorb_factor(&mut workspace, segment);
             }
             let others = all_but_one(&own, columns);
             [own, others]
         };
         let parts = equations.into_par_iter().map(part).collect();
-        let fewest = most_segments.into_iter().filter(|&count| count > 0).min().unwrap_or(0);
+        let fewest = segments.into_iter().filter(|&count| count > 0).min().unwrap_or(0);
         if fewest < folds {
             return Err(EstimationError::TooFewSegments { clusters: fewest });
         }

@@ -193,6 +193,11 @@ struct Tally {
 /// Normal noise has its median magnitude at this share of its standard deviation: Φ⁻¹(3/4).
 const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
 
+/// Part of the passes after which the scales stay as they are. With few rows for each parameter the scale and the rows
+/// that count chase each other without end; at a fixed scale reweighting settles, as in MM-estimates (Yohai, Ann. Stat.
+/// 15 (1987) 642).
+const SCALING_PART: usize = 4;
+
 /// The scale never falls below this share of the torque's root mean square (most rows fitted exactly, as in a
 /// simulation).
 const SMALLEST_SCALE: f64 = 1.0e-9;
@@ -202,9 +207,9 @@ const SMALLEST_SCALE: f64 = 1.0e-9;
 ///
 /// Starts from [`weighted_least_squares`] on `problem`'s factors; then every pass over the rows gives residuals, scales
 /// and the factors of the reweighted rows, from which the next θ follows. The scale of a pass is that of the θ before,
-/// which has the same limit and needs one pass each, not two. Regressors are never stored; residuals are, one number
-/// per row, for their median. `pass` hands every row that `problem` was made of to its visitor, as often as it is
-/// called.
+/// which has the same limit and needs one pass each, not two; after a quarter of the passes scales stay. Regressors are
+/// never stored; residuals are, one number per row, for their median. `pass` hands every row that `problem` was made of
+/// to its visitor, as often as it is called.
 ///
 /// The covariance is that of the reweighted rows times `(Σw/Σψ')²`, for an outlier's weight falls when the fit bends
 /// towards it (Huber, Robust Statistics (1981), 7.6). Rows are judged one by one: behind a filter that smears an
@@ -255,8 +260,11 @@ pub fn robust_least_squares<E: From<EstimationError>>(
     loop {
         let gathered = gather(problem, &theta, &scales, &weight, &mut pass)?;
         passes += 1;
-        let new_scales: Vec<f64> =
-            gathered.residuals.into_iter().zip(&floors).map(|(r, floor)| median_scale(r).max(*floor)).collect();
+        let new_scales: Vec<f64> = if passes > settings.max_passes / SCALING_PART {
+            scales.clone()
+        } else {
+            gathered.residuals.into_iter().zip(&floors).map(|(r, floor)| median_scale(r).max(*floor)).collect()
+        };
         if scales.iter().any(|scale| scale.is_infinite()) {
             scales = new_scales;
             continue;

@@ -58,6 +58,17 @@ pub struct CutoffByError {
     pub candidates: Vec<CutoffCandidate>,
 }
 
+impl CutoffByError {
+    /// The highest that serves the parameters nearly as well as the best: where friction is told best, whose details
+    /// are beyond the motion's band.
+    pub fn highest_alike_hz(&self) -> f64 {
+        let errors = || self.candidates.iter().map(|candidate| candidate.predicted_error_percent);
+        let least = errors().fold(f64::INFINITY, f64::min);
+        let alike = self.candidates.iter().filter(|candidate| candidate.predicted_error_percent <= ALIKE * least);
+        alike.map(|candidate| candidate.cutoff_hz).fold(self.cutoff_hz, f64::max)
+    }
+}
+
 /// Tries cut-offs on a simulated copy of the recordings `training` and returns the best; `None` where the cut-off is
 /// not left to the data, or where the recordings are too short for a copy to say anything.
 ///
@@ -149,6 +160,7 @@ impl Logs<'_> {
     fn automatic_cutoff_hz(&self) -> Option<f64> {
         let filter = self.filter;
         let is_automatic = filter.enabled && filter.factor.is_none() && filter.cutoff_hz.is_none();
-        motion_band_hz(&self.motion).filter(|_| is_automatic && !self.spectra().is_empty())
+        let motion_hz = self.motion_hz().or_else(|| motion_band_hz(&self.motion));
+        motion_hz.filter(|_| is_automatic && !self.spectra().is_empty())
     }
 }

@@ -248,7 +248,14 @@ impl StandIn {
         let mut pieces = Vec::with_capacity(measured.len());
         for mut block in measured {
             let torque = torque(model, &block, &theta)?;
-            let noise = block.tau.iter().zip(&torque).map(|(measured, torque)| measured - torque).collect();
+            let mut noise: Vec<f64> =
+                block.tau.iter().zip(&torque).map(|(measured, torque)| measured - torque).collect();
+            // Where the torque does not count nothing is known of its noise; the copies leave it out as the fit does.
+            noise
+                .iter_mut()
+                .zip(&block.set_aside)
+                .filter(|(_, left_out)| **left_out)
+                .for_each(|(noise, _)| *noise = 0.0);
             block.tau = torque;
             pieces.push(Piece { motion: block, noise });
         }
@@ -367,8 +374,12 @@ fn unseen_rows(model: &RegressorModel, pieces: &[Piece]) -> Result<Vec<Option<DM
     Ok(squares.1.into_iter().enumerate().map(in_spreads).collect())
 }
 
-/// Sends the unfiltered rows of a motion to a consumer.
+/// Sends the unfiltered rows of a motion to a consumer, whether their measured torque counts or not.
 fn every_sample(model: &RegressorModel, block: &MotionBlock, consumer: &mut dyn RowConsumer) -> Result<(), LogError> {
+    if !block.set_aside.is_empty() {
+        let block = MotionBlock { set_aside: Vec::new(), ..block.clone() };
+        return every_sample(model, &block, consumer);
+    }
     let places: Vec<usize> = (0..model.dof()).collect();
     let in_filter = |source| LogError::Filter { log: "a simulated copy".to_owned(), source };
     RowBuilder::new(model, &places, block.rate_hz, None).map_err(in_filter)?.take(block, consumer)

@@ -1,6 +1,7 @@
 //! A log at a lower rate: its torque through a low-pass, its smooth motion as it is.
 
 use crate::recording::LogError;
+use crate::rows::set_aside;
 use dynident_recording::{Decimator, MotionBlock};
 
 /// A log's blocks at a lower rate, piece by piece, joints in the model's order.
@@ -12,6 +13,8 @@ pub(super) struct Thinned {
     segment: Option<usize>,
     decimators: Vec<Decimator>,
     columns: [Vec<Vec<f64>>; 4],
+    /// Joint by joint whether a sample's torque does not count; empty where all of the piece do.
+    left_out: Vec<Vec<bool>>,
     out: Vec<f64>,
     rate_hz: f64,
 }
@@ -39,6 +42,14 @@ impl Thinned {
             self.rate_hz = block.rate_hz;
             self.decimators = (0..self.dof).map(|_| decimator()).collect::<Result<_, _>>()?;
             self.columns = core::array::from_fn(|_| vec![Vec::new(); self.dof]);
+            self.left_out.clear();
+        }
+        if !block.set_aside.is_empty() {
+            self.left_out.resize(self.dof, Vec::new());
+        }
+        for (left_out, (&place, q)) in self.left_out.iter_mut().zip(places.iter().zip(&self.columns[0])) {
+            left_out.resize(q.len(), false);
+            left_out.extend_from_slice(set_aside(block, place, 0, rows));
         }
         for (joint, &place) in places.iter().enumerate() {
             for (column, source) in self.columns.iter_mut().zip([&block.q, &block.dq, &block.ddq]) {
@@ -57,6 +68,18 @@ impl Thinned {
         let thinned = |columns: &[Vec<f64>]| -> Vec<f64> {
             columns.iter().flat_map(|x| (0..rows).map(|row| x[first + row * self.thinning])).collect()
         };
+        // A sample stands for those nearest to it, and counts where at least half of them do.
+        let (half, all) = (self.thinning / 2, self.columns[0].first().map_or(0, Vec::len));
+        let counts_not = |left_out: &[bool], row: usize| {
+            let centre = first + row * self.thinning;
+            let nearest = &left_out[centre.saturating_sub(half)..(centre + half + 1).min(left_out.len())];
+            2 * nearest.iter().filter(|left_out| **left_out).count() > nearest.len()
+        };
+        let mut set_aside = Vec::new();
+        for left_out in &mut self.left_out {
+            left_out.resize(all, false);
+            set_aside.extend((0..rows).map(|row| counts_not(left_out, row)));
+        }
         let [q, dq, ddq, tau] = &self.columns;
         self.pieces.push(MotionBlock {
             rate_hz: self.rate_hz / self.thinning as f64,
@@ -66,6 +89,7 @@ impl Thinned {
             dq: thinned(dq),
             ddq: thinned(ddq),
             tau: tau.concat(),
+            set_aside,
             ..MotionBlock::default()
         });
         self.decimators.clear();

@@ -9,6 +9,9 @@ use dynident_estimation::{CrossProblem, Estimate, SegmentedFactor, generalized_l
 struct SideBySide {
     factor: SegmentedFactor,
     panel: Vec<f64>,
+    /// Row by row the least coverage of all joints; empty where all is covered.
+    coverage: Vec<f64>,
+    counted: Vec<f64>,
     joints: usize,
 }
 
@@ -17,10 +20,18 @@ impl RowConsumer for SideBySide {
         // Joints of a block come in their order, with as many rows each.
         if rows.joint == 0 {
             self.panel.clear();
+            self.coverage.clear();
         }
         self.panel.extend_from_slice(rows.panel);
+        if !rows.coverage.is_empty() {
+            self.coverage.resize(rows.rows, 1.0);
+            self.coverage.iter_mut().zip(rows.coverage).for_each(|(least, own)| *least = least.min(*own));
+        }
         if rows.joint + 1 == self.joints {
-            self.factor.absorb(&self.panel, rows.rows)?;
+            // An instant counts where it does for every joint.
+            let all = JointRows { panel: &self.panel, coverage: &self.coverage, ..*rows };
+            let counted = all.counted(&mut self.counted);
+            self.factor.absorb(counted.panel, counted.rows)?;
         }
         Ok(())
     }
@@ -38,7 +49,8 @@ pub(super) fn generalized(rows: &TrainingRows<'_>) -> Result<(Estimate, Findings
     rows.begin("joints side by side");
     for (place, &index) in rows.training.iter().enumerate() {
         let factor = SegmentedFactor::new(cross.width(), settings.segments)?;
-        let mut consumer = SideBySide { factor, panel: Vec::new(), joints };
+        let [panel, coverage, counted] = [(); 3].map(|()| Vec::new());
+        let mut consumer = SideBySide { factor, panel, coverage, counted, joints };
         logs.pass(model, index).run(&mut consumer)?;
         cross.add(&problem.logs()[place], consumer.factor)?;
     }

@@ -4,11 +4,11 @@
 use super::instruments::InstrumentSource;
 use super::{EstimatorError, TrainingRows};
 use crate::recording::{LogError, Samples};
-use crate::rows::{PANEL_SAMPLES, in_model_order, motion_band_hz, predicted_torque};
+use crate::rows::{JointFilters, PANEL_SAMPLES, in_model_order, motion_band_hz, predicted_torque, set_aside};
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_estimation::{EstimationError, SegmentedFactor};
 use dynident_model::terms::JointMotion;
-use dynident_recording::{Decimator, MotionBlock};
+use dynident_recording::MotionBlock;
 
 /// The factors of one log's `[Z | W | τ]`, one for each joint.
 pub(super) fn instrumented_factors(
@@ -72,9 +72,8 @@ struct InstrumentedRows<'r, 'a> {
     widths: Vec<usize>,
     /// Each joint's sum of squares of its first column behind the filter.
     squares: Vec<f64>,
-    /// Made with the first block, which knows the rate; none where every sample counts.
-    decimators: Option<Vec<Decimator>>,
-    has_begun: bool,
+    /// Made with the first block, which knows the rate.
+    filters: Option<JointFilters>,
     factors: Vec<SegmentedFactor>,
     workspace: BatchWorkspace,
     /// What friction remembers of either motion, instruments first.
@@ -85,7 +84,7 @@ struct InstrumentedRows<'r, 'a> {
     temperature_c: Vec<f64>,
     panel: Vec<f64>,
     slow: Vec<f64>,
-    out: Vec<f64>,
+    counted: Vec<f64>,
     segment: usize,
 }
 
@@ -111,8 +110,7 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
             theta,
             squares: vec![0.0; widths.len()],
             widths,
-            decimators: None,
-            has_begun: false,
+            filters: None,
             factors,
             workspace: BatchWorkspace::new(model),
             histories: [history(), history()],
@@ -122,27 +120,20 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
             temperature_c: Vec::new(),
             panel: Vec::new(),
             slow: Vec::new(),
-            out: Vec::new(),
+            counted: Vec::new(),
             segment: 0,
         })
     }
 
-    fn decimators_at(&self, rate_hz: f64) -> Result<Option<Vec<Decimator>>, LogError> {
+    fn filters_at(&self, rate_hz: f64) -> Result<JointFilters, LogError> {
         let logs = self.rows.logs;
         let settings = logs.filter.decimation(rate_hz, motion_band_hz(&logs.motion));
-        settings
-            .map(|settings| {
-                let one = |width: &usize| Decimator::new(&settings, rate_hz, width + 1);
-                self.widths.iter().map(one).collect::<Result<Vec<_>, _>>()
-            })
-            .transpose()
+        let columns: Vec<usize> = self.widths.iter().map(|width| width + 1).collect();
+        JointFilters::new(&columns, rate_hz, settings.as_ref())
             .map_err(|source| LogError::Filter { log: self.log.clone(), source })
     }
 
     fn take(&mut self, measured: &MotionBlock, source: &mut dyn InstrumentSource) -> Result<(), EstimatorError> {
-        if !self.has_begun {
-            (self.decimators, self.has_begun) = (self.decimators_at(measured.rate_hz)?, true);
-        }
         source.motion(measured, &mut self.other)?;
         (self.other.rows, self.other.joints) = (measured.rows, measured.joints);
         let numbers = measured.rows * measured.joints;
@@ -154,13 +145,15 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
                 return Err(EstimatorError::Instruments { log: self.log.clone(), message });
             }
         }
-        let mut decimators = self.decimators.as_mut();
+        let filters = match self.filters.take() {
+            Some(filters) => filters,
+            None => self.filters_at(measured.rate_hz)?,
+        };
+        let filters = self.filters.insert(filters);
         if measured.segment != self.segment {
             self.segment = measured.segment;
             self.histories.iter_mut().for_each(TermHistory::restart);
-            decimators.iter_mut().flat_map(|all| all.iter_mut()).for_each(|decimator| {
-                decimator.finish();
-            });
+            filters.restart();
         }
         let (model, layout) = (self.rows.model.model(), self.rows.model.layout());
         for from in (0..measured.rows).step_by(PANEL_SAMPLES) {
@@ -198,17 +191,17 @@ impl<'r, 'a> InstrumentedRows<'r, 'a> {
                     self.panel.extend_from_slice(&own.joint(joint)[..width]);
                     self.panel.extend(torque.iter().map(|torque| gain * torque));
                 }
-                let (rows, panel) = match &mut decimators {
-                    Some(decimators) => (decimators[joint].push(&self.panel, samples, &mut self.out), &self.out),
-                    None => (samples, &self.panel),
-                };
-                if rows > 0 {
-                    self.squares[joint] += panel[..rows].iter().map(|value| value * value).sum::<f64>();
+                // What does not count is left out of both motions and the torque alike, as in the rows of a fit.
+                let left_out = set_aside(measured, place, from, samples);
+                let rows = filters.push(joint, &self.panel, samples, left_out).counted(&mut self.counted);
+                if rows.rows > 0 {
+                    self.squares[joint] += rows.panel[..rows.rows].iter().map(|value| value * value).sum::<f64>();
                     self.factors[joint]
-                        .absorb(panel, rows)
+                        .absorb(rows.panel, rows.rows)
                         .map_err(|source| LogError::Rows { log: self.label.clone(), source })?;
                 }
             }
+            filters.advance(samples);
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! Rows weighted by the noise around them.
 
-use super::row_pass::{Stop, every_row};
+use super::row_pass::{KeptRows, Stop};
 use super::{EstimationSettings, EstimatorError, Findings, TrainingRows};
 use dynident_estimation::{Estimate, NoiseLevelSettings, noise_weighted_least_squares};
 use serde::{Deserialize, Serialize};
@@ -45,6 +45,7 @@ pub(super) fn noise_weighted(
     levels: &NoiseLevels,
 ) -> Result<(Estimate, Findings), EstimatorError> {
     let settings = levels.settings(rows.settings);
-    let found = noise_weighted_least_squares::<Stop>(rows.problem, &settings, |visit| every_row(rows, visit))?;
+    let mut kept = KeptRows::new();
+    let found = noise_weighted_least_squares::<Stop>(rows.problem, &settings, |visit| kept.every_row(rows, visit))?;
     Ok((found.estimate, Findings::NoiseLevels(found.level_range)))
 }

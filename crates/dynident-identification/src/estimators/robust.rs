@@ -1,6 +1,6 @@
 //! Iteratively reweighted least squares: rows far off count less, or not at all.
 
-use super::row_pass::{Stop, every_row};
+use super::row_pass::{KeptRows, Stop};
 use super::{EstimatorError, Findings, TrainingRows};
 use dynident_estimation::{Estimate, RobustSettings, RowWeight, robust_least_squares};
 use serde::{Deserialize, Serialize};
@@ -24,7 +24,8 @@ pub(super) fn robust(rows: &TrainingRows<'_>, weight: RowWeight) -> Result<(Esti
         covariance: estimation.covariance,
         ..RobustSettings::default()
     };
-    let found = robust_least_squares::<Stop>(rows.problem, &settings, |visit| every_row(rows, visit))?;
+    let mut kept = KeptRows::new();
+    let found = robust_least_squares::<Stop>(rows.problem, &settings, |visit| kept.every_row(rows, visit))?;
     let errors = GrossErrors { share: found.outlier_share, mean_weight: found.mean_weight };
     Ok((found.estimate, Findings::GrossErrors(errors)))
 }

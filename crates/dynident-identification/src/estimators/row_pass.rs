@@ -17,16 +17,74 @@ impl From<EstimationError> for Stop {
     }
 }
 
+/// Numbers of filtered rows that are kept at most, 256 MiB.
+const MOST_KEPT_NUMBERS: usize = 1 << 25;
+
+/// Rows of the training logs for estimators that come back to them: made once and kept if they fit, else made anew in
+/// every pass.
+pub(super) struct KeptRows {
+    blocks: Option<Vec<KeptBlock>>,
+    complete: bool,
+}
+
+struct KeptBlock {
+    log: usize,
+    joint: usize,
+    rows: usize,
+    panel: Vec<f64>,
+}
+
+impl KeptRows {
+    pub(super) fn new() -> Self {
+        Self { blocks: Some(Vec::new()), complete: false }
+    }
+
+    /// One pass: every row of every training log.
+    pub(super) fn every_row(&mut self, rows: &TrainingRows<'_>, visit: &mut RowVisitor<'_>) -> Result<(), Stop> {
+        if let (Some(blocks), true) = (&self.blocks, self.complete) {
+            for KeptBlock { log, joint, rows, panel } in blocks {
+                visit(&RowBlock { log: *log, joint: *joint, rows: *rows, panel })?;
+            }
+            return Ok(());
+        }
+        rows.begin("reweighting rows");
+        let mut numbers = 0;
+        for (log, &index) in rows.training.iter().enumerate() {
+            let mut keep = |block: &RowBlock<'_>| {
+                numbers += block.panel.len();
+                if numbers > MOST_KEPT_NUMBERS {
+                    self.blocks = None;
+                }
+                if let Some(blocks) = &mut self.blocks {
+                    let RowBlock { log, joint, rows, panel } = *block;
+                    blocks.push(KeptBlock { log, joint, rows, panel: panel.to_vec() });
+                }
+                visit(block)
+            };
+            let mut consumer = VisitorConsumer { log, visit: &mut keep, refused: None, counted: Vec::new() };
+            rows.logs.pass(rows.model, index).run(&mut consumer).map_err(|error| Stop::Log(error.into()))?;
+            if let Some(refused) = consumer.refused {
+                return Err(refused.into());
+            }
+        }
+        rows.logs.end();
+        self.complete = true;
+        Ok(())
+    }
+}
+
 /// Hands a log's rows to a visitor.
 struct VisitorConsumer<'a, 'b> {
     log: usize,
     visit: &'a mut RowVisitor<'b>,
     refused: Option<EstimationError>,
+    counted: Vec<f64>,
 }
 
 impl RowConsumer for VisitorConsumer<'_, '_> {
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         if self.refused.is_none() {
+            let rows = rows.counted(&mut self.counted);
             let block = RowBlock { log: self.log, joint: rows.joint, rows: rows.rows, panel: rows.panel };
             self.refused = (self.visit)(&block).err();
         }
@@ -41,18 +99,4 @@ impl From<Stop> for EstimatorError {
             Stop::Log(error) => error,
         }
     }
-}
-
-/// One pass: every row of every training log.
-pub(super) fn every_row(rows: &TrainingRows<'_>, visit: &mut RowVisitor<'_>) -> Result<(), Stop> {
-    rows.begin("reweighting rows");
-    for (log, &index) in rows.training.iter().enumerate() {
-        let mut consumer = VisitorConsumer { log, visit: &mut *visit, refused: None };
-        rows.logs.pass(rows.model, index).run(&mut consumer).map_err(|error| Stop::Log(error.into()))?;
-        if let Some(refused) = consumer.refused {
-            return Err(refused.into());
-        }
-    }
-    rows.logs.end();
-    Ok(())
 }

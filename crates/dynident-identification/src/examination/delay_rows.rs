@@ -1,6 +1,7 @@
 //! Rows for estimating a lag: regressor, slope of the predicted torque, and the torque at six neighbouring samples,
 //! from which it is known at any time between.
 
+use crate::rows::{JointRows, divide_by_coverage as divide};
 use dynident_estimation::{EstimationError, SegmentSettings, SegmentedFactor};
 use dynident_recording::{DecimationSettings, Decimator};
 
@@ -18,14 +19,33 @@ pub(crate) struct Piece {
     pub(crate) model: Vec<Vec<f64>>,
     /// Measured torque sample by sample, by joint.
     pub(crate) measured: Vec<Vec<f64>>,
-    /// Filtered regressor rows by joint: blocks of rows, column by column.
-    pub(crate) rows: Vec<Vec<(usize, Vec<f64>)>>,
+    /// Samples left out of the regressor before the filter, ascending, by joint.
+    left_out: Vec<Vec<usize>>,
+    /// Filtered regressor rows by joint.
+    pub(crate) rows: Vec<Vec<FilteredRows>>,
+}
+
+/// A block of one joint's regressor behind the filter.
+pub(crate) struct FilteredRows {
+    pub(crate) rows: usize,
+    /// Column by column.
+    pub(crate) regressor: Vec<f64>,
+    /// See [`JointRows::coverage`].
+    pub(crate) coverage: Vec<f64>,
 }
 
 impl Piece {
     pub(crate) fn new(segment: usize, joints: usize) -> Self {
         let none = || vec![Vec::new(); joints];
-        Self { segment, model: none(), measured: none(), rows: vec![Vec::new(); joints] }
+        let rows = (0..joints).map(|_| Vec::new()).collect();
+        Self { segment, model: none(), measured: none(), left_out: vec![Vec::new(); joints], rows }
+    }
+
+    /// Of the samples that a joint got last, those that do not count (none if empty).
+    pub(crate) fn leave_out(&mut self, joint: usize, set_aside: &[bool]) {
+        let first = self.measured[joint].len() - set_aside.len();
+        let marked = set_aside.iter().enumerate().filter(|(_, marked)| **marked);
+        self.left_out[joint].extend(marked.map(|(sample, _)| first + sample));
     }
 }
 
@@ -54,21 +74,30 @@ impl DelayRows {
         let centre = shift.floor() as isize;
         let mut factor = SegmentedFactor::new(columns + NODES, segments)?;
         let mut panel = Vec::new();
+        let (mut shares, mut counted) = (Vec::new(), Vec::new());
         for piece in pieces {
-            let further = Further::new(&piece.model[joint], &piece.measured[joint], centre, rate_hz, filter);
+            let signals = (&piece.model[joint][..], &piece.measured[joint][..], &piece.left_out[joint][..]);
+            let further = Further::new(signals, centre, rate_hz, filter);
             let mut first = 0;
-            for (rows, regressor) in &piece.rows[joint] {
+            for FilteredRows { rows, regressor, coverage } in &piece.rows[joint] {
                 let from = further.valid.start.max(first).min(first + rows);
                 let to = further.valid.end.clamp(from, first + rows);
                 panel.clear();
                 for column in regressor.chunks_exact(*rows) {
                     panel.extend_from_slice(&column[from - first..to - first]);
                 }
+                shares.clear();
+                shares.extend(coverage.get(from - first..to - first).unwrap_or_default());
                 for column in further.values.chunks_exact(further.rows.max(1)) {
+                    let whole = panel.len();
                     panel.extend_from_slice(&column[from..to]);
+                    // As the regressor's rows were.
+                    divide(&mut panel[whole..], &shares);
                 }
                 if to > from {
-                    factor.absorb(&panel, to - from)?;
+                    let all = JointRows { joint, rows: to - from, panel: &panel, coverage: &shares };
+                    let counted = all.counted(&mut counted);
+                    factor.absorb(counted.panel, counted.rows)?;
                 }
                 first += rows;
             }
@@ -92,7 +121,14 @@ struct Further {
 }
 
 impl Further {
-    fn new(model: &[f64], measured: &[f64], centre: isize, rate_hz: f64, filter: Option<&DecimationSettings>) -> Self {
+    /// Of the predicted torque, the measured one, and the samples that are left out of both as they were of the
+    /// regressor.
+    fn new(
+        (model, measured, left_out): (&[f64], &[f64], &[usize]),
+        centre: isize,
+        rate_hz: f64,
+        filter: Option<&DecimationSettings>,
+    ) -> Self {
         let n = model.len() as isize;
         let at = |signal: &[f64], k: isize| usize::try_from(k).ok().and_then(|k| signal.get(k).copied()).unwrap_or(0.0);
         // Differences of order four: less than 1 % short at a tenth of the sampling rate.
@@ -101,6 +137,11 @@ impl Further {
         let mut signals: Vec<f64> = (0..n).map(|k| -slope(k)).collect();
         for node in 0..NODES as isize {
             signals.extend((0..n).map(|k| at(measured, k + centre + FIRST_NODE + node)));
+        }
+        for column in signals.chunks_exact_mut(model.len().max(1)) {
+            for &sample in left_out {
+                column[sample] = 0.0;
+            }
         }
         let last_node = FIRST_NODE + NODES as isize - 1;
         let low = SLOPE_REACH.max(-(centre + FIRST_NODE)).max(0);
@@ -149,7 +190,7 @@ mod tests {
     fn rows_at_the_ends_are_left_out() {
         let signal: Vec<f64> = (0..50).map(f64::from).collect();
         for (centre, valid) in [(0, 2..47), (4, 2..43), (-5, 7..48)] {
-            let found = Further::new(&signal, &signal, centre, 100.0, None);
+            let found = Further::new((&signal, &signal, &[]), centre, 100.0, None);
             assert_eq!(found.valid, valid, "{centre}");
             for k in valid {
                 // The slope of a ramp, and the ramp itself further on.
@@ -157,6 +198,6 @@ mod tests {
                 assert_eq!(found.values[50 + k], (k as isize + centre - 2) as f64);
             }
         }
-        assert!(Further::new(&signal[..3], &signal[..3], 20, 100.0, None).valid.is_empty());
+        assert!(Further::new((&signal[..3], &signal[..3], &[]), 20, 100.0, None).valid.is_empty());
     }
 }

@@ -67,16 +67,12 @@ struct Test<'a> {
     delay: DelayCheck<'a>,
     trace: Option<TraceConsumer<'a>>,
     buffer: Vec<f64>,
+    counted: Vec<f64>,
 }
 
 impl Test<'_> {
-    fn failed(&self, source: dynident_estimation::EstimationError) -> LogError {
-        LogError::Rows { log: self.log.clone(), source }
-    }
-}
-
-impl RowConsumer for Test<'_> {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
+    /// Errors and residuals of rows that count.
+    fn judge(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         let columns = self.rows_of.layout().joint_columns(rows.joint);
         let measured = &rows.panel[columns.len() * rows.rows..];
         predicted_torque(rows.panel, rows.rows, columns, self.theta, &mut self.buffer);
@@ -90,6 +86,21 @@ impl RowConsumer for Test<'_> {
         if let Some(evidence) = &mut self.evidence {
             evidence.filtered(rows, &mut self.buffer);
         }
+        Ok(())
+    }
+
+    fn failed(&self, source: dynident_estimation::EstimationError) -> LogError {
+        LogError::Rows { log: self.log.clone(), source }
+    }
+}
+
+impl RowConsumer for Test<'_> {
+    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
+        let mut counted = core::mem::take(&mut self.counted);
+        let judged = self.judge(&rows.counted(&mut counted));
+        self.counted = counted;
+        judged?;
+        // Over time every row has its place.
         if let Some(trace) = &mut self.trace {
             trace.filtered(rows);
         }
@@ -103,7 +114,13 @@ impl RowConsumer for Test<'_> {
             let columns = self.rows_of.layout().joint_columns(joint);
             let panel = samples.panels.joint(joint);
             predicted_torque(panel, rows, columns, self.theta, &mut self.buffer);
-            let added = self.raw.add_joint(joint, &panel[columns.len() * rows..], &self.buffer);
+            // Neither where the motion is made of invented samples nor where the torque is none.
+            let measured = &panel[columns.len() * rows..];
+            let set_aside = samples.set_aside.get(joint);
+            let counts = |row: &usize| set_aside.is_none_or(|set_aside| !set_aside[*row]);
+            let kept = samples.settled.clone().filter(counts);
+            let (measured, predicted): (Vec<f64>, Vec<f64>) = kept.map(|row| (measured[row], self.buffer[row])).unzip();
+            let added = self.raw.add_joint(joint, &measured, &predicted);
             added.map_err(|source| self.failed(source))?;
         }
         if let Some(band) = &mut self.motion_band {
@@ -176,6 +193,7 @@ pub(crate) fn tested_on(
         delay: DelayCheck::new(model, theta),
         trace: traced.then(|| TraceConsumer::new(model, physical.unwrap_or(theta))),
         buffer: Vec::new(),
+        counted: Vec::new(),
     };
     let reader_thread = alone && logs.execution.parallel();
     let statistics = LogPass { reader_thread, kept: None, ..logs.pass(model, index) }.run(&mut test)?;

@@ -3,9 +3,9 @@
 use crate::logs::Logs;
 use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
-use crate::rows::{ParallelFilterSettings, RawSamples, predicted_torque};
+use crate::rows::{JointFilters, ParallelFilterSettings, RawSamples, predicted_torque};
 use dynident_estimation::{Validation, ValidationReport};
-use dynident_recording::{DecimationSettings, Decimator, FilterError};
+use dynident_recording::{DecimationSettings, FilterError};
 
 /// Measured torque and that of several sets of base parameters, all through the low-pass that the motion's spectrum
 /// alone asks for: a fit with a lower cut-off leaves less torque to explain, and looks better for it.
@@ -14,10 +14,10 @@ pub(crate) struct MotionBand<'a> {
     sets: Vec<&'a [f64]>,
     validations: Vec<Validation>,
     motion_hz: f64,
-    filter: Option<(u64, usize, Vec<Decimator>)>,
+    filter: Option<(u64, usize, JointFilters)>,
     panel: Vec<f64>,
     predicted: Vec<f64>,
-    out: Vec<f64>,
+    counted: Vec<f64>,
 }
 
 impl<'a> MotionBand<'a> {
@@ -25,8 +25,8 @@ impl<'a> MotionBand<'a> {
     pub(crate) fn of(logs: &Logs<'_>, model: &'a RegressorModel, sets: Vec<&'a [f64]>) -> Option<Self> {
         let motion_hz = logs.motion_hz()?;
         let validations = sets.iter().map(|_| Validation::new(model.joint_names())).collect();
-        let (panel, predicted, out) = (Vec::new(), Vec::new(), Vec::new());
-        Some(Self { model, sets, validations, motion_hz, filter: None, panel, predicted, out })
+        let (panel, predicted, counted) = (Vec::new(), Vec::new(), Vec::new());
+        Some(Self { model, sets, validations, motion_hz, filter: None, panel, predicted, counted })
     }
 
     /// Takes samples before the parallel filter.
@@ -35,18 +35,16 @@ impl<'a> MotionBand<'a> {
         let rate_bits = samples.rate_hz.to_bits();
         let is_made = self.filter.as_ref().is_some_and(|(rate, ..)| *rate == rate_bits);
         if !is_made {
-            let decimators = self.decimators(samples.rate_hz).map_err(in_filter)?;
-            self.filter = Some((rate_bits, samples.segment, decimators));
+            let filters = self.filters(samples.rate_hz).map_err(in_filter)?;
+            self.filter = Some((rate_bits, samples.segment, filters));
         }
-        let Some((_, segment, decimators)) = &mut self.filter else { return Ok(()) };
+        let Some((_, segment, filters)) = &mut self.filter else { return Ok(()) };
         if *segment != samples.segment {
             *segment = samples.segment;
-            for decimator in decimators.iter_mut() {
-                decimator.finish();
-            }
+            filters.restart();
         }
         let rows = samples.panels.samples();
-        for (joint, decimator) in decimators.iter_mut().enumerate() {
+        for joint in 0..self.model.dof() {
             let (columns, panel) = (self.model.layout().joint_columns(joint), samples.panels.joint(joint));
             self.panel.clear();
             self.panel.extend_from_slice(&panel[columns.len() * rows..][..rows]);
@@ -54,26 +52,28 @@ impl<'a> MotionBand<'a> {
                 predicted_torque(panel, rows, columns, set, &mut self.predicted);
                 self.panel.extend_from_slice(&self.predicted);
             }
-            let left = decimator.push(&self.panel, rows, &mut self.out);
-            if left == 0 {
+            // Measured and predicted torque leave out what does not count alike: neither is judged where one is not.
+            let left_out = samples.set_aside.get(joint).map_or(&[][..], Vec::as_slice);
+            let left = filters.push(joint, &self.panel, rows, left_out).counted(&mut self.counted);
+            if left.rows == 0 {
                 continue;
             }
-            let mut series = self.out.chunks_exact(left);
+            let mut series = left.panel.chunks_exact(left.rows);
             let Some(measured) = series.next() else { continue };
             for (validation, predicted) in self.validations.iter_mut().zip(series) {
                 let added = validation.add_joint(joint, measured, predicted);
                 added.map_err(|source| LogError::Rows { log: log.to_owned(), source })?;
             }
         }
+        filters.advance(rows);
         Ok(())
     }
 
-    fn decimators(&self, rate_hz: f64) -> Result<Vec<Decimator>, FilterError> {
+    fn filters(&self, rate_hz: f64) -> Result<JointFilters, FilterError> {
         let every_sample = DecimationSettings { factor: 1, cutoff_hz: None, ..DecimationSettings::default() };
         let filter =
             ParallelFilterSettings::default().decimation(rate_hz, Some(self.motion_hz)).unwrap_or(every_sample);
-        let columns = 1 + self.sets.len();
-        (0..self.model.dof()).map(|_| Decimator::new(&filter, rate_hz, columns)).collect()
+        JointFilters::new(&vec![1 + self.sets.len(); self.model.dof()], rate_hz, Some(&filter))
     }
 
     /// Set by set; none where no row was left.

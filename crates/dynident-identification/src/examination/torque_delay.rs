@@ -7,7 +7,7 @@
 //! the model cannot say (backlash, elasticity) is in it as far as it differs from segment to segment.
 
 use crate::estimators::EstimationSettings;
-use crate::examination::delay_rows::{DelayRows, NODES, Piece, lagrange};
+use crate::examination::delay_rows::{DelayRows, FilteredRows, NODES, Piece, lagrange};
 use crate::logs::Logs;
 use crate::regressor_model::RegressorModel;
 use crate::rows::{JointRows, RawSamples, motion_band_hz, predicted_torque};
@@ -70,7 +70,8 @@ impl<'a> DelayCheck<'a> {
         let Some(piece) = self.pieces.last_mut().filter(|_| !self.full) else { return };
         let regressor = &rows.panel[..self.model.layout().joint_columns(rows.joint).len() * rows.rows];
         self.numbers += regressor.len();
-        piece.rows[rows.joint].push((rows.rows, regressor.to_vec()));
+        let (regressor, coverage) = (regressor.to_vec(), rows.coverage.to_vec());
+        piece.rows[rows.joint].push(FilteredRows { rows: rows.rows, regressor, coverage });
     }
 
     pub(crate) fn raw(&mut self, samples: &RawSamples<'_>) {
@@ -92,6 +93,7 @@ impl<'a> DelayCheck<'a> {
             predicted_torque(panel, rows, columns, self.theta, &mut self.buffer);
             piece.model[joint].extend_from_slice(&self.buffer);
             piece.measured[joint].extend_from_slice(&panel[columns.len() * rows..]);
+            piece.leave_out(joint, samples.set_aside.get(joint).map_or(&[], Vec::as_slice));
             self.numbers += 2 * rows;
         }
     }

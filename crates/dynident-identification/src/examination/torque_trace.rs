@@ -10,7 +10,7 @@ const MOST_ROWS: usize = 100_000;
 /// Torque of one joint.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointTrace {
-    /// As measured, filtered as for the fit, Nm (N); NaN where the log has a gap.
+    /// As measured, filtered as for the fit, Nm (N); NaN where the log has a gap or a row does not count.
     pub measured_nm: Vec<f64>,
     /// By the estimated base parameters; NaN in gaps.
     pub predicted_nm: Vec<f64>,
@@ -67,8 +67,10 @@ impl<'a> TraceConsumer<'a> {
         self.trace.cut |= kept < rows.rows;
         if kept > 0 {
             predicted_torque(rows.panel, rows.rows, columns, self.theta, &mut self.buffer);
-            predicted_nm.extend_from_slice(&self.buffer[..kept]);
-            measured_nm.extend_from_slice(&rows.panel[columns.len() * rows.rows..][..kept]);
+            let counts = |row: usize| if rows.counts(row) { 1.0 } else { f64::NAN };
+            let measured = &rows.panel[columns.len() * rows.rows..];
+            predicted_nm.extend((0..kept).map(|row| counts(row) * self.buffer[row]));
+            measured_nm.extend((0..kept).map(|row| counts(row) * measured[row]));
         }
     }
 

@@ -2,8 +2,8 @@
 //! a column.
 
 use dynident_model::terms::{
-    Coulomb, CoulombShape, Direction, DirectionalViscous, LoadFriction, MaxwellSlip, Power, PowerExponent, Sigmoid,
-    Stribeck, TorqueTerm, Viscous,
+    Coulomb, CoulombShape, Direction, DirectionalCoulomb, DirectionalViscous, LoadFriction, MaxwellSlip, Power,
+    PowerExponent, Sigmoid, Stribeck, TorqueTerm, Viscous,
 };
 
 /// Widths of the smooth Coulomb step, rad/s or m/s; beside them the sign and what the study states.
@@ -12,7 +12,7 @@ const WIDTHS: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
 const STRIBECK_SPEEDS: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.4];
 const STRIBECK_EXPONENTS: [f64; 2] = [1.0, 2.0];
 /// Width of the step under the Stribeck term as a share of its velocity: beyond half its velocity the step is done.
-const STRIBECK_WIDTH: f64 = 0.25;
+pub(super) const STRIBECK_WIDTH: f64 = 0.25;
 const SIGMOID_WIDTHS: [f64; 3] = [0.02, 0.05, 0.1];
 /// Yield displacements of the Maxwell-slip elements, rad or m.
 const YIELDS: [f64; 6] = [3.0e-4, 1.0e-3, 3.0e-3, 1.0e-2, 3.0e-2, 1.0e-1];
@@ -23,6 +23,7 @@ pub(crate) enum FrictionKind {
     Viscous,
     AsymmetricViscous,
     Coulomb,
+    AsymmetricCoulomb,
     Sigmoid,
     Stribeck,
     CubeRoot,
@@ -37,6 +38,7 @@ impl FrictionKind {
             Self::Viscous => "viscous",
             Self::AsymmetricViscous => "asymmetric viscous",
             Self::Coulomb => "coulomb",
+            Self::AsymmetricCoulomb => "asymmetric coulomb",
             Self::Sigmoid => "sigmoid",
             Self::Stribeck => "stribeck",
             Self::CubeRoot => "cube-root",
@@ -49,7 +51,7 @@ impl FrictionKind {
     /// Constants that are tuned for it: they count as parameters.
     pub(crate) fn constants(self) -> usize {
         match self {
-            Self::Coulomb => 1,
+            Self::Coulomb | Self::AsymmetricCoulomb => 1,
             Self::Sigmoid | Self::Stribeck => 2,
             Self::Viscous
             | Self::AsymmetricViscous
@@ -66,14 +68,14 @@ impl FrictionKind {
             TorqueTerm::Viscous(_) => Some(Self::Viscous),
             TorqueTerm::Coulomb(_) => Some(Self::Coulomb),
             TorqueTerm::DirectionalViscous(_) => Some(Self::AsymmetricViscous),
+            TorqueTerm::DirectionalCoulomb(_) => Some(Self::AsymmetricCoulomb),
             TorqueTerm::Stribeck(_) => Some(Self::Stribeck),
             TorqueTerm::Sigmoid(_) => Some(Self::Sigmoid),
             TorqueTerm::Power(Power { exponent: PowerExponent::CubeRoot, .. }) => Some(Self::CubeRoot),
             TorqueTerm::Power(Power { exponent: PowerExponent::Quadratic, .. }) => Some(Self::Quadratic),
             TorqueTerm::Load(_) => Some(Self::Load),
             TorqueTerm::MaxwellSlip(_) => Some(Self::MaxwellSlip),
-            TorqueTerm::DirectionalCoulomb(_)
-            | TorqueTerm::TemperatureViscous(_)
+            TorqueTerm::TemperatureViscous(_)
             | TorqueTerm::TemperatureCoulomb(_)
             | TorqueTerm::Offset(_)
             | TorqueTerm::DriveInertia(_)
@@ -86,6 +88,7 @@ impl FrictionKind {
         match self {
             Self::Viscous | Self::Coulomb | Self::Sigmoid => false,
             Self::AsymmetricViscous
+            | Self::AsymmetricCoulomb
             | Self::Stribeck
             | Self::CubeRoot
             | Self::Quadratic
@@ -94,9 +97,43 @@ impl FrictionKind {
         }
     }
 
-    /// True when one column of its grid is taken; else all are.
+    /// The candidate in whose place it is tried; none for one that is tried beside all others.
+    pub(crate) fn replaces(self) -> Option<Self> {
+        match self {
+            Self::AsymmetricViscous => Some(Self::Viscous),
+            Self::AsymmetricCoulomb => Some(Self::Coulomb),
+            Self::Viscous
+            | Self::Coulomb
+            | Self::Sigmoid
+            | Self::Stribeck
+            | Self::CubeRoot
+            | Self::Quadratic
+            | Self::Load
+            | Self::MaxwellSlip => None,
+        }
+    }
+
+    /// True when its constants are found on the grid; else all of its columns are taken.
     pub(crate) fn takes_one(self) -> bool {
         self.constants() > 0
+    }
+
+    /// True for the step at rest, whose width is found anew with every further term.
+    pub(crate) fn is_step(self) -> bool {
+        matches!(self, Self::Coulomb | Self::AsymmetricCoulomb)
+    }
+
+    /// Which of the columns are tried together: neighbours on the grid, all columns where there is no grid.
+    pub(crate) fn options(self, columns: &[CandidateColumn]) -> Vec<Vec<usize>> {
+        let of_kind: Vec<usize> = (0..columns.len()).filter(|&place| columns[place].kind == self).collect();
+        if !self.takes_one() {
+            return vec![of_kind];
+        }
+        let (alone, of_grid): (Vec<usize>, Vec<usize>) =
+            of_kind.into_iter().partition(|&place| columns[place].grid.is_none());
+        let steps: Vec<&[usize]> = of_grid.chunk_by(|&a, &b| columns[a].grid == columns[b].grid).collect();
+        let pairs = steps.windows(2).map(|pair| pair.concat());
+        alone.into_iter().map(|place| vec![place]).chain(pairs).collect()
     }
 }
 
@@ -107,6 +144,8 @@ pub(crate) struct CandidateColumn {
     pub(crate) term: TorqueTerm,
     /// What is stated when this column is chosen: itself, or both directions of a term that has two.
     pub(crate) stated: Vec<TorqueTerm>,
+    /// Number of its step on the first axis of the grid, in ascending order; none for one that is tried alone.
+    pub(crate) grid: Option<usize>,
 }
 
 /// A joint whose friction the training logs choose, and where the search begins.
@@ -132,46 +171,57 @@ impl FrictionSearch {
 /// The columns to choose from at `joint`; a term's columns stand together, in the order of its grid.
 pub(crate) fn candidate_columns(search: &FrictionSearch, joint: usize) -> Vec<CandidateColumn> {
     let sign = CoulombShape::Sign { dead_band: search.dead_band };
-    let mut shapes = vec![sign];
-    shapes.extend(WIDTHS.map(|width| CoulombShape::Smooth { width }));
-    if let Some(stated) = search.coulomb.filter(|stated| !shapes.contains(stated)) {
-        shapes.push(stated);
+    let mut widths = WIDTHS.to_vec();
+    let mut alone = vec![sign];
+    match search.coulomb {
+        Some(CoulombShape::Smooth { width }) if !widths.contains(&width) => widths.push(width),
+        Some(stated @ CoulombShape::Sign { .. }) if stated != sign => alone.push(stated),
+        _ => {}
     }
+    widths.sort_by(f64::total_cmp);
     let load_width = match search.coulomb {
         Some(CoulombShape::Smooth { width }) => width,
         _ => search.width,
     };
     let mut columns = Vec::new();
-    let mut add = |terms: Vec<TorqueTerm>| {
+    let mut add = |terms: Vec<TorqueTerm>, grid: Option<usize>| {
         let column = |term: &TorqueTerm| {
-            Some(CandidateColumn { kind: FrictionKind::of(term)?, term: term.clone(), stated: terms.clone() })
+            Some(CandidateColumn { kind: FrictionKind::of(term)?, term: term.clone(), stated: terms.clone(), grid })
         };
         columns.extend(terms.iter().filter_map(column));
     };
-    add(vec![TorqueTerm::Viscous(Viscous { joint })]);
-    for shape in shapes {
-        add(vec![TorqueTerm::Coulomb(Coulomb { joint, shape })]);
+    add(vec![TorqueTerm::Viscous(Viscous { joint })], None);
+    for shape in alone {
+        add(vec![TorqueTerm::Coulomb(Coulomb { joint, shape })], None);
+    }
+    for (step, &width) in widths.iter().enumerate() {
+        add(vec![TorqueTerm::Coulomb(Coulomb { joint, shape: CoulombShape::Smooth { width } })], Some(step));
     }
     let both = [Direction::Forward, Direction::Backward];
     let directions = both.map(|direction| TorqueTerm::DirectionalViscous(DirectionalViscous { joint, direction }));
-    add(directions.to_vec());
-    for width in SIGMOID_WIDTHS {
+    add(directions.to_vec(), None);
+    for (step, &width) in widths.iter().enumerate() {
+        let shape = CoulombShape::Smooth { width };
+        let of = |direction| TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { joint, direction, shape });
+        add(both.map(of).to_vec(), Some(step));
+    }
+    for (step, &width) in SIGMOID_WIDTHS.iter().enumerate() {
         for offset_speed in [-0.5 * width, 0.5 * width] {
-            add(vec![TorqueTerm::Sigmoid(Sigmoid { joint, steepness: 2.0 / width, offset_speed })]);
+            add(vec![TorqueTerm::Sigmoid(Sigmoid { joint, steepness: 2.0 / width, offset_speed })], Some(step));
         }
     }
-    for speed in STRIBECK_SPEEDS {
+    for (step, &speed) in STRIBECK_SPEEDS.iter().enumerate() {
         for exponent in STRIBECK_EXPONENTS {
             let shape = CoulombShape::Smooth { width: STRIBECK_WIDTH * speed };
-            add(vec![TorqueTerm::Stribeck(Stribeck { joint, speed, exponent, shape })]);
+            add(vec![TorqueTerm::Stribeck(Stribeck { joint, speed, exponent, shape })], Some(step));
         }
     }
     for exponent in [PowerExponent::CubeRoot, PowerExponent::Quadratic] {
-        add(vec![TorqueTerm::Power(Power { joint, exponent, rounding: Power::ROUNDING })]);
+        add(vec![TorqueTerm::Power(Power { joint, exponent, rounding: Power::ROUNDING })], None);
     }
-    add(vec![TorqueTerm::Load(LoadFriction { joint, shape: CoulombShape::Smooth { width: load_width } })]);
+    add(vec![TorqueTerm::Load(LoadFriction { joint, shape: CoulombShape::Smooth { width: load_width } })], None);
     for yield_displacement in YIELDS {
-        add(vec![TorqueTerm::MaxwellSlip(MaxwellSlip { joint, yield_displacement })]);
+        add(vec![TorqueTerm::MaxwellSlip(MaxwellSlip { joint, yield_displacement })], None);
     }
     columns
 }

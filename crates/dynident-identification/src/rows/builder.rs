@@ -1,12 +1,14 @@
 //! Blocks of a motion into rows of regressor and torque.
 
+use super::coverage::set_aside;
+use super::joint_filters::JointFilters;
 use super::mask::RowMask;
 use super::{JointRows, PANEL_SAMPLES, RawSamples, RowConsumer};
 use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
 use dynident_model::terms::JointMotion;
-use dynident_recording::{DecimationSettings, Decimator, FilterError, MotionBlock};
+use dynident_recording::{DecimationSettings, FilterError, MotionBlock};
 
 /// Some samples of a block's positions, velocities and accelerations, joints in the model's order.
 pub(crate) fn in_model_order(
@@ -32,12 +34,12 @@ pub struct RowBuilder<'a> {
     workspace: BatchWorkspace,
     panels: Panels,
     history: TermHistory,
-    decimators: Option<Vec<Decimator>>,
+    filters: JointFilters,
     mask: Option<RowMask<'a>>,
+    set_aside: Vec<Vec<bool>>,
     temperature_c: Vec<f64>,
     segment: usize,
     motion: [Vec<f64>; 3],
-    out: Vec<f64>,
     filtered_rows: u64,
     samples: u64,
 }
@@ -54,25 +56,19 @@ impl<'a> RowBuilder<'a> {
         filter: Option<&DecimationSettings>,
     ) -> Result<Self, FilterError> {
         let layout = model.layout();
-        let decimators = filter
-            .map(|settings| {
-                (0..model.dof())
-                    .map(|joint| Decimator::new(settings, rate_hz, layout.joint_columns(joint).len() + 1))
-                    .collect::<Result<Vec<_>, _>>()
-            })
-            .transpose()?;
+        let columns: Vec<usize> = (0..model.dof()).map(|joint| layout.joint_columns(joint).len() + 1).collect();
         Ok(Self {
             model,
             places: places.to_vec(),
             workspace: BatchWorkspace::new(model.model()),
             panels: Panels::default(),
             history: TermHistory::new(model.load_parameters.clone()),
-            decimators,
+            filters: JointFilters::new(&columns, rate_hz, filter)?,
             mask: None,
+            set_aside: Vec::new(),
             temperature_c: Vec::new(),
             segment: 0,
             motion: [Vec::new(), Vec::new(), Vec::new()],
-            out: Vec::new(),
             filtered_rows: 0,
             samples: 0,
         })
@@ -86,12 +82,12 @@ impl<'a> RowBuilder<'a> {
 
     /// Samples to either side of a filtered row that it is made from.
     pub(crate) fn reach(&self) -> usize {
-        self.decimators.as_ref().and_then(|all| all.first()).map_or(0, Decimator::half_length)
+        self.filters.reach()
     }
 
     /// Samples that the first filtered row needs.
     pub(crate) fn needed(&self) -> usize {
-        self.decimators.as_ref().and_then(|all| all.first()).map_or(1, Decimator::length)
+        self.filters.needed()
     }
 
     /// Filtered rows of each joint so far, whether they counted or not.
@@ -112,9 +108,7 @@ impl<'a> RowBuilder<'a> {
         if block.segment != self.segment {
             self.segment = block.segment;
             self.history.restart();
-            self.decimators.iter_mut().flatten().for_each(|decimator| {
-                decimator.finish();
-            });
+            self.filters.restart();
         }
         let (model, layout) = (self.model.model(), self.model.layout());
         for from in (0..block.rows).step_by(PANEL_SAMPLES) {
@@ -148,28 +142,48 @@ impl<'a> RowBuilder<'a> {
                     }
                 }
             }
-            consumer.raw(&RawSamples { segment: block.segment, rate_hz: block.rate_hz, panels: &self.panels })?;
+            // A record of a motion says itself which of its samples can be used.
+            let counts_all = block.set_aside.is_empty() || self.mask.is_some();
+            self.set_aside.clear();
+            if !counts_all {
+                let of_joints = self.places.iter().map(|&place| set_aside(block, place, from, samples).to_vec());
+                self.set_aside.extend(of_joints);
+            }
+            consumer.raw(&RawSamples {
+                segment: block.segment,
+                rate_hz: block.rate_hz,
+                panels: &self.panels,
+                set_aside: &self.set_aside,
+                settled: settled(block, from, samples),
+            })?;
             let mut rows = samples;
             for joint in 0..model.dof() {
-                let panel = self.panels.joint(joint);
-                let panel = match &mut self.decimators {
-                    Some(decimators) => {
-                        rows = decimators[joint].push(panel, samples, &mut self.out);
-                        &self.out[..]
+                let left_out = self.set_aside.get(joint).map_or(&[][..], Vec::as_slice);
+                let all = self.filters.push(joint, self.panels.joint(joint), samples, left_out);
+                rows = all.rows;
+                let counted = match &mut self.mask {
+                    Some(mask) if rows > 0 => {
+                        let (rows, panel) = mask.apply(joint, rows, all.panel);
+                        JointRows { rows, panel, ..all }
                     }
-                    None => panel,
+                    _ => all,
                 };
-                let (counted, panel) = match &mut self.mask {
-                    Some(mask) if rows > 0 => mask.apply(joint, rows, panel),
-                    _ => (rows, panel),
-                };
-                if counted > 0 {
-                    consumer.filtered(&JointRows { joint, rows: counted, panel })?;
+                if counted.rows > 0 {
+                    consumer.filtered(&counted)?;
                 }
             }
+            self.filters.advance(samples);
             self.filtered_rows += rows as u64;
             self.samples += samples as u64;
         }
         Ok(())
     }
+}
+
+/// The samples of a panel whose motion does not rest on samples invented at the ends of a piece.
+fn settled(block: &MotionBlock, from: usize, samples: usize) -> core::ops::Range<usize> {
+    let [begin, end] = block.unsettled;
+    let inside = begin..block.rows.saturating_sub(end);
+    let clamped = |row: usize| row.clamp(from, from + samples) - from;
+    clamped(inside.start)..clamped(inside.end).max(clamped(inside.start))
 }

@@ -4,7 +4,9 @@
 //! low-pass and decimation, then to a [`RowConsumer`]. The whole regressor is never stored.
 
 mod builder;
+mod coverage;
 mod filter;
+mod joint_filters;
 mod mask;
 mod motion_noise;
 mod pass;
@@ -12,7 +14,9 @@ mod reader;
 
 pub use builder::RowBuilder;
 pub(crate) use builder::in_model_order;
+pub(crate) use coverage::{divide_by_coverage, set_aside};
 pub use filter::{ParallelFilterError, ParallelFilterSettings, motion_band_hz};
+pub(crate) use joint_filters::JointFilters;
 pub(crate) use motion_noise::noise_factors;
 pub use pass::{KeptLog, LogPass, LogStatistics};
 
@@ -32,10 +36,13 @@ pub struct JointRows<'a> {
     pub rows: usize,
     /// The joint's columns of the layout one after another, each of `rows` numbers, then its torque (N m, N).
     pub panel: &'a [f64],
+    /// Row by row the share of the filter's weight on samples that count, by which the row was divided (at least by one
+    /// half); empty where all do. [`counted`](Self::counted) leaves out rows with less than half.
+    pub coverage: &'a [f64],
 }
 
 /// Unfiltered samples of all joints.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct RawSamples<'a> {
     /// Number of the uninterrupted piece of the log.
     pub segment: usize,
@@ -43,6 +50,11 @@ pub struct RawSamples<'a> {
     pub rate_hz: f64,
     /// Regressor blocks with the torque as logged, or as smoothed with `smooth_torque`.
     pub panels: &'a Panels,
+    /// For each joint whether a sample's torque does not count (outlier, held, in a gap that was bridged); empty if all
+    /// count.
+    pub set_aside: &'a [Vec<bool>],
+    /// The samples whose motion does not rest on samples that a filter invented at the ends of a piece.
+    pub settled: core::ops::Range<usize>,
 }
 
 /// What is done with a log's rows.

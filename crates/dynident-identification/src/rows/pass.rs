@@ -267,6 +267,8 @@ impl BlockCache {
     /// Returns the block if it is not kept.
     fn keep(&mut self, block: MotionBlock) -> Option<MotionBlock> {
         let MotionBlock { q, dq, ddq, tau, tau_smooth, temperature_c, .. } = &block;
+        // Marks take an eighth of a number each.
+        self.numbers += block.set_aside.len() / 8;
         self.numbers += [q, dq, ddq, tau, tau_smooth, temperature_c].into_iter().map(Vec::len).sum::<usize>();
         if self.numbers > MOST_KEPT_NUMBERS {
             self.blocks = None;

@@ -1,10 +1,15 @@
 //! From rows with stamps to pieces of samples on a uniform clock.
 //!
-//! [`Clock`] is the decision about the rate, and whether the stamps or the even spacing are to be believed. The
-//! `Segmenter` then cuts a stream of rows at gaps, and its `Resampler` puts each piece on a grid of its own.
+//! [`Clock`] is the decision about the rate, and whether the stamps, the stamps smoothed (`drift`) or the even spacing
+//! are to be believed. The `Timeline` gives each row its place by it, the `Segmenter` cuts a stream of rows at gaps,
+//! and its `Resampler` puts each piece on a grid of its own.
 
+mod drift;
 mod resampler;
 pub(crate) mod segments;
+pub(crate) mod timeline;
+
+use drift::{Drift, smoothed, windows};
 
 use crate::log::ClockRule;
 use serde::{Deserialize, Serialize};
@@ -16,6 +21,9 @@ pub(crate) const NEGLIGIBLE_JITTER: f64 = 1e-3;
 /// Stamps closer together than this part of the mean step carry no information beside the noise: the second is left out
 /// when stamps are interpolated.
 pub(crate) const SHORTEST_STEP: f64 = 0.1;
+
+/// Share by which one spacing has to predict positions better than another to be believed.
+const CLEARLY: f64 = 0.1;
 
 /// What the first rows say about the clock.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -32,18 +40,50 @@ pub struct Clock {
     pub misfit_uniform: Option<f64>,
     /// The same if the stamps are believed.
     pub misfit_stamps: Option<f64>,
+    /// Steps by which the stamps, smoothed, stray from an even grid (largest less smallest); `None` if the question was
+    /// idle.
+    #[serde(default)]
+    pub drift_steps: Option<f64>,
+    /// Rows over which stamps are smoothed by local lines; 0 if they are not.
+    #[serde(default)]
+    pub smoothing_rows: usize,
     /// The decision in a sentence.
     pub evidence: String,
 }
 
+/// Where samples stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Spacing {
+    /// At equal steps.
+    Even,
+    /// At the stamps.
+    Stamps,
+    /// At the stamps smoothed by local lines.
+    Smoothed,
+}
+
+impl Clock {
+    pub(crate) fn spacing(&self) -> Spacing {
+        match (self.uniform, self.smoothing_rows) {
+            (true, _) => Spacing::Even,
+            (false, 0) => Spacing::Stamps,
+            (false, _) => Spacing::Smoothed,
+        }
+    }
+}
+
 /// Decides on the clock from the stamps `time_s` and positions `q` (one slice for each joint) of the first rows.
 ///
-/// Rule: with a jitter below [`NEGLIGIBLE_JITTER`] spacing is even. Otherwise every sample is predicted from its four
-/// neighbours by the cubic through them, once at even spacing and once at the stamps; where sampling was regular and
-/// only the stamps jitter (a time taken after transmission), the first predicts better, and the other way round. Stamps
-/// are believed if they predict at least 10 % better.
+/// Rule: with a jitter below [`NEGLIGIBLE_JITTER`] spacing is even. Otherwise two questions. *Do single stamps tell
+/// when their samples were taken?* Every sample is predicted from its four neighbours by the cubic through them, once
+/// at even spacing and once at the stamps; where sampling was regular and only the stamps jitter (a time taken after
+/// transmission), the first predicts better, and the other way round. Stamps are believed if they predict at least 10 %
+/// better. *Does the rate change slowly?* No cubic over five samples can tell, and noise of the position hides jitter
+/// besides; but stamps that stray ever further from an even grid do. Where they stray by more than a step, and the rate
+/// varies by more than 0.1 %, samples stand at the stamps smoothed by local lines, over as many rows as predict
+/// left-out stamps best: the drift is followed, jitter is averaged out.
 ///
-/// `Err` holds the reason why no rate follows.
+/// Steps are the unit throughout, so nothing depends on the unit of time. `Err` holds the reason why no rate follows.
 pub(crate) fn clock(
     rule: ClockRule,
     time_s: &[f64],
@@ -76,6 +116,8 @@ pub(crate) fn clock(
         median_step_s: median,
         misfit_uniform: None,
         misfit_stamps: None,
+        drift_steps: None,
+        smoothing_rows: 0,
         evidence: String::new(),
     };
     let share = format!("{:.3} % jitter", 100.0 * jitter);
@@ -84,21 +126,62 @@ pub(crate) fn clock(
         return Ok(result);
     }
     let (uniform, stamps) = misfits(time_s, q, mean, max_gap_steps * median);
+    let drift = drift((time_s, row), q, rate_hz, max_gap_steps * median);
     result.misfit_uniform = Some(uniform);
     result.misfit_stamps = Some(stamps);
-    result.uniform = match rule {
-        ClockRule::Uniform => true,
-        ClockRule::Stamps => false,
-        ClockRule::Auto => stamps.partial_cmp(&(0.9 * uniform)) != Some(core::cmp::Ordering::Less),
+    result.drift_steps = drift.map(|drift| drift.steps);
+    let smoothing_rows = drift.map_or(0, |drift| 2 * drift.half + 1);
+    let stamps_predict_better = stamps.partial_cmp(&((1.0 - CLEARLY) * uniform)) == Some(core::cmp::Ordering::Less);
+    (result.uniform, result.smoothing_rows) = match rule {
+        ClockRule::Stamps => (false, 0),
+        ClockRule::Smoothed => (false, smoothing_rows),
+        ClockRule::Auto if stamps_predict_better => (false, 0),
+        ClockRule::Auto if drift.is_some_and(|drift| drift.matters()) => (false, smoothing_rows),
+        ClockRule::Uniform | ClockRule::Auto => (true, 0),
     };
-    let believed = if result.uniform { "even spacing" } else { "stamps" };
-    let by = if rule == ClockRule::Auto {
-        "decided by the misfit of a local cubic"
-    } else {
-        "as asked; misfit of a local cubic"
+    let believed = match result.spacing() {
+        Spacing::Even => "even spacing".to_owned(),
+        Spacing::Stamps => "stamps".to_owned(),
+        Spacing::Smoothed => format!("stamps smoothed over {} rows", result.smoothing_rows),
     };
-    result.evidence = format!("{believed}, {by}: {uniform:.3e} evenly spaced, {stamps:.3e} at the stamps ({share})");
+    let misfit = format!("misfit of a local cubic: {uniform:.3e} evenly spaced, {stamps:.3e} at the stamps ({share})");
+    let strays = drift.map_or_else(String::new, |drift| {
+        let Drift { steps, variation, .. } = drift;
+        format!("; the stamps stray {steps:.2} steps from an even grid, the rate varies by {:.2} %", 100.0 * variation)
+    });
+    result.evidence = match rule {
+        ClockRule::Auto if result.spacing() == Spacing::Smoothed => {
+            format!("{believed}, decided by the drift{strays}; {misfit}")
+        }
+        ClockRule::Auto => format!("{believed}, decided by the {misfit}{strays}"),
+        ClockRule::Uniform | ClockRule::Stamps | ClockRule::Smoothed => {
+            format!("{believed}, as asked; {misfit}{strays}")
+        }
+    };
     Ok(result)
+}
+
+/// How far the stamps stray from an even grid; smoothed over as many rows as predict left-out stamps best, and over
+/// more as long as positions follow from their neighbours clearly worse than at even spacing: jitter that lasts for
+/// several rows (packets that come late together) is none of the rate.
+fn drift((time_s, row): (&[f64], &[u64]), q: &[Vec<f64>], rate_hz: f64, longest_step_s: f64) -> Option<Drift> {
+    let place: Vec<f64> = row.iter().map(|row| *row as f64).collect();
+    let stamp: Vec<f64> = time_s.iter().map(|time_s| time_s * rate_hz).collect();
+    let is_gap = |i: usize| {
+        let step = time_s[i] - time_s[i - 1];
+        step < 0.0 || step > longest_step_s
+    };
+    let begins: Vec<bool> = (0..row.len()).map(|i| i > 0 && is_gap(i)).collect();
+    let mut found = None;
+    for &half in windows(&place, &stamp, &begins) {
+        found = Some(Drift::of(&place, &stamp, &begins, half));
+        let smooth = smoothed(&place, &stamp, &begins, half);
+        let (uniform, stamps) = misfits(&smooth, q, 1.0, longest_step_s * rate_hz);
+        if stamps <= (1.0 + CLEARLY) * uniform {
+            break;
+        }
+    }
+    found
 }
 
 /// RMS misfit of the cubic through two neighbours on either side, over all joints in units of each joint's deviation.
@@ -174,6 +257,47 @@ mod tests {
         assert!(decided(false).uniform, "{:?}", decided(false));
         assert!(!decided(true).uniform, "{:?}", decided(true));
         assert!((decided(true).rate_hz - 200.0).abs() < 0.1);
+    }
+
+    /// The decision for samples taken at `taken(row)` steps and stamped `stamp(row)`, with noise of the position, in
+    /// units of time of which a second has `unit`.
+    fn decided_in(unit: f64, sigma: f64, taken: impl Fn(usize) -> f64, stamp: impl Fn(usize) -> f64) -> Clock {
+        let n = 20_000;
+        let noise = crate::derivative::test_signals::normal(4, n);
+        let q: Vec<f64> = (0..n).map(|i| (taken(i) * 0.002).sin() + sigma * noise[i]).collect();
+        let time: Vec<f64> = (0..n).map(|i| stamp(i) * 0.001 * unit).collect();
+        let row: Vec<u64> = (0..n as u64).collect();
+        clock(ClockRule::Auto, &time, &row, &[q], 5.0).unwrap()
+    }
+
+    #[test]
+    fn drift_is_followed_under_noise_that_hides_it_from_the_cubic() {
+        // Blocks of 500 rows at rates some percent apart.
+        let rate = |block: usize| 1.0 + 0.06 * (block as f64 * 2.4).sin();
+        let taken = |i: usize| (0..i / 500).map(|b| 500.0 * rate(b)).sum::<f64>() + (i % 500) as f64 * rate(i / 500);
+        for unit in [1e-3, 1.0, 1e3] {
+            for sigma in [0.0, 1e-4] {
+                let found = decided_in(unit, sigma, taken, |i| taken(i) + jitter(i));
+                assert_eq!(found.spacing(), Spacing::Smoothed, "{unit} {sigma}: {found:?}");
+                // Nothing depends on the unit of time.
+                let other = decided_in(1.0, sigma, taken, |i| taken(i) + jitter(i));
+                assert_eq!(found.smoothing_rows, other.smoothing_rows, "{unit} {sigma}");
+            }
+        }
+    }
+
+    #[test]
+    fn jitter_and_late_packets_on_an_even_grid_stay_even() {
+        let even = |i: usize| i as f64;
+        let late = |i: usize| (3.6 - 0.8 * (i % 50) as f64).max(0.0);
+        for sigma in [0.0, 1e-6, 1e-4] {
+            let jittered = decided_in(1.0, sigma, even, |i| even(i) + jitter(i));
+            assert_eq!(jittered.spacing(), Spacing::Even, "{sigma}: {jittered:?}");
+        }
+        for sigma in [0.0, 1e-6, 1e-5] {
+            let packets = decided_in(1.0, sigma, even, |i| even(i) + late(i));
+            assert_eq!(packets.spacing(), Spacing::Even, "{sigma}: {packets:?}");
+        }
     }
 
     #[test]

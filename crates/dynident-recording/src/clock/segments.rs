@@ -1,35 +1,31 @@
 //! Uninterrupted pieces of a log, each on its own uniform grid.
 
-use super::Clock;
 use super::resampler::Resampler;
 
-/// Cuts a stream of rows at gaps and backward stamps and resamples each piece.
+/// Cuts a stream of rows where a piece begins and resamples each piece.
 #[derive(Clone, Debug)]
 pub(crate) struct Segmenter {
-    uniform: bool,
-    rate_hz: f64,
-    longest_step_s: f64,
-    longest_step_rows: f64,
     resampler: Resampler,
-    last: Option<(u64, f64)>,
-    first: Option<(u64, f64)>,
+    last: bool,
+    first: Option<(f64, f64)>,
     closed: bool,
     crowded: u64,
 }
 
+/// Some rows on their way to the grid.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PlacedRows<'a> {
+    /// Stamps in seconds.
+    pub(crate) time_s: &'a [f64],
+    /// Places in steps.
+    pub(crate) steps: &'a [f64],
+    /// Whether a row cannot follow the one before.
+    pub(crate) begins: &'a [bool],
+}
+
 impl Segmenter {
-    pub(crate) fn new(clock: &Clock, max_gap_steps: f64, channels: usize) -> Self {
-        Self {
-            uniform: clock.uniform,
-            rate_hz: clock.rate_hz,
-            longest_step_s: max_gap_steps * clock.median_step_s,
-            longest_step_rows: max_gap_steps,
-            resampler: Resampler::new(channels),
-            last: None,
-            first: None,
-            closed: false,
-            crowded: 0,
-        }
+    pub(crate) fn new(channels: usize) -> Self {
+        Self { resampler: Resampler::new(channels), last: false, first: None, closed: false, crowded: 0 }
     }
 
     /// Whether the piece in `out` is complete and waits for [`reopen`](Self::reopen).
@@ -42,6 +38,11 @@ impl Segmenter {
         self.first.map_or(0.0, |(_, time_s)| time_s)
     }
 
+    /// Place of a row in the piece, in steps after its first sample.
+    pub(crate) fn place_in_piece(&self, steps: f64) -> f64 {
+        self.first.map_or(0.0, |(first, _)| steps - first)
+    }
+
     /// Samples left out for standing too close to the one before.
     pub(crate) fn crowded(&self) -> u64 {
         self.crowded
@@ -51,30 +52,22 @@ impl Segmenter {
     /// channels.
     pub(crate) fn feed<'a, I: Iterator<Item = &'a Vec<f64>>>(
         &mut self,
-        row: &[u64],
-        time_s: &[f64],
+        rows: PlacedRows<'_>,
         at: usize,
         out: &mut [Vec<f64>],
         columns: impl Fn() -> I,
     ) -> usize {
-        for index in at..row.len() {
-            let (row, time_s) = (row[index], time_s[index]);
-            if let Some((last_row, last_s)) = self.last {
-                let step = time_s - last_s;
-                let rows = (row - last_row) as f64;
-                // A dropped row is no gap in time beyond its own length, but too many of them are.
-                if step < 0.0 || step > self.longest_step_s || rows > self.longest_step_rows {
-                    self.close(out);
-                    return index;
-                }
+        for index in at..rows.steps.len() {
+            if self.last && rows.begins[index] {
+                self.close(out);
+                return index;
             }
-            let (first_row, first_s) = *self.first.get_or_insert((row, time_s));
-            let stamp = if self.uniform { (row - first_row) as f64 } else { (time_s - first_s) * self.rate_hz };
-            self.crowded += u64::from(!self.resampler.push(stamp, index, columns()));
-            self.last = Some((row, time_s));
+            let (first, _) = *self.first.get_or_insert((rows.steps[index], rows.time_s[index]));
+            self.crowded += u64::from(!self.resampler.push(rows.steps[index] - first, index, columns()));
+            self.last = true;
         }
         self.resampler.drain(false, out);
-        row.len()
+        rows.steps.len()
     }
 
     /// Ends the piece: appends what is left of it to `out`.
@@ -89,6 +82,6 @@ impl Segmenter {
     pub(crate) fn reopen(&mut self) {
         self.closed = false;
         self.first = None;
-        self.last = None;
+        self.last = false;
     }
 }

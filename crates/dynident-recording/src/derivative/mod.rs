@@ -25,7 +25,7 @@ mod savitzky_golay;
 mod settings;
 mod smoothed_differences;
 #[cfg(test)]
-mod test_signals;
+pub(crate) mod test_signals;
 mod time_warp;
 mod velocity_series;
 

@@ -1,6 +1,7 @@
 //! The description of a log: which column is what. Plain data, read from the study file.
 
 use super::column_pattern::expanded;
+use super::row_rules::{self, RowRule};
 use super::units::{Quantity, si_factor, unit_names};
 use crate::error::FormatError;
 use serde::{Deserialize, Serialize};
@@ -247,6 +248,8 @@ pub enum ClockRule {
     Uniform,
     /// Samples were taken at the stamps; they are interpolated onto a uniform grid.
     Stamps,
+    /// Samples were taken at a rate that changes slowly; single stamps jitter and are smoothed.
+    Smoothed,
 }
 
 /// A log, described: part of the study file.
@@ -303,6 +306,18 @@ pub struct LogFormat {
     /// Seconds `[from, to)` after the first data row of the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_range_s: Option<[f64; 2]>,
+    /// Data rows `[first, end)`, 0-based, that are left out of what is used, one range or several.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub drop_rows: Vec<[u64; 2]>,
+    /// Seconds `[from, to)` after the first data row of the file that are left out, one range or several.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub drop_time_s: Vec<[f64; 2]>,
+    /// Rows are left out where one of these rules holds.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub drop_where: Vec<RowRule>,
+    /// Rows are left out where one of these rules does not hold.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub keep_where: Vec<RowRule>,
     /// Rows with an empty, NaN or infinite field.
     #[serde(default)]
     pub missing: Missing,
@@ -312,6 +327,14 @@ pub struct LogFormat {
     /// A step longer than this many median steps splits the log; 1.5 to 1000, 5 by default.
     #[serde(default = "default_max_gap_steps")]
     pub max_gap_steps: f64,
+    /// Whether a longer gap is filled where it is short against the motion (a fifth of the cut-off's period); what
+    /// stands in it counts as no row. True by default.
+    #[serde(default = "yes")]
+    pub bridge_gaps: bool,
+}
+
+fn yes() -> bool {
+    true
 }
 
 fn default_max_gap_steps() -> f64 {
@@ -334,9 +357,14 @@ impl LogFormat {
             rows: None,
             fraction: None,
             time_range_s: None,
+            drop_rows: Vec::new(),
+            drop_time_s: Vec::new(),
+            drop_where: Vec::new(),
+            keep_where: Vec::new(),
             missing: Missing::default(),
             clock: ClockRule::default(),
             max_gap_steps: default_max_gap_steps(),
+            bridge_gaps: yes(),
         }
     }
 
@@ -397,6 +425,7 @@ impl LogFormat {
             let fix = "write [from, to] in seconds with from < to";
             return wrong("time_range_s", &format!("[{from}, {to}] is empty"), fix);
         }
+        row_rules::validate(self)?;
         if !(1.5..=1000.0).contains(&self.max_gap_steps) {
             let problem = format!("{} is out of range", self.max_gap_steps);
             return wrong("max_gap_steps", &problem, "give 1.5 to 1000 median steps");

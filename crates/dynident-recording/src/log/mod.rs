@@ -15,6 +15,7 @@ mod lines;
 mod mapping;
 mod memory;
 mod reader;
+mod row_rules;
 mod source;
 mod text;
 mod units;
@@ -24,6 +25,7 @@ pub use format::{
 };
 pub use memory::{JointSamples, MemoryLog, SampleClock};
 pub use reader::{LinesDropped, LogReader, RawBlock};
+pub use row_rules::RowRule;
 pub use source::{LogSource, LogTable};
 pub use text::TextLog;
 pub use units::{Quantity, si_factor, unit_names};

@@ -3,6 +3,7 @@
 use super::columns::ColumnSelection;
 use super::format::Missing;
 use super::mapping::Mapping;
+use super::row_rules::FoundRules;
 use super::source::LogSource;
 use super::units::Quantity;
 use super::{Log, file_source};
@@ -47,6 +48,9 @@ impl RawBlock {
 pub struct LinesDropped {
     /// Rows with an empty, NaN or infinite field, under `missing = "drop"`.
     pub missing: u64,
+    /// Rows left out by `drop_rows`, `drop_time_s`, `drop_where` and `keep_where`.
+    #[serde(default)]
+    pub by_rule: u64,
     /// File and line of a cut-off last row.
     pub truncated: Option<String>,
 }
@@ -73,6 +77,7 @@ pub struct LogReader {
     first_stamp_s: Option<f64>,
     rows: [u64; 2],
     time_range_s: [f64; 2],
+    rules: FoundRules,
     selection: String,
     missing: Missing,
     next_row: u64,
@@ -95,6 +100,8 @@ impl LogReader {
             Some(time) => Some((tables[0].want("time.column", &time.column)?, time.unit.seconds() * time.scale)),
             None => None,
         };
+
+        let rules = FoundRules::new(format, |key, column| tables[0].want(key, column))?;
 
         // Channel groups in files of their own: each file is opened once.
         let mut paths = vec![main.path().map(Path::to_owned)];
@@ -136,6 +143,13 @@ impl LogReader {
             }
             (None, None) => [0, u64::MAX],
         };
+        let rules_in_force = [
+            (!format.drop_rows.is_empty()).then_some("drop_rows"),
+            (!format.drop_time_s.is_empty()).then_some("drop_time_s"),
+            (!format.drop_where.is_empty()).then_some("drop_where"),
+            (!format.keep_where.is_empty()).then_some("keep_where"),
+        ];
+        selection.extend(rules_in_force.into_iter().flatten().map(str::to_owned));
         if let Some(range) = format.time_range_s {
             selection.push(format!("time_range_s = {range:?}"));
         }
@@ -149,6 +163,7 @@ impl LogReader {
             first_stamp_s: None,
             rows,
             time_range_s: format.time_range_s.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
+            rules,
             selection: selection.join(", "),
             missing: format.missing,
             next_row: 0,
@@ -262,6 +277,15 @@ impl LogReader {
         let row = self.next_row;
         self.next_row += 1;
         if let Some(index) = missing {
+            let values = &self.tables[0].values;
+            let since =
+                |stamp: f64| (stamp - self.first_stamp_s.unwrap_or(stamp)) * self.time.map_or(0.0, |time| time.1);
+            let time_s = self.time.map_or(row as f64 * self.period_s, |(slot, _)| since(values[slot]));
+            // Rows that are left out may hold anything.
+            if self.rules.drops(row, time_s, values) {
+                self.dropped.by_rule += u64::from(row >= self.rows[0]);
+                return Ok(());
+            }
             if self.missing == Missing::Error {
                 return Err(self.tables[index].missing_error());
             }
@@ -277,6 +301,10 @@ impl LogReader {
             None => row as f64 * self.period_s,
         };
         if row < self.rows[0] || time_s < self.time_range_s[0] || time_s >= self.time_range_s[1] {
+            return Ok(());
+        }
+        if self.rules.drops(row, time_s, &self.tables[0].values) {
+            self.dropped.by_rule += 1;
             return Ok(());
         }
         block.row.push(row);

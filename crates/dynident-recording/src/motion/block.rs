@@ -17,6 +17,10 @@ pub struct MotionSettings {
     /// Seconds left out at both ends of every uninterrupted piece, where a zero-phase filter has to invent
     /// samples; 0 to 60, 0 by default.
     pub trim_s: f64,
+    /// Leave everything as it was logged: by default single torque samples far from their neighbours and torque that is
+    /// repeated while its joint moves do not count, and lone spikes of a position are replaced; see
+    /// [`SetAside`](crate::SetAside).
+    pub keep_outliers: bool,
 }
 
 impl MotionSettings {
@@ -55,6 +59,13 @@ pub struct MotionBlock {
     pub tau_smooth: Vec<f64>,
     /// Temperatures of the joints on the uniform clock, unfiltered (°C); empty without a `temperature` group.
     pub temperature_c: Vec<f64>,
+    /// Whether a sample's torque does not count (outlier, held, hole that was filled), laid out as the torques; empty
+    /// if all count. What stands in its place is a straight line; a fit leaves the sample out of torque and regressor
+    /// alike.
+    pub set_aside: Vec<bool>,
+    /// Rows at the begin and at the end whose motion rests on samples that the filter had to invent at the ends of a
+    /// piece: one and a half periods of the cut-off, as far as the filter reaches and at most a quarter of the piece.
+    pub unsettled: [usize; 2],
 }
 
 impl MotionBlock {
@@ -92,6 +103,14 @@ impl MotionBlock {
             tau: some(&self.tau),
             tau_smooth: some(&self.tau_smooth),
             temperature_c: some(&self.temperature_c),
+            set_aside: (0..self.joints)
+                .filter(|_| !self.set_aside.is_empty())
+                .flat_map(|joint| self.set_aside[joint * self.rows..][run.clone()].iter().copied())
+                .collect(),
+            unsettled: [
+                self.unsettled[0].saturating_sub(run.start).min(run.len()),
+                (self.unsettled[1] + run.end).saturating_sub(self.rows).min(run.len()),
+            ],
         }
     }
 }

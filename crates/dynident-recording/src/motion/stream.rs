@@ -2,22 +2,31 @@
 
 use super::block::{MotionBlock, MotionSettings};
 use super::marks::kept_runs;
-use crate::clock::segments::Segmenter;
+use crate::cleaning::{CleanBlock, CleanRows, replace_spikes};
+use crate::clock::segments::{PlacedRows, Segmenter};
+use crate::clock::timeline::Timeline;
 use crate::clock::{Clock, clock};
 use crate::derivative::{Derivatives, Differentiator, Place};
 use crate::error::{FilterError, RecordingError};
 use crate::filter::cutoff::{CUTOFF_SAMPLES, CutoffChoice, cutoff};
 use crate::filter::position_noise;
 use crate::log::{Log, LogFormat, LogReader, Quantity, RawBlock};
+use crate::quantisation::quantisation_step;
 use crate::reference::Reference;
 use crate::report::ImportReport;
-use crate::report::channels::{ChannelCheck, quantisation_step};
+use crate::report::channels::ChannelCheck;
 use crate::report::comparison::Comparison;
 use crate::report::steps::TimeCheck;
 use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::Arc;
 
+/// Periods of the cut-off at an end of a piece after which what the filter invented beyond it has faded: the slowest
+/// poles of a Butterworth filter of order 4 leave 3 % there.
+const UNSETTLED_PERIODS: f64 = 1.5;
+/// Longest hole that is filled, as a share of the cut-off's period: a tenth of the period of the motion's highest
+/// frequency. A polynomial of degree 5 through both sides misses a sinusoid of that frequency by less than 1e-4 there.
+const BRIDGED_PERIODS: f64 = 0.2;
 /// Rows of a [`MotionBlock`] at least, but for the last of a segment.
 const CHUNK_ROWS: usize = 8192;
 
@@ -28,9 +37,9 @@ const CHUNK_ROWS: usize = 8192;
 /// from the start, as [`next_block`](Self::next_block) is called.
 #[derive(Debug)]
 pub struct MotionStream {
-    reader: LogReader,
-    raw: RawBlock,
-    raw_at: usize,
+    rows_in: CleanRows,
+    clean: CleanBlock,
+    clean_at: usize,
     joints: Vec<String>,
     clock: Clock,
     cutoff: CutoffChoice,
@@ -38,6 +47,8 @@ pub struct MotionStream {
     differentiator: Box<dyn Differentiator>,
     smooth_torque: bool,
     trim: usize,
+    /// Samples at the ends of a piece that rest on invented ones.
+    unsettled: usize,
     /// Samples on either side of a chunk that enter it; `None`: the whole segment.
     context: Option<usize>,
     segmenter: Segmenter,
@@ -47,6 +58,8 @@ pub struct MotionStream {
     done: usize,
     /// Samples of the segment before those in `uniform`.
     passed: u64,
+    /// Samples of the segment whose torque does not count: number in the segment and joint, ascending.
+    set_aside: VecDeque<(u64, usize)>,
     ended: bool,
     segments: usize,
     short_segments: [u64; 2],
@@ -134,7 +147,13 @@ impl MotionStream {
         build: impl FnOnce(&CutoffChoice) -> Result<Box<dyn Differentiator>, FilterError>,
     ) -> Result<Self, RecordingError> {
         let Log { format, joints, .. } = log;
-        let (prefix, time_label) = prefix(log)?;
+        let (mut prefix, time_label) = prefix(log)?;
+        if !settings.keep_outliers {
+            for q in &mut prefix.q {
+                let rows = 0..q.len();
+                replace_spikes(q, rows);
+            }
+        }
         let clock = match format.rate_hz {
             Some(rate_hz) => Clock {
                 rate_hz,
@@ -142,16 +161,20 @@ impl MotionStream {
                 median_step_s: rate_hz.recip(),
                 misfit_uniform: None,
                 misfit_stamps: None,
+                drift_steps: None,
+                smoothing_rows: 0,
                 evidence: "even spacing: the rate is given, there are no stamps".to_owned(),
             },
             None => clock(format.clock, &prefix.time_s, &prefix.row, &prefix.q, format.max_gap_steps)
                 .map_err(|reason| RecordingError::NoRate { log: log.source().label(), column: time_label, reason })?,
         };
-        let segmenter = Segmenter::new(&clock, format.max_gap_steps, 2 * joints.len());
-        let longest = longest_segment(segmenter, &prefix);
+        let timeline = Timeline::new(&clock, format.max_gap_steps, 0.0);
+        let longest = longest_segment(timeline, &prefix);
         let cutoff = cutoff(&longest, clock.rate_hz);
         let in_force_hz = settings.differentiator.cutoff_hz().unwrap_or(cutoff.cutoff_hz);
         let position_noise = position_noise(&longest, clock.rate_hz, in_force_hz);
+        let bridged = if format.bridge_gaps { BRIDGED_PERIODS * clock.rate_hz / cutoff.cutoff_hz } else { 0.0 };
+        let timeline = Timeline::new(&clock, format.max_gap_steps, bridged);
         let differentiator = build(&cutoff)?;
         let mut checks = Vec::new();
         for (quantity, _) in format.groups() {
@@ -173,13 +196,18 @@ impl MotionStream {
         let temperature = if format.temperature.is_some() { joints.len() } else { 0 };
         let channels = 2 * joints.len() + velocity.len() + acceleration.len() + temperature;
         Ok(Self {
-            reader: LogReader::open(log)?,
-            raw: RawBlock::default(),
-            raw_at: 0,
+            rows_in: CleanRows::new(LogReader::open(log)?, timeline, joints, settings.keep_outliers),
+            clean: CleanBlock::default(),
+            clean_at: 0,
             joints: joints.clone(),
             trim: (settings.trim_s * clock.rate_hz).round() as usize,
             context: differentiator.context_samples(clock.rate_hz),
-            segmenter: Segmenter::new(&clock, format.max_gap_steps, channels),
+            unsettled: {
+                let cutoff_hz = settings.differentiator.cutoff_hz().unwrap_or(cutoff.cutoff_hz);
+                let reach = differentiator.context_samples(clock.rate_hz).unwrap_or(0);
+                ((UNSETTLED_PERIODS * clock.rate_hz / cutoff_hz) as usize).min(reach)
+            },
+            segmenter: Segmenter::new(channels),
             time_check: TimeCheck::new(clock.median_step_s),
             clock,
             cutoff,
@@ -189,6 +217,7 @@ impl MotionStream {
             uniform: vec![Vec::new(); channels],
             done: 0,
             passed: 0,
+            set_aside: VecDeque::new(),
             ended: false,
             segments: 0,
             short_segments: [0; 2],
@@ -247,7 +276,7 @@ impl MotionStream {
                 if given {
                     return Ok(true);
                 }
-                if self.waiting.is_empty() && self.ended && self.raw_at >= self.raw.rows() {
+                if self.waiting.is_empty() && self.ended && self.clean_at >= self.clean.raw.rows() {
                     return self.finish(block);
                 }
                 continue;
@@ -260,7 +289,7 @@ impl MotionStream {
         *block = MotionBlock { rate_hz: self.clock.rate_hz, joints: self.joints.len(), ..MotionBlock::default() };
         if self.segments == 0 {
             return Err(RecordingError::TooShort {
-                log: self.reader.label().to_owned(),
+                log: self.rows_in.reader().label().to_owned(),
                 found: self.longest_short,
                 needed: self.needed(),
                 method: self.differentiator.name(),
@@ -268,7 +297,7 @@ impl MotionStream {
         }
         if self.given == 0 && self.unmapped > 0 {
             return Err(RecordingError::NotFollowed {
-                log: self.reader.label().to_owned(),
+                log: self.rows_in.reader().label().to_owned(),
                 method: self.differentiator.name(),
                 samples: self.unmapped,
             });
@@ -287,28 +316,51 @@ impl MotionStream {
 
     /// Moves raw rows to the uniform clock until the raw block or the segment ends.
     fn feed(&mut self) -> Result<(), RecordingError> {
-        if self.raw_at >= self.raw.rows() {
-            self.raw_at = 0;
-            if !self.reader.next_block(&mut self.raw)? {
-                self.ended = true;
+        if self.clean_at >= self.clean.raw.rows() {
+            self.clean_at = 0;
+            let Self { rows_in, rows, time_check, checks, .. } = self;
+            let mut read = |raw: &RawBlock| {
+                *rows += raw.rows() as u64;
+                for (row, time_s) in raw.row.iter().zip(&raw.time_s) {
+                    time_check.see(*row, *time_s);
+                }
+                // In the order of LogFormat::groups.
+                let logged = raw.q.iter().chain(&raw.dq).chain(&raw.ddq).chain(&raw.tau).chain(&raw.temperature_c);
+                for (check, values) in checks.iter_mut().zip(logged) {
+                    check.see(values);
+                }
+            };
+            let next = rows_in.next_block(&mut read)?;
+            self.ended = next.is_none();
+            self.clean = next.unwrap_or_default();
+            if self.ended {
                 self.segmenter.close(&mut self.uniform);
                 return Ok(());
             }
-            self.rows += self.raw.rows() as u64;
-            for (row, time_s) in self.raw.row.iter().zip(&self.raw.time_s) {
-                self.time_check.see(*row, *time_s);
-            }
-            // In the order of LogFormat::groups.
-            let raw = &self.raw;
-            let logged = raw.q.iter().chain(&raw.dq).chain(&raw.ddq).chain(&raw.tau).chain(&raw.temperature_c);
-            for (check, values) in self.checks.iter_mut().zip(logged) {
-                check.see(values);
-            }
         }
-        let raw = &self.raw;
-        self.raw_at = self.segmenter.feed(&raw.row, &raw.time_s, self.raw_at, &mut self.uniform, || {
+        let CleanBlock { raw, places, marked } = &self.clean;
+        let rows = PlacedRows { time_s: &raw.time_s, steps: &places.steps, begins: &places.begins };
+        let from = self.clean_at;
+        self.clean_at = self.segmenter.feed(rows, from, &mut self.uniform, || {
             raw.q.iter().chain(&raw.tau).chain(&raw.dq).chain(&raw.ddq).chain(&raw.temperature_c)
         });
+        let mut grid = Vec::new();
+        for (joint, marked) in marked.iter().enumerate() {
+            let first = marked.partition_point(|row| *row < from);
+            for row in marked[first..].iter().take_while(|row| **row < self.clean_at) {
+                // A sample on the grid is copied, one beside it enters the points before and after it.
+                let place = self.segmenter.place_in_piece(places.steps[*row]);
+                let on_grid = (place - place.round()).abs() <= 1e-6;
+                let (low, high) = if on_grid { (place.round(), place.round()) } else { (place.floor(), place.ceil()) };
+                grid.extend([low as u64, high as u64].map(|sample| (sample, joint)));
+            }
+        }
+        if !grid.is_empty() {
+            grid.extend(self.set_aside.drain(..));
+            grid.sort_unstable();
+            grid.dedup();
+            self.set_aside.extend(grid);
+        }
         Ok(())
     }
 
@@ -329,6 +381,7 @@ impl MotionStream {
             }
         }
         self.uniform.iter_mut().for_each(Vec::clear);
+        self.set_aside.clear();
         self.done = 0;
         self.passed = 0;
         self.in_cut = false;
@@ -353,8 +406,28 @@ impl MotionStream {
         for values in [q, dq, ddq, tau, tau_smooth, temperature_c] {
             values.clear();
         }
+        block.set_aside.clear();
+        let total = (self.passed as usize + self.uniform[0].len()).max(1);
+        let settled_from = if last { self.unsettled.min(total / 4) } else { self.unsettled };
+        let first = self.passed as usize + from;
+        block.unsettled = [settled_from.saturating_sub(first).min(rows), 0];
+        if last {
+            let settled_to = total - settled_from;
+            block.unsettled[1] = (first + rows).saturating_sub(settled_to).min(rows);
+        }
         let mut marked = Vec::new();
         if rows > 0 {
+            let first = self.passed + from as u64;
+            while self.set_aside.front().is_some_and(|(sample, _)| *sample < first) {
+                self.set_aside.pop_front();
+            }
+            while let Some((sample, joint)) =
+                self.set_aside.front().copied().filter(|(sample, _)| *sample < first + rows as u64)
+            {
+                block.set_aside.resize(joints * rows, false);
+                block.set_aside[joint * rows + (sample - first) as usize] = true;
+                self.set_aside.pop_front();
+            }
             let inside = from - window_from..end - window_from;
             let [q, dq, ddq, other] = &mut self.window;
             for values in [&mut *q, &mut *dq, &mut *ddq, &mut *other] {
@@ -428,7 +501,7 @@ impl MotionStream {
     /// What was found so far; complete once [`next_block`](Self::next_block) has returned false.
     pub fn report(&self) -> ImportReport {
         let mut report = ImportReport {
-            file: self.reader.label().to_owned(),
+            file: self.rows_in.reader().label().to_owned(),
             rows: self.rows,
             rate_hz: self.clock.rate_hz,
             clock: self.clock.clone(),
@@ -438,10 +511,12 @@ impl MotionStream {
             duplicate_stamps: self.time_check.duplicates,
             backward_stamps: self.time_check.backward,
             crowded_samples: self.segmenter.crowded(),
-            dropped: self.reader.dropped().clone(),
+            dropped: self.rows_in.reader().dropped().clone(),
             segments: self.segments,
             short_segments: self.short_segments,
             unmapped_samples: self.unmapped,
+            set_aside: self.rows_in.set_aside(),
+            bridged: self.rows_in.bridged(),
             channels: self.checks.iter().map(ChannelCheck::report).collect(),
             velocity: self.velocity.iter().map(|c| c.report(self.clock.rate_hz)).collect(),
             acceleration: self.acceleration.iter().map(|c| c.report(self.clock.rate_hz)).collect(),
@@ -471,16 +546,19 @@ fn prefix(log: &Log) -> Result<(Prefix, String), RecordingError> {
 }
 
 /// Positions of the longest uninterrupted piece of the prefix, on the uniform clock.
-fn longest_segment(mut segmenter: Segmenter, prefix: &Prefix) -> Vec<Vec<f64>> {
+fn longest_segment(mut timeline: Timeline, prefix: &Prefix) -> Vec<Vec<f64>> {
     let joints = prefix.q.len();
+    let rows = RawBlock { row: prefix.row.clone(), time_s: prefix.time_s.clone(), ..RawBlock::default() };
+    let places = timeline.places(&rows, None);
+    let rows = PlacedRows { time_s: &prefix.time_s, steps: &places.steps, begins: &places.begins };
+    let mut segmenter = Segmenter::new(joints);
     let mut longest = vec![Vec::new(); joints];
     let mut at = 0;
     while at < prefix.row.len() {
-        let mut piece = vec![Vec::new(); 2 * joints];
-        at = segmenter.feed(&prefix.row, &prefix.time_s, at, &mut piece, || prefix.q.iter().chain(&prefix.tau));
+        let mut piece = vec![Vec::new(); joints];
+        at = segmenter.feed(rows, at, &mut piece, || prefix.q.iter());
         segmenter.close(&mut piece);
         segmenter.reopen();
-        piece.truncate(joints);
         if piece.first().map_or(0, Vec::len) > longest.first().map_or(0, Vec::len) {
             longest = piece;
         }

@@ -133,6 +133,7 @@ impl Reference {
             acceleration: Some(columns("ddq")),
             clock: ClockRule::Stamps,
             max_gap_steps: 1000.0,
+            bridge_gaps: false,
             // A log has a torque; a reference has none, and its positions stand in.
             ..LogFormat::with_time(time, columns("q"), columns("q"))
         };

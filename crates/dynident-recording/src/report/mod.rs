@@ -15,6 +15,7 @@ pub use comparison::DerivativeComparison;
 pub use jumps::LoneSample;
 pub use lag::{Lag, best_lag};
 
+use crate::cleaning::{Reason, SetAside};
 use crate::clock::Clock;
 use crate::filter::CutoffChoice;
 use crate::log::{LinesDropped, Quantity};
@@ -32,6 +33,9 @@ pub enum Level {
     /// Harms the result.
     Problem,
 }
+
+/// Share of samples set aside below which they are good to know and no more.
+const FEW: f64 = 5e-3;
 
 /// One thing that was found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -103,6 +107,13 @@ pub struct ImportReport {
     pub short_segments: [u64; 2],
     /// Samples left out because the differentiator does not apply there.
     pub unmapped_samples: u64,
+    /// Samples whose torque does not count, and positions that were replaced, by joint.
+    #[serde(default)]
+    pub set_aside: Vec<SetAside>,
+    /// Gaps that were filled because they are short against the motion, and the samples in them, which count as no
+    /// rows.
+    #[serde(default)]
+    pub bridged: [u64; 2],
     /// Every channel of every joint.
     pub channels: Vec<ChannelReport>,
     /// Logged velocities against the derivative of the position.
@@ -139,6 +150,13 @@ impl ImportReport {
         if self.segments > 1 {
             add(Level::Info, "time", format!("split at gaps into {} pieces", self.segments));
         }
+        if self.bridged[0] > 0 {
+            let [gaps, samples] = self.bridged;
+            let message = format!(
+                "{gaps} gaps, short against the motion, were bridged; the {samples} samples in them count as no rows"
+            );
+            add(Level::Info, "time", message);
+        }
         if self.short_segments[0] > 0 {
             let [pieces, samples] = self.short_segments;
             let message = format!("{pieces} pieces too short for the filter were left out ({samples} samples)");
@@ -166,8 +184,16 @@ impl ImportReport {
         if self.dropped.missing > 0 {
             add(Level::Warning, "rows", format!("{} rows with missing values were left out", self.dropped.missing));
         }
+        if self.dropped.by_rule > 0 {
+            add(Level::Info, "rows", format!("{} rows were left out as asked", self.dropped.by_rule));
+        }
         if let Some(place) = &self.dropped.truncated {
             add(Level::Info, "rows", format!("the cut-off last line was left out ({place})"));
+        }
+        for found in &self.set_aside {
+            let name = format!("{} {}", found.channel.key(), found.joint);
+            let few = found.share < FEW && found.reason != Reason::Held;
+            add(if few { Level::Info } else { Level::Warning }, &name, found.sentence());
         }
         // Each channel by itself.
         for channel in &self.channels {
@@ -196,7 +222,12 @@ impl ImportReport {
                 );
                 add(Level::Problem, &name, message);
             }
-            if let Some(worst) = &channel.worst_lone_sample {
+            let is_set_aside = |found: &SetAside| {
+                found.channel == channel.channel && found.joint == channel.joint && found.reason != Reason::Held
+            };
+            if let Some(worst) = &channel.worst_lone_sample
+                && !self.set_aside.iter().any(is_set_aside)
+            {
                 let message = format!(
                     "{} samples stand alone, the worst in row {} of those used: {:.6e} after {:.6e}; empty the field \
                      and write `missing = \"drop\"`",
@@ -215,22 +246,20 @@ impl ImportReport {
             for comparison in comparisons {
                 let name = format!("{quantity} {}", comparison.joint);
                 let difference = 100.0 * comparison.relative_rms_difference;
-                match &comparison.lag {
-                    Some(lag) if lag.correlation < -0.5 => {
-                        let message = "the logged signal has the opposite sign of the position's derivative";
-                        add(Level::Problem, &name, message.to_owned());
-                    }
-                    Some(lag) if difference > 20.0 => {
-                        let message = format!(
-                            "differs from the position's derivative by {difference:.1} % RMS (correlation {:.3})",
-                            lag.correlation_unshifted
-                        );
-                        add(Level::Warning, &name, message);
-                    }
-                    Some(lag) if lag.matters() && lag.samples.abs() > 0.5 => {
-                        add(Level::Info, &name, format!("comes {:.4} s after the position's derivative", lag.seconds));
-                    }
-                    _ => {}
+                if comparison.correlation < -0.5 {
+                    let message = "the logged signal has the opposite sign of the position's derivative";
+                    add(Level::Problem, &name, message.to_owned());
+                } else if difference > 20.0 && comparison.lag.is_some() {
+                    let message = format!(
+                        "differs from the position's derivative by {difference:.1} % RMS (correlation {:.3})",
+                        comparison.correlation
+                    );
+                    add(Level::Warning, &name, message);
+                } else if let Some(lag) = &comparison.lag
+                    && lag.matters()
+                    && lag.samples.abs() > 0.5
+                {
+                    add(Level::Info, &name, format!("comes {:.4} s after the position's derivative", lag.seconds));
                 }
             }
         }

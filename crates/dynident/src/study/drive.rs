@@ -49,8 +49,9 @@ pub struct DriveSection {
     /// Further laws of friction. None by default.
     #[serde(rename = "laws")]
     pub terms: Vec<FrictionTerm>,
-    /// Whether the keys above say which friction there is (`"stated"`, the default), or the training logs (`"auto"`).
-    pub friction: FrictionChoice,
+    /// Whether the keys above say which friction there is (`"stated"`), or the training logs (`"auto"`). By default
+    /// `identify` lets the logs choose where no key above states friction, and the other commands take the keys.
+    pub friction: Option<FrictionChoice>,
     /// Exceptions, by joint name.
     pub joints: BTreeMap<String, JointDrive>,
 }
@@ -68,7 +69,7 @@ impl Default for DriveSection {
             gains: GainChoice::Stated,
             gain_std_percent: None,
             terms: Vec::new(),
-            friction: FrictionChoice::Stated,
+            friction: None,
             joints: BTreeMap::new(),
         }
     }
@@ -123,6 +124,26 @@ pub struct CouplingSection {
 }
 
 impl DriveSection {
+    /// Who says which friction this joint has, where a key does; `None` where all keys of friction, the joint's and
+    /// those of all joints, are as they are by default.
+    pub(crate) fn friction_of(&self, joint: &str) -> Option<FrictionChoice> {
+        let own = self.joints.get(joint);
+        if let Some(choice) = own.and_then(|own| own.friction).or(self.friction) {
+            return Some(choice);
+        }
+        let usual = Self::default();
+        let of_all = self.viscous == usual.viscous
+            && self.coulomb == usual.coulomb
+            && self.coulomb_width == usual.coulomb_width
+            && self.coulomb_dead_band == usual.coulomb_dead_band
+            && self.terms.is_empty();
+        let of_joint = own.is_none_or(|own| {
+            let width = own.coulomb_width.is_none() && own.coulomb_dead_band.is_none();
+            own.viscous.is_none() && own.coulomb.is_none() && width && own.terms.is_none()
+        });
+        (!(of_all && of_joint)).then_some(FrictionChoice::Stated)
+    }
+
     pub(crate) fn validate(&self) -> Result<(), StudyError> {
         Expected::Positive.check("drive.coulomb_width", self.coulomb_width)?;
         Expected::NotNegative.check("drive.coulomb_dead_band", self.coulomb_dead_band)?;

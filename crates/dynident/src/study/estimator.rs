@@ -47,6 +47,25 @@ pub enum EstimatorMethod {
 }
 
 impl EstimatorMethod {
+    /// Whether it is least squares on the rows of the logs, or begins with it.
+    pub(crate) fn is_least_squares(self) -> bool {
+        match self {
+            Self::Auto
+            | Self::Ordinary
+            | Self::Weighted
+            | Self::Generalized
+            | Self::Huber
+            | Self::Tukey
+            | Self::NoiseWeighted => true,
+            Self::Instrumental
+            | Self::MaximumLikelihood
+            | Self::Simultaneous
+            | Self::Didim
+            | Self::Clie
+            | Self::Cloe => false,
+        }
+    }
+
     /// The name in the study file.
     pub fn name(self) -> &'static str {
         match self {

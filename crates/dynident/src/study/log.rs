@@ -38,6 +38,12 @@ pub struct LogSection {
     /// In place of the format's `time_range_s`.
     #[serde(default, deserialize_with = "exactly")]
     pub time_range_s: Option<[f64; 2]>,
+    /// Beside the format's `drop_rows`.
+    #[serde(default)]
+    pub drop_rows: Vec<[u64; 2]>,
+    /// Beside the format's `drop_time_s`.
+    #[serde(default)]
+    pub drop_time_s: Vec<[f64; 2]>,
 }
 
 impl LogSection {

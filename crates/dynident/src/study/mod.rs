@@ -241,8 +241,8 @@ impl Study {
         if !terms.into_iter().any(|term| matches!(term, FrictionTerm::Temperature { .. })) {
             return Ok(());
         }
-        let own = self.drive.joints.values().filter_map(|own| own.friction);
-        if own.chain([self.drive.friction]).any(|choice| choice == FrictionChoice::Auto) {
+        let own = self.drive.joints.values().map(|own| own.friction);
+        if own.chain([self.drive.friction]).any(|choice| choice == Some(FrictionChoice::Auto)) {
             return Err(StudyError::conflict(
                 "drive.friction = \"auto\" with the law `temperature`",
                 "let the logs choose friction without it, then state what they chose beside it",
@@ -267,6 +267,8 @@ impl Study {
         if log.rows.is_some() || log.fraction.is_some() || log.time_range_s.is_some() {
             (format.rows, format.fraction, format.time_range_s) = (log.rows, log.fraction, log.time_range_s);
         }
+        format.drop_rows.extend_from_slice(&log.drop_rows);
+        format.drop_time_s.extend_from_slice(&log.drop_time_s);
         format
     }
 

@@ -3,12 +3,12 @@
 
 use super::friction::FrictionChoice;
 use super::robot_model::drive_choice;
-use super::{Folders, Study, StudyRobot};
+use super::{EstimatorMethod, Folders, Study, StudyRobot};
 use crate::error::{Error, StudyError};
 use dynident_identification::estimators::SimulatedLoopSettings;
-use dynident_identification::friction::FrictionSearch;
+use dynident_identification::friction::{FrictionSearch, JointFriction};
 use dynident_identification::payload::Payload;
-use dynident_identification::{IdentificationSettings, IdentificationTask, Recording};
+use dynident_identification::{GainChoice, IdentificationSettings, IdentificationTask, OffsetChoice, Recording};
 use dynident_recording::{FilterError, Log, RecordingError, Reference};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -150,20 +150,49 @@ impl Study {
         })
     }
 
-    /// The joints whose friction the training logs choose.
+    /// The joints whose friction the training logs choose: those of which a key says so, and by default all others
+    /// whose friction no key states, unless something else in the study stands against it.
     fn friction_searches(&self, robot: &StudyRobot) -> Vec<FrictionSearch> {
-        let drive = &self.drive;
-        let is_chosen = |name: &str| {
-            let own = drive.joints.get(name).and_then(|own| own.friction);
-            own.unwrap_or(drive.friction) == FrictionChoice::Auto
+        let by_default = self.why_friction_is_stated().is_none();
+        let is_chosen = |name: &str| match self.drive.friction_of(name) {
+            Some(choice) => choice == FrictionChoice::Auto,
+            None => by_default,
         };
         let names = robot.model().joints().iter().map(|joint| &joint.name).filter(|name| is_chosen(name));
         let search = |name: &String| FrictionSearch {
             coulomb: drive_choice(self, name).coulomb,
-            dead_band: drive.coulomb_dead_band,
-            width: drive.coulomb_width,
+            dead_band: self.drive.coulomb_dead_band,
+            width: self.drive.coulomb_width,
             ..FrictionSearch::of(name)
         };
         names.map(search).collect()
+    }
+
+    /// Joints whose friction is left as it is by default although no key states it, with the reason.
+    pub(crate) fn friction_as_stated(&self, robot: &StudyRobot) -> Vec<JointFriction> {
+        let Some(reason) = self.why_friction_is_stated() else { return Vec::new() };
+        let names = robot.model().joints().iter().map(|joint| &joint.name);
+        names
+            .filter(|name| self.drive.friction_of(name).is_none())
+            .map(|name| JointFriction::as_stated(name, reason))
+            .collect()
+    }
+
+    /// Why the logs do not choose friction that no key states; `None` where they do.
+    fn why_friction_is_stated(&self) -> Option<&'static str> {
+        let estimator = &self.estimator;
+        if self.arm.is_some() || !self.payload.is_empty() {
+            Some("with payloads it is not chosen; let a study of the unloaded logs choose it")
+        } else if self.drive.gains == GainChoice::Unknown {
+            Some("with gains that nobody knows it is not chosen")
+        } else if self.drive.offsets == OffsetChoice::PerLog {
+            Some("with offsets of each log it is not chosen")
+        } else if !(estimator.method.is_least_squares() || estimator.method == EstimatorMethod::Instrumental) {
+            Some("with this estimator it is not chosen unless friction = \"auto\" says so")
+        } else if estimator.physical.settings().is_some_and(|knowledge| !knowledge.terms.is_empty()) {
+            Some("[estimator.physical] says what is known of its parameters")
+        } else {
+            None
+        }
     }
 }

@@ -30,6 +30,7 @@ mod reversed_torque;
 mod same_result;
 mod scales;
 mod simulated_loop;
+mod spoilt_logs;
 mod synthetic_truth;
 mod temperature;
 mod torque_lag;

@@ -24,7 +24,7 @@ fn with_stated_friction(name: &str) -> Option<IdentificationOutcome> {
     let data = recordings()?;
     let path = repository("examples").join(name);
     let mut study = Study::load(&path).unwrap();
-    study.drive.friction = FrictionChoice::Stated;
+    study.drive.friction = Some(FrictionChoice::Stated);
     Some(run(&study, &path, &data))
 }
 

@@ -11,7 +11,7 @@ use crate::jobs::provenance::{beside, now, provenance, seen_from};
 use crate::result::{
     LogSummary, MethodSummary, PhysicalVerdict, Provenance, RESULT_SCHEMA, ResultFile, Timings, TrainingResult,
 };
-use crate::study::{ArmSection, EstimatorMethod, Folders, Study, StudyRobot};
+use crate::study::{ArmSection, EstimatorMethod, Folders, FrictionChoice, Study, StudyRobot};
 use dynident_estimation::{Estimate, strongest_correlations};
 use dynident_identification::estimators::{Findings, InstrumentSource};
 use dynident_identification::examination::{LogTrace, friction_sign_findings, sign_findings};
@@ -107,6 +107,10 @@ fn identified(
     // Whoever reads the result may load its model: the study is examined whether the fit looks doubtful or not.
     let mut settings = study.settings(study_path, &robot)?;
     settings.diagnosis = DiagnosisChoice::Always;
+    if source.is_some() {
+        // What makes the instruments has the study's own terms.
+        settings.friction.retain(|search| study.drive.friction_of(&search.joint) == Some(FrictionChoice::Auto));
+    }
     settings.check_names(&robot.parametric).map_err(|error| in_study(IdentificationError::Consistency(error)))?;
     let task = study.task_with(settings, &robot, &folders)?;
     let files = study.log_files(&folders)?;
@@ -282,7 +286,10 @@ fn result_file(
         essential: found.essential.clone(),
         correlations: strongest_correlations(estimate, CORRELATIONS),
         joints: joint_results(model, estimate, parameters, &found.examination.pooled_delays),
-        friction_choice: friction_results(&found.training.friction_choice),
+        friction_choice: [&found.training.friction_choice[..], &study.friction_as_stated(robot)]
+            .into_iter()
+            .flat_map(friction_results)
+            .collect(),
         payloads: found.payloads.clone(),
         offsets: offset_results(found, &task.recordings),
         drive_gains: found.training.gains.as_ref().map(|(_, gains)| gains.clone()),

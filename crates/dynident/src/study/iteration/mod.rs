@@ -4,6 +4,7 @@ mod legs;
 
 pub use legs::{LegOrder, LegSection};
 
+use super::FrictionChoice;
 use super::Study;
 use crate::error::StudyError;
 use dynident_identification::IdentificationSettings;
@@ -158,7 +159,9 @@ impl IterationSection {
         identification: IdentificationSettings,
     ) -> Result<IterationSettings, StudyError> {
         self.differentiator.validate().map_err(StudyError::at("iteration.differentiator"))?;
-        let IdentificationSettings { mut estimation, consistency, friction, .. } = identification;
+        let IdentificationSettings { mut estimation, consistency, mut friction, .. } = identification;
+        // A controller is to have the friction that the study states, unless a key says otherwise.
+        friction.retain(|search| study.drive.friction_of(&search.joint) == Some(FrictionChoice::Auto));
         if self.scheme == Scheme::StepByStep && !estimation.estimator.is_plain() {
             let key = format!("estimator.method = \"{}\"", estimation.estimator.name());
             return Err(StudyError::conflict(key, "scheme = \"step-by-step\" takes \"ordinary\" or \"weighted\""));

@@ -1,0 +1,262 @@
+//! Friction chosen by default against friction stated as it is: robots × motions × what friction truly is.
+//!
+//! As in [`cutoffs`](crate::cutoffs), the error is that of the fitted model's torque on another random motion without
+//! noise: root mean square over joints, each in units of its torque's spread.
+
+use crate::accuracy::BenchmarkError;
+use crate::simulated_logs::{
+    PANDA, PERIOD_S, SimulatedLog, SimulatedRobot, UR10, excitation, model_error, panels, recording, rms, torque, truth,
+};
+use dynident_dynamics::ParametricModel;
+use dynident_estimation::{EstimationError, TriangularFactor};
+use dynident_excitation::Motion;
+use dynident_identification::friction::FrictionSearch;
+use dynident_identification::{
+    DiagnosisChoice, Execution, Identification, IdentificationError, IdentificationTask, Recording, RegressorModel,
+    identify,
+};
+use dynident_model::Model;
+use dynident_model::terms::{
+    Coulomb, CoulombShape, Direction, DirectionalCoulomb, DirectionalViscous, DriveChoice, LoadFriction, Offset,
+    Sigmoid, Stribeck, TorqueTerm, Viscous, terms_per_joint,
+};
+
+/// What the friction of every joint truly is, beside an offset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrictionTruth {
+    /// Viscous and Coulomb.
+    Plain,
+    /// Both by direction: 30 and 40 % more backward.
+    Asymmetric,
+    /// Plain, and half of the Coulomb friction more near rest.
+    Stribeck,
+    /// Viscous, and a step that is not at rest.
+    Sigmoid,
+    /// Plain, and a tenth of the load.
+    Load,
+}
+
+/// Width of the truth's step, rad/s: not one that the search begins with.
+const WIDTH: f64 = 0.015;
+/// Stribeck velocity, rad/s, and exponent: between the search's candidates.
+const STRIBECK: (f64, f64) = (0.07, 1.5);
+/// Steepness of the shifted step, s/rad, and how far from rest it is, rad/s.
+const SIGMOID: (f64, f64) = (50.0, 0.015);
+/// Share of the load that is lost.
+const LOAD: f64 = 0.1;
+/// A term can be told if what it adds to the best fit without it is so many standard deviations of the noise, over all
+/// samples together.
+const TOLD: f64 = 10.0;
+
+impl FrictionTruth {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Plain, Self::Asymmetric, Self::Stribeck, Self::Sigmoid, Self::Load];
+
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Plain => "plain",
+            Self::Asymmetric => "asymmetric",
+            Self::Stribeck => "Stribeck",
+            Self::Sigmoid => "sigmoid",
+            Self::Load => "load",
+        }
+    }
+
+    fn terms(self, joint: usize) -> Vec<TorqueTerm> {
+        let shape = CoulombShape::Smooth { width: WIDTH };
+        let (viscous, coulomb) =
+            (TorqueTerm::Viscous(Viscous { joint }), TorqueTerm::Coulomb(Coulomb { joint, shape }));
+        let mut terms = match self {
+            Self::Plain => vec![viscous, coulomb],
+            Self::Asymmetric => [Direction::Forward, Direction::Backward]
+                .into_iter()
+                .flat_map(|direction| {
+                    [
+                        TorqueTerm::DirectionalViscous(DirectionalViscous { joint, direction }),
+                        TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { joint, direction, shape }),
+                    ]
+                })
+                .collect(),
+            Self::Stribeck => {
+                let (speed, exponent) = STRIBECK;
+                vec![viscous, coulomb, TorqueTerm::Stribeck(Stribeck { joint, speed, exponent, shape })]
+            }
+            Self::Sigmoid => {
+                let (steepness, offset_speed) = SIGMOID;
+                vec![viscous, TorqueTerm::Sigmoid(Sigmoid { joint, steepness, offset_speed })]
+            }
+            Self::Load => vec![viscous, coulomb, TorqueTerm::Load(LoadFriction { joint, shape })],
+        };
+        terms.push(TorqueTerm::Offset(Offset { joint }));
+        terms
+    }
+
+    /// The term by which this truth is told from others.
+    fn is_told_by(self, term: &TorqueTerm) -> bool {
+        match self {
+            Self::Plain => matches!(term, TorqueTerm::Coulomb(_)),
+            Self::Asymmetric => {
+                matches!(term, TorqueTerm::DirectionalViscous(_) | TorqueTerm::DirectionalCoulomb(_))
+            }
+            Self::Stribeck => matches!(term, TorqueTerm::Stribeck(_)),
+            Self::Sigmoid => matches!(term, TorqueTerm::Sigmoid(_)),
+            Self::Load => matches!(term, TorqueTerm::Load(_)),
+        }
+    }
+}
+
+/// How much larger than usual a term of the truth is.
+fn share(term: &TorqueTerm) -> f64 {
+    match term {
+        TorqueTerm::DirectionalViscous(DirectionalViscous { direction: Direction::Backward, .. }) => 1.3,
+        TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { direction: Direction::Backward, .. }) => 1.4,
+        TorqueTerm::Stribeck(_) => 0.5,
+        TorqueTerm::Load(_) => LOAD,
+        _ => 1.0,
+    }
+}
+
+/// A robot, its recordings and its friction.
+#[derive(Clone, Copy, Debug)]
+pub struct FrictionCell {
+    /// The robot.
+    pub robot: SimulatedRobot,
+    /// Its recordings.
+    pub log: SimulatedLog,
+    /// Its friction.
+    pub truth: FrictionTruth,
+}
+
+const MOTIONS: [(SimulatedRobot, SimulatedLog); 3] =
+    [(UR10, log((5, 10.0), 500.0, 1e-5)), (UR10, log((5, 30.0), 500.0, 1e-4)), (PANDA, log((5, 30.0), 1000.0, 1e-5))];
+
+const fn log((harmonics, duration_s): (usize, f64), rate_hz: f64, position_noise_rad: f64) -> SimulatedLog {
+    SimulatedLog { harmonics, duration_s, rate_hz, position_noise_rad, torque_noise: 0.01 }
+}
+
+/// The registry: every motion with every friction.
+pub fn friction_cells() -> Vec<FrictionCell> {
+    let with = |(robot, log)| FrictionTruth::ALL.map(|truth| FrictionCell { robot, log, truth });
+    MOTIONS.into_iter().flat_map(with).collect()
+}
+
+/// Figures of one cell over its runs; errors are root mean squares, as shares.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FrictionFigures {
+    /// Joints, over all runs, of which the recordings can tell the term.
+    pub tellable: usize,
+    /// Those of which it was chosen.
+    pub told: usize,
+    /// Error of the model with chosen friction.
+    pub of_choice: f64,
+    /// Error with the true terms stated.
+    pub of_truth: f64,
+    /// Error with viscous and Coulomb friction.
+    pub of_plain: f64,
+}
+
+/// Fits `runs` recordings of a cell with friction chosen, stated as it is, and plain.
+///
+/// # Errors
+/// A robot, motion or recording that cannot be made, a fit that fails.
+pub fn friction_figures(cell: &FrictionCell, runs: u64) -> Result<FrictionFigures, BenchmarkError> {
+    let failed = |reason: String| BenchmarkError::Excitation { robot: cell.robot.name.to_owned(), reason };
+    let model = cell.robot.model().map_err(failed)?;
+    let with_terms = |terms| ParametricModel::new(model.clone(), terms).map_err(|source| failed(source.to_string()));
+    let usual = DriveChoice { viscous: true, coulomb: Some(USUAL_STEP), offset: true, ..DriveChoice::default() };
+    let plain = with_terms(terms_per_joint(&model, |_| usual))?;
+    let exact = with_terms((0..model.dof()).flat_map(|joint| cell.truth.terms(joint)).collect())?;
+    let mut figures = FrictionFigures::default();
+    for run in 0..runs {
+        let made = Made::new(cell, &model, &exact, run).map_err(failed)?;
+        let without = plain_without(&plain, cell.truth);
+        let tellable =
+            made.tellable(without.as_ref().unwrap_or(&plain)).map_err(|source| failed(source.to_string()))?;
+        let choice = made.fit(&plain, true)?;
+        for (joint, name) in model.joints().iter().enumerate() {
+            let found = choice.training.friction_choice.iter().find(|one| one.joint == name.name);
+            let terms = found.and_then(|one| one.terms.as_ref());
+            if tellable[joint] {
+                figures.tellable += 1;
+                figures.told += usize::from(terms.is_some_and(|terms| terms.iter().any(|t| cell.truth.is_told_by(t))));
+            }
+        }
+        let add = |to: &mut f64, found: &Identification| *to += made.error(found).powi(2) / runs as f64;
+        add(&mut figures.of_choice, &choice);
+        add(&mut figures.of_truth, &made.fit(&exact, false)?);
+        add(&mut figures.of_plain, &made.fit(&plain, false)?);
+    }
+    for square in [&mut figures.of_choice, &mut figures.of_truth, &mut figures.of_plain] {
+        *square = square.sqrt();
+    }
+    Ok(figures)
+}
+
+/// The step of a study that says nothing.
+const USUAL_STEP: CoulombShape = CoulombShape::Smooth { width: 0.02 };
+
+/// For plain friction: the robot without its Coulomb step; none for others.
+fn plain_without(plain: &ParametricModel, truth: FrictionTruth) -> Option<ParametricModel> {
+    if truth != FrictionTruth::Plain {
+        return None;
+    }
+    let rest = plain.terms().iter().filter(|term| !truth.is_told_by(term)).cloned().collect();
+    plain.with_terms(rest).ok()
+}
+
+/// A recording and what is true of it.
+struct Made {
+    log: dynident_recording::Log,
+    motion: Motion,
+    exact: Vec<f64>,
+    torque_noise: f64,
+    other: Motion,
+    other_exact: Vec<f64>,
+}
+
+impl Made {
+    fn new(cell: &FrictionCell, model: &Model, robot: &ParametricModel, run: u64) -> Result<Self, String> {
+        let made = &cell.log;
+        let motion = excitation(model, made.harmonics, (made.duration_s, made.rate_hz), 10 + run)?;
+        let other = excitation(model, made.harmonics, (PERIOD_S, 100.0), 1000 + run)?;
+        let regressor = RegressorModel::from(robot.clone());
+        let mut bodies = model.parameter_vector();
+        bodies.resize(bodies.len() + robot.terms().len(), 0.0);
+        let regressor = regressor.clone().with_load_of(&regressor, &robot.base().values(&bodies));
+        let theta = truth(&regressor, &motion, share);
+        let exact = torque(&regressor, &motion, &theta);
+        let (log, _) = recording(made, model, (&motion, &exact), 77 + run)?;
+        let other_exact = torque(&regressor, &other, &theta);
+        Ok(Self { log, motion, exact, torque_noise: made.torque_noise, other, other_exact })
+    }
+
+    /// Joints whose exact torque is further from what `without` can say than noise could be.
+    fn tellable(&self, without: &ParametricModel) -> Result<Vec<bool>, EstimationError> {
+        let panels = panels(&RegressorModel::from(without.clone()), &self.motion);
+        let of_joint = |joint: usize| {
+            let own = &self.exact[self.motion.of(joint)];
+            let columns = without.layout().joint_columns(joint).len();
+            let mut factor = TriangularFactor::new(columns);
+            let rows = [&panels.joint(joint)[..columns * self.motion.samples], own].concat();
+            factor.absorb(&rows, self.motion.samples)?;
+            Ok(factor.entry(columns, columns).abs() > TOLD * self.torque_noise * rms(own))
+        };
+        (0..without.dof()).map(of_joint).collect()
+    }
+
+    fn fit(&self, robot: &ParametricModel, chosen: bool) -> Result<Identification, IdentificationError> {
+        let mut task = IdentificationTask::new(robot.clone(), vec![Recording::training("run", self.log.clone())]);
+        task.settings.diagnosis = DiagnosisChoice::Never;
+        task.settings.consistency = None;
+        if chosen {
+            let search = |name| FrictionSearch { coulomb: Some(USUAL_STEP), ..FrictionSearch::of(name) };
+            task.settings.friction = robot.joint_names().into_iter().map(search).collect();
+        }
+        identify(&task, Execution::default())
+    }
+
+    fn error(&self, found: &Identification) -> f64 {
+        model_error(&self.other, &self.other_exact, &torque(found.model(), &self.other, found.base_values()))
+    }
+}

@@ -1,0 +1,167 @@
+//! Recordings whose truth is known: a random Fourier motion, exact torque with friction, white noise on both.
+
+use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
+use dynident_excitation::families::{Fourier, FourierSettings};
+use dynident_excitation::{Family, Motion};
+use dynident_identification::RegressorModel;
+use dynident_identification::rows::predicted_torque;
+use dynident_model::sample::Random;
+use dynident_model::terms::{TermAction, TorqueTerm};
+use dynident_model::{Model, read_urdf};
+use dynident_recording::{JointSamples, Log, filter::cutoff};
+
+/// Seconds of the Fourier motion's period.
+pub(crate) const PERIOD_S: f64 = 10.0;
+/// Furthest position and highest speed of a joint, for those with wider limits or none.
+const RANGE: f64 = 3.0;
+const SPEED: f64 = 2.0;
+/// Viscous and dry friction at the root mean square velocity, and offsets, in units of what the bodies ask of the
+/// joint.
+const VISCOUS: f64 = 0.15;
+const DRY: f64 = 0.15;
+const OFFSET: f64 = 0.03;
+/// The least of that, Nm: a joint without load has friction too.
+const LEAST_TORQUE: f64 = 0.5;
+
+/// A robot of the tables.
+#[derive(Clone, Copy, Debug)]
+pub struct SimulatedRobot {
+    /// Its name in tables.
+    pub name: &'static str,
+    urdf: &'static str,
+}
+
+/// The robots of the tables.
+pub(crate) const UR10: SimulatedRobot = SimulatedRobot { name: "UR10", urdf: include_str!("../robots/ur10.urdf") };
+pub(crate) const PANDA: SimulatedRobot =
+    SimulatedRobot { name: "Panda", urdf: include_str!("../robots/panda_arm7.urdf") };
+
+impl SimulatedRobot {
+    pub(crate) fn model(&self) -> Result<Model, String> {
+        Ok(read_urdf(self.urdf).map_err(|source| source.to_string())?.model)
+    }
+}
+
+/// How a recording is made.
+#[derive(Clone, Copy, Debug)]
+pub struct SimulatedLog {
+    /// Harmonics of 0.1 Hz.
+    pub harmonics: usize,
+    /// Length, s.
+    pub duration_s: f64,
+    /// Samples a second, Hz.
+    pub rate_hz: f64,
+    /// Standard deviation of the positions' white noise, rad.
+    pub position_noise_rad: f64,
+    /// Standard deviation of a torque's white noise in units of its root mean square.
+    pub torque_noise: f64,
+}
+
+/// A random Fourier motion of that many harmonics within the robot's ranges and speeds.
+pub(crate) fn excitation(
+    model: &Model,
+    harmonics: usize,
+    (duration_s, rate_hz): (f64, f64),
+    seed: u64,
+) -> Result<Motion, String> {
+    let settings = FourierSettings { harmonics, ..FourierSettings::default() };
+    let family = Fourier::new(model.dof(), PERIOD_S, &settings).map_err(|source| source.to_string())?;
+    let limits = || model.joints().iter().map(|joint| joint.limits);
+    let ranges: Vec<[f64; 2]> = limits()
+        .map(|limits| [limits.lower.unwrap_or(-RANGE).max(-RANGE), limits.upper.unwrap_or(RANGE).min(RANGE)])
+        .collect();
+    let speeds: Vec<f64> = limits().map(|limits| limits.velocity.unwrap_or(SPEED).min(SPEED)).collect();
+    let parameters = family.random(&ranges, &speeds, &mut Random::new(seed));
+    let times: Vec<f64> = (0..=(duration_s * rate_hz) as usize).map(|sample| sample as f64 / rate_hz).collect();
+    let mut motion = Motion::default();
+    family.motion(&parameters, &times, &mut motion);
+    Ok(motion)
+}
+
+/// The description's bodies, friction and offsets in proportion to what the bodies ask of the joint; `share` says by
+/// how much a term is larger or smaller than that.
+pub(crate) fn truth(regressor: &RegressorModel, motion: &Motion, share: impl Fn(&TorqueTerm) -> f64) -> Vec<f64> {
+    let mut parameters = regressor.model().parameter_vector();
+    let first = parameters.len();
+    parameters.resize(first + regressor.terms().len(), 0.0);
+    let bodies = torque(regressor, motion, &regressor.base().values(&parameters));
+    let value = |term: &TorqueTerm| {
+        let own = motion.of(term.joints()[0]);
+        let torque = rms(&bodies[own.clone()]).max(LEAST_TORQUE);
+        let usual = match term.action() {
+            TermAction::Damping { .. } => VISCOUS * torque / rms(&motion.dq[own]),
+            TermAction::Friction(_) => DRY * torque,
+            _ => OFFSET * torque,
+        };
+        usual * share(term)
+    };
+    for (parameter, term) in parameters[first..].iter_mut().zip(regressor.terms()) {
+        *parameter = value(term);
+    }
+    regressor.base().values(&parameters)
+}
+
+/// What encoders and torque sensors say of a motion with this torque (joint-major), and the cut-off that the positions'
+/// spectra ask for, Hz.
+pub(crate) fn recording(
+    made: &SimulatedLog,
+    model: &Model,
+    (motion, exact): (&Motion, &[f64]),
+    seed: u64,
+) -> Result<(Log, f64), String> {
+    let mut random = Random::new(seed);
+    let mut noisy = |values: &[f64], sigma: f64| -> Vec<f64> {
+        values.iter().map(|value| value + sigma * random.normal()).collect()
+    };
+    let joints = 0..model.dof();
+    let q: Vec<Vec<f64>> =
+        joints.clone().map(|joint| noisy(&motion.q[motion.of(joint)], made.position_noise_rad)).collect();
+    let tau: Vec<Vec<f64>> = joints
+        .map(|joint| {
+            let own = &exact[motion.of(joint)];
+            noisy(own, made.torque_noise * rms(own))
+        })
+        .collect();
+    let asked_hz = cutoff(&q, made.rate_hz).cutoff_hz;
+    let names: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
+    let log = JointSamples::at_rate(made.rate_hz, q, tau).into_log("run", &names);
+    log.map(|log| (log, asked_hz)).map_err(|source| source.to_string())
+}
+
+/// Root mean square over joints of the error of a torque, each in units of the exact torque's spread; joint-major.
+pub(crate) fn model_error(motion: &Motion, exact: &[f64], found: &[f64]) -> f64 {
+    let dof = exact.len() / motion.samples;
+    let joints = (0..dof).map(|joint| {
+        let own = &exact[motion.of(joint)];
+        let mean = own.iter().sum::<f64>() / own.len() as f64;
+        let spread = rms(&own.iter().map(|tau| tau - mean).collect::<Vec<_>>());
+        let error: Vec<f64> = own.iter().zip(&found[motion.of(joint)]).map(|(exact, found)| found - exact).collect();
+        (rms(&error) / spread).powi(2)
+    });
+    (joints.sum::<f64>() / dof as f64).sqrt()
+}
+
+/// Torque of base parameters on a motion, joint-major.
+pub(crate) fn torque(regressor: &RegressorModel, motion: &Motion, theta: &[f64]) -> Vec<f64> {
+    let panels = panels(regressor, motion);
+    let layout = regressor.layout();
+    let (mut all, mut own) = (Vec::with_capacity(motion.q.len()), Vec::new());
+    for joint in 0..regressor.dof() {
+        predicted_torque(panels.joint(joint), motion.samples, layout.joint_columns(joint), theta, &mut own);
+        all.extend_from_slice(&own);
+    }
+    all
+}
+
+/// The regressor on a motion.
+pub(crate) fn panels(regressor: &RegressorModel, motion: &Motion) -> Panels {
+    let (mut panels, mut workspace) = (Panels::default(), BatchWorkspace::new(regressor.model()));
+    let mut history = TermHistory::new(regressor.load_parameters.clone());
+    let (model, layout) = (regressor.model(), regressor.layout());
+    regressor_panels_following(model, &mut workspace, layout, &motion.view(), &mut history, &mut panels);
+    panels
+}
+
+pub(crate) fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
+}

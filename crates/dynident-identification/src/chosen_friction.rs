@@ -1,0 +1,100 @@
+//! The friction of the joints as their recordings choose it: which terms, then their constants.
+
+use crate::error::IdentificationError;
+use crate::estimators::Estimator;
+use crate::friction::{
+    JointFriction, Neighbourhood, candidate_columns, choose_friction as choose_terms, chosen_model, refined,
+};
+use crate::logs::Logs;
+use crate::regressor_model::RegressorModel;
+use crate::settings::IdentificationSettings;
+use crate::training::{TrainingPasses, plain_estimate};
+use dynident_dynamics::{Column, ParametricModel};
+use dynident_model::terms::TorqueTerm;
+
+/// Factors by which constants are moved around what was found before, one for each pass: half a step of the grid, then
+/// closer.
+const REFINEMENTS: [f64; 3] = [1.4, 1.15, 1.05];
+
+/// A model with the friction that its recordings chose.
+#[derive(Clone, Debug)]
+pub struct ChosenFriction {
+    /// The model, with the load where friction depends on it.
+    pub model: RegressorModel,
+    /// How each joint's was chosen; empty where none was to be.
+    pub joints: Vec<JointFriction>,
+}
+
+/// Chooses the friction of the joints that `settings.friction` names, by cross-validation inside the recordings
+/// `training`: first among terms whose columns stand in one set of factors, for a grid of constants; then in further
+/// passes the constants between the grid's points. Filters are those of `logs`.
+///
+/// # Errors
+/// Recordings that cannot be read, rows that do not carry an estimate.
+pub fn choose_friction(
+    (logs, settings): (&Logs<'_>, &IdentificationSettings),
+    robot: &ParametricModel,
+    training: &[usize],
+) -> Result<ChosenFriction, IdentificationError> {
+    let stated = RegressorModel::from(robot.clone());
+    let candidates: Vec<_> = settings
+        .friction
+        .iter()
+        .filter_map(|search| Some((stated.model().joint_index(&search.joint)?, search)))
+        .map(|(joint, search)| (joint, candidate_columns(search, joint)))
+        .collect();
+    if candidates.is_empty() {
+        return Ok(ChosenFriction { model: stated, joints: Vec::new() });
+    }
+    let passes = TrainingPasses { logs, settings, training, payloads: &[], known_arm: None };
+    let equal_weights = matches!(settings.estimation.estimator, Estimator::Ordinary);
+
+    // The stated terms first: the load, the noise of every joint, what is excited.
+    let first = passes.rows_once(stated)?;
+    let plain = plain_estimate(&settings.estimation, &first.problem)?;
+
+    // All candidates as columns of one set of factors, from which each candidate model is a selection.
+    let further = candidates.iter().flat_map(|(_, columns)| columns).map(|column| column.term.clone());
+    let wide = with_terms(&first.model, further).with_load_of(&first.model, &plain.values);
+    let factors = passes.read(&wide)?;
+    let wide_problem = passes.stated_problem(&wide, &passes.columns(&wide)?, &factors)?;
+    let mut joints = choose_terms(&first.model, &wide, &wide_problem, &candidates, (&plain, equal_weights))?;
+    let mut model = RegressorModel::from(chosen_model(robot, &joints)?).with_load_of(&first.model, &plain.values);
+
+    // Their constants, and the load with them.
+    for ratio in REFINEMENTS {
+        let around = |joint: &JointFriction| {
+            let own = Neighbourhood::new(joint.terms.clone()?, ratio);
+            Some((model.model().joint_index(&joint.joint)?, own))
+        };
+        let around: Vec<(usize, Neighbourhood)> = joints.iter().filter_map(around).collect();
+        if !(model.needs_load() || around.iter().any(|(_, own)| own.has_constants())) {
+            break;
+        }
+        let wide = with_terms(&model, around.iter().flat_map(|(_, own)| own.terms()));
+        let factors = passes.read(&wide)?;
+        let wide_problem = passes.stated_problem(&wide, &passes.columns(&wide)?, &factors)?;
+        let own = factors.into_iter().map(|log| log.of(&wide, &model)).collect::<Result<Vec<_>, _>>()?;
+        let problem = passes.stated_problem(&model, &passes.columns(&model)?, &own)?;
+        let fit = plain_estimate(&settings.estimation, &problem)?;
+        let better = refined((&model, &fit, equal_weights), (&wide, &wide_problem), &around)?;
+        for ((joint, _), terms) in around.iter().zip(better) {
+            let name = &model.model().joints()[*joint].name;
+            joints.iter_mut().filter(|one| one.joint == *name).for_each(|one| one.terms = Some(terms.clone()));
+        }
+        model = RegressorModel::from(chosen_model(robot, &joints)?).with_load_of(&model, &fit.values);
+    }
+    Ok(ChosenFriction { model, joints })
+}
+
+/// The model with those of these terms as columns that it does not have.
+fn with_terms(model: &RegressorModel, terms: impl Iterator<Item = TorqueTerm>) -> RegressorModel {
+    let known = model.layout().columns();
+    let mut further: Vec<TorqueTerm> = Vec::new();
+    for term in terms {
+        if !known.contains(&Column::Term(term.clone())) && !further.contains(&term) {
+            further.push(term);
+        }
+    }
+    model.with_further_columns(further)
+}

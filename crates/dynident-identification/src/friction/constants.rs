@@ -1,0 +1,80 @@
+//! The constants of a term's curve (width of a step, Stribeck velocity, ..) as coordinates that can be moved.
+
+use super::candidates::STRIBECK_WIDTH;
+use dynident_model::terms::{Coulomb, CoulombShape, DirectionalCoulomb, Sigmoid, Stribeck, TorqueTerm};
+
+/// The constants of a term as coordinates on one scale: a step of ln r is a change by the factor r. Two at most.
+pub(super) fn coordinates(term: &TorqueTerm) -> Vec<f64> {
+    let of_shape = |shape: &CoulombShape| match shape {
+        CoulombShape::Smooth { width } => vec![width.ln()],
+        CoulombShape::Sign { .. } => Vec::new(),
+    };
+    match term {
+        TorqueTerm::Coulomb(term) => of_shape(&term.shape),
+        TorqueTerm::DirectionalCoulomb(term) => of_shape(&term.shape),
+        TorqueTerm::Stribeck(term) => vec![term.speed.ln(), term.exponent.ln()],
+        // The step's distance from rest in units of its width.
+        TorqueTerm::Sigmoid(term) => vec![term.steepness.ln(), 0.5 * term.offset_speed * term.steepness],
+        TorqueTerm::Viscous(_)
+        | TorqueTerm::DirectionalViscous(_)
+        | TorqueTerm::Power(_)
+        | TorqueTerm::Load(_)
+        | TorqueTerm::MaxwellSlip(_)
+        | TorqueTerm::TemperatureViscous(_)
+        | TorqueTerm::TemperatureCoulomb(_)
+        | TorqueTerm::Offset(_)
+        | TorqueTerm::DriveInertia(_)
+        | TorqueTerm::Coupling(_) => Vec::new(),
+    }
+}
+
+/// Bounds of the coordinates: velocities of 10⁻⁴ to 10 rad/s (m/s), exponents of 1/2 to 3, a shift of two widths.
+fn within(value: f64, [least, most]: [f64; 2]) -> f64 {
+    value.clamp(least.ln(), most.ln()).exp()
+}
+
+const VELOCITIES: [f64; 2] = [1.0e-4, 10.0];
+const EXPONENTS: [f64; 2] = [0.5, 3.0];
+const MOST_SHIFT: f64 = 2.0;
+
+/// The term with its constants at these coordinates.
+pub(super) fn at(term: &TorqueTerm, coordinates: &[f64]) -> TorqueTerm {
+    let shape = |shape: CoulombShape| match (shape, coordinates) {
+        (CoulombShape::Smooth { .. }, [width]) => CoulombShape::Smooth { width: within(*width, VELOCITIES) },
+        _ => shape,
+    };
+    match (term, coordinates) {
+        (TorqueTerm::Coulomb(own), _) => TorqueTerm::Coulomb(Coulomb { shape: shape(own.shape), ..*own }),
+        (TorqueTerm::DirectionalCoulomb(own), _) => {
+            TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { shape: shape(own.shape), ..*own })
+        }
+        (TorqueTerm::Stribeck(own), [speed, exponent]) => {
+            let speed = within(*speed, VELOCITIES);
+            let shape = CoulombShape::Smooth { width: STRIBECK_WIDTH * speed };
+            TorqueTerm::Stribeck(Stribeck { speed, exponent: within(*exponent, EXPONENTS), shape, ..*own })
+        }
+        (TorqueTerm::Sigmoid(own), [steepness, shift]) => {
+            let steepness = 2.0 / within((2.0 / steepness.exp()).ln(), VELOCITIES);
+            let offset_speed = 2.0 * shift.clamp(-MOST_SHIFT, MOST_SHIFT) / steepness;
+            TorqueTerm::Sigmoid(Sigmoid { steepness, offset_speed, ..*own })
+        }
+        _ => term.clone(),
+    }
+}
+
+/// One term in place of several that differ in their constants: at the mean of their coordinates, by their weights.
+///
+/// # Panics
+/// If there is no term.
+pub(super) fn mean_term(weighted: &[(&TorqueTerm, f64)]) -> TorqueTerm {
+    let total: f64 = weighted.iter().map(|(_, weight)| weight).sum();
+    let mut mean = coordinates(weighted[0].0);
+    for (place, value) in mean.iter_mut().enumerate() {
+        let sum: f64 = weighted
+            .iter()
+            .map(|(term, weight)| weight * coordinates(term).get(place).copied().unwrap_or(*value))
+            .sum();
+        *value = sum / total;
+    }
+    at(weighted[0].0, &mean)
+}

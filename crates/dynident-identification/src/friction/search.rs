@@ -1,0 +1,207 @@
+//! The search for one joint's friction among columns that its factors hold already.
+//!
+//! A constant of a term (a width, a velocity) is taken between two neighbours of its grid, whose columns together say
+//! what the column between them would: so no further term is needed to patch up a grid that is too coarse.
+
+use super::candidates::{CandidateColumn, FrictionKind};
+use super::choice::{FrictionCandidate, JointFriction};
+use super::constants::mean_term;
+use dynident_estimation::{FoldErrors, JointFolds};
+use dynident_model::terms::TorqueTerm;
+
+/// Terms added at most to viscous friction and a step.
+const MOST_ADDED: usize = 3;
+
+/// A candidate with the best of its constants.
+struct ScoredCandidate {
+    kinds: Vec<FrictionKind>,
+    /// Places of its columns.
+    places: Vec<usize>,
+    errors: FoldErrors,
+}
+
+impl ScoredCandidate {
+    /// Columns of a kind that have a value at all, with it.
+    fn present(&self, columns: &[CandidateColumn], kind: FrictionKind) -> Vec<(usize, f64)> {
+        let values = self.places.iter().copied().zip(self.errors.coefficients.iter().copied());
+        values.filter(|&(place, value)| value != 0.0 && columns[place].kind == kind).collect()
+    }
+
+    /// Its terms that have a value at all, with their constants; both directions of one that has two.
+    fn terms(&self, columns: &[CandidateColumn]) -> Vec<TorqueTerm> {
+        self.kinds.iter().flat_map(|&kind| self.terms_of(columns, kind)).collect()
+    }
+
+    fn terms_of(&self, columns: &[CandidateColumn], kind: FrictionKind) -> Vec<TorqueTerm> {
+        let present = self.present(columns, kind);
+        if !kind.takes_one() {
+            let mut stated: Vec<TorqueTerm> = Vec::new();
+            for term in present.iter().flat_map(|&(place, _)| &columns[place].stated) {
+                if !stated.contains(term) {
+                    stated.push(term.clone());
+                }
+            }
+            return stated;
+        }
+        let Some(&(first, _)) = present.first() else { return Vec::new() };
+        // As many terms as one point of the grid has.
+        let weighted = |number: usize| -> Vec<(&TorqueTerm, f64)> {
+            present.iter().map(|&(place, value)| (&columns[place].stated[number], value)).collect()
+        };
+        (0..columns[first].stated.len()).map(|number| mean_term(&weighted(number))).collect()
+    }
+
+    /// Symbols of the parameters that are not zero, each once.
+    fn parameters(&self, columns: &[CandidateColumn]) -> Vec<String> {
+        let mut symbols: Vec<String> = Vec::new();
+        for (place, _) in self.kinds.iter().flat_map(|&kind| self.present(columns, kind)) {
+            let symbol = columns[place].term.symbol();
+            if !symbols.contains(&symbol) {
+                symbols.push(symbol);
+            }
+        }
+        symbols
+    }
+
+    fn complexity(&self, columns: &[CandidateColumn]) -> usize {
+        let is_present = |kind: &&FrictionKind| !self.present(columns, **kind).is_empty();
+        let constants = self.kinds.iter().filter(is_present).map(|kind| kind.constants());
+        self.parameters(columns).len() + constants.sum::<usize>()
+    }
+
+    /// Its terms that have a value at all.
+    fn present_name(&self, columns: &[CandidateColumn]) -> String {
+        let is_present = |kind: &&FrictionKind| !self.present(columns, **kind).is_empty();
+        let names: Vec<&str> = self.kinds.iter().filter(is_present).map(|kind| kind.name()).collect();
+        if names.is_empty() { "none".to_owned() } else { names.join(" + ") }
+    }
+
+    fn name(&self) -> String {
+        self.kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(" + ")
+    }
+}
+
+/// The best constants of a model with the given terms. Constants of `before` are kept, but for those of the step, which
+/// shares its velocities with the new term.
+fn tuned(
+    folds: &JointFolds,
+    columns: &[CandidateColumn],
+    kinds: Vec<FrictionKind>,
+    before: Option<&ScoredCandidate>,
+) -> ScoredCandidate {
+    let mut choices: Vec<Vec<usize>> = vec![Vec::new()];
+    for &kind in &kinds {
+        let options = kind.options(columns);
+        let kept = before.filter(|_| !kind.is_step()).and_then(|before| {
+            let of_kind = |place: &&usize| columns[**place].kind == kind;
+            let places: Vec<usize> = before.places.iter().filter(of_kind).copied().collect();
+            options.contains(&places).then_some(places)
+        });
+        let options = kept.map_or(options, |kept| vec![kept]);
+        choices = choices
+            .iter()
+            .flat_map(|chosen| options.iter().map(move |option| [chosen.as_slice(), option].concat()))
+            .collect();
+    }
+    let nonnegative: Vec<Vec<bool>> = choices
+        .iter()
+        .map(|places| places.iter().map(|&place| columns[place].term.is_nonnegative()).collect())
+        .collect();
+    let models: Vec<(&[usize], &[bool])> =
+        choices.iter().zip(&nonnegative).map(|(places, nonnegative)| (&places[..], &nonnegative[..])).collect();
+    let errors = folds.errors_of_all(&models);
+    let evaluated = choices.into_iter().zip(errors).map(|(places, errors)| ScoredCandidate {
+        kinds: kinds.clone(),
+        places,
+        errors,
+    });
+    // The first of equals, so that the choice is the same everywhere.
+    evaluated
+        .reduce(|best, next| if next.errors.rms() < best.errors.rms() { next } else { best })
+        .unwrap_or_else(|| ScoredCandidate { kinds, places: Vec::new(), errors: folds.errors(&[], &[]) })
+}
+
+/// Terms added one at a time to `start`, each time the one that lowers the error most; all that was tried goes into
+/// `met`.
+fn add_terms(
+    folds: &JointFolds,
+    columns: &[CandidateColumn],
+    start: Vec<FrictionKind>,
+    met: &mut Vec<ScoredCandidate>,
+) {
+    let mut additions: Vec<FrictionKind> =
+        columns.iter().map(|column| column.kind).filter(|kind| kind.is_addition()).collect();
+    additions.dedup();
+    let mut at = met.len();
+    met.push(tuned(folds, columns, start, None));
+    for _ in 0..MOST_ADDED {
+        let start = met.len();
+        for &added in &additions {
+            let replaced = added.replaces();
+            let has = |kind: FrictionKind| met[at].kinds.contains(&kind);
+            if has(added) || replaced.is_some_and(|replaced| !has(replaced)) {
+                continue;
+            }
+            let mut kinds: Vec<FrictionKind> =
+                met[at].kinds.iter().copied().filter(|kind| Some(*kind) != replaced).collect();
+            kinds.push(added);
+            kinds.sort();
+            let with_constants_kept = tuned(folds, columns, kinds, Some(&met[at]));
+            met.push(with_constants_kept);
+        }
+        let Some(best) =
+            (start..met.len()).reduce(|a, b| if met[b].errors.rms() < met[a].errors.rms() { b } else { a })
+        else {
+            break;
+        };
+        if met[best].errors.rms() >= met[at].errors.rms() {
+            break;
+        }
+        at = best;
+    }
+}
+
+/// The choice for one joint, and the places of its columns.
+pub(super) fn search(
+    joint: String,
+    count: usize,
+    folds: &JointFolds,
+    columns: &[CandidateColumn],
+) -> (JointFriction, Vec<usize>) {
+    let mut met = Vec::new();
+    for step in [FrictionKind::Coulomb, FrictionKind::Sigmoid] {
+        add_terms(folds, columns, vec![FrictionKind::Viscous, step], &mut met);
+    }
+    let least =
+        (0..met.len()).reduce(|a, b| if met[b].errors.rms() < met[a].errors.rms() { b } else { a }).unwrap_or(0);
+    let excess: Vec<[f64; 2]> = met.iter().map(|one| one.errors.excess_over(&met[least].errors)).collect();
+    let within = |index: &usize| *index == least || excess[*index][0] <= excess[*index][1];
+    // Of equally simple ones the better.
+    let order = |a: &usize, b: &usize| {
+        let complexity = |index: usize| met[index].complexity(columns);
+        complexity(*a).cmp(&complexity(*b)).then(met[*a].errors.rms().total_cmp(&met[*b].errors.rms()))
+    };
+    let chosen = (0..met.len()).filter(within).min_by(order).unwrap_or(least);
+    let candidate = |(index, one): (usize, &ScoredCandidate)| FrictionCandidate {
+        term: one.name(),
+        parameters: one.parameters(columns),
+        complexity: one.complexity(columns),
+        cv_error_nm: one.errors.rms(),
+        excess_standard_errors: if index == least || excess[index][1] <= 0.0 {
+            0.0
+        } else {
+            excess[index][0] / excess[index][1]
+        },
+        chosen: index == chosen,
+    };
+    let best = &met[chosen];
+    let friction = JointFriction {
+        joint,
+        chosen: best.present_name(columns),
+        terms: Some(best.terms(columns)),
+        folds: count,
+        candidates: met.iter().enumerate().map(candidate).collect(),
+    };
+    let present = best.kinds.iter().flat_map(|&kind| best.present(columns, kind)).map(|(place, _)| place).collect();
+    (friction, present)
+}

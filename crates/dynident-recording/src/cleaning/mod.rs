@@ -1,0 +1,212 @@
+//! From rows as they were read to rows that a motion is made of.
+//!
+//! [`CleanRows`] reads two blocks ahead and, on the way: finds single torque samples far from those around them
+//! (`outliers`) and torque that stands still while its joint moves (`held`), both marked so that no row of a fit holds
+//! them; replaces lone spikes of a position (`spikes`); gives each row its place by the clock; and fills holes that are
+//! short against the motion (`holes`), marked likewise. What it did is kept for the report.
+
+mod held;
+mod holes;
+mod outliers;
+mod set_aside;
+mod spikes;
+
+pub use set_aside::{Reason, SetAside};
+pub(crate) use spikes::replace_spikes;
+
+use crate::clock::timeline::{Places, Timeline};
+use crate::error::RecordingError;
+use crate::log::{LogReader, RawBlock};
+use holes::{Before, Filled, fill, last_rows};
+use set_aside::Tally;
+use std::collections::VecDeque;
+
+/// Some rows, ready for the grid.
+#[derive(Debug, Default)]
+pub(crate) struct CleanBlock {
+    pub(crate) raw: RawBlock,
+    pub(crate) places: Places,
+    /// For each joint the rows whose torque does not count, ascending.
+    pub(crate) marked: Vec<Vec<usize>>,
+}
+
+/// A log's rows, read ahead and cleaned.
+#[derive(Debug)]
+pub(crate) struct CleanRows {
+    reader: LogReader,
+    timeline: Timeline,
+    keep_outliers: bool,
+    joints: usize,
+    /// Read, not cleaned.
+    waiting: Option<RawBlock>,
+    /// Cleaned, not placed.
+    cleaned: VecDeque<(RawBlock, Vec<Vec<usize>>)>,
+    ended: bool,
+    /// The last torques as logged and positions as cleaned.
+    tail: [Vec<Vec<f64>>; 2],
+    /// Smallest and largest torque of each joint, and its spread.
+    extremes: Vec<[f64; 2]>,
+    spread: Vec<f64>,
+    before: Before,
+    tally: Tally,
+    bridged: [u64; 2],
+}
+
+impl CleanRows {
+    pub(crate) fn new(reader: LogReader, timeline: Timeline, joints: &[String], keep_outliers: bool) -> Self {
+        Self {
+            reader,
+            timeline,
+            keep_outliers,
+            joints: joints.len(),
+            waiting: None,
+            cleaned: VecDeque::new(),
+            ended: false,
+            tail: [vec![Vec::new(); joints.len()], vec![Vec::new(); joints.len()]],
+            extremes: vec![[f64::INFINITY, f64::NEG_INFINITY]; joints.len()],
+            spread: vec![0.0; joints.len()],
+            before: Before::default(),
+            tally: Tally::new(joints),
+            bridged: [0; 2],
+        }
+    }
+
+    pub(crate) fn reader(&self) -> &LogReader {
+        &self.reader
+    }
+
+    /// What was set aside so far.
+    pub(crate) fn set_aside(&self) -> Vec<SetAside> {
+        self.tally.all()
+    }
+
+    /// Holes that were filled, and the samples in them.
+    pub(crate) fn bridged(&self) -> [u64; 2] {
+        self.bridged
+    }
+
+    /// The next rows; `None` at the end. `read` sees every block as it was logged.
+    pub(crate) fn next_block(&mut self, read: &mut dyn FnMut(&RawBlock)) -> Result<Option<CleanBlock>, RecordingError> {
+        while self.cleaned.len() < 2 && !(self.ended && self.waiting.is_none()) {
+            let next = self.read(read)?;
+            if let Some(block) = core::mem::replace(&mut self.waiting, next) {
+                let cleaned = self.clean(block);
+                self.cleaned.push_back(cleaned);
+            }
+        }
+        let Some((raw, marked)) = self.cleaned.pop_front() else { return Ok(None) };
+        let next = self.cleaned.front().map(|(next, _)| next);
+        let places = self.timeline.places(&raw, next);
+        let block = if places.holes.is_empty() {
+            CleanBlock { raw, places, marked }
+        } else {
+            let holes = places.holes.len() as u64;
+            let Filled { raw, places, invented, moved } = fill(&self.before, &raw, &places, next);
+            // A hole that could not be filled begins a piece.
+            self.bridged[0] += if invented.is_empty() { 0 } else { holes };
+            self.bridged[1] += invented.len() as u64;
+            let marked = marked.into_iter().map(|marked| {
+                let mut rows: Vec<usize> = marked.into_iter().map(|row| moved[row]).chain(invented.clone()).collect();
+                rows.sort_unstable();
+                rows
+            });
+            CleanBlock { marked: marked.collect(), raw, places }
+        };
+        self.before = last_rows(&block.raw, &block.places);
+        Ok(Some(block))
+    }
+
+    fn read(&mut self, read: &mut dyn FnMut(&RawBlock)) -> Result<Option<RawBlock>, RecordingError> {
+        let mut block = RawBlock::default();
+        if self.ended || !self.reader.next_block(&mut block)? {
+            self.ended = true;
+            return Ok(None);
+        }
+        read(&block);
+        for (joint, tau) in block.tau.iter().enumerate() {
+            let [low, high] = &mut self.extremes[joint];
+            for value in tau {
+                (*low, *high) = (low.min(*value), high.max(*value));
+            }
+        }
+        Ok(Some(block))
+    }
+
+    /// Finds what does not count, and puts something sane in its place.
+    fn clean(&mut self, mut block: RawBlock) -> (RawBlock, Vec<Vec<usize>>) {
+        let rows = block.rows();
+        self.tally.rows += rows as u64;
+        let mut marked = vec![Vec::new(); self.joints];
+        if self.keep_outliers {
+            return (block, marked);
+        }
+        let next = self.waiting.as_ref();
+        for (joint, marked) in marked.iter_mut().enumerate() {
+            // Positions first: whether a joint moves is asked of them.
+            let joined = |tail: &[f64], own: &[f64], next: Option<&[f64]>, most: usize| -> Vec<f64> {
+                let ahead = next.map_or(&[][..], |next| &next[..next.len().min(most)]);
+                [tail, own, ahead].concat()
+            };
+            let [tau_tail, q_tail] = &mut self.tail;
+            let next_q = next.map(|next| &next.q[joint][..]);
+            let mut q = joined(&q_tail[joint], &block.q[joint], next_q, usize::MAX);
+            let own = q_tail[joint].len()..q_tail[joint].len() + rows;
+            let seen = own.end + held::AROUND.min(q.len() - own.end);
+            let spikes = replace_spikes(&mut q[..seen], own.clone());
+            for &at in &spikes {
+                let index = at - own.start;
+                let old = core::mem::replace(&mut block.q[joint][index], q[at]);
+                self.tally.add((joint, Reason::Spike), &block, index, [old, q[at]], 1);
+            }
+
+            let next_tau = next.map(|next| &next.tau[joint][..]);
+            let tau = joined(&tau_tail[joint], &block.tau[joint], next_tau, usize::MAX);
+            let mut values = tau[own.start.saturating_sub(held::AROUND)..own.end].to_vec();
+            values.sort_by(f64::total_cmp);
+            let part = values.len() / 20;
+            let spread = values[values.len() - 1 - part] - values[part];
+            self.spread[joint] = self.spread[joint].max(spread);
+            let held_runs = held::held_runs(&tau, &q, self.extremes[joint]);
+            let single = outliers::outliers(&tau[..seen], own.clone(), self.spread[joint]);
+            marked.extend(single.iter().map(|at| at - own.start));
+            for run in &held_runs {
+                let repeated = (run.from + 1).max(own.start)..run.to.min(own.end);
+                marked.extend(repeated.clone().map(|at| at - own.start));
+            }
+            marked.sort_unstable();
+            marked.dedup();
+            keep_last(&mut tau_tail[joint], &block.tau[joint]);
+            keep_last(&mut q_tail[joint], &block.q[joint]);
+            if marked.is_empty() {
+                continue;
+            }
+            let mut repaired = tau[own.start.saturating_sub(1)..seen].to_vec();
+            let shift = own.start - own.start.saturating_sub(1);
+            let places: Vec<usize> = marked.iter().map(|index| index + shift).collect();
+            outliers::bridged(&mut repaired, &places);
+            block.tau[joint].copy_from_slice(&repaired[shift..shift + rows]);
+            for &at in &single {
+                let index = at - own.start;
+                let values = [tau[at], block.tau[joint][index]];
+                self.tally.add((joint, Reason::Outlier), &block, index, values, 1);
+            }
+            for run in &held_runs {
+                let repeated = (run.from + 1).max(own.start)..run.to.min(own.end);
+                if !repeated.is_empty() {
+                    let begins = u64::from(run.from + 1 >= own.start);
+                    let index = repeated.start - own.start;
+                    let values = [tau[repeated.start]; 2];
+                    self.tally.add_run((joint, Reason::Held), &block, index, values, (repeated.len() as u64, begins));
+                }
+            }
+        }
+        (block, marked)
+    }
+}
+
+/// Keeps the last samples of what has passed.
+fn keep_last(tail: &mut Vec<f64>, own: &[f64]) {
+    tail.extend_from_slice(own);
+    let unneeded = tail.len().saturating_sub(held::AROUND);
+    tail.drain(..unneeded);
+}

@@ -1,0 +1,303 @@
+//! Single torque samples far from those around them.
+
+use crate::quantisation::quantisation_step;
+
+/// Samples of a group of which the median is taken.
+const GROUP: usize = 5;
+/// Samples to either side that a judgement needs: two groups.
+pub(super) const REACH: usize = 2 * GROUP;
+/// Samples over which the noise is taken to be alike.
+const NOISE_SPAN: usize = 512;
+/// Robust standard deviations that a sample has to stand off. Normal noise does so once in 10¹⁵ samples.
+const TIMES_NOISE: f64 = 8.0;
+/// Least distance as a share of the spread of the torque: less does not matter to any fit.
+const SHARE_OF_SPREAD: f64 = 0.005;
+/// Least distance in steps of a quantised channel.
+const QUANTA: f64 = 3.5;
+/// Times the usual distance of its nearest neighbours that a sample has to stand off: a peak over several samples takes
+/// them along.
+const TIMES_NEIGHBOURS: f64 = 5.0;
+/// Near an end of the log, where a line through ten samples has to tell what would be beyond it: times as far as
+/// elsewhere that a sample has to stand off, and times the usual change from sample to sample nearby (a controller that
+/// settles swings).
+const TIMES_AT_ENDS: f64 = 4.0;
+const TIMES_CHANGES: f64 = 2.0;
+/// Nearest neighbours to either side.
+const NEIGHBOURS: usize = 3;
+/// With more samples apart than this they are the nature of the signal.
+const LARGEST_SHARE: f64 = 0.15;
+/// Share of outliers that follow one another directly above which they are pulses of the torque, and fewest of them to
+/// say so.
+const LARGEST_BESIDE: f64 = 0.2;
+const FEWEST_PULSES: usize = 10;
+/// So many side by side, off the same way by at least this share of the one in question, are a pulse of the torque (a
+/// contact, a drive that catches up).
+const SIDE_BY_SIDE: usize = 3;
+const SHARE_OF_PULSE: f64 = 0.25;
+/// Fewest samples to judge by.
+const FEWEST: usize = 64;
+
+/// Standard deviations in one median of absolute deviations of normal noise.
+const NORMAL: f64 = 1.4826;
+
+/// Places of outliers in `own` (a part of `x`), which stands among its neighbours in `x`.
+///
+/// Before and behind a sample stand two groups of five; a group's median does not care for two outliers in it. The
+/// cubic through the four medians is where a smooth torque would be; the lines through those before and those behind
+/// are the torque on either side of a step (friction reversed, contact made). A sample is an outlier
+/// if it lies outside of all of these by more than eight robust standard deviations of samples from their cubics
+/// nearby, half a percent of the torque's spread, and three steps of a quantised channel. Source of the rule by
+/// medians: Hampel, J. Am. Stat. Assoc. 69 (1974) 383; Davies and Gather, J. Am. Stat. Assoc. 88 (1993) 782. Groups
+/// beside the sample and the step are this project's own.
+pub(super) fn outliers(x: &[f64], own: core::ops::Range<usize>, spread: f64) -> Vec<usize> {
+    let n = x.len();
+    if n < FEWEST {
+        return Vec::new();
+    }
+    // The ends are mirrored in the point where the line through the two groups inside ends: a slope goes on beyond it,
+    // and the last sample itself, which may be an outlier, has no say.
+    let end = |at: &dyn Fn(usize) -> f64| {
+        let [near, far] =
+            [1, 1 + GROUP].map(|from| median_of_five(&core::array::from_fn::<f64, GROUP, _>(|k| at(from + k))));
+        near + 0.6 * (near - far)
+    };
+    let (first, last) = (end(&|k| x[k]), end(&|k| x[n - 1 - k]));
+    let before = (1..=REACH).rev().map(|k| 2.0 * first - x[k]);
+    let behind = (1..=REACH).map(|k| 2.0 * last - x[n - 1 - k]);
+    let padded: Vec<f64> = before.chain(x.iter().copied()).chain(behind).collect();
+    let medians: Vec<f64> = padded.windows(GROUP).map(median_of_five).collect();
+    let around = |i: usize| {
+        let place = i + REACH;
+        [place - 2 * GROUP, place - GROUP, place + 1, place + 1 + GROUP].map(|from| medians[from])
+    };
+    // The cubic through values at -8, -3, 3 and 8, at 0.
+    let smooth =
+        |[far, before, behind, beyond]: [f64; 4]| 32.0 / 55.0 * (before + behind) - 9.0 / 110.0 * (far + beyond);
+    let off: Vec<f64> = (0..n).map(|i| x[i] - smooth(around(i))).collect();
+    // How far sample k lies above all that is suggested for sample i, or below.
+    let signed = |i: usize, k: usize| {
+        let usual = usual_range(around(i), x[i] - off[i]);
+        (x[k] - usual.end).max(0.0) - (usual.start - x[k]).max(0.0)
+    };
+    let outside = |i: usize| signed(i, i).abs();
+    // Where one side alone is known: what swings from sample to sample is none either.
+    let at_an_end = |i: usize, least: f64| {
+        if (REACH..n - REACH).contains(&i) {
+            return 0.0;
+        }
+        let nearby = i.saturating_sub(GROUP)..(i + GROUP).min(n - 1);
+        let nearby = nearby.filter(|k| *k != i && k + 1 != i);
+        let changes = middle(&mut nearby.map(|k| (x[k + 1] - x[k]).abs()).collect::<Vec<f64>>());
+        f64::max(TIMES_AT_ENDS * least, TIMES_CHANGES * changes)
+    };
+    let mut distances: Vec<f64> = off.iter().map(|off| off.abs()).collect();
+    let overall = NORMAL * middle(&mut distances);
+    let mostly_repeats = 2 * x.windows(2).filter(|pair| pair[0] == pair[1]).count() > n;
+    let mut apart = Vec::new();
+    let half = NOISE_SPAN / 2;
+    let mut from = own.start;
+    while from < own.end {
+        let to = (from + half).min(own.end);
+        let (low, high) = (from.saturating_sub(half / 2), (to + half / 2).min(n));
+        let mut distances: Vec<f64> = off[low..high].iter().map(|off| off.abs()).collect();
+        let noise = f64::max(NORMAL * middle(&mut distances), 0.5 * overall);
+        // Where most samples lie on a line there is no noise to go by, only the spread of the whole.
+        let share = if noise > 0.0 && !mostly_repeats { SHARE_OF_SPREAD } else { 2.0 };
+        let least = f64::max(TIMES_NOISE * noise, share * spread).max(f64::MIN_POSITIVE);
+        for i in from..to {
+            if off[i].abs() > 0.5 * least {
+                let nearby = i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(n);
+                let mut nearby: Vec<f64> = nearby.map(outside).collect();
+                let usual = (TIMES_NEIGHBOURS * middle(&mut nearby)).max(at_an_end(i, least));
+                apart.push((i, outside(i) / least.max(usual)));
+            }
+        }
+        from = to;
+    }
+    let limit = limit_of(apart.iter().map(|(_, times)| *times));
+    let mut found: Vec<usize> = apart.into_iter().filter(|(_, times)| *times > limit).map(|(i, _)| i).collect();
+    if found.is_empty() || found.len() as f64 > LARGEST_SHARE * own.len() as f64 {
+        return Vec::new();
+    }
+    // Errors come one by one; what lasts for some samples again and again is a torque.
+    let beside = (1..found.len()).filter(|&k| found[k] == found[k - 1] + 1).count();
+    if found.len() >= FEWEST_PULSES && beside as f64 > LARGEST_BESIDE * found.len() as f64 {
+        return Vec::new();
+    }
+    if let Some(step) = quantisation_step(x) {
+        found.retain(|&i| outside(i) > QUANTA * step);
+    }
+    found.retain(|&i| {
+        let beside = |k: &usize| signed(i, *k) / signed(i, i) > SHARE_OF_PULSE;
+        let before = (0..i).rev().take(SIDE_BY_SIDE).take_while(beside).count();
+        let behind = (i + 1..n).take(SIDE_BY_SIDE).take_while(beside).count();
+        before + 1 + behind < SIDE_BY_SIDE
+    });
+    found
+}
+
+/// Where outliers begin, for distances in units of the least that one can have: at one, or twice as far, and so on,
+/// until more lie behind the limit than between it and its half. What errors of the recorder do stands apart from the
+/// noise; a noise with long tails thins out.
+pub(super) fn limit_of(distances: impl Iterator<Item = f64>) -> f64 {
+    let distances: Vec<f64> = distances.collect();
+    let mut limit = 1.0;
+    loop {
+        let beyond = distances.iter().filter(|distance| **distance > limit).count();
+        let below = distances.iter().filter(|distance| **distance > 0.5 * limit && **distance <= limit).count();
+        if beyond == 0 || beyond > below {
+            return limit;
+        }
+        limit *= 2.0;
+    }
+}
+
+/// From the least to the largest of what the medians at -8, -3, 3 and 8 suggest at 0: the lines through those before
+/// and those behind, the cubic through all.
+fn usual_range([far, before, behind, beyond]: [f64; 4], smooth: f64) -> core::ops::Range<f64> {
+    let suggested = [before + 0.6 * (before - far), behind + 0.6 * (behind - beyond), smooth];
+    let low = suggested.iter().fold(f64::INFINITY, |low, value| low.min(*value));
+    low..suggested.iter().fold(f64::NEG_INFINITY, |high, value| high.max(*value))
+}
+
+/// What stands in place of outliers: the line between the nearest samples that are none.
+pub(super) fn bridged(x: &mut [f64], marked: &[usize]) {
+    let mut at = 0;
+    while at < marked.len() {
+        let mut last = at;
+        while last + 1 < marked.len() && marked[last + 1] == marked[last] + 1 {
+            last += 1;
+        }
+        let (first, end) = (marked[at], marked[last] + 1);
+        let before = first.checked_sub(1).map(|k| x[k]);
+        let behind = x.get(end).copied();
+        let (from, to) = (before.or(behind).unwrap_or(0.0), behind.or(before).unwrap_or(0.0));
+        let steps = (end - first + 1) as f64;
+        for (k, value) in x[first..end].iter_mut().enumerate() {
+            *value = from + (to - from) * (k + 1) as f64 / steps;
+        }
+        at = last + 1;
+    }
+}
+
+/// The middle value; zero of none.
+pub(super) fn middle(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let half = values.len() / 2;
+    *values.select_nth_unstable_by(half, f64::total_cmp).1
+}
+
+fn median_of_five(x: &[f64]) -> f64 {
+    let (a, b) = (x[0].min(x[1]), x[0].max(x[1]));
+    let (c, d) = (x[2].min(x[3]), x[2].max(x[3]));
+    // The smaller of the two minima and the larger of the two maxima are not the middle.
+    let (low, high) = (a.max(c), b.min(d));
+    low.min(high).max(low.max(high).min(x[4]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::derivative::test_signals::normal;
+
+    fn found(x: &[f64]) -> Vec<usize> {
+        let mut sorted = x.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let spread = sorted[19 * x.len() / 20] - sorted[x.len() / 20];
+        outliers(x, 0..x.len(), spread)
+    }
+
+    /// Torque with gravity, inertia and dry friction.
+    fn torque(i: usize) -> f64 {
+        let t = i as f64 * 0.004;
+        30.0 * (0.7 * t).sin() + 5.0 * (3.1 * t).cos() + 4.0 * (1.3 * t).sin().signum()
+    }
+
+    #[test]
+    fn the_middle_of_five() {
+        for order in [[1.0, 2.0, 3.0, 4.0, 5.0], [5.0, 1.0, 4.0, 2.0, 3.0], [3.0, 5.0, 1.0, 4.0, 2.0]] {
+            assert_eq!(median_of_five(&order), 3.0, "{order:?}");
+        }
+        assert_eq!(median_of_five(&[2.0, 2.0, 2.0, 9.0, -9.0]), 2.0);
+    }
+
+    #[test]
+    fn twenty_sigma_is_found_and_nothing_else() {
+        let n = 20_000;
+        let noise = normal(7, n);
+        let clean: Vec<f64> = (0..n).map(|i| torque(i) + 0.1 * noise[i]).collect();
+        // Two normal samples in ten million stand off by eight deviations of the whole rule.
+        assert!(found(&clean).is_empty(), "{:?}", found(&clean));
+        let pick = normal(8, n);
+        // The upper twentieth of a normal sample.
+        let spoilt: Vec<usize> = (0..n).filter(|i| pick[*i] > 1.645).collect();
+        let mut x = clean;
+        for &i in &spoilt {
+            x[i] += if i % 2 == 0 { 2.0 } else { -2.0 };
+        }
+        let found = found(&x);
+        assert!(found.iter().all(|i| spoilt.contains(i)), "{} of {}", found.len(), spoilt.len());
+        // Three of five neighbours are outliers themselves in a thousandth of the groups.
+        assert!(found.len() as f64 > 0.97 * spoilt.len() as f64, "{} of {}", found.len(), spoilt.len());
+    }
+
+    #[test]
+    fn ends_on_a_slope_are_none_and_an_outlier_at_an_end_is_found() {
+        for from in (0..4000).step_by(37) {
+            // Without the step of dry friction: of a step some samples before an end only one side is there.
+            let smooth = |i: usize| torque(i) - 4.0 * (1.3 * i as f64 * 0.004).sin().signum();
+            let mut x: Vec<f64> = (from..from + 300).map(smooth).collect();
+            assert!(found(&x).is_empty(), "{from}: {:?}", found(&x));
+            x[0] += 30.0;
+            x[299] -= 30.0;
+            assert_eq!(found(&x), [0, 299], "{from}");
+        }
+    }
+
+    #[test]
+    fn long_tails_thin_out_and_outliers_stand_apart() {
+        let n = 20_000;
+        let (a, b) = (normal(13, n), normal(14, n));
+        // Student's t with one and a half degrees of freedom or so: a normal over a power of another.
+        let mut x: Vec<f64> = (0..n).map(|i| torque(i) + 0.1 * a[i] / b[i].abs().powf(0.7).max(0.01)).collect();
+        let few = found(&x).len();
+        // A thousandth stands off by eight deviations; what is flagged is the farthest few.
+        assert!(few < 10, "{few}");
+        x[777] = 1e9;
+        assert!(found(&x).contains(&777));
+    }
+
+    #[test]
+    fn coloured_noise_exact_torque_steps_and_steps_of_a_current_are_none() {
+        let n = 20_000;
+        let noise = normal(3, n);
+        let mut last = 0.0;
+        let coloured = |share: f64, last: &mut f64| -> Vec<f64> {
+            (0..n)
+                .map(|i| {
+                    *last = share * *last + noise[i];
+                    torque(i) + 0.1 * *last
+                })
+                .collect()
+        };
+        for share in [0.5, 0.95, -0.7] {
+            assert!(found(&coloured(share, &mut last)).is_empty(), "{share}");
+        }
+        assert!(found(&(0..n).map(torque).collect::<Vec<f64>>()).is_empty());
+        let quantised: Vec<f64> = (0..n).map(|i| ((torque(i) + 0.02 * noise[i]) / 0.5).round() * 0.5).collect();
+        assert!(found(&quantised).is_empty());
+        // A controller that swings in during the first samples, as a Panda's does.
+        let swing = [-11.0, 8.0, -6.0, 5.5, -5.0, -9.0, 4.0, 1.0];
+        let swings: Vec<f64> =
+            (0..500).map(|i| 0.3 * torque(i) + swing.get(i).copied().unwrap_or(0.02 * noise[i])).collect();
+        assert!(found(&swings).is_empty(), "{:?}", found(&swings));
+        // A blow that fades within some samples.
+        let blow = |i: usize| if i % 700 < 8 && i > 8 { 6.0 * (-0.3 * (i % 700) as f64).exp() } else { 0.0 };
+        let blows: Vec<f64> = (0..3000).map(|i| torque(i) + 0.02 * noise[i] + blow(i)).collect();
+        assert!(found(&blows).is_empty(), "{:?}", found(&blows));
+        let blunt: Vec<f64> = (0..n).map(|i| torque(i) + 8.0 * (i as f64 * 0.02).sin().powi(40)).collect();
+        assert!(found(&blunt).is_empty(), "peaks over some samples");
+    }
+}

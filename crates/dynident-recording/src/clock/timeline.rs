@@ -1,0 +1,126 @@
+//! Where rows stand on the time axis, in steps of the even grid, and where a piece of the log ends.
+
+use super::drift::{MARGIN, smoothed};
+use super::{Clock, Spacing};
+use crate::log::RawBlock;
+
+/// Rows before and after a block that its places depend on.
+const AROUND: usize = MARGIN;
+
+/// Rows within which late packets have caught up.
+const LATE_ROWS: usize = 32;
+
+/// The places of a block's rows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Places {
+    /// Steps of the even grid since the log's first row.
+    pub(crate) steps: Vec<f64>,
+    /// Whether a row cannot follow the one before: behind a gap, or earlier than it.
+    pub(crate) begins: Vec<bool>,
+    /// Rows behind a hole that is longer than a gap and can be bridged.
+    pub(crate) holes: Vec<usize>,
+}
+
+/// Gives rows their places as they come.
+#[derive(Clone, Debug)]
+pub(crate) struct Timeline {
+    clock: Clock,
+    longest_step_s: f64,
+    longest_step_rows: f64,
+    /// Longest hole that is bridged, in steps.
+    bridged_steps: f64,
+    /// Number, stamp in seconds and whether a piece begins, of the last rows.
+    past: Vec<(u64, f64, bool)>,
+    last: Option<(u64, f64, f64)>,
+}
+
+impl Timeline {
+    /// On `clock`; a step longer than `max_gap_steps` median steps is a gap, but for holes of at most `bridged_steps`.
+    pub(crate) fn new(clock: &Clock, max_gap_steps: f64, bridged_steps: f64) -> Self {
+        Self {
+            clock: clock.clone(),
+            longest_step_s: max_gap_steps * clock.median_step_s,
+            longest_step_rows: max_gap_steps,
+            bridged_steps,
+            past: Vec::new(),
+            last: None,
+        }
+    }
+
+    /// The places of the rows of `block`, which `next` follows.
+    pub(crate) fn places(&mut self, block: &RawBlock, next: Option<&RawBlock>) -> Places {
+        let (rate, n) = (self.clock.rate_hz, block.rows());
+        let mut places = Places { steps: Vec::with_capacity(n), begins: vec![false; n], holes: Vec::new() };
+        let mut before = self.last;
+        for (index, (&row, &time_s)) in block.row.iter().zip(&block.time_s).enumerate() {
+            let step = match before {
+                Some((last_row, last_s, last_place)) => {
+                    let (rows, time) = ((row - last_row) as f64, time_s - last_s);
+                    let hole = f64::max(rows, time * rate);
+                    let is_gap = rows > self.longest_step_rows
+                        || time > self.longest_step_s && !self.catches_up((last_row, last_s), (block, index), next);
+                    if time < 0.0 || (is_gap && hole > self.bridged_steps) {
+                        places.begins[index] = true;
+                    } else if is_gap {
+                        places.holes.push(index);
+                    }
+                    let even = if is_gap { hole.round().max(rows) } else { rows };
+                    last_place + even
+                }
+                None => row as f64,
+            };
+            places.steps.push(if self.clock.spacing() == Spacing::Even { step } else { time_s * rate });
+            before = Some((row, time_s, step));
+        }
+        if self.clock.spacing() == Spacing::Smoothed {
+            self.smooth(block, next, &mut places);
+        }
+        self.last = before;
+        places
+    }
+
+    /// Whether a stamp that comes late is followed by ones that make up for it: a packet that was late, not a gap.
+    fn catches_up(
+        &self,
+        (last_row, last_s): (u64, f64),
+        (block, index): (&RawBlock, usize),
+        next: Option<&RawBlock>,
+    ) -> bool {
+        if self.clock.spacing() == Spacing::Stamps {
+            return false;
+        }
+        let own = block.row[index..].iter().zip(&block.time_s[index..]);
+        let further = next.into_iter().flat_map(|next| next.row.iter().zip(&next.time_s));
+        own.chain(further).skip(1).take(LATE_ROWS).any(|(&row, &time_s)| {
+            let late = (time_s - last_s) * self.clock.rate_hz - (row - last_row) as f64;
+            time_s >= last_s && late < 1.0
+        })
+    }
+
+    fn smooth(&mut self, block: &RawBlock, next: Option<&RawBlock>, places: &mut Places) {
+        let rate = self.clock.rate_hz;
+        let own = block.row.iter().zip(&block.time_s).zip(&places.begins);
+        let own: Vec<(u64, f64, bool)> = own.map(|((row, time_s), begins)| (*row, *time_s, *begins)).collect();
+        let mut rows = self.past.clone();
+        rows.extend_from_slice(&own);
+        if let Some(next) = next {
+            let mut last = own.last().map(|(row, time_s, _)| (*row, *time_s));
+            for (&row, &time_s) in next.row.iter().zip(&next.time_s).take(AROUND) {
+                let begins = last.is_some_and(|(last_row, last_s)| {
+                    let hole = f64::max((row - last_row) as f64, (time_s - last_s) * rate);
+                    time_s < last_s || hole > f64::max(self.bridged_steps, self.longest_step_s * rate)
+                });
+                rows.push((row, time_s, begins));
+                last = Some((row, time_s));
+            }
+        }
+        let numbers: Vec<f64> = rows.iter().map(|(row, ..)| *row as f64).collect();
+        let stamps: Vec<f64> = rows.iter().map(|(_, time_s, _)| time_s * rate).collect();
+        let begins: Vec<bool> = rows.iter().map(|(.., begins)| *begins).collect();
+        let smooth = smoothed(&numbers, &stamps, &begins, self.clock.smoothing_rows / 2);
+        places.steps.copy_from_slice(&smooth[self.past.len()..self.past.len() + own.len()]);
+        self.past.extend(own);
+        let unneeded = self.past.len().saturating_sub(AROUND);
+        self.past.drain(..unneeded);
+    }
+}
