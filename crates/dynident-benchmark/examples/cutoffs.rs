@@ -13,13 +13,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let runs: u64 = std::env::args().nth(1).map_or(Ok(8), |text| text.parse())?;
     let rows: usize = std::env::args().nth(2).map_or(Ok(CUTOFF_CELLS.len()), |text| text.parse())?;
     println!(
-        "| robot | harmonics | length, s | rate, Hz | position noise, rad | spectrum asks for, Hz | its error, % | default, % | best, % | at, times | default over best |"
+        "| robot | harmonics | length, s | rate, Hz | position noise, rad | spectrum asks for, Hz | its error, % | default, % | best, % | at, times | default over best | motion and parameters at once, % | over best | unsettled |"
     );
-    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
     for cell in CUTOFF_CELLS.iter().take(rows) {
         let figures = cutoff_figures(cell, runs)?;
         println!(
-            "| {} | {} | {} | {} | {:.0e} | {:.1} | {:.2} | {:.2} | {:.2} | {:.1} | {:.2} |",
+            "| {} | {} | {} | {} | {:.0e} | {:.1} | {:.2} | {:.2} | {:.2} | {:.1} | {:.2} | {:.2} | {:.2} | {} |",
             cell.robot.name,
             cell.log.harmonics,
             cell.log.duration_s,
@@ -30,7 +30,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             100.0 * figures.of_default,
             100.0 * figures.best,
             figures.best_multiple,
-            figures.default_over_best()
+            figures.default_over_best(),
+            100.0 * figures.of_simultaneous,
+            figures.of_simultaneous / figures.best,
+            figures.unsettled
         );
     }
     Ok(())

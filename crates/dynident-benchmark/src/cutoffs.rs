@@ -9,6 +9,8 @@ use crate::simulated_logs::{
     PANDA, PERIOD_S, SimulatedLog, SimulatedRobot, UR10, excitation, model_error, recording, torque, truth,
 };
 use dynident_dynamics::ParametricModel;
+use dynident_estimation::{EstimateStatus, SplineMotionSettings};
+use dynident_identification::estimators::Estimator;
 use dynident_identification::{
     DiagnosisChoice, Execution, IdentificationError, IdentificationTask, Recording, RegressorModel, identify,
 };
@@ -65,6 +67,10 @@ pub struct CutoffFigures {
     pub of_spectrum: f64,
     /// Error of the default.
     pub of_default: f64,
+    /// Error of motion and parameters at once, with no cut-off.
+    pub of_simultaneous: f64,
+    /// Runs in which that did not settle.
+    pub unsettled: usize,
     /// Error of the best cut-off, the same in all runs.
     pub best: f64,
     /// The best cut-off in units of what the spectra ask for.
@@ -95,6 +101,7 @@ pub fn cutoff_figures(cell: &CutoffCell, runs: u64) -> Result<CutoffFigures, Ben
     let robot = robot.map_err(|source| failed(source.to_string()))?;
     let regressor = RegressorModel::from(robot.clone());
     let (mut squares, mut spectrum_hz, mut of_default) = ([0.0; MULTIPLES.len()], 0.0, 0.0);
+    let (mut of_simultaneous, mut unsettled) = (0.0, 0);
     for run in 0..runs {
         let motion = excitation(&model, made.harmonics, (made.duration_s, made.rate_hz), 10 + run).map_err(failed)?;
         let other = excitation(&model, made.harmonics, (PERIOD_S, 100.0), 1000 + run).map_err(failed)?;
@@ -103,16 +110,23 @@ pub fn cutoff_figures(cell: &CutoffCell, runs: u64) -> Result<CutoffFigures, Ben
         let (log, asked_hz) = recording(made, &model, (&motion, &exact), 77 + run).map_err(failed)?;
         let other_exact = torque(&regressor, &other, &theta);
         spectrum_hz += asked_hz / runs as f64;
-        let error = |cutoff_hz: Option<f64>| -> Result<f64, IdentificationError> {
+        let fitted = |cutoff_hz: Option<f64>, estimator: Estimator| -> Result<(f64, bool), IdentificationError> {
             let mut task = IdentificationTask::new(robot.clone(), vec![Recording::training("run", log.clone())]);
             task.settings.diagnosis = DiagnosisChoice::Never;
             task.settings.consistency = None;
+            task.settings.estimation.estimator = estimator;
             if let Some(cutoff_hz) = cutoff_hz {
                 task.settings.motion.differentiator = task.settings.motion.differentiator.with_cutoff(cutoff_hz);
             }
             let found = identify(&task, Execution::default())?;
-            Ok(model_error(&other, &other_exact, &torque(&regressor, &other, found.base_values())))
+            let settled = found.estimate().status != EstimateStatus::IterationLimit;
+            let predicted = torque(&regressor, &other, found.base_values());
+            Ok((model_error(&other, &other_exact, &predicted), settled))
         };
+        let error = |cutoff_hz| fitted(cutoff_hz, Estimator::Weighted).map(|(error, _)| error);
+        let (error_of_all, settled) = fitted(None, Estimator::SplineMotion(SplineMotionSettings::default()))?;
+        of_simultaneous += error_of_all.powi(2) / runs as f64;
+        unsettled += usize::from(!settled);
         of_default += error(None)?.powi(2) / runs as f64;
         for (square, multiple) in squares.iter_mut().zip(MULTIPLES) {
             // A filter that leaves no rows, or that does not exist at this rate, is no candidate.
@@ -125,6 +139,8 @@ pub fn cutoff_figures(cell: &CutoffCell, runs: u64) -> Result<CutoffFigures, Ben
         spectrum_hz,
         of_spectrum: squares[OF_SPECTRUM].sqrt(),
         of_default: of_default.sqrt(),
+        of_simultaneous: of_simultaneous.sqrt(),
+        unsettled,
         best: squares[least].sqrt(),
         best_multiple: MULTIPLES[least],
     })

@@ -26,7 +26,7 @@
 //! | parameters, noise of every joint unknown | [`weighted_least_squares`] |
 //! | gross errors set aside | [`robust_least_squares`] |
 //! | noise in position as well as in torque | [`instrumental_variables`], [`hausman_test`] |
-//! | the motion estimated as well | [`simultaneous_least_squares`], [`maximum_likelihood`] |
+//! | the motion estimated as well | [`spline_motion_least_squares`], [`simultaneous_least_squares`], [`maximum_likelihood`] |
 //! | a simulation that looks like the record | [`simulated_least_squares`] |
 //! | errors correlated between joints | [`generalized_least_squares`] |
 //! | errors uneven in time | [`noise_weighted_least_squares`] |
@@ -74,8 +74,10 @@ pub use linear::{
 pub use nonlinear::{
     ChannelNoise, ChannelRows, InstantRows, InstantVisitor, MaximumLikelihoodEstimate, MaximumLikelihoodSettings,
     SimulatedCriterion, SimulatedEstimate, SimulatedMotion, SimulatedProblem, SimulatedRows, SimulatedSettings,
-    SimultaneousEstimate, SimultaneousModel, SimultaneousProblem, SimultaneousSettings, maximum_likelihood,
-    simulated_least_squares, simultaneous_bound, simultaneous_least_squares,
+    SimultaneousEstimate, SimultaneousModel, SimultaneousProblem, SimultaneousSettings, SplineJointFit, SplineLogFit,
+    SplineMotionEstimate, SplineMotionProblem, SplineMotionSettings, SplineRecord, TorqueModel, TorqueSlopes,
+    maximum_likelihood, simulated_least_squares, simultaneous_bound, simultaneous_least_squares,
+    spline_motion_least_squares,
 };
 pub use uncertainty::{CovarianceMethod, Estimate, EstimateStatus, correlation, student_half_width};
 

@@ -3,16 +3,16 @@
 use super::estimators::{Answer, Trial};
 use super::pipeline;
 use super::rows::Rows;
-use super::scenario::{RATE_HZ, SERIES};
+use super::scenario::{RATE_HZ, Record, SERIES};
 use dynident_estimation::{
     CovarianceMethod, Estimate, EstimateStatus, EstimationError, InstrumentalSettings, RobustSettings, RowWeight,
-    SimultaneousProblem, SimultaneousSettings, instrumental_variables, robust_least_squares,
-    simultaneous_least_squares,
+    SimultaneousProblem, SimultaneousSettings, SplineMotionProblem, SplineMotionSettings, SplineRecord,
+    instrumental_variables, robust_least_squares, simultaneous_least_squares, spline_motion_least_squares,
 };
 use dynident_excitation::Motion;
 use dynident_identification::IdentificationError;
 use dynident_identification::consistent::{ConsistencySettings, consistent_parameters};
-use dynident_identification::estimators::{Estimator, PeriodicModel, PeriodicRecord};
+use dynident_identification::estimators::{Estimator, PeriodicModel, PeriodicRecord, SplineTorque};
 use dynident_recording::MotionBlock;
 
 /// What `identify` says of these rows.
@@ -95,6 +95,21 @@ pub(super) fn simultaneous(trial: &Trial<'_>) -> Result<Answer, IdentificationEr
     let names = trial.rows.problem.columns().to_vec();
     let problem = SimultaneousProblem { names, channels, motion, parameters: start.values };
     Ok(answer(simultaneous_least_squares(&problem, &settings, &mut model)?.estimate))
+}
+
+/// Motion and parameters together without knowing the excitation's frequencies, from the pipeline's parameters on.
+pub(super) fn spline_motion(trial: &Trial<'_>) -> Result<Answer, IdentificationError> {
+    let start = trial.rows.estimate(Estimator::Weighted, CovarianceMethod::White)?;
+    let Record { q, tau, .. } = trial.record.clone();
+    let names = trial.rows.problem.columns().to_vec();
+    let mut held = vec![false; names.len()];
+    start.rank.fixed.iter().for_each(|fixed| held[fixed.column] = true);
+    let joints = trial.rows.problem.joints().to_vec();
+    let records = vec![SplineRecord { log: 0, rate_hz: RATE_HZ, q, tau }];
+    let problem = SplineMotionProblem { names, joints, records, parameters: start.values, held };
+    let settings = SplineMotionSettings { covariance: CovarianceMethod::White, ..SplineMotionSettings::default() };
+    let mut torque = SplineTorque::new(&trial.scenario.model, Vec::new());
+    Ok(answer(spline_motion_least_squares(&problem, &settings, &mut torque)?.estimate))
 }
 
 fn answer(estimate: Estimate) -> Answer {

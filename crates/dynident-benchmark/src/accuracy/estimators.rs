@@ -1,6 +1,8 @@
 //! What the benchmark compares. **To add an estimator, add one line to [`ESTIMATORS`].**
 
-use super::answers::{estimated, instrumental, physical, robust, simultaneous, true_motion, weighted, wide};
+use super::answers::{
+    estimated, instrumental, physical, robust, simultaneous, spline_motion, true_motion, weighted, wide,
+};
 use super::rows::Rows;
 use super::scenario::{Record, Scenario};
 use super::shared::TrialData;
@@ -125,5 +127,10 @@ pub const ESTIMATORS: &[BenchmarkEstimator] = &[
         "simultaneous",
         "Fourier series of the motion and parameters from one likelihood, torque noise autoregressive",
         simultaneous,
+    ),
+    entry(
+        "simultaneous-spline",
+        "the same for any motion, a smoothing spline: nothing is known of the excitation",
+        spline_motion,
     ),
 ];

@@ -10,16 +10,26 @@ use nalgebra::{DMatrix, DVector};
 pub(crate) fn autoregression(e: &[f64], most: usize) -> Vec<f64> {
     let count = e.len();
     let covariance = |lag: usize| -> f64 { e[lag..].iter().zip(e).map(|(late, early)| late * early).sum() };
-    let mut left = covariance(0);
+    let covariances: Vec<f64> = (0..=most.min(count / 4)).map(covariance).collect();
+    from_covariances(&covariances, count).0
+}
+
+/// The same from the autocovariances themselves, of lag 0 on, that `count` numbers have shown; with the variance of
+/// what is new, in units of theirs.
+pub(crate) fn from_covariances(covariances: &[f64], count: usize) -> (Vec<f64>, f64) {
+    let mut left = covariances.first().copied().unwrap_or_default();
     if left <= 0.0 || !left.is_finite() {
-        return Vec::new();
+        return (Vec::new(), 0.0);
     }
     let penalty = (count as f64).ln() / count as f64;
     let all = left;
-    let (mut a, mut best) = (Vec::new(), (0.0, Vec::new()));
-    for order in 1..=most.min(count / 4) {
-        let ahead: f64 = a.iter().enumerate().map(|(i, a)| a * covariance(order - 1 - i)).sum();
-        let reflection = (covariance(order) - ahead) / left;
+    let (mut a, mut best) = (Vec::new(), (0.0, Vec::new(), left));
+    for order in 1..covariances.len() {
+        let ahead: f64 = a.iter().enumerate().map(|(i, a)| a * covariances[order - 1 - i]).sum();
+        let reflection = (covariances[order] - ahead) / left;
+        if reflection.is_nan() || reflection.abs() >= 1.0 {
+            break;
+        }
         let turned: Vec<f64> = a.iter().zip(a.iter().rev()).map(|(a, b)| a - reflection * b).collect();
         a = turned;
         a.push(reflection);
@@ -29,10 +39,38 @@ pub(crate) fn autoregression(e: &[f64], most: usize) -> Vec<f64> {
         }
         let criterion = (left / all).ln() + order as f64 * penalty;
         if criterion < best.0 {
-            best = (criterion, a.clone());
+            best = (criterion, a.clone(), left);
         }
     }
-    best.1
+    (best.1, best.2)
+}
+
+/// The same autoregression with all that lasts shortened, so that none of its modes keeps more than the share `most`
+/// from one number to the next: `a_k cᵏ`; with the variance that it leaves of noise of these autocovariances.
+pub(crate) fn shortened(a: Vec<f64>, variance: f64, covariances: &[f64], most: f64) -> (Vec<f64>, f64) {
+    let order = a.len();
+    let companion =
+        DMatrix::from_fn(
+            order,
+            order,
+            |row, column| {
+                if row == 0 { a[column] } else { f64::from(u8::from(row == column + 1)) }
+            },
+        );
+    let longest =
+        if order == 0 { 0.0 } else { companion.complex_eigenvalues().iter().map(|x| x.norm()).fold(0.0, f64::max) };
+    if longest <= most {
+        return (a, variance);
+    }
+    let share = most / longest;
+    let a: Vec<f64> = a.iter().enumerate().map(|(k, a)| a * share.powi(k as i32 + 1)).collect();
+    let filter: Vec<f64> = core::iter::once(1.0).chain(a.iter().map(|a| -a)).collect();
+    let products = filter
+        .iter()
+        .enumerate()
+        .flat_map(|(i, x)| filter.iter().enumerate().map(move |(j, y)| x * y * covariances[i.abs_diff(j)]));
+    let left = products.sum::<f64>().max(variance);
+    (a, left)
 }
 
 /// `y_t − a_1 y_{t−1} − … − a_k y_{t−k}` for `t ≥ k`, the first k values being spent.
@@ -81,6 +119,15 @@ mod tests {
         for (left, w) in left.iter().zip(&w[2..]) {
             assert!((left - w).abs() < 1e-12);
         }
+    }
+
+    /// One mode of 0.9 shortened to 0.5: the filter is 1 − 0.5 z⁻¹, and of unit variance leaves 1 − 2 · 0.5 · 0.9 +
+    /// 0.25.
+    #[test]
+    fn long_modes_are_shortened() {
+        let (a, left) = shortened(vec![0.9], 0.19, &[1.0, 0.9], 0.5);
+        assert!((a[0] - 0.5).abs() < 1e-12 && (left - 0.35).abs() < 1e-12);
+        assert_eq!(shortened(vec![0.4], 0.84, &[1.0, 0.4], 0.5), (vec![0.4], 0.84));
     }
 
     #[test]

@@ -21,4 +21,5 @@ mod physical_routes;
 mod physical_verdicts;
 mod rank;
 mod simulated;
+mod spline_motion;
 mod validation;

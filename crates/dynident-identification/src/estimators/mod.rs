@@ -23,6 +23,8 @@ mod settings;
 mod simulated;
 mod simulated_loop;
 mod simultaneous;
+mod spline_motion;
+mod spline_torque;
 
 pub use error::EstimatorError;
 pub use exogeneity::{EstimateContrast, NoiseInRegressor, NoiseVerdict};
@@ -35,11 +37,15 @@ pub use robust::GrossErrors;
 pub use settings::EstimationSettings;
 pub use simulated::{SimulatedFit, SimulatedLoopSettings, SimulationStart};
 pub use simultaneous::SeriesFit;
+pub use spline_motion::SplineFit;
+pub use spline_torque::SplineTorque;
 
 use crate::consistent::ConsistencySettings;
 use crate::logs::Logs;
 use crate::regressor_model::RegressorModel;
-use dynident_estimation::{Estimate, LinearProblem, RowWeight, ordinary_least_squares, weighted_least_squares};
+use dynident_estimation::{
+    Estimate, LinearProblem, RowWeight, SplineMotionSettings, ordinary_least_squares, weighted_least_squares,
+};
 use simulated::ComparedSignal;
 
 /// How base parameters are estimated, with the settings that belong to the estimator alone.
@@ -69,6 +75,8 @@ pub enum Estimator {
     /// Motion and parameters together, for a motion that is a Fourier series: noise of positions and torques weighed
     /// against each other.
     Simultaneous(PeriodSettings),
+    /// The same for any motion, a smoothing spline whose smoothness comes from the likelihood.
+    SplineMotion(SplineMotionSettings),
     /// Regression on the motion of the simulated closed loop: no measured position enters the regressor.
     Didim(Box<SimulatedLoopSettings>),
     /// The simulated closed loop's torque fitted to the measured one (closed-loop input error).
@@ -90,7 +98,7 @@ impl Estimator {
             Self::Auto(_) => "auto",
             Self::Instrumental(_) => "instrumental",
             Self::MaximumLikelihood(_) => "maximum-likelihood",
-            Self::Simultaneous(_) => "simultaneous",
+            Self::Simultaneous(_) | Self::SplineMotion(_) => "simultaneous",
             Self::Didim(_) => "didim",
             Self::Clie(_) => "clie",
             Self::Cloe(_) => "cloe",
@@ -109,6 +117,7 @@ impl Estimator {
             | Self::Instrumental(_)
             | Self::MaximumLikelihood(_)
             | Self::Simultaneous(_)
+            | Self::SplineMotion(_)
             | Self::Didim(_)
             | Self::Clie(_)
             | Self::Cloe(_) => false,
@@ -133,6 +142,8 @@ pub enum Findings {
     Periodic(PeriodicFit),
     /// Motion and noise of every training log by the simultaneous fit.
     Series(Vec<SeriesFit>),
+    /// Motion as a smoothing spline and noise of every training log.
+    Spline(SplineFit),
     /// How the fit to a simulated closed loop went.
     Simulated(SimulatedFit),
 }
@@ -252,6 +263,7 @@ fn without_instruments(rows: &TrainingRows<'_>) -> Result<(Estimate, Findings), 
             (estimate, Findings::Periodic(found))
         }
         Estimator::Simultaneous(periods) => simultaneous::simultaneous(rows, periods)?,
+        Estimator::SplineMotion(settings) => spline_motion::spline_motion(rows, settings)?,
         Estimator::Didim(settings) => simulated(settings, ComparedSignal::TorqueRows)?,
         Estimator::Clie(settings) => simulated(settings, ComparedSignal::Torque)?,
         Estimator::Cloe(settings) => simulated(settings, ComparedSignal::Position)?,

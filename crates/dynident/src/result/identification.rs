@@ -7,7 +7,9 @@ use crate::study::JointDrive;
 use dynident_estimation::consistent::ConsistencyTest;
 use dynident_estimation::{CorrelatedPair, EssentialReport};
 use dynident_identification::consistent::ParameterInterval;
-use dynident_identification::estimators::{GrossErrors, NoiseInRegressor, PeriodicFit, SeriesFit, SimulatedFit};
+use dynident_identification::estimators::{
+    GrossErrors, NoiseInRegressor, PeriodicFit, SeriesFit, SimulatedFit, SplineFit,
+};
 use dynident_identification::examination::{LogValidation, PriorAgreement, TorqueBand, TorqueLag, TorqueSignCheck};
 use dynident_identification::friction::FrictionCandidate;
 use dynident_identification::payload::{DriveGain, PayloadResult};
@@ -49,9 +51,13 @@ pub struct ResultFile {
     pub noise_levels: Option<Vec<[f64; 2]>>,
     /// Periods and their noise; none unless the estimator is `maximum-likelihood`.
     pub periodic: Option<PeriodicFit>,
-    /// Motion and noise of every training log; only with the estimator `simultaneous`.
+    /// Motion and noise of every training log; only with the estimator `simultaneous` and a period.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub series: Option<Vec<SeriesFit>>,
+    /// Motion, a smoothing spline, and noise of every training log; only with the estimator `simultaneous` without a
+    /// period.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spline_motion: Option<SplineFit>,
     /// The simulated loop; none unless the estimator is `didim`, `clie` or `cloe`.
     pub simulated: Option<SimulatedFit>,
     /// The base parameters, in the order of the tree.

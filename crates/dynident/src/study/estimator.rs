@@ -3,7 +3,7 @@
 use super::physical::PhysicalChoice;
 use super::simulated::SimulatedSection;
 use crate::error::{Error, Expected, StudyError};
-use dynident_estimation::{CovarianceMethod, EssentialSettings, RankSettings, SegmentSettings};
+use dynident_estimation::{CovarianceMethod, EssentialSettings, RankSettings, SegmentSettings, SplineMotionSettings};
 use dynident_identification::EstimationSettings;
 use dynident_identification::estimators::{
     Estimator, InstrumentSettings, NoiseLevels, PeriodSettings, SimulatedLoopSettings,
@@ -35,8 +35,8 @@ pub enum EstimatorMethod {
     Instrumental,
     /// Maximum likelihood for a motion that repeats: noise of motion and torque from how the periods differ.
     MaximumLikelihood,
-    /// Motion and parameters together, for a motion that is a Fourier series: noise of positions and torques weighed
-    /// against each other.
+    /// Motion and parameters together: noise of positions and torques weighed against each other. The motion is a
+    /// smoothing spline, or, with `periods`, a Fourier series.
     Simultaneous,
     /// Regression on the motion of the simulated closed loop: no measured position enters the regressor.
     Didim,
@@ -114,8 +114,11 @@ pub struct EstimatorSection {
     pub instruments: Option<InstrumentSettings>,
     /// How `method = "noise-weighted"` finds the noise around a row.
     pub noise_levels: NoiseLevels,
-    /// The repeated motion of `method = "maximum-likelihood"` and `"simultaneous"`.
+    /// The repeated motion of `method = "maximum-likelihood"`; of `"simultaneous"` where the motion is a Fourier
+    /// series.
     pub periods: PeriodSettings,
+    /// The motion of `method = "simultaneous"` where it is not said to repeat.
+    pub spline: SplineMotionSettings,
     /// How the loop is simulated for `method = "didim"`, `"clie"` and `"cloe"`.
     pub simulated: SimulatedSection,
 }
@@ -149,17 +152,24 @@ impl EstimatorSection {
             EstimatorMethod::NoiseWeighted => Estimator::NoiseWeighted(self.noise_levels.clone()),
             EstimatorMethod::Instrumental => Estimator::Instrumental(self.instruments.clone().unwrap_or_default()),
             EstimatorMethod::MaximumLikelihood => Estimator::MaximumLikelihood(self.periods.clone()),
-            EstimatorMethod::Simultaneous => Estimator::Simultaneous(self.periods.clone()),
+            EstimatorMethod::Simultaneous if self.has_series() => Estimator::Simultaneous(self.periods.clone()),
+            EstimatorMethod::Simultaneous => Estimator::SplineMotion(self.spline.clone()),
             EstimatorMethod::Didim => Estimator::Didim(simulated()?),
             EstimatorMethod::Clie => Estimator::Clie(simulated()?),
             EstimatorMethod::Cloe => Estimator::Cloe(simulated()?),
         })
     }
 
+    /// Whether `method = "simultaneous"` is told that the motion is a Fourier series.
+    fn has_series(&self) -> bool {
+        self.periods.period_s.is_some() || self.periods.harmonics.is_some()
+    }
+
     /// Whether the method cannot do without the motion that was commanded.
     pub(crate) fn needs_commanded_motion(&self) -> bool {
         match self.method {
-            EstimatorMethod::MaximumLikelihood | EstimatorMethod::Simultaneous => self.periods.period_s.is_none(),
+            EstimatorMethod::MaximumLikelihood => self.periods.period_s.is_none(),
+            EstimatorMethod::Simultaneous => self.has_series() && self.periods.period_s.is_none(),
             EstimatorMethod::Didim | EstimatorMethod::Clie | EstimatorMethod::Cloe => true,
             EstimatorMethod::Auto
             | EstimatorMethod::Ordinary
@@ -185,6 +195,7 @@ impl EstimatorSection {
         let noise_levels = self.noise_levels.settings(&estimation);
         noise_levels.validate().map_err(StudyError::at("[estimator.noise_levels]"))?;
         self.periods.validate().map_err(StudyError::at("[estimator.periods]"))?;
+        self.spline.validate().map_err(StudyError::at("[estimator.spline]"))?;
         self.simulated.validate().map_err(StudyError::at("[estimator.simulated]"))?;
         self.physical.validate().map_err(StudyError::at("[estimator.physical]"))?;
         if self.intervals && self.physical.settings().is_none() {

@@ -188,8 +188,8 @@ fn the_period_may_come_from_the_commanded_motion() {
     assert!((fit.period_s - PERIOD_S).abs() < 1e-12 && fit.periods == [3], "{fit:?}");
 
     let message = |text: &str| run(folder.path(), text).unwrap_err().to_string();
-    let unknown = message(&text);
-    assert!(unknown.contains("period_s") && unknown.contains("log `log`"), "{unknown}");
+    let unknown = message(&(text.clone() + "periods.harmonics = 5"));
+    assert!(unknown.contains("reference"), "{unknown}");
     let too_few = message(&(text.clone() + "periods = { period_s = 7.69, skip_s = 12.0 }"));
     assert!(too_few.contains("fewer than two periods"), "{too_few}");
     let another = message(&(text.clone() + "periods.period_s = 5.0"));
@@ -235,14 +235,37 @@ fn motion_and_parameters_together_find_the_truth_within_their_bars() {
     assert!(together < 1.8, "{together}");
 }
 
+/// Without a period the motion is a spline: nothing is known of it, and of a log with a gap both pieces count.
+#[test]
+fn motion_and_parameters_of_any_log_find_the_truth_within_their_bars() {
+    let (folder, truth) = (tempfile::tempdir().unwrap(), truth());
+    write_noisy(folder.path(), "log.csv", &truth, 3, 16.0);
+    let log = std::fs::read_to_string(folder.path().join("log.csv")).unwrap();
+    let lines = log.lines().enumerate().filter(|(row, _)| !(2000..2200).contains(row)).map(|(_, line)| line);
+    std::fs::write(folder.path().join("log.csv"), lines.collect::<Vec<_>>().join("\n") + "\n").unwrap();
+    let job = Job::new(folder.path(), &study("simultaneous", ""));
+    let found = job.identify();
+    let values = truth.base_values(&job.robot());
+    let spline = found.result.spline_motion.as_ref().unwrap();
+    assert!(found.result.series.is_none() && spline.cost <= spline.cost_at_start);
+    assert_eq!(spline.logs.len(), 1);
+    for joint in &spline.logs[0].joints {
+        // σ of 3800 samples is known to 1.2 %, and what the spline takes of them is estimated: four of these.
+        assert!((joint.position_std / 2e-3 - 1.0).abs() < 0.05, "{joint:?}");
+    }
+    // Nine squares of mean one: below 1.8 by four deviations.
+    let together = score(&found, &values, &found.estimate.std);
+    assert!(together < 1.8, "{together}");
+}
+
 #[test]
 fn logs_without_a_series_are_refused_with_the_fix() {
     let (folder, truth) = (tempfile::tempdir().unwrap(), truth());
     write_noisy(folder.path(), "log.csv", &truth, 3, 16.0);
     let text = study("simultaneous", "");
     let message = |text: &str| run(folder.path(), text).unwrap_err().to_string();
-    let unknown = message(&text);
-    assert!(unknown.contains("period_s") && unknown.contains("log `log`"), "{unknown}");
+    let unknown = message(&(text.clone() + "periods.harmonics = 5"));
+    assert!(unknown.contains("reference"), "{unknown}");
     let another = message(&(text.clone() + "periods = { period_s = 5.0, harmonics = 5 }"));
     assert!(another.contains("fix period_s") && another.contains("joint1"), "{another}");
     let short = message(&(text.clone() + "periods = { period_s = 7.69, skip_s = 12.0 }"));

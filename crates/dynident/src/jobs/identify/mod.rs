@@ -246,13 +246,14 @@ fn result_file(
     let parameters = &found.consistent.parameters;
     let covariance = estimate.covariance.view((0, 0), (base, base)).into_owned();
     let (mut gross_errors, mut noise_correlation, mut noise_levels) = (None, None, None);
-    let (mut periodic, mut series, mut simulated) = (None, None, None);
+    let (mut periodic, mut series, mut spline_motion, mut simulated) = (None, None, None, None);
     match found.estimation.findings.clone() {
         Findings::GrossErrors(found) => gross_errors = Some(found),
         Findings::NoiseCorrelation(found) => noise_correlation = Some(found),
         Findings::NoiseLevels(found) => noise_levels = Some(found),
         Findings::Periodic(found) => periodic = Some(found),
         Findings::Series(found) => series = Some(found),
+        Findings::Spline(found) => spline_motion = Some(found),
         Findings::Simulated(found) => simulated = Some(found),
         Findings::None => {}
     }
@@ -276,6 +277,7 @@ fn result_file(
         noise_levels,
         periodic,
         series,
+        spline_motion,
         simulated,
         base_parameters: base_parameters(model, estimate, found.consistent_base_values(), &conditionals),
         base_parameter_covariance: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),

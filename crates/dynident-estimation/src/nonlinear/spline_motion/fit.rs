@@ -1,0 +1,349 @@
+//! Motion and parameters of any log from one likelihood, the motion a smoothing spline.
+
+use super::bspline::Spline;
+use super::covariance::estimate_of;
+use super::noise::LogNoise;
+use super::problem::{
+    SplineJointFit, SplineLogFit, SplineMotionEstimate, SplineMotionProblem, SplineMotionSettings, SplineRecord,
+    TorqueModel,
+};
+use super::rows::{FreeParameters, Piece};
+use super::smoothing::smoothed;
+use super::system::{Paid, System, torque_information};
+use crate::error::EstimationError;
+use crate::nonlinear::autoregression::{from_covariances, shortened, whitened};
+use rayon::prelude::*;
+
+/// Longest time between knots that is tried, s, and how much closer the next one is.
+const LONGEST_SPACING_S: f64 = 0.5;
+const CLOSER: f64 = 1.5;
+/// Rows in an interval between knots, at least, where the rate allows: so many that friction which turns within an
+/// interval is followed.
+const ROWS_OF_INTERVAL: usize = 6;
+/// A torque's σ never falls below this share of the torque's own size: noise-free data leave rounding.
+const LEAST_TORQUE_SIGMA: f64 = 1e-7;
+/// Noise levels have settled when none moves by more than this share.
+const SETTLED: f64 = 0.05;
+/// However much the unknowns bend to the torque, at least this share of its noise stays in its residuals.
+const LEAST_SHARE: f64 = 0.1;
+/// What lasts longer than this in the torque's residuals is the model's error and not noise: a filter that took it away
+/// would take what slow motion says of the parameters as well.
+const LONGEST_NOISE_S: f64 = 0.1;
+/// After so many steps orders of autoregressions fall only, and after so many levels stay: what goes to and fro between
+/// two descriptions of the noise that are as good as each other comes to rest.
+const ORDERS_FALL: usize = 6;
+const LEVELS_STAY: usize = 12;
+/// How often levels are found again from one linearisation: at first, when they are far off, and later.
+const EARLY: (usize, usize) = (3, 3);
+
+/// Where motion and parameters are.
+struct State {
+    coefficients: Vec<Vec<f64>>,
+    parameters: Vec<f64>,
+}
+
+/// `argmax p(q, τ | motion, θ) p(motion)` over the motion of every joint and the parameters, for any log:
+///
+/// ```text
+///     Σ_j ‖q_j − B c_j‖²/σ_qj²  +  Σ_j ‖A_j (τ_j − f_j(Bc, Ḃc, B̈c, θ))‖²/σ_τj²  +  Σ_j λ_j ∫ (dʳq_j/dtʳ)² dt
+/// ```
+///
+/// B are quintic B-splines, the third sum says that the r-th derivative of a motion is white noise of intensity 1/λ
+/// (an integrated Wiener process, a Gaussian process prior); A_j whitens the torque's noise, an autoregression of its
+/// residuals. σ_q, σ_τ, λ maximise the restricted likelihood, in which motion and parameters are integrated out about
+/// their best values; r and the knots' spacing are chosen from the positions. There is no cut-off: a frequency at which
+/// positions say nothing is smoothed away by as much as they are noisy, and where torque tells more of a motion than
+/// the encoder does, it counts by its own precision.
+///
+/// Each step linearises the torque at all samples (Gauss and Newton; a step that raises the sum is halved). The
+/// motion's block of the normal equations is a band, the parameters are its arrow: the motion is eliminated by a banded
+/// Cholesky factor, parameters are solved for by the Schur complement, whose inverse is their covariance with the
+/// motion unknown. Torque rows are means of a few samples, at least six between knots. Levels follow `σ² = RSS/(N −
+/// paid)`, `λ = (rank P − paid)/(cᵀPc)` from the inverse's entries inside the band (Harville, JASA 72 (1977) 320; Wood
+/// and Fasiolo, Biometrics 73 (2017) 1071).
+///
+/// Ramsay, Hooker, Campbell and Cao, J. R. Statist. Soc. B 69 (2007) 741, for fits of equations of motion to smoothed
+/// records; Wahba, Spline Models for Observational Data (1990), for the prior.
+///
+/// # Errors
+/// [`EstimationError::Setting`], [`EstimationError::Mismatch`] for other shapes, [`EstimationError::Unusable`] for
+/// numbers that are none, [`EstimationError::TooFewRows`], [`EstimationError::Undetermined`] when the rows do not
+/// separate a parameter from those before it, and whatever the model returns. Reaching `max_iterations` is a status,
+/// not an error.
+#[doc(alias("smoothing spline", "Gaussian process", "state estimation", "errors in variables"))]
+pub fn spline_motion_least_squares<M: TorqueModel>(
+    problem: &SplineMotionProblem,
+    settings: &SplineMotionSettings,
+    model: &mut M,
+) -> Result<SplineMotionEstimate, M::Error> {
+    settings.validate()?;
+    problem.check()?;
+    let free = FreeParameters::new(&problem.held);
+    let (pieces, mut noise, coefficients) = begin(problem, settings)?;
+    let mut state = State { coefficients, parameters: problem.parameters.clone() };
+    let mut residuals = all_residuals(&pieces, model, &state)?;
+    for (log, own) in noise.iter_mut().enumerate() {
+        let of_log = || pieces.iter().zip(&residuals).filter(move |(piece, _)| piece.record.log == log);
+        for joint in 0..own.torque_std.len() {
+            let (sum, rows) = of_log().fold((0.0, 0), |(sum, rows), (_, r)| {
+                (sum + r[joint].iter().map(|x| x * x).sum::<f64>(), rows + r[joint].len())
+            });
+            let sigma = (sum / rows.max(1) as f64).sqrt().max(least_sigma(&pieces, log, joint));
+            (own.torque_std[joint], own.torque_variance[joint]) = (sigma, sigma * sigma);
+        }
+    }
+    let first = State { coefficients: state.coefficients.clone(), parameters: state.parameters.clone() };
+    let (mut iterations, mut converged) = (0, false);
+    let mut paid = None;
+    while !converged && iterations < settings.max_iterations {
+        iterations += 1;
+        let information: Vec<_> = pieces
+            .iter()
+            .zip(&state.coefficients)
+            .map(|(piece, own)| {
+                let log = &noise[piece.record.log];
+                torque_information(piece, model, (own, &state.parameters, &free), (log, settings.most_autoregression))
+            })
+            .collect::<Result<_, _>>()?;
+        // Levels of positions and smoothness about the linearised optimum, which moves with them.
+        let before_levels = noise.clone();
+        let solve = |noise: &[LogNoise]| {
+            let system = System::new(&pieces, &information, &state.coefficients, noise, &free, &problem.names)?;
+            let (of_parameters, length) = system.step();
+            let of_motion: Vec<_> = (0..pieces.len()).map(|k| system.motion_step(k, &of_parameters)).collect();
+            Ok::<_, EstimationError>((system, of_parameters, of_motion, length))
+        };
+        let again = match iterations {
+            early if early <= EARLY.0 => EARLY.1,
+            late if late > LEVELS_STAY => 0,
+            _ => 1,
+        };
+        for _ in 0..again {
+            let (system, _, of_motion, _) = solve(&noise)?;
+            let found = Paid::new(&system, &pieces, &information, &noise, &free);
+            let moved: Vec<Vec<f64>> =
+                state.coefficients.iter().zip(&of_motion).map(|(c, step)| sum(c, step, 1.0)).collect();
+            found.levels(&pieces, &moved, &mut noise);
+            paid = Some(found);
+        }
+        let (_, of_parameters, of_motion, length) = solve(&noise)?;
+        let before = cost(&pieces, &state, &residuals, &noise);
+        let mut share = 1.0;
+        let mut better = None;
+        while better.is_none() && share > 1e-3 {
+            let mut candidate = State {
+                coefficients: state.coefficients.iter().zip(&of_motion).map(|(c, step)| sum(c, step, share)).collect(),
+                parameters: state.parameters.clone(),
+            };
+            for (&place, step) in free.free.iter().zip(&of_parameters) {
+                candidate.parameters[place] += share * step;
+            }
+            let found = all_residuals(&pieces, model, &candidate)?;
+            let after = cost(&pieces, &candidate, &found, &noise);
+            // At the minimum costs differ by rounding.
+            if after <= before * (1.0 + 1e-9) {
+                better = Some((candidate, found));
+            }
+            share *= 0.5;
+        }
+        let worse = better.is_none();
+        if let Some((candidate, found)) = better {
+            (state, residuals) = (candidate, found);
+        }
+        if let Some(paid) = paid.as_ref().filter(|_| iterations <= LEVELS_STAY) {
+            torque_levels(&pieces, &residuals, paid, &mut noise, (settings.most_autoregression, iterations));
+        }
+        let change = noise.iter().zip(&before_levels).map(|(new, old)| new.change(old)).fold(0.0, f64::max);
+        converged = length <= settings.tolerance && change <= SETTLED && iterations > 2;
+        if worse && length > settings.tolerance && change <= SETTLED {
+            break;
+        }
+    }
+    let cost_now = cost(&pieces, &state, &residuals, &noise);
+    let at_start = all_residuals(&pieces, model, &first)?;
+    let cost_at_start = cost(&pieces, &first, &at_start, &noise);
+    let converged = converged && cost_now <= cost_at_start * (1.0 + 1e-9);
+    let logs = log_fits(&pieces, &noise, paid.as_ref());
+    let estimate = estimate_of(
+        problem,
+        settings,
+        model,
+        (&pieces, &noise, &free),
+        (&state.coefficients, &state.parameters),
+        (iterations, converged),
+    )?;
+    let motion = pieces.iter().zip(&state.coefficients).map(|(piece, own)| piece.motion(own, 0, piece.samples()));
+    Ok(SplineMotionEstimate { estimate, motion: motion.collect(), logs, cost_at_start, cost: cost_now })
+}
+
+/// Pieces with their knots, levels of every log, and coefficients of every piece.
+type Beginning<'a> = (Vec<Piece<'a>>, Vec<LogNoise>, Vec<Vec<f64>>);
+
+/// Knots, the motion that the positions alone give, and its levels.
+fn begin<'a>(
+    problem: &'a SplineMotionProblem,
+    settings: &SplineMotionSettings,
+) -> Result<Beginning<'a>, EstimationError> {
+    let joints = problem.joints.len();
+    let samples = |record: &SplineRecord| record.q.len() / joints;
+    let logs = problem.records.iter().map(|record| record.log + 1).max().unwrap_or(0);
+    let all: usize = problem.records.iter().map(samples).sum();
+    let of_log = |log: usize| {
+        let own: Vec<(usize, &SplineRecord)> =
+            problem.records.iter().enumerate().filter(|(_, record)| record.log == log).collect();
+        let Some(&(_, any)) = own.first() else { return Err(EstimationError::Empty) };
+        let rate_hz = any.rate_hz;
+        if let Some((_, other)) = own.iter().find(|(_, record)| record.rate_hz != rate_hz) {
+            let fix = "pieces of one log have one rate: give them numbers of their own";
+            return Err(EstimationError::Setting { setting: "rate_hz", value: other.rate_hz, fix });
+        }
+        // Each log's share of the unknowns is its share of the samples.
+        let least = (all * joints).div_ceil(settings.max_unknowns).max(2);
+        let mut ladder = Vec::new();
+        let mut step = LONGEST_SPACING_S * rate_hz;
+        while step.round() as usize > least {
+            ladder.push(step.round() as usize);
+            step /= CLOSER;
+        }
+        ladder.push(least);
+        if let Some(spacing_s) = settings.knot_spacing_s {
+            ladder = vec![((spacing_s * rate_hz).round() as usize).max(least)];
+        }
+        let position = |joint: usize| {
+            let of = |(_, record): &(usize, &'a SplineRecord)| -> &'a [f64] {
+                let count = samples(record);
+                &record.q[joint * count..(joint + 1) * count]
+            };
+            own.iter().map(of).collect::<Vec<_>>()
+        };
+        let positions: Vec<Vec<&[f64]>> = (0..joints).map(position).collect();
+        let (step, found) = smoothed(&positions, rate_hz, &ladder);
+        let mean_of = (step / ROWS_OF_INTERVAL).max(1);
+        let mut pieces = Vec::new();
+        for (place, (number, record)) in own.into_iter().enumerate() {
+            let spline = Spline::new(samples(record), step, rate_hz);
+            let mut coefficients = vec![0.0; spline.functions() * joints];
+            for (joint, found) in found.iter().enumerate() {
+                for (k, c) in found.coefficients.get(place).into_iter().flatten().enumerate() {
+                    coefficients[k * joints + joint] = *c;
+                }
+            }
+            pieces.push((Piece { number, record, spline, joints, mean_of }, coefficients));
+        }
+        let noise = LogNoise {
+            positions: found.iter().map(|found| found.smoothness).collect(),
+            torque_std: vec![1.0; joints],
+            torque_variance: vec![1.0; joints],
+            colours: vec![Vec::new(); joints],
+        };
+        Ok((noise, pieces))
+    };
+    let found: Vec<_> = (0..logs).into_par_iter().map(of_log).collect::<Result<_, _>>()?;
+    let (mut noise, mut pieces) = (Vec::new(), Vec::new());
+    for (own, of_log) in found {
+        noise.push(own);
+        pieces.extend(of_log);
+    }
+    pieces.sort_by_key(|(piece, _)| piece.number);
+    let (pieces, coefficients) = pieces.into_iter().unzip();
+    Ok((pieces, noise, coefficients))
+}
+
+fn sum(values: &[f64], step: &[f64], share: f64) -> Vec<f64> {
+    values.iter().zip(step).map(|(x, step)| x + share * step).collect()
+}
+
+fn all_residuals<M: TorqueModel>(
+    pieces: &[Piece<'_>],
+    model: &mut M,
+    state: &State,
+) -> Result<Vec<Vec<Vec<f64>>>, M::Error> {
+    let each = pieces.iter().zip(&state.coefficients);
+    each.map(|(piece, own)| piece.residuals(model, own, &state.parameters)).collect()
+}
+
+/// The sum of squares that is made small, at these levels.
+fn cost(pieces: &[Piece<'_>], state: &State, residuals: &[Vec<Vec<f64>>], noise: &[LogNoise]) -> f64 {
+    let mut sum = 0.0;
+    for ((piece, coefficients), torques) in pieces.iter().zip(&state.coefficients).zip(residuals) {
+        let own = &noise[piece.record.log];
+        for joint in 0..piece.joints {
+            let at = (joint, piece.joints);
+            let smoothness = own.positions[joint];
+            let left = piece.spline.residual(coefficients, at, piece.q(joint));
+            sum += left.iter().map(|x| x * x).sum::<f64>() / smoothness.position_std.powi(2);
+            let gram = piece.spline.roughness(smoothness.order);
+            sum += smoothness.penalty * piece.spline.penalty(&gram, coefficients, at).0;
+            sum += whitened(&torques[joint], &own.colours[joint]).norm_squared() / own.torque_std[joint].powi(2);
+        }
+    }
+    sum
+}
+
+fn least_sigma(pieces: &[Piece<'_>], log: usize, joint: usize) -> f64 {
+    let of_log = pieces.iter().filter(|piece| piece.record.log == log);
+    let own = of_log.flat_map(|piece| &piece.record.tau[joint * piece.samples()..(joint + 1) * piece.samples()]);
+    let (sum, count) = own.fold((0.0, 0), |(sum, count), tau| (sum + tau * tau, count + 1));
+    let size = (sum / f64::from(count.max(1))).sqrt();
+    if size > 0.0 { LEAST_TORQUE_SIGMA * size } else { LEAST_TORQUE_SIGMA }
+}
+
+/// Colour and σ of the torques' noise by the residuals.
+fn torque_levels(
+    pieces: &[Piece<'_>],
+    residuals: &[Vec<Vec<f64>>],
+    paid: &Paid,
+    noise: &mut [LogNoise],
+    (most, iterations): (usize, usize),
+) {
+    for (log, own) in noise.iter_mut().enumerate() {
+        for joint in 0..own.colours.len() {
+            let of_log = pieces.iter().zip(residuals).filter(|(piece, _)| piece.record.log == log);
+            let of_joint: Vec<&[f64]> = of_log.map(|(_, r)| r[joint].as_slice()).collect();
+            // Of the longest piece: what stands between two pieces is not known.
+            // What motion and parameters can take of the noise is gone from the residual; its mean is added again
+            // (the expectation step of Dempster, Laird and Rubin, J. R. Statist. Soc. B 39 (1977) 1).
+            let rows: usize = of_joint.iter().map(|r| r.len()).sum();
+            let taken = &paid.torque[log][joint];
+            let product =
+                |r: &&[f64], lag: usize| r.iter().zip(&r[lag.min(r.len())..]).map(|(a, b)| a * b).sum::<f64>();
+            let left = |lag: usize| of_joint.iter().map(|r| product(r, lag)).sum::<f64>() / rows.max(1) as f64;
+            // What is taken grows with the noise: as large as where both agree, which is where small steps lead to.
+            let before = own.torque_variance[joint];
+            let growth = (left(0) / (before - taken[0]).max(LEAST_SHARE * before)).clamp(0.5, 2.0);
+            let covariances: Vec<f64> =
+                taken.iter().enumerate().map(|(lag, taken)| left(lag) + growth * taken).collect();
+            let most = if iterations > ORDERS_FALL { own.colours[joint].len() } else { most };
+            let (colour, variance) = from_covariances(&covariances[..=most.min(rows / 4)], rows);
+            let row_s = pieces.iter().find(|piece| piece.record.log == log);
+            let row_s = row_s.map_or(1.0, |piece| piece.mean_of as f64 / piece.record.rate_hz);
+            let (colour, variance) = shortened(colour, variance, &covariances, (-row_s / LONGEST_NOISE_S).exp());
+            own.colours[joint] = colour;
+            own.torque_variance[joint] = covariances[0].max(least_sigma(pieces, log, joint).powi(2));
+            own.torque_std[joint] = variance.sqrt().max(least_sigma(pieces, log, joint));
+        }
+    }
+}
+
+fn log_fits(pieces: &[Piece<'_>], noise: &[LogNoise], paid: Option<&Paid>) -> Vec<SplineLogFit> {
+    let of_log = |(log, own): (usize, &LogNoise)| {
+        let of_log: Vec<&Piece<'_>> = pieces.iter().filter(|piece| piece.record.log == log).collect();
+        let functions: usize = of_log.iter().map(|piece| piece.spline.functions()).sum();
+        let joint = |joint: usize| SplineJointFit {
+            position_std: own.positions[joint].position_std,
+            torque_std: own.torque_std[joint],
+            torque_autoregression: own.colours[joint].clone(),
+            order: own.positions[joint].order,
+            used_functions: paid.map_or(0.0, |paid| functions as f64 - paid.smoothness[log][joint]),
+        };
+        let any = of_log.first();
+        SplineLogFit {
+            knot_spacing_s: any.map_or(0.0, |piece| piece.spline.step as f64 / piece.record.rate_hz),
+            functions,
+            rows: of_log.iter().map(|piece| piece.rows()).sum(),
+            samples_of_row: any.map_or(1, |piece| piece.mean_of),
+            joints: (0..own.positions.len()).map(joint).collect(),
+        }
+    };
+    noise.iter().enumerate().map(of_log).collect()
+}
