@@ -67,10 +67,9 @@ pub struct CutoffFigures {
     pub of_spectrum: f64,
     /// Error of the default.
     pub of_default: f64,
-    /// Error of motion and parameters at once, with no cut-off.
-    pub of_simultaneous: f64,
-    /// Runs in which that did not settle.
-    pub unsettled: usize,
+    /// Error of motion and parameters at once, with no cut-off, and the runs in which that did not settle; none where
+    /// it was not asked for.
+    pub simultaneous: Option<(f64, usize)>,
     /// Error of the best cut-off, the same in all runs.
     pub best: f64,
     /// The best cut-off in units of what the spectra ask for.
@@ -84,11 +83,12 @@ impl CutoffFigures {
     }
 }
 
-/// Fits `runs` recordings of a cell with the default cut-off and with each of a ladder.
+/// Fits `runs` recordings of a cell with the default cut-off and with each of a ladder; and motion and parameters at
+/// once if `simultaneous`.
 ///
 /// # Errors
 /// A robot, motion or recording that cannot be made, a default fit that fails.
-pub fn cutoff_figures(cell: &CutoffCell, runs: u64) -> Result<CutoffFigures, BenchmarkError> {
+pub fn cutoff_figures(cell: &CutoffCell, runs: u64, simultaneous: bool) -> Result<CutoffFigures, BenchmarkError> {
     let failed = |reason: String| BenchmarkError::Excitation { robot: cell.robot.name.to_owned(), reason };
     let (model, made) = (cell.robot.model().map_err(failed)?, &cell.log);
     let drive = DriveChoice {
@@ -124,9 +124,11 @@ pub fn cutoff_figures(cell: &CutoffCell, runs: u64) -> Result<CutoffFigures, Ben
             Ok((model_error(&other, &other_exact, &predicted), settled))
         };
         let error = |cutoff_hz| fitted(cutoff_hz, Estimator::Weighted).map(|(error, _)| error);
-        let (error_of_all, settled) = fitted(None, Estimator::SplineMotion(SplineMotionSettings::default()))?;
-        of_simultaneous += error_of_all.powi(2) / runs as f64;
-        unsettled += usize::from(!settled);
+        if simultaneous {
+            let (error, settled) = fitted(None, Estimator::SplineMotion(SplineMotionSettings::default()))?;
+            of_simultaneous += error.powi(2) / runs as f64;
+            unsettled += usize::from(!settled);
+        }
         of_default += error(None)?.powi(2) / runs as f64;
         for (square, multiple) in squares.iter_mut().zip(MULTIPLES) {
             // A filter that leaves no rows, or that does not exist at this rate, is no candidate.
@@ -139,8 +141,7 @@ pub fn cutoff_figures(cell: &CutoffCell, runs: u64) -> Result<CutoffFigures, Ben
         spectrum_hz,
         of_spectrum: squares[OF_SPECTRUM].sqrt(),
         of_default: of_default.sqrt(),
-        of_simultaneous: of_simultaneous.sqrt(),
-        unsettled,
+        simultaneous: simultaneous.then(|| (of_simultaneous.sqrt(), unsettled)),
         best: squares[least].sqrt(),
         best_multiple: MULTIPLES[least],
     })

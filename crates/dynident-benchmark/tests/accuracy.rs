@@ -72,7 +72,7 @@ fn unknown_names_and_no_runs_are_reported() {
 #[test]
 fn a_slow_motion_gets_the_cutoff_that_its_parameters_need() -> Result<(), Box<dyn std::error::Error>> {
     let slow = CUTOFF_CELLS.iter().find(|cell| cell.robot.name == "Panda" && cell.log.position_noise_rad == 1e-4);
-    let figures = cutoff_figures(slow.ok_or("no such cell")?, 2)?;
+    let figures = cutoff_figures(slow.ok_or("no such cell")?, 2, false)?;
     assert!(figures.default_over_best() < 1.3, "{figures:?}");
     assert!(figures.of_default < 0.85 * figures.of_spectrum, "{figures:?}");
     Ok(())
