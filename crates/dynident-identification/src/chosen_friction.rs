@@ -1,15 +1,17 @@
 //! The friction of the joints as their recordings choose it: which terms, then their constants.
 
 use crate::error::IdentificationError;
-use crate::estimators::Estimator;
+use crate::estimators::{EstimationSettings, Estimator};
 use crate::friction::{
     JointFriction, Neighbourhood, candidate_columns, choose_friction as choose_terms, chosen_model, refined,
 };
 use crate::logs::Logs;
+use crate::payload::Payload;
 use crate::regressor_model::RegressorModel;
 use crate::settings::IdentificationSettings;
-use crate::training::{TrainingPasses, plain_estimate};
+use crate::training::{Training, TrainingPasses, plain_estimate};
 use dynident_dynamics::{Column, ParametricModel};
+use dynident_estimation::{CovarianceMethod, Estimate};
 use dynident_model::terms::TorqueTerm;
 
 /// Factors by which constants are moved around what was found before, one for each pass: half a step of the grid, then
@@ -23,6 +25,8 @@ pub struct ChosenFriction {
     pub model: RegressorModel,
     /// How each joint's was chosen; empty where none was to be.
     pub joints: Vec<JointFriction>,
+    /// The rows and the fit with the terms as stated, of which the choice began; none where none was to be.
+    pub stated: Option<(Training, Estimate)>,
 }
 
 /// Chooses the friction of the joints that `settings.friction` names, by cross-validation inside the recordings
@@ -34,7 +38,7 @@ pub struct ChosenFriction {
 pub fn choose_friction(
     (logs, settings): (&Logs<'_>, &IdentificationSettings),
     robot: &ParametricModel,
-    training: &[usize],
+    (training, payloads): (&[usize], &[Payload]),
 ) -> Result<ChosenFriction, IdentificationError> {
     let stated = RegressorModel::from(robot.clone());
     let candidates: Vec<_> = settings
@@ -44,14 +48,16 @@ pub fn choose_friction(
         .map(|(joint, search)| (joint, candidate_columns(search, joint)))
         .collect();
     if candidates.is_empty() {
-        return Ok(ChosenFriction { model: stated, joints: Vec::new() });
+        return Ok(ChosenFriction { model: stated, joints: Vec::new(), stated: None });
     }
-    let passes = TrainingPasses { logs, settings, training, payloads: &[], known_arm: None };
+    let passes = TrainingPasses { logs, settings, training, payloads, known_arm: None };
     let equal_weights = matches!(settings.estimation.estimator, Estimator::Ordinary);
+    // No error bars are wanted on the way.
+    let estimation = EstimationSettings { covariance: CovarianceMethod::White, ..settings.estimation.clone() };
 
     // The stated terms first: the load, the noise of every joint, what is excited.
     let first = passes.rows_once(stated)?;
-    let plain = plain_estimate(&settings.estimation, &first.problem)?;
+    let plain = plain_estimate(&estimation, &first.problem)?;
 
     // All candidates as columns of one set of factors, from which each candidate model is a selection.
     let further = candidates.iter().flat_map(|(_, columns)| columns).map(|column| column.term.clone());
@@ -76,7 +82,7 @@ pub fn choose_friction(
         let wide_problem = passes.stated_problem(&wide, &passes.columns(&wide)?, &factors)?;
         let own = factors.into_iter().map(|log| log.of(&wide, &model)).collect::<Result<Vec<_>, _>>()?;
         let problem = passes.stated_problem(&model, &passes.columns(&model)?, &own)?;
-        let fit = plain_estimate(&settings.estimation, &problem)?;
+        let fit = plain_estimate(&estimation, &problem)?;
         let better = refined((&model, &fit, equal_weights), (&wide, &wide_problem), &around)?;
         for ((joint, _), terms) in around.iter().zip(better) {
             let name = &model.model().joints()[*joint].name;
@@ -84,7 +90,7 @@ pub fn choose_friction(
         }
         model = RegressorModel::from(chosen_model(robot, &joints)?).with_load_of(&model, &fit.values);
     }
-    Ok(ChosenFriction { model, joints })
+    Ok(ChosenFriction { model, joints, stated: Some((first, plain)) })
 }
 
 /// The model with those of these terms as columns that it does not have.

@@ -214,11 +214,11 @@ fn identified(
     let cutoff = choose_cutoff((&logs, settings), &first, &chosen)?;
     let started = Instant::now();
     let (logs, cutoff, friction) = if settings.friction.is_empty() {
-        let friction = ChosenFriction { model: first, joints: Vec::new() };
+        let friction = ChosenFriction { model: first, joints: Vec::new(), stated: None };
         (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
     } else {
         let logs = with_choice(logs, settings, cutoff.as_ref().map(CutoffByError::highest_alike_hz));
-        let friction = choose_friction((&logs, settings), robot, &chosen)?;
+        let friction = choose_friction((&logs, settings), robot, (&chosen, payloads))?;
         let cutoff = choose_cutoff((&logs, settings), &friction.model, &chosen)?.or(cutoff);
         (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
     };
@@ -265,7 +265,12 @@ fn identified(
         Ok((consistent, estimation_s, held_out))
     };
     // Beside that, what training recordings say of the estimate.
-    let signs = || if held { Ok((None, Vec::new())) } else { torque_signs(&training, &estimation.estimate) };
+    // Friction that was chosen has no wrong sign: where it would, there is none. The stated terms tell.
+    let signs = || match &friction.stated {
+        _ if held => Ok((None, Vec::new())),
+        Some((stated, plain)) => torque_signs(stated, plain),
+        None => torque_signs(&training, &estimation.estimate),
+    };
     let examined = || examine_all_training((&logs, settings), &training, &estimation.estimate);
     let (bodies, (signs, examined)) = if execution.parallel() {
         rayon::join(bodies, || rayon::join(signs, examined))

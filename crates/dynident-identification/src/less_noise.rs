@@ -2,6 +2,7 @@
 
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, Estimator, InstrumentSettings, estimate};
+use crate::friction::JointFriction;
 use crate::logs::Logs;
 use crate::settings::IdentificationSettings;
 use crate::task::IdentificationTask;
@@ -19,11 +20,14 @@ pub(crate) struct Estimated<'a> {
 /// The regressor's cut-off over that of the instruments, where both are free: positions are smoothed little inside of
 /// the instruments' band.
 const CUTOFF_OVER_INSTRUMENTS: f64 = 2.0;
+/// Why friction is not chosen then.
+const NOISY: &str = "noise of the positions biases the least squares by which it would be chosen";
 /// A cut-off that would be lowered by less is kept.
 const WORTH_LOWERING: f64 = 0.8;
 
 /// The settings with the estimator that `auto` took. Where it took instruments and the cut-off was left to the data,
-/// rows and estimate are made again with a cut-off that lets less noise into the regressor: what least squares,
+/// rows and estimate are made again with a cut-off that lets less noise into the regressor, and with friction as stated
+/// in any case: what least squares,
 /// held-out errors and delays are made from then shows the robot and not the noise.
 pub(crate) fn with_less_noise<'a>(
     task: &'a IdentificationTask,
@@ -42,24 +46,33 @@ pub(crate) fn with_less_noise<'a>(
     let IdentificationTask { robot, recordings, payloads, settings } = task;
     let lower_hz = CUTOFF_OVER_INSTRUMENTS * cutoff_hz;
     let before_hz = found.logs.motion.differentiator.cutoff_hz();
-    let is_lower = before_hz.is_some_and(|before_hz| lower_hz < WORTH_LOWERING * before_hz);
-    if !(settings.motion.differentiator.wants_cutoff() && is_lower) {
+    let is_lower = settings.motion.differentiator.wants_cutoff()
+        && before_hz.is_some_and(|before_hz| lower_hz < WORTH_LOWERING * before_hz);
+    if !is_lower && found.training.friction_choice.is_empty() {
         return Ok(found);
     }
-    let execution = found.logs.execution;
-    // What is above the lower cut-off is noise and no motion: held-out figures are for what is below.
-    let logs = Logs::new(robot.model(), recordings, settings.filters(), chosen, Some(lower_hz), execution)?;
-    let mut training = training_rows((&logs, &found.settings), found.training.model.clone(), chosen, payloads, None)?;
-    training.friction_choice.clone_from(&found.training.friction_choice);
+    let (logs, before) = if is_lower {
+        // What is above the lower cut-off is noise and no motion: held-out figures are for what is below.
+        let execution = found.logs.execution;
+        let lower = Logs::new(robot.model(), recordings, settings.filters(), chosen, Some(lower_hz), execution)?;
+        (lower, Some(found.logs))
+    } else {
+        (found.logs, None)
+    };
+    // Friction was chosen by least squares, which the noise biases.
+    let as_stated = |joint: &JointFriction| JointFriction::as_stated(&joint.joint, NOISY);
+    let friction_choice = found.training.friction_choice.iter().map(as_stated).collect();
+    let training = training_rows((&logs, &found.settings), robot.clone().into(), chosen, payloads, None)?;
+    let training = Training { friction_choice, ..training };
     let mut estimation = estimate(&training.rows((&logs, &found.settings), chosen), None)?;
     if let Some(again) = &mut estimation.noise_in_regressor {
         if again.instruments.weak || estimation.estimate.status == EstimateStatus::IterationLimit {
-            return Ok(found);
+            return Ok(Estimated { logs: before.unwrap_or(logs), ..found });
         }
         // The verdict is about the rows that noise was found in.
         (again.verdict, again.fast_motion, again.hausman) = (noise.verdict, noise.fast_motion, noise.hausman);
         (again.least_squares, again.instruments_taken) = (noise.least_squares, true);
-        again.cutoff_before_hz = before_hz;
+        again.cutoff_before_hz = before_hz.filter(|_| is_lower);
     }
     Ok(Estimated { logs, training, estimation, settings: found.settings })
 }

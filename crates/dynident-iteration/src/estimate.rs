@@ -90,7 +90,7 @@ pub fn identify_run(
     let identification = identification_settings(task, settings);
     let (robot, execution) = (&task.robot, Execution::default());
     let logs = Logs::new(robot.model(), &recordings, identification.filters(), &all, None, execution)?;
-    let chosen = choose_friction((&logs, &identification), robot, &all)?;
+    let chosen = choose_friction((&logs, &identification), robot, (&all, &settings.payloads))?;
     let mut training = training_rows((&logs, &identification), chosen.model, &all, &settings.payloads, None)?;
     training.friction_choice = chosen.joints;
     if training.problem.joint_rows().iter().sum::<usize>() == 0 {

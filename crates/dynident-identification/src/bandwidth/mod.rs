@@ -17,7 +17,7 @@ use crate::regressor_model::RegressorModel;
 use crate::rows::{ParallelFilterSettings, motion_band_hz};
 use crate::settings::{GainChoice, IdentificationSettings};
 use crate::training::plain_fit;
-use dynident_estimation::SegmentSettings;
+use dynident_estimation::{CovarianceMethod, SegmentSettings};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use stand_in::StandIn;
@@ -134,6 +134,7 @@ pub fn choose_cutoff(
 fn plain_settings(settings: &IdentificationSettings) -> IdentificationSettings {
     let mut plain = IdentificationSettings { friction: Vec::new(), ..settings.clone() };
     // No error bars are wanted.
+    plain.estimation.covariance = CovarianceMethod::White;
     plain.estimation.segments = SegmentSettings { max_segments: 2, first_length_rows: 1024 };
     plain
 }

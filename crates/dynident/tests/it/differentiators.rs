@@ -40,6 +40,8 @@ fn study(differentiator: &str, further: &str) -> String {
         [motion]
         differentiator = {{ {differentiator} }}
         {further}
+        [drive]
+        friction = "stated"
         [format]
         time = {{ column = "t" }}
         position = {{ columns = "q{{1..6}}" }}
@@ -140,6 +142,8 @@ fn a_log_has_its_own_reference_and_joints_their_own_order() {
         robot = {{ file = {:?}, joints = {names:?} }}
         [motion]
         differentiator = {{ method = "time-warp", reference = {{ file = "ref1.csv", start_s = -0.31 }} }}
+        [drive]
+        friction = "stated"
         [format]
         time = {{ column = "t" }}
         position = {{ columns = {:?} }}
@@ -218,6 +222,8 @@ fn the_papers_map_identifies_the_planar_arm_through_a_lag() {
         robot.file = {:?}
         [motion]
         differentiator = {{ method = "logistic-map", reference = {{ joints = [{}] }} }}
+        [drive]
+        friction = "stated"
         [format]
         time = {{ column = "t" }}
         position = {{ columns = "q{{1..2}}" }}

@@ -45,7 +45,7 @@ fn log(path: &Path, truth: &Truth, moving: &[usize], position_noise: f64, seed: 
 fn job(folder: &Path) -> Job {
     let robot = repository("robots/ur10.urdf").display().to_string();
     let text = format!(
-        "robot.file = {robot:?}\nlog = [{{ file = \"log.csv\" }}]\n[format]\ntime = {{ column = \"t\" }}\n\
+        "robot.file = {robot:?}\ndrive.friction = \"stated\"\nlog = [{{ file = \"log.csv\" }}]\n[format]\ntime = {{ column = \"t\" }}\n\
          position = {{ columns = \"q{{1..{DOF}}}\" }}\ntorque = {{ columns = \"tau{{1..{DOF}}}\" }}\n"
     );
     Job::new(folder, &text)

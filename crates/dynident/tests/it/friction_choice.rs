@@ -75,12 +75,12 @@ fn the_friction_that_was_put_in_is_chosen_and_the_model_can_be_tested_again() {
     assert_eq!(shoulder.chosen, "viscous + coulomb", "{shoulder:?}");
     assert!(elbow.chosen.contains("stribeck"), "{elbow:?}");
     let terms = elbow.drive.as_ref().unwrap().terms.clone().unwrap();
-    // 0.08 lies between 0.05 and 0.1 of the grid.
+    // 0.08 lies between 0.05 and 0.1 of the grid: a tenth is far less than the grid's step, and more than the noise.
     let near =
-        |term: &FrictionTerm| matches!(term, FrictionTerm::Stribeck { speed, .. } if (0.05..=0.1).contains(speed));
+        |term: &FrictionTerm| matches!(term, FrictionTerm::Stribeck { speed, .. } if (speed / 0.08 - 1.0).abs() < 0.1);
     assert!(terms.iter().any(near), "{terms:?}");
-    // The noise, and what a grid of velocities and widths leaves of friction forty times as large.
-    assert!(found.result.validation[0].model.rmse_nm < 2.0 * NOISE, "{:?}", found.result.validation[0].model);
+    // The noise, and a tenth of it for constants that are not quite those of the truth.
+    assert!(found.result.validation[0].model.rmse_nm < 1.1 * NOISE, "{:?}", found.result.validation[0].model);
     let plain = job_with_stated(folder.path()).identify();
     assert!(plain.result.validation[0].model.rmse_nm > 3.0 * NOISE);
 
@@ -93,8 +93,29 @@ fn the_friction_that_was_put_in_is_chosen_and_the_model_can_be_tested_again() {
     assert_eq!(threads.estimate.values, found.estimate.values);
 }
 
+/// What no key states the logs choose; a key that says how the step looks is a statement; and where the study stands
+/// against a choice the reason is in the result.
+#[test]
+fn friction_is_chosen_by_default_where_no_key_states_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let arm = arm(folder.path());
+    write_log(&folder.path().join("a.csv"), &arm, 6000, 1.0, 1.5, 1);
+    write_log(&folder.path().join("b.csv"), &arm, 500, 1.0, 1.5, 2);
+    let choice = |drive: &str| job(folder.path(), drive).identify().result.friction_choice;
+    let by_default = choice("");
+    let text = |choice: &_| serde_json::to_string(choice).unwrap();
+    assert_eq!(text(&by_default), text(&choice("friction = \"auto\"")));
+    assert!(by_default.iter().all(|joint| joint.drive.is_some()), "{by_default:?}");
+    assert!(choice("friction = \"stated\"").is_empty() && choice("coulomb_width = 0.03").is_empty());
+    let elbow_stated = choice("joints.elbow.viscous = true");
+    assert!(elbow_stated.len() == 1 && elbow_stated[0].joint == "shoulder", "{elbow_stated:?}");
+    let refused = choice("offsets = \"per-log\"");
+    assert_eq!(refused.len(), 2);
+    assert!(refused.iter().all(|joint| joint.chosen.contains("offsets") && joint.drive.is_none()), "{refused:?}");
+}
+
 fn job_with_stated(folder: &Path) -> Job {
-    job(folder, "coulomb_width = 0.02")
+    job(folder, "friction = \"stated\"")
 }
 
 #[test]

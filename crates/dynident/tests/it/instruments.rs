@@ -44,7 +44,7 @@ fn a_simulated_motion_undoes_the_bias_of_noisy_positions() {
         q.into_iter().chain(tau.iter().map(|t| t + 0.1 * random.normal())).collect()
     });
     let text = format!(
-        "robot.file = {:?}\nlog = [{{ file = \"log.csv\" }}]\nparallel_filter.factor = 4\n{}",
+        "robot.file = {:?}\nlog = [{{ file = \"log.csv\" }}]\nparallel_filter.factor = 4\ndrive.friction = \"stated\"\n{}",
         repository("robots/ur10.urdf").display().to_string(),
         format(6).replace("method = \"central-differences\", order = 8", "method = \"butterworth\", cutoff_hz = 30.0")
     );

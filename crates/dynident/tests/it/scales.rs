@@ -100,7 +100,7 @@ fn example(scale: Scale) -> (tempfile::TempDir, Job) {
             "file = \"../robots/ur10.urdf\"",
             &format!("file = \"arm.urdf\"\ngravity_m_s2 = [0.0, 0.0, {:e}]", -9.81 * scale.length / scale.time.powi(2)),
         )
-        .replace("[drive]", &format!("[drive]\ncoulomb_width = {:e}", 0.02 / scale.time))
+        .replace("[drive]", &format!("[drive]\nfriction = \"stated\"\ncoulomb_width = {:e}", 0.02 / scale.time))
         .replace("ur10_simulated/", "");
     let job = Job::new(folder.path(), &study);
     (folder, job)
