@@ -147,17 +147,21 @@ fn a_reversed_torque_is_found_without_held_out_logs() {
     let study = study.replace(columns, &format!("{columns}, sign = [-1, 1, 1, 1, 1, 1]"));
     let study = study.replace("../robots", &repository("robots").display().to_string());
     let study = study.replace("role = \"validate\"", "role = \"identify\"");
-    std::fs::write(out.path().join("study.toml"), study).unwrap();
     let data = examples.display().to_string();
-    let ran = run_in(out.path(), &["identify", "study.toml", "--out", "found", "--data", &data]);
-    assert_eq!(ran.status, 1, "{}", ran.stderr);
-    assert!(ran.stdout.contains("PROBLEM"), "{}", ran.stdout);
-    let result: serde_json::Value =
-        serde_json::from_slice(&std::fs::read(out.path().join("found/result.json")).unwrap()).unwrap();
-    let problems: Vec<&str> = result["problems"].as_array().unwrap().iter().filter_map(|p| p.as_str()).collect();
-    let fitted = |problem: &&&str| problem.contains("fitted to") && problem.contains("shoulder_pan_joint");
-    assert!(problems.iter().any(|problem| fitted(&problem)), "{problems:?}");
-    assert_eq!(result["physical"]["fit"]["difference"]["is_significant"], true);
+    // Friction that is chosen cannot be negative: the free fit has none then, and is no better than the consistent set.
+    for (friction, words) in [("stated", "fitted to"), ("auto", "opposite sign")] {
+        let study = study.replace("[drive]", &format!("[drive]\nfriction = \"{friction}\""));
+        std::fs::write(out.path().join("study.toml"), study).unwrap();
+        let ran = run_in(out.path(), &["identify", "study.toml", "--out", "found", "--data", &data]);
+        assert_eq!(ran.status, 1, "{}", ran.stderr);
+        assert!(ran.stdout.contains("PROBLEM"), "{}", ran.stdout);
+        let result: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(out.path().join("found/result.json")).unwrap()).unwrap();
+        let problems: Vec<&str> = result["problems"].as_array().unwrap().iter().filter_map(|p| p.as_str()).collect();
+        let fitted = |problem: &&&str| problem.contains(words) && problem.contains("shoulder_pan_joint");
+        assert!(problems.iter().any(|problem| fitted(&problem)), "{problems:?}");
+        assert_eq!(result["physical"]["fit"]["difference"]["is_significant"], true);
+    }
     // On the page the problems stand before any figure, and no tick beside them.
     let page = std::fs::read_to_string(out.path().join("found/report.html")).unwrap();
     let at = |what: &str| page.find(what).unwrap_or_else(|| panic!("{what} is not on the page"));
