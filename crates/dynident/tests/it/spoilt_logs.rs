@@ -47,6 +47,7 @@ fn fitted(folder: &Path, rows: &[Vec<f64>]) -> IdentificationOutcome {
         r#"
         robot.file = {:?}
         drive.drive_inertia = true
+        drive.friction = "stated"
         [format]
         time = {{ column = "t" }}
         position = {{ columns = "q{{1..6}}" }}

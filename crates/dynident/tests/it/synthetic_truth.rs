@@ -27,7 +27,7 @@ fn the_plain_case_and_the_parallel_filter() {
     one_log(folder.path(), &truth);
     for filter in ["enabled = false", "factor = 1\ncutoff_hz = 30.0", "factor = 8", "factor = 5\nstop_band_db = 80.0"] {
         let text = format!(
-            "robot.file = {:?}\nlog = [{{ file = \"log.csv\" }}]\n{}\n[parallel_filter]\n{filter}",
+            "robot.file = {:?}\ndrive.friction = \"stated\"\nlog = [{{ file = \"log.csv\" }}]\n{}\n[parallel_filter]\n{filter}",
             ur10(),
             format(6)
         );
@@ -47,7 +47,7 @@ fn every_estimator_drive_inertia_and_the_butterworth_filter() {
     for method in ["ordinary", "weighted", "generalized", "huber", "tukey", "noise-weighted", "instrumental"] {
         // At a fortieth of the cut-off a two-way filter of order 4 passes all but 1e-13.
         let text = format!(
-            "robot.file = {:?}\nlog = [{{ file = \"log.csv\" }}]\ndrive.drive_inertia = true\nestimator.method = \"{method}\"\n\
+            "robot.file = {:?}\ndrive.friction = \"stated\"\nlog = [{{ file = \"log.csv\" }}]\ndrive.drive_inertia = true\nestimator.method = \"{method}\"\n\
              parallel_filter.factor = 4\n{}",
             ur10(),
             format(6)
@@ -68,7 +68,7 @@ fn several_logs_and_a_held_out_one() {
         write_log(&path, &truth, &Motion::new(6, seed), (400.0, 6.0), &header(6), plain);
     }
     let text = format!(
-        "robot.file = {:?}\nlog = [{{ file = \"log1.csv\" }}, {{ file = \"log2.csv\", rows = [100, 2300] }}, \
+        "robot.file = {:?}\ndrive.friction = \"stated\"\nlog = [{{ file = \"log1.csv\" }}, {{ file = \"log2.csv\", rows = [100, 2300] }}, \
          {{ file = \"log3.csv\", role = \"validate\" }}]\nparallel_filter.factor = 4\n{}",
         ur10(),
         format(6)
@@ -93,7 +93,7 @@ fn joints_in_another_order() {
     write_log(&folder.path().join("log.csv"), &truth, &Motion::new(6, 1), CLOCK, &header(6), permuted);
     let names: Vec<&str> = order.iter().map(|&j| &truth.model.joints()[j].name[..]).collect();
     let text = format!(
-        "robot = {{ file = {:?}, joints = {names:?} }}\nlog = [{{ file = \"log.csv\" }}]\nparallel_filter.factor = 4\n{}",
+        "robot = {{ file = {:?}, joints = {names:?} }}\ndrive.friction = \"stated\"\nlog = [{{ file = \"log.csv\" }}]\nparallel_filter.factor = 4\n{}",
         ur10(),
         format(6)
     );
@@ -124,7 +124,7 @@ fn locked_joints_and_a_tilted_base() {
     }
     std::fs::write(folder.path().join("log.csv"), text).unwrap();
     let text = format!(
-        "robot = {{ file = {:?}, lock = {{ wrist_3_joint = 0.7 }}, base_rpy_rad = [0.3, -0.4, 0.2] }}\n\
+        "robot = {{ file = {:?}, lock = {{ wrist_3_joint = 0.7 }}, base_rpy_rad = [0.3, -0.4, 0.2] }}\ndrive.friction = \"stated\"\n\
          log = [{{ file = \"log.csv\" }}]\nparallel_filter.factor = 4\n{}",
         ur10(),
         format(5)
@@ -143,7 +143,7 @@ fn a_denavit_hartenberg_table() {
     let truth = Truth::near(&description, 0.3, false);
     write_log(&folder.path().join("log.csv"), &truth, &Motion::new(2, 1), CLOCK, &header(2), plain);
     let text = format!(
-        "robot.file = {:?}\nlog = [{{ file = \"log.csv\" }}]\nparallel_filter.factor = 4\n{}",
+        "robot.file = {:?}\ndrive.friction = \"stated\"\nlog = [{{ file = \"log.csv\" }}]\nparallel_filter.factor = 4\n{}",
         description.display().to_string(),
         format(2)
     );
@@ -191,7 +191,7 @@ fn motor_side_in_degrees_with_gears_currents_and_a_coupled_wrist() {
         format!("[{}]", rows.collect::<Vec<_>>().join(","))
     };
     let text = format!(
-        "robot.file = {:?}\nlog = [{{ file = \"log.csv\" }}]\nparallel_filter.factor = 4\n{}\n",
+        "robot.file = {:?}\ndrive.friction = \"stated\"\nlog = [{{ file = \"log.csv\" }}]\nparallel_filter.factor = 4\n{}\n",
         ur10(),
         format(6)
             .replace("\"q{1..6}\" }", &format!("\"q{{1..6}}\", unit = \"deg\", inverse_matrix = {} }}", matrix(false)))
@@ -212,7 +212,11 @@ fn a_reversed_sign_is_found_and_fixed() {
     truth.drive.iter_mut().flatten().for_each(|value| *value *= 0.1);
     let reversed = |q: &[f64], tau: &[f64]| -> Vec<f64> { q.iter().copied().chain(tau.iter().map(|t| -t)).collect() };
     write_log(&folder.path().join("log.csv"), &truth, &Motion::new(6, 1), CLOCK, &header(6), reversed);
-    let as_logged = format!("robot.file = {:?}\nlog = [{{ file = \"log.csv\" }}]\n{}", ur10(), format(6));
+    let as_logged = format!(
+        "robot.file = {:?}\ndrive.friction = \"stated\"\nlog = [{{ file = \"log.csv\" }}]\n{}",
+        ur10(),
+        format(6)
+    );
     let fixed = as_logged.replace("\"tau{1..6}\" }", "\"tau{1..6}\", sign = -1 }");
     for (text, reversed) in [(&as_logged, true), (&fixed, false)] {
         let job = Job::new(folder.path(), text);
@@ -239,7 +243,7 @@ fn noise_widens_the_error_bars_by_as_much_as_it_moves_the_values() {
         write_log(&path, &truth, &Motion::new(6, seed), (200.0, 20.0), &header(6), &mut noisy);
     }
     let text = format!(
-        "robot.file = {:?}\nlog = [{{ file = \"log1.csv\" }}, {{ file = \"log2.csv\" }}, {{ file = \"log3.csv\", role = \"validate\" }}]\n\
+        "robot.file = {:?}\ndrive.friction = \"stated\"\nlog = [{{ file = \"log1.csv\" }}, {{ file = \"log2.csv\" }}, {{ file = \"log3.csv\", role = \"validate\" }}]\n\
          parallel_filter.enabled = false\n{}",
         ur10(),
         format(6)
@@ -276,7 +280,7 @@ fn the_description_in_the_study_may_know_no_inertials() {
     bare += rest;
     std::fs::write(folder.path().join("bare.urdf"), bare).unwrap();
     let text = format!(
-        "robot.file = \"bare.urdf\"\nlog = [{{ file = \"log.csv\" }}]\nparallel_filter.factor = 4\n{}",
+        "robot.file = \"bare.urdf\"\ndrive.friction = \"stated\"\nlog = [{{ file = \"log.csv\" }}]\nparallel_filter.factor = 4\n{}",
         format(6)
     );
     let job = Job::new(folder.path(), &text);

@@ -29,7 +29,7 @@ fn late_log(path: &Path, truth: &Truth, motion: &Motion, clock: (f64, f64), lags
 }
 
 fn study(robot: &str, dof: usize, more: &str) -> String {
-    format!("robot.file = {robot:?}\n{more}\n{}", format(dof))
+    format!("robot.file = {robot:?}\ndrive.friction = \"stated\"\n{more}\n{}", format(dof))
 }
 
 #[test]
