@@ -31,8 +31,9 @@ pub struct SimulatedRobot {
     urdf: &'static str,
 }
 
-/// The robots of the tables.
+/// Universal Robots UR10.
 pub(crate) const UR10: SimulatedRobot = SimulatedRobot { name: "UR10", urdf: include_str!("../robots/ur10.urdf") };
+/// Franka Panda without its hand.
 pub(crate) const PANDA: SimulatedRobot =
     SimulatedRobot { name: "Panda", urdf: include_str!("../robots/panda_arm7.urdf") };
 

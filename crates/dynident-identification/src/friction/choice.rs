@@ -1,11 +1,7 @@
-//! Friction by cross-validation inside the training logs, joint by joint.
+//! Friction by cross-validation inside the training logs: joint by joint, in rounds, the others with what they have.
 //!
 //! All columns that a joint may have are in the factors already, so a candidate model is a selection of them (see
-//! [`CrossValidation`]). Terms are added one at a time to viscous friction with a Coulomb step or a sigmoid, the one
-//! that lowers the error most first; of all candidates met, the simplest counts whose mean square error is within one
-//! standard error of the least (Hastie, Tibshirani and Friedman, *The Elements of Statistical Learning*, 7.10; the
-//! standard error is that of the difference, block by block, because blocks differ among themselves far more than
-//! candidates do).
+//! [`CrossValidation`]); how one joint's are searched is in `search`.
 
 use super::candidates::CandidateColumn;
 use super::search::search;

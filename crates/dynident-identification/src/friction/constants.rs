@@ -28,14 +28,16 @@ pub(super) fn coordinates(term: &TorqueTerm) -> Vec<f64> {
     }
 }
 
-/// Bounds of the coordinates: velocities of 10⁻⁴ to 10 rad/s (m/s), exponents of 1/2 to 3, a shift of two widths.
-fn within(value: f64, [least, most]: [f64; 2]) -> f64 {
-    value.clamp(least.ln(), most.ln()).exp()
-}
-
+/// Bounds of velocities, rad/s (m/s), and of exponents.
 const VELOCITIES: [f64; 2] = [1.0e-4, 10.0];
 const EXPONENTS: [f64; 2] = [0.5, 3.0];
+/// Furthest that a step is from rest, in units of its width.
 const MOST_SHIFT: f64 = 2.0;
+
+/// The constant of this logarithm, within its bounds.
+fn within(logarithm: f64, [least, most]: [f64; 2]) -> f64 {
+    logarithm.clamp(least.ln(), most.ln()).exp()
+}
 
 /// The term with its constants at these coordinates.
 pub(super) fn at(term: &TorqueTerm, coordinates: &[f64]) -> TorqueTerm {

@@ -1,5 +1,11 @@
 //! The search for one joint's friction among columns that its factors hold already.
 //!
+//! Terms are added one at a time to viscous friction with a Coulomb step, and to that with a sigmoid, the one that
+//! lowers the error most first; of all candidates met, the simplest counts whose mean square error is within one
+//! standard error of the least (Hastie, Tibshirani and Friedman, *The Elements of Statistical Learning*, 7.10; the
+//! standard error is that of the difference, block by block, because blocks differ among themselves far more than
+//! candidates do).
+//!
 //! A constant of a term (a width, a velocity) is taken between two neighbours of its grid, whose columns together say
 //! what the column between them would: so no further term is needed to patch up a grid that is too coarse.
 
