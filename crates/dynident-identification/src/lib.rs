@@ -128,6 +128,7 @@ pub mod examination;
 mod execution;
 pub mod friction;
 mod identify;
+mod lag;
 mod less_noise;
 mod logs;
 pub mod payload;

@@ -107,7 +107,7 @@ impl<T: Clone> OneOrMany<T> {
         matches!(self, Self::One(_)) || matches!(self, Self::Many(values) if values.len() == count)
     }
 
-    fn values(&self) -> &[T] {
+    pub(crate) fn values(&self) -> &[T] {
         match self {
             Self::One(value) => core::slice::from_ref(value),
             Self::Many(values) => values,
