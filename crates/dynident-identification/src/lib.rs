@@ -126,6 +126,7 @@ mod error;
 pub mod estimators;
 pub mod examination;
 mod execution;
+mod fitted;
 pub mod friction;
 mod identify;
 mod lag;
@@ -147,8 +148,9 @@ pub use conditional::{Condition, Conditional, conditionals, resting_joints};
 pub use error::IdentificationError;
 pub use estimators::EstimationSettings;
 pub use execution::Execution;
+pub use fitted::StageTimes;
 pub use identify::{
-    ConsistentParameters, Identification, StageTimes, TrainingExamination, consistent_stage, identify,
+    ConsistentParameters, Identification, TrainingExamination, consistent_stage, identify,
     identify_payload, identify_with_instruments,
 };
 pub use logs::Logs;

@@ -8,7 +8,7 @@ use core::fmt::Write;
 use dynident::ResultFile;
 use dynident::identification::CutoffCandidate;
 use dynident::identification::consistent::ParameterInterval;
-use dynident::identification::examination::LogValidation;
+use dynident::identification::examination::{LagKind, LogValidation};
 use dynident::identification::friction::FrictionCandidate;
 use dynident::result::{BaseParameterResult, LogSummary};
 use std::path::Path;
@@ -203,18 +203,16 @@ fn joints(r: &ResultFile) -> String {
 /// How late the torque comes, where it matters at any joint; else that it does not.
 fn lags(r: &ResultFile) -> String {
     let known = || r.joints.iter().filter_map(|joint| joint.torque_lag.map(|lag| (&joint.name, lag)));
-    if known().next().is_none() {
-        return String::new();
-    }
-    if known().all(|(_, lag)| !lag.matters) {
-        return "\n  torque lag: none that matters at any joint (result.json has them)\n".to_owned();
+    let text = r.method.torque_lag.sentence().map_or_else(String::new, |what| format!("\n  torque lag: {what}\n"));
+    if r.method.torque_lag.kind != LagKind::Joints && known().all(|(_, lag)| !lag.matters) {
+        return text;
     }
     let header = ["torque lag behind motion", "ms", "+- (95 %)"].map(str::to_owned);
     let rows = known().map(|(joint, lag)| {
         let [value, half] = with_deviation(1e3 * lag.lag_s, 1e3 * lag.half_width_95_s);
         vec![name(joint), value, half]
     });
-    format!("\n{}", table(&header, 1..3, rows.collect()))
+    format!("{text}\n{}", table(&header, 1..3, rows.collect()))
 }
 
 /// What friction the training logs chose, against the plain one; and whose they did not, with the reason.

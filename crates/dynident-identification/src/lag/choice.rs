@@ -52,6 +52,33 @@ pub struct LagChoice {
     pub scatter: Option<f64>,
 }
 
+impl LagChoice {
+    /// What was done, in a sentence without a full stop; none where there is nothing to tell.
+    pub fn sentence(&self) -> Option<String> {
+        let ms = |seconds: f64| format!("{:.1}", 1e3 * seconds);
+        let taken_off = || self.lag_s.first().copied().unwrap_or(0.0);
+        let side = |lag_s: f64| if lag_s < 0.0 { "before" } else { "after" };
+        Some(match self.kind {
+            LagKind::None => {
+                let common = self.common?;
+                let bar = ms(common.half_width_95_s);
+                format!("none that matters ({} +- {bar} ms, 95 %, one for all joints)", ms(common.lag_s))
+            }
+            LagKind::Common => {
+                let bar = self.common.map_or_else(String::new, |common| format!(" +- {}", ms(common.half_width_95_s)));
+                let lag_s = taken_off();
+                format!("{}{bar} ms {} the motion at all joints, taken off", ms(lag_s.abs()), side(lag_s))
+            }
+            LagKind::Joints => "another at each joint, taken off".to_owned(),
+            LagKind::Stated => {
+                let is_one = self.lag_s.iter().all(|lag_s| *lag_s == taken_off());
+                let what = if is_one { format!("{} ms", ms(taken_off())) } else { "joint by joint".to_owned() };
+                format!("{what} as stated, taken off")
+            }
+        })
+    }
+}
+
 /// The choice that a fit's lags ask for, beyond what was `taken_off` before (seconds, joint by joint, or empty);
 /// `estimate` is the one whose parameters are to be kept from harm.
 pub(crate) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate) -> LagChoice {

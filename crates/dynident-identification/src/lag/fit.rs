@@ -89,10 +89,17 @@ pub(crate) fn fit_lags(
     fitted(checks.first()?.model(), checks, (logs, settings)).ok()
 }
 
-/// The lags of one log alone, by joint; `None` where it does not determine one.
+/// The lags of one log alone with what was taken off before it was read, by joint; `None` where it does not determine
+/// one. A lag matters where its rest does.
 pub(crate) fn lags_of_log(check: DelayCheck<'_>, with: (&Logs<'_>, &EstimationSettings)) -> Vec<Option<TorqueLag>> {
     let joints = check.model().model().dof();
-    fit_lags(&[check], with).map_or_else(|| vec![None; joints], |fit| fit.joints)
+    let taken_off = &with.0.motion.torque_lag_s;
+    let before = |joint: usize| taken_off.as_ref().and_then(|lags| lags.at(joint)).unwrap_or(0.0);
+    let rest = fit_lags(&[check], with).map_or_else(|| vec![None; joints], |fit| fit.joints);
+    let total = |(joint, rest): (usize, Option<TorqueLag>)| {
+        rest.map(|rest| TorqueLag { lag_s: before(joint) + rest.lag_s, ..rest })
+    };
+    rest.into_iter().enumerate().map(total).collect()
 }
 
 fn fitted(

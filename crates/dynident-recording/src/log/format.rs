@@ -96,7 +96,8 @@ pub enum OneOrMany<T> {
 }
 
 impl<T: Clone> OneOrMany<T> {
-    pub(crate) fn at(&self, index: usize) -> Option<T> {
+    /// The value of number `index`; none where a list is shorter.
+    pub fn at(&self, index: usize) -> Option<T> {
         match self {
             Self::One(value) => Some(value.clone()),
             Self::Many(values) => values.get(index).cloned(),

@@ -47,6 +47,7 @@ pub(super) fn method_summary(identification: &Identification, estimator: &str) -
         clusters: estimate.clusters,
         motion: motion.clone(),
         cutoff: identification.cutoff.clone(),
+        torque_lag: identification.torque_lag.clone(),
         motion_hz: identification.motion_hz,
         condition_number: estimate.condition_number_raw,
         condition_number_scaled: estimate.condition_number_scaled,
