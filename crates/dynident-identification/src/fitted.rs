@@ -215,8 +215,11 @@ fn lag_fit(found: &Fitted<'_>, chosen: &[usize]) -> Result<Option<LagFit>, LogEr
     let theta = &estimation.estimate.values[..training.columns.base()];
     let of_log = |&index: &usize| -> Result<DelayCheck<'_>, LogError> {
         let mut samples = LagPass(DelayCheck::new(&training.model, theta));
-        let pass =
-            LogPass { most_samples: Some(DELAY_SAMPLES as u64), progress: &Silent, ..logs.pass(&training.model, index) };
+        let pass = LogPass {
+            most_samples: Some(DELAY_SAMPLES as u64),
+            progress: &Silent,
+            ..logs.pass(&training.model, index)
+        };
         pass.run(&mut samples)?;
         Ok(samples.0)
     };

@@ -150,8 +150,8 @@ pub use estimators::EstimationSettings;
 pub use execution::Execution;
 pub use fitted::StageTimes;
 pub use identify::{
-    ConsistentParameters, Identification, TrainingExamination, consistent_stage, identify,
-    identify_payload, identify_with_instruments,
+    ConsistentParameters, Identification, TrainingExamination, consistent_stage, identify, identify_payload,
+    identify_with_instruments,
 };
 pub use logs::Logs;
 pub use progress::{Progress, Silent};

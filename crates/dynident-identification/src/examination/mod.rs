@@ -10,11 +10,11 @@ mod torque_sign;
 mod torque_trace;
 mod training;
 
+pub use crate::lag::{LagChoice, LagKind, TorqueLag, delay_findings, pooled_delay};
 pub use friction_sign::{FrictionSign, friction_sign_findings, friction_signs};
 pub use held_out::{HeldOutExamination, LogValidation, ModelUnderTest, examine_held_out};
 pub use nominal_agreement::{PriorAgreement, agreement_findings};
 pub use residuals::{JointResiduals, TorqueBand, Uncertainty};
-pub use crate::lag::{LagChoice, LagKind, TorqueLag, delay_findings, pooled_delay};
 pub use torque_sign::{TorqueSignCheck, sign_evidence, sign_findings};
 pub use torque_trace::{JointTrace, LogTrace};
 pub use training::examine_training;

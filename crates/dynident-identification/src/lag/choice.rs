@@ -100,7 +100,8 @@ pub(crate) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate) -
     let own: Vec<usize> = all.iter().copied().filter(|&joint| unlike && fit.share(joint) > OWN_SHARE).collect();
     if !own.is_empty() {
         let others: Vec<usize> = all.iter().copied().filter(|joint| !own.contains(joint)).collect();
-        let of_others = common(fit, &others).map(|mean| mean.lag).filter(is_beyond_its_bar).map_or(0.0, |lag| lag.lag_s);
+        let of_others =
+            common(fit, &others).map(|mean| mean.lag).filter(is_beyond_its_bar).map_or(0.0, |lag| lag.lag_s);
         let rest = |joint: usize| match fit.joints[joint] {
             Some(lag) if own.contains(&joint) => lag.lag_s,
             _ => of_others,
@@ -186,5 +187,5 @@ fn common(fit: &LagFit, joints: &[usize]) -> Option<Mean> {
     let half_width_95_s = quantile * std_s;
     let matters = mean.abs() > half_width_95_s && lags.iter().any(|lag| lag.matters);
     (std_s.is_finite() && mean.is_finite())
-        .then_some(Mean { lag: TorqueLag { lag_s: mean, std_s, half_width_95_s, matters }, scatter })
+        .then_some(Mean { lag: TorqueLag { lag_s: mean, std_s, half_width_95_s, matters, taken_off_s: 0.0 }, scatter })
 }

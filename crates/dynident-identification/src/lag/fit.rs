@@ -51,7 +51,8 @@ impl LagFit {
         let known: Vec<usize> = (0..self.joints.len()).filter(|&joint| self.joints[joint].is_some()).collect();
         let mut answers = DMatrix::zeros(self.base, self.joints.len());
         let white = &self.last.covariance_white;
-        let own = DMatrix::from_fn(known.len(), known.len(), |a, b| white[(self.base + known[a], self.base + known[b])]);
+        let own =
+            DMatrix::from_fn(known.len(), known.len(), |a, b| white[(self.base + known[a], self.base + known[b])]);
         let Some(own) = own.cholesky() else { return answers };
         for row in 0..self.base {
             let with_lags = DVector::from_fn(known.len(), |place, _| white[(row, self.base + known[place])]);
@@ -97,7 +98,7 @@ pub(crate) fn lags_of_log(check: DelayCheck<'_>, with: (&Logs<'_>, &EstimationSe
     let before = |joint: usize| taken_off.as_ref().and_then(|lags| lags.at(joint)).unwrap_or(0.0);
     let rest = fit_lags(&[check], with).map_or_else(|| vec![None; joints], |fit| fit.joints);
     let total = |(joint, rest): (usize, Option<TorqueLag>)| {
-        rest.map(|rest| TorqueLag { lag_s: before(joint) + rest.lag_s, ..rest })
+        rest.map(|rest| TorqueLag { lag_s: before(joint) + rest.lag_s, taken_off_s: before(joint), ..rest })
     };
     rest.into_iter().enumerate().map(total).collect()
 }
@@ -181,13 +182,15 @@ impl<'a> Samples<'a> {
             let per_second = rows[joint].slope_rms * check.rate_hz();
             [per_second * per_second, 1.0].map(|value| value * rows[joint].factor.rows() as f64)
         };
-        let [squares, rows] = self.checks.iter().zip(&self.rows).map(of_log).fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y]);
+        let [squares, rows] =
+            self.checks.iter().zip(&self.rows).map(of_log).fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y]);
         let moved = lag_s.abs() * (squares / rows.max(1.0)).sqrt();
         Some(TorqueLag {
             lag_s,
             std_s: std,
             half_width_95_s: half_width,
             matters: lag_s.abs() > half_width && moved > last.joint_sigma[joint],
+            taken_off_s: 0.0,
         })
     }
 
