@@ -1,4 +1,4 @@
-//! From recordings to an estimate: cut-off, friction, factors, parameters, and the lag of the torque among the unknowns.
+//! From recordings to an estimate: cut-off, friction, factors, parameters, with the torque's lag among the unknowns.
 
 use crate::bandwidth::{CutoffByError, choose_cutoff};
 use crate::chosen_friction::{ChosenFriction, choose_friction};

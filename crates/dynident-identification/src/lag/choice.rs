@@ -2,8 +2,8 @@
 //!
 //! A lag of a recorder or a bus is the same for all joints, so their common lag is what is looked for first: the
 //! generalised mean of the joints' lags, its bar widened by what the joints differ by beyond their own bars (Birge,
-//! Phys. Rev. 40 (1932) 207). What friction or elasticity leaves looks like a lag too, another in every joint: it widens
-//! the bar and is not taken off. A lag that is not known leaves its mark on the parameters in any case,
+//! Phys. Rev. 40 (1932) 207). What friction or elasticity leaves looks like a lag too, another in every joint: it
+//! widens the bar and is not taken off. A lag that is not known leaves its mark on the parameters in any case,
 //! `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`, and the error bars hold it.
 
 use super::fit::LagFit;
