@@ -174,8 +174,7 @@ fn identified(
     }
     settings.check_names(robot).map_err(IdentificationError::Consistency)?;
 
-    // Rows and factors with the filters in force, the friction that the logs choose and without the torque's lag; then the
-    // estimate.
+    // Rows and factors, with filters and friction stated or chosen and the torque's lag taken off; then the estimate.
     let Fitted { logs, training, mut estimation, settings, cutoff, stated_friction, lag, mut times } =
         fitted(task, &chosen, execution, job)?;
     let (settings, started) = (&settings, Instant::now());

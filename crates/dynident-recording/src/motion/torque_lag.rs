@@ -56,14 +56,13 @@ impl TorqueShift {
             }
             let first = row as i64 + whole as i64 - (NODES as i64 / 2 - 1);
             let nodes = usize::try_from(first).ok().and_then(|first| signal.get(first..first + NODES));
-            out.push(match nodes {
-                Some(nodes) => nodes.iter().zip(weights).map(|(value, weight)| value * weight).sum(),
+            out.push(if let Some(nodes) = nodes {
+                nodes.iter().zip(weights).map(|(value, weight)| value * weight).sum()
+            } else {
                 // At the very ends of a piece a straight line.
-                None => {
-                    let at = place as usize;
-                    let next = signal[(at + 1).min(signal.len() - 1)];
-                    signal[at] + (place - at as f64) * (next - signal[at])
-                }
+                let at = place as usize;
+                let next = signal[(at + 1).min(signal.len() - 1)];
+                signal[at] + (place - at as f64) * (next - signal[at])
             });
         }
         unreached
