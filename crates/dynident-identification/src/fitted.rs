@@ -1,6 +1,7 @@
 //! From recordings to an estimate: cut-off, friction, factors, parameters, with the torque's lag among the unknowns.
 
 use crate::bandwidth::{CutoffByError, choose_cutoff};
+use crate::between_logs::{BetweenLogs, with_variation};
 use crate::chosen_friction::{ChosenFriction, choose_friction};
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
@@ -66,11 +67,33 @@ pub(crate) struct Fitted<'a> {
     /// Rows and fit with friction as stated, where it was chosen.
     pub(crate) stated_friction: Option<(Training, Estimate)>,
     pub(crate) lag: LagChoice,
+    /// None for a single log.
+    pub(crate) between_logs: Option<BetweenLogs>,
     pub(crate) times: StageTimes,
 }
 
-/// Rows and estimate; where the rows show a lag of the torque that moves parameters, again without it.
+/// Rows and estimate, with the lag of the torque and what varies between logs in its error bars.
 pub(crate) fn fitted<'a>(
+    task: &'a IdentificationTask,
+    chosen: &[usize],
+    execution: Execution<'a>,
+    job: &mut Job<'_, '_>,
+) -> Result<Fitted<'a>, IdentificationError> {
+    let is_model = job.arm().is_none();
+    let mut found = without_lag(task, chosen, execution, job)?;
+    if is_model && found.settings.estimation.estimator.reads_filtered_rows() {
+        let weighted = found.settings.estimation.weighted();
+        let varied = with_variation(&found.training, &weighted, &found.estimation.estimate);
+        found.between_logs = varied.map(|(estimate, between)| {
+            found.estimation.estimate = estimate;
+            between
+        });
+    }
+    Ok(found)
+}
+
+/// Rows and estimate; where the rows show a lag of the torque that moves parameters, again without it.
+fn without_lag<'a>(
     task: &'a IdentificationTask,
     chosen: &[usize],
     execution: Execution<'a>,
@@ -182,6 +205,7 @@ fn fitted_once<'a>(
         cutoff,
         stated_friction: friction.stated,
         lag: LagChoice::default(),
+        between_logs: None,
         times: StageTimes { logs_s, estimation_s, examination_s: 0.0 },
     })
 }

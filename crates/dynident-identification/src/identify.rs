@@ -1,6 +1,7 @@
 //! The whole way from recordings to an identified model, stage by stage.
 
 use crate::bandwidth::CutoffByError;
+use crate::between_logs::BetweenLogs;
 use crate::consistent::{
     ConsistencyError, ParameterInterval, consistent_intervals, consistent_with_estimate, inconsistent_nominal_bodies,
     inertials, nearest_to_nominal,
@@ -92,6 +93,9 @@ pub struct Identification {
     pub diagnosis: Option<Diagnosis>,
     /// The lag of the torque that was taken off the rows, and how well the rest is known.
     pub torque_lag: LagChoice,
+    /// By how much training logs differ beyond their own error bars, which the estimate's bars hold; none for a single
+    /// one.
+    pub between_logs: Option<BetweenLogs>,
     /// Where the time went.
     pub times: StageTimes,
 }
@@ -175,7 +179,7 @@ fn identified(
     settings.check_names(robot).map_err(IdentificationError::Consistency)?;
 
     // Rows and factors, with filters and friction stated or chosen and the torque's lag taken off; then the estimate.
-    let Fitted { logs, training, mut estimation, settings, cutoff, stated_friction, lag, mut times } =
+    let Fitted { logs, training, mut estimation, settings, cutoff, stated_friction, lag, between_logs, mut times } =
         fitted(task, &chosen, execution, job)?;
     let (settings, started) = (&settings, Instant::now());
     let mut dropped = None;
@@ -257,6 +261,7 @@ fn identified(
         held_out,
         diagnosis,
         torque_lag: lag,
+        between_logs,
         times,
     })
 }

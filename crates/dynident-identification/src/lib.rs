@@ -116,6 +116,7 @@
 #![forbid(unsafe_code)]
 
 mod bandwidth;
+mod between_logs;
 mod check;
 mod chosen_friction;
 mod conditional;
@@ -142,6 +143,7 @@ mod task;
 mod training;
 
 pub use bandwidth::{CutoffByError, CutoffCandidate, choose_cutoff};
+pub use between_logs::BetweenLogs;
 pub use check::{StudyExamination, examine_study};
 pub use chosen_friction::{ChosenFriction, choose_friction};
 pub use conditional::{Condition, Conditional, conditionals, resting_joints};

@@ -17,6 +17,8 @@ use std::path::Path;
 const SHOWN: usize = 6;
 /// Held-out logs up to which the table shows their root mean squares and priors.
 const WITH_DETAILS: usize = 2;
+/// Times their bars that logs differ from which on it is said.
+const DIFFERING: f64 = 1.5;
 /// Held-out logs that have a column.
 const COLUMNS: usize = 5;
 /// Columns that are left for an expression.
@@ -48,6 +50,7 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, models: &[&str]) -> Str
         text += &residuals(log);
     }
     text += &lags(r);
+    text += &between_logs(r);
     text += &super::load::loads(r);
     text.push('\n');
     if !r.friction_choice.is_empty() {
@@ -198,6 +201,21 @@ fn joints(r: &ResultFile) -> String {
         let _ = writeln!(text, "  {} more held-out logs in result.json", r.validation.len() - COLUMNS);
     }
     text
+}
+
+/// Where training logs differ beyond their own bars.
+fn between_logs(r: &ResultFile) -> String {
+    let Some(found) = r.method.between_logs else { return String::new() };
+    let of = |what: &str, k: Option<f64>| {
+        k.filter(|k| *k >= DIFFERING)
+            .map(|k| format!("{what} differ {k:.1} times as much as their own error bars allow"))
+    };
+    let said: Vec<String> =
+        [of("bodies", found.bodies), of("friction parameters", found.friction)].into_iter().flatten().collect();
+    if said.is_empty() {
+        return String::new();
+    }
+    wrapped(&format!("from log to log {}; theirs hold it", said.join(", ")), 2)
 }
 
 /// How late the torque comes, where it matters at any joint; else that it does not.

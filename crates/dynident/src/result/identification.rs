@@ -15,7 +15,7 @@ use dynident_identification::examination::{
 };
 use dynident_identification::friction::FrictionCandidate;
 use dynident_identification::payload::{DriveGain, PayloadResult};
-use dynident_identification::{Condition, CutoffByError, Role};
+use dynident_identification::{BetweenLogs, Condition, CutoffByError, Role};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};
 
@@ -156,6 +156,10 @@ pub struct MethodSummary {
     /// The lag of the torque behind the motion: what was taken off before the fit, and how well it is known.
     #[serde(default)]
     pub torque_lag: LagChoice,
+    /// By how much the parameters of two training logs differ, in units of what the logs' own error bars allow; the
+    /// bars of `base_parameters` hold what is beyond. None for a single log.
+    #[serde(default)]
+    pub between_logs: Option<BetweenLogs>,
     /// Held-out figures are for the torque below 0.7 of this, the cut-off that the motion's spectrum asks for; none
     /// where they are for the fit's own band.
     #[serde(default)]
