@@ -8,6 +8,8 @@
 //! | a program that speaks the line protocol, or a person with a folder | [`robot`] |
 //! | a robot of one's own | a type with [`Robot`] |
 //! | one run's identification | [`identify_run`]: all joints at once, or step by step from tip to base as in the paper |
+//! | several runs' identification together | [`identify_runs`], each weighted by its own noise |
+//! | what is not met yet | [`Iteration::shortfalls`]: tracking, parameters, clipping, lag, prediction ([`Shortfall`]) |
 //! | what the next run is | [`Iteration::next`], a pure function of the records so far: which controller and model it has, whether a run got worse, when all has settled |
 //! | kept on disk, and resumed to the same result | [`IterationStore`] |
 //!
@@ -58,23 +60,31 @@
 
 #![forbid(unsafe_code)]
 
+mod clipping;
+mod convergence;
 mod drive;
 mod error;
 mod estimate;
+mod evidence;
 mod leg;
 mod model_parameters;
 mod motion;
 mod policy;
+mod prediction;
 mod record;
 pub mod robot;
+mod run_examination;
 mod settings;
 mod status;
 mod step_by_step;
 mod store;
+mod tracking_floor;
 
+pub use convergence::Shortfall;
 pub use drive::{Iteration, IterationOutcome, iterate};
 pub use error::IterationError;
-pub use estimate::{RunEstimate, identify_run};
+pub use estimate::{RunEstimate, RunLog, identify_run, identify_runs};
+pub use evidence::{Clipping, JointEvidence, Prediction, RunEvidence};
 pub use leg::{IterationTask, Leg};
 pub use model_parameters::ModelParameters;
 pub use motion::measured_motion;
