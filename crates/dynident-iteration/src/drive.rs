@@ -249,10 +249,12 @@ impl Iteration {
         }
         let all: Vec<RunRecord> = before.iter().cloned().chain([record.clone()]).collect();
         let (task, _) = self.in_force(&all)?;
-        let known = record.pooled.as_ref().unwrap_or(&own);
+        let after = record.pooled.as_ref().unwrap_or(&own);
         let errors = &record.max_tracking_error_rad;
-        if let (Some(evidence), true) = (&mut record.evidence, record.controller.model.is_some()) {
-            add_tracking_floors(evidence, &task, records, &self.settings, (&own, known), errors);
+        // The first good run is not judged, whatever it was under.
+        let is_judged = known.is_some() && record.controller.model.is_some();
+        if let (Some(evidence), true) = (&mut record.evidence, is_judged) {
+            add_tracking_floors(evidence, &task, records, &self.settings, (&own, after), errors);
         }
         Ok(())
     }

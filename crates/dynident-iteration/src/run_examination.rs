@@ -128,35 +128,32 @@ fn predict(
     Ok(())
 }
 
-/// Adds what noise, friction and delay explain of each joint's tracking error, where that is beyond the tolerance.
-/// `newest` is the run's own estimate, `known` what is known after the run.
+/// Adds what noise, friction and delay explain of each joint's tracking error, where one is beyond the tolerance. `own`
+/// is the run's own estimate, `known` what is known after it.
 pub(crate) fn add_tracking_floors(
     evidence: &mut RunEvidence,
     task: &IterationTask,
     records: &[Record],
     settings: &IterationSettings,
-    (newest, known): (&RunEstimate, &RunEstimate),
+    (own, known): (&RunEstimate, &RunEstimate),
     errors_rad: &[f64],
 ) {
     let Some(parameters) = &known.possible else { return };
     if errors_rad.iter().all(|error| *error <= settings.settled.tracking_tolerance) {
         return;
     }
-    let beyond = newest.torque_lags.iter().flatten().filter(|lag| lag.lag_s.abs() > lag.half_width_95_s);
+    let beyond = own.torque_lags.iter().flatten().filter(|lag| lag.lag_s.abs() > lag.half_width_95_s);
     let delay_s = beyond.map(|lag| lag.lag_s.abs()).fold(0.0, f64::max);
-    let mut floors: Option<Vec<f64>> = None;
+    let mut floors = vec![0.0_f64; task.robot.dof()];
     for (leg, record) in task.legs.iter().zip(records) {
         let q: Vec<&[f64]> = record.q.chunks_exact(record.samples.max(1)).collect();
-        let noise = position_noise(&q, record.rate_hz, cutoff(&q, record.rate_hz).cutoff_hz);
+        let position_noise = &position_noise(&q, record.rate_hz, cutoff(&q, record.rate_hz).cutoff_hz)[..];
         let (robot, controller) = (&task.robot, &settings.controller);
-        let known = KnownLoop { robot, parameters, controller, position_noise: &noise, delay_s };
+        let known = KnownLoop { robot, parameters, controller, position_noise, delay_s };
         let Some(of_leg) = tracking_floor(leg.reference(), &known) else { return };
-        floors = Some(match floors {
-            None => of_leg,
-            Some(before) => before.iter().zip(&of_leg).map(|(a, b)| a.max(*b)).collect(),
-        });
+        floors.iter_mut().zip(of_leg).for_each(|(most, floor)| *most = most.max(floor));
     }
-    for (joint, floor) in evidence.joints.iter_mut().zip(floors.into_iter().flatten()) {
+    for (joint, floor) in evidence.joints.iter_mut().zip(floors) {
         joint.tracking_floor_rad = Some(floor);
     }
 }

@@ -3,9 +3,7 @@
 use dynident_dynamics::ParametricModel;
 use dynident_model::InertialParameters;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
-use dynident_simulation::{
-    Integrator, LoopSettings, Plant, Reference, SensorSettings, Start, closed_loop,
-};
+use dynident_simulation::{Integrator, LoopSettings, Plant, Reference, SensorSettings, closed_loop};
 
 /// Seed of the noise: a floor is the same for the same run.
 const SEED: u64 = 17;
@@ -34,25 +32,21 @@ pub(crate) fn tracking_floor(reference: &Reference, known: &KnownLoop<'_>) -> Op
         .collect();
     let model = robot.model().with_inertials(&bodies).ok()?;
     let mut plant = Plant::new(&model, robot.terms(), &known.parameters[10 * dof..]).ok()?;
-    let of_controller = ControllerModel::from_parameters(robot.model(), robot.terms(), known.parameters).ok()?;
-    let mut controller = known.controller.build(dof, Some(&of_controller)).ok()?;
     let sensors = SensorSettings {
         position_std: known.position_noise.to_vec().into(),
         feedback_delay_samples: (known.delay_s * reference.rate_hz()).round() as usize,
         seed: SEED,
         ..SensorSettings::default()
     };
-    // Friction implicit: no chatter that the robot has not.
-    let integrator = Integrator::SemiImplicitEuler { steps_per_sample: 1 };
-    let settings = LoopSettings { integrator, start: Start::Reference, sensors, ..LoopSettings::default() };
-    let run = closed_loop(&mut plant, controller.as_mut(), reference, &settings).ok()?;
-    if !run.status.is_done() {
-        return None;
-    }
-    // What the log shows late, it shows beside the trajectory.
-    let speeds = (0..dof).map(|joint| {
+    let settings = LoopSettings { integrator: Integrator::Rk4 { steps_per_sample: 2 }, sensors, ..LoopSettings::default() };
+    let speed = |joint: usize| {
         let motion = reference.motion();
         motion.dq[motion.of(joint)].iter().fold(0.0_f64, |most, dq| most.max(dq.abs()))
-    });
-    Some(run.max_error.iter().zip(speeds).map(|(error, speed)| error + known.delay_s * speed).collect())
+    };
+    let of_controller = ControllerModel::from_parameters(robot.model(), robot.terms(), known.parameters).ok()?;
+    let mut controller = known.controller.build(dof, Some(&of_controller)).ok()?;
+    let run = closed_loop(&mut plant, controller.as_mut(), reference, &settings).ok()?;
+    // What the log shows late, it shows beside the trajectory.
+    let errors = run.max_error.iter().enumerate();
+    run.status.is_done().then(|| errors.map(|(joint, error)| error + known.delay_s * speed(joint)).collect())
 }

@@ -4,4 +4,7 @@
 mod identification;
 mod iteration;
 mod policy;
+mod pooling;
 mod robots;
+mod simulated_arm;
+mod verdict;

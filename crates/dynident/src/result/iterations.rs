@@ -1,6 +1,8 @@
 //! What `iterations.json` holds.
 
 use super::provenance::Provenance;
+use dynident_iteration::{RunEvidence, Shortfall};
+use dynident_identification::examination::TorqueLag;
 use serde::{Deserialize, Serialize};
 
 /// Schema of `iterations.json`.
@@ -17,12 +19,16 @@ pub struct IterationsFile {
     /// Where it comes from; none in files of before it was written.
     #[serde(default)]
     pub provenance: Option<Provenance>,
-    /// Whether tracking and parameters have settled.
+    /// Whether everything is met that makes a success: see `unmet`.
     pub converged: bool,
-    /// `converged`, `runs-used-up`, `refused` or `waiting`.
+    /// `converged`, `settled` (nothing changes any more, but something is unmet), `runs-used-up`, `refused` or
+    /// `waiting`.
     pub status: String,
     /// The status in words.
     pub reason: String,
+    /// What is not met after the last run; empty if the iteration has converged, and in files of before it was written.
+    #[serde(default)]
+    pub unmet: Vec<UnmetCondition>,
     /// Names of the joints.
     pub joints: Vec<String>,
     /// Length of each run, s; of legs one after another, of all of them once.
@@ -40,6 +46,19 @@ pub struct IterationsFile {
     pub bound: Option<Vec<f64>>,
     /// All parameters of the last good physically consistent set: ten for each body, one for each term.
     pub possible_parameters: Option<Vec<f64>>,
+}
+
+/// Something that stands between an iteration and success.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct UnmetCondition {
+    /// What it is, with its numbers.
+    #[serde(flatten)]
+    pub shortfall: Shortfall,
+    /// The same in words.
+    pub message: String,
+    /// What would help.
+    pub remedy: String,
 }
 
 /// One run.
@@ -69,8 +88,25 @@ pub struct IterationRun {
     pub reason: Option<String>,
     /// For each joint the largest distance from the trajectory, rad (m).
     pub max_tracking_error_rad: Vec<f64>,
-    /// What it determines.
+    /// What it determines by itself.
     pub parameters: Vec<IterationParameter>,
+    /// What all good runs up to this one determine together; empty for the first, for those that do not count, and where
+    /// runs are not pooled.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pooled: Vec<IterationParameter>,
+    /// What its log shows beside parameters, joint by joint; none where it did not get to its end.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub evidence: Option<RunEvidence>,
+    /// By how much each joint's torque comes after the motion, by this run alone; empty where windows leave rows out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub torque_lags: Vec<Option<TorqueLag>>,
+}
+
+impl IterationRun {
+    /// What is known after it: by all good runs together, or else by it alone.
+    pub fn known(&self) -> &[IterationParameter] {
+        if self.pooled.is_empty() { &self.parameters } else { &self.pooled }
+    }
 }
 
 /// One base parameter by one run.

@@ -14,7 +14,7 @@ use crate::output::write_whole;
 use crate::output_set::OutputSet;
 use crate::pages::iteration::{RunName, RunTrace, TimeSpent, iteration_report};
 use crate::result::IterationsFile;
-use crate::study::{Folders, PriorChoice, RobotChoice, Study, StudyRobot};
+use crate::study::{Folders, PriorChoice, RobotChoice, SimulationSection, Study, StudyRobot};
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
 use dynident_iteration::{
@@ -98,8 +98,7 @@ pub fn iterate_study(
         }
     };
     let legs = section.legs(&trajectories, &robot).map_err(in_section)?;
-    let efforts = robot.model().joints().iter().map(|joint| joint.limits.effort.unwrap_or(f64::INFINITY)).collect();
-    let torque_limits: Option<Vec<f64>> = simulation.effort_limits.then_some(efforts);
+    let torque_limits = torque_limits(&simulation, &robot, truth.is_some());
     let simulated = truth.is_some();
     let report = IterationReport {
         study,
@@ -139,7 +138,9 @@ pub fn iterate_study(
             unwritten = match iteration.robot(&so_far) {
                 Ok(robot) => {
                     let (robot, records) = (&*robot, &so_far[..]);
-                    let now = report.file(&Stage { leg, robot, records, status: &status, known_std: &known_std });
+                    let stage =
+                        Stage { leg, robot, records, status: &status, shortfalls: &[], known_std: &known_std };
+                    let now = report.file(&stage);
                     let all: Vec<IterationsFile> = files.iter().cloned().chain([now]).collect();
                     joined(all).and_then(|file| write_set(out, &file, None).err())
                 }
@@ -153,9 +154,9 @@ pub fn iterate_study(
         }
         // What the stage has found.
         made += outcome.runs.len() - runs_before;
-        let (records, status) = (&outcome.runs[..], &outcome.status);
+        let (records, status, shortfalls) = (&outcome.runs[..], &outcome.status, &outcome.shortfalls[..]);
         let in_force = &iteration.robot(records).map_err(in_iteration)?;
-        files.push(report.file(&Stage { leg, robot: in_force, records, status, known_std: &known_std }));
+        files.push(report.file(&Stage { leg, robot: in_force, records, status, shortfalls, known_std: &known_std }));
         for record in records {
             for (place, own) in iteration.task().legs.iter().enumerate() {
                 let name = RunName { run: record.run, leg: leg.or((members.len() > 1).then_some(place + 1)), place };
@@ -163,7 +164,7 @@ pub fn iterate_study(
             }
         }
         // What the next one holds.
-        let last = records.iter().rev().find(|record| record.accepted).and_then(|record| record.estimate.as_ref());
+        let last = records.iter().rev().find(|record| record.accepted).and_then(RunRecord::knowledge);
         if matches!(status, IterationStatus::Refused { .. } | IterationStatus::Waiting { .. }) {
             break;
         }
@@ -195,6 +196,16 @@ fn write_set(out: &Path, file: &IterationsFile, page: Option<String>) -> Result<
         None => set.absent(PAGE),
     }
     .write()
+}
+
+/// What each drive gives at most: of a simulated robot the stated limits, or else the description's.
+fn torque_limits(simulation: &SimulationSection, robot: &StudyRobot, simulated: bool) -> Option<Vec<f64>> {
+    let dof = robot.model().dof();
+    if let Some(stated) = simulation.limits.torque.as_ref().filter(|_| simulated) {
+        return Some((0..dof).map(|joint| stated.of(joint)).collect());
+    }
+    let efforts = robot.model().joints().iter().map(|joint| joint.limits.effort.unwrap_or(f64::INFINITY));
+    simulation.effort_limits.then(|| efforts.collect())
 }
 
 /// The files of an iteration as a whole.
