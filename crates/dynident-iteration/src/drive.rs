@@ -136,7 +136,7 @@ impl Iteration {
     }
 
     /// The task and how runs are identified, with the friction that a run before chose, if one did.
-    fn in_force(
+    pub(crate) fn in_force(
         &self,
         before: &[RunRecord],
     ) -> Result<(Cow<'_, IterationTask>, Cow<'_, RunIdentificationSettings>), IterationError> {
@@ -302,6 +302,12 @@ impl Iteration {
     /// The logs of the good runs among `records`, from the store: what further runs are identified together with.
     fn good_logs(&self, records: &[RunRecord], store: Option<&IterationStore>) -> Result<Vec<GoodLog>, IterationError> {
         let Some(store) = store.filter(|_| self.settings.pool) else { return Ok(Vec::new()) };
+        let good = |record: &&RunRecord| record.accepted && record.estimate.is_some();
+        self.logs_of(&records.iter().filter(good).collect::<Vec<_>>(), store)
+    }
+
+    /// The logs of these runs.
+    pub(crate) fn logs_of(&self, records: &[&RunRecord], store: &IterationStore) -> Result<Vec<GoodLog>, IterationError> {
         let joints = self.task.robot.joint_names();
         let rates = |record: &RunRecord| -> Vec<f64> {
             let kept = record.evidence.as_ref().map(|evidence| evidence.log_rates_hz.clone()).unwrap_or_default();
@@ -312,13 +318,13 @@ impl Iteration {
             let records = store.logs(record.run, &joints, &rates(record))?;
             Ok(GoodLog::new(record, records))
         };
-        records.iter().filter(|record| record.accepted && record.estimate.is_some()).map(one).collect()
+        records.iter().copied().map(one).collect()
     }
 }
 
 /// A good run's records, kept for those after it.
 #[derive(Clone, Debug)]
-struct GoodLog {
+pub(crate) struct GoodLog {
     run: usize,
     records: Vec<Record>,
     joint_sigma: Vec<f64>,
@@ -330,7 +336,7 @@ impl GoodLog {
         Self { run: record.run, records, joint_sigma }
     }
 
-    fn as_run(&self) -> RunLog<'_> {
+    pub(crate) fn as_run(&self) -> RunLog<'_> {
         RunLog { run: self.run, records: &self.records, joint_sigma: &self.joint_sigma }
     }
 }

@@ -123,7 +123,7 @@ impl IterationStore {
     /// A log that is not there any more or holds something else.
     pub fn logs(&self, run: usize, joints: &[String], rates_hz: &[f64]) -> Result<Vec<Record>, IterationError> {
         let of_leg = |(leg, rate_hz): (usize, &f64)| {
-            let path = self.run_folder(run).join(log_name(leg));
+            let path = self.log_path(run, leg);
             read_log_table(&path, joints, *rate_hz).map_err(|error| IterationError::State {
                 problem: format!(
                     "{error}: runs are fitted together, so put the log back, or remove this run's folder and those after it"
@@ -139,6 +139,11 @@ impl IterationStore {
         IterationError::State { path: self.run_folder(run).join("run.json"), problem }
     }
 
+    /// The log of a run's leg, by its place from 0.
+    pub fn log_path(&self, run: usize, leg: usize) -> PathBuf {
+        self.run_folder(run).join(log_name(leg))
+    }
+
     /// The folder of a run.
     pub fn run_folder(&self, run: usize) -> PathBuf {
         self.runs.join(format!("run_{run}"))
@@ -146,7 +151,7 @@ impl IterationStore {
 }
 
 /// The log of a leg, by its place from 0, in its run's folder.
-pub(crate) fn log_name(leg: usize) -> String {
+fn log_name(leg: usize) -> String {
     if leg == 0 { "log.csv".to_owned() } else { format!("log_{}.csv", leg + 1) }
 }
 

@@ -1,9 +1,12 @@
 //! What `iterations.json` holds.
 
+use super::identification::BaseParameterResult;
 use super::provenance::Provenance;
 use dynident_iteration::{RunEvidence, Shortfall};
 use dynident_identification::examination::TorqueLag;
+use crate::error::Error;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// Schema of `iterations.json`.
 pub const ITERATIONS_SCHEMA: &str = "dynident/iterations/1";
@@ -44,8 +47,42 @@ pub struct IterationsFile {
     /// The Cramér-Rao bound of every parameter for one run: white torque noise of the simulated sensors at every
     /// recorded sample, exact positions.
     pub bound: Option<Vec<f64>>,
+    /// The base parameters by all good runs together, as in `result.json`; empty while runs are still being made.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub base_parameters: Vec<BaseParameterResult>,
+    /// Why there is no `result.json` although a run was good; none where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub no_result: Option<String>,
     /// All parameters of the last good physically consistent set: ten for each body, one for each term.
     pub possible_parameters: Option<Vec<f64>>,
+}
+
+impl IterationsFile {
+    /// Reads what an iteration has written so far.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is none of this version.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
+        let wrong = |message: String| Error::Result { path: path.to_owned(), message };
+        let file: Self = serde_json::from_slice(&bytes)
+            .map_err(|error| wrong(format!("not what `iterate` writes: {error}")))?;
+        if file.schema != ITERATIONS_SCHEMA {
+            return Err(wrong(format!("schema `{}`, not `{ITERATIONS_SCHEMA}`: iterate again with this version", file.schema)));
+        }
+        Ok(file)
+    }
+
+    /// The state in one line: how it stands, runs, tracking, what is unmet.
+    pub fn status_line(&self) -> String {
+        let good = self.runs.iter().filter(|run| run.accepted).count();
+        let mut line = format!("{}: {}; {good} good of {} runs", self.name, self.reason, self.runs.len());
+        if let Some(last) = self.runs.iter().rfind(|run| run.accepted) {
+            let worst = last.max_tracking_error_rad.iter().fold(0.0_f64, |most, error| most.max(*error));
+            line += &format!("; tracking {worst:.2e} rad (m)");
+        }
+        if self.converged { line } else { format!("{line}; {} unmet", self.unmet.len()) }
+    }
 }
 
 /// Something that stands between an iteration and success.

@@ -2,6 +2,7 @@
 
 mod bound;
 mod legs;
+mod model;
 mod report;
 mod trajectory;
 
@@ -22,6 +23,7 @@ use dynident_iteration::{
 };
 use dynident_iteration::{Robot, RobotRun};
 use fnv::FnvHasher;
+use model::{EndedStage, MODEL_FILES, RobotFiles, robot_found};
 use report::{IterationReport, Stage, joined};
 use std::hash::Hasher;
 use std::path::Path;
@@ -78,7 +80,8 @@ pub fn iterate_study(
     let folder = |stage: usize| if one { out.to_owned() } else { out.join(format!("leg_{}", stage + 1)) };
     // What an earlier call found goes before its runs do.
     if !resume {
-        OutputSet::new(out).absent(ITERATIONS).absent(PAGE).absent(TRAJECTORY).write()?;
+        let set = OutputSet::new(out).absent(ITERATIONS).absent(PAGE).absent(TRAJECTORY);
+        MODEL_FILES.into_iter().fold(set, OutputSet::absent).write()?;
     }
     // All of them first: with --fresh no run of an earlier call may be left in any.
     let stores = (0..stages.len())
@@ -114,7 +117,7 @@ pub fn iterate_study(
     // The stages, each with what those before it have found held.
     let mut known_std: Vec<Option<f64>> = vec![None; robot.layout().columns().len()];
     let mut known: Vec<(usize, f64)> = Vec::new();
-    let (mut files, mut traces, mut made) = (Vec::new(), Vec::new(), 0);
+    let (mut files, mut traces, mut made, mut ended) = (Vec::new(), Vec::new(), 0, Vec::new());
     for (number, members) in stages.iter().enumerate() {
         let own: Vec<_> = members.iter().map(|&leg| legs[leg].clone()).collect();
         let task = IterationTask {
@@ -142,7 +145,7 @@ pub fn iterate_study(
                         Stage { leg, robot, records, status: &status, shortfalls: &[], known_std: &known_std };
                     let now = report.file(&stage);
                     let all: Vec<IterationsFile> = files.iter().cloned().chain([now]).collect();
-                    joined(all).and_then(|file| write_set(out, &file, None).err())
+                    joined(all).and_then(|file| write_set(out, &file, None, RobotFiles::none()).err())
                 }
                 Err(error) => Some(in_iteration(error)),
             };
@@ -163,9 +166,11 @@ pub fn iterate_study(
                 traces.push(RunTrace::new(name, &stores[number], own.reference(), &robot.parametric.joint_names()));
             }
         }
+        let is_over = matches!(status, IterationStatus::Refused { .. } | IterationStatus::Waiting { .. });
+        ended.push(EndedStage { records: outcome.runs.clone(), iteration, store: &stores[number] });
         // What the next one holds.
         let last = records.iter().rev().find(|record| record.accepted).and_then(RunRecord::knowledge);
-        if matches!(status, IterationStatus::Refused { .. } | IterationStatus::Waiting { .. }) {
+        if is_over {
             break;
         }
         let Some(last) = last else { break };
@@ -182,15 +187,22 @@ pub fn iterate_study(
     let mut file = joined(files).ok_or_else(|| in_section(StudyError::missing("leg", "there is none")))?;
     file.converged &= file.runs.last().is_some_and(|run| run.leg.is_none_or(|leg| leg == stages.len()));
     let time = TimeSpent { before_runs_s, all_s: begin.elapsed().as_secs_f64(), runs: made };
-    write_set(out, &file, Some(iteration_report(&file, &traces, &time)?))?;
+    // Runs are not lost because their robot cannot be written.
+    let found = robot_found((study, study_path), &robot, &ended, options, in_iteration).unwrap_or_else(|why| {
+        file.no_result = Some(why.to_string());
+        RobotFiles::none()
+    });
+    file.base_parameters = found.base_parameters.clone();
+    write_set(out, &file, Some(iteration_report(&file, &traces, &time)?), found)?;
     Ok(file)
 }
 
-/// The file and its page; while runs are still being made there is no page, and none of an earlier call.
-fn write_set(out: &Path, file: &IterationsFile, page: Option<String>) -> Result<(), Error> {
+/// The file, its page and the robot that was found; while runs are still being made there is no page and no robot, and
+/// none of an earlier call.
+fn write_set(out: &Path, file: &IterationsFile, page: Option<String>, found: RobotFiles) -> Result<(), Error> {
     let bytes = serde_json::to_vec_pretty(file)
         .map_err(|error| Error::Result { path: out.join(ITERATIONS), message: error.to_string() })?;
-    let set = OutputSet::new(out).file(ITERATIONS, bytes);
+    let set = found.added_to(OutputSet::new(out).file(ITERATIONS, bytes));
     match page {
         Some(page) => set.file(PAGE, page),
         None => set.absent(PAGE),

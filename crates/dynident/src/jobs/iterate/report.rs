@@ -123,6 +123,8 @@ impl IterationReport<'_> {
             tracking_improvement,
             error_over_bound,
             bound: bound.map(<[f64]>::to_vec),
+            base_parameters: Vec::new(),
+            no_result: None,
             possible_parameters: last.and_then(|estimate| estimate.possible.clone()),
         }
     }
