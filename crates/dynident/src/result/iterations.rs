@@ -41,8 +41,8 @@ pub struct IterationsFile {
     /// Largest tracking error (mean over the joints) of the first good run over that of the last; none before there are
     /// two.
     pub tracking_improvement: Option<f64>,
-    /// Root mean square over the parameters of the last good estimate's error in units of the Cramér-Rao bound; for
-    /// simulated robots with torque noise.
+    /// Root mean square over the parameters of the error of what the last good run says alone, in units of the Cramér-Rao
+    /// bound; for simulated robots with torque noise.
     pub error_over_bound: Option<f64>,
     /// The Cramér-Rao bound of every parameter for one run: white torque noise of the simulated sensors at every
     /// recorded sample, exact positions.

@@ -95,7 +95,9 @@ impl IterationReport<'_> {
             _ => None,
         };
         let last = good.last().and_then(|record| record.knowledge());
-        let error_over_bound = last.zip(truth).zip(bound).and_then(|((estimate, truth), bound)| {
+        // The bound is one run's.
+        let own = good.last().and_then(|record| record.estimate.as_ref());
+        let error_over_bound = own.zip(truth).zip(bound).and_then(|((estimate, truth), bound)| {
             let ratios: Vec<f64> = (0..bound.len())
                 .filter(|&k| bound[k] > 0.0 && !estimate.fixed.contains(&k))
                 .map(|k| ((estimate.values[k] - truth[k]) / bound[k]).powi(2))
