@@ -6,6 +6,7 @@
 //! | what is run | [`Leg`]: a trajectory and which of its rows count |
 //! | a simulated robot | [`SimulatedRobot`] |
 //! | a program that speaks the line protocol, or a person with a folder | [`robot`] |
+//! | stops, permissions, what no sample may leave | [`iterate_supervised`] with a [`Supervisor`]; [`SafetySettings`] |
 //! | a robot of one's own | a type with [`Robot`] |
 //! | one run's identification | [`identify_run`]: all joints at once, or step by step from tip to base as in the paper |
 //! | what the next run is | [`Iteration::next`], a pure function of the records so far: which controller and model it has, whether a run got worse, when all has settled |
@@ -67,12 +68,14 @@ mod motion;
 mod policy;
 mod record;
 pub mod robot;
+mod runs_folder;
 mod settings;
 mod status;
 mod step_by_step;
 mod store;
+mod supervision;
 
-pub use drive::{Iteration, IterationOutcome, iterate};
+pub use drive::{Iteration, IterationOutcome, iterate, iterate_supervised};
 pub use error::IterationError;
 pub use estimate::{RunEstimate, identify_run};
 pub use leg::{IterationTask, Leg};
@@ -80,7 +83,8 @@ pub use model_parameters::ModelParameters;
 pub use motion::measured_motion;
 pub use policy::{Next, RunPlan};
 pub use record::{RunRecord, UsedController};
-pub use robot::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, SimulatedRobot};
+pub use robot::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, SimulatedRobot, StopSignal};
 pub use settings::{IterationSettings, RunIdentificationSettings, Scheme, SettledSettings, StartWith};
 pub use status::IterationStatus;
 pub use store::{IterationStore, RUN_SCHEMA, RunFile};
+pub use supervision::{NextMotion, SafetySettings, Supervisor};

@@ -5,3 +5,4 @@ mod identification;
 mod iteration;
 mod policy;
 mod robots;
+mod stops;

@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 /// Schema of `iterations.json`.
 pub const ITERATIONS_SCHEMA: &str = "dynident/iterations/1";
 
+/// The status of an iteration that a stop ended.
+pub const INTERRUPTED: &str = "interrupted";
+
 /// `iterations.json`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -19,7 +22,7 @@ pub struct IterationsFile {
     pub provenance: Option<Provenance>,
     /// Whether tracking and parameters have settled.
     pub converged: bool,
-    /// `converged`, `runs-used-up`, `refused` or `waiting`.
+    /// `converged`, `runs-used-up`, `refused`, `waiting` or `interrupted`.
     pub status: String,
     /// The status in words.
     pub reason: String,

@@ -52,7 +52,8 @@ fn iterated(folder: &Path, more: &str) -> (IterationsFile, String) {
     let path = folder.join("study.toml");
     let study = Study::load(&path).unwrap();
     let options = RunOptions { data: None, threads: 1, progress: &Silent };
-    let mut watch = IterationWatch { design: &|_| ControlFlow::Continue(()), run: &mut |_, _| {} };
+    let mut hear = |_: &_, _: &[_]| {};
+    let mut watch = IterationWatch::new(&|_| ControlFlow::Continue(()), &mut hear);
     let out = folder.join("out");
     let file = iterate_study(&study, &path, &out, true, &options, &mut watch).unwrap();
     assert_reads_back(&file);

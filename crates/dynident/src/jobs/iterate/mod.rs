@@ -18,7 +18,8 @@ use crate::study::{Folders, PriorChoice, RobotChoice, Study, StudyRobot};
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
 use dynident_iteration::{
-    Iteration, IterationError, IterationStatus, IterationStore, IterationTask, RunRecord, iterate,
+    Iteration, IterationError, IterationStatus, IterationStore, IterationTask, NextMotion, RunRecord, StopSignal,
+    Supervisor, iterate_supervised,
 };
 use dynident_iteration::{Robot, RobotRun};
 use fnv::FnvHasher;
@@ -33,6 +34,45 @@ pub struct IterationWatch<'a> {
     pub design: &'a (dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
     /// Every new run.
     pub run: &'a mut dyn FnMut(&RunRecord, &[RobotRun]),
+    /// Who asks for a stop: the robot is stopped, what was recorded is kept, and no further run is commanded.
+    pub stop: StopSignal,
+    /// Whether a motion of a robot outside may be commanded, asked before each; without it all may.
+    pub allow: Option<&'a mut dyn FnMut(&NextMotion) -> bool>,
+}
+
+impl<'a> IterationWatch<'a> {
+    /// Hears only; nobody stops it, and every motion may be commanded.
+    pub fn new(
+        design: &'a (dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
+        run: &'a mut dyn FnMut(&RunRecord, &[RobotRun]),
+    ) -> Self {
+        Self { design, run, stop: StopSignal::default(), allow: None }
+    }
+}
+
+/// Hears of a stage's runs, and asks for permission.
+struct Watched<'a, 'b> {
+    stop: &'a StopSignal,
+    allow: &'a mut Option<&'b mut dyn FnMut(&NextMotion) -> bool>,
+    made: &'a mut dyn FnMut(&RunRecord, &[RobotRun]),
+}
+
+impl Supervisor for Watched<'_, '_> {
+    fn stop(&self) -> Option<&StopSignal> {
+        Some(self.stop)
+    }
+
+    fn asks(&self) -> bool {
+        self.allow.is_some()
+    }
+
+    fn allows(&mut self, motion: &NextMotion) -> bool {
+        self.allow.as_mut().is_none_or(|allow| allow(motion))
+    }
+
+    fn made(&mut self, record: &RunRecord, runs: &[RobotRun]) {
+        (self.made)(record, runs);
+    }
 }
 
 /// Iterates a study's robot. What is found stands in `out`: `trajectory.json` (the trajectories at the controller's
@@ -86,7 +126,15 @@ pub fn iterate_study(
         .collect::<Result<Vec<_>, _>>()
         .map_err(in_iteration)?;
     let rate_hz = simulation.rate_hz;
-    let make = || legs::trajectories(study, study_path, &robot, rate_hz, options, watch.design);
+    let stop = watch.stop.clone();
+    let make = || {
+        let found = legs::trajectories(study, study_path, &robot, rate_hz, options, watch.design)?;
+        // A search that was cut short would be this folder's trajectory for ever.
+        if stop.is_requested() {
+            return Err(Error::Interrupted { what: "the search for the trajectory" });
+        }
+        Ok(found)
+    };
     let trajectories = kept(&out.join(TRAJECTORY), &fingerprint, resume, make)?;
 
     // What is believed of the robot, what it runs, and what the file says of it.
@@ -133,7 +181,7 @@ pub fn iterate_study(
         let mut unwritten = None;
         let run = &mut *watch.run;
         // The runs; the file is written after each.
-        let outcome = iterate(&iteration, &mut robots, Some(&stores[number]), &mut |record, runs| {
+        let mut made_one = |record: &RunRecord, runs: &[RobotRun]| {
             so_far.push(record.clone());
             let status = IterationStatus::Waiting { reason: "for the next run".to_owned() };
             unwritten = match iteration.robot(&so_far) {
@@ -146,7 +194,9 @@ pub fn iterate_study(
                 Err(error) => Some(in_iteration(error)),
             };
             run(record, runs);
-        });
+        };
+        let mut watched = Watched { stop: &watch.stop, allow: &mut watch.allow, made: &mut made_one };
+        let outcome = iterate_supervised(&iteration, &mut robots, Some(&stores[number]), &mut watched);
         let outcome = outcome.map_err(in_iteration)?;
         if let Some(error) = unwritten {
             return Err(error);
@@ -164,8 +214,11 @@ pub fn iterate_study(
         }
         // What the next one holds.
         let last = records.iter().rev().find(|record| record.accepted).and_then(|record| record.estimate.as_ref());
-        if matches!(status, IterationStatus::Refused { .. } | IterationStatus::Waiting { .. }) {
-            break;
+        match status {
+            IterationStatus::Refused { .. } | IterationStatus::Waiting { .. } | IterationStatus::Interrupted { .. } => {
+                break;
+            }
+            IterationStatus::Converged | IterationStatus::RunsUsedUp => {}
         }
         let Some(last) = last else { break };
         let determined = known_std.len().min(last.values.len());

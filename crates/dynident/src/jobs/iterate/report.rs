@@ -1,7 +1,7 @@
 //! From records to what `iterations.json` holds.
 
 use crate::jobs::options::study_name;
-use crate::result::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, Provenance};
+use crate::result::{INTERRUPTED, ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, Provenance};
 use crate::study::{Study, StudyRobot};
 use dynident_dynamics::ParametricModel;
 use dynident_iteration::{IterationStatus, RunEstimate, RunRecord};
@@ -106,6 +106,7 @@ impl IterationReport<'_> {
                 IterationStatus::Converged => "converged",
                 IterationStatus::RunsUsedUp => "runs-used-up",
                 IterationStatus::Refused { .. } => "refused",
+                IterationStatus::Interrupted { .. } => INTERRUPTED,
                 IterationStatus::Waiting { .. } => "waiting",
             }
             .to_owned(),
