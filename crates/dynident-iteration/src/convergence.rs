@@ -64,7 +64,9 @@ pub enum Shortfall {
         allowed: f64,
     },
     /// A parameter that is hardly known.
-    #[error("the error bar of {parameter} is {percent:.0} % of the largest parameter, {allowed_percent:.0} % are allowed")]
+    #[error(
+        "the error bar of {parameter} is {percent:.0} % of the largest parameter, {allowed_percent:.0} % are allowed"
+    )]
     ParameterUncertain {
         /// The base parameter.
         parameter: String,
@@ -96,7 +98,9 @@ pub enum Shortfall {
         half_width_95_s: f64,
     },
     /// The model of the runs before does not predict the last one.
-    #[error("the model of the runs before holds {inside_percent:.0} % of joint {joint}'s torque in its 95 % band, off by {rms_error_nm:.3} Nm where the band is {half_width_nm:.3}")]
+    #[error(
+        "the model of the runs before holds {inside_percent:.0} % of joint {joint}'s torque in its 95 % band, off by {rms_error_nm:.3} Nm where the band is {half_width_nm:.3}"
+    )]
     Prediction {
         /// The joint.
         joint: String,
@@ -108,7 +112,9 @@ pub enum Shortfall {
         half_width_nm: f64,
     },
     /// Torque that no parameter of the model explains.
-    #[error("{percent:.1} % of joint {joint}'s torque is left unexplained beyond its noise, {allowed_percent:.1} % are allowed")]
+    #[error(
+        "{percent:.1} % of joint {joint}'s torque is left unexplained beyond its noise, {allowed_percent:.1} % are allowed"
+    )]
     Unexplained {
         /// The joint.
         joint: String,
@@ -135,7 +141,9 @@ impl Shortfall {
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::TooFewRuns { .. } => "allow more runs (max_runs)",
-            Self::LastRunRejected { .. } => "see the reason; a first controller that holds the robot is the commonest cure",
+            Self::LastRunRejected { .. } => {
+                "see the reason; a first controller that holds the robot is the commonest cure"
+            }
             Self::NoModel => "allow more runs (max_runs)",
             Self::NoEvidence { .. } => "begin anew with this version",
             Self::Tracking { .. } => {
@@ -149,7 +157,9 @@ impl Shortfall {
             Self::Lag { .. } => {
                 "take positions and torques at the same instant, or correct the delay where the log is made"
             }
-            Self::Prediction { .. } => "look for what changed between the runs: temperature, load, sticking friction, sensor zeros",
+            Self::Prediction { .. } => {
+                "look for what changed between the runs: temperature, load, sticking friction, sensor zeros"
+            }
             Self::Unexplained { .. } => {
                 "other friction terms (friction = \"auto\"), the right lengths and axes in the description, or a larger settled.most_unexplained_percent"
             }
@@ -192,7 +202,9 @@ pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, na
     let own = last.estimate.as_ref();
     let lags = own.map_or(&[][..], |estimate| &estimate.torque_lags);
     for (place, shown) in evidence.joints.iter().enumerate() {
-        if let Some(Clipping { share, torque, stated }) = shown.clipping.filter(|clipping| clipping.share > MOST_CLIPPED) {
+        if let Some(Clipping { share, torque, stated }) =
+            shown.clipping.filter(|clipping| clipping.share > MOST_CLIPPED)
+        {
             let beyond = last.max_tracking_error_rad[place] > limits.tracking_tolerance;
             // Without a stated limit a flat top is a matter of the drive only where the joint does not follow.
             if stated || beyond {
@@ -231,7 +243,8 @@ fn parameters(
     let limits = &settings.settled;
     let largest = largest(new);
     let count = new.values.len().min(old.values.len());
-    let name = |place: usize| names.parameters.get(place).cloned().unwrap_or_else(|| format!("parameter {}", place + 1));
+    let name =
+        |place: usize| names.parameters.get(place).cloned().unwrap_or_else(|| format!("parameter {}", place + 1));
     let moved = |k: usize| {
         let beyond = (new.values[k] - old.values[k]).abs() - limits.parameter_tolerance * largest;
         let bar = new.std[k].hypot(old.std[k]);

@@ -7,15 +7,16 @@ use crate::leg::{IterationTask, Leg};
 use crate::model_parameters::ModelParameters;
 use crate::policy::{self, Next, RunPlan};
 use crate::record::{RunRecord, UsedController};
-use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest};
+use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest, StopSignal};
 use crate::run_examination::{add_tracking_floors, examined, following_limits};
 use crate::settings::{IterationSettings, RunIdentificationSettings};
 use crate::status::IterationStatus;
 use crate::store::IterationStore;
+use crate::supervision::{NextMotion, Supervisor, Watching};
 use dynident_dynamics::ParametricModel;
 use dynident_identification::friction::chosen_model;
 use dynident_simulation::Record;
-use dynident_simulation::controllers::ControllerModel;
+use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{SimulationError, require_length};
 
 use std::borrow::Cow;
@@ -45,6 +46,8 @@ pub struct IterationOutcome {
 enum PlannedRun {
     Run(Box<RunRecord>, Vec<RobotRun>),
     Stopped(IterationStatus),
+    /// A stop was asked for: what was recorded of the run, and how it ended.
+    Interrupted(Vec<RobotRun>, String),
 }
 
 impl Iteration {
@@ -75,7 +78,8 @@ impl Iteration {
     pub fn next(&self, records: &[RunRecord]) -> Result<Next, IterationError> {
         let robot = self.robot(records)?;
         let next = policy::next(records, &self.settings, robot.nominal(), &names(&robot));
-        if let Next::Finished(IterationStatus::Converged | IterationStatus::Settled | IterationStatus::RunsUsedUp) = next
+        if let Next::Finished(IterationStatus::Converged | IterationStatus::Settled | IterationStatus::RunsUsedUp) =
+            next
             && let Some(reason) = self.beyond_torque(records)?
         {
             return Ok(Next::Finished(IterationStatus::Refused { reason }));
@@ -175,6 +179,7 @@ impl Iteration {
         plan: &RunPlan,
         before: &[RunRecord],
         earlier: &[GoodLog],
+        supervisor: &mut dyn Supervisor,
     ) -> Result<PlannedRun, IterationError> {
         let legs = &self.task.legs;
         let controller = plan.controller(&self.settings);
@@ -185,7 +190,20 @@ impl Iteration {
             // Numbers of runs differ from leg to leg: noise and folders go by them.
             let run = (plan.run - 1) * legs.len() + number + 1;
             let reference = leg.reference();
-            let came = robot.run(&RunRequest { run, reference, controller: &controller, model: model.as_ref() })?;
+            let stop = supervisor.stop().cloned();
+            if stop.as_ref().is_some_and(StopSignal::is_requested) {
+                return Ok(PlannedRun::Interrupted(runs, "between two runs".to_owned()));
+            }
+            if !supervisor.allows(&self.next_motion(plan, &controller, number)) {
+                let reason = format!("run {} was not allowed", plan.run);
+                return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
+            }
+            let came = robot.run(&RunRequest {
+                model: model.as_ref(),
+                envelope: self.settings.safety.envelope.as_ref(),
+                stop: stop.as_ref(),
+                ..RunRequest::new(run, reference, &controller)
+            })?;
             match &came.status {
                 RobotStatus::Waiting { .. } => {
                     let reason = came.status.to_string();
@@ -195,7 +213,15 @@ impl Iteration {
                     let reason = format!("run {}: {fault}", plan.run);
                     return Ok(PlannedRun::Stopped(IterationStatus::Refused { reason }));
                 }
-                _ => {}
+                RobotStatus::Interrupted { .. } => {
+                    let how = came.status.to_string();
+                    runs.push(came);
+                    return Ok(PlannedRun::Interrupted(runs, how));
+                }
+                RobotStatus::Done
+                | RobotStatus::Simulated { .. }
+                | RobotStatus::Stopped { .. }
+                | RobotStatus::LeftEnvelope { .. } => {}
             }
             let done = came.status.is_done();
             runs.push(came);
@@ -269,6 +295,24 @@ impl Iteration {
         Ok(())
     }
 
+    fn next_motion(&self, plan: &RunPlan, controller: &ControllerSettings, leg: usize) -> NextMotion {
+        let reference = self.task.legs[leg].reference();
+        let motion = reference.motion();
+        let names = self.task.robot.joint_names();
+        let largest = |(joint, name): (usize, String)| {
+            (name, motion.dq[motion.of(joint)].iter().fold(0.0_f64, |most, dq| most.max(dq.abs())))
+        };
+        NextMotion {
+            run: plan.run,
+            leg: (leg, self.task.legs.len()),
+            controller: controller.name().to_owned(),
+            model_based: plan.model.is_some(),
+            duration_s: reference.duration_s(),
+            speed: 1.0,
+            largest_speed: names.into_iter().enumerate().map(largest).collect(),
+        }
+    }
+
     fn recorded(&self, plan: &RunPlan, name: &str, runs: &[RobotRun]) -> RunRecord {
         let joints = self.task.robot.dof();
         let mut worst = vec![0.0_f64; joints];
@@ -307,7 +351,11 @@ impl Iteration {
     }
 
     /// The logs of these runs.
-    pub(crate) fn logs_of(&self, records: &[&RunRecord], store: &IterationStore) -> Result<Vec<GoodLog>, IterationError> {
+    pub(crate) fn logs_of(
+        &self,
+        records: &[&RunRecord],
+        store: &IterationStore,
+    ) -> Result<Vec<GoodLog>, IterationError> {
         let joints = self.task.robot.joint_names();
         let rates = |record: &RunRecord| -> Vec<f64> {
             let kept = record.evidence.as_ref().map(|evidence| evidence.log_rates_hz.clone()).unwrap_or_default();
@@ -363,6 +411,20 @@ pub fn iterate(
     store: Option<&IterationStore>,
     watch: &mut dyn FnMut(&RunRecord, &[RobotRun]),
 ) -> Result<IterationOutcome, IterationError> {
+    iterate_supervised(iteration, robots, store, &mut Watching(watch))
+}
+
+/// [`iterate()`] under somebody's eyes, who may stop it, and is asked before every motion. A run that a stop cuts short
+/// does not count: what was recorded of it is kept in a folder of its own, and the run is made anew by the next call.
+///
+/// # Errors
+/// As [`iterate()`].
+pub fn iterate_supervised(
+    iteration: &Iteration,
+    robots: &mut [&mut dyn Robot],
+    store: Option<&IterationStore>,
+    supervisor: &mut dyn Supervisor,
+) -> Result<IterationOutcome, IterationError> {
     let legs = iteration.task.legs.len();
     if robots.len() != 1 {
         require_length("robots", legs, robots.len())?;
@@ -379,6 +441,7 @@ pub fn iterate(
         Ok(IterationOutcome { status, shortfalls, runs: records })
     };
     let mut good: Option<Vec<GoodLog>> = None;
+    let mut stopped: Option<String> = None;
     loop {
         let plan = match iteration.next(&records)? {
             Next::Run(plan) => plan,
@@ -389,8 +452,19 @@ pub fn iterate(
             Some(good) => good,
             None => good.insert(iteration.good_logs(&records, store)?),
         };
-        match iteration.made(robots, &plan, &records, good)? {
+        if let Some(why) = stopped.filter(|_| iteration.settings.safety.outside && !supervisor.asks()) {
+            let reason = format!("{why}. Look at the robot; the same command goes on with run {}", plan.run);
+            return outcome(IterationStatus::Waiting { reason }, records);
+        }
+        match iteration.made(robots, &plan, &records, good, supervisor)? {
             PlannedRun::Stopped(status) => return outcome(status, records),
+            PlannedRun::Interrupted(runs, how) => {
+                let kept = store.map_or(Ok(None), |store| store.keep_interrupted(plan.run, &runs, &how))?;
+                let kept =
+                    kept.map_or_else(String::new, |path| format!("; what was recorded of it: {}", path.display()));
+                let reason = format!("{how}{kept}. The same command goes on with run {}", plan.run);
+                return outcome(IterationStatus::Interrupted { reason }, records);
+            }
             PlannedRun::Run(record, runs) => {
                 if record.accepted && record.estimate.is_some() && iteration.settings.pool {
                     good.push(GoodLog::new(&record, runs.iter().map(|run| run.record.clone()).collect()));
@@ -398,7 +472,8 @@ pub fn iterate(
                 if let Some(store) = store {
                     store.keep(&record, &runs)?;
                 }
-                watch(&record, &runs);
+                supervisor.made(&record, &runs);
+                stopped = (!record.done).then(|| format!("run {} ended early: {}", record.run, record.outcome));
                 records.push(*record);
             }
         }

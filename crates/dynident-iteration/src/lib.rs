@@ -6,6 +6,7 @@
 //! | what is run | [`Leg`]: a trajectory and which of its rows count |
 //! | a simulated robot | [`SimulatedRobot`] |
 //! | a program that speaks the line protocol, or a person with a folder | [`robot`] |
+//! | stops, permissions, what no sample may leave | [`iterate_supervised`] with a [`Supervisor`]; [`SafetySettings`] |
 //! | a robot of one's own | a type with [`Robot`] |
 //! | one run's identification | [`identify_run`]: all joints at once, or step by step from tip to base as in the paper |
 //! | several runs' identification together | [`identify_runs`], each weighted by its own noise |
@@ -75,14 +76,16 @@ mod prediction;
 mod record;
 pub mod robot;
 mod run_examination;
+mod runs_folder;
 mod settings;
 mod status;
 mod step_by_step;
 mod store;
+mod supervision;
 mod tracking_floor;
 
 pub use convergence::Shortfall;
-pub use drive::{Iteration, IterationOutcome, iterate};
+pub use drive::{Iteration, IterationOutcome, iterate, iterate_supervised};
 pub use error::IterationError;
 pub use estimate::{RunEstimate, RunLog, identify_run, identify_runs};
 pub use evidence::{Clipping, JointEvidence, Prediction, RunEvidence};
@@ -92,7 +95,8 @@ pub use model_parameters::ModelParameters;
 pub use motion::measured_motion;
 pub use policy::{Next, RunPlan};
 pub use record::{RunRecord, UsedController};
-pub use robot::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, SimulatedRobot};
+pub use robot::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, SimulatedRobot, StopSignal};
 pub use settings::{IterationSettings, RunIdentificationSettings, Scheme, SettledSettings, StartWith};
 pub use status::IterationStatus;
 pub use store::{IterationStore, RUN_SCHEMA, RunFile};
+pub use supervision::{NextMotion, SafetySettings, Supervisor};

@@ -35,7 +35,8 @@ pub(crate) fn predictions(
         let root = DMatrix::from_diagonal(&root) * eigen.eigenvectors.transpose();
         JointSums { root, sigma: known.joint_sigma[joint], ..JointSums::default() }
     });
-    let mut sums = Sums { model, theta: known.theta, joints: joints.collect(), counted: Vec::new(), buffer: Vec::new() };
+    let mut sums =
+        Sums { model, theta: known.theta, joints: joints.collect(), counted: Vec::new(), buffer: Vec::new() };
     for &index in indices {
         logs.pass(model, index).run(&mut sums)?;
     }

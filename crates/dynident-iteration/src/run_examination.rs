@@ -72,7 +72,8 @@ pub(crate) fn examined(
 fn torque_noise(records: &[Record], dof: usize) -> Vec<f64> {
     let mut most = vec![0.0_f64; dof];
     for record in records.iter().filter(|record| record.samples > 0) {
-        let columns = |values: &[f64]| -> Vec<Vec<f64>> { values.chunks_exact(record.samples).map(<[f64]>::to_vec).collect() };
+        let columns =
+            |values: &[f64]| -> Vec<Vec<f64>> { values.chunks_exact(record.samples).map(<[f64]>::to_vec).collect() };
         let (q, tau) = (columns(&record.q), columns(&record.tau));
         // Torque has faded where positions have: friction at reversals alone goes beyond.
         let found = position_noise(&tau, record.rate_hz, cutoff(&q, record.rate_hz).cutoff_hz);
@@ -101,7 +102,8 @@ fn predict(
     let logs = Logs::new(task.robot.model(), &recordings, identification.filters(), &all, None, Execution::default())?;
     let model = RegressorModel::from(task.robot.clone());
     let model = model.clone().with_load_of(&model, &known.values);
-    let added = known_payloads(&settings.payloads, &model).map_err(dynident_identification::IdentificationError::from)?;
+    let added =
+        known_payloads(&settings.payloads, &model).map_err(dynident_identification::IdentificationError::from)?;
     // Legs with the same payload together.
     let mut groups: Vec<(Vec<f64>, Vec<usize>)> = Vec::new();
     for index in all {

@@ -1,5 +1,6 @@
 //! Settings of an iteration.
 
+use crate::supervision::SafetySettings;
 use dynident_identification::EstimationSettings;
 use dynident_identification::consistent::ConsistencySettings;
 use dynident_identification::estimators::Estimator;
@@ -153,6 +154,8 @@ pub struct IterationSettings {
     pub max_runs: usize,
     /// When all has settled.
     pub settled: SettledSettings,
+    /// What keeps runs safe.
+    pub safety: SafetySettings,
 }
 
 impl Default for IterationSettings {
@@ -171,6 +174,7 @@ impl Default for IterationSettings {
             most_model_free: 4,
             max_runs: 8,
             settled: SettledSettings::default(),
+            safety: SafetySettings::default(),
         }
     }
 }

@@ -18,6 +18,11 @@ pub enum IterationStatus {
         /// Why.
         reason: String,
     },
+    /// Somebody asked for a stop; the next call goes on from here.
+    Interrupted {
+        /// What became of the run that was under way, and how to go on.
+        reason: String,
+    },
     /// Somebody has to run the robot first; then the iteration goes on from here.
     Waiting {
         /// For what.
@@ -39,6 +44,7 @@ impl core::fmt::Display for IterationStatus {
             Self::Settled => write!(f, "not converged: nothing changes any more"),
             Self::RunsUsedUp => write!(f, "not converged: all runs allowed were made"),
             Self::Refused { reason } => write!(f, "refused: {reason}"),
+            Self::Interrupted { reason } => write!(f, "interrupted: {reason}"),
             Self::Waiting { reason } => write!(f, "waiting: {reason}"),
         }
     }

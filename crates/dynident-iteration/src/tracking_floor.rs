@@ -38,7 +38,8 @@ pub(crate) fn tracking_floor(reference: &Reference, known: &KnownLoop<'_>) -> Op
         seed: SEED,
         ..SensorSettings::default()
     };
-    let settings = LoopSettings { integrator: Integrator::Rk4 { steps_per_sample: 2 }, sensors, ..LoopSettings::default() };
+    let settings =
+        LoopSettings { integrator: Integrator::Rk4 { steps_per_sample: 2 }, sensors, ..LoopSettings::default() };
     let speed = |joint: usize| {
         let motion = reference.motion();
         motion.dq[motion.of(joint)].iter().fold(0.0_f64, |most, dq| most.max(dq.abs()))

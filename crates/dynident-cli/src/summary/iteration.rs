@@ -38,7 +38,11 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
     if let Some(why) = &file.no_result {
         text += &wrapped(&format!("No result.json: {why}"), 4);
     }
-    let robot = if file.base_parameters.is_empty() { "" } else { ", and the robot found: result.json, identification.html, controller.json and its description" };
+    let robot = if file.base_parameters.is_empty() {
+        ""
+    } else {
+        ", and the robot found: result.json, identification.html, controller.json and its description"
+    };
     text += &wrapped(
         &format!("Written: {}, {}{robot}", out.join("iterations.json").display(), out.join("report.html").display()),
         4,
@@ -58,7 +62,10 @@ fn parameters(file: &IterationsFile) -> String {
     });
     text += &table(&["parameter", "value", "+-", "unit"].map(str::to_owned), 1..3, rows.collect());
     if file.base_parameters.len() > MOST_PARAMETERS {
-        text += &wrapped(&format!("and {} more, in result.json and report.html", file.base_parameters.len() - MOST_PARAMETERS), 4);
+        text += &wrapped(
+            &format!("and {} more, in result.json and report.html", file.base_parameters.len() - MOST_PARAMETERS),
+            4,
+        );
     }
     text.push('\n');
     text

@@ -7,4 +7,5 @@ mod policy;
 mod pooling;
 mod robots;
 mod simulated_arm;
+mod stops;
 mod verdict;

@@ -26,12 +26,8 @@ pub(crate) struct Simulated {
 
 impl Default for Simulated {
     fn default() -> Self {
-        let sensors = SensorSettings {
-            position_std: 2e-5.into(),
-            torque_std: 0.05.into(),
-            seed: 1,
-            ..SensorSettings::default()
-        };
+        let sensors =
+            SensorSettings { position_std: 2e-5.into(), torque_std: 0.05.into(), seed: 1, ..SensorSettings::default() };
         let shape = CoulombShape::Smooth { width: 0.1 };
         Self { length_m: 1.0, tip_kg: 1.3, shape, coulomb: [1.5, 1.0], limits: RunLimits::default(), sensors }
     }
@@ -85,7 +81,9 @@ pub(crate) fn reference() -> Reference {
                 let (a, w) = (share * amplitude, core::f64::consts::TAU * hertz);
                 [a * (1.0 - (w * t).cos()), a * w * (w * t).sin(), a * w * w * (w * t).cos()]
             };
-            let sum = |k: usize| [term(0.6, first), term(-0.5, 2.0 * first), term(0.35, 4.0 * first)].iter().map(|own| own[k]).sum();
+            let sum = |k: usize| {
+                [term(0.6, first), term(-0.5, 2.0 * first), term(0.35, 4.0 * first)].iter().map(|own| own[k]).sum()
+            };
             motion.q.push(sum(0));
             motion.dq.push(sum(1));
             motion.ddq.push(sum(2));

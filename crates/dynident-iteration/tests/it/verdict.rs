@@ -90,7 +90,8 @@ fn another_arm_than_described_never_converges() {
 /// Friction that breaks loose with a step, in a joint whose model has a smooth one of a wide range.
 #[test]
 fn a_joint_that_sticks_never_converges() {
-    let sticking = Simulated { shape: CoulombShape::Smooth { width: 0.002 }, coulomb: [6.0, 4.0], ..Simulated::default() };
+    let sticking =
+        Simulated { shape: CoulombShape::Smooth { width: 0.002 }, coulomb: [6.0, 4.0], ..Simulated::default() };
     let (_, outcome) = iterated(&sticking, settings());
     assert!(!outcome.status.is_converged(), "{}", words(&outcome));
 }

@@ -112,7 +112,8 @@ pub(crate) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time:
 
 /// What stands between the iteration and success, with what would help.
 fn unmet(file: &IterationsFile) -> Text {
-    let point = |unmet: &UnmetCondition| (Tone::Warning, format!("{}. What would help: {}.", unmet.message, unmet.remedy));
+    let point =
+        |unmet: &UnmetCondition| (Tone::Warning, format!("{}. What would help: {}.", unmet.message, unmet.remedy));
     Text { paragraphs: Vec::new(), points: file.unmet.iter().map(point).collect() }
 }
 

@@ -2,14 +2,17 @@
 
 use super::identification::BaseParameterResult;
 use super::provenance::Provenance;
-use dynident_iteration::{RunEvidence, Shortfall};
-use dynident_identification::examination::TorqueLag;
 use crate::error::Error;
+use dynident_identification::examination::TorqueLag;
+use dynident_iteration::{RunEvidence, Shortfall};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Schema of `iterations.json`.
 pub const ITERATIONS_SCHEMA: &str = "dynident/iterations/1";
+
+/// The status of an iteration that a stop ended.
+pub const INTERRUPTED: &str = "interrupted";
 
 /// `iterations.json`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -24,8 +27,8 @@ pub struct IterationsFile {
     pub provenance: Option<Provenance>,
     /// Whether everything is met that makes a success: see `unmet`.
     pub converged: bool,
-    /// `converged`, `settled` (nothing changes any more, but something is unmet), `runs-used-up`, `refused` or
-    /// `waiting`.
+    /// `converged`, `settled` (nothing changes any more, but something is unmet), `runs-used-up`, `refused`, `waiting` or
+    /// `interrupted`.
     pub status: String,
     /// The status in words.
     pub reason: String,
@@ -65,10 +68,13 @@ impl IterationsFile {
     pub fn read(path: &Path) -> Result<Self, Error> {
         let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
         let wrong = |message: String| Error::Result { path: path.to_owned(), message };
-        let file: Self = serde_json::from_slice(&bytes)
-            .map_err(|error| wrong(format!("not what `iterate` writes: {error}")))?;
+        let file: Self =
+            serde_json::from_slice(&bytes).map_err(|error| wrong(format!("not what `iterate` writes: {error}")))?;
         if file.schema != ITERATIONS_SCHEMA {
-            return Err(wrong(format!("schema `{}`, not `{ITERATIONS_SCHEMA}`: iterate again with this version", file.schema)));
+            return Err(wrong(format!(
+                "schema `{}`, not `{ITERATIONS_SCHEMA}`: iterate again with this version",
+                file.schema
+            )));
         }
         Ok(file)
     }

@@ -16,7 +16,8 @@ fn options() -> RunOptions<'static> {
 }
 
 fn iterated(study: &Study, path: &Path, out: &Path) -> Result<IterationsFile, Error> {
-    let mut watch = IterationWatch { design: &|_| ControlFlow::Continue(()), run: &mut |_, _| {} };
+    let mut hear = |_: &_, _: &[_]| {};
+    let mut watch = IterationWatch::new(&|_| ControlFlow::Continue(()), &mut hear);
     iterate_study(study, path, out, true, &options(), &mut watch)
 }
 

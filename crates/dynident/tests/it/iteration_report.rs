@@ -52,7 +52,8 @@ fn iterated(folder: &Path, more: &str) -> (IterationsFile, String) {
     let path = folder.join("study.toml");
     let study = Study::load(&path).unwrap();
     let options = RunOptions { data: None, threads: 1, progress: &Silent };
-    let mut watch = IterationWatch { design: &|_| ControlFlow::Continue(()), run: &mut |_, _| {} };
+    let mut hear = |_: &_, _: &[_]| {};
+    let mut watch = IterationWatch::new(&|_| ControlFlow::Continue(()), &mut hear);
     let out = folder.join("out");
     let file = iterate_study(&study, &path, &out, true, &options, &mut watch).unwrap();
     assert_reads_back(&file);
@@ -104,7 +105,8 @@ fn a_refused_iteration_says_why_run_by_run() {
 #[test]
 fn an_iteration_ends_with_the_robot_it_found() {
     let folder = tempfile::tempdir().unwrap();
-    let settings = "[iteration]\ntrajectory = \"motion.csv\"\nmodel_free = { kind = \"joint-pd\", kp = 20.0, kd = 4.0 }";
+    let settings =
+        "[iteration]\ntrajectory = \"motion.csv\"\nmodel_free = { kind = \"joint-pd\", kp = 20.0, kd = 4.0 }";
     let (file, page) = iterated(folder.path(), settings);
     let out = folder.path().join("out");
     assert_eq!((file.converged, file.unmet.len(), &file.no_result), (true, 0, &None), "{}", file.reason);
@@ -141,7 +143,8 @@ fn an_iteration_ends_with_the_robot_it_found() {
     // A fresh start that goes nowhere leaves no robot of an earlier one behind.
     write(folder.path(), &format!("limits = {{ tracking_error = 1e-3 }}\n{}", settings.replace("20.0", "1.0")));
     let path = folder.path().join("study.toml");
-    let mut watch = IterationWatch { design: &|_| ControlFlow::Continue(()), run: &mut |_, _| {} };
+    let mut hear = |_: &_, _: &[_]| {};
+    let mut watch = IterationWatch::new(&|_| ControlFlow::Continue(()), &mut hear);
     let refused = iterate_study(&Study::load(&path).unwrap(), &path, &out, false, &options, &mut watch).unwrap();
     assert_eq!(refused.status, "refused");
     for name in ["result.json", "identified.urdf", "controller.json", "identification.html"] {

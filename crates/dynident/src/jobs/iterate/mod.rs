@@ -19,7 +19,8 @@ use crate::study::{Folders, PriorChoice, RobotChoice, SimulationSection, Study, 
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
 use dynident_iteration::{
-    Iteration, IterationError, IterationStatus, IterationStore, IterationTask, RunRecord, iterate,
+    Iteration, IterationError, IterationStatus, IterationStore, IterationTask, NextMotion, RunRecord, StopSignal,
+    Supervisor, iterate_supervised,
 };
 use dynident_iteration::{Robot, RobotRun};
 use fnv::FnvHasher;
@@ -35,6 +36,45 @@ pub struct IterationWatch<'a> {
     pub design: &'a (dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
     /// Every new run.
     pub run: &'a mut dyn FnMut(&RunRecord, &[RobotRun]),
+    /// Who asks for a stop: the robot is stopped, what was recorded is kept, and no further run is commanded.
+    pub stop: StopSignal,
+    /// Whether a motion of a robot outside may be commanded, asked before each; without it all may.
+    pub allow: Option<&'a mut dyn FnMut(&NextMotion) -> bool>,
+}
+
+impl<'a> IterationWatch<'a> {
+    /// Hears only; nobody stops it, and every motion may be commanded.
+    pub fn new(
+        design: &'a (dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
+        run: &'a mut dyn FnMut(&RunRecord, &[RobotRun]),
+    ) -> Self {
+        Self { design, run, stop: StopSignal::default(), allow: None }
+    }
+}
+
+/// Hears of a stage's runs, and asks for permission.
+struct Watched<'a, 'b> {
+    stop: &'a StopSignal,
+    allow: &'a mut Option<&'b mut dyn FnMut(&NextMotion) -> bool>,
+    made: &'a mut dyn FnMut(&RunRecord, &[RobotRun]),
+}
+
+impl Supervisor for Watched<'_, '_> {
+    fn stop(&self) -> Option<&StopSignal> {
+        Some(self.stop)
+    }
+
+    fn asks(&self) -> bool {
+        self.allow.is_some()
+    }
+
+    fn allows(&mut self, motion: &NextMotion) -> bool {
+        self.allow.as_mut().is_none_or(|allow| allow(motion))
+    }
+
+    fn made(&mut self, record: &RunRecord, runs: &[RobotRun]) {
+        (self.made)(record, runs);
+    }
 }
 
 /// Iterates a study's robot. What is found stands in `out`: `trajectory.json` (the trajectories at the controller's
@@ -89,7 +129,15 @@ pub fn iterate_study(
         .collect::<Result<Vec<_>, _>>()
         .map_err(in_iteration)?;
     let rate_hz = simulation.rate_hz;
-    let make = || legs::trajectories(study, study_path, &robot, rate_hz, options, watch.design);
+    let stop = watch.stop.clone();
+    let make = || {
+        let found = legs::trajectories(study, study_path, &robot, rate_hz, options, watch.design)?;
+        // A search that was cut short would be this folder's trajectory for ever.
+        if stop.is_requested() {
+            return Err(Error::Interrupted { what: "the search for the trajectory" });
+        }
+        Ok(found)
+    };
     let trajectories = kept(&out.join(TRAJECTORY), &fingerprint, resume, make)?;
 
     // What is believed of the robot, what it runs, and what the file says of it.
@@ -135,14 +183,13 @@ pub fn iterate_study(
         let mut unwritten = None;
         let run = &mut *watch.run;
         // The runs; the file is written after each.
-        let outcome = iterate(&iteration, &mut robots, Some(&stores[number]), &mut |record, runs| {
+        let mut made_one = |record: &RunRecord, runs: &[RobotRun]| {
             so_far.push(record.clone());
             let status = IterationStatus::Waiting { reason: "for the next run".to_owned() };
             unwritten = match iteration.robot(&so_far) {
                 Ok(robot) => {
                     let (robot, records) = (&*robot, &so_far[..]);
-                    let stage =
-                        Stage { leg, robot, records, status: &status, shortfalls: &[], known_std: &known_std };
+                    let stage = Stage { leg, robot, records, status: &status, shortfalls: &[], known_std: &known_std };
                     let now = report.file(&stage);
                     let all: Vec<IterationsFile> = files.iter().cloned().chain([now]).collect();
                     joined(all).and_then(|file| write_set(out, &file, None, RobotFiles::none()).err())
@@ -150,7 +197,9 @@ pub fn iterate_study(
                 Err(error) => Some(in_iteration(error)),
             };
             run(record, runs);
-        });
+        };
+        let mut watched = Watched { stop: &watch.stop, allow: &mut watch.allow, made: &mut made_one };
+        let outcome = iterate_supervised(&iteration, &mut robots, Some(&stores[number]), &mut watched);
         let outcome = outcome.map_err(in_iteration)?;
         if let Some(error) = unwritten {
             return Err(error);
@@ -166,7 +215,12 @@ pub fn iterate_study(
                 traces.push(RunTrace::new(name, &stores[number], own.reference(), &robot.parametric.joint_names()));
             }
         }
-        let is_over = matches!(status, IterationStatus::Refused { .. } | IterationStatus::Waiting { .. });
+        let is_over = match status {
+            IterationStatus::Refused { .. } | IterationStatus::Waiting { .. } | IterationStatus::Interrupted { .. } => {
+                true
+            }
+            IterationStatus::Converged | IterationStatus::Settled | IterationStatus::RunsUsedUp => false,
+        };
         ended.push(EndedStage { records: outcome.runs.clone(), iteration, store: &stores[number] });
         // What the next one holds.
         let last = records.iter().rev().find(|record| record.accepted).and_then(RunRecord::knowledge);

@@ -110,7 +110,8 @@ pub(super) fn robot_found(
         (PAGE, outcome.report()?.into_bytes()),
     ];
     let IdentificationOutcome { urdf, table, result, .. } = outcome;
-    files.extend([(URDF, urdf), (TABLE, table)].into_iter().filter_map(|(name, text)| Some((name, text?.into_bytes()))));
+    files
+        .extend([(URDF, urdf), (TABLE, table)].into_iter().filter_map(|(name, text)| Some((name, text?.into_bytes()))));
     Ok(RobotFiles { files, base_parameters: result.base_parameters })
 }
 
@@ -128,6 +129,6 @@ fn controller(stage: &EndedStage<'_>, parameters: &[f64]) -> Result<serde_json::
     let controller = &iteration.settings().controller;
     let joints = iteration.task().robot.joint_names();
     let reference = iteration.task().legs[0].reference();
-    let request = RunRequest { run: records.len() + 1, reference, controller, model: Some(&model) };
+    let request = RunRequest { model: Some(&model), ..RunRequest::new(records.len() + 1, reference, controller) };
     Ok(controller_json(&request, &joints))
 }

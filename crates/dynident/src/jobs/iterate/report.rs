@@ -1,7 +1,9 @@
 //! From records to what `iterations.json` holds.
 
 use crate::jobs::options::study_name;
-use crate::result::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, Provenance, UnmetCondition};
+use crate::result::{
+    INTERRUPTED, ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, Provenance, UnmetCondition,
+};
 use crate::study::{Study, StudyRobot};
 use dynident_dynamics::ParametricModel;
 use dynident_iteration::{IterationStatus, RunEstimate, RunRecord, Shortfall};
@@ -11,8 +13,7 @@ use std::path::Path;
 fn model_of_run(record: &RunRecord, records: &[RunRecord]) -> Option<usize> {
     let model = record.controller.model.as_ref()?;
     let with_model = |before: &&RunRecord| {
-        before.run < record.run
-            && before.knowledge().and_then(RunEstimate::for_controller).as_ref() == Some(model)
+        before.run < record.run && before.knowledge().and_then(RunEstimate::for_controller).as_ref() == Some(model)
     };
     records.iter().rfind(with_model).map(|before| before.run)
 }
@@ -114,6 +115,7 @@ impl IterationReport<'_> {
                 IterationStatus::Settled => "settled",
                 IterationStatus::RunsUsedUp => "runs-used-up",
                 IterationStatus::Refused { .. } => "refused",
+                IterationStatus::Interrupted { .. } => INTERRUPTED,
                 IterationStatus::Waiting { .. } => "waiting",
             }
             .to_owned(),
@@ -152,7 +154,8 @@ fn unmet(shortfall: &Shortfall) -> UnmetCondition {
 pub(super) fn joined(stages: Vec<IterationsFile>) -> Option<IterationsFile> {
     let converged = stages.iter().all(|stage| stage.converged);
     let improvement = stages.iter().filter_map(|stage| stage.tracking_improvement).reduce(f64::min);
-    let unmet = stages.iter().find(|stage| !stage.unmet.is_empty()).map(|stage| stage.unmet.clone()).unwrap_or_default();
+    let unmet =
+        stages.iter().find(|stage| !stage.unmet.is_empty()).map(|stage| stage.unmet.clone()).unwrap_or_default();
     let unsettled =
         stages.iter().find(|stage| !stage.converged).map(|stage| (stage.status.clone(), stage.reason.clone()));
     let mut runs = Vec::new();

@@ -10,7 +10,9 @@ use crate::error::StudyError;
 use dynident_identification::IdentificationSettings;
 use dynident_identification::estimators::Estimator;
 use dynident_iteration::robot::{FolderSettings, ProcessSettings};
-use dynident_iteration::{IterationSettings, RunIdentificationSettings, Scheme, SettledSettings, StartWith};
+use dynident_iteration::{
+    IterationSettings, RunIdentificationSettings, SafetySettings, Scheme, SettledSettings, StartWith,
+};
 use dynident_recording::{DecimationSettings, DifferentiatorSettings};
 use dynident_simulation::ControllerSettings;
 use serde::{Deserialize, Serialize};
@@ -207,6 +209,7 @@ impl IterationSection {
             most_model_free: self.most_model_free,
             max_runs: self.max_runs,
             settled: self.settled.clone(),
+            safety: SafetySettings::default(),
         })
     }
 }
