@@ -2,10 +2,11 @@
 
 use crate::error::IterationError;
 use crate::estimate::{RunEstimate, identify_run};
-use crate::leg::IterationTask;
+use crate::leg::{IterationTask, Leg};
 use crate::model_parameters::ModelParameters;
 use crate::policy::{self, Next, RunPlan};
 use crate::record::{RunRecord, UsedController};
+use crate::rehearsal::{Rehearsal, RehearsalFailure, Rehearsed};
 use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest, StopSignal};
 use crate::settings::{IterationSettings, RunIdentificationSettings};
 use crate::status::IterationStatus;
@@ -13,8 +14,8 @@ use crate::store::IterationStore;
 use crate::supervision::{NextMotion, Supervisor, Watching};
 use dynident_dynamics::ParametricModel;
 use dynident_identification::friction::chosen_model;
-use dynident_simulation::Record;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
+use dynident_simulation::{Record, Reference};
 use dynident_simulation::{SimulationError, require_length};
 
 use std::borrow::Cow;
@@ -166,17 +167,27 @@ impl Iteration {
         let legs = &self.task.legs;
         let controller = plan.controller(&self.settings);
         let model = plan.model.as_ref().map(|parameters| self.controller_model(before, parameters)).transpose()?;
+        let rehearsal = match self.rehearsed(plan, &controller, model.as_ref(), before)? {
+            Ok(rehearsal) => rehearsal,
+            Err(failure) => {
+                let reason = format!("run {} is not commanded: {failure}", plan.run);
+                return Ok(PlannedRun::Stopped(IterationStatus::Refused { reason }));
+            }
+        };
         let mut runs: Vec<RobotRun> = Vec::with_capacity(legs.len());
-        for (number, leg) in legs.iter().enumerate() {
+        for (number, leg, speed) in self.motions(before) {
             let robot = if robots.len() == 1 { &mut robots[0] } else { &mut robots[number] };
             // Numbers of runs differ from leg to leg: noise and folders go by them.
             let run = (plan.run - 1) * legs.len() + number + 1;
-            let reference = leg.reference();
+            let slow = (speed < 1.0).then(|| leg.reference().slowed(speed)).transpose()?;
+            let reference = slow.as_ref().unwrap_or(leg.reference());
             let stop = supervisor.stop().cloned();
             if stop.as_ref().is_some_and(StopSignal::is_requested) {
                 return Ok(PlannedRun::Interrupted(runs, "between two runs".to_owned()));
             }
-            if !supervisor.allows(&self.next_motion(plan, &controller, number)) {
+            let mut motion = self.next_motion(plan, &controller, (number, reference, speed));
+            motion.rehearsal.clone_from(&rehearsal);
+            if !supervisor.allows(&motion) {
                 let reason = format!("run {} was not allowed", plan.run);
                 return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
             }
@@ -184,6 +195,7 @@ impl Iteration {
                 model: model.as_ref(),
                 envelope: self.settings.safety.envelope.as_ref(),
                 stop: stop.as_ref(),
+                speed,
                 ..RunRequest::new(run, reference, &controller)
             })?;
             match &came.status {
@@ -206,12 +218,23 @@ impl Iteration {
                 | RobotStatus::LeftEnvelope { .. } => {}
             }
             let done = came.status.is_done();
+            if slow.is_some() {
+                if !done {
+                    let reason = format!(
+                        "at {speed} of its speed run {} ended early: {}. Look at the robot; the same command begins it anew",
+                        plan.run, came.status
+                    );
+                    return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
+                }
+                continue;
+            }
             runs.push(came);
             if !done {
                 break;
             }
         }
         let mut record = self.recorded(plan, controller.name(), &runs);
+        record.rehearsal = rehearsal;
         if record.done {
             let records: Vec<Record> = runs.iter().map(|run| run.record.clone()).collect();
             match self.identified(&records, before) {
@@ -231,8 +254,50 @@ impl Iteration {
         Ok(PlannedRun::Run(Box::new(record), runs))
     }
 
-    fn next_motion(&self, plan: &RunPlan, controller: &ControllerSettings, leg: usize) -> NextMotion {
-        let reference = self.task.legs[leg].reference();
+    /// Every leg at each speed step before the first run, then the run itself: place, leg, share of its speed.
+    fn motions(&self, before: &[RunRecord]) -> Vec<(usize, &Leg, f64)> {
+        let legs = || self.task.legs.iter().enumerate();
+        let steps = if before.is_empty() { &self.settings.safety.speed_steps[..] } else { &[] };
+        let slow = steps.iter().filter(|&&step| step < 1.0);
+        let slow = slow.flat_map(|&step| legs().map(move |(number, leg)| (number, leg, step)));
+        slow.chain(legs().map(|(number, leg)| (number, leg, 1.0))).collect()
+    }
+
+    /// What the rehearsal of a plan shows, if there is one.
+    fn rehearsed(
+        &self,
+        plan: &RunPlan,
+        controller: &ControllerSettings,
+        model: Option<&ControllerModel>,
+        before: &[RunRecord],
+    ) -> Result<Result<Option<Rehearsal>, RehearsalFailure>, IterationError> {
+        let Some(settings) = &self.settings.safety.rehearsal else { return Ok(Ok(None)) };
+        let robot = self.robot(before)?;
+        // What is believed of the whole robot: the controller's own model, else what the last run has shown, else the
+        // description.
+        let own = match &plan.model {
+            Some(ModelParameters::All(values)) => Some(&values[..]),
+            Some(ModelParameters::Base(_)) | None => None,
+        };
+        let shown = before.iter().rev().find_map(|record| record.estimate.as_ref()?.possible.as_deref());
+        let described = Some(robot.nominal()).filter(|all| all.iter().any(|value| *value != 0.0));
+        let rehearsed = Rehearsed {
+            robot: &robot,
+            legs: &self.task.legs,
+            controller,
+            model,
+            believed: own.or(shown).or(described),
+            envelope: self.settings.safety.envelope.as_ref(),
+        };
+        Ok(rehearsed.run(settings)?.map(Some))
+    }
+
+    fn next_motion(
+        &self,
+        plan: &RunPlan,
+        controller: &ControllerSettings,
+        (leg, reference, speed): (usize, &Reference, f64),
+    ) -> NextMotion {
         let motion = reference.motion();
         let names = self.task.robot.joint_names();
         let largest = |(joint, name): (usize, String)| {
@@ -244,8 +309,9 @@ impl Iteration {
             controller: controller.name().to_owned(),
             model_based: plan.model.is_some(),
             duration_s: reference.duration_s(),
-            speed: 1.0,
+            speed,
             largest_speed: names.into_iter().enumerate().map(largest).collect(),
+            rehearsal: None,
         }
     }
 
@@ -273,6 +339,7 @@ impl Iteration {
             max_tracking_error_rad: worst,
             accepted: false,
             reason: None,
+            rehearsal: None,
             estimate: None,
         }
     }

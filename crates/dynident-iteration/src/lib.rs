@@ -7,6 +7,8 @@
 //! | a simulated robot | [`SimulatedRobot`] |
 //! | a program that speaks the line protocol, or a person with a folder | [`robot`] |
 //! | stops, permissions, what no sample may leave | [`iterate_supervised`] with a [`Supervisor`]; [`SafetySettings`] |
+//! | gains from a nominal model and a bandwidth | [`derived_controllers`] |
+//! | a motion rehearsed before it is commanded | [`RehearsalSettings`] in [`SafetySettings`] |
 //! | a robot of one's own | a type with [`Robot`] |
 //! | one run's identification | [`identify_run`]: all joints at once, or step by step from tip to base as in the paper |
 //! | what the next run is | [`Iteration::next`], a pure function of the records so far: which controller and model it has, whether a run got worse, when all has settled |
@@ -62,11 +64,14 @@
 mod drive;
 mod error;
 mod estimate;
+mod gains;
 mod leg;
 mod model_parameters;
 mod motion;
 mod policy;
+mod posture;
 mod record;
+mod rehearsal;
 pub mod robot;
 mod runs_folder;
 mod settings;
@@ -78,11 +83,13 @@ mod supervision;
 pub use drive::{Iteration, IterationOutcome, iterate, iterate_supervised};
 pub use error::IterationError;
 pub use estimate::{RunEstimate, identify_run};
+pub use gains::{DerivedControllers, derived_controllers};
 pub use leg::{IterationTask, Leg};
 pub use model_parameters::ModelParameters;
 pub use motion::measured_motion;
 pub use policy::{Next, RunPlan};
 pub use record::{RunRecord, UsedController};
+pub use rehearsal::{Rehearsal, RehearsalFailure, RehearsalSettings};
 pub use robot::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, SimulatedRobot, StopSignal};
 pub use settings::{IterationSettings, RunIdentificationSettings, Scheme, SettledSettings, StartWith};
 pub use status::IterationStatus;

@@ -2,6 +2,7 @@
 
 use crate::estimate::RunEstimate;
 use crate::model_parameters::ModelParameters;
+use crate::rehearsal::Rehearsal;
 use dynident_dynamics::ParametricModel;
 use serde::{Deserialize, Serialize};
 
@@ -37,6 +38,9 @@ pub struct RunRecord {
     pub accepted: bool,
     /// Why not, or why there is no estimate.
     pub reason: Option<String>,
+    /// What its rehearsal had shown; none where there was none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rehearsal: Option<Rehearsal>,
     /// What it says about the parameters; none if it determines nothing.
     pub estimate: Option<RunEstimate>,
 }

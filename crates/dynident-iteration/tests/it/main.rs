@@ -4,5 +4,6 @@
 mod identification;
 mod iteration;
 mod policy;
+mod rehearsals;
 mod robots;
 mod stops;
