@@ -1,13 +1,13 @@
 """A robot program for Dynident's line protocol: MuJoCo on a URDF arm (see docs/src/robot-protocol.md).
 
     pip install mujoco numpy
-    python examples/robots/mujoco_client.py robots/panda_arm7.urdf [--friction 0.2] [--damping 0.5]
+    python examples/robots/mujoco_client.py robots/panda_arm7.urdf [--friction 0.2] [--damping 0.5] [--armature 0.1]
 
 It offers both modes. In `run` it runs the control loop itself from the two files it is handed: joint PD and PID by their gains,
 model-based controllers through a small Newton-Euler recursion over the numbers of controller.json. In `step` it holds the
 torques that it is sent. It stops at a stop message, when its input ends, and when a sample leaves the envelope that a motion comes
-with: a simulated robot stands at once, a real one brakes here. --friction and --damping give every joint dry (Nm) and viscous (Nm s/rad) friction that the URDF does
-not tell. Standard output belongs to the protocol; messages go to standard error.
+with: a simulated robot stands at once, a real one brakes here. --friction, --damping and --armature give the joints dry (Nm) and viscous (Nm s/rad) friction and drive inertia
+(kg m^2) that the URDF does not tell: one number, or one for each joint with commas between; --torque cuts the drives' torque (Nm). Standard output belongs to the protocol; messages go to standard error.
 """
 import argparse
 import csv
@@ -28,13 +28,13 @@ def send(kind, **fields):
     print(json.dumps({"type": kind, **fields}, allow_nan=False), flush=True)
 
 
-def load(path, friction, damping):
+def load(path, friction, damping, armature):
     tree = ElementTree.parse(path)
     extension = ElementTree.SubElement(tree.getroot(), "mujoco")
     ElementTree.SubElement(extension, "compiler", fusestatic="false", balanceinertia="false", boundmass="0", boundinertia="0",
                            discardvisual="true")
     model = mujoco.MjModel.from_xml_string(ElementTree.tostring(tree.getroot(), encoding="unicode"))
-    model.dof_frictionloss[:], model.dof_damping[:] = friction, damping
+    model.dof_frictionloss[:], model.dof_damping[:], model.dof_armature[:] = friction, damping, armature
     # Limits of joints are the controller's business, and links may overlap at their joints.
     model.jnt_limited[:] = 0
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
@@ -255,8 +255,8 @@ def breach(envelope, joints, q, dq, tau, q_d):
 
 
 class Robot:
-    def __init__(self, model, messages):
-        self.model, self.data, self.messages = model, mujoco.MjData(model), messages
+    def __init__(self, model, messages, most):
+        self.model, self.data, self.messages, self.most = model, mujoco.MjData(model), messages, most
         self.joints = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, j) for j in range(model.njnt)]
 
     def start(self, rate_hz, q, dq):
@@ -291,7 +291,8 @@ class Robot:
             q, dq = self.data.qpos.copy(), self.data.qvel.copy()
             if not np.all(np.isfinite(q)) or np.max(np.abs(dq)) > 100:
                 return send("end", status="stopped", reason=f"a joint moves too fast at {row[0]:.3f} s")
-            tau = controller.torque(target, q[back], dq[back])[order]
+            # A drive gives what it can, and logs what it gives.
+            tau = np.clip(controller.torque(target, q[back], dq[back])[order], -self.most, self.most)
             send("sample", t_s=row[0], q=q.tolist(), dq=dq.tolist(), tau=tau.tolist())
             if self.messages.stop_asked():
                 return send("end", status="stopped", reason="the host asked for it")
@@ -318,11 +319,14 @@ class Robot:
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("urdf", type=Path)
-    parser.add_argument("--friction", type=float, default=0.0, help="dry friction of every joint, Nm")
-    parser.add_argument("--damping", type=float, default=0.0, help="viscous friction of every joint, Nm s/rad")
+    numbers = lambda text: np.array([float(part) for part in text.split(",")])
+    parser.add_argument("--friction", type=numbers, default=0.0, help="dry friction of the joints, Nm")
+    parser.add_argument("--damping", type=numbers, default=0.0, help="viscous friction of the joints, Nm s/rad")
+    parser.add_argument("--armature", type=numbers, default=0.0, help="drive inertia of the joints, kg m^2")
+    parser.add_argument("--torque", type=numbers, default=np.inf, help="largest torque of the drives, Nm")
     options = parser.parse_args()
     messages = Messages()
-    robot = Robot(load(options.urdf, options.friction, options.damping), messages)
+    robot = Robot(load(options.urdf, options.friction, options.damping, options.armature), messages, options.torque)
     send("hello", protocol=PROTOCOL, name=f"MuJoCo {mujoco.__version__}: {options.urdf.name}", joints=robot.joints,
          modes=["run", "step"])
     while (message := messages.next()) is not None:

@@ -12,6 +12,7 @@ use crate::settings::{IterationSettings, RunIdentificationSettings};
 use crate::status::IterationStatus;
 use crate::store::IterationStore;
 use crate::supervision::{NextMotion, Supervisor, Watching};
+use crate::typical_drives::with_typical_drives;
 use dynident_dynamics::ParametricModel;
 use dynident_identification::friction::chosen_model;
 use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
@@ -273,14 +274,18 @@ impl Iteration {
     ) -> Result<Result<Option<Rehearsal>, RehearsalFailure>, IterationError> {
         let Some(settings) = &self.settings.safety.rehearsal else { return Ok(Ok(None)) };
         let robot = self.robot(before)?;
-        // What is believed of the whole robot: the controller's own model, else what the last run has shown, else the
-        // description.
+        // What is believed of the whole robot: the controller's own model once runs have shown one, else what the last
+        // run has shown, else the description with typical drives.
         let own = match &plan.model {
             Some(ModelParameters::All(values)) => Some(&values[..]),
             Some(ModelParameters::Base(_)) | None => None,
         };
         let shown = before.iter().rev().find_map(|record| record.estimate.as_ref()?.possible.as_deref());
-        let described = Some(robot.nominal()).filter(|all| all.iter().any(|value| *value != 0.0));
+        let bodies = 10 * robot.dof();
+        let known = robot.nominal()[..bodies].iter().any(|value| *value != 0.0);
+        let typical = with_typical_drives(&robot).unwrap_or_else(|| robot.nominal().to_vec());
+        let described = known.then_some(&typical[..]);
+        let own = own.filter(|_| shown.is_some());
         let rehearsed = Rehearsed {
             robot: &robot,
             legs: &self.task.legs,

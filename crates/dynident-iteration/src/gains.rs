@@ -1,6 +1,7 @@
 //! Gains of a first controller from the nominal model, its uncertainty, and a stated bandwidth.
 
 use crate::posture::{at_sample, inertia_matrix};
+use crate::typical_drives::with_typical_drives;
 use dynident_dynamics::ParametricModel;
 use dynident_simulation::controllers::{
     ComputedTorqueSettings, ControllerModel, ControllerSettings, FrictionCompensation, JointPdSettings,
@@ -15,7 +16,7 @@ const POSTURES: usize = 200;
 pub struct DerivedControllers {
     /// Joint PD.
     pub model_free: ControllerSettings,
-    /// Computed torque with the nominal model.
+    /// Computed torque with the nominal model; joint PD with its gravity where it knows nothing of the drives.
     pub first: ControllerSettings,
     /// Computed torque with the newest model.
     pub model_based: ControllerSettings,
@@ -25,7 +26,9 @@ pub struct DerivedControllers {
 /// bandwidth` of each joint:
 ///
 /// * joint PD: `K_p = ω² m`, `K_d = 2 ω m`, `m = (1 - uncertainty) max M_jj(q)` along the motions;
-/// * computed torque with the nominal model: `K_p = (1 - uncertainty) ω²`, `K_d = 2 √K_p`;
+/// * computed torque with the nominal model: `K_p = (1 - uncertainty) ω²`, `K_d = 2 √K_p`; where the model has drive
+///   inertia or friction of which the description says nothing, joint PD with the nominal gravity takes its place, and
+///   M_jj has the inertia of a typical drive (the effort limit accelerates it by 300 rad/s²);
 /// * computed torque with an identified model: `K_p = ω²`, `K_d = 2 ω`.
 ///
 /// So the lightest robot that the uncertainty leaves is not faster than stated: under computed torque anywhere, under
@@ -43,7 +46,9 @@ pub fn derived_controllers(
     let dof = robot.dof();
     let bandwidth =
         bandwidth_hz.values("bandwidth_hz", dof, "give more than 0 and at most 100 Hz", |f| f > 0.0 && f <= 100.0)?;
-    let mut model = ControllerModel::from_parameters(robot.model(), robot.terms(), robot.nominal())?;
+    let typical = with_typical_drives(robot);
+    let parameters = typical.as_deref().unwrap_or(robot.nominal());
+    let mut model = ControllerModel::from_parameters(robot.model(), robot.terms(), parameters)?;
     let mut largest = vec![0.0_f64; dof];
     for reference in references {
         let step = (reference.samples() / POSTURES).max(1);
@@ -72,8 +77,8 @@ pub fn derived_controllers(
         })
     };
     Ok(DerivedControllers {
-        model_free: ControllerSettings::JointPd(pd),
-        first: computed(left),
+        model_free: ControllerSettings::JointPd(pd.clone()),
+        first: if typical.is_some() { ControllerSettings::PdGravity(pd) } else { computed(left) },
         model_based: computed(1.0),
     })
 }

@@ -79,6 +79,7 @@ mod status;
 mod step_by_step;
 mod store;
 mod supervision;
+mod typical_drives;
 
 pub use drive::{Iteration, IterationOutcome, iterate, iterate_supervised};
 pub use error::IterationError;
