@@ -129,6 +129,7 @@ mod execution;
 pub mod friction;
 mod identify;
 mod less_noise;
+mod log_noise;
 mod logs;
 pub mod payload;
 mod progress;
@@ -150,6 +151,7 @@ pub use identify::{
     ConsistentParameters, Identification, StageTimes, TrainingExamination, consistent_stage, identify,
     identify_payload, identify_with_instruments,
 };
+pub use log_noise::LogNoise;
 pub use logs::Logs;
 pub use progress::{Progress, Silent};
 pub use recording::{LogError, MotionRecord, Recording, Role, Samples};

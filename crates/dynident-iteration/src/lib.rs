@@ -11,6 +11,8 @@
 //! | a motion rehearsed before it is commanded | [`RehearsalSettings`] in [`SafetySettings`] |
 //! | a robot of one's own | a type with [`Robot`] |
 //! | one run's identification | [`identify_run`]: all joints at once, or step by step from tip to base as in the paper |
+//! | several runs' identification together | [`identify_runs`], each weighted by its own noise |
+//! | what is not met yet | [`Iteration::shortfalls`]: tracking, parameters, clipping, lag, prediction ([`Shortfall`]) |
 //! | what the next run is | [`Iteration::next`], a pure function of the records so far: which controller and model it has, whether a run got worse, when all has settled |
 //! | kept on disk, and resumed to the same result | [`IterationStore`] |
 //!
@@ -61,29 +63,39 @@
 
 #![forbid(unsafe_code)]
 
+mod clipping;
+mod convergence;
 mod drive;
 mod error;
 mod estimate;
+mod evidence;
+mod final_fit;
 mod gains;
 mod leg;
 mod model_parameters;
 mod motion;
 mod policy;
 mod posture;
+mod prediction;
 mod record;
 mod rehearsal;
 pub mod robot;
+mod run_examination;
 mod runs_folder;
 mod settings;
 mod status;
 mod step_by_step;
 mod store;
 mod supervision;
+mod tracking_floor;
 mod typical_drives;
 
+pub use convergence::Shortfall;
 pub use drive::{Iteration, IterationOutcome, iterate, iterate_supervised};
 pub use error::IterationError;
-pub use estimate::{RunEstimate, identify_run};
+pub use estimate::{RunEstimate, RunLog, identify_run, identify_runs};
+pub use evidence::{Clipping, JointEvidence, Prediction, RunEvidence};
+pub use final_fit::friction_chosen;
 pub use gains::{DerivedControllers, derived_controllers};
 pub use leg::{IterationTask, Leg};
 pub use model_parameters::ModelParameters;

@@ -2,8 +2,9 @@
 
 use crate::error::IterationError;
 use crate::record::RunRecord;
-use crate::robot::RobotRun;
+use crate::robot::{RobotRun, read_log_table};
 use crate::runs_folder::{INTERRUPTED, INTERRUPTED_FILE, RUN_FILE, RunsFolder, UNFINISHED};
+use dynident_simulation::Record;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
 use std::io::Write;
@@ -134,8 +135,7 @@ impl IterationStore {
             .tempdir_in(&self.runs)
             .map_err(IterationError::file(&self.runs))?;
         for (leg, run) in runs.iter().enumerate() {
-            let name = if leg == 0 { "log.csv".to_owned() } else { format!("log_{}.csv", leg + 1) };
-            write_synced(&fresh.path().join(name), run.record.csv().as_bytes())?;
+            write_synced(&fresh.path().join(log_name(leg)), run.record.csv().as_bytes())?;
         }
         write_synced(&fresh.path().join(file.0), file.1.as_bytes())?;
         sync_folder(fresh.path())?;
@@ -146,15 +146,42 @@ impl IterationStore {
         sync_folder(&self.runs)
     }
 
+    /// The records of a run, leg after leg, at these rates: bit for bit as they were when it was made.
+    ///
+    /// # Errors
+    /// A log that is not there any more or holds something else.
+    pub fn logs(&self, run: usize, joints: &[String], rates_hz: &[f64]) -> Result<Vec<Record>, IterationError> {
+        let of_leg = |(leg, rate_hz): (usize, &f64)| {
+            let path = self.log_path(run, leg);
+            read_log_table(&path, joints, *rate_hz).map_err(|error| IterationError::State {
+                problem: format!(
+                    "{error}: runs are fitted together, so put the log back, or remove this run's folder and those after it"
+                ),
+                path: path.clone(),
+            })
+        };
+        rates_hz.iter().enumerate().map(of_leg).collect()
+    }
+
     /// That run number `run` cannot be gone on from.
     pub(crate) fn refused(&self, run: usize, problem: String) -> IterationError {
         IterationError::State { path: self.run_folder(run).join(RUN_FILE), problem }
+    }
+
+    /// The log of a run's leg, by its place from 0.
+    pub fn log_path(&self, run: usize, leg: usize) -> PathBuf {
+        self.run_folder(run).join(log_name(leg))
     }
 
     /// The folder of a run.
     pub fn run_folder(&self, run: usize) -> PathBuf {
         self.runs.join(format!("run_{run}"))
     }
+}
+
+/// The log of a leg, by its place from 0, in its run's folder.
+fn log_name(leg: usize) -> String {
+    if leg == 0 { "log.csv".to_owned() } else { format!("log_{}.csv", leg + 1) }
 }
 
 fn write_synced(path: &Path, contents: &[u8]) -> Result<(), IterationError> {

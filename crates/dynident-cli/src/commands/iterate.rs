@@ -7,20 +7,26 @@ use dynident::excitation::DesignProgress;
 use dynident::iteration::{NextMotion, StopSignal};
 use dynident::result::INTERRUPTED;
 use dynident::study::LegOrder;
-use dynident::{Error, IterationWatch, Progress, RunOptions, Silent, Study, check_writable, iterate_study};
-use std::path::PathBuf;
+use dynident::{
+    Error, IterationWatch, IterationsFile, Progress, RunOptions, Silent, Study, check_writable, iterate_study,
+};
+use std::path::{Path, PathBuf};
 
 /// Options of `iterate`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The study file.
     study: PathBuf,
-    /// Folder for iterations.json, report.html, trajectory.json and runs/.
+    /// Folder for iterations.json, report.html, trajectory.json, runs/, and the robot that was found: result.json,
+    /// identified.urdf (and .toml), identification.html, controller.json.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Make every run anew: by default runs that are in the folder already are not made again.
     #[arg(long)]
     fresh: bool,
+    /// Say in one line how the iteration in the folder stands, and run nothing.
+    #[arg(long, conflicts_with = "fresh")]
+    status: bool,
     /// Seed of the simulated sensors' noise, in place of the study's.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -36,6 +42,9 @@ pub(crate) struct Options {
 }
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
+    if options.status {
+        return status(&options.out, context);
+    }
     let mut study = Study::load(&options.study).map_err(message_of)?;
     if let Some(seed) = options.seed {
         study.simulation.get_or_insert_default().sensors.seed = seed;
@@ -43,6 +52,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let legs = study.iteration.as_ref().map_or(0, |section| section.leg.len());
     let legs: Vec<String> = (1..=legs).map(|leg| format!("leg_{leg}/runs")).collect();
     let mut names = vec!["iterations.json", "report.html", "trajectory.json", "runs"];
+    names.extend(["result.json", "identified.urdf", "identified.toml", "identification.html", "controller.json"]);
     names.extend(legs.iter().map(String::as_str));
     let of_study = (&study, &*options.study, options.data.as_deref());
     let sections = ["robot", "design", "iteration", "simulation", "controller"];
@@ -87,5 +97,16 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     if file.status == INTERRUPTED {
         return Ok(Verdict::Interrupted);
     }
+    Ok(if file.converged { Verdict::Good } else { Verdict::Negative })
+}
+
+/// How the iteration in a folder stands.
+fn status(out: &Path, context: &Context) -> Result<Verdict, String> {
+    let path = out.join("iterations.json");
+    if !path.is_file() {
+        return Err(format!("{}: no iteration has been here yet", path.display()));
+    }
+    let file = IterationsFile::read(&path).map_err(message_of)?;
+    terminal::print(&if context.json { json(&file)? } else { format!("{}\n", file.status_line()) })?;
     Ok(if file.converged { Verdict::Good } else { Verdict::Negative })
 }

@@ -85,9 +85,12 @@ pub struct IterationSection {
     pub scheme: Scheme,
     /// Every sample of every joint counts, also where a windowed design names windows; false by default.
     pub every_sample: bool,
-    /// The paper's scheme as it stands: no physically consistent set is asked for and nothing is rejected. False by
-    /// default.
+    /// The paper's scheme as it stands: no physically consistent set is asked for, nothing is rejected and runs are not
+    /// pooled. False by default.
     pub literal: bool,
+    /// Whether the model is fitted to all good runs together, each weighted by its own noise; true by default. Otherwise
+    /// to the newest alone.
+    pub pool: bool,
     /// From positions to velocities and accelerations; `deviation` from the trajectory by default.
     pub differentiator: DifferentiatorSettings,
     /// Low-pass and decimation of torque and regressor alike; none by default.
@@ -131,6 +134,7 @@ impl Default for IterationSection {
             most_model_free,
             max_runs,
             settled,
+            pool,
             ..
         } = IterationSettings::default();
         Self {
@@ -144,6 +148,7 @@ impl Default for IterationSection {
             scheme: identification.scheme,
             every_sample: false,
             literal: false,
+            pool,
             differentiator: identification.differentiator,
             parallel_filter: identification.parallel_filter,
             held_torque: identification.held_torque,
@@ -210,6 +215,7 @@ impl IterationSection {
             model_free: self.model_free.clone().unwrap_or(default.model_free),
             controller: study.controller.clone().unwrap_or(default.controller),
             reject: !self.literal,
+            pool: self.pool && !self.literal,
             worse_factor: self.worse_factor,
             most_halvings: self.most_halvings,
             // Nobody's gains are raised who did not ask for it.
