@@ -1,5 +1,6 @@
 //! Robots, records and the policy together.
 
+use crate::before_motion::{motions, next_motion, rehearsed};
 use crate::convergence::{Names, Shortfall, shortfalls};
 use crate::error::IterationError;
 use crate::estimate::{RunEstimate, RunLog, identify_run, identify_runs};
@@ -7,18 +8,16 @@ use crate::leg::{IterationTask, Leg};
 use crate::model_parameters::ModelParameters;
 use crate::policy::{self, Next, RunPlan};
 use crate::record::{RunRecord, UsedController};
-use crate::rehearsal::{Rehearsal, RehearsalFailure, Rehearsed};
 use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest, StopSignal};
 use crate::run_examination::{add_tracking_floors, examined, following_limits};
 use crate::settings::{IterationSettings, RunIdentificationSettings};
 use crate::status::IterationStatus;
 use crate::store::IterationStore;
-use crate::supervision::{NextMotion, Supervisor, Watching};
-use crate::typical_drives::with_typical_drives;
+use crate::supervision::{Supervisor, Watching};
 use dynident_dynamics::ParametricModel;
 use dynident_identification::friction::chosen_model;
-use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
-use dynident_simulation::{Record, Reference};
+use dynident_simulation::controllers::ControllerModel;
+use dynident_simulation::Record;
 use dynident_simulation::{SimulationError, require_length};
 
 use std::borrow::Cow;
@@ -186,15 +185,17 @@ impl Iteration {
         let legs = &self.task.legs;
         let controller = plan.controller(&self.settings);
         let model = plan.model.as_ref().map(|parameters| self.controller_model(before, parameters)).transpose()?;
-        let rehearsal = match self.rehearsed(plan, &controller, model.as_ref(), before)? {
-            Ok(rehearsal) => rehearsal,
-            Err(failure) => {
-                let reason = format!("run {} is not commanded: {failure}", plan.run);
-                return Ok(PlannedRun::Stopped(IterationStatus::Refused { reason }));
-            }
-        };
+        let robot = self.robot(before)?;
+        let rehearsal =
+            match rehearsed(&self.task, &self.settings, &robot, (plan, &controller, model.as_ref()), before)? {
+                Ok(rehearsal) => rehearsal,
+                Err(failure) => {
+                    let reason = format!("run {} is not commanded: {failure}", plan.run);
+                    return Ok(PlannedRun::Stopped(IterationStatus::Refused { reason }));
+                }
+            };
         let mut runs: Vec<RobotRun> = Vec::with_capacity(legs.len());
-        for (number, leg, speed) in self.motions(before) {
+        for (number, leg, speed) in motions(&self.task, &self.settings, before) {
             let robot = if robots.len() == 1 { &mut robots[0] } else { &mut robots[number] };
             // Numbers of runs differ from leg to leg: noise and folders go by them.
             let run = (plan.run - 1) * legs.len() + number + 1;
@@ -204,7 +205,7 @@ impl Iteration {
             if stop.as_ref().is_some_and(StopSignal::is_requested) {
                 return Ok(PlannedRun::Interrupted(runs, "between two runs".to_owned()));
             }
-            let mut motion = self.next_motion(plan, &controller, (number, reference, speed));
+            let mut motion = next_motion(&self.task, plan, &controller, (number, reference, speed));
             motion.rehearsal.clone_from(&rehearsal);
             if !supervisor.allows(&motion) {
                 let reason = format!("run {} was not allowed", plan.run);
@@ -317,71 +318,6 @@ impl Iteration {
             Err(reason) => record.reason = Some(reason.to_string()),
         }
         Ok(())
-    }
-
-    /// Every leg at each speed step before the first run, then the run itself: place, leg, share of its speed.
-    fn motions(&self, before: &[RunRecord]) -> Vec<(usize, &Leg, f64)> {
-        let legs = || self.task.legs.iter().enumerate();
-        let steps = if before.is_empty() { &self.settings.safety.speed_steps[..] } else { &[] };
-        let slow = steps.iter().filter(|&&step| step < 1.0);
-        let slow = slow.flat_map(|&step| legs().map(move |(number, leg)| (number, leg, step)));
-        slow.chain(legs().map(|(number, leg)| (number, leg, 1.0))).collect()
-    }
-
-    /// What the rehearsal of a plan shows, if there is one.
-    fn rehearsed(
-        &self,
-        plan: &RunPlan,
-        controller: &ControllerSettings,
-        model: Option<&ControllerModel>,
-        before: &[RunRecord],
-    ) -> Result<Result<Option<Rehearsal>, RehearsalFailure>, IterationError> {
-        let Some(settings) = &self.settings.safety.rehearsal else { return Ok(Ok(None)) };
-        let robot = self.robot(before)?;
-        // What is believed of the whole robot: the controller's own model once runs have shown one, else what the last
-        // run has shown, else the description with typical drives.
-        let own = match &plan.model {
-            Some(ModelParameters::All(values)) => Some(&values[..]),
-            Some(ModelParameters::Base(_)) | None => None,
-        };
-        let shown = before.iter().rev().find_map(|record| record.estimate.as_ref()?.possible.as_deref());
-        let bodies = 10 * robot.dof();
-        let known = robot.nominal()[..bodies].iter().any(|value| *value != 0.0);
-        let typical = with_typical_drives(&robot).unwrap_or_else(|| robot.nominal().to_vec());
-        let described = known.then_some(&typical[..]);
-        let own = own.filter(|_| shown.is_some());
-        let rehearsed = Rehearsed {
-            robot: &robot,
-            legs: &self.task.legs,
-            controller,
-            model,
-            believed: own.or(shown).or(described),
-            envelope: self.settings.safety.envelope.as_ref(),
-        };
-        Ok(rehearsed.run(settings)?.map(Some))
-    }
-
-    fn next_motion(
-        &self,
-        plan: &RunPlan,
-        controller: &ControllerSettings,
-        (leg, reference, speed): (usize, &Reference, f64),
-    ) -> NextMotion {
-        let motion = reference.motion();
-        let names = self.task.robot.joint_names();
-        let largest = |(joint, name): (usize, String)| {
-            (name, motion.dq[motion.of(joint)].iter().fold(0.0_f64, |most, dq| most.max(dq.abs())))
-        };
-        NextMotion {
-            run: plan.run,
-            leg: (leg, self.task.legs.len()),
-            controller: controller.name().to_owned(),
-            model_based: plan.model.is_some(),
-            duration_s: reference.duration_s(),
-            speed,
-            largest_speed: names.into_iter().enumerate().map(largest).collect(),
-            rehearsal: None,
-        }
     }
 
     fn recorded(&self, plan: &RunPlan, name: &str, runs: &[RobotRun]) -> RunRecord {

@@ -63,6 +63,7 @@
 
 #![forbid(unsafe_code)]
 
+mod before_motion;
 mod clipping;
 mod convergence;
 mod drive;
