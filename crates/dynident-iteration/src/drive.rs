@@ -1,5 +1,6 @@
 //! Robots, records and the policy together.
 
+use crate::before_motion::{motions, next_motion, rehearsed};
 use crate::convergence::{Names, Shortfall, shortfalls};
 use crate::error::IterationError;
 use crate::estimate::{RunEstimate, RunLog, identify_run, identify_runs};
@@ -12,11 +13,11 @@ use crate::run_examination::{add_tracking_floors, examined, following_limits};
 use crate::settings::{IterationSettings, RunIdentificationSettings};
 use crate::status::IterationStatus;
 use crate::store::IterationStore;
-use crate::supervision::{NextMotion, Supervisor, Watching};
+use crate::supervision::{Supervisor, Watching};
 use dynident_dynamics::ParametricModel;
 use dynident_identification::friction::chosen_model;
+use dynident_simulation::controllers::ControllerModel;
 use dynident_simulation::Record;
-use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
 use dynident_simulation::{SimulationError, require_length};
 
 use std::borrow::Cow;
@@ -184,17 +185,29 @@ impl Iteration {
         let legs = &self.task.legs;
         let controller = plan.controller(&self.settings);
         let model = plan.model.as_ref().map(|parameters| self.controller_model(before, parameters)).transpose()?;
+        let robot = self.robot(before)?;
+        let rehearsal =
+            match rehearsed(&self.task, &self.settings, &robot, (plan, &controller, model.as_ref()), before)? {
+                Ok(rehearsal) => rehearsal,
+                Err(failure) => {
+                    let reason = format!("run {} is not commanded: {failure}", plan.run);
+                    return Ok(PlannedRun::Stopped(IterationStatus::Refused { reason }));
+                }
+            };
         let mut runs: Vec<RobotRun> = Vec::with_capacity(legs.len());
-        for (number, leg) in legs.iter().enumerate() {
+        for (number, leg, speed) in motions(&self.task, &self.settings, before) {
             let robot = if robots.len() == 1 { &mut robots[0] } else { &mut robots[number] };
             // Numbers of runs differ from leg to leg: noise and folders go by them.
             let run = (plan.run - 1) * legs.len() + number + 1;
-            let reference = leg.reference();
+            let slow = (speed < 1.0).then(|| leg.reference().slowed(speed)).transpose()?;
+            let reference = slow.as_ref().unwrap_or(leg.reference());
             let stop = supervisor.stop().cloned();
             if stop.as_ref().is_some_and(StopSignal::is_requested) {
                 return Ok(PlannedRun::Interrupted(runs, "between two runs".to_owned()));
             }
-            if !supervisor.allows(&self.next_motion(plan, &controller, number)) {
+            let mut motion = next_motion(&self.task, plan, &controller, (number, reference, speed));
+            motion.rehearsal.clone_from(&rehearsal);
+            if !supervisor.allows(&motion) {
                 let reason = format!("run {} was not allowed", plan.run);
                 return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
             }
@@ -202,6 +215,7 @@ impl Iteration {
                 model: model.as_ref(),
                 envelope: self.settings.safety.envelope.as_ref(),
                 stop: stop.as_ref(),
+                speed,
                 ..RunRequest::new(run, reference, &controller)
             })?;
             match &came.status {
@@ -224,12 +238,23 @@ impl Iteration {
                 | RobotStatus::LeftEnvelope { .. } => {}
             }
             let done = came.status.is_done();
+            if slow.is_some() {
+                if !done {
+                    let reason = format!(
+                        "at {speed} of its speed run {} ended early: {}. Look at the robot; the same command begins it anew",
+                        plan.run, came.status
+                    );
+                    return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
+                }
+                continue;
+            }
             runs.push(came);
             if !done {
                 break;
             }
         }
         let mut record = self.recorded(plan, controller.name(), &runs);
+        record.rehearsal = rehearsal;
         if record.done {
             let records: Vec<Record> = runs.iter().map(|run| run.record.clone()).collect();
             self.examine(&mut record, &records, before, earlier)?;
@@ -295,24 +320,6 @@ impl Iteration {
         Ok(())
     }
 
-    fn next_motion(&self, plan: &RunPlan, controller: &ControllerSettings, leg: usize) -> NextMotion {
-        let reference = self.task.legs[leg].reference();
-        let motion = reference.motion();
-        let names = self.task.robot.joint_names();
-        let largest = |(joint, name): (usize, String)| {
-            (name, motion.dq[motion.of(joint)].iter().fold(0.0_f64, |most, dq| most.max(dq.abs())))
-        };
-        NextMotion {
-            run: plan.run,
-            leg: (leg, self.task.legs.len()),
-            controller: controller.name().to_owned(),
-            model_based: plan.model.is_some(),
-            duration_s: reference.duration_s(),
-            speed: 1.0,
-            largest_speed: names.into_iter().enumerate().map(largest).collect(),
-        }
-    }
-
     fn recorded(&self, plan: &RunPlan, name: &str, runs: &[RobotRun]) -> RunRecord {
         let joints = self.task.robot.dof();
         let mut worst = vec![0.0_f64; joints];
@@ -337,6 +344,7 @@ impl Iteration {
             max_tracking_error_rad: worst,
             accepted: false,
             reason: None,
+            rehearsal: None,
             estimate: None,
             pooled: None,
             evidence: None,

@@ -3,6 +3,7 @@
 use crate::estimate::RunEstimate;
 use crate::evidence::RunEvidence;
 use crate::model_parameters::ModelParameters;
+use crate::rehearsal::Rehearsal;
 use dynident_dynamics::ParametricModel;
 use serde::{Deserialize, Serialize};
 
@@ -38,6 +39,9 @@ pub struct RunRecord {
     pub accepted: bool,
     /// Why not, or why there is no estimate.
     pub reason: Option<String>,
+    /// What its rehearsal had shown; none where there was none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rehearsal: Option<Rehearsal>,
     /// What it says about the parameters by itself; none if it determines nothing.
     pub estimate: Option<RunEstimate>,
     /// What all good runs up to this one say together; none where this is the first or no good one, and where runs are

@@ -1,7 +1,9 @@
 //! Who watches over an iteration: asks for stops, allows motions, hears of runs.
 
 use crate::record::RunRecord;
+use crate::rehearsal::{Rehearsal, RehearsalSettings};
 use crate::robot::{Envelope, RobotRun, StopSignal};
+use dynident_simulation::{SimulationError, require};
 
 /// What keeps runs safe, apart from the robot itself.
 #[derive(Clone, Debug, Default)]
@@ -11,6 +13,24 @@ pub struct SafetySettings {
     pub outside: bool,
     /// What no sample may leave. Default none.
     pub envelope: Option<Envelope>,
+    /// How every motion is rehearsed before it is commanded. Default not at all.
+    pub rehearsal: Option<RehearsalSettings>,
+    /// Shares of its speed at which the motion is run before the first run, slowest first; those of 1 are the run
+    /// itself. Default none. These runs are not identified.
+    pub speed_steps: Vec<f64>,
+}
+
+impl SafetySettings {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// Shares that are not within (0, 1]; [`RehearsalSettings::validate`].
+    pub fn validate(&self) -> Result<(), SimulationError> {
+        for &step in &self.speed_steps {
+            require(step > 0.0 && step <= 1.0, "speed_steps", step, "give shares of the speed: above 0, at most 1")?;
+        }
+        self.rehearsal.as_ref().map_or(Ok(()), RehearsalSettings::validate)
+    }
 }
 
 /// A motion that is about to be commanded.
@@ -30,6 +50,8 @@ pub struct NextMotion {
     pub speed: f64,
     /// For each joint, by name, the largest velocity of the motion, rad/s (m/s).
     pub largest_speed: Vec<(String, f64)>,
+    /// What its rehearsal has shown, if there was one.
+    pub rehearsal: Option<Rehearsal>,
 }
 
 /// Who watches over an iteration.

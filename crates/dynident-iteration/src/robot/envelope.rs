@@ -105,7 +105,7 @@ impl Envelope {
 
     /// Puts the envelope in place of the limits of a simulated run that are not stated: torques are cut by the
     /// simulator, the others stop the run.
-    pub(super) fn limit(&self, limits: &mut RunLimits) {
+    pub(crate) fn limit(&self, limits: &mut RunLimits) {
         // Infinity has no place in files; the largest number has.
         let each = |values: &[Option<f64>], none: f64| {
             Some(PerJoint::Each(values.iter().map(|value| value.unwrap_or(none)).collect()))

@@ -124,7 +124,7 @@ impl Robot for FolderRobot {
 
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
         request.validate(self.joints.len())?;
-        Ok(self.exchange(request, &self.run_folder(request.run)).unwrap_or_else(|fault| RobotRun {
+        Ok(self.exchange(request, &self.settings.folder.join(request.folder_name())).unwrap_or_else(|fault| RobotRun {
             status: RobotStatus::Failed { fault },
             record: conversation::empty_record(&self.joints, request.reference.rate_hz()),
             truth: None,

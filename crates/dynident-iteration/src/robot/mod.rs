@@ -51,12 +51,19 @@ pub struct RunRequest<'a> {
     pub envelope: Option<&'a Envelope>,
     /// Who may ask for a stop.
     pub stop: Option<&'a StopSignal>,
+    /// Share of the trajectory's own speed that the reference has; 1 but for slow runs before the first.
+    pub speed: f64,
 }
 
 impl<'a> RunRequest<'a> {
     /// A run without a model, an envelope and anybody who may stop it: set the fields.
     pub fn new(run: usize, reference: &'a Reference, controller: &'a ControllerSettings) -> Self {
-        Self { run, reference, controller, model: None, envelope: None, stop: None }
+        Self { run, reference, controller, model: None, envelope: None, stop: None, speed: 1.0 }
+    }
+
+    /// Name of the folder for its files: a slow run is no other's.
+    pub fn folder_name(&self) -> String {
+        if self.speed < 1.0 { format!("run_{}_speed_{}", self.run, self.speed) } else { format!("run_{}", self.run) }
     }
 
     /// Whether a stop was asked for.

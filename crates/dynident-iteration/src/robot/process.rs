@@ -31,7 +31,7 @@ impl ProcessRobot {
     }
 
     /// The folder of a run's files.
-    fn folder(&mut self, run: usize) -> Result<PathBuf, RobotFault> {
+    fn folder(&mut self, name: &str) -> Result<PathBuf, RobotFault> {
         let file = |path: PathBuf| move |error: std::io::Error| RobotFault::File { path, reason: error.to_string() };
         let base = if let Some(folder) = &self.settings.folder {
             folder.clone()
@@ -41,7 +41,7 @@ impl ProcessRobot {
             }
             self.temporary.as_ref().map(|folder| folder.path().to_owned()).unwrap_or_default()
         };
-        let folder = base.join(format!("run_{run}"));
+        let folder = base.join(name);
         std::fs::create_dir_all(&folder).map_err(file(folder.clone()))?;
         std::path::absolute(&folder).map_err(file(folder))
     }
@@ -53,7 +53,7 @@ impl ProcessRobot {
             return Ok(not_begun);
         }
         let folder = match self.settings.mode {
-            ProcessMode::Run => Some(self.folder(request.run)?),
+            ProcessMode::Run => Some(self.folder(&request.folder_name())?),
             ProcessMode::Step => None,
         };
         let client = match &mut self.client {

@@ -5,6 +5,7 @@ mod identification;
 mod iteration;
 mod policy;
 mod pooling;
+mod rehearsals;
 mod robots;
 mod simulated_arm;
 mod stops;

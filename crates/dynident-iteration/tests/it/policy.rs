@@ -46,6 +46,7 @@ fn run(number: usize, model: Option<f64>, tracking: f64, accepted: bool, estimat
         max_tracking_error_rad: vec![tracking; 2],
         accepted,
         reason: None,
+        rehearsal: None,
         estimate: Some(estimate),
         pooled: None,
         evidence: Some(evidence()),

@@ -281,7 +281,7 @@ fn iteration(safety: SafetySettings) -> Iteration {
     let robot = ParametricModel::new(load_robot(urdf()).unwrap().model, Vec::new()).unwrap();
     let mut settings = IterationSettings { model_free: pd(), controller: pd(), safety, ..IterationSettings::default() };
     // Never settled: it is stops that end these.
-    (settings.settled.parameter_sigmas, settings.settled.parameter_tolerance) = (0.0, 0.0);
+    settings.settled.most_uncertain = 0.0;
     Iteration::new(IterationTask::new(robot, reference()).unwrap(), settings).unwrap()
 }
 
@@ -293,7 +293,7 @@ fn watcher(stop_after: usize) -> Watcher {
 #[test]
 fn a_stop_between_runs_ends_the_iteration() {
     let folder = tempfile::tempdir().unwrap();
-    let iteration = iteration(SafetySettings { outside: true, envelope: None });
+    let iteration = iteration(SafetySettings { outside: true, ..SafetySettings::default() });
     let store = IterationStore::open(folder.path(), "test", true).unwrap();
     let mut robot = ProcessRobot::new(settings(ProcessMode::Run, command("", folder.path())), joints()).unwrap();
     for runs in [1, 2] {
@@ -311,7 +311,7 @@ fn a_stop_between_runs_ends_the_iteration() {
 #[test]
 fn a_run_that_is_cut_short_is_kept_aside() {
     let folder = tempfile::tempdir().unwrap();
-    let iteration = iteration(SafetySettings { outside: true, envelope: None });
+    let iteration = iteration(SafetySettings { outside: true, ..SafetySettings::default() });
     let store = IterationStore::open(folder.path(), "test", true).unwrap();
     let mut robot = ProcessRobot::new(settings(ProcessMode::Run, command("wait", folder.path())), joints()).unwrap();
     let mut watcher = watcher(0);
@@ -337,7 +337,7 @@ fn a_run_that_is_cut_short_is_kept_aside() {
 fn after_an_early_end_somebody_looks() {
     let folder = tempfile::tempdir().unwrap();
     let tight = Envelope { tracking_error: vec![Some(0.01); 2], ..envelope() };
-    let iteration = iteration(SafetySettings { outside: true, envelope: Some(tight) });
+    let iteration = iteration(SafetySettings { outside: true, envelope: Some(tight), ..SafetySettings::default() });
     let store = IterationStore::open(folder.path(), "test", true).unwrap();
     let mut robot = ProcessRobot::new(settings(ProcessMode::Run, command("", folder.path())), joints()).unwrap();
     for runs in [1, 2] {

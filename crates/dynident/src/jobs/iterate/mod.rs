@@ -19,7 +19,7 @@ use crate::study::{Folders, PriorChoice, RobotChoice, SimulationSection, Study, 
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
 use dynident_iteration::{
-    Iteration, IterationError, IterationStatus, IterationStore, IterationTask, NextMotion, RunRecord, StopSignal,
+    Iteration, IterationError, IterationStatus, IterationStore, IterationTask, Leg, NextMotion, RunRecord, StopSignal,
     Supervisor, iterate_supervised,
 };
 use dynident_iteration::{Robot, RobotRun};
@@ -112,6 +112,7 @@ pub fn iterate_study(
         _ => None,
     };
     section.check_legs(&robot).map_err(in_section)?;
+    section.check_gains(study, &robot).map_err(in_section)?;
 
     // What an earlier call has left in the folder.
     let fingerprint = fingerprint(study, &robot, options);
@@ -149,6 +150,8 @@ pub fn iterate_study(
         }
     };
     let legs = section.legs(&trajectories, &robot).map_err(in_section)?;
+    let references: Vec<_> = legs.iter().map(Leg::reference).collect();
+    let settings = section.guarded(settings, study, &robot, &references).map_err(in_section)?;
     let torque_limits = torque_limits(&simulation, &robot, truth.is_some());
     let simulated = truth.is_some();
     let report = IterationReport {
@@ -281,6 +284,8 @@ const PAGE: &str = "report.html";
 
 /// Everything that runs depend on, in one number: study, robot, and the version of the program (FNV-1a, 64 bits).
 fn fingerprint(study: &Study, robot: &StudyRobot, options: &RunOptions<'_>) -> String {
+    let mut study = study.clone();
+    study.iteration = study.iteration.map(|section| section.of_runs());
     let text = format!("{study:?} {:?} {:?} {}", robot.model(), options.data, env!("CARGO_PKG_VERSION"));
     let mut hasher = FnvHasher::default();
     hasher.write(text.as_bytes());
