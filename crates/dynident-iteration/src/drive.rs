@@ -16,8 +16,8 @@ use crate::store::IterationStore;
 use crate::supervision::{Supervisor, Watching};
 use dynident_dynamics::ParametricModel;
 use dynident_identification::friction::chosen_model;
-use dynident_simulation::controllers::ControllerModel;
 use dynident_simulation::Record;
+use dynident_simulation::controllers::ControllerModel;
 use dynident_simulation::{SimulationError, require_length};
 
 use std::borrow::Cow;
