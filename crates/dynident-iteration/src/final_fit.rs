@@ -9,9 +9,9 @@ use dynident_identification::IdentificationTask;
 use dynident_identification::friction::JointFriction;
 
 impl Iteration {
-    /// What [`identify`](dynident_identification::identify()) makes the iteration's result of: the logs of all good runs
-    /// in the store (of the last where runs are not pooled), each weighted by its own noise, all joints at once whatever
-    /// the scheme, nothing held. `None` without a good run.
+    /// What [`identify`](dynident_identification::identify()) makes the iteration's result of: the logs of all good
+    /// runs in the store (of the last where runs are not pooled), each weighted by its own noise, all joints at once
+    /// whatever the scheme, nothing held. `None` without a good run.
     ///
     /// # Errors
     /// Logs that are not in the store any more, records of another robot.

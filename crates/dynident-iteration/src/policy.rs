@@ -17,8 +17,8 @@ const FAR_WIDER: f64 = 3.0;
 /// A rejected run's estimate takes the place of a good one's where its error bars are this many times as wide.
 const CLEARLY_NARROWER: f64 = 0.5;
 
-/// A run that left its trajectory tells that no controller helps where so large a share of the samples of a joint stands
-/// at the drive's limit.
+/// A run that left its trajectory tells that no controller helps where so large a share of the samples of a joint
+/// stands at the drive's limit.
 const HELPLESS: f64 = 0.05;
 
 /// What comes next.

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 pub enum IterationStatus {
     /// Nothing is left of what [`Shortfall`](super::Shortfall) names.
     Converged,
-    /// Neither tracking nor parameters change any more, and something is not met: a further run of the same motion would
-    /// not help.
+    /// Neither tracking nor parameters change any more, and something is not met: a further run of the same motion
+    /// would not help.
     Settled,
     /// All runs allowed were made.
     RunsUsedUp,

@@ -149,9 +149,9 @@ impl LinearProblem {
         Ok(self)
     }
 
-    /// The same with the rows of every joint of every log multiplied by a weight: `weight(log, joint)` with the log's and
-    /// the joint's number. Logs with noise of their own count as much as they tell; residuals are in the unit of a log
-    /// with weight 1.
+    /// The same with the rows of every joint of every log multiplied by a weight: `weight(log, joint)` with the log's
+    /// and the joint's number. Logs with noise of their own count as much as they tell; residuals are in the unit of a
+    /// log with weight 1.
     ///
     /// # Errors
     /// [`EstimationError::Setting`] for a weight that is negative, NaN or infinite.

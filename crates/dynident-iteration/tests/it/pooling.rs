@@ -25,8 +25,8 @@ fn errors_in_bars(estimate: &RunEstimate, truth: &[f64]) -> Vec<f64> {
     pairs.filter(|(_, std)| **std > 0.0).map(|((value, truth), std)| (value - truth) / std).collect()
 }
 
-/// Bars after k runs are at most 1.1/√k of the first's, and they hold: over seeds the errors are 0.8 to 1.2 of them, and
-/// 93 to 97 % lie inside 95 % intervals. Of few seeds both have the leeway of their number: errors of one seed are
+/// Bars after k runs are at most 1.1/√k of the first's, and they hold: over seeds the errors are 0.8 to 1.2 of them,
+/// and 93 to 97 % lie inside 95 % intervals. Of few seeds both have the leeway of their number: errors of one seed are
 /// correlated, so that a seed counts as four of its own.
 #[test]
 fn bars_narrow_with_every_run_and_hold() {

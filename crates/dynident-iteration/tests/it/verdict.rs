@@ -1,4 +1,5 @@
-//! Success means success: what an iteration says of robots that follow, clip, log late, fall, stick, or are another arm.
+//! Success means success: what an iteration says of robots that follow, clip, log late, fall, stick, or are another
+//! arm.
 
 use crate::simulated_arm::{Simulated, iterated, settings};
 use dynident_iteration::{IterationOutcome, IterationStatus, Shortfall};

@@ -27,8 +27,8 @@ pub struct IterationsFile {
     pub provenance: Option<Provenance>,
     /// Whether everything is met that makes a success: see `unmet`.
     pub converged: bool,
-    /// `converged`, `settled` (nothing changes any more, but something is unmet), `runs-used-up`, `refused`, `waiting` or
-    /// `interrupted`.
+    /// `converged`, `settled` (nothing changes any more, but something is unmet), `runs-used-up`, `refused`, `waiting`
+    /// or `interrupted`.
     pub status: String,
     /// The status in words.
     pub reason: String,
@@ -44,8 +44,8 @@ pub struct IterationsFile {
     /// Largest tracking error (mean over the joints) of the first good run over that of the last; none before there are
     /// two.
     pub tracking_improvement: Option<f64>,
-    /// Root mean square over the parameters of the error of what the last good run says alone, in units of the Cramér-Rao
-    /// bound; for simulated robots with torque noise.
+    /// Root mean square over the parameters of the error of what the last good run says alone, in units of the
+    /// Cramér-Rao bound; for simulated robots with torque noise.
     pub error_over_bound: Option<f64>,
     /// The Cramér-Rao bound of every parameter for one run: white torque noise of the simulated sensors at every
     /// recorded sample, exact positions.
@@ -133,8 +133,8 @@ pub struct IterationRun {
     pub max_tracking_error_rad: Vec<f64>,
     /// What it determines by itself.
     pub parameters: Vec<IterationParameter>,
-    /// What all good runs up to this one determine together; empty for the first, for those that do not count, and where
-    /// runs are not pooled.
+    /// What all good runs up to this one determine together; empty for the first, for those that do not count, and
+    /// where runs are not pooled.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pooled: Vec<IterationParameter>,
     /// What its log shows beside parameters, joint by joint; none where it did not get to its end.

@@ -1,4 +1,5 @@
-//! The robot that an iteration found, as `identify` writes one: result.json, the description with the new values, pages.
+//! The robot that an iteration found, as `identify` writes one: result.json, the description with the new values,
+//! pages.
 
 use crate::error::Error;
 use crate::jobs::identify::{IdentificationOutcome, Made, written};

@@ -88,8 +88,8 @@ pub struct IterationSection {
     /// The paper's scheme as it stands: no physically consistent set is asked for, nothing is rejected and runs are not
     /// pooled. False by default.
     pub literal: bool,
-    /// Whether the model is fitted to all good runs together, each weighted by its own noise; true by default. Otherwise
-    /// to the newest alone.
+    /// Whether the model is fitted to all good runs together, each weighted by its own noise; true by default.
+    /// Otherwise to the newest alone.
     pub pool: bool,
     /// From positions to velocities and accelerations; `deviation` from the trajectory by default.
     pub differentiator: DifferentiatorSettings,
