@@ -208,6 +208,9 @@ impl Iteration {
             let mut motion = next_motion(&self.task, plan, &controller, (number, reference, speed));
             motion.rehearsal.clone_from(&rehearsal);
             if !supervisor.allows(&motion) {
+                if stop.as_ref().is_some_and(StopSignal::is_requested) {
+                    return Ok(PlannedRun::Interrupted(runs, "before a run".to_owned()));
+                }
                 let reason = format!("run {} was not allowed", plan.run);
                 return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
             }
