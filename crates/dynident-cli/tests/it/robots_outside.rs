@@ -33,8 +33,8 @@ fn study(folder: &Path, further: &str) -> PathBuf {
     std::fs::write(folder.join("still.csv"), format!("t_s,q1,q2,dq1,dq2,ddq1,ddq2\n{rows}")).unwrap();
     let script = folder.join("robot.sh");
     let text = format!(
-        "[robot]\nfile = {urdf:?}\n[simulation]\nrate_hz = 100.0\n[controller]\nkind = \"joint-pd\"\nkp = 50.0\nkd = 10.0\n\
-         [iteration]\ntrajectory = \"still.csv\"\nmodel_free = {{ kind = \"joint-pd\", kp = 50.0, kd = 10.0 }}\n\
+        "[robot]\nfile = {urdf:?}\n[simulation]\nrate_hz = 1000.0\n[controller]\nkind = \"joint-pd\"\nkp = [200.0, 60.0]\nkd = [10.0, 1.0]\n\
+         [iteration]\ntrajectory = \"still.csv\"\nmodel_free = {{ kind = \"joint-pd\", kp = [200.0, 60.0], kd = [10.0, 1.0] }}\n\
          robot = {{ kind = \"process\", command = [\"sh\", {script:?}, \"{folder}\"]{further} }}\n",
         folder = folder.display()
     );
@@ -160,11 +160,12 @@ fn an_interrupted_search_keeps_no_trajectory() {
 #[test]
 fn a_robot_outside_has_no_default_gains() {
     let folder = tempfile::tempdir().unwrap();
-    robot(folder.path(), r#"touch "$1/begun""#);
+    let stopped = r#"touch "$1/begun"; printf '%s\n' '{"type":"end","status":"stopped","reason":"as asked"}'"#;
+    robot(folder.path(), stopped);
     let study = study(folder.path(), "");
     let text = std::fs::read_to_string(&study).unwrap();
-    let text = text.replace("[controller]\nkind = \"joint-pd\"\nkp = 50.0\nkd = 10.0\n", "");
-    let text = text.replace("model_free = { kind = \"joint-pd\", kp = 50.0, kd = 10.0 }\n", "");
+    let text = text.replace("[controller]\nkind = \"joint-pd\"\nkp = [200.0, 60.0]\nkd = [10.0, 1.0]\n", "");
+    let text = text.replace("model_free = { kind = \"joint-pd\", kp = [200.0, 60.0], kd = [10.0, 1.0] }\n", "");
     std::fs::write(&study, &text).unwrap();
     let output = iterate(&study, &["--allow-command"]).wait_with_output().unwrap();
     let said = said(&output);
@@ -195,6 +196,6 @@ fn a_corrected_command_is_no_other_iteration() {
     let said = said(&output);
     // The robot stopped: somebody is to look, and the run is there.
     assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.contains("protective stop") && said.contains("Look at the robot"), "{said}");
+    assert!(said.contains("protective stop") && said.contains("ended early"), "{said}");
     assert!(folder.path().join("result/runs/run_1/run.json").exists() && script.exists());
 }
