@@ -7,7 +7,8 @@ It offers both modes. In `run` it runs the control loop itself from the two file
 model-based controllers through a small Newton-Euler recursion over the numbers of controller.json. In `step` it holds the
 torques that it is sent. It stops at a stop message, when its input ends, and when a sample leaves the envelope that a motion comes
 with: a simulated robot stands at once, a real one brakes here. --friction, --damping and --armature give the joints dry (Nm) and viscous (Nm s/rad) friction and drive inertia
-(kg m^2) that the URDF does not tell: one number, or one for each joint with commas between; --torque cuts the drives' torque (Nm). Standard output belongs to the protocol; messages go to standard error.
+(kg m^2) that the URDF does not tell: one number, or one for each joint with commas between; --torque cuts the drives' torque (Nm).
+--kp and --kd are the drives' own position loop, for the controller position-loop. Standard output belongs to the protocol; messages go to standard error.
 """
 import argparse
 import csv
@@ -167,18 +168,22 @@ class Unknown(Exception):
 
 
 class Controller:
-    """Torque from the files' settings; `feed_forward` is the model's torque along the trajectory."""
+    """Torque from the files' settings; `own_loop` are the gains of the drives' own position loop, in the files' order."""
 
-    def __init__(self, file):
+    def __init__(self, file, own_loop):
         self.settings, n = file["controller"], len(file["joints"])
         self.model = InverseDynamics(file["model"]) if file["model"] else None
         laws = {law["kind"] for law in file["model"]["laws"]} if file["model"] else set()
         if laws - KNOWN_LAWS:
             raise Unknown(f"the laws {', '.join(sorted(laws - KNOWN_LAWS))}")
-        if self.settings["kind"] not in ("joint-pd", "joint-pid", "pd-gravity", "computed-torque", "finite-time"):
+        known = ("joint-pd", "joint-pid", "pd-gravity", "computed-torque", "finite-time", "position-loop")
+        if self.settings["kind"] not in known:
             raise Unknown(f"the controller {self.settings['kind']}")
-        of = lambda key: np.broadcast_to(np.array(self.settings.get(key, 0.0), float), n)
+        of = lambda key: np.broadcast_to(np.array(self.settings.get(key) or 0.0, float), n)
         self.kp, self.ki, self.kd = of("kp"), of("ki"), of("kd")
+        if self.settings["kind"] == "position-loop":
+            # The drives' own gains, whatever the file believes of them.
+            self.kp, self.kd = own_loop
         limit = self.settings.get("integral_limit")
         self.limit = np.broadcast_to(np.array(np.inf if limit is None else limit, float), n)
         self.integral, self.last_error = np.zeros(n), None
@@ -188,9 +193,13 @@ class Controller:
         inside = blend ** (alpha - 1) * x if blend > 0 else x
         return np.where(np.abs(x) < blend, inside, np.sign(x) * np.abs(x) ** alpha)
 
-    def torque(self, target, q, dq):
+    def torque(self, target, q, dq, ahead):
+        """`ahead` is the trajectory's own torque column, where it has one."""
         q_d, dq_d, ddq_d = target
         e, de, kind = q_d - q, dq_d - dq, self.settings["kind"]
+        if kind == "position-loop":
+            tau = self.kp * e + self.kd * de
+            return tau + ahead if ahead is not None and self.settings["feed_forward"] else tau
         if kind in ("joint-pd", "joint-pid", "pd-gravity"):
             tau = self.kp * e + self.kd * de
             if kind == "joint-pid":
@@ -255,8 +264,9 @@ def breach(envelope, joints, q, dq, tau, q_d):
 
 
 class Robot:
-    def __init__(self, model, messages, most):
+    def __init__(self, model, messages, most, own_loop):
         self.model, self.data, self.messages, self.most = model, mujoco.MjData(model), messages, most
+        self.own_loop = [np.broadcast_to(gains, model.nv) for gains in own_loop]
         self.joints = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, j) for j in range(model.njnt)]
 
     def start(self, rate_hz, q, dq):
@@ -280,7 +290,7 @@ class Robot:
             rows = [[float(x) for x in row] for row in list(csv.reader(text))[1:]]
         table, n = np.array(rows), len(order)
         try:
-            controller = Controller(file)
+            controller = Controller(file, [gains[back] for gains in self.own_loop])
         except Unknown as unknown:
             return send("end", status="stopped", reason=str(unknown))
         envelope = message.get("envelope")
@@ -292,7 +302,8 @@ class Robot:
             if not np.all(np.isfinite(q)) or np.max(np.abs(dq)) > 100:
                 return send("end", status="stopped", reason=f"a joint moves too fast at {row[0]:.3f} s")
             # A drive gives what it can, and logs what it gives.
-            tau = np.clip(controller.torque(target, q[back], dq[back])[order], -self.most, self.most)
+            ahead = row[1 + 3 * n:] if len(row) > 1 + 3 * n else None
+            tau = np.clip(controller.torque(target, q[back], dq[back], ahead)[order], -self.most, self.most)
             send("sample", t_s=row[0], q=q.tolist(), dq=dq.tolist(), tau=tau.tolist())
             if self.messages.stop_asked():
                 return send("end", status="stopped", reason="the host asked for it")
@@ -324,9 +335,12 @@ def main():
     parser.add_argument("--damping", type=numbers, default=0.0, help="viscous friction of the joints, Nm s/rad")
     parser.add_argument("--armature", type=numbers, default=0.0, help="drive inertia of the joints, kg m^2")
     parser.add_argument("--torque", type=numbers, default=np.inf, help="largest torque of the drives, Nm")
+    parser.add_argument("--kp", type=numbers, default=0.0, help="stiffness of the drives' own position loop, Nm/rad")
+    parser.add_argument("--kd", type=numbers, default=0.0, help="damping of the drives' own position loop, Nm s/rad")
     options = parser.parse_args()
     messages = Messages()
-    robot = Robot(load(options.urdf, options.friction, options.damping, options.armature), messages, options.torque)
+    robot = Robot(load(options.urdf, options.friction, options.damping, options.armature), messages, options.torque,
+                  (options.kp, options.kd))
     send("hello", protocol=PROTOCOL, name=f"MuJoCo {mujoco.__version__}: {options.urdf.name}", joints=robot.joints,
          modes=["run", "step"])
     while (message := messages.next()) is not None:

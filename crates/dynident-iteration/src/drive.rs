@@ -16,8 +16,8 @@ use crate::store::IterationStore;
 use crate::supervision::{Supervisor, Watching};
 use dynident_dynamics::ParametricModel;
 use dynident_identification::friction::chosen_model;
-use dynident_simulation::controllers::ControllerModel;
 use dynident_simulation::Record;
+use dynident_simulation::controllers::ControllerModel;
 use dynident_simulation::{SimulationError, require_length};
 
 use std::borrow::Cow;
@@ -208,6 +208,9 @@ impl Iteration {
             let mut motion = next_motion(&self.task, plan, &controller, (number, reference, speed));
             motion.rehearsal.clone_from(&rehearsal);
             if !supervisor.allows(&motion) {
+                if stop.as_ref().is_some_and(StopSignal::is_requested) {
+                    return Ok(PlannedRun::Interrupted(runs, "before a run".to_owned()));
+                }
                 let reason = format!("run {} was not allowed", plan.run);
                 return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
             }

@@ -153,7 +153,7 @@ impl Rehearsed<'_> {
             }
         }
         // The closed loop.
-        if let Some(believed) = self.believed {
+        if let Some(believed) = self.believed.filter(|_| self.controller.can_be_simulated()) {
             for number in 0..=settings.robots {
                 if let Err(failure) = self.simulate(believed, (number, settings), &mut random, &mut shown)? {
                     return Ok(Err(failure));

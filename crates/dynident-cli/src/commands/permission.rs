@@ -1,5 +1,6 @@
 //! What a person is asked before a robot moves.
 
+use super::interruption;
 use crate::terminal;
 use dynident::iteration::NextMotion;
 use dynident::study::{RobotChoice, Study};
@@ -60,6 +61,9 @@ fn asked(question: &str) -> Option<bool> {
     terminal::ask(&format!("{question} [y/N] "));
     let mut answer = String::new();
     std::io::stdin().lock().read_line(&mut answer).ok()?;
+    if interruption::pressed() {
+        return Some(false);
+    }
     Some(matches!(answer.trim().to_lowercase().as_str(), "y" | "yes"))
 }
 

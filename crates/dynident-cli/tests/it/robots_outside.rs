@@ -33,8 +33,8 @@ fn study(folder: &Path, further: &str) -> PathBuf {
     std::fs::write(folder.join("still.csv"), format!("t_s,q1,q2,dq1,dq2,ddq1,ddq2\n{rows}")).unwrap();
     let script = folder.join("robot.sh");
     let text = format!(
-        "[robot]\nfile = {urdf:?}\n[simulation]\nrate_hz = 100.0\n[controller]\nkind = \"joint-pd\"\nkp = 50.0\nkd = 10.0\n\
-         [iteration]\ntrajectory = \"still.csv\"\nmodel_free = {{ kind = \"joint-pd\", kp = 50.0, kd = 10.0 }}\n\
+        "[robot]\nfile = {urdf:?}\n[simulation]\nrate_hz = 1000.0\n[controller]\nkind = \"joint-pd\"\nkp = [200.0, 60.0]\nkd = [10.0, 1.0]\n\
+         [iteration]\ntrajectory = \"still.csv\"\nmodel_free = {{ kind = \"joint-pd\", kp = [200.0, 60.0], kd = [10.0, 1.0] }}\n\
          robot = {{ kind = \"process\", command = [\"sh\", {script:?}, \"{folder}\"]{further} }}\n",
         folder = folder.display()
     );
@@ -154,4 +154,48 @@ fn an_interrupted_search_keeps_no_trajectory() {
     let said = said(&output);
     assert_eq!(output.status.code(), Some(130), "{said}");
     assert!(said.contains("interrupted") && !result.join("trajectory.json").exists(), "{said}");
+}
+
+/// Nobody's gains are guessed: the words say what to write instead.
+#[test]
+fn a_robot_outside_has_no_default_gains() {
+    let folder = tempfile::tempdir().unwrap();
+    let stopped = r#"touch "$1/begun"; printf '%s\n' '{"type":"end","status":"stopped","reason":"as asked"}'"#;
+    robot(folder.path(), stopped);
+    let study = study(folder.path(), "");
+    let text = std::fs::read_to_string(&study).unwrap();
+    let text = text.replace("[controller]\nkind = \"joint-pd\"\nkp = [200.0, 60.0]\nkd = [10.0, 1.0]\n", "");
+    let text = text.replace("model_free = { kind = \"joint-pd\", kp = [200.0, 60.0], kd = [10.0, 1.0] }\n", "");
+    std::fs::write(&study, &text).unwrap();
+    let output = iterate(&study, &["--allow-command"]).wait_with_output().unwrap();
+    let said = said(&output);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("no default gains") && said.contains("bandwidth_hz"), "{said}");
+    assert!(!folder.path().join("begun").exists());
+    // A bandwidth is enough where the description has inertials.
+    std::fs::write(&study, text.replace("[iteration]\n", "[iteration]\nbandwidth_hz = 2.0\n")).unwrap();
+    let output = iterate(&study, &["--allow-command"]).wait_with_output().unwrap();
+    assert!(folder.path().join("begun").exists(), "{}", self::said(&output));
+}
+
+/// A command that was wrong, a limit that was too short, another envelope: corrected, the folder goes on.
+#[test]
+fn a_corrected_command_is_no_other_iteration() {
+    let folder = tempfile::tempdir().unwrap();
+    let stopped = r#"touch "$1/begun"; printf '%s\n' '{"type":"end","status":"stopped","reason":"protective stop"}'"#;
+    let script = robot(folder.path(), stopped);
+    let study = study(folder.path(), "");
+    let text = std::fs::read_to_string(&study).unwrap();
+    std::fs::write(&study, text.replace("robot.sh", "robto.sh")).unwrap();
+    let output = iterate(&study, &["--allow-command"]).wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert!(!folder.path().join("begun").exists() && folder.path().join("result/trajectory.json").exists());
+    let corrected = text.replace("\"]", "\"], limits = { message_s = 90.0 }");
+    std::fs::write(&study, format!("{corrected}[iteration.envelope]\ntracking_error = 0.25\n")).unwrap();
+    let output = iterate(&study, &["--allow-command"]).wait_with_output().unwrap();
+    let said = said(&output);
+    // The robot stopped: somebody is to look, and the run is there.
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("protective stop") && said.contains("ended early"), "{said}");
+    assert!(folder.path().join("result/runs/run_1/run.json").exists() && script.exists());
 }

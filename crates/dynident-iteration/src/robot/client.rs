@@ -3,7 +3,7 @@
 use super::RobotFault;
 use super::process_group::ProcessGroup;
 use super::process_settings::{ProcessLimits, ProcessMode, ProcessSettings};
-use super::protocol::{PROTOCOL, ToClient, ToHost};
+use super::protocol::{LoggedTorque, PROTOCOL, ToClient, ToHost};
 use super::stop_reason::Stopping;
 use super::stop_signal::{Listening, StopSignal};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -74,6 +74,8 @@ pub(super) struct Client {
     limits: ProcessLimits,
     /// For each joint of the model, its place in the client's vectors.
     pub(super) places: Vec<usize>,
+    /// Torque of each of the client's joints for what it logs as 1.
+    pub(super) torque_per_unit: Vec<f64>,
     run_ends: Option<(Instant, f64)>,
     stop: Option<StopSignal>,
     /// Deregisters when dropped.
@@ -115,6 +117,7 @@ impl Client {
             last_words,
             limits: settings.limits.clone(),
             places: Vec::new(),
+            torque_per_unit: Vec::new(),
             run_ends: None,
             stop: None,
             listening: None,
@@ -126,7 +129,7 @@ impl Client {
             Heard::Message(message) => message,
             Heard::StopRequested => return Ok(Started::StopRequested),
         };
-        let ToHost::Hello { protocol, joints: found, modes, .. } = hello else {
+        let ToHost::Hello { protocol, joints: found, modes, logs, .. } = hello else {
             return Err(RobotFault::OutOfTurn { found: hello.kind().to_owned(), expected: "hello".to_owned() });
         };
         if protocol != PROTOCOL {
@@ -145,6 +148,7 @@ impl Client {
         client.places = places
             .filter(|_| found.len() == joints.len())
             .ok_or(RobotFault::OtherJoints { expected: joints.to_vec(), found })?;
+        client.torque_per_unit = torque_per_unit(&logs, joints.len())?;
         Ok(Started::Ready(Box::new(client)))
     }
 
@@ -272,6 +276,29 @@ impl Drop for Client {
         self.group.end(grace);
         // Its number may be another's from here on.
         self.listening = None;
+    }
+}
+
+/// Factors from what a client logs to torque.
+fn torque_per_unit(logs: &LoggedTorque, joints: usize) -> Result<Vec<f64>, RobotFault> {
+    let fault = |what: String, fix: &str| RobotFault::LoggedTorque { what, fix: fix.to_owned() };
+    match logs {
+        LoggedTorque::Drive => Ok(vec![1.0; joints]),
+        LoggedTorque::Current { torque_per_ampere } => {
+            if torque_per_ampere.len() != joints || torque_per_ampere.iter().any(|k| !k.is_finite() || *k == 0.0) {
+                let fix = "give torque_per_ampere at the joint (torque constant times gear ratio) for each joint";
+                return Err(fault(
+                    format!("as currents with {} factors for {joints} joints", torque_per_ampere.len()),
+                    fix,
+                ));
+            }
+            Ok(torque_per_ampere.clone())
+        }
+        LoggedTorque::Reduced { without } => {
+            let fix = "what is missing belongs to the robot that is looked for; log the whole torque of the drives (a \
+                       Franka's tau_J, not tau_J_d), or add what the robot adds before you send it";
+            Err(fault(format!("without {}", without.join(" and ")), fix))
+        }
     }
 }
 

@@ -92,14 +92,14 @@ const INTERRUPTED: &str = "interrupted";
 
 /// Stops a client. Samples that it still sends are kept as long as they are such.
 fn stopped(client: &mut Client, record: &mut Record, most: usize, reason: &str) -> Stopping {
-    let places = client.places.clone();
+    let order = (client.places.clone(), client.torque_per_unit.clone());
     let mut fine = true;
     client.stop(reason, &mut |message| {
         if let ToHost::Sample { t_s, q, dq, tau } = &message
             && fine
             && record.samples < most
         {
-            fine = keep_sample_of(&places, record, (*t_s, q, dq.as_deref(), tau)).is_ok();
+            fine = keep_sample_of((&order.0, &order.1), record, (*t_s, q, dq.as_deref(), tau)).is_ok();
         }
     })
 }
@@ -108,12 +108,12 @@ fn stopped(client: &mut Client, record: &mut Record, most: usize, reason: &str) 
 type SentSample<'a> = (Option<f64>, &'a [Option<f64>], Option<&'a [Option<f64>]>, &'a [Option<f64>]);
 
 fn keep_sample(client: &Client, record: &mut Record, sent: SentSample<'_>) -> Result<Option<Vec<f64>>, RobotFault> {
-    keep_sample_of(&client.places, record, sent)
+    keep_sample_of((&client.places, &client.torque_per_unit), record, sent)
 }
 
 /// Appends a sample to the record; its velocities, if it has them.
 fn keep_sample_of(
-    places: &[usize],
+    (places, torque_per_unit): (&[usize], &[f64]),
     record: &mut Record,
     (t_s, q, dq, tau): SentSample<'_>,
 ) -> Result<Option<Vec<f64>>, RobotFault> {
@@ -123,7 +123,7 @@ fn keep_sample_of(
     let dq = dq.map(|dq| vector(places, dq, "dq", sample)).transpose()?;
     record.times_s.push(time_s);
     record.q.extend(q);
-    record.tau.extend(tau);
+    record.tau.extend(tau.iter().zip(places).map(|(tau, &place)| tau * torque_per_unit[place]));
     record.samples += 1;
     Ok(dq)
 }

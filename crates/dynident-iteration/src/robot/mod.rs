@@ -22,7 +22,7 @@ pub use handover::{CONTROLLER_SCHEMA, controller_json, trajectory_csv};
 pub use log_table::{LogTableError, read_log_table};
 pub use process::ProcessRobot;
 pub use process_settings::{ProcessLimits, ProcessMode, ProcessSettings};
-pub use protocol::{PROTOCOL, ToClient, ToHost};
+pub use protocol::{LoggedTorque, PROTOCOL, ToClient, ToHost};
 pub use simulated::SimulatedRobot;
 pub use stop_reason::{Breach, EnvelopeQuantity, Stopping};
 pub use stop_signal::StopSignal;
@@ -279,6 +279,14 @@ pub enum RobotFault {
         found: String,
         /// What is needed.
         expected: String,
+    },
+    /// The robot logs something from which its dynamics cannot be told.
+    #[error("the robot logs torque {what}: {fix}")]
+    LoggedTorque {
+        /// What it logs.
+        what: String,
+        /// What to do.
+        fix: String,
     },
     /// The record ends before the trajectory does.
     #[error("the robot says done, but its record ends at {end_s} s of {duration_s} s")]

@@ -75,6 +75,9 @@ pub enum ToHost {
         joints: Vec<String>,
         /// Which of `run` and `step` it offers.
         modes: Vec<String>,
+        /// What it logs as torque; everything that the drives give, Nm (N), where it does not say.
+        #[serde(default)]
+        logs: LoggedTorque,
     },
     /// One sample of a run.
     Sample {
@@ -104,6 +107,25 @@ pub enum ToHost {
         /// Why it stopped.
         #[serde(default)]
         reason: String,
+    },
+}
+
+/// What a robot logs as `tau`.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(tag = "torque", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum LoggedTorque {
+    /// All that the drives give at the joints, Nm (N).
+    #[default]
+    Drive,
+    /// Currents of the drives, A, which make so much torque at the joint, gear included.
+    Current {
+        /// Nm/A (N/A) at each joint.
+        torque_per_ampere: Vec<f64>,
+    },
+    /// Torques from which the robot has taken what it adds by itself (gravity, friction).
+    Reduced {
+        /// What is missing in them.
+        without: Vec<String>,
     },
 }
 

@@ -129,7 +129,7 @@ pub fn iterate_study(
         .map(|stage| IterationStore::open(&folder(stage), &fingerprint, resume))
         .collect::<Result<Vec<_>, _>>()
         .map_err(in_iteration)?;
-    let rate_hz = simulation.rate_hz;
+    let rate_hz = section.rate_hz.unwrap_or(simulation.rate_hz);
     let stop = watch.stop.clone();
     let make = || {
         let found = legs::trajectories(study, study_path, &robot, rate_hz, options, watch.design)?;

@@ -108,6 +108,8 @@ pub struct IterationSection {
     pub envelope: EnvelopeSettings,
     /// How every motion of a robot outside is rehearsed before it is commanded.
     pub rehearsal: RehearsalSettings,
+    /// Samples a second of the robot's control loop and of what is handed over; `[simulation] rate_hz` (1000) by default.
+    pub rate_hz: Option<f64>,
     /// Shares of its speed at which the motion is run before the first run, as `[0.1, 0.5, 1.0]`; none by default.
     pub speed_steps: Vec<f64>,
     /// Tracking this many times worse than that of the last good run rejects a run.
@@ -157,6 +159,7 @@ impl Default for IterationSection {
             envelope: EnvelopeSettings::default(),
             rehearsal: RehearsalSettings::default(),
             speed_steps: Vec::new(),
+            rate_hz: None,
             worse_factor,
             most_halvings,
             stiffen: None,

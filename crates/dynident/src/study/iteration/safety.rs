@@ -3,9 +3,10 @@
 use super::{IterationSection, RobotChoice, Study};
 use crate::error::StudyError;
 use crate::study::StudyRobot;
-use dynident_iteration::robot::EnvelopeSettings;
+use dynident_iteration::robot::{EnvelopeSettings, ProcessMode};
 use dynident_iteration::{IterationSettings, SafetySettings, StartWith, derived_controllers};
-use dynident_simulation::Reference;
+use dynident_simulation::controllers::PositionLoopSettings;
+use dynident_simulation::{ControllerSettings, Reference};
 
 impl IterationSection {
     /// Whether the robot is not the simulator.
@@ -22,6 +23,18 @@ impl IterationSection {
     /// # Errors
     /// What is missing, and what to write.
     pub(crate) fn check_gains(&self, study: &Study, robot: &StudyRobot) -> Result<(), StudyError> {
+        let controllers = [study.controller.as_ref(), self.model_free.as_ref(), self.first.as_ref()];
+        let own_loop = controllers.into_iter().flatten().any(|controller| !controller.can_be_simulated());
+        let steps = match &self.robot {
+            RobotChoice::Simulation => true,
+            RobotChoice::Process(process) => process.mode == ProcessMode::Step,
+            RobotChoice::Folder(_) => false,
+        };
+        if own_loop && steps {
+            let fix = "here Dynident computes every torque: state what kp and kd of the drives' loop are, or let a \
+                       program run it (mode = \"run\")";
+            return Err(StudyError::conflict("kind = \"position-loop\"", fix));
+        }
         if !self.is_outside() {
             return Ok(());
         }
@@ -34,7 +47,7 @@ impl IterationSection {
             return Err(StudyError::NoInertials { bodies: unknown.into_iter().map(str::to_owned).collect(), fix });
         }
         let missing = match (&self.model_free, &study.controller) {
-            (Some(_), Some(_)) => return Ok(()),
+            (Some(_), Some(_)) | (None, Some(ControllerSettings::PositionLoop(_))) => return Ok(()),
             (None, Some(_)) => "model_free",
             (Some(_), None) => "[controller]",
             (None, None) => "model_free and [controller]",
@@ -42,7 +55,8 @@ impl IterationSection {
         Err(StudyError::missing(
             format!("gains ({missing})"),
             "a robot outside has no default gains: what holds one arm drops another. Give bandwidth_hz (gains from the \
-             description's inertials, critically damped, say 2.0), or model_free = { kind = \"joint-pd\", kp = [..], \
+             description's inertials, critically damped, say 2.0), [controller] with kind = \"position-loop\" (the \
+             drives' own loop), or model_free = { kind = \"joint-pd\", kp = [..], \
              kd = [..] } and [controller] with gains that this robot has run under",
         ))
     }
@@ -60,10 +74,16 @@ impl IterationSection {
     ) -> Result<IterationSettings, StudyError> {
         self.rehearsal.validate()?;
         let (outside, model) = (self.is_outside(), robot.model());
+        // Before there is a model the drives' loop gets nothing but the path.
+        if let (Some(ControllerSettings::PositionLoop(own)), None) = (&study.controller, &self.model_free) {
+            let own = PositionLoopSettings { feed_forward: false, ..own.clone() };
+            settings.model_free = ControllerSettings::PositionLoop(own);
+        }
         if let Some(bandwidth) = &self.bandwidth_hz {
             let uncertainty = self.rehearsal.uncertainty_percent;
             let derived = derived_controllers(&robot.parametric, references, bandwidth, uncertainty)?;
-            if self.model_free.is_none() {
+            let is_own = matches!(settings.model_free, ControllerSettings::PositionLoop(_));
+            if self.model_free.is_none() && !is_own {
                 settings.model_free = derived.model_free;
             }
             // Gains of the description's bodies: their weight is known as well.
