@@ -140,11 +140,10 @@ impl Shortfall {
     /// What would help.
     pub fn remedy(&self) -> &'static str {
         match self {
-            Self::TooFewRuns { .. } => "allow more runs (max_runs)",
+            Self::TooFewRuns { .. } | Self::NoModel => "allow more runs (max_runs)",
             Self::LastRunRejected { .. } => {
                 "see the reason; a first controller that holds the robot is the commonest cure"
             }
-            Self::NoModel => "allow more runs (max_runs)",
             Self::NoEvidence { .. } => "begin anew with this version",
             Self::Tracking { .. } => {
                 "look for what the model has no term for (sticking, backlash, elasticity, a controller that is not the stated one); or give stiffer gains or a larger settled.tracking_tolerance"

@@ -78,7 +78,9 @@ pub(crate) fn step_by_step(
                 narrow_panel.extend_from_slice(&torque);
                 wide_panel.extend_from_slice(&torque);
                 for panel in [&mut narrow_panel, &mut wide_panel] {
-                    panel.iter_mut().for_each(|value| *value *= weights[joint]);
+                    for value in panel.iter_mut() {
+                        *value *= weights[joint];
+                    }
                 }
                 factor.absorb(&narrow_panel, rows)?;
                 wide.absorb(&wide_panel, rows)?;

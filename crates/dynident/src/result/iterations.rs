@@ -3,6 +3,7 @@
 use super::identification::BaseParameterResult;
 use super::provenance::Provenance;
 use crate::error::Error;
+use core::fmt::Write as _;
 use dynident_identification::examination::TorqueLag;
 use dynident_iteration::{RunEvidence, Shortfall};
 use serde::{Deserialize, Serialize};
@@ -85,7 +86,8 @@ impl IterationsFile {
         let mut line = format!("{}: {}; {good} good of {} runs", self.name, self.reason, self.runs.len());
         if let Some(last) = self.runs.iter().rfind(|run| run.accepted) {
             let worst = last.max_tracking_error_rad.iter().fold(0.0_f64, |most, error| most.max(*error));
-            line += &format!("; tracking {worst:.2e} rad (m)");
+            // Writing to a string cannot fail.
+            let _ = write!(line, "; tracking {worst:.2e} rad (m)");
         }
         if self.converged { line } else { format!("{line}; {} unmet", self.unmet.len()) }
     }

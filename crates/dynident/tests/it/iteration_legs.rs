@@ -54,7 +54,7 @@ fn by_library(study: &Study, path: &Path) -> Vec<Vec<RunRecord>> {
         let legs = vec![Leg::windowed(reference, windows).unwrap()];
         let task = IterationTask { robot, legs, known: known.clone(), torque_limits: None };
         let mut settings = IterationSettings {
-            model_free: section.model_free.clone(),
+            model_free: section.model_free.clone().unwrap(),
             controller: study.controller.clone().unwrap(),
             max_runs: section.max_runs,
             ..IterationSettings::default()

@@ -249,7 +249,7 @@ pub fn iterate_study(
         file.no_result = Some(why.to_string());
         RobotFiles::none()
     });
-    file.base_parameters = found.base_parameters.clone();
+    file.base_parameters.clone_from(&found.base_parameters);
     write_set(out, &file, Some(iteration_report(&file, &traces, &time)?), found)?;
     Ok(file)
 }
