@@ -25,8 +25,8 @@ pub struct RehearsalSettings {
     pub uncertainty_percent: f64,
     /// Robots within that which are simulated beside the model itself. Default 4.
     pub robots: usize,
-    /// Postures at which the mass matrix is looked at: so many over the workspace, and so many along the motion. Default
-    /// 200.
+    /// Postures at which the mass matrix is looked at: so many over the workspace, and so many along the motion.
+    /// Default 200.
     pub postures: usize,
     /// Seed of robots and postures. Default 1.
     pub seed: u64,

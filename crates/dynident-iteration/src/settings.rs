@@ -1,6 +1,6 @@
 //! Settings of an iteration.
 
-use crate::supervision::SafetySettings;
+use crate::safety::SafetySettings;
 use dynident_identification::EstimationSettings;
 use dynident_identification::consistent::ConsistencySettings;
 use dynident_identification::estimators::Estimator;

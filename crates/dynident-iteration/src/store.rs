@@ -121,8 +121,11 @@ impl IterationStore {
             1 => format!("{INTERRUPTED}{run}"),
             more => format!("{INTERRUPTED}{run}_{more}"),
         };
-        let free = (1..).map(|again| self.runs.join(name(again))).find(|folder| !folder.exists());
-        let Some(folder) = free else { return Ok(None) };
+        let mut again = 1;
+        while self.runs.join(name(again)).exists() {
+            again += 1;
+        }
+        let folder = self.runs.join(name(again));
         let text = serde_json::json!({ "schema": INTERRUPTED_SCHEMA, "run": run, "outcome": how }).to_string();
         self.keep_whole(&folder, (INTERRUPTED_FILE, &text), runs)?;
         Ok(Some(folder))

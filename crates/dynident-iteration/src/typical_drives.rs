@@ -10,10 +10,10 @@ const FRICTION: f64 = 0.05;
 /// Velocity of a joint whose description has no limit, rad/s (m/s).
 const SPEED: f64 = 2.0;
 
-/// The nominal parameters with typical ones of drives where the model has such terms and the description says nothing of
-/// them: inertia that the joint's effort limit accelerates by 300 rad/s² (geared arms have 100 to 500: that of a UR10's
-/// wrist is 0.2 kg m² at 56 Nm), dry friction of 5 % of it, and as much viscous friction at the velocity limit. None if
-/// nothing was to be filled in.
+/// The nominal parameters with typical ones of drives where the model has such terms and the description says nothing
+/// of them: inertia that the joint's effort limit accelerates by 300 rad/s² (geared arms have 100 to 500: that of a
+/// UR10's wrist is 0.2 kg m² at 56 Nm), dry friction of 5 % of it, and as much viscous friction at the velocity limit.
+/// None if nothing was to be filled in.
 pub(crate) fn with_typical_drives(robot: &ParametricModel) -> Option<Vec<f64>> {
     let mut parameters = robot.nominal().to_vec();
     let bodies = 10 * robot.dof();

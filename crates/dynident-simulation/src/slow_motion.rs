@@ -5,8 +5,9 @@ use crate::reference::Reference;
 use dynident_excitation::Motion;
 
 impl Reference {
-    /// The motion at a share s of its speed, at the same rate: `q(s t)`, `s q̇(s t)`, `s² q̈(s t)`. Between samples positions
-    /// and velocities are those of the cubic polynomial that takes over both at either end, accelerations go straight.
+    /// The motion at a share s of its speed, at the same rate: `q(s t)`, `s q̇(s t)`, `s² q̈(s t)`. Between samples
+    /// positions and velocities are those of the cubic polynomial that takes over both at either end, accelerations go
+    /// straight.
     ///
     /// # Errors
     /// A share that is not within (0, 1].

@@ -9,8 +9,8 @@ pub(crate) const STATUS: u8 = 130;
 /// Set by the first Ctrl-C.
 static PRESSED: AtomicBool = AtomicBool::new(false);
 
-/// From now on the first Ctrl-C asks for a stop: searches end with the best, robots stop. The second kills every program
-/// that serves a robot, with all its processes, and ends this one.
+/// From now on the first Ctrl-C asks for a stop: searches end with the best, robots stop. The second kills every
+/// program that serves a robot, with all its processes, and ends this one.
 pub(crate) fn listen(stop: &StopSignal) {
     let stop = stop.clone();
     // Without a handler Ctrl-C ends the program as ever.

@@ -29,13 +29,16 @@ done
 /// A study of the planar arm with that robot, at rest for a second.
 fn study(folder: &Path, further: &str) -> PathBuf {
     let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/planar2r.urdf");
-    let rows: String = (0..101).map(|k| format!("{},0,0,0,0,0,0\n", f64::from(k) * 0.01)).collect();
-    std::fs::write(folder.join("still.csv"), format!("t_s,q1,q2,dq1,dq2,ddq1,ddq2\n{rows}")).unwrap();
+    let mut rows = vec!["t_s,q1,q2,dq1,dq2,ddq1,ddq2".to_owned()];
+    rows.extend((0..101).map(|k| format!("{},0,0,0,0,0,0", f64::from(k) * 0.01)));
+    std::fs::write(folder.join("still.csv"), rows.join("\n") + "\n").unwrap();
     let script = folder.join("robot.sh");
     let text = format!(
-        "[robot]\nfile = {urdf:?}\n[simulation]\nrate_hz = 1000.0\n[controller]\nkind = \"joint-pd\"\nkp = [200.0, 60.0]\nkd = [10.0, 1.0]\n\
+        "[robot]\nfile = \"{urdf}\"\n[simulation]\nrate_hz = 1000.0\n[controller]\nkind = \"joint-pd\"\nkp = [200.0, 60.0]\nkd = [10.0, 1.0]\n\
          [iteration]\ntrajectory = \"still.csv\"\nmodel_free = {{ kind = \"joint-pd\", kp = [200.0, 60.0], kd = [10.0, 1.0] }}\n\
-         robot = {{ kind = \"process\", command = [\"sh\", {script:?}, \"{folder}\"]{further} }}\n",
+         robot = {{ kind = \"process\", command = [\"sh\", \"{script}\", \"{folder}\"]{further} }}\n",
+        urdf = urdf.display(),
+        script = script.display(),
         folder = folder.display()
     );
     let path = folder.join("study.toml");

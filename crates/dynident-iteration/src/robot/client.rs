@@ -223,7 +223,6 @@ impl Client {
             let left = limit.0.saturating_sub(begin.elapsed());
             match self.events.recv_timeout(left.min(LOOK)) {
                 Ok(Event::Line(line)) => return self.heard(line).map(Heard::Message),
-                Ok(Event::Woken) => {}
                 Ok(Event::Closed) | Err(RecvTimeoutError::Disconnected) => return Err(self.died(waiting_for)),
                 // Its pipe may be held open by a process that it has started. What it wrote last may still be on its
                 // way when it is first seen dead.
@@ -236,7 +235,7 @@ impl Client {
                 Err(RecvTimeoutError::Timeout) if left.is_zero() => {
                     return Err(RobotFault::Hung { waiting_for: waiting_for.to_owned(), limit_s: limit.1 });
                 }
-                Err(RecvTimeoutError::Timeout) => {}
+                Ok(Event::Woken) | Err(RecvTimeoutError::Timeout) => {}
             }
         }
     }

@@ -49,8 +49,8 @@ pub fn trajectory_csv(reference: &Reference, model: Option<&ControllerModel>) ->
     text
 }
 
-/// The controller's settings, the joints' order, the envelope that no sample may leave, and the model in numbers: enough
-/// to compute every torque of the controller elsewhere.
+/// The controller's settings, the joints' order, the envelope that no sample may leave, and the model in numbers:
+/// enough to compute every torque of the controller elsewhere.
 pub fn controller_json(request: &RunRequest<'_>, joints: &[String]) -> Value {
     json!({
         "schema": CONTROLLER_SCHEMA,

@@ -10,8 +10,8 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// A robot behind a program's standard input and output. The program is started with the first run and kept for the
-/// next; after a failure it is killed, and the next run starts it anew. On Unix it has a process group of its own, which
-/// ends with this robot: no process of it is left.
+/// next; after a failure it is killed, and the next run starts it anew. On Unix it has a process group of its own,
+/// which ends with this robot: no process of it is left.
 #[derive(Debug)]
 pub struct ProcessRobot {
     settings: ProcessSettings,

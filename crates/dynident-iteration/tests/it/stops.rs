@@ -1,5 +1,5 @@
-//! Stops: asked for, or because a sample leaves its envelope; in every mode, with a robot that answers and with one that
-//! does not; and no process of a robot is left.
+//! Stops: asked for, or because a sample leaves its envelope; in every mode, with a robot that answers and with one
+//! that does not; and no process of a robot is left.
 
 use super::robots::{client, joints, pd, reference};
 use dynident_dynamics::ParametricModel;
@@ -177,8 +177,9 @@ fn watched(mode: ProcessMode, envelope: &Envelope, folder: &Path, unwatched: boo
     robot.run(&RunRequest { envelope: Some(envelope), ..RunRequest::new(1, &reference, &controller) }).unwrap()
 }
 
-/// The arm sags under joint PD: the first sample that is too far from the path ends the run, with joint, quantity, value,
-/// limit and time, whether the program watches or not; and in the mode step the next thing the program hears is a stop.
+/// The arm sags under joint PD: the first sample that is too far from the path ends the run, with joint, quantity,
+/// value, limit and time, whether the program watches or not; and in the mode step the next thing the program hears is
+/// a stop.
 #[test]
 fn a_sample_outside_of_the_envelope_stops_the_run() {
     let tight = Envelope { tracking_error: vec![None, Some(0.01)], ..envelope() };

@@ -57,8 +57,9 @@ impl PositionLoopSettings {
     }
 }
 
-/// The loop as it is believed to be, `τ = K_p e + K_d ė + τ̂(q_d, q̇_d, q̈_d)` with the model's torque along the reference
-/// where it is fed forward. On a robot it runs in the drives: what is handed over is the path, and that torque.
+/// The loop as it is believed to be, `τ = K_p e + K_d ė + τ̂(q_d, q̇_d, q̈_d)` with the model's torque along the
+/// reference where it is fed forward. On a robot it runs in the drives: what is handed over is the path, and that
+/// torque.
 #[derive(Clone, Debug)]
 pub struct PositionLoop {
     pd: JointPd,

@@ -64,6 +64,7 @@ pub enum PriorChoice {
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
+#[allow(clippy::struct_excessive_bools, reason = "keys of a file, each a choice of its own")]
 pub struct IterationSection {
     /// A trajectory to run (`t_s, q1.., dq1.., ddq1..`), in place of the one that `[design]` leads to.
     pub trajectory: Option<PathBuf>,
@@ -108,7 +109,8 @@ pub struct IterationSection {
     pub envelope: EnvelopeSettings,
     /// How every motion of a robot outside is rehearsed before it is commanded.
     pub rehearsal: RehearsalSettings,
-    /// Samples a second of the robot's control loop and of what is handed over; `[simulation] rate_hz` (1000) by default.
+    /// Samples a second of the robot's control loop and of what is handed over; `[simulation] rate_hz` (1000) by
+    /// default.
     pub rate_hz: Option<f64>,
     /// Shares of its speed at which the motion is run before the first run, as `[0.1, 0.5, 1.0]`; none by default.
     pub speed_steps: Vec<f64>,

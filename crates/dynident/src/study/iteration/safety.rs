@@ -3,7 +3,7 @@
 use super::{IterationSection, RobotChoice, Study};
 use crate::error::StudyError;
 use crate::study::StudyRobot;
-use dynident_iteration::robot::{EnvelopeSettings, ProcessMode};
+use dynident_iteration::robot::{EnvelopeSettings, ProcessLimits, ProcessMode};
 use dynident_iteration::{IterationSettings, SafetySettings, StartWith, derived_controllers};
 use dynident_simulation::controllers::PositionLoopSettings;
 use dynident_simulation::{ControllerSettings, Reference};
@@ -117,7 +117,7 @@ impl IterationSection {
             RobotChoice::Simulation => {}
             RobotChoice::Process(process) => {
                 process.command.clear();
-                process.limits = Default::default();
+                process.limits = ProcessLimits::default();
                 process.folder = None;
             }
             RobotChoice::Folder(folder) => folder.wait_s = 0.0,
