@@ -43,6 +43,9 @@ run 0 "$dynident" design examples/design_paper.toml --out "$out/paper_motion"
 # One run, the iteration, the paper.
 run 0 "$dynident" simulate examples/iterate_ur10.toml --out "$out/run"
 run 0 "$dynident" iterate examples/iterate_paper_2r.toml --out "$out/iteration"
+# A robot outside: MuJoCo behind the line protocol, by the Python of the environment. One run, as an iteration that may make no more ends with status 1.
+sed -e "s#\"python3\"#\"$venv/bin/python\"#" -e 's#"\.\./robots#"'"$PWD"'/robots#' -e 's/max_runs = 5/max_runs = 1/' examples/iterate_ur10_mujoco.toml >"$out/mujoco.toml"
+run 1 "$dynident" iterate "$out/mujoco.toml" --out "$out/outside" --allow-command
 run 0 "$dynident" reproduce --out "$out/paper"
 
 # The programs behind the tables of the book, with the least work that they take.

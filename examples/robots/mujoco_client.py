@@ -1,17 +1,21 @@
 """A robot program for Dynident's line protocol: MuJoCo on a URDF arm (see docs/src/robot-protocol.md).
 
     pip install mujoco numpy
-    python examples/robots/mujoco_client.py robots/panda_arm7.urdf [--friction 0.2] [--damping 0.5]
+    python examples/robots/mujoco_client.py robots/panda_arm7.urdf [--friction 0.2] [--damping 0.5] [--armature 0.1]
 
 It offers both modes. In `run` it runs the control loop itself from the two files it is handed: joint PD and PID by their gains,
 model-based controllers through a small Newton-Euler recursion over the numbers of controller.json. In `step` it holds the
-torques that it is sent. --friction and --damping give every joint dry (Nm) and viscous (Nm s/rad) friction that the URDF does
-not tell. Standard output belongs to the protocol; messages go to standard error.
+torques that it is sent. It stops at a stop message, when its input ends, and when a sample leaves the envelope that a motion comes
+with: a simulated robot stands at once, a real one brakes here. --friction, --damping and --armature give the joints dry (Nm) and viscous (Nm s/rad) friction and drive inertia
+(kg m^2) that the URDF does not tell: one number, or one for each joint with commas between; --torque cuts the drives' torque (Nm).
+--kp and --kd are the drives' own position loop, for the controller position-loop. Standard output belongs to the protocol; messages go to standard error.
 """
 import argparse
 import csv
 import json
+import queue
 import sys
+import threading
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -25,13 +29,13 @@ def send(kind, **fields):
     print(json.dumps({"type": kind, **fields}, allow_nan=False), flush=True)
 
 
-def load(path, friction, damping):
+def load(path, friction, damping, armature):
     tree = ElementTree.parse(path)
     extension = ElementTree.SubElement(tree.getroot(), "mujoco")
     ElementTree.SubElement(extension, "compiler", fusestatic="false", balanceinertia="false", boundmass="0", boundinertia="0",
                            discardvisual="true")
     model = mujoco.MjModel.from_xml_string(ElementTree.tostring(tree.getroot(), encoding="unicode"))
-    model.dof_frictionloss[:], model.dof_damping[:] = friction, damping
+    model.dof_frictionloss[:], model.dof_damping[:], model.dof_armature[:] = friction, damping, armature
     # Limits of joints are the controller's business, and links may overlap at their joints.
     model.jnt_limited[:] = 0
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
@@ -96,33 +100,90 @@ class InverseDynamics:
     def torque(self, q, dq, ddq, friction_speed):
         """`friction_speed` is the speed at which friction is taken, or None for no friction."""
         tau = self.bodies_torque(q, dq, ddq)
+        load = tau.copy()
         for law, joints in self.laws:
             kind, value, j = law["kind"], law["value"], joints[0]
             if kind == "drive-inertia":
                 tau[j] += value * ddq[j]
             elif kind == "offset":
                 tau[j] += value
+            elif kind == "coupling" and law["effect"] == "inertia":
+                first, second = joints
+                cross = value * law["ratios"][0] * law["ratios"][1]
+                tau[first] += cross * ddq[second]
+                tau[second] += cross * ddq[first]
             elif friction_speed is None:
                 continue
-            elif kind == "viscous":
-                tau[j] += value * friction_speed[j]
-            elif kind == "coulomb":
-                shape, speed = law["shape"], friction_speed[j]
-                step = np.tanh(speed / shape["width"]) if shape["step"] == "smooth" else np.sign(speed)
-                tau[j] += value * step
+            elif kind == "coupling":
+                first, second = joints
+                one, other = law["ratios"]
+                if law["effect"] == "viscous":
+                    tau[first] += value * one * other * friction_speed[second]
+                    tau[second] += value * one * other * friction_speed[first]
+                else:
+                    felt = step(law["shape"], one * friction_speed[first] + other * friction_speed[second])
+                    tau[first] += value * one * felt
+                    tau[second] += value * other * felt
             else:
-                raise ValueError(f"this client does not know the law {kind}: add it here, or run in the mode step")
+                tau[j] += value * friction(law, friction_speed[j], load[j])
         return tau
 
 
-class Controller:
-    """Torque from the files' settings; `feed_forward` is the model's torque along the trajectory."""
+# What friction() knows, and what is not friction.
+KNOWN_LAWS = {"viscous", "coulomb", "stribeck", "sigmoid", "power", "directional-viscous", "directional-coulomb", "load",
+              "drive-inertia", "offset", "coupling"}
 
-    def __init__(self, file):
+
+def step(shape, speed):
+    """The step of dry friction near rest."""
+    return np.tanh(speed / shape["width"]) if shape["step"] == "smooth" else np.sign(speed)
+
+
+def friction(law, speed, load):
+    """The law's torque for the parameter 1 (docs/src/friction.md)."""
+    kind = law["kind"]
+    if kind == "viscous":
+        return speed
+    if kind == "coulomb":
+        return step(law["shape"], speed)
+    if kind == "stribeck":
+        return np.exp(-abs(speed / law["speed"]) ** law["exponent"]) * step(law["shape"], speed)
+    if kind == "sigmoid":
+        logistic = lambda x: 0.5 * (1.0 + np.tanh(0.5 * x))
+        steep, offset = law["steepness"], law["offset_speed"]
+        return logistic(steep * (speed + offset)) - logistic(steep * offset)
+    if kind == "power":
+        return speed * np.hypot(speed, law["rounding"]) ** (law["exponent"] - 1.0)
+    if kind == "load":
+        return abs(load) * step(law["shape"], speed)
+    full = speed if kind == "directional-viscous" else step(law["shape"], speed)
+    return max(full, 0.0) if law["direction"] == "+" else min(full, 0.0)
+
+
+class Unknown(Exception):
+    """Something of the files that this client does not know: the motion is declined before anything moves."""
+
+    def __str__(self):
+        return f"this client does not know {self.args[0]}: add it here, or run in the mode step"
+
+
+class Controller:
+    """Torque from the files' settings; `own_loop` are the gains of the drives' own position loop, in the files' order."""
+
+    def __init__(self, file, own_loop):
         self.settings, n = file["controller"], len(file["joints"])
         self.model = InverseDynamics(file["model"]) if file["model"] else None
-        of = lambda key: np.broadcast_to(np.array(self.settings.get(key, 0.0), float), n)
+        laws = {law["kind"] for law in file["model"]["laws"]} if file["model"] else set()
+        if laws - KNOWN_LAWS:
+            raise Unknown(f"the laws {', '.join(sorted(laws - KNOWN_LAWS))}")
+        known = ("joint-pd", "joint-pid", "pd-gravity", "computed-torque", "finite-time", "position-loop")
+        if self.settings["kind"] not in known:
+            raise Unknown(f"the controller {self.settings['kind']}")
+        of = lambda key: np.broadcast_to(np.array(self.settings.get(key) or 0.0, float), n)
         self.kp, self.ki, self.kd = of("kp"), of("ki"), of("kd")
+        if self.settings["kind"] == "position-loop":
+            # The drives' own gains, whatever the file believes of them.
+            self.kp, self.kd = own_loop
         limit = self.settings.get("integral_limit")
         self.limit = np.broadcast_to(np.array(np.inf if limit is None else limit, float), n)
         self.integral, self.last_error = np.zeros(n), None
@@ -132,9 +193,13 @@ class Controller:
         inside = blend ** (alpha - 1) * x if blend > 0 else x
         return np.where(np.abs(x) < blend, inside, np.sign(x) * np.abs(x) ** alpha)
 
-    def torque(self, target, q, dq):
+    def torque(self, target, q, dq, ahead):
+        """`ahead` is the trajectory's own torque column, where it has one."""
         q_d, dq_d, ddq_d = target
         e, de, kind = q_d - q, dq_d - dq, self.settings["kind"]
+        if kind == "position-loop":
+            tau = self.kp * e + self.kd * de
+            return tau + ahead if ahead is not None and self.settings["feed_forward"] else tau
         if kind in ("joint-pd", "joint-pid", "pd-gravity"):
             tau = self.kp * e + self.kd * de
             if kind == "joint-pid":
@@ -149,20 +214,59 @@ class Controller:
             return tau
         if kind == "computed-torque":
             a = ddq_d + self.kp * e + self.kd * de
-        elif kind == "finite-time":
+        else:
             s = self.settings
             alpha = s["alpha"]
             a = ddq_d + self.kp * self.power(e, alpha, s["blend_position"])
             a = a + self.kd * self.power(de, 2 * alpha / (1 + alpha), s["blend_speed"])
-        else:
-            raise ValueError(f"this client does not know the controller {kind}: run in the mode step")
         speed = {"none": None, "reference": dq_d, "measured": dq}[self.settings["friction"]]
         return self.model.torque(q, dq, a, speed)
 
 
+class Messages:
+    """What the host writes, read aside, so that a stop is heard while the robot moves."""
+
+    def __init__(self):
+        self.waiting = queue.Queue()
+        threading.Thread(target=self.read, daemon=True).start()
+
+    def read(self):
+        for line in sys.stdin:
+            self.waiting.put(json.loads(line))
+        # The host is gone: that is a stop, too.
+        self.waiting.put(None)
+
+    def next(self):
+        return self.waiting.get()
+
+    def stop_asked(self):
+        """Whether a stop has come; nothing else comes in the middle of a motion."""
+        try:
+            message = self.waiting.get_nowait()
+        except queue.Empty:
+            return False
+        return message is None or message["type"] == "stop"
+
+
+def breach(envelope, joints, q, dq, tau, q_d):
+    """What leaves the envelope, in words; None while nothing does. Limits that are null do not count."""
+    if envelope is None:
+        return None
+    for j, name in enumerate(joints):
+        low, high = envelope["lower"][j], envelope["upper"][j]
+        if (low is not None and q[j] < low) or (high is not None and q[j] > high):
+            return f"position of {name} is {q[j]:.4f}, its limits {low} and {high}"
+        for key, value in (("speed", dq[j]), ("torque", tau[j]), ("tracking_error", q_d[j] - q[j])):
+            limit = envelope[key][j]
+            if limit is not None and abs(value) > limit:
+                return f"{key} of {name} is {value:.4f}, its limit {limit:.4f}"
+    return None
+
+
 class Robot:
-    def __init__(self, model):
-        self.model, self.data = model, mujoco.MjData(model)
+    def __init__(self, model, messages, most, own_loop):
+        self.model, self.data, self.messages, self.most = model, mujoco.MjData(model), messages, most
+        self.own_loop = [np.broadcast_to(gains, model.nv) for gains in own_loop]
         self.joints = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, j) for j in range(model.njnt)]
 
     def start(self, rate_hz, q, dq):
@@ -185,7 +289,11 @@ class Robot:
         with open(message["trajectory"], newline="", encoding="utf-8") as text:
             rows = [[float(x) for x in row] for row in list(csv.reader(text))[1:]]
         table, n = np.array(rows), len(order)
-        controller = Controller(file)
+        try:
+            controller = Controller(file, [gains[back] for gains in self.own_loop])
+        except Unknown as unknown:
+            return send("end", status="stopped", reason=str(unknown))
+        envelope = message.get("envelope")
         first = [table[0, 1 + k * n: 1 + (k + 1) * n][order] for k in range(2)]
         self.start(message["rate_hz"], *first)
         for row in table:
@@ -193,8 +301,15 @@ class Robot:
             q, dq = self.data.qpos.copy(), self.data.qvel.copy()
             if not np.all(np.isfinite(q)) or np.max(np.abs(dq)) > 100:
                 return send("end", status="stopped", reason=f"a joint moves too fast at {row[0]:.3f} s")
-            tau = controller.torque(target, q[back], dq[back])[order]
-            send("sample", t_s=row[0], q=q.tolist(), tau=tau.tolist())
+            # A drive gives what it can, and logs what it gives.
+            ahead = row[1 + 3 * n:] if len(row) > 1 + 3 * n else None
+            tau = np.clip(controller.torque(target, q[back], dq[back], ahead)[order], -self.most, self.most)
+            send("sample", t_s=row[0], q=q.tolist(), dq=dq.tolist(), tau=tau.tolist())
+            if self.messages.stop_asked():
+                return send("end", status="stopped", reason="the host asked for it")
+            left = breach(envelope, self.joints, q, dq, tau, target[0][order])
+            if left:
+                return send("end", status="stopped", reason=f"at {row[0]:.3f} s {left}")
             self.advance(tau)
         send("end", status="done")
 
@@ -203,8 +318,10 @@ class Robot:
         for sample in range(message["samples"]):
             time = sample / message["rate_hz"]
             send("state", t_s=time, q=self.data.qpos.tolist(), dq=self.data.qvel.tolist())
-            answer = json.loads(sys.stdin.readline())
-            if answer["type"] != "torque":
+            answer = self.messages.next()
+            if answer is None or answer["type"] not in ("torque", "finish"):
+                return send("end", status="stopped", reason="the host asked for it")
+            if answer["type"] == "finish":
                 break
             self.advance(answer["tau"])
         send("end", status="done")
@@ -213,14 +330,20 @@ class Robot:
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("urdf", type=Path)
-    parser.add_argument("--friction", type=float, default=0.0, help="dry friction of every joint, Nm")
-    parser.add_argument("--damping", type=float, default=0.0, help="viscous friction of every joint, Nm s/rad")
+    numbers = lambda text: np.array([float(part) for part in text.split(",")])
+    parser.add_argument("--friction", type=numbers, default=0.0, help="dry friction of the joints, Nm")
+    parser.add_argument("--damping", type=numbers, default=0.0, help="viscous friction of the joints, Nm s/rad")
+    parser.add_argument("--armature", type=numbers, default=0.0, help="drive inertia of the joints, kg m^2")
+    parser.add_argument("--torque", type=numbers, default=np.inf, help="largest torque of the drives, Nm")
+    parser.add_argument("--kp", type=numbers, default=0.0, help="stiffness of the drives' own position loop, Nm/rad")
+    parser.add_argument("--kd", type=numbers, default=0.0, help="damping of the drives' own position loop, Nm s/rad")
     options = parser.parse_args()
-    robot = Robot(load(options.urdf, options.friction, options.damping))
+    messages = Messages()
+    robot = Robot(load(options.urdf, options.friction, options.damping, options.armature), messages, options.torque,
+                  (options.kp, options.kd))
     send("hello", protocol=PROTOCOL, name=f"MuJoCo {mujoco.__version__}: {options.urdf.name}", joints=robot.joints,
          modes=["run", "step"])
-    for line in sys.stdin:
-        message = json.loads(line)
+    while (message := messages.next()) is not None:
         if message["type"] == "run":
             robot.run(message)
         elif message["type"] == "begin":

@@ -73,7 +73,8 @@ fn row(path: &Path, seeds: u64) -> Result<String, Box<dyn Error>> {
         let simulation = study.simulation.get_or_insert_default();
         (simulation.seed, simulation.sensors.seed) = (seed, seed);
         let out = folder.path().join(format!("seed_{seed}"));
-        let mut watch = IterationWatch { design: &|_| ControlFlow::Continue(()), run: &mut |_, _| {} };
+        let mut hear = |_: &_, _: &[_]| {};
+        let mut watch = IterationWatch::new(&|_| ControlFlow::Continue(()), &mut hear);
         files.push(iterate_study(&study, path, &out, false, &options, &mut watch)?);
         std::fs::remove_dir_all(&out)?;
     }

@@ -79,6 +79,8 @@ enum Verdict {
     Good,
     /// Done, but the verdict is negative: exit status 1.
     Negative,
+    /// Stopped by Ctrl-C, in good order: exit status 130.
+    Interrupted,
 }
 
 fn main() -> ExitCode {
@@ -129,6 +131,7 @@ fn ended(outcome: Result<Verdict, String>) -> ExitCode {
     match outcome {
         Ok(Verdict::Good) => ExitCode::SUCCESS,
         Ok(Verdict::Negative) => ExitCode::from(1),
+        Ok(Verdict::Interrupted) => ExitCode::from(commands::interruption::STATUS),
         Err(message) => {
             terminal::complain(&message);
             ExitCode::from(2)

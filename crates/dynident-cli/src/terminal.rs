@@ -37,6 +37,13 @@ pub(crate) fn remark(message: &str) {
     let _ = writeln!(out, "note: {}", visible(message));
 }
 
+/// A question, on standard error; the answer comes on the same line.
+pub(crate) fn ask(question: &str) {
+    let mut out = io::stderr().lock();
+    let _ = write!(out, "{}", visible(question));
+    let _ = out.flush();
+}
+
 /// Whether a person watches standard error.
 pub(crate) fn watched() -> bool {
     io::stderr().is_terminal()

@@ -132,6 +132,7 @@ pub mod friction;
 mod identify;
 mod lag;
 mod less_noise;
+mod log_noise;
 mod logs;
 pub mod payload;
 mod progress;
@@ -155,6 +156,7 @@ pub use identify::{
     ConsistentParameters, Identification, TrainingExamination, consistent_stage, identify, identify_payload,
     identify_with_instruments,
 };
+pub use log_noise::LogNoise;
 pub use logs::Logs;
 pub use progress::{Progress, Silent};
 pub use recording::{LogError, MotionRecord, Recording, Role, Samples};

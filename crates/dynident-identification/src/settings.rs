@@ -3,6 +3,7 @@
 use crate::consistent::{ConsistencyError, ConsistencySettings};
 use crate::estimators::EstimationSettings;
 use crate::friction::FrictionSearch;
+use crate::log_noise::LogNoise;
 use crate::rows::ParallelFilterSettings;
 use dynident_dynamics::ParametricModel;
 use dynident_recording::MotionSettings;
@@ -66,6 +67,8 @@ pub struct IdentificationSettings {
     pub friction: Vec<FrictionSearch>,
     /// Whether training logs share their offsets; by default they do.
     pub offsets: OffsetChoice,
+    /// Whether training logs share the noise of their joints; by default they do.
+    pub log_noise: LogNoise,
     /// Whether torque is in newton metres; by default it is.
     pub gains: GainChoice,
     /// Standard deviation of stated gains as a share of each, independent from joint to joint: it goes into the error
@@ -86,6 +89,7 @@ impl Default for IdentificationSettings {
             intervals: false,
             friction: Vec::new(),
             offsets: OffsetChoice::default(),
+            log_noise: LogNoise::default(),
             gains: GainChoice::default(),
             gain_std: 0.0,
             diagnosis: DiagnosisChoice::default(),

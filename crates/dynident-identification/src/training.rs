@@ -6,6 +6,7 @@ use crate::estimators::{EstimationSettings, Estimator, TrainingRows};
 use crate::examination::{Evidence, PriorAgreement};
 use crate::execution::Execution;
 use crate::friction::JointFriction;
+use crate::log_noise::{LogNoise, weighted_by_log};
 use crate::logs::Logs;
 use crate::payload::{DriveGain, Gains, LoadColumns, Payload, Refit, drive_gains, known_loads};
 use crate::recording::{LogError, MotionRecord, Recording};
@@ -101,6 +102,9 @@ pub fn training_rows(
         fitted.model.torque_gains = of_joints.iter().map(|gain| gain.gain).collect();
         fitted.problem = problem;
         fitted.gains = Some((estimate, of_joints));
+    }
+    if settings.log_noise == LogNoise::Own && fitted.gains.is_none() {
+        fitted.problem = weighted_by_log(&settings.estimation, fitted.problem)?;
     }
     Ok(fitted)
 }

@@ -1,19 +1,25 @@
 //! A robot program behind the line protocol, `docs/src/robot-protocol.md`: the simulator, served on standard input and
 //! output. What a program for a real robot looks like, and what the tests speak to.
 //!
-//!     robot_client ROBOT.urdf [--fault KIND] [--at SAMPLE]
+//!     robot_client ROBOT.urdf [--fault KIND] [--at SAMPLE] [--marker FILE] [--unwatched yes]
 //!
-//! With `--fault` it misbehaves at the given sample (default 50): die, hang, garbage, nan, null, joints, backwards,
-//! flood, megabyte, stop, short, turn; or at its hello: deaf, protocol, names, modes.
+//! A stop message, or the end of its input, stops the robot at the next sample; so does a sample outside of the
+//! envelope that a motion comes with, unless it is `--unwatched`. With `--fault` it misbehaves at the given sample
+//! (default 50), with a word in the marker file before: die, hang, wait (for a message), ignore (a stop), orphan (dies
+//! while a process that it started holds its output), garbage, nan, null, joints, backwards, flood, megabyte, stop,
+//! short, turn; or it sends all samples `afterwards`; or at its hello: deaf, protocol, names, modes.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "speaking is what this program is for")]
 
 use dynident_excitation::Motion;
 use dynident_model::load_robot;
-use dynident_simulation::{ControllerSettings, Integrator, LoopSettings, Plant, Reference, closed_loop};
+use dynident_simulation::controllers::Measured;
+use dynident_simulation::{ControllerSettings, Integrator, Plant, Reference, ReferenceSample};
 use serde_json::{Value, json};
 use std::error::Error;
 use std::io::{BufRead, Write};
+use std::process::{Command, Stdio};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::Duration;
 
 type Result<T> = core::result::Result<T, Box<dyn Error>>;
@@ -23,17 +29,26 @@ struct Client {
     joints: Vec<String>,
     fault: String,
     at: usize,
+    marker: String,
+    watched: bool,
+    /// What the host writes: read aside, so that a stop is heard in the middle of a motion.
+    messages: Receiver<Value>,
 }
+
+/// Why a motion ends before its end.
+const INTERRUPTED: &str = "the host asked for it";
 
 fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
     let path = arguments.next().ok_or("give the robot's URDF file")?;
-    let (mut fault, mut at) = (String::new(), 50);
+    let (mut fault, mut at, mut marker, mut watched) = (String::new(), 50, String::new(), true);
     while let Some(name) = arguments.next() {
         let value = arguments.next().ok_or("an option without a value")?;
         match name.as_str() {
             "--fault" => fault = value,
             "--at" => at = value.parse()?,
+            "--marker" => marker = value,
+            "--unwatched" => watched = false,
             _ => return Err(format!("unknown option {name}").into()),
         }
     }
@@ -41,14 +56,23 @@ fn main() -> Result<()> {
     // The other way round than the model: vectors follow the names of the hello.
     let joints: Vec<String> = model.joints().iter().rev().map(|joint| joint.name.clone()).collect();
     let plant = Plant::new(&model, &[], &[])?;
-    let mut client = Client { plant, joints, fault, at };
+    let (sender, messages) = channel();
+    std::thread::spawn(move || {
+        for line in std::io::stdin().lock().lines().map_while(core::result::Result::ok) {
+            let Ok(message) = serde_json::from_str(&line) else { return };
+            if sender.send(message).is_err() {
+                return;
+            }
+        }
+    });
+    let mut client = Client { plant, joints, fault, at, marker, watched, messages };
     client.hello()?;
-    let mut lines = std::io::stdin().lock().lines();
-    while let Some(line) = lines.next() {
-        let message: Value = serde_json::from_str(&line?)?;
+    while let Ok(message) = client.messages.recv() {
         match message["type"].as_str() {
             Some("run") => client.run(&message)?,
-            Some("begin") => client.steps(&message, &mut lines)?,
+            Some("begin") => client.steps(&message)?,
+            // It stands already.
+            Some("stop") => {}
             Some("bye") => break,
             other => return Err(format!("unknown message {other:?}").into()),
         }
@@ -86,6 +110,48 @@ impl Client {
         send(&hello)
     }
 
+    /// A word in the marker file, whole or not at all.
+    fn mark(&self, word: &str) -> Result<()> {
+        if self.marker.is_empty() {
+            return Ok(());
+        }
+        let unfinished = format!("{}.unfinished", self.marker);
+        std::fs::write(&unfinished, word)?;
+        Ok(std::fs::rename(unfinished, &self.marker)?)
+    }
+
+    /// Whether a stop has come, or nobody is there any more.
+    fn stop_asked(&self) -> bool {
+        match self.messages.try_recv() {
+            Ok(message) => message["type"] == "stop",
+            Err(TryRecvError::Empty) => false,
+            Err(TryRecvError::Disconnected) => true,
+        }
+    }
+
+    /// What leaves the envelope of the message, joints in the client's order: limits that are null do not count.
+    fn breach(&self, envelope: &Value, q: &[f64], dq: &[f64], tau: &[f64], target: &[f64]) -> Option<String> {
+        if !self.watched {
+            return None;
+        }
+        (0..q.len()).find_map(|joint| {
+            let limit = |key: &str| envelope[key][joint].as_f64();
+            let beyond = |key: &str, value: f64| {
+                let limit = limit(key).filter(|limit| value.abs() > *limit)?;
+                Some(format!("{key} of {} is {value:.4}, its limit {limit:.4}", self.joints[joint]))
+            };
+            let place = |key: &str, is_beyond: fn(f64, f64) -> bool| {
+                let limit = limit(key).filter(|limit| is_beyond(q[joint], *limit))?;
+                Some(format!("position of {} is {:.4}, its limit {limit:.4}", self.joints[joint], q[joint]))
+            };
+            place("lower", |q, limit| q < limit)
+                .or_else(|| place("upper", |q, limit| q > limit))
+                .or_else(|| beyond("speed", dq[joint]))
+                .or_else(|| beyond("torque", tau[joint]))
+                .or_else(|| beyond("tracking_error", target[joint] - q[joint]))
+        })
+    }
+
     /// Misbehaves, if it is time for it. True if the run is over.
     fn misbehave(&self, sample: usize, time_s: f64) -> Result<bool> {
         if sample != self.at {
@@ -98,7 +164,27 @@ impl Client {
                 eprintln!("the brake is on fire");
                 std::process::exit(3);
             }
-            "hang" => std::thread::sleep(Duration::from_secs(3600)),
+            "hang" => {
+                self.mark(&std::process::id().to_string())?;
+                std::thread::sleep(Duration::from_secs(3600));
+            }
+            "orphan" => {
+                let child = Command::new("sleep").arg("3600").stdin(Stdio::null()).spawn()?;
+                self.mark(&child.id().to_string())?;
+                eprintln!("left alone");
+                std::process::exit(4);
+            }
+            "wait" => {
+                self.mark(&std::process::id().to_string())?;
+                let message = self.messages.recv()?;
+                send(&json!({ "type": "end", "status": "stopped", "reason": message["type"] }))?;
+                return Ok(true);
+            }
+            "ignore" => {
+                self.mark(&std::process::id().to_string())?;
+                self.messages.recv()?;
+                std::thread::sleep(Duration::from_secs(3600));
+            }
             "garbage" => println!("Segmentation fault (core dumped)"),
             "nan" => println!("{}", message(time_s, json!("Q")).to_string().replace("\"Q\"", "[NaN, 0.0]")),
             "null" => send(&message(time_s, json!([null, 0.0])))?,
@@ -126,6 +212,7 @@ impl Client {
         let controller: Value = serde_json::from_str(&file("controller")?)?;
         let settings: ControllerSettings = serde_json::from_value(controller["controller"].clone())?;
         let dof = self.plant.dof();
+        let message_envelope = message["envelope"].clone();
         let mut rows: Vec<Vec<f64>> = Vec::new();
         for line in file("trajectory")?.lines().skip(1) {
             rows.push(line.split(',').map(str::parse).collect::<core::result::Result<_, _>>()?);
@@ -143,24 +230,50 @@ impl Client {
         let rate_hz = message["rate_hz"].as_f64().ok_or("no rate")?;
         let reference = Reference::new(rate_hz, motion)?;
         let mut controller = settings.build(dof, None)?;
-        let run = closed_loop(&mut self.plant, controller.as_mut(), &reference, &LoopSettings::default())?;
-        for sample in 0..run.samples {
-            let of =
-                |values: &[f64]| -> Vec<f64> { (0..dof).rev().map(|j| values[j * run.samples + sample]).collect() };
-            if self.misbehave(sample, run.time_s(sample))? {
+        self.plant.set_state(
+            0.0,
+            &first(&reference.motion().q, rows.len()),
+            &first(&reference.motion().dq, rows.len()),
+        );
+        controller.reset();
+        let mut target = ReferenceSample::new(dof);
+        let mut tau = vec![0.0; dof];
+        let mut kept = Vec::new();
+        for sample in 0..reference.samples() {
+            let time_s = sample as f64 / rate_hz;
+            self.plant.set_time_s(time_s);
+            target.take(&reference, sample);
+            let measured = Measured { q: self.plant.q(), dq: self.plant.dq() };
+            controller.torque(time_s, target.target(), measured, &mut tau);
+            let (q, dq) = (turned(self.plant.q()), turned(self.plant.dq()));
+            let (own, path) = (turned(&tau), turned(target.target().q));
+            if self.misbehave(sample, time_s)? {
                 return Ok(());
             }
-            send(&json!({ "type": "sample", "t_s": run.time_s(sample), "q": of(&run.q), "tau": of(&run.tau) }))?;
+            let message = json!({ "type": "sample", "t_s": time_s, "q": q, "tau": own });
+            if self.fault == "afterwards" {
+                kept.push(message);
+            } else {
+                send(&message)?;
+            }
+            let why = if self.stop_asked() { Some(INTERRUPTED.to_owned()) } else { None };
+            if let Some(reason) = why.or_else(|| self.breach(&message_envelope, &q, &dq, &own, &path)) {
+                return send(&json!({ "type": "end", "status": "stopped", "reason": reason }));
+            }
+            if sample + 1 < reference.samples() {
+                self.plant.advance(&tau, 1.0 / rate_hz, Integrator::default())?;
+            }
         }
-        if run.status.is_done() {
-            send(&json!({ "type": "end", "status": "done" }))
-        } else {
-            send(&json!({ "type": "end", "status": "stopped", "reason": run.status.to_string() }))
+        if !kept.is_empty() {
+            // Longer than a message may take, shorter than that and the motion.
+            std::thread::sleep(Duration::from_secs_f64(0.75 * message["duration_s"].as_f64().ok_or("no duration")?));
         }
+        kept.iter().try_for_each(send)?;
+        send(&json!({ "type": "end", "status": "done" }))
     }
 
     /// Holds the torques that it is sent.
-    fn steps(&mut self, begin: &Value, lines: &mut impl Iterator<Item = std::io::Result<String>>) -> Result<()> {
+    fn steps(&mut self, begin: &Value) -> Result<()> {
         self.plant.set_state(0.0, &turned(&numbers(&begin["q"])?), &turned(&numbers(&begin["dq"])?));
         let rate_hz = begin["rate_hz"].as_f64().ok_or("no rate")?;
         let mut sample = 0;
@@ -171,12 +284,23 @@ impl Client {
             }
             let (q, dq) = (turned(self.plant.q()), turned(self.plant.dq()));
             send(&json!({ "type": "state", "t_s": time_s, "q": q, "dq": dq }))?;
-            let message: Value = serde_json::from_str(&lines.next().ok_or("the host has gone")??)?;
-            if message["type"] == "finish" {
-                return send(&json!({ "type": "end", "status": "done" }));
+            let message = self.messages.recv()?;
+            match message["type"].as_str() {
+                Some("torque") => {}
+                Some("finish") => return send(&json!({ "type": "end", "status": "done" })),
+                _ => {
+                    let reason = format!("{INTERRUPTED}, after {sample} torques");
+                    self.mark(&reason)?;
+                    return send(&json!({ "type": "end", "status": "stopped", "reason": reason }));
+                }
             }
             self.plant.advance(&turned(&numbers(&message["tau"])?), 1.0 / rate_hz, Integrator::default())?;
             sample += 1;
         }
     }
+}
+
+/// The first sample of each joint.
+fn first(values: &[f64], samples: usize) -> Vec<f64> {
+    values.chunks(samples).map(|own| own[0]).collect()
 }

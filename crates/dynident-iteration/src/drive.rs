@@ -1,15 +1,19 @@
 //! Robots, records and the policy together.
 
+use crate::before_motion::{motions, next_motion, rehearsed};
+use crate::convergence::{Names, Shortfall, shortfalls};
 use crate::error::IterationError;
-use crate::estimate::{RunEstimate, identify_run};
-use crate::leg::IterationTask;
+use crate::estimate::{RunEstimate, RunLog, identify_run, identify_runs};
+use crate::leg::{IterationTask, Leg};
 use crate::model_parameters::ModelParameters;
 use crate::policy::{self, Next, RunPlan};
 use crate::record::{RunRecord, UsedController};
-use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest};
+use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest, StopSignal};
+use crate::run_examination::{add_tracking_floors, examined, following_limits};
 use crate::settings::{IterationSettings, RunIdentificationSettings};
 use crate::status::IterationStatus;
 use crate::store::IterationStore;
+use crate::supervision::{Supervisor, Watching};
 use dynident_dynamics::ParametricModel;
 use dynident_identification::friction::chosen_model;
 use dynident_simulation::Record;
@@ -33,6 +37,8 @@ pub struct Iteration {
 pub struct IterationOutcome {
     /// How it ended.
     pub status: IterationStatus,
+    /// What is not met; nothing if it has converged.
+    pub shortfalls: Vec<Shortfall>,
     /// Every run.
     pub runs: Vec<RunRecord>,
 }
@@ -41,6 +47,8 @@ pub struct IterationOutcome {
 enum PlannedRun {
     Run(Box<RunRecord>, Vec<RobotRun>),
     Stopped(IterationStatus),
+    /// A stop was asked for: what was recorded of the run, and how it ended.
+    Interrupted(Vec<RobotRun>, String),
 }
 
 impl Iteration {
@@ -69,8 +77,10 @@ impl Iteration {
     /// # Errors
     /// Records of another robot.
     pub fn next(&self, records: &[RunRecord]) -> Result<Next, IterationError> {
-        let next = policy::next(records, &self.settings, self.robot(records)?.nominal());
-        if let Next::Finished(IterationStatus::Converged | IterationStatus::RunsUsedUp) = next
+        let robot = self.robot(records)?;
+        let next = policy::next(records, &self.settings, robot.nominal(), &names(&robot));
+        if let Next::Finished(IterationStatus::Converged | IterationStatus::Settled | IterationStatus::RunsUsedUp) =
+            next
             && let Some(reason) = self.beyond_torque(records)?
         {
             return Ok(Next::Finished(IterationStatus::Refused { reason }));
@@ -78,10 +88,19 @@ impl Iteration {
         Ok(next)
     }
 
+    /// What is not met after these records; nothing if the iteration has converged.
+    ///
+    /// # Errors
+    /// Records of another robot.
+    pub fn shortfalls(&self, records: &[RunRecord]) -> Result<Vec<Shortfall>, IterationError> {
+        let robot = self.robot(records)?;
+        Ok(shortfalls(records, &self.settings, &names(&robot)))
+    }
+
     /// Where the trajectories ask for more torque than the joints have, by the last good model.
     fn beyond_torque(&self, records: &[RunRecord]) -> Result<Option<String>, IterationError> {
         let Some(limits) = &self.task.torque_limits else { return Ok(None) };
-        let good = records.iter().rev().find(|record| record.accepted).and_then(|record| record.estimate.as_ref());
+        let good = records.iter().rev().find(|record| record.accepted).and_then(RunRecord::knowledge);
         let Some(parameters) = good.and_then(RunEstimate::for_controller) else { return Ok(None) };
         let mut model = self.controller_model(records, &parameters)?;
         let dof = self.task.robot.dof();
@@ -121,17 +140,19 @@ impl Iteration {
         chosen.map(Cow::Owned).map_err(|source| IterationError::ChosenFriction { run, source })
     }
 
-    /// What of a run's records: with the friction that a run before chose, if one did.
-    fn identified(&self, records: &[Record], before: &[RunRecord]) -> Result<RunEstimate, IterationError> {
-        match self.robot(before)? {
-            Cow::Borrowed(_) => identify_run(&self.task, records, &self.settings.identification),
-            Cow::Owned(robot) => {
-                let task = IterationTask { robot, ..self.task.clone() };
-                let settings = &self.settings.identification;
-                let settings = RunIdentificationSettings { friction: Vec::new(), ..settings.clone() };
-                identify_run(&task, records, &settings)
-            }
-        }
+    /// The task and how runs are identified, with the friction that a run before chose, if one did.
+    pub(crate) fn in_force(
+        &self,
+        before: &[RunRecord],
+    ) -> Result<(Cow<'_, IterationTask>, Cow<'_, RunIdentificationSettings>), IterationError> {
+        let settings = &self.settings.identification;
+        Ok(match self.robot(before)? {
+            Cow::Borrowed(_) => (Cow::Borrowed(&self.task), Cow::Borrowed(settings)),
+            Cow::Owned(robot) => (
+                Cow::Owned(IterationTask { robot, ..self.task.clone() }),
+                Cow::Owned(RunIdentificationSettings { friction: Vec::new(), ..settings.clone() }),
+            ),
+        })
     }
 
     /// The model of a controller with these parameters, after these records.
@@ -158,17 +179,48 @@ impl Iteration {
         robots: &mut [&mut dyn Robot],
         plan: &RunPlan,
         before: &[RunRecord],
+        earlier: &[GoodLog],
+        supervisor: &mut dyn Supervisor,
     ) -> Result<PlannedRun, IterationError> {
         let legs = &self.task.legs;
         let controller = plan.controller(&self.settings);
         let model = plan.model.as_ref().map(|parameters| self.controller_model(before, parameters)).transpose()?;
+        let robot = self.robot(before)?;
+        let rehearsal =
+            match rehearsed(&self.task, &self.settings, &robot, (plan, &controller, model.as_ref()), before)? {
+                Ok(rehearsal) => rehearsal,
+                Err(failure) => {
+                    let reason = format!("run {} is not commanded: {failure}", plan.run);
+                    return Ok(PlannedRun::Stopped(IterationStatus::Refused { reason }));
+                }
+            };
         let mut runs: Vec<RobotRun> = Vec::with_capacity(legs.len());
-        for (number, leg) in legs.iter().enumerate() {
+        for (number, leg, speed) in motions(&self.task, &self.settings, before) {
             let robot = if robots.len() == 1 { &mut robots[0] } else { &mut robots[number] };
             // Numbers of runs differ from leg to leg: noise and folders go by them.
             let run = (plan.run - 1) * legs.len() + number + 1;
-            let reference = leg.reference();
-            let came = robot.run(&RunRequest { run, reference, controller: &controller, model: model.as_ref() })?;
+            let slow = (speed < 1.0).then(|| leg.reference().slowed(speed)).transpose()?;
+            let reference = slow.as_ref().unwrap_or(leg.reference());
+            let stop = supervisor.stop().cloned();
+            if stop.as_ref().is_some_and(StopSignal::is_requested) {
+                return Ok(PlannedRun::Interrupted(runs, "between two runs".to_owned()));
+            }
+            let mut motion = next_motion(&self.task, plan, &controller, (number, reference, speed));
+            motion.rehearsal.clone_from(&rehearsal);
+            if !supervisor.allows(&motion) {
+                if stop.as_ref().is_some_and(StopSignal::is_requested) {
+                    return Ok(PlannedRun::Interrupted(runs, "before a run".to_owned()));
+                }
+                let reason = format!("run {} was not allowed", plan.run);
+                return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
+            }
+            let came = robot.run(&RunRequest {
+                model: model.as_ref(),
+                envelope: self.settings.safety.envelope.as_ref(),
+                stop: stop.as_ref(),
+                speed,
+                ..RunRequest::new(run, reference, &controller)
+            })?;
             match &came.status {
                 RobotStatus::Waiting { .. } => {
                     let reason = came.status.to_string();
@@ -178,32 +230,97 @@ impl Iteration {
                     let reason = format!("run {}: {fault}", plan.run);
                     return Ok(PlannedRun::Stopped(IterationStatus::Refused { reason }));
                 }
-                _ => {}
+                RobotStatus::Interrupted { .. } => {
+                    let how = came.status.to_string();
+                    runs.push(came);
+                    return Ok(PlannedRun::Interrupted(runs, how));
+                }
+                RobotStatus::Done
+                | RobotStatus::Simulated { .. }
+                | RobotStatus::Stopped { .. }
+                | RobotStatus::LeftEnvelope { .. } => {}
             }
             let done = came.status.is_done();
+            if slow.is_some() {
+                if !done {
+                    let reason = format!(
+                        "at {speed} of its speed run {} ended early: {}. Look at the robot; the same command begins it anew",
+                        plan.run, came.status
+                    );
+                    return Ok(PlannedRun::Stopped(IterationStatus::Waiting { reason }));
+                }
+                continue;
+            }
             runs.push(came);
             if !done {
                 break;
             }
         }
         let mut record = self.recorded(plan, controller.name(), &runs);
+        record.rehearsal = rehearsal;
         if record.done {
             let records: Vec<Record> = runs.iter().map(|run| run.record.clone()).collect();
-            match self.identified(&records, before) {
-                Ok(estimate) => record.estimate = Some(estimate),
-                Err(
-                    error @ (IterationError::File { .. }
-                    | IterationError::State { .. }
-                    | IterationError::ChosenFriction { .. }),
-                ) => return Err(error),
-                Err(error) => record.reason = Some(error.to_string()),
-            }
+            self.examine(&mut record, &records, before, earlier)?;
+        } else {
+            self.judge(&mut record, before)?;
         }
-        match policy::verdict(&record, before, &self.settings) {
+        Ok(PlannedRun::Run(Box::new(record), runs))
+    }
+
+    /// What a finished run's records say: parameters, alone and with the good runs before it, and what its log shows.
+    fn examine(
+        &self,
+        record: &mut RunRecord,
+        records: &[Record],
+        before: &[RunRecord],
+        earlier: &[GoodLog],
+    ) -> Result<(), IterationError> {
+        let fatal = |error: &IterationError| {
+            matches!(
+                error,
+                IterationError::File { .. } | IterationError::State { .. } | IterationError::ChosenFriction { .. }
+            )
+        };
+        let (task, settings) = self.in_force(before)?;
+        match identify_run(&task, records, &settings) {
+            Ok(estimate) => record.estimate = Some(estimate),
+            Err(error) if fatal(&error) => return Err(error),
+            Err(error) => record.reason = Some(error.to_string()),
+        }
+        let known = before.iter().rev().find(|record| record.accepted).and_then(RunRecord::knowledge);
+        match examined(&task, records, &settings, known) {
+            Ok(evidence) => record.evidence = Some(evidence),
+            Err(error) if fatal(&error) => return Err(error),
+            Err(error) => record.reason = record.reason.take().or_else(|| Some(error.to_string())),
+        }
+        self.judge(record, before)?;
+        let Some(own) = record.estimate.clone().filter(|_| record.accepted) else { return Ok(()) };
+        if self.settings.pool && !earlier.is_empty() {
+            let own = RunLog { run: record.run, records, joint_sigma: &own.joint_sigma };
+            let runs: Vec<RunLog<'_>> = earlier.iter().map(GoodLog::as_run).chain([own]).collect();
+            // Where all together cannot be fitted the newest stands alone.
+            record.pooled = identify_runs(&task, &runs, &settings).ok().filter(|found| found.impossible.is_none());
+        }
+        let all: Vec<RunRecord> = before.iter().cloned().chain([record.clone()]).collect();
+        let (task, _) = self.in_force(&all)?;
+        let after = record.pooled.as_ref().unwrap_or(&own);
+        let errors = &record.max_tracking_error_rad;
+        // The first good run is not judged, whatever it was under.
+        let is_judged = known.is_some() && record.controller.model.is_some();
+        if let (Some(evidence), true) = (&mut record.evidence, is_judged) {
+            add_tracking_floors(evidence, &task, records, &self.settings, (&own, after), errors);
+        }
+        Ok(())
+    }
+
+    /// Whether the run counts as good.
+    fn judge(&self, record: &mut RunRecord, before: &[RunRecord]) -> Result<(), IterationError> {
+        let names = names(&*self.robot(before)?);
+        match policy::verdict(record, before, &self.settings, (&following_limits(&self.task), &names)) {
             Ok(()) => record.accepted = true,
             Err(reason) => record.reason = Some(reason.to_string()),
         }
-        Ok(PlannedRun::Run(Box::new(record), runs))
+        Ok(())
     }
 
     fn recorded(&self, plan: &RunPlan, name: &str, runs: &[RobotRun]) -> RunRecord {
@@ -230,9 +347,62 @@ impl Iteration {
             max_tracking_error_rad: worst,
             accepted: false,
             reason: None,
+            rehearsal: None,
             estimate: None,
+            pooled: None,
+            evidence: None,
         }
     }
+
+    /// The logs of the good runs among `records`, from the store: what further runs are identified together with.
+    fn good_logs(&self, records: &[RunRecord], store: Option<&IterationStore>) -> Result<Vec<GoodLog>, IterationError> {
+        let Some(store) = store.filter(|_| self.settings.pool) else { return Ok(Vec::new()) };
+        let good = |record: &&RunRecord| record.accepted && record.estimate.is_some();
+        self.logs_of(&records.iter().filter(good).collect::<Vec<_>>(), store)
+    }
+
+    /// The logs of these runs.
+    pub(crate) fn logs_of(
+        &self,
+        records: &[&RunRecord],
+        store: &IterationStore,
+    ) -> Result<Vec<GoodLog>, IterationError> {
+        let joints = self.task.robot.joint_names();
+        let rates = |record: &RunRecord| -> Vec<f64> {
+            let kept = record.evidence.as_ref().map(|evidence| evidence.log_rates_hz.clone()).unwrap_or_default();
+            let of_leg = |(place, leg): (usize, &Leg)| kept.get(place).copied().unwrap_or(leg.reference().rate_hz());
+            self.task.legs.iter().enumerate().map(of_leg).collect()
+        };
+        let one = |record: &RunRecord| {
+            let records = store.logs(record.run, &joints, &rates(record))?;
+            Ok(GoodLog::new(record, records))
+        };
+        records.iter().copied().map(one).collect()
+    }
+}
+
+/// A good run's records, kept for those after it.
+#[derive(Clone, Debug)]
+pub(crate) struct GoodLog {
+    run: usize,
+    records: Vec<Record>,
+    joint_sigma: Vec<f64>,
+}
+
+impl GoodLog {
+    fn new(record: &RunRecord, records: Vec<Record>) -> Self {
+        let joint_sigma = record.estimate.as_ref().map(|estimate| estimate.joint_sigma.clone()).unwrap_or_default();
+        Self { run: record.run, records, joint_sigma }
+    }
+
+    pub(crate) fn as_run(&self) -> RunLog<'_> {
+        RunLog { run: self.run, records: &self.records, joint_sigma: &self.joint_sigma }
+    }
+}
+
+/// The names of a robot's joints and base parameters.
+fn names(robot: &ParametricModel) -> Names {
+    Names { joints: robot.joint_names(), parameters: robot.base().expressions() }
 }
 
 /// Runs, identifies and runs again until all has settled: the first run by a controller without a model or by the
@@ -252,6 +422,20 @@ pub fn iterate(
     store: Option<&IterationStore>,
     watch: &mut dyn FnMut(&RunRecord, &[RobotRun]),
 ) -> Result<IterationOutcome, IterationError> {
+    iterate_supervised(iteration, robots, store, &mut Watching(watch))
+}
+
+/// [`iterate()`] under somebody's eyes, who may stop it, and is asked before every motion. A run that a stop cuts short
+/// does not count: what was recorded of it is kept in a folder of its own, and the run is made anew by the next call.
+///
+/// # Errors
+/// As [`iterate()`].
+pub fn iterate_supervised(
+    iteration: &Iteration,
+    robots: &mut [&mut dyn Robot],
+    store: Option<&IterationStore>,
+    supervisor: &mut dyn Supervisor,
+) -> Result<IterationOutcome, IterationError> {
     let legs = iteration.task.legs.len();
     if robots.len() != 1 {
         require_length("robots", legs, robots.len())?;
@@ -263,18 +447,44 @@ pub fn iterate(
             record.check(&robot).map_err(|problem| store.refused(record.run, problem))?;
         }
     }
+    let outcome = |status, records: Vec<RunRecord>| {
+        let shortfalls = iteration.shortfalls(&records)?;
+        Ok(IterationOutcome { status, shortfalls, runs: records })
+    };
+    let mut good: Option<Vec<GoodLog>> = None;
+    let mut stopped: Option<String> = None;
     loop {
         let plan = match iteration.next(&records)? {
             Next::Run(plan) => plan,
-            Next::Finished(status) => return Ok(IterationOutcome { status, runs: records }),
+            Next::Finished(status) => return outcome(status, records),
         };
-        match iteration.made(robots, &plan, &records)? {
-            PlannedRun::Stopped(status) => return Ok(IterationOutcome { status, runs: records }),
+        // Only now: an iteration that has ended needs no logs.
+        let good = match &mut good {
+            Some(good) => good,
+            None => good.insert(iteration.good_logs(&records, store)?),
+        };
+        if let Some(why) = stopped.filter(|_| iteration.settings.safety.outside && !supervisor.asks()) {
+            let reason = format!("{why}. Look at the robot; the same command goes on with run {}", plan.run);
+            return outcome(IterationStatus::Waiting { reason }, records);
+        }
+        match iteration.made(robots, &plan, &records, good, supervisor)? {
+            PlannedRun::Stopped(status) => return outcome(status, records),
+            PlannedRun::Interrupted(runs, how) => {
+                let kept = store.map_or(Ok(None), |store| store.keep_interrupted(plan.run, &runs, &how))?;
+                let kept =
+                    kept.map_or_else(String::new, |path| format!("; what was recorded of it: {}", path.display()));
+                let reason = format!("{how}{kept}. The same command goes on with run {}", plan.run);
+                return outcome(IterationStatus::Interrupted { reason }, records);
+            }
             PlannedRun::Run(record, runs) => {
+                if record.accepted && record.estimate.is_some() && iteration.settings.pool {
+                    good.push(GoodLog::new(&record, runs.iter().map(|run| run.record.clone()).collect()));
+                }
                 if let Some(store) = store {
                     store.keep(&record, &runs)?;
                 }
-                watch(&record, &runs);
+                supervisor.made(&record, &runs);
+                stopped = (!record.done).then(|| format!("run {} ended early: {}", record.run, record.outcome));
                 records.push(*record);
             }
         }

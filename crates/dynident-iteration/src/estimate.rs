@@ -1,4 +1,4 @@
-//! One run's identification.
+//! The identification of one run, and of several together.
 
 use crate::error::IterationError;
 use crate::leg::IterationTask;
@@ -14,7 +14,7 @@ use dynident_identification::examination::{TorqueLag, examine_training, pooled_d
 use dynident_identification::friction::JointFriction;
 use dynident_identification::rows::ParallelFilterSettings;
 use dynident_identification::{
-    EstimationSettings, Execution, IdentificationSettings, Logs, Recording, Training, choose_friction,
+    EstimationSettings, Execution, IdentificationSettings, LogNoise, Logs, Recording, Training, choose_friction,
     consistent_stage, training_rows,
 };
 use dynident_simulation::{Record, require_length};
@@ -72,6 +72,18 @@ impl RunEstimate {
     }
 }
 
+/// The records of one run with its number.
+#[derive(Clone, Copy, Debug)]
+pub struct RunLog<'a> {
+    /// The run's number, from 1.
+    pub run: usize,
+    /// One record for each leg of the task.
+    pub records: &'a [Record],
+    /// Standard deviation of each joint's residual by the run alone, Nm (N); for step-by-step identification, which
+    /// weights runs by it.
+    pub joint_sigma: &'a [f64],
+}
+
 /// Base parameters from the records of one run, one record for each leg of the task: the same identification as of any
 /// log ([`dynident_identification`]), on records in memory. Rows count within the windows; joints without rows are left
 /// out; known columns are held.
@@ -84,10 +96,23 @@ pub fn identify_run(
     records: &[Record],
     settings: &RunIdentificationSettings,
 ) -> Result<RunEstimate, IterationError> {
-    require_length("records of the run's legs", task.legs.len(), records.len())?;
-    let recordings = recordings(task, records, settings)?;
+    identify_runs(task, &[RunLog { run: 1, records, joint_sigma: &[] }], settings)
+}
+
+/// As [`identify_run`] from several runs together, each weighted by its own noise joint by joint
+/// ([`LogNoise::Own`](dynident_identification::LogNoise::Own)): bars narrow with every run, and a run that followed its
+/// trajectory badly counts for what it tells. Residuals are those of the last run. Delays are those of all runs.
+///
+/// # Errors
+/// As [`identify_run`].
+pub fn identify_runs(
+    task: &IterationTask,
+    runs: &[RunLog<'_>],
+    settings: &RunIdentificationSettings,
+) -> Result<RunEstimate, IterationError> {
+    let recordings = recordings(task, runs, settings)?;
     let all: Vec<usize> = (0..recordings.len()).collect();
-    let identification = identification_settings(task, settings);
+    let identification = identification_settings(task, settings, runs.len());
     let (robot, execution) = (&task.robot, Execution::default());
     let logs = Logs::new(robot.model(), &recordings, identification.filters(), &all, None, execution)?;
     let chosen = choose_friction((&logs, &identification), robot, (&all, &settings.payloads))?;
@@ -99,28 +124,48 @@ pub fn identify_run(
     }
     match settings.scheme {
         Scheme::AllJoints => all_joints((&logs, &identification), training, &all),
-        Scheme::StepByStep => joint_by_joint(task, &logs, &training, settings),
+        Scheme::StepByStep => joint_by_joint(task, &logs, &training, (settings, &run_weights(task, runs))),
     }
 }
 
-/// The records as recordings of motions that are made already.
-fn recordings(
+/// The records as recordings of motions that are made already, leg after leg of run after run.
+pub(crate) fn recordings(
     task: &IterationTask,
-    records: &[Record],
+    runs: &[RunLog<'_>],
     settings: &RunIdentificationSettings,
 ) -> Result<Vec<Recording>, IterationError> {
-    let one = |(number, (leg, record)): (usize, (&crate::leg::Leg, &Record))| {
-        let motion = measured_motion(record, leg, settings)?;
-        let mut recording = Recording::of_motion(format!("leg {}", number + 1), motion);
-        recording.commanded = Some(Arc::clone(leg.commanded()));
-        recording.payload = leg.payload().map(str::to_owned);
-        Ok(recording)
+    let legs = task.legs.len();
+    let mut recordings = Vec::with_capacity(runs.len() * legs);
+    for log in runs {
+        require_length("records of the run's legs", legs, log.records.len())?;
+        for (number, (leg, record)) in task.legs.iter().zip(log.records).enumerate() {
+            let motion = measured_motion(record, leg, settings)?;
+            let of_leg = if legs > 1 { format!(", leg {}", number + 1) } else { String::new() };
+            let mut recording = Recording::of_motion(format!("run {}{of_leg}", log.run), motion);
+            recording.commanded = Some(Arc::clone(leg.commanded()));
+            recording.payload = leg.payload().map(str::to_owned);
+            recordings.push(recording);
+        }
+    }
+    Ok(recordings)
+}
+
+/// For each recording and joint what its rows are multiplied by: the noise of the last run over that of its own.
+fn run_weights(task: &IterationTask, runs: &[RunLog<'_>]) -> Vec<Vec<f64>> {
+    let sigma = |log: &RunLog<'_>, joint: usize| log.joint_sigma.get(joint).copied().filter(|sigma| *sigma > 0.0);
+    let of_run = |log: &RunLog<'_>| -> Vec<f64> {
+        let weight = |joint: usize| Some(sigma(runs.last()?, joint)? / sigma(log, joint)?);
+        (0..task.robot.dof()).map(|joint| weight(joint).unwrap_or(1.0)).collect()
     };
-    task.legs.iter().zip(records).enumerate().map(one).collect()
+    runs.iter().flat_map(|log| core::iter::repeat_n(of_run(log), task.legs.len())).collect()
 }
 
 /// What the identification is given.
-fn identification_settings(task: &IterationTask, settings: &RunIdentificationSettings) -> IdentificationSettings {
+pub(crate) fn identification_settings(
+    task: &IterationTask,
+    settings: &RunIdentificationSettings,
+    runs: usize,
+) -> IdentificationSettings {
     let mut identification = IdentificationSettings::default();
     identification.motion.differentiator = settings.differentiator.clone();
     identification.parallel_filter = ParallelFilterSettings::from(settings.parallel_filter.as_ref());
@@ -128,6 +173,7 @@ fn identification_settings(task: &IterationTask, settings: &RunIdentificationSet
     identification.estimation.held.clone_from(&task.known);
     identification.consistency.clone_from(&settings.consistency);
     identification.friction.clone_from(&settings.friction);
+    identification.log_noise = if runs > 1 { LogNoise::Own } else { LogNoise::Shared };
     identification
 }
 
@@ -163,12 +209,12 @@ fn joint_by_joint(
     task: &IterationTask,
     logs: &Logs<'_>,
     training: &Training,
-    settings: &RunIdentificationSettings,
+    (settings, weights): (&RunIdentificationSettings, &[Vec<f64>]),
 ) -> Result<RunEstimate, IterationError> {
     let robot = &task.robot;
     let (names, joints) = (robot.base().expressions(), robot.joint_names());
     let fallback = robot.base().values(robot.nominal());
-    let steps = step_by_step(task, (logs, &settings.estimation), &names, &joints, &fallback)?;
+    let steps = step_by_step(task, (logs, &settings.estimation, weights), &names, &joints, &fallback)?;
     let given = task.known_values();
     let fixed = (0..names.len()).filter(|&k| !steps.found[k] && given[k].is_none()).collect();
     let sigma: Vec<f64> = training.joints.iter().map(|&joint| steps.joint_sigma[joint]).collect();

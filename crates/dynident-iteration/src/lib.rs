@@ -6,8 +6,13 @@
 //! | what is run | [`Leg`]: a trajectory and which of its rows count |
 //! | a simulated robot | [`SimulatedRobot`] |
 //! | a program that speaks the line protocol, or a person with a folder | [`robot`] |
+//! | stops, permissions, what no sample may leave | [`iterate_supervised`] with a [`Supervisor`]; [`SafetySettings`] |
+//! | gains from a nominal model and a bandwidth | [`derived_controllers`] |
+//! | a motion rehearsed before it is commanded | [`RehearsalSettings`] in [`SafetySettings`] |
 //! | a robot of one's own | a type with [`Robot`] |
 //! | one run's identification | [`identify_run`]: all joints at once, or step by step from tip to base as in the paper |
+//! | several runs' identification together | [`identify_runs`], each weighted by its own noise |
+//! | what is not met yet | [`Iteration::shortfalls`]: tracking, parameters, clipping, lag, prediction ([`Shortfall`]) |
 //! | what the next run is | [`Iteration::next`], a pure function of the records so far: which controller and model it has, whether a run got worse, when all has settled |
 //! | kept on disk, and resumed to the same result | [`IterationStore`] |
 //!
@@ -58,29 +63,51 @@
 
 #![forbid(unsafe_code)]
 
+mod before_motion;
+mod clipping;
+mod convergence;
 mod drive;
 mod error;
 mod estimate;
+mod evidence;
+mod final_fit;
+mod gains;
 mod leg;
 mod model_parameters;
 mod motion;
 mod policy;
+mod posture;
+mod prediction;
 mod record;
+mod rehearsal;
 pub mod robot;
+mod run_examination;
+mod runs_folder;
+mod safety;
 mod settings;
 mod status;
 mod step_by_step;
 mod store;
+mod supervision;
+mod tracking_floor;
+mod typical_drives;
 
-pub use drive::{Iteration, IterationOutcome, iterate};
+pub use convergence::Shortfall;
+pub use drive::{Iteration, IterationOutcome, iterate, iterate_supervised};
 pub use error::IterationError;
-pub use estimate::{RunEstimate, identify_run};
+pub use estimate::{RunEstimate, RunLog, identify_run, identify_runs};
+pub use evidence::{Clipping, JointEvidence, Prediction, RunEvidence};
+pub use final_fit::friction_chosen;
+pub use gains::{DerivedControllers, derived_controllers};
 pub use leg::{IterationTask, Leg};
 pub use model_parameters::ModelParameters;
 pub use motion::measured_motion;
 pub use policy::{Next, RunPlan};
 pub use record::{RunRecord, UsedController};
-pub use robot::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, SimulatedRobot};
+pub use rehearsal::{Rehearsal, RehearsalFailure, RehearsalSettings};
+pub use robot::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, SimulatedRobot, StopSignal};
+pub use safety::SafetySettings;
 pub use settings::{IterationSettings, RunIdentificationSettings, Scheme, SettledSettings, StartWith};
 pub use status::IterationStatus;
 pub use store::{IterationStore, RUN_SCHEMA, RunFile};
+pub use supervision::{NextMotion, Supervisor};

@@ -1,6 +1,8 @@
 //! What the next run is: a pure function of the records so far.
 
+use crate::convergence::{Names, shortfalls, stands_still};
 use crate::estimate::RunEstimate;
+use crate::evidence::Clipping;
 use crate::model_parameters::ModelParameters;
 use crate::record::RunRecord;
 use crate::settings::{IterationSettings, StartWith};
@@ -14,6 +16,10 @@ const FAR_WIDER: f64 = 3.0;
 
 /// A rejected run's estimate takes the place of a good one's where its error bars are this many times as wide.
 const CLEARLY_NARROWER: f64 = 0.5;
+
+/// A run that left its trajectory tells that no controller helps where so large a share of the samples of a joint
+/// stands at the drive's limit.
+const HELPLESS: f64 = 0.05;
 
 /// What comes next.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,7 +59,7 @@ impl RunPlan {
 }
 
 /// The run after `records`, or how the iteration has ended. `prior` is what the robot is believed to be before any run.
-pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &[f64]) -> Next {
+pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &[f64], names: &Names) -> Next {
     let run = records.len() + 1;
     let model_free = |stiffness| Next::Run(RunPlan { run, model: None, damping: 1.0, stiffness });
     let Some(last) = records.last() else {
@@ -63,8 +69,13 @@ pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
         };
     };
     let newest = model_of(last);
-    if settled(records, settings) {
+    if shortfalls(records, settings, names).is_empty() {
         return Next::Finished(IterationStatus::Converged);
+    }
+    // Once more before it is said: the second of two runs that stand still was made with the model of the first.
+    let earlier = &records[..records.len() - 1];
+    if stands_still(records, settings) && (!settings.reject || stands_still(earlier, settings)) {
+        return Next::Finished(IterationStatus::Settled);
     }
     if !settings.reject {
         return match newest {
@@ -101,13 +112,31 @@ pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
         let share = 0.5_f64.powi(halvings as i32);
         return Next::Run(RunPlan::with_model(run, ModelParameters::between(&good, &new, share), share));
     }
+    if let Some(clipped) = rejected.iter().rev().find_map(|record| helpless(record, names)) {
+        return Next::Finished(IterationStatus::Refused { reason: clipped });
+    }
     let before = records.iter().filter(|record| record.controller.model.is_none()).count();
     model_free(settings.stiffen.powi(before as i32))
 }
 
 /// What a controller gets from a run.
 fn model_of(record: &RunRecord) -> Option<ModelParameters> {
-    record.estimate.as_ref().and_then(RunEstimate::for_controller)
+    record.knowledge().and_then(RunEstimate::for_controller)
+}
+
+/// What a run with a model that left its trajectory with its drives at their limits says of them.
+fn helpless(record: &RunRecord, names: &Names) -> Option<String> {
+    let joints = &record.evidence.as_ref().filter(|_| record.done && record.controller.model.is_some())?.joints;
+    let clipped = joints.iter().enumerate().filter_map(|(joint, shown)| Some((joint, shown.clipping?)));
+    let (joint, Clipping { share, torque, .. }) = clipped.max_by(|a, b| a.1.share.total_cmp(&b.1.share))?;
+    (share >= HELPLESS).then(|| {
+        format!(
+            "{}: torque of joint {} stood at {torque:.3} Nm in {:.0} % of the samples, and no controller can ask its drive for more: give a slower motion, or a limit of torque in [design.limits]",
+            failed(record),
+            names.joints[joint],
+            100.0 * share
+        )
+    })
 }
 
 /// The run whose estimate is worth most: the newest good one, unless its error bars are far wider than those of an
@@ -117,7 +146,7 @@ fn model_of(record: &RunRecord) -> Option<ModelParameters> {
 fn most_trusted(records: &[RunRecord]) -> Option<&RunRecord> {
     records.iter().filter(|record| model_of(record).is_some()).reduce(|best, record| {
         let most = if record.accepted { FAR_WIDER } else { CLEARLY_NARROWER };
-        let (Some(old), Some(new)) = (&best.estimate, &record.estimate) else { return best };
+        let (Some(old), Some(new)) = (best.knowledge(), record.knowledge()) else { return best };
         if new.wider_than(old) <= most { record } else { best }
     })
 }
@@ -134,13 +163,22 @@ pub(crate) enum Rejection {
     /// No robot can have its parameters.
     #[error("no physically consistent set fits it: {reason}")]
     Inconsistent { reason: String },
+    /// A joint left its trajectory, rad (m).
+    #[error("joint {joint} left its trajectory: {error:.3} rad away, {limit:.3} still count as following")]
+    LeftTrajectory { joint: String, error: f64, limit: f64 },
     /// It followed the reference worse than the last good run did, rad (m).
     #[error("it tracks worse: {now:.3e} rad after {then:.3e} rad")]
     TracksWorse { now: f64, then: f64 },
 }
 
-/// Whether a run counts as good beside those before it, and why not.
-pub(crate) fn verdict(record: &RunRecord, before: &[RunRecord], settings: &IterationSettings) -> Result<(), Rejection> {
+/// Whether a run counts as good beside those before it, and why not. `following` is the largest tracking error of each
+/// joint that still counts as following.
+pub(crate) fn verdict(
+    record: &RunRecord,
+    before: &[RunRecord],
+    settings: &IterationSettings,
+    (following, names): (&[f64], &Names),
+) -> Result<(), Rejection> {
     if !record.done {
         return Err(Rejection::NotDone { outcome: record.outcome.clone() });
     }
@@ -151,6 +189,12 @@ pub(crate) fn verdict(record: &RunRecord, before: &[RunRecord], settings: &Itera
     if let Some(reason) = &estimate.impossible {
         return Err(Rejection::Inconsistent { reason: reason.clone() });
     }
+    let beyond = record.max_tracking_error_rad.iter().zip(following).enumerate();
+    if settings.reject
+        && let Some((joint, (&error, &limit))) = beyond.into_iter().find(|(_, (error, limit))| error > limit)
+    {
+        return Err(Rejection::LeftTrajectory { joint: names.joints[joint].clone(), error, limit });
+    }
     let Some(good) = before.iter().rev().find(|record| record.accepted) else { return Ok(()) };
     let (now, then) = (record.tracking_error(), good.tracking_error());
     let worst = (settings.worse_factor * then).max(settings.settled.tracking_tolerance);
@@ -159,24 +203,6 @@ pub(crate) fn verdict(record: &RunRecord, before: &[RunRecord], settings: &Itera
         return Err(Rejection::TracksWorse { now, then });
     }
     Ok(())
-}
-
-fn settled(records: &[RunRecord], settings: &IterationSettings) -> bool {
-    let [.., before, last] = records else { return false };
-    if !(before.accepted && last.accepted && last.controller.model.is_some() && last.controller.damping == 1.0) {
-        return false;
-    }
-    let (Some(old), Some(new)) = (&before.estimate, &last.estimate) else { return false };
-    let limits = &settings.settled;
-    let largest = new.values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-    let parameters = new.values.iter().zip(&old.values).zip(new.std.iter().zip(&old.std));
-    let still = parameters.into_iter().all(|((new, old), (s, t))| {
-        // Nothing can be said to stand still that is hardly known.
-        s.max(*t) <= limits.most_uncertain * largest
-            && (new - old).abs() <= limits.parameter_sigmas * s.hypot(*t) + limits.parameter_tolerance * largest
-    });
-    let (now, then) = (last.tracking_error(), before.tracking_error());
-    still && (now <= limits.tracking_tolerance || limits.tracking_ratio * now >= then)
 }
 
 fn failed(record: &RunRecord) -> String {

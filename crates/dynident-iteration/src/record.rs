@@ -1,7 +1,9 @@
 //! What is kept of a run.
 
 use crate::estimate::RunEstimate;
+use crate::evidence::RunEvidence;
 use crate::model_parameters::ModelParameters;
+use crate::rehearsal::Rehearsal;
 use dynident_dynamics::ParametricModel;
 use serde::{Deserialize, Serialize};
 
@@ -37,8 +39,18 @@ pub struct RunRecord {
     pub accepted: bool,
     /// Why not, or why there is no estimate.
     pub reason: Option<String>,
-    /// What it says about the parameters; none if it determines nothing.
+    /// What its rehearsal had shown; none where there was none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rehearsal: Option<Rehearsal>,
+    /// What it says about the parameters by itself; none if it determines nothing.
     pub estimate: Option<RunEstimate>,
+    /// What all good runs up to this one say together; none where this is the first or no good one, and where runs are
+    /// not pooled.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pooled: Option<RunEstimate>,
+    /// What its log shows beside parameters; none where it did not get to its end, and in runs of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub evidence: Option<RunEvidence>,
 }
 
 impl RunRecord {
@@ -61,26 +73,36 @@ impl RunRecord {
             Some(ModelParameters::Base(values)) => length("controller.model", values.len(), columns)?,
             None => {}
         }
-        let Some(estimate) = &self.estimate else { return Ok(()) };
-        length("estimate.values", estimate.values.len(), columns)?;
-        length("estimate.std", estimate.std.len(), columns)?;
-        length("estimate.covariance", estimate.covariance.len(), columns)?;
-        for row in &estimate.covariance {
-            length("a row of estimate.covariance", row.len(), columns)?;
+        if let Some(evidence) = &self.evidence {
+            length("evidence.joints", evidence.joints.len(), joints)?;
         }
-        length("estimate.joint_sigma", estimate.joint_sigma.len(), joints)?;
-        if let Some(possible) = &estimate.possible {
-            length("estimate.possible", possible.len(), all)?;
-        }
-        if let Some(column) = estimate.fixed.iter().find(|&&column| column >= columns) {
-            return Err(format!(
-                "names base parameter {column} as fixed where this robot has {columns}: remove its folder"
-            ));
-        }
-        if !estimate.torque_lags.is_empty() {
-            length("estimate.torque_lags", estimate.torque_lags.len(), joints)?;
+        for (name, estimate) in [("estimate", &self.estimate), ("pooled", &self.pooled)] {
+            let Some(estimate) = estimate else { continue };
+            length(&format!("{name}.values"), estimate.values.len(), columns)?;
+            length(&format!("{name}.std"), estimate.std.len(), columns)?;
+            length(&format!("{name}.covariance"), estimate.covariance.len(), columns)?;
+            for row in &estimate.covariance {
+                length(&format!("a row of {name}.covariance"), row.len(), columns)?;
+            }
+            length(&format!("{name}.joint_sigma"), estimate.joint_sigma.len(), joints)?;
+            if let Some(possible) = &estimate.possible {
+                length(&format!("{name}.possible"), possible.len(), all)?;
+            }
+            if let Some(column) = estimate.fixed.iter().find(|&&column| column >= columns) {
+                return Err(format!(
+                    "names base parameter {column} as fixed where this robot has {columns}: remove its folder"
+                ));
+            }
+            if !estimate.torque_lags.is_empty() {
+                length(&format!("{name}.torque_lags"), estimate.torque_lags.len(), joints)?;
+            }
         }
         Ok(())
+    }
+
+    /// What is known after it: what all good runs say together, or else what it says alone.
+    pub fn knowledge(&self) -> Option<&RunEstimate> {
+        self.pooled.as_ref().or(self.estimate.as_ref())
     }
 
     /// Mean over the joints of the largest tracking error, rad (m).

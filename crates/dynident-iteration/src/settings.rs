@@ -1,5 +1,6 @@
 //! Settings of an iteration.
 
+use crate::safety::SafetySettings;
 use dynident_identification::EstimationSettings;
 use dynident_identification::consistent::ConsistencySettings;
 use dynident_identification::estimators::Estimator;
@@ -79,9 +80,9 @@ pub enum StartWith {
     Prior,
 }
 
-/// When an iteration has settled. A run of the model-based controller must follow an accepted run, with `|θ_k -
-/// θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance · max|θ|` and `s ≤ most_uncertain · max|θ|`
-/// for every parameter, and a tracking error that is below `tracking_tolerance` or fell by less than `tracking_ratio`.
+/// When an iteration has converged: see [`Shortfall`](super::Shortfall) for what must be met, and by what it is judged.
+/// Parameters stand still with `|θ_k - θ_{k-1}| ≤ parameter_sigmas · √(s_k² + s_{k-1}²) + parameter_tolerance · max|θ|`
+/// and `s ≤ most_uncertain · max|θ|`, where θ_k is what is known after run k.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -93,10 +94,18 @@ pub struct SettledSettings {
     /// Widest error bar (one standard deviation) as a share of the largest parameter: what is known worse than that
     /// cannot be said to stand still. Default 0.1.
     pub most_uncertain: f64,
-    /// Tracking error that is good enough, rad (m). Default 1e-4.
+    /// Tracking error that is good enough, rad (m): the largest distance of every joint from its trajectory. Default
+    /// 1e-4.
     pub tracking_tolerance: f64,
-    /// Tracking that falls by less than this factor from a run to the next has settled. Default 1.5.
+    /// Tracking that falls by less than this factor from a run to the next no longer gets better: the iteration ends,
+    /// converged or not. Default 1.5.
     pub tracking_ratio: f64,
+    /// A tracking error beyond the tolerance is explained up to this many times the floor that noise, friction and
+    /// delay make. Default 2.
+    pub floor_ratio: f64,
+    /// Torque of a joint that the model leaves unexplained beyond the log's own noise, as a percentage of the joint's
+    /// torque (root mean squares). Default 5.
+    pub most_unexplained_percent: f64,
 }
 
 impl Default for SettledSettings {
@@ -107,6 +116,8 @@ impl Default for SettledSettings {
             most_uncertain: 0.1,
             tracking_tolerance: 1e-4,
             tracking_ratio: 1.5,
+            floor_ratio: 2.0,
+            most_unexplained_percent: 5.0,
         }
     }
 }
@@ -128,6 +139,8 @@ pub struct IterationSettings {
     pub controller: ControllerSettings,
     /// Whether a run that got worse is rejected and its step halved; true by default.
     pub reject: bool,
+    /// Whether the model is fitted to all good runs together; true by default. Otherwise to the newest alone.
+    pub pool: bool,
     /// A run is worse when its tracking error (mean over the joints of the largest) is above this many times that of
     /// the last good run, and above `settled.tracking_tolerance`. Default 1.5.
     pub worse_factor: f64,
@@ -141,6 +154,8 @@ pub struct IterationSettings {
     pub max_runs: usize,
     /// When all has settled.
     pub settled: SettledSettings,
+    /// What keeps runs safe.
+    pub safety: SafetySettings,
 }
 
 impl Default for IterationSettings {
@@ -152,12 +167,14 @@ impl Default for IterationSettings {
             model_free: ControllerSettings::JointPd(JointPdSettings { kp: 16.0.into(), kd: 8.0.into() }),
             controller: ControllerSettings::FiniteTime(FiniteTimeSettings::with_gains(4.0, 4.0)),
             reject: true,
+            pool: true,
             worse_factor: 1.5,
             most_halvings: 3,
             stiffen: 2.0,
             most_model_free: 4,
             max_runs: 8,
             settled: SettledSettings::default(),
+            safety: SafetySettings::default(),
         }
     }
 }
@@ -179,6 +196,7 @@ impl IterationSettings {
                 ..RunIdentificationSettings::default()
             },
             reject: false,
+            pool: false,
             ..Self::default()
         }
     }
@@ -188,6 +206,7 @@ impl IterationSettings {
     /// # Errors
     /// Numbers out of range, controllers whose gains do not fit, a controller for the first run that needs a model.
     pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
+        self.safety.validate()?;
         self.model_free.validate(joints)?;
         self.controller.validate(joints)?;
         self.first.as_ref().map_or(Ok(()), |first| first.validate(joints))?;
@@ -206,6 +225,9 @@ impl IterationSettings {
         within("settled.parameter_tolerance", settled.parameter_tolerance, 0.0, 1.0, "give 0 to 1")?;
         within("settled.most_uncertain", settled.most_uncertain, 0.0, 1e6, "give 0 or a positive share")?;
         within("settled.tracking_tolerance", settled.tracking_tolerance, 0.0, 1e3, "give 0 or a positive distance")?;
-        within("settled.tracking_ratio", settled.tracking_ratio, 1.0, 1e6, "give 1 or more")
+        within("settled.tracking_ratio", settled.tracking_ratio, 1.0, 1e6, "give 1 or more")?;
+        within("settled.floor_ratio", settled.floor_ratio, 1.0, 1e6, "give 1 or more")?;
+        let unexplained = settled.most_unexplained_percent;
+        within("settled.most_unexplained_percent", unexplained, 0.0, 1e6, "give 0 or a positive percentage")
     }
 }

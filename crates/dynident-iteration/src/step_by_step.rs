@@ -23,10 +23,11 @@ pub(crate) struct Steps {
 }
 
 /// Step by step: θ_k by least squares on `τ_k - B θ_known = A θ_k`, the rows of joint k alone (Eqs. 9, 10). What was
-/// estimated before enters with its covariance, `∂θ_k/∂θ_known = -A⁺ B`.
+/// estimated before enters with its covariance, `∂θ_k/∂θ_known = -A⁺ B`. Rows of joint k of recording ℓ are multiplied
+/// by `weights[ℓ][k]`.
 pub(crate) fn step_by_step(
     task: &IterationTask,
-    (logs, settings): (&Logs<'_>, &EstimationSettings),
+    (logs, settings, weights): (&Logs<'_>, &EstimationSettings, &[Vec<f64>]),
     names: &[String],
     joints: &[String],
     fallback: &[f64],
@@ -53,7 +54,7 @@ pub(crate) fn step_by_step(
         let mut wide = TriangularFactor::new(unknown.len() + uncertain.len());
         let (mut narrow_panel, mut wide_panel) = (Vec::new(), Vec::new());
         let model = RegressorModel::from(task.robot.clone());
-        for leg in 0..task.legs.len() {
+        for (index, weights) in weights.iter().enumerate() {
             let visit = |JointRows { joint: of, rows, panel, .. }: &JointRows<'_>| {
                 let rows = *rows;
                 if *of != joint {
@@ -76,11 +77,14 @@ pub(crate) fn step_by_step(
                 }
                 narrow_panel.extend_from_slice(&torque);
                 wide_panel.extend_from_slice(&torque);
+                for value in narrow_panel.iter_mut().chain(&mut wide_panel) {
+                    *value *= weights[joint];
+                }
                 factor.absorb(&narrow_panel, rows)?;
                 wide.absorb(&wide_panel, rows)?;
                 Ok(())
             };
-            logs.pass(&model, leg).run(&mut Visit(visit))?;
+            logs.pass(&model, index).run(&mut Visit(visit))?;
         }
         if factor.rows() == 0 {
             continue;

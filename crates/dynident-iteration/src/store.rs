@@ -2,14 +2,16 @@
 
 use crate::error::IterationError;
 use crate::record::RunRecord;
-use crate::robot::RobotRun;
+use crate::robot::{RobotRun, read_log_table};
+use crate::runs_folder::{INTERRUPTED, INTERRUPTED_FILE, RUN_FILE, RunsFolder, UNFINISHED};
+use dynident_simulation::Record;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// What a run's folder begins with until it is whole.
-const UNFINISHED: &str = ".unfinished-";
+/// Schema of `runs/interrupted_k/interrupted.json`.
+const INTERRUPTED_SCHEMA: &str = "dynident/interrupted/1";
 
 /// Schema of `runs/run_k/run.json`.
 pub const RUN_SCHEMA: &str = "dynident/run/1";
@@ -38,22 +40,21 @@ pub struct RunFile {
 
 impl IterationStore {
     /// Opens or makes the folder. `fingerprint` stands for everything that the runs depend on; runs with another one
-    /// are another iteration's. Without `resume`, runs that are there are removed.
+    /// are another iteration's. Without `resume`, runs that are there are removed: the files that an iteration writes,
+    /// never others, and never through a symbolic link.
     ///
     /// # Errors
-    /// A folder that cannot be written; runs of another iteration.
+    /// A folder that cannot be written; runs of another iteration; in a run's folder or in its place something that no
+    /// iteration wrote.
     pub fn open(folder: &Path, fingerprint: &str, resume: bool) -> Result<Self, IterationError> {
         let runs = folder.join("runs");
         fs::create_dir_all(&runs).map_err(IterationError::file(&runs))?;
-        let store = Self { runs, fingerprint: fingerprint.to_owned() };
-        for entry in fs::read_dir(&store.runs).map_err(IterationError::file(&store.runs))? {
-            let entry = entry.map_err(IterationError::file(&store.runs))?;
-            let name = entry.file_name().to_string_lossy().into_owned();
-            let left_over = name.starts_with(UNFINISHED);
-            if left_over || (!resume && name.starts_with("run_")) {
-                fs::remove_dir_all(entry.path()).map_err(IterationError::file(&entry.path()))?;
-            }
+        let found = RunsFolder::look(&runs)?;
+        if !resume {
+            found.remove_runs()?;
         }
+        found.remove_unfinished()?;
+        let store = Self { runs, fingerprint: fingerprint.to_owned() };
         store.records()?;
         Ok(store)
     }
@@ -65,7 +66,7 @@ impl IterationStore {
     pub fn records(&self) -> Result<Vec<RunRecord>, IterationError> {
         let mut records = Vec::new();
         loop {
-            let path = self.run_folder(records.len() + 1).join("run.json");
+            let path = self.run_folder(records.len() + 1).join(RUN_FILE);
             let text = match fs::read_to_string(&path) {
                 Ok(text) => text,
                 Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(records),
@@ -94,38 +95,96 @@ impl IterationStore {
     /// # Errors
     /// A folder that cannot be written; then the run is not there.
     pub fn keep(&self, record: &RunRecord, runs: &[RobotRun]) -> Result<(), IterationError> {
+        let file =
+            RunFile { schema: RUN_SCHEMA.to_owned(), fingerprint: self.fingerprint.clone(), record: record.clone() };
+        let folder = self.run_folder(record.run);
+        let text = serde_json::to_string_pretty(&file)
+            .map_err(|error| IterationError::State { path: folder.join(RUN_FILE), problem: error.to_string() })?;
+        self.keep_whole(&folder, (RUN_FILE, &text), runs)
+    }
+
+    /// Keeps what was recorded of a run that a stop cut short, beside the runs: `interrupted_k/`, with the logs and
+    /// `interrupted.json`; where it is, or none if nothing was recorded.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn keep_interrupted(
+        &self,
+        run: usize,
+        runs: &[RobotRun],
+        how: &str,
+    ) -> Result<Option<PathBuf>, IterationError> {
+        if runs.iter().all(|run| run.record.samples == 0) {
+            return Ok(None);
+        }
+        let name = |again: usize| match again {
+            1 => format!("{INTERRUPTED}{run}"),
+            more => format!("{INTERRUPTED}{run}_{more}"),
+        };
+        let mut again = 1;
+        while self.runs.join(name(again)).exists() {
+            again += 1;
+        }
+        let folder = self.runs.join(name(again));
+        let text = serde_json::json!({ "schema": INTERRUPTED_SCHEMA, "run": run, "outcome": how }).to_string();
+        self.keep_whole(&folder, (INTERRUPTED_FILE, &text), runs)?;
+        Ok(Some(folder))
+    }
+
+    /// A folder with a file and the logs, whole or not at all.
+    fn keep_whole(&self, folder: &Path, file: (&str, &str), runs: &[RobotRun]) -> Result<(), IterationError> {
         let fresh = tempfile::Builder::new()
             .prefix(UNFINISHED)
             .tempdir_in(&self.runs)
             .map_err(IterationError::file(&self.runs))?;
         for (leg, run) in runs.iter().enumerate() {
-            let name = if leg == 0 { "log.csv".to_owned() } else { format!("log_{}.csv", leg + 1) };
-            write_synced(&fresh.path().join(name), run.record.csv().as_bytes())?;
+            write_synced(&fresh.path().join(log_name(leg)), run.record.csv().as_bytes())?;
         }
-        let file =
-            RunFile { schema: RUN_SCHEMA.to_owned(), fingerprint: self.fingerprint.clone(), record: record.clone() };
-        let path = fresh.path().join("run.json");
-        let text = serde_json::to_string_pretty(&file)
-            .map_err(|error| IterationError::State { path: path.clone(), problem: error.to_string() })?;
-        write_synced(&path, text.as_bytes())?;
+        write_synced(&fresh.path().join(file.0), file.1.as_bytes())?;
         sync_folder(fresh.path())?;
-        let folder = self.run_folder(record.run);
         open_to_others(fresh.path())?;
-        fs::rename(fresh.path(), &folder).map_err(IterationError::file(&folder))?;
+        fs::rename(fresh.path(), folder).map_err(IterationError::file(folder))?;
         // It has another name now: there is nothing left to remove.
         let _ = fresh.keep();
         sync_folder(&self.runs)
     }
 
+    /// The records of a run, leg after leg, at these rates: bit for bit as they were when it was made.
+    ///
+    /// # Errors
+    /// A log that is not there any more or holds something else.
+    pub fn logs(&self, run: usize, joints: &[String], rates_hz: &[f64]) -> Result<Vec<Record>, IterationError> {
+        let of_leg = |(leg, rate_hz): (usize, &f64)| {
+            let path = self.log_path(run, leg);
+            read_log_table(&path, joints, *rate_hz).map_err(|error| IterationError::State {
+                problem: format!(
+                    "{error}: runs are fitted together, so put the log back, or remove this run's folder and those after it"
+                ),
+                path: path.clone(),
+            })
+        };
+        rates_hz.iter().enumerate().map(of_leg).collect()
+    }
+
     /// That run number `run` cannot be gone on from.
     pub(crate) fn refused(&self, run: usize, problem: String) -> IterationError {
-        IterationError::State { path: self.run_folder(run).join("run.json"), problem }
+        IterationError::State { path: self.run_folder(run).join(RUN_FILE), problem }
+    }
+
+    /// The log of a run's leg, by its place from 0.
+    pub fn log_path(&self, run: usize, leg: usize) -> PathBuf {
+        self.run_folder(run).join(log_name(leg))
     }
 
     /// The folder of a run.
     pub fn run_folder(&self, run: usize) -> PathBuf {
         self.runs.join(format!("run_{run}"))
     }
+}
+
+/// The log of a leg, by its place from 0, in its run's folder.
+fn log_name(leg: usize) -> String {
+    if leg == 0 { "log.csv".to_owned() } else { format!("log_{}.csv", leg + 1) }
 }
 
 fn write_synced(path: &Path, contents: &[u8]) -> Result<(), IterationError> {

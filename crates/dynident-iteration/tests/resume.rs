@@ -111,6 +111,22 @@ fn killed_at_some_moments_it_goes_on_to_the_same_result() {
     killed_at(dynident_testing::count(4, 50));
 }
 
+/// Runs are fitted together, also after a kill: a good run's log that is gone is named, and no fit is made without it.
+#[test]
+fn a_log_that_is_gone_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = outcome(folder.path()).unwrap();
+    assert!(whole.runs[1..].iter().all(|run| run.pooled.is_some()));
+    std::fs::remove_dir_all(folder.path().join(format!("runs/run_{RUNS}"))).unwrap();
+    let log = folder.path().join("runs/run_2/log.csv");
+    let kept = std::fs::read(&log).unwrap();
+    std::fs::remove_file(&log).unwrap();
+    let error = outcome(folder.path()).unwrap_err().to_string();
+    assert!(error.contains("run_2") && error.contains("put the log back"), "{error}");
+    std::fs::write(&log, kept).unwrap();
+    assert_eq!(outcome(folder.path()).unwrap(), whole);
+}
+
 /// A file from outside may hold anything: what does not fit the robot is refused with the file's name, and nothing is
 /// overwritten.
 #[test]
@@ -126,6 +142,9 @@ fn runs_whose_numbers_do_not_fit_the_robot_are_refused() {
         "/estimate/covariance",
         "/estimate/covariance/0",
         "/estimate/joint_sigma",
+        "/pooled/values",
+        "/pooled/covariance",
+        "/evidence/joints",
         "/max_tracking_error_rad",
         "/controller/model/values",
     ];

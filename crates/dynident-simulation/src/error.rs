@@ -29,6 +29,9 @@ pub enum SimulationError {
         /// How many there are.
         found: usize,
     },
+    /// A robot's own loop of which nothing is known here.
+    #[error("the controller position-loop runs in the robot's drives: state its kp and kd to simulate it")]
+    OwnLoop,
     /// A controller that needs a model and was given none.
     #[error("controller {controller} needs a model of the robot: give one, or take joint-pd or joint-pid")]
     NoModel {

@@ -47,6 +47,7 @@ mod record;
 mod reference;
 mod run;
 mod sensors;
+mod slow_motion;
 
 pub use closed_loop::{LoopSettings, RunLimits, Start, closed_loop};
 pub use controllers::{Controller, ControllerModel, ControllerSettings, FrictionCompensation};

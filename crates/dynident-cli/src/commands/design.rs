@@ -1,13 +1,14 @@
 //! `dynident design STUDY.toml --out DIR`.
 
 use super::search::Search;
-use super::{Context, json, known_in, message_of, pretty_json, refuse_overwriting};
+use super::{Context, interruption, json, known_in, message_of, pretty_json, refuse_overwriting};
 use crate::{Verdict, summary, terminal};
 use clap::ValueEnum;
 use dynident::excitation::DesignProgress;
 use dynident::excitation::export::{
     ExportError, Sampled, UrScriptSettings, fitness_csv, ros2_joint_trajectory, trajectory_csv, urscript, waypoints_csv,
 };
+use dynident::iteration::StopSignal;
 use dynident::{
     DesignOutcome, Folders, OutputSet, RunOptions, Study, StudyRobot, check_log, check_trajectory, check_writable,
     design_study,
@@ -94,6 +95,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     writable_formats(options, &study)?;
     let progress = context.progress();
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
+    interruption::listen(&StopSignal::default());
     let search = Search::new(context);
     let watch = |at: &DesignProgress| search.hear(at);
     let outcome = match (&options.check, &options.check_log) {
@@ -103,7 +105,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     };
     let outcome = outcome.map_err(known_in(&options.study))?;
     search.end();
-    if Search::stopped() {
+    if interruption::pressed() {
         terminal::remark("stopped: this is the best motion so far");
     }
     let files = files(&outcome, options)?;

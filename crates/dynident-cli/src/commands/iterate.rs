@@ -1,32 +1,51 @@
 //! `dynident iterate STUDY.toml --out DIR`.
 
 use super::search::Search;
-use super::{Context, json, known_in, message_of, refuse_overwriting};
+use super::{Context, interruption, json, known_in, message_of, permission, refuse_overwriting};
 use crate::{Verdict, summary, terminal};
+use dynident::excitation::DesignProgress;
+use dynident::iteration::{NextMotion, StopSignal};
+use dynident::result::INTERRUPTED;
 use dynident::study::LegOrder;
-use dynident::{IterationWatch, RunOptions, Study, check_writable, iterate_study};
-use std::path::PathBuf;
+use dynident::{
+    Error, IterationWatch, IterationsFile, Progress, RunOptions, Silent, Study, check_writable, iterate_study,
+};
+use std::path::{Path, PathBuf};
 
 /// Options of `iterate`.
 #[derive(clap::Args)]
+#[allow(clippy::struct_excessive_bools, reason = "switches of a command line, each for itself")]
 pub(crate) struct Options {
     /// The study file.
     study: PathBuf,
-    /// Folder for iterations.json, report.html, trajectory.json and runs/.
+    /// Folder for iterations.json, report.html, trajectory.json, runs/, and the robot that was found: result.json,
+    /// identified.urdf (and .toml), identification.html, controller.json.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Make every run anew: by default runs that are in the folder already are not made again.
     #[arg(long)]
     fresh: bool,
+    /// Say in one line how the iteration in the folder stands, and run nothing.
+    #[arg(long, conflicts_with = "fresh")]
+    status: bool,
     /// Seed of the simulated sensors' noise, in place of the study's.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// Start the program that the study names as its robot, without asking.
+    #[arg(long)]
+    allow_command: bool,
+    /// Ask on the terminal before each run.
+    #[arg(long)]
+    confirm: bool,
     /// Folder of the robot description, in place of the study's own.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
 }
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
+    if options.status {
+        return status(&options.out, context);
+    }
     let mut study = Study::load(&options.study).map_err(message_of)?;
     if let Some(seed) = options.seed {
         study.simulation.get_or_insert_default().sensors.seed = seed;
@@ -34,12 +53,20 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let legs = study.iteration.as_ref().map_or(0, |section| section.leg.len());
     let legs: Vec<String> = (1..=legs).map(|leg| format!("leg_{leg}/runs")).collect();
     let mut names = vec!["iterations.json", "report.html", "trajectory.json", "runs"];
+    names.extend(["result.json", "identified.urdf", "identified.toml", "identification.html", "controller.json"]);
     names.extend(legs.iter().map(String::as_str));
     let of_study = (&study, &*options.study, options.data.as_deref());
     let sections = ["robot", "design", "iteration", "simulation", "controller"];
     refuse_overwriting((&options.out, &names), of_study, &sections, &[])?;
     check_writable(&options.out).map_err(message_of)?;
-    let progress = context.progress();
+    permission::for_command(&study, options.allow_command)?;
+    if options.confirm {
+        permission::somebody()?;
+    }
+    let stop = StopSignal::default();
+    interruption::listen(&stop);
+    // A bar would be drawn over the questions.
+    let progress: Box<dyn Progress> = if options.confirm { Box::new(Silent) } else { context.progress() };
     let run = RunOptions { data: options.data.clone(), threads: context.threads, progress: &*progress };
     let search = Search::new(context);
     let section = study.iteration.clone().unwrap_or_default();
@@ -47,15 +74,40 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     let most = section.max_runs * iterations;
     progress.begin("runs", Some(most as u64));
     let mut hear = |_: &_, _: &[_]| progress.advance(1);
-    let mut watch = IterationWatch { design: &|at| search.hear(at), run: &mut hear };
+    let mut allow = |motion: &NextMotion| permission::for_motion(motion);
+    let design = |at: &DesignProgress| search.hear(at);
+    let mut watch = IterationWatch { stop, ..IterationWatch::new(&design, &mut hear) };
+    if options.confirm {
+        watch.allow = Some(&mut allow);
+    }
     let file = iterate_study(&study, &options.study, &options.out, !options.fresh, &run, &mut watch);
     progress.end();
-    let file = file.map_err(known_in(&options.study))?;
     search.end();
+    let file = match file {
+        Err(error @ Error::Interrupted { .. }) => {
+            terminal::remark(&error.to_string());
+            return Ok(Verdict::Interrupted);
+        }
+        other => other.map_err(known_in(&options.study))?,
+    };
     if context.json {
         terminal::print(&json(&file)?)?;
     } else if !context.quiet {
         terminal::print(&summary::iteration(&file, &options.out))?;
     }
+    if file.status == INTERRUPTED {
+        return Ok(Verdict::Interrupted);
+    }
+    Ok(if file.converged { Verdict::Good } else { Verdict::Negative })
+}
+
+/// How the iteration in a folder stands.
+fn status(out: &Path, context: &Context) -> Result<Verdict, String> {
+    let path = out.join("iterations.json");
+    if !path.is_file() {
+        return Err(format!("{}: no iteration has been here yet", path.display()));
+    }
+    let file = IterationsFile::read(&path).map_err(message_of)?;
+    terminal::print(&if context.json { json(&file)? } else { format!("{}\n", file.status_line()) })?;
     Ok(if file.converged { Verdict::Good } else { Verdict::Negative })
 }

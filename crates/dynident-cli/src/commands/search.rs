@@ -1,14 +1,10 @@
-//! What a person sees of a search for a trajectory, and how it is stopped.
+//! What a person sees of a search for a trajectory.
 
-use crate::commands::Context;
+use crate::commands::{Context, interruption};
 use crate::terminal;
 use core::ops::ControlFlow;
 use dynident::excitation::DesignProgress;
 use indicatif::{ProgressBar, ProgressStyle};
-use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Set by the first Ctrl-C: the search ends with its best motion.
-static STOP: AtomicBool = AtomicBool::new(false);
 
 /// A line that says how far a search is.
 pub(crate) struct Search {
@@ -16,15 +12,8 @@ pub(crate) struct Search {
 }
 
 impl Search {
-    /// Shows a line to people who watch; the first Ctrl-C ends the search and keeps the best, the second ends the
-    /// program.
+    /// Shows a line to people who watch. Once Ctrl-C was pressed the search ends with its best.
     pub(crate) fn new(context: &Context) -> Self {
-        // Without a handler Ctrl-C ends the program as ever.
-        let _ = ctrlc::set_handler(|| {
-            if STOP.swap(true, Ordering::Relaxed) {
-                std::process::exit(130);
-            }
-        });
         Self { line: (!context.quiet && terminal::watched()).then(line) }
     }
 
@@ -34,12 +23,7 @@ impl Search {
             line.set_message(state(at));
             line.tick();
         }
-        if Self::stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    }
-
-    /// Whether Ctrl-C was pressed.
-    pub(crate) fn stopped() -> bool {
-        STOP.load(Ordering::Relaxed)
+        if interruption::pressed() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
     /// Clears the line.

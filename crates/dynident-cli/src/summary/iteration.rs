@@ -5,6 +5,9 @@ use dynident::result::IterationRun;
 use dynident::{IterationsFile, SimulationFile};
 use std::path::Path;
 
+/// Parameters that the screen shows.
+const MOST_PARAMETERS: usize = 20;
+
 /// An iteration: its verdict, run by run, and where the files are.
 pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
     let runs = file.runs.len();
@@ -13,7 +16,7 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
     let header = ["run", "controller", "tracking", "change", "error", "verdict"].map(str::to_owned);
     let rows = file.runs.iter().enumerate().map(|(place, run)| row(run, place.checked_sub(1).map(|k| &file.runs[k])));
     text += &table(&header, 2..5, rows.collect());
-    text += "  tracking: largest distance from the trajectory, rad (m); change: of the\n  parameters, in error bars; error: largest, where the truth is known\n\n";
+    text += "  tracking: largest distance from the trajectory, rad (m); change: of the\n  parameters, in error bars; error: largest, where the truth is known; both of\n  all good runs so far together\n\n";
     for run in file.runs.iter().filter(|run| !run.accepted) {
         if let Some(reason) = &run.reason {
             text += &wrapped(&format!("run {} does not count: {reason}", run.run), 4);
@@ -28,25 +31,58 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
             4,
         );
     }
+    for unmet in &file.unmet {
+        text += &wrapped(&format!("UNMET: {}. What would help: {}.", unmet.message, unmet.remedy), 4);
+    }
+    text += &parameters(file);
+    if let Some(why) = &file.no_result {
+        text += &wrapped(&format!("No result.json: {why}"), 4);
+    }
+    let robot = if file.base_parameters.is_empty() {
+        ""
+    } else {
+        ", and the robot found: result.json, identification.html, controller.json and its description"
+    };
     text += &wrapped(
-        &format!("Written: {}, {}", out.join("iterations.json").display(), out.join("report.html").display()),
+        &format!("Written: {}, {}{robot}", out.join("iterations.json").display(), out.join("report.html").display()),
         4,
     );
     text
 }
 
+/// The base parameters that were found, by all good runs together.
+fn parameters(file: &IterationsFile) -> String {
+    if file.base_parameters.is_empty() {
+        return String::new();
+    }
+    let mut text = "\nFound by all good runs together (+- 95 %):\n".to_owned();
+    let rows = file.base_parameters.iter().take(MOST_PARAMETERS).map(|one| {
+        let bar = if one.excited { format!("{:.2e}", one.bar_95()) } else { "not excited".to_owned() };
+        vec![super::text::name(&one.symbol), format!("{:.5}", one.value), bar, one.unit.clone()]
+    });
+    text += &table(&["parameter", "value", "+-", "unit"].map(str::to_owned), 1..3, rows.collect());
+    if file.base_parameters.len() > MOST_PARAMETERS {
+        text += &wrapped(
+            &format!("and {} more, in result.json and report.html", file.base_parameters.len() - MOST_PARAMETERS),
+            4,
+        );
+    }
+    text.push('\n');
+    text
+}
+
 fn row(run: &IterationRun, before: Option<&IterationRun>) -> Vec<String> {
     let tracking = run.max_tracking_error_rad.iter().fold(0.0_f64, |most, error| most.max(*error));
-    let change = before.filter(|before| before.parameters.len() == run.parameters.len() && !run.parameters.is_empty());
+    let change = before.filter(|before| before.known().len() == run.known().len() && !run.known().is_empty());
     let change = change.map(|before| {
-        let pairs = run.parameters.iter().zip(&before.parameters);
+        let pairs = run.known().iter().zip(before.known());
         let each = pairs.filter_map(|(new, old)| {
             let bar = new.std?.hypot(old.std?);
             (bar > 0.0).then(|| (new.value - old.value).abs() / bar)
         });
         each.fold(0.0, f64::max)
     });
-    let errors = run.parameters.iter().filter_map(|parameter| parameter.error.map(f64::abs));
+    let errors = run.known().iter().filter_map(|parameter| parameter.error.map(f64::abs));
     let error = errors.fold(None, |most: Option<f64>, error| Some(most.map_or(error, |most| most.max(error))));
     let damped = if run.damping < 1.0 { format!(" ({:.3} step)", run.damping) } else { String::new() };
     let dash = || "-".to_owned();

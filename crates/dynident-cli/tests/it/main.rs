@@ -11,4 +11,5 @@ mod evaluation;
 mod files;
 mod iterate;
 mod reproduce;
+mod robots_outside;
 mod verdict;

@@ -149,6 +149,24 @@ impl LinearProblem {
         Ok(self)
     }
 
+    /// The same with the rows of every joint of every log multiplied by a weight: `weight(log, joint)` with the log's
+    /// and the joint's number. Logs with noise of their own count as much as they tell; residuals are in the unit of a
+    /// log with weight 1.
+    ///
+    /// # Errors
+    /// [`EstimationError::Setting`] for a weight that is negative, NaN or infinite.
+    pub fn with_log_weights(mut self, weight: impl Fn(usize, usize) -> f64) -> Result<Self, EstimationError> {
+        for equation in &mut self.equations {
+            let weight = weight(equation.log, equation.joint);
+            check_weight(weight)?;
+            if weight != 1.0 {
+                let size = equation.factor.columns() + 1;
+                equation.factor = equation.factor.mapped(&DMatrix::from_diagonal_element(size, size, weight))?;
+            }
+        }
+        Ok(self)
+    }
+
     /// Names of the columns.
     pub fn columns(&self) -> &[String] {
         &self.columns

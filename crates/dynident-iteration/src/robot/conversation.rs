@@ -1,7 +1,9 @@
 //! The two ways of a run with a robot program.
 
-use super::process::Client;
+use super::client::{Client, Heard};
+use super::envelope::EnvelopeWatch;
 use super::protocol::{EndStatus, ToClient, ToHost};
+use super::stop_reason::Stopping;
 use super::{RobotFault, RobotStatus, RunRequest, handover};
 use dynident_simulation::Record;
 use dynident_simulation::ReferenceSample;
@@ -43,26 +45,34 @@ pub(super) fn run(
             duration_s: reference.duration_s(),
             trajectory: text(&trajectory),
             controller: text(&controller),
+            envelope: request.envelope.map(|envelope| envelope.in_order(&client.places)),
         },
         "sample",
     )?;
     let most = FINEST * reference.samples() + 1000;
+    let mut watch = EnvelopeWatch::new(request.envelope, reference);
     loop {
-        match client.next("sample")? {
-            ToHost::Sample { t_s, q, tau } => {
-                let sample = record.samples;
-                if sample >= most {
+        // Samples may come afterwards: what is left of the motion counts as well.
+        let left_s = (reference.duration_s() - record.times_s.last().copied().unwrap_or(0.0)).max(0.0);
+        match client.next("sample", client.message_s() + left_s)? {
+            Heard::StopRequested => {
+                let stopping = stopped(client, record, most, INTERRUPTED);
+                return Ok(RobotStatus::Interrupted { stopping });
+            }
+            Heard::Message(ToHost::Sample { t_s, q, dq, tau }) => {
+                if record.samples >= most {
                     return Err(RobotFault::TooMuch { most, duration_s: reference.duration_s() });
                 }
-                let time_s = time(t_s, sample, record.times_s.last())?;
-                let (q, tau) = (vector(client, &q, "q", sample)?, vector(client, &tau, "tau", sample)?);
-                record.times_s.push(time_s);
-                record.q.extend(q);
-                record.tau.extend(tau);
-                record.samples += 1;
+                let dq = keep_sample(client, record, (t_s, &q, dq.as_deref(), &tau))?;
+                if let Some(breach) = watch.look(record, dq.as_deref()) {
+                    let stopping = stopped(client, record, most, &breach.to_string());
+                    return Ok(RobotStatus::LeftEnvelope { breach, stopping });
+                }
             }
-            ToHost::End { status: EndStatus::Stopped, reason } => return Ok(RobotStatus::Stopped { reason }),
-            ToHost::End { status: EndStatus::Done, .. } => {
+            Heard::Message(ToHost::End { status: EndStatus::Stopped, reason }) => {
+                return Ok(RobotStatus::Stopped { reason });
+            }
+            Heard::Message(ToHost::End { status: EndStatus::Done, .. }) => {
                 let (end_s, duration_s) = (record.times_s.last().copied().unwrap_or(0.0), reference.duration_s());
                 // Up to two samples of the slower of the two clocks may be missing, or a hundredth of the run.
                 if end_s < 0.99 * duration_s - 2.0 / reference.rate_hz() || record.samples == 0 {
@@ -70,11 +80,52 @@ pub(super) fn run(
                 }
                 return Ok(RobotStatus::Done);
             }
-            other => {
+            Heard::Message(other) => {
                 return Err(RobotFault::OutOfTurn { found: other.kind().to_owned(), expected: "sample".to_owned() });
             }
         }
     }
+}
+
+/// What a client's stop message says where a person asked for it.
+const INTERRUPTED: &str = "interrupted";
+
+/// Stops a client. Samples that it still sends are kept as long as they are such.
+fn stopped(client: &mut Client, record: &mut Record, most: usize, reason: &str) -> Stopping {
+    let order = (client.places.clone(), client.torque_per_unit.clone());
+    let mut fine = true;
+    client.stop(reason, &mut |message| {
+        if let ToHost::Sample { t_s, q, dq, tau } = &message
+            && fine
+            && record.samples < most
+        {
+            fine = keep_sample_of((&order.0, &order.1), record, (*t_s, q, dq.as_deref(), tau)).is_ok();
+        }
+    })
+}
+
+/// A sample's time, positions, velocities and torques as a client sends them.
+type SentSample<'a> = (Option<f64>, &'a [Option<f64>], Option<&'a [Option<f64>]>, &'a [Option<f64>]);
+
+fn keep_sample(client: &Client, record: &mut Record, sent: SentSample<'_>) -> Result<Option<Vec<f64>>, RobotFault> {
+    keep_sample_of((&client.places, &client.torque_per_unit), record, sent)
+}
+
+/// Appends a sample to the record; its velocities, if it has them.
+fn keep_sample_of(
+    (places, torque_per_unit): (&[usize], &[f64]),
+    record: &mut Record,
+    (t_s, q, dq, tau): SentSample<'_>,
+) -> Result<Option<Vec<f64>>, RobotFault> {
+    let sample = record.samples;
+    let time_s = time(t_s, sample, record.times_s.last())?;
+    let (q, tau) = (vector(places, q, "q", sample)?, vector(places, tau, "tau", sample)?);
+    let dq = dq.map(|dq| vector(places, dq, "dq", sample)).transpose()?;
+    record.times_s.push(time_s);
+    record.q.extend(q);
+    record.tau.extend(tau.iter().zip(places).map(|(tau, &place)| tau * torque_per_unit[place]));
+    record.samples += 1;
+    Ok(dq)
 }
 
 /// The host runs the controller, sample by sample.
@@ -98,19 +149,25 @@ pub(super) fn steps(
         samples: reference.samples(),
         q: own_order(target.target().q),
         dq: own_order(target.target().dq),
+        envelope: request.envelope.map(|envelope| envelope.in_order(&client.places)),
     };
     client.send(&begin, "state")?;
+    let mut watch = EnvelopeWatch::new(request.envelope, reference);
     let mut tau = vec![0.0; joints];
     for sample in 0..reference.samples() {
-        let (time_s, q, dq) = match client.next("state")? {
-            ToHost::State { t_s, q, dq } => (
+        let (time_s, q, dq) = match client.next("state", client.message_s())? {
+            Heard::Message(ToHost::State { t_s, q, dq }) => (
                 time(t_s, sample, record.times_s.last())?,
-                vector(client, &q, "q", sample)?,
-                vector(client, &dq, "dq", sample)?,
+                vector(&client.places, &q, "q", sample)?,
+                vector(&client.places, &dq, "dq", sample)?,
             ),
-            ToHost::End { reason, .. } => return Ok(RobotStatus::Stopped { reason }),
-            other => {
+            Heard::Message(ToHost::End { reason, .. }) => return Ok(RobotStatus::Stopped { reason }),
+            Heard::Message(other) => {
                 return Err(RobotFault::OutOfTurn { found: other.kind().to_owned(), expected: "state".to_owned() });
+            }
+            Heard::StopRequested => {
+                let stopping = stopped(client, record, 0, INTERRUPTED);
+                return Ok(RobotStatus::Interrupted { stopping });
             }
         };
         target.take(reference, sample);
@@ -123,6 +180,11 @@ pub(super) fn steps(
         record.q.extend(q);
         record.tau.extend_from_slice(&tau);
         record.samples += 1;
+        // Before the torque is sent: one beyond the envelope never is.
+        if let Some(breach) = watch.look(record, Some(&dq)) {
+            let stopping = stopped(client, record, 0, &breach.to_string());
+            return Ok(RobotStatus::LeftEnvelope { breach, stopping });
+        }
         let message = if sample + 1 < reference.samples() {
             ToClient::Torque { tau: in_client_order(client, &tau) }
         } else {
@@ -130,10 +192,16 @@ pub(super) fn steps(
         };
         client.send(&message, "state")?;
     }
-    match client.next("end")? {
-        ToHost::End { status: EndStatus::Done, .. } => Ok(RobotStatus::Done),
-        ToHost::End { reason, .. } => Ok(RobotStatus::Stopped { reason }),
-        other => Err(RobotFault::OutOfTurn { found: other.kind().to_owned(), expected: "end".to_owned() }),
+    match client.next("end", client.message_s())? {
+        Heard::Message(ToHost::End { status: EndStatus::Done, .. }) => Ok(RobotStatus::Done),
+        Heard::Message(ToHost::End { reason, .. }) => Ok(RobotStatus::Stopped { reason }),
+        Heard::Message(other) => {
+            Err(RobotFault::OutOfTurn { found: other.kind().to_owned(), expected: "end".to_owned() })
+        }
+        Heard::StopRequested => {
+            let stopping = stopped(client, record, 0, INTERRUPTED);
+            Ok(RobotStatus::Interrupted { stopping })
+        }
     }
 }
 
@@ -155,8 +223,8 @@ fn time(t_s: Option<f64>, sample: usize, before: Option<&f64>) -> Result<f64, Ro
 }
 
 /// A client's vector in the model's order.
-fn vector(client: &Client, values: &[Option<f64>], what: &'static str, sample: usize) -> Result<Vec<f64>, RobotFault> {
-    let expected = client.places.len();
+fn vector(places: &[usize], values: &[Option<f64>], what: &'static str, sample: usize) -> Result<Vec<f64>, RobotFault> {
+    let expected = places.len();
     if values.len() != expected {
         return Err(RobotFault::WrongJoints { sample, what: what.to_owned(), expected, found: values.len() });
     }
@@ -164,5 +232,5 @@ fn vector(client: &Client, values: &[Option<f64>], what: &'static str, sample: u
         let not_a_number = || RobotFault::NotANumber { sample, what: format!("{what}[{place}]") };
         values[place].filter(|x| x.is_finite()).ok_or_else(not_a_number)
     };
-    client.places.iter().map(one).collect()
+    places.iter().map(one).collect()
 }

@@ -1,6 +1,8 @@
 //! A robot that a person runs: files out, a log in.
 
+use super::envelope::EnvelopeWatch;
 use super::log_table::{LogTableError, read_log_table};
+use super::stop_reason::Stopping;
 use super::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, conversation, handover};
 use dynident_simulation::{SimulationError, require};
 use serde::{Deserialize, Serialize};
@@ -67,7 +69,7 @@ impl FolderRobot {
         loop {
             let run = self.look(request, folder)?;
             let waiting = matches!(run.status, RobotStatus::Waiting { .. });
-            if !waiting || Instant::now() >= ends {
+            if !waiting || Instant::now() >= ends || request.stop_requested() {
                 return Ok(run);
             }
             std::thread::sleep(Duration::from_millis(200).min(ends.saturating_duration_since(Instant::now())));
@@ -102,7 +104,10 @@ impl FolderRobot {
                 );
                 return Ok(waiting(reason));
             }
-            None => RobotStatus::Done,
+            None => match EnvelopeWatch::first(request.envelope, request.reference, &record) {
+                Some(breach) => RobotStatus::LeftEnvelope { breach, stopping: Stopping::SeenAfterwards },
+                None => RobotStatus::Done,
+            },
         };
         Ok(RobotRun { status, record, truth: None })
     }
@@ -119,7 +124,7 @@ impl Robot for FolderRobot {
 
     fn run(&mut self, request: &RunRequest<'_>) -> Result<RobotRun, SimulationError> {
         request.validate(self.joints.len())?;
-        Ok(self.exchange(request, &self.run_folder(request.run)).unwrap_or_else(|fault| RobotRun {
+        Ok(self.exchange(request, &self.settings.folder.join(request.folder_name())).unwrap_or_else(|fault| RobotRun {
             status: RobotStatus::Failed { fault },
             record: conversation::empty_record(&self.joints, request.reference.rate_hz()),
             truth: None,

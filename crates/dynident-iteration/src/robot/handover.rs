@@ -49,8 +49,8 @@ pub fn trajectory_csv(reference: &Reference, model: Option<&ControllerModel>) ->
     text
 }
 
-/// The controller's settings, the joints' order, and the model in numbers: enough to compute every torque of the
-/// controller elsewhere.
+/// The controller's settings, the joints' order, the envelope that no sample may leave, and the model in numbers:
+/// enough to compute every torque of the controller elsewhere.
 pub fn controller_json(request: &RunRequest<'_>, joints: &[String]) -> Value {
     json!({
         "schema": CONTROLLER_SCHEMA,
@@ -59,6 +59,7 @@ pub fn controller_json(request: &RunRequest<'_>, joints: &[String]) -> Value {
         "duration_s": request.reference.duration_s(),
         "joints": joints,
         "controller": request.controller,
+        "envelope": request.envelope,
         "model": request.model.map(model_json),
     })
 }
@@ -107,12 +108,20 @@ pub(super) fn write(request: &RunRequest<'_>, joints: &[String], folder: &Path) 
     Ok([trajectory.0, controller.0])
 }
 
-/// The first file in the folder that is there and is another one.
+/// The first file in the folder that is there and is another one. Another envelope makes no other run.
 pub(super) fn other(request: &RunRequest<'_>, joints: &[String], folder: &Path) -> Result<Option<PathBuf>, RobotFault> {
+    let same = |there: &str, text: &str| there == text || without_envelope(there) == without_envelope(text);
     let differs = |(path, text): &(PathBuf, String)| {
-        path.exists() && !std::fs::read_to_string(path).is_ok_and(|there| there == *text)
+        path.exists() && !std::fs::read_to_string(path).is_ok_and(|there| same(&there, text))
     };
     Ok(files(request, joints, folder)?.into_iter().find(differs).map(|(path, _)| path))
+}
+
+/// A controller's file but for the envelope; `Err` with the text itself if it is none.
+fn without_envelope(text: &str) -> Result<Value, &str> {
+    let Ok(Value::Object(mut file)) = serde_json::from_str(text) else { return Err(text) };
+    file.remove("envelope");
+    Ok(Value::Object(file))
 }
 
 /// Writes under another name in the same folder, then renames; what is there already with the same text stays.

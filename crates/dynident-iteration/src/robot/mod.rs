@@ -1,21 +1,31 @@
 //! The robot as an experiment sees it: something that runs a trajectory under a controller and gives a record back. The
 //! built-in simulator, another process, or a person with a folder.
 
+mod client;
 mod conversation;
+mod envelope;
 mod folder;
 mod handover;
 mod log_table;
 mod process;
+mod process_group;
+mod process_settings;
 mod protocol;
 mod simulated;
+mod stop_reason;
+mod stop_signal;
 mod term_description;
 
+pub use envelope::{Envelope, EnvelopeSettings};
 pub use folder::{FolderRobot, FolderSettings};
 pub use handover::{CONTROLLER_SCHEMA, controller_json, trajectory_csv};
 pub use log_table::{LogTableError, read_log_table};
-pub use process::{ProcessLimits, ProcessMode, ProcessRobot, ProcessSettings};
-pub use protocol::{PROTOCOL, ToClient, ToHost};
+pub use process::ProcessRobot;
+pub use process_settings::{ProcessLimits, ProcessMode, ProcessSettings};
+pub use protocol::{LoggedTorque, PROTOCOL, ToClient, ToHost};
 pub use simulated::SimulatedRobot;
+pub use stop_reason::{Breach, EnvelopeQuantity, Stopping};
+pub use stop_signal::StopSignal;
 
 use dynident_simulation::Record;
 use dynident_simulation::Reference;
@@ -37,9 +47,30 @@ pub struct RunRequest<'a> {
     pub controller: &'a ControllerSettings,
     /// Its model, if it needs one.
     pub model: Option<&'a ControllerModel>,
+    /// What no sample may leave; a run that does is stopped. None watches nothing.
+    pub envelope: Option<&'a Envelope>,
+    /// Who may ask for a stop.
+    pub stop: Option<&'a StopSignal>,
+    /// Share of the trajectory's own speed that the reference has; 1 but for slow runs before the first.
+    pub speed: f64,
 }
 
-impl RunRequest<'_> {
+impl<'a> RunRequest<'a> {
+    /// A run without a model, an envelope and anybody who may stop it: set the fields.
+    pub fn new(run: usize, reference: &'a Reference, controller: &'a ControllerSettings) -> Self {
+        Self { run, reference, controller, model: None, envelope: None, stop: None, speed: 1.0 }
+    }
+
+    /// Name of the folder for its files: a slow run is no other's.
+    pub fn folder_name(&self) -> String {
+        if self.speed < 1.0 { format!("run_{}_speed_{}", self.run, self.speed) } else { format!("run_{}", self.run) }
+    }
+
+    /// Whether a stop was asked for.
+    pub fn stop_requested(&self) -> bool {
+        self.stop.is_some_and(StopSignal::is_requested)
+    }
+
     /// Checks that reference, controller and model belong to so many joints.
     ///
     /// # Errors
@@ -72,17 +103,11 @@ impl RobotRun {
     /// Per joint: largest distance of the recorded positions from the reference at the record's times, rad (m); the
     /// reference between its samples by straight lines.
     pub fn max_error(&self, reference: &Reference) -> Vec<f64> {
-        let samples = reference.samples();
         (0..self.record.joints.len())
             .map(|joint| {
-                let target = &reference.motion().q[joint * samples..(joint + 1) * samples];
-                let own = &self.record.q[self.record.of(joint)];
-                own.iter().zip(&self.record.times_s).fold(0.0_f64, |most, (q, time_s)| {
-                    let place = (time_s * reference.rate_hz()).clamp(0.0, (samples - 1) as f64);
-                    let from = place.floor() as usize;
-                    let next = (from + 1).min(samples - 1);
-                    let desired = target[from] + (place - from as f64) * (target[next] - target[from]);
-                    most.max((desired - q).abs())
+                let own = self.record.q[self.record.of(joint)].iter().zip(&self.record.times_s);
+                own.fold(0.0_f64, |most, (q, time_s)| {
+                    most.max((envelope::target_at(reference, joint, *time_s) - q).abs())
                 })
             })
             .collect()
@@ -105,6 +130,18 @@ pub enum RobotStatus {
     Stopped {
         /// What it said.
         reason: String,
+    },
+    /// Somebody asked for a stop (Ctrl-C), and the run was given up.
+    Interrupted {
+        /// What became of the stop.
+        stopping: Stopping,
+    },
+    /// A sample left its envelope, and the run was stopped.
+    LeftEnvelope {
+        /// Which.
+        breach: Breach,
+        /// What became of the stop.
+        stopping: Stopping,
     },
     /// The exchange with the robot failed.
     Failed {
@@ -133,6 +170,8 @@ impl core::fmt::Display for RobotStatus {
             Self::Done => write!(f, "done"),
             Self::Simulated { verdict } => write!(f, "{verdict}"),
             Self::Stopped { reason } => write!(f, "the robot stopped: {reason}"),
+            Self::Interrupted { stopping } => write!(f, "a stop was asked for: {stopping}"),
+            Self::LeftEnvelope { breach, stopping } => write!(f, "out of the envelope: {breach}; {stopping}"),
             Self::Failed { fault } => write!(f, "{fault}"),
             Self::Waiting { folder, reason } => write!(f, "{}: {reason}", folder.display()),
         }
@@ -240,6 +279,14 @@ pub enum RobotFault {
         found: String,
         /// What is needed.
         expected: String,
+    },
+    /// The robot logs something from which its dynamics cannot be told.
+    #[error("the robot logs torque {what}: {fix}")]
+    LoggedTorque {
+        /// What it logs.
+        what: String,
+        /// What to do.
+        fix: String,
     },
     /// The record ends before the trajectory does.
     #[error("the robot says done, but its record ends at {end_s} s of {duration_s} s")]

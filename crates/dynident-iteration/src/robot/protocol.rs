@@ -1,6 +1,7 @@
 //! The messages between an experiment (the host) and a robot program (the client): one JSON object a line. The book's
 //! page `robot-protocol.md` describes them with examples.
 
+use super::envelope::Envelope;
 use serde::{Deserialize, Serialize};
 
 /// Name and version of the protocol.
@@ -23,6 +24,9 @@ pub enum ToClient {
         trajectory: String,
         /// Path of the controller.
         controller: String,
+        /// What no sample may leave, in the order of the client's joints: the client stops by itself where one does.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        envelope: Option<Envelope>,
     },
     /// A run in steps begins: go to the start and send the state.
     Begin {
@@ -36,6 +40,9 @@ pub enum ToClient {
         q: Vec<f64>,
         /// Velocities to start with.
         dq: Vec<f64>,
+        /// As in a run.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        envelope: Option<Envelope>,
     },
     /// Hold this torque for one sample, then send the state.
     Torque {
@@ -44,6 +51,12 @@ pub enum ToClient {
     },
     /// The steps are over: stop, and send an end.
     Finish {},
+    /// Stop the robot at once, whatever it does, and send an end. It may come at any moment of a run, also in place of
+    /// a torque.
+    Stop {
+        /// Why.
+        reason: String,
+    },
     /// Nothing more will come.
     Bye {},
 }
@@ -62,6 +75,9 @@ pub enum ToHost {
         joints: Vec<String>,
         /// Which of `run` and `step` it offers.
         modes: Vec<String>,
+        /// What it logs as torque; everything that the drives give, Nm (N), where it does not say.
+        #[serde(default)]
+        logs: LoggedTorque,
     },
     /// One sample of a run.
     Sample {
@@ -69,6 +85,9 @@ pub enum ToHost {
         t_s: Option<f64>,
         /// Positions, rad (m).
         q: Vec<Option<f64>>,
+        /// Velocities, rad/s (m/s), where the robot measures them.
+        #[serde(default)]
+        dq: Option<Vec<Option<f64>>>,
         /// Torques of the drives, Nm (N).
         tau: Vec<Option<f64>>,
     },
@@ -88,6 +107,25 @@ pub enum ToHost {
         /// Why it stopped.
         #[serde(default)]
         reason: String,
+    },
+}
+
+/// What a robot logs as `tau`.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(tag = "torque", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum LoggedTorque {
+    /// All that the drives give at the joints, Nm (N).
+    #[default]
+    Drive,
+    /// Currents of the drives, A, which make so much torque at the joint, gear included.
+    Current {
+        /// Nm/A (N/A) at each joint.
+        torque_per_ampere: Vec<f64>,
+    },
+    /// Torques from which the robot has taken what it adds by itself (gravity, friction).
+    Reduced {
+        /// What is missing in them.
+        without: Vec<String>,
     },
 }
 

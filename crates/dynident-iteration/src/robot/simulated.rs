@@ -52,6 +52,9 @@ impl Robot for SimulatedRobot {
         request.validate(self.joints.len())?;
         let mut controller = request.controller.build(self.joints.len(), request.model)?;
         let mut settings = self.settings.clone();
+        if let Some(envelope) = request.envelope {
+            envelope.limit(&mut settings.limits);
+        }
         // Any odd number spreads neighbours over the seeds.
         settings.sensors.seed ^= (request.run as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let run = closed_loop(&mut self.plant, controller.as_mut(), request.reference, &settings)?;

@@ -73,7 +73,7 @@ fn noise() -> SensorSettings {
 fn record(model: &Model, shape: CoulombShape) -> Record {
     let reference = reference();
     let controller = pd();
-    let request = RunRequest { run: 1, reference: &reference, controller: &controller, model: None };
+    let request = RunRequest::new(1, &reference, &controller);
     robot(model, shape, noise()).run(&request).unwrap().record
 }
 

@@ -4,4 +4,9 @@
 mod identification;
 mod iteration;
 mod policy;
+mod pooling;
+mod rehearsals;
 mod robots;
+mod simulated_arm;
+mod stops;
+mod verdict;

@@ -3,8 +3,8 @@
 use dynident_dynamics::ParametricModel;
 use dynident_excitation::Motion;
 use dynident_iteration::{
-    Iteration, IterationSettings, IterationStatus, IterationTask, ModelParameters, Next, RunEstimate, RunPlan,
-    RunRecord, UsedController,
+    Clipping, Iteration, IterationSettings, IterationStatus, IterationTask, JointEvidence, ModelParameters, Next,
+    Prediction, RunEstimate, RunEvidence, RunPlan, RunRecord, Shortfall, UsedController,
 };
 use dynident_model::InertialParameters;
 use dynident_model::sample::planar_2r;
@@ -46,8 +46,24 @@ fn run(number: usize, model: Option<f64>, tracking: f64, accepted: bool, estimat
         max_tracking_error_rad: vec![tracking; 2],
         accepted,
         reason: None,
+        rehearsal: None,
         estimate: Some(estimate),
+        pooled: None,
+        evidence: Some(evidence()),
     }
+}
+
+/// A log that shows nothing against its run: what the model before predicted, torque that is all explained.
+fn evidence() -> RunEvidence {
+    let joint = JointEvidence {
+        torque_rms: 10.0,
+        torque_noise: 0.1,
+        row_noise: 0.1,
+        clipping: None,
+        prediction: Some(Prediction { rows: 1000, inside: 0.95, rms_error: 0.1, half_width: 0.2 }),
+        tracking_floor_rad: None,
+    };
+    RunEvidence { log_rates_hz: vec![100.0], joints: vec![joint; 2] }
 }
 
 fn planned(records: &[RunRecord]) -> RunPlan {
@@ -101,8 +117,94 @@ fn a_poor_run_does_not_take_the_place_of_a_good_one() {
 #[test]
 fn what_is_hardly_known_has_not_settled() {
     let records = |std: f64| {
-        [run(1, Some(1.0), 0.5, true, estimate(1.0, std)), run(2, Some(1.0), 0.5, true, estimate(1.0 + std, std))]
+        [run(1, Some(1.0), 1e-4, true, estimate(1.0, std)), run(2, Some(1.0), 1e-4, true, estimate(1.0 + std, std))]
     };
     assert_eq!(model(&planned(&records(0.8))), Some(1.8));
     assert_eq!(iteration().next(&records(0.01)).unwrap(), Next::Finished(IterationStatus::Converged));
+}
+
+/// Two runs that meet everything.
+fn good_pair() -> [RunRecord; 2] {
+    [1, 2].map(|number| run(number, Some(1.0), 1e-4, true, estimate(1.0, 0.01)))
+}
+
+fn shortfalls(records: &[RunRecord]) -> Vec<Shortfall> {
+    iteration().shortfalls(records).unwrap()
+}
+
+/// Tracking that no longer falls is no success by itself: the iteration ends, and says what is not met.
+#[test]
+fn standing_still_is_not_success() {
+    let still = |number| run(number, Some(1.0), 1.17, true, estimate(1.0, 0.01));
+    let two = [still(1), still(2)];
+    assert!(matches!(iteration().next(&two).unwrap(), Next::Run(_)));
+    let three = [still(1), still(2), still(3)];
+    assert_eq!(iteration().next(&three).unwrap(), Next::Finished(IterationStatus::Settled));
+    let unmet = shortfalls(&three);
+    assert_eq!(unmet.len(), 2);
+    let Shortfall::Tracking { error_rad, floor_rad, .. } = &unmet[0] else { panic!("{unmet:?}") };
+    assert_eq!((*error_rad, *floor_rad), (1.17, None));
+}
+
+/// At the floor that noise, friction and delay explain tracking cannot get better: up to twice it counts.
+#[test]
+fn tracking_at_its_floor_is_met() {
+    for (error, met) in [(1.9e-3, true), (2.1e-3, false)] {
+        let mut records = good_pair();
+        records[1].max_tracking_error_rad = vec![error; 2];
+        for joint in &mut records[1].evidence.as_mut().unwrap().joints {
+            joint.tracking_floor_rad = Some(1e-3);
+        }
+        assert_eq!(shortfalls(&records).is_empty(), met, "{error}");
+    }
+}
+
+/// Each condition alone keeps the iteration from converging, and is named with joint and numbers.
+#[test]
+fn every_condition_counts_by_itself() {
+    use dynident_identification::examination::TorqueLag;
+    assert!(shortfalls(&good_pair()).is_empty());
+    let with = |spoil: &dyn Fn(&mut RunRecord)| {
+        let mut records = good_pair();
+        spoil(&mut records[1]);
+        assert_ne!(iteration().next(&records).unwrap(), Next::Finished(IterationStatus::Converged));
+        let unmet = shortfalls(&records);
+        assert_eq!(unmet.len(), 1, "{unmet:?}");
+        assert!(!unmet[0].remedy().is_empty());
+        unmet[0].to_string()
+    };
+    let joint = |record: &mut RunRecord, change: &dyn Fn(&mut JointEvidence)| {
+        change(&mut record.evidence.as_mut().unwrap().joints[1]);
+    };
+    let clipped = |stated| Clipping { share: 0.59, torque: 8.0, stated };
+    let message = with(&|record| joint(record, &|shown| shown.clipping = Some(clipped(true))));
+    assert!(message.contains("joint2") && message.contains("59.0 %") && message.contains("8.000 Nm"), "{message}");
+    let late = TorqueLag { lag_s: -8e-3, std_s: 1e-4, half_width_95_s: 2e-4, matters: true, taken_off_s: 0.0 };
+    let message = with(&|record| record.estimate.as_mut().unwrap().torque_lags = vec![None, Some(late)]);
+    assert!(message.contains("8.0 +- 0.2 ms before"), "{message}");
+    let poor = Prediction { rows: 1000, inside: 0.6, rms_error: 0.4, half_width: 0.2 };
+    let message = with(&|record| joint(record, &|shown| shown.prediction = Some(poor)));
+    assert!(message.contains("60 %") && message.contains("0.400 Nm"), "{message}");
+    let message = with(&|record| record.estimate.as_mut().unwrap().joint_sigma[1] = 1.0);
+    assert!(message.contains("9.9 %"), "{message}");
+    let message = with(&|record| record.estimate.as_mut().unwrap().values[3] = 1.1);
+    assert!(message.contains("moved by 7.1 error bars"), "{message}");
+    let message = with(&|record| record.controller.model = None);
+    assert!(message.contains("newest model"), "{message}");
+    let message = with(&|record| record.evidence = None);
+    assert!(message.contains("earlier version"), "{message}");
+    let message = with(&|record| (record.accepted, record.reason) = (false, Some("it fell".to_owned())));
+    assert!(message.contains("it fell"), "{message}");
+    // A flat top without a stated limit, of a joint that follows all the same, is a matter of the motion.
+    let mut records = good_pair();
+    joint(&mut records[1], &|shown| shown.clipping = Some(clipped(false)));
+    assert!(shortfalls(&records).is_empty());
+}
+
+/// What all good runs say together is what counts, where they are pooled.
+#[test]
+fn the_next_model_is_that_of_all_good_runs() {
+    let mut last = run(2, Some(1.0), 0.1, true, estimate(3.0, 0.1));
+    last.pooled = Some(estimate(2.0, 0.05));
+    assert_eq!(model(&planned(&[run(1, Some(1.0), 0.2, true, estimate(1.0, 0.1)), last])), Some(2.0));
 }

@@ -3,7 +3,7 @@
 
 use dynident_excitation::Motion;
 use dynident_iteration::robot::{
-    FolderRobot, FolderSettings, ProcessLimits, ProcessMode, ProcessRobot, ProcessSettings, ToClient, ToHost,
+    Envelope, FolderRobot, FolderSettings, ProcessLimits, ProcessMode, ProcessRobot, ProcessSettings, ToClient, ToHost,
     controller_json, trajectory_csv,
 };
 use dynident_iteration::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, SimulatedRobot};
@@ -21,7 +21,7 @@ fn model() -> Model {
 }
 
 /// The example program beside this test: `cargo test` builds it.
-fn client() -> PathBuf {
+pub(crate) fn client() -> PathBuf {
     let test = std::env::current_exe().unwrap();
     test.parent()
         .unwrap()
@@ -37,25 +37,25 @@ fn settings(mode: ProcessMode, fault: &str) -> ProcessSettings {
     if !fault.is_empty() {
         command.extend(["--fault".to_owned(), fault.to_owned()]);
     }
-    let limits = ProcessLimits { hello_s: 20.0, message_s: 20.0, run_s: None, bye_s: 0.2 };
+    let limits = ProcessLimits { hello_s: 20.0, message_s: 20.0, run_s: None, stop_s: 0.5, bye_s: 0.2 };
     ProcessSettings { command, mode, limits, folder: None }
 }
 
-fn joints() -> Vec<String> {
+pub(crate) fn joints() -> Vec<String> {
     vec!["joint1".to_owned(), "joint2".to_owned()]
 }
 
-fn pd() -> ControllerSettings {
+pub(crate) fn pd() -> ControllerSettings {
     ControllerSettings::JointPd(JointPdSettings { kp: vec![200.0, 80.0].into(), kd: vec![20.0, 8.0].into() })
 }
 
-fn reference() -> Reference {
+pub(crate) fn reference() -> Reference {
     Reference::standing(&[-0.4, 0.3], 500.0, 0.4).unwrap()
 }
 
 fn run(robot: &mut dyn Robot) -> RobotRun {
     let (reference, controller) = (reference(), pd());
-    robot.run(&RunRequest { run: 1, reference: &reference, controller: &controller, model: None }).unwrap()
+    robot.run(&RunRequest::new(1, &reference, &controller)).unwrap()
 }
 
 fn fault(mode: ProcessMode, name: &str) -> (RobotFault, RobotRun) {
@@ -123,7 +123,8 @@ fn programs_that_fail_have_a_verdict() {
 /// A program that hangs is given up at the limit and killed: the call returns long before the program's hour is over.
 #[test]
 fn programs_that_hang_are_given_up() {
-    let limits = |hello_s, message_s, run_s| ProcessLimits { hello_s, message_s, run_s, bye_s: 0.1 };
+    let limits =
+        |hello_s, message_s, run_s| ProcessLimits { hello_s, message_s, run_s, bye_s: 0.1, ..ProcessLimits::default() };
     for (mode, name, limits) in [
         (ProcessMode::Run, "hang", limits(20.0, 0.4, None)),
         (ProcessMode::Step, "hang", limits(20.0, 0.4, None)),
@@ -181,7 +182,7 @@ fn a_folder_waits_for_its_log() {
     // The log of another trajectory is not taken for this one's.
     let other = Reference::standing(&[-0.4, 0.31], 500.0, 0.4).unwrap();
     let controller = pd();
-    let request = RunRequest { run: 1, reference: &other, controller: &controller, model: None };
+    let request = RunRequest::new(1, &other, &controller);
     let refused = robot.run(&request).unwrap().status;
     assert!(matches!(refused, RobotStatus::Failed { .. }) && refused.to_string().contains("another run"), "{refused}");
     std::fs::write(&log, &half).unwrap();
@@ -197,11 +198,20 @@ fn the_book_tells_the_protocol() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/robot-protocol.md");
     let page = std::fs::read_to_string(page).unwrap();
     let (trajectory, controller) = ("/…/run_1/trajectory.csv".to_owned(), "/…/run_1/controller.json".to_owned());
+    let each = |limit: f64| vec![Some(limit), Some(limit)];
+    let envelope = Some(Envelope {
+        lower: vec![Some(-2.9), None],
+        upper: vec![Some(2.9), None],
+        speed: each(2.5),
+        torque: vec![Some(96.0), Some(30.0)],
+        tracking_error: each(0.3),
+    });
     let own = [
-        ToClient::Run { run: 1, rate_hz: 1000.0, duration_s: 10.0, trajectory, controller },
-        ToClient::Begin { run: 1, rate_hz: 1000.0, samples: 10_001, q: vec![0.1, 0.2], dq: vec![0.0, 0.0] },
+        ToClient::Run { run: 1, rate_hz: 1000.0, duration_s: 10.0, trajectory, controller, envelope: envelope.clone() },
+        ToClient::Begin { run: 1, rate_hz: 1000.0, samples: 10_001, q: vec![0.1, 0.2], dq: vec![0.0, 0.0], envelope },
         ToClient::Torque { tau: vec![3.1, 0.4] },
         ToClient::Finish {},
+        ToClient::Stop { reason: "interrupted".to_owned() },
         ToClient::Bye {},
     ];
     let mut own: Vec<String> = own.iter().map(|message| serde_json::to_string(message).unwrap()).collect();
@@ -236,7 +246,7 @@ fn what_is_handed_over_is_enough() {
         kd: 20.0.into(),
         friction: dynident_simulation::FrictionCompensation::None,
     });
-    let request = RunRequest { run: 3, reference: &reference, controller: &controller, model: Some(&believed) };
+    let request = RunRequest { model: Some(&believed), ..RunRequest::new(3, &reference, &controller) };
     let file = controller_json(&request, &joints());
     assert_eq!(file["schema"], "dynident/controller/1");
     assert_eq!(file["controller"]["kind"], "computed-torque");
@@ -288,7 +298,7 @@ fn mujoco_is_a_robot() {
         let plant = Plant::new(&model, &terms, &[0.5; 7]).unwrap();
         let mut own = SimulatedRobot::new(plant, LoopSettings::default()).unwrap();
         for controller in &controllers {
-            let request = RunRequest { run: 1, reference: &reference, controller, model: Some(&believed) };
+            let request = RunRequest { model: Some(&believed), ..RunRequest::new(1, &reference, controller) };
             let (theirs, own) = (mujoco.run(&request).unwrap(), own.run(&request).unwrap());
             assert!(theirs.status.is_done(), "{}: {}", controller.name(), theirs.status);
             let worst = theirs.record.q.iter().zip(&own.record.q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);

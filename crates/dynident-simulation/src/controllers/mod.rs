@@ -6,6 +6,7 @@ mod joint_pd;
 mod joint_pid;
 mod model;
 mod pd_gravity;
+mod position_loop;
 mod slotine_li;
 
 pub use computed_torque::{ComputedTorque, ComputedTorqueSettings};
@@ -14,6 +15,7 @@ pub use joint_pd::{JointPd, JointPdSettings};
 pub use joint_pid::{JointPid, JointPidSettings};
 pub use model::{ControllerModel, FrictionCompensation};
 pub use pd_gravity::PdGravity;
+pub use position_loop::{PositionLoop, PositionLoopSettings};
 pub use slotine_li::{SlotineLi, SlotineLiSettings};
 
 use crate::error::SimulationError;
@@ -96,6 +98,8 @@ pub enum ControllerSettings {
     FiniteTimeLiteral(FiniteTimeSettings),
     /// [`SlotineLi`]: passivity-based, adaptive if asked.
     SlotineLi(SlotineLiSettings),
+    /// [`PositionLoop`]: the loop of the robot's own drives, with torque fed forward or with nothing but a path.
+    PositionLoop(PositionLoopSettings),
 }
 
 impl ControllerSettings {
@@ -109,12 +113,35 @@ impl ControllerSettings {
             Self::FiniteTime(_) => finite_time::NAME,
             Self::FiniteTimeLiteral(_) => finite_time::LITERAL_NAME,
             Self::SlotineLi(_) => slotine_li::NAME,
+            Self::PositionLoop(_) => position_loop::NAME,
         }
     }
 
     /// Whether it needs a model of the robot.
     pub fn needs_model(&self) -> bool {
-        !matches!(self, Self::JointPd(_) | Self::JointPid(_))
+        match self {
+            Self::JointPd(_) | Self::JointPid(_) => false,
+            Self::PositionLoop(settings) => settings.feed_forward,
+            Self::PdGravity(_)
+            | Self::ComputedTorque(_)
+            | Self::FiniteTime(_)
+            | Self::FiniteTimeLiteral(_)
+            | Self::SlotineLi(_) => true,
+        }
+    }
+
+    /// Whether its law is known here: that of a robot's own loop is only where its gains are stated.
+    pub fn can_be_simulated(&self) -> bool {
+        match self {
+            Self::PositionLoop(settings) => settings.can_be_simulated(),
+            Self::JointPd(_)
+            | Self::JointPid(_)
+            | Self::PdGravity(_)
+            | Self::ComputedTorque(_)
+            | Self::FiniteTime(_)
+            | Self::FiniteTimeLiteral(_)
+            | Self::SlotineLi(_) => true,
+        }
     }
 
     /// Checks the numbers for so many joints.
@@ -128,6 +155,7 @@ impl ControllerSettings {
             Self::ComputedTorque(settings) => settings.validate(joints),
             Self::FiniteTime(settings) | Self::FiniteTimeLiteral(settings) => settings.validate(joints),
             Self::SlotineLi(settings) => settings.validate(joints),
+            Self::PositionLoop(settings) => settings.validate(joints),
         }
     }
 
@@ -154,6 +182,10 @@ impl ControllerSettings {
             Self::FiniteTime(settings) => Box::new(FiniteTime::new(model()?, settings)?),
             Self::FiniteTimeLiteral(settings) => Box::new(FiniteTime::literal(model()?, settings)?),
             Self::SlotineLi(settings) => Box::new(SlotineLi::new(model()?, settings)?),
+            Self::PositionLoop(settings) => {
+                let ahead = if settings.feed_forward { Some(model()?) } else { None };
+                Box::new(PositionLoop::new(joints, settings, ahead)?)
+            }
         })
     }
 }

@@ -93,6 +93,12 @@ pub enum Error {
         /// What is wrong, and the fix.
         message: String,
     },
+    /// Somebody asked for a stop before there was anything to keep.
+    #[error("{what} was interrupted, and nothing was kept of it: the same command begins it anew")]
+    Interrupted {
+        /// What.
+        what: &'static str,
+    },
     /// An output that would take the place of an input.
     #[error("{}: would overwrite {}, which this command reads; nothing was written: give another --out", output.display(), input.display())]
     Overwrite {

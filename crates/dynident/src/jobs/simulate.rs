@@ -48,7 +48,7 @@ pub fn simulate_study(
     let prior = robot.nominal().to_vec();
     let model = ControllerModel::from_parameters(robot.model(), robot.terms(), &prior)
         .map_err(Error::section(study_path, "controller"))?;
-    let request = RunRequest { run: 1, reference: &reference, controller: &controller, model: Some(&model) };
+    let request = RunRequest { model: Some(&model), ..RunRequest::new(1, &reference, &controller) };
     let run = truth.robot.run(&request).map_err(Error::section(study_path, "simulation"))?;
 
     // The truth beside it.

@@ -1,7 +1,7 @@
 //! `report.html` of an iteration.
 
 use crate::error::Error;
-use crate::result::{IterationParameter, IterationRun, IterationsFile};
+use crate::result::{IterationParameter, IterationRun, IterationsFile, UnmetCondition};
 use dynident_iteration::IterationStore;
 use dynident_iteration::robot::read_log_table;
 use dynident_report::{
@@ -82,6 +82,10 @@ pub(crate) struct TimeSpent {
 pub(crate) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time: &TimeSpent) -> Result<String, Error> {
     let mut page = Report::new(&file.name).subtitle(format!("{} joints; {}", file.joints.len(), file.reason));
     page.add(figures(file));
+    if !file.unmet.is_empty() {
+        page.add(Heading::new("What is not met"));
+        page.add(unmet(file));
+    }
     page.add(Heading::new("Runs"));
     page.add(runs(file));
     let rejected = file.runs.iter().filter_map(|run| run.reason.as_ref().map(|reason| (run_name(run), reason)));
@@ -90,13 +94,75 @@ pub(crate) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time:
     if !points.is_empty() {
         page.add(Text { paragraphs: Vec::new(), points });
     }
+    if let Some(shown) = last_shown(file) {
+        page.add(Heading::new("What the last log shows"));
+        page.add(shown);
+    }
     page.add(Heading::new("Tracking"));
     tracking(&mut page, file, traces);
     page.add(Heading::new("Parameters"));
+    if !file.base_parameters.is_empty() {
+        page.add(found(file));
+    }
     parameters(&mut page, file);
     page.add(Heading::new("Time"));
     page.add(spent(file, time));
     Ok(page.html()?)
+}
+
+/// What stands between the iteration and success, with what would help.
+fn unmet(file: &IterationsFile) -> Text {
+    let point =
+        |unmet: &UnmetCondition| (Tone::Warning, format!("{}. What would help: {}.", unmet.message, unmet.remedy));
+    Text { paragraphs: Vec::new(), points: file.unmet.iter().map(point).collect() }
+}
+
+/// Joint by joint what the verdict rests on, of the last run whose log shows it.
+fn last_shown(file: &IterationsFile) -> Option<Table> {
+    let run = file.runs.iter().rfind(|run| run.evidence.is_some())?;
+    let optional = |value: Option<String>| Cell::from(value.unwrap_or_else(|| "–".to_owned()));
+    let columns = [
+        "joint",
+        "tracking error, rad (m)",
+        "its floor",
+        "at the torque limit",
+        "torque after motion, ms",
+        "predicted inside the 95 % band",
+    ];
+    let mut table = Table::new(format!("Run {}", run_name(run)), columns).note(
+        "floor: what noise, friction and delay explain, looked for where tracking is beyond the tolerance; predicted: by the model of the good runs before it",
+    );
+    for (joint, (name, shown)) in file.joints.iter().zip(&run.evidence.as_ref()?.joints).enumerate() {
+        let lag = run.torque_lags.get(joint).copied().flatten();
+        table = table.rows([vec![
+            Cell::from(name),
+            Cell::from(short(run.max_tracking_error_rad[joint], 3)),
+            optional(shown.tracking_floor_rad.map(|floor| short(floor, 3))),
+            optional(shown.clipping.map(|clipping| format!("{} %", short(100.0 * clipping.share, 3)))),
+            optional(lag.map(|lag| format!("{:.2} ± {:.2}", 1e3 * lag.lag_s, 1e3 * lag.half_width_95_s))),
+            optional(shown.prediction.map(|prediction| format!("{} %", short(100.0 * prediction.inside, 3)))),
+        ]]);
+    }
+    Some(table)
+}
+
+/// The base parameters by all good runs together.
+fn found(file: &IterationsFile) -> Table {
+    let columns = ["parameter", "what it sums", "unit", "value", "± (95 %)", "of the consistent robot"];
+    let mut table = Table::new("The robot found, by all good runs together", columns)
+        .note("result.json has all of it with the bodies and friction, identification.html the torques; controller.json is the controller with this robot as its model");
+    for one in &file.base_parameters {
+        let bar = if one.excited { short(one.bar_95(), 3) } else { "not excited".to_owned() };
+        table = table.rows([vec![
+            Cell::from(&one.symbol),
+            Cell::from(&one.expression),
+            Cell::from(unit(&one.unit)),
+            Cell::from(short(one.value, 5)),
+            Cell::from(bar),
+            Cell::from(one.physical.map_or_else(|| "–".to_owned(), |value| short(value, 5))),
+        ]]);
+    }
+    table
 }
 
 fn is_known(file: &IterationsFile) -> bool {

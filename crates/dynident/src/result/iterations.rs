@@ -1,10 +1,18 @@
 //! What `iterations.json` holds.
 
+use super::identification::BaseParameterResult;
 use super::provenance::Provenance;
+use crate::error::Error;
+use dynident_identification::examination::TorqueLag;
+use dynident_iteration::{RunEvidence, Shortfall};
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// Schema of `iterations.json`.
 pub const ITERATIONS_SCHEMA: &str = "dynident/iterations/1";
+
+/// The status of an iteration that a stop ended.
+pub const INTERRUPTED: &str = "interrupted";
 
 /// `iterations.json`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -17,12 +25,16 @@ pub struct IterationsFile {
     /// Where it comes from; none in files of before it was written.
     #[serde(default)]
     pub provenance: Option<Provenance>,
-    /// Whether tracking and parameters have settled.
+    /// Whether everything is met that makes a success: see `unmet`.
     pub converged: bool,
-    /// `converged`, `runs-used-up`, `refused` or `waiting`.
+    /// `converged`, `settled` (nothing changes any more, but something is unmet), `runs-used-up`, `refused`, `waiting`
+    /// or `interrupted`.
     pub status: String,
     /// The status in words.
     pub reason: String,
+    /// What is not met after the last run; empty if the iteration has converged, and in files of before it was written.
+    #[serde(default)]
+    pub unmet: Vec<UnmetCondition>,
     /// Names of the joints.
     pub joints: Vec<String>,
     /// Length of each run, s; of legs one after another, of all of them once.
@@ -32,14 +44,65 @@ pub struct IterationsFile {
     /// Largest tracking error (mean over the joints) of the first good run over that of the last; none before there are
     /// two.
     pub tracking_improvement: Option<f64>,
-    /// Root mean square over the parameters of the last good estimate's error in units of the Cramér-Rao bound; for
-    /// simulated robots with torque noise.
+    /// Root mean square over the parameters of the error of what the last good run says alone, in units of the
+    /// Cramér-Rao bound; for simulated robots with torque noise.
     pub error_over_bound: Option<f64>,
     /// The Cramér-Rao bound of every parameter for one run: white torque noise of the simulated sensors at every
     /// recorded sample, exact positions.
     pub bound: Option<Vec<f64>>,
+    /// The base parameters by all good runs together, as in `result.json`; empty while runs are still being made.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub base_parameters: Vec<BaseParameterResult>,
+    /// Why there is no `result.json` although a run was good; none where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub no_result: Option<String>,
     /// All parameters of the last good physically consistent set: ten for each body, one for each term.
     pub possible_parameters: Option<Vec<f64>>,
+}
+
+impl IterationsFile {
+    /// Reads what an iteration has written so far.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is none of this version.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let bytes = std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
+        let wrong = |message: String| Error::Result { path: path.to_owned(), message };
+        let file: Self =
+            serde_json::from_slice(&bytes).map_err(|error| wrong(format!("not what `iterate` writes: {error}")))?;
+        if file.schema != ITERATIONS_SCHEMA {
+            return Err(wrong(format!(
+                "schema `{}`, not `{ITERATIONS_SCHEMA}`: iterate again with this version",
+                file.schema
+            )));
+        }
+        Ok(file)
+    }
+
+    /// The state in one line: how it stands, runs, tracking, what is unmet.
+    pub fn status_line(&self) -> String {
+        let good = self.runs.iter().filter(|run| run.accepted).count();
+        let last = self.runs.iter().rfind(|run| run.accepted);
+        let tracking = last.map_or_else(String::new, |last| {
+            let worst = last.max_tracking_error_rad.iter().fold(0.0_f64, |most, error| most.max(*error));
+            format!("; tracking {worst:.2e} rad (m)")
+        });
+        let unmet = if self.converged { String::new() } else { format!("; {} unmet", self.unmet.len()) };
+        format!("{}: {}; {good} good of {} runs{tracking}{unmet}", self.name, self.reason, self.runs.len())
+    }
+}
+
+/// Something that stands between an iteration and success.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct UnmetCondition {
+    /// What it is, with its numbers.
+    #[serde(flatten)]
+    pub shortfall: Shortfall,
+    /// The same in words.
+    pub message: String,
+    /// What would help.
+    pub remedy: String,
 }
 
 /// One run.
@@ -69,8 +132,25 @@ pub struct IterationRun {
     pub reason: Option<String>,
     /// For each joint the largest distance from the trajectory, rad (m).
     pub max_tracking_error_rad: Vec<f64>,
-    /// What it determines.
+    /// What it determines by itself.
     pub parameters: Vec<IterationParameter>,
+    /// What all good runs up to this one determine together; empty for the first, for those that do not count, and
+    /// where runs are not pooled.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pooled: Vec<IterationParameter>,
+    /// What its log shows beside parameters, joint by joint; none where it did not get to its end.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub evidence: Option<RunEvidence>,
+    /// By how much each joint's torque comes after the motion, by this run alone; empty where windows leave rows out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub torque_lags: Vec<Option<TorqueLag>>,
+}
+
+impl IterationRun {
+    /// What is known after it: by all good runs together, or else by it alone.
+    pub fn known(&self) -> &[IterationParameter] {
+        if self.pooled.is_empty() { &self.parameters } else { &self.pooled }
+    }
 }
 
 /// One base parameter by one run.

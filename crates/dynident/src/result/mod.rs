@@ -27,7 +27,9 @@ pub use identification::{
 pub use inspection::{
     AuditEntry, BaseSummary, BodySummary, CorrectionEntry, INSPECTION_SCHEMA, Inspection, JointSummary, SlipEntry,
 };
-pub use iterations::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile};
+pub use iterations::{
+    INTERRUPTED, ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, UnmetCondition,
+};
 pub use provenance::{InputFile, Provenance};
 pub use simulation::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};
 // What the files hold of the crates below.

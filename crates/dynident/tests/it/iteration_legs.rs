@@ -16,7 +16,8 @@ fn options() -> RunOptions<'static> {
 }
 
 fn iterated(study: &Study, path: &Path, out: &Path) -> Result<IterationsFile, Error> {
-    let mut watch = IterationWatch { design: &|_| ControlFlow::Continue(()), run: &mut |_, _| {} };
+    let mut hear = |_: &_, _: &[_]| {};
+    let mut watch = IterationWatch::new(&|_| ControlFlow::Continue(()), &mut hear);
     iterate_study(study, path, out, true, &options(), &mut watch)
 }
 
@@ -53,7 +54,7 @@ fn by_library(study: &Study, path: &Path) -> Vec<Vec<RunRecord>> {
         let legs = vec![Leg::windowed(reference, windows).unwrap()];
         let task = IterationTask { robot, legs, known: known.clone(), torque_limits: None };
         let mut settings = IterationSettings {
-            model_free: section.model_free.clone(),
+            model_free: section.model_free.clone().unwrap(),
             controller: study.controller.clone().unwrap(),
             max_runs: section.max_runs,
             ..IterationSettings::default()
@@ -65,7 +66,7 @@ fn by_library(study: &Study, path: &Path) -> Vec<Vec<RunRecord>> {
         let mut robot = SimulatedRobot::new(plant, LoopSettings { integrator, ..LoopSettings::default() }).unwrap();
         let iteration = Iteration::new(task, settings).unwrap();
         let outcome = iterate(&iteration, &mut [&mut robot as &mut dyn Robot], None, &mut |_, _| {}).unwrap();
-        let estimate = outcome.runs.last().unwrap().estimate.clone().unwrap();
+        let estimate = outcome.runs.last().unwrap().knowledge().cloned().unwrap();
         for (column, value) in estimate.values.iter().enumerate() {
             if !estimate.fixed.contains(&column) && known.iter().all(|(other, _)| *other != column) {
                 known.push((column, *value));
@@ -95,9 +96,9 @@ fn legs_one_after_another_are_the_librarys() {
         assert_eq!(run.max_tracking_error_rad, record.max_tracking_error_rad);
     }
     // All six parameters in the end, those of joint 2 with the error bars that its own leg gave them.
-    let last = &file.runs[file.runs.len() - 1].parameters;
+    let last = file.runs[file.runs.len() - 1].known();
     let of_first = file.runs.iter().rfind(|run| run.leg == Some(1)).unwrap();
-    for (parameter, before) in last.iter().zip(&of_first.parameters) {
+    for (parameter, before) in last.iter().zip(of_first.known()) {
         assert!(parameter.error.unwrap().abs() < 1e-6, "{parameter:?}");
         assert!(parameter.std.is_some() && (before.std.is_none() || parameter.std == before.std));
     }

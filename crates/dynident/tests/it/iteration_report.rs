@@ -2,7 +2,7 @@
 use crate::common::{assert_reads_back, repository};
 use core::fmt::Write;
 use core::ops::ControlFlow;
-use dynident::{IterationWatch, IterationsFile, RunOptions, Silent, Study, iterate_study};
+use dynident::{IterationWatch, IterationsFile, ResultFile, RunOptions, Silent, Study, iterate_study, validate};
 use std::path::Path;
 
 const NAME: &str = "elbow</script><b>&quot;";
@@ -52,7 +52,8 @@ fn iterated(folder: &Path, more: &str) -> (IterationsFile, String) {
     let path = folder.join("study.toml");
     let study = Study::load(&path).unwrap();
     let options = RunOptions { data: None, threads: 1, progress: &Silent };
-    let mut watch = IterationWatch { design: &|_| ControlFlow::Continue(()), run: &mut |_, _| {} };
+    let mut hear = |_: &_, _: &[_]| {};
+    let mut watch = IterationWatch::new(&|_| ControlFlow::Continue(()), &mut hear);
     let out = folder.join("out");
     let file = iterate_study(&study, &path, &out, true, &options, &mut watch).unwrap();
     assert_reads_back(&file);
@@ -98,4 +99,62 @@ fn a_refused_iteration_says_why_run_by_run() {
     assert_eq!(file.status, "refused");
     assert_eq!(page.matches("run 1: stopped").count(), 1);
     assert!(page.contains("No run determines the parameters") && page.contains("rejected") && page.contains("stiffer"));
+}
+
+/// An iteration ends with the robot that all good runs tell, as `identify` writes one, and `validate` takes it.
+#[test]
+fn an_iteration_ends_with_the_robot_it_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings =
+        "[iteration]\ntrajectory = \"motion.csv\"\nmodel_free = { kind = \"joint-pd\", kp = 20.0, kd = 4.0 }";
+    let (file, page) = iterated(folder.path(), settings);
+    let out = folder.path().join("out");
+    assert_eq!((file.converged, file.unmet.len(), &file.no_result), (true, 0, &None), "{}", file.reason);
+    assert!(file.status_line().contains("converged") && !file.status_line().contains('\n'));
+    let result = ResultFile::read(&out.join("result.json")).unwrap();
+    assert!(result.problems.is_empty(), "{:?}", result.problems);
+    let good: Vec<String> = file.runs.iter().filter(|run| run.accepted).map(|run| format!("run {}", run.run)).collect();
+    assert_eq!(result.training.logs, good);
+    // The same numbers as the last run's pooled ones, with their names on the page.
+    let last = file.runs.last().unwrap();
+    assert_eq!(result.base_parameters.len(), last.pooled.len());
+    for (one, pooled) in result.base_parameters.iter().zip(&last.pooled) {
+        assert_eq!((one.value, Some(one.std), &one.symbol), (pooled.value, pooled.std, &pooled.symbol));
+        assert!(page.contains(&one.symbol), "{}", one.symbol);
+    }
+    let urdf = std::fs::read_to_string(out.join("identified.urdf")).unwrap();
+    assert!(urdf.contains(&result.provenance.as_ref().unwrap().identity));
+    let text = std::fs::read(out.join("controller.json")).unwrap();
+    let controller: serde_json::Value = serde_json::from_slice(&text).unwrap();
+    // The controller's model is the robot of the result.
+    let mass = &controller["model"]["joints"][0]["inertial"][0];
+    assert!((mass.as_f64().unwrap() - result.bodies[0].mass_kg).abs() < 1e-12);
+    assert!(std::fs::read_to_string(out.join("identification.html")).unwrap().contains("</html>"));
+    // A log of the iteration as any log.
+    let study = folder.path().join("test.toml");
+    let text = std::fs::read_to_string(folder.path().join("study.toml")).unwrap();
+    let (head, _) = text.split_once("[iteration]").unwrap();
+    let log = r#"
+        [format]
+        time = { column = "t_s" }
+        position = { columns = "q{1..2}" }
+        torque = { columns = "tau{1..2}" }
+        [[log]]
+        file = "out/runs/run_2/log.csv"
+        "#;
+    std::fs::write(&study, format!("{head}\n[parallel_filter]\ncutoff_hz = 5.0\nfactor = 20\n{log}")).unwrap();
+    let options = RunOptions { data: None, threads: 1, progress: &Silent };
+    let tested = validate(&out.join("result.json"), &Study::load(&study).unwrap(), &study, &options).unwrap();
+    let percent = tested.validation[0].model.relative_error_percent.unwrap();
+    assert!(percent < 1.0, "{percent}");
+    // A fresh start that goes nowhere leaves no robot of an earlier one behind.
+    write(folder.path(), &format!("limits = {{ tracking_error = 1e-3 }}\n{}", settings.replace("20.0", "1.0")));
+    let path = folder.path().join("study.toml");
+    let mut hear = |_: &_, _: &[_]| {};
+    let mut watch = IterationWatch::new(&|_| ControlFlow::Continue(()), &mut hear);
+    let refused = iterate_study(&Study::load(&path).unwrap(), &path, &out, false, &options, &mut watch).unwrap();
+    assert_eq!(refused.status, "refused");
+    for name in ["result.json", "identified.urdf", "controller.json", "identification.html"] {
+        assert!(!out.join(name).exists(), "{name}");
+    }
 }

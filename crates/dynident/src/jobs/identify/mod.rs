@@ -142,10 +142,33 @@ fn identified(
     timings.total = start.elapsed().as_secs_f64();
     timings.made_at = now();
 
-    // What is written.
+    let made = Made { timings, provenance, is_payload: arm.is_some() };
+    written((study, study_path), &robot, &task, found, made)
+}
+
+/// How an identification was made.
+pub(in crate::jobs) struct Made {
+    pub(in crate::jobs) timings: Timings,
+    pub(in crate::jobs) provenance: Provenance,
+    /// Whether payloads on a known arm were looked for.
+    pub(in crate::jobs) is_payload: bool,
+}
+
+/// What is written of an identification.
+///
+/// # Errors
+/// Rows that the estimate does not belong to.
+pub(in crate::jobs) fn written(
+    (study, study_path): (&Study, &Path),
+    robot: &StudyRobot,
+    task: &IdentificationTask,
+    found: Identification,
+    Made { timings, provenance, is_payload }: Made,
+) -> Result<IdentificationOutcome, Error> {
+    let in_study = Error::identification::<IdentificationError>(study_path);
     let inertials = found.inertials();
     let verdict = physical_verdict(study, &found, &inertials);
-    let (files, no_urdf) = match exported_model(&robot, &task, &found, &verdict, arm.is_some()) {
+    let (files, no_urdf) = match exported_model(robot, task, &found, &verdict, is_payload) {
         Ok(files) => (Some(files.with_provenance(&provenance)), None),
         Err(reason) => (None, Some(reason)),
     };
@@ -160,7 +183,7 @@ fn identified(
         inertials: &inertials,
         training,
     };
-    let mut result = result_file(study, &robot, &task, &found, parts);
+    let mut result = result_file(study, robot, task, &found, parts);
     result.problems = result.found_problems();
     let folder = study_path.parent().unwrap_or(Path::new(""));
     result.robot.file = seen_from(folder, &robot.robot.path);

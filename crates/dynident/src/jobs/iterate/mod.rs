@@ -2,6 +2,7 @@
 
 mod bound;
 mod legs;
+mod model;
 mod report;
 mod trajectory;
 
@@ -14,14 +15,16 @@ use crate::output::write_whole;
 use crate::output_set::OutputSet;
 use crate::pages::iteration::{RunName, RunTrace, TimeSpent, iteration_report};
 use crate::result::IterationsFile;
-use crate::study::{Folders, PriorChoice, RobotChoice, Study, StudyRobot};
+use crate::study::{Folders, PriorChoice, RobotChoice, SimulationSection, Study, StudyRobot};
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
 use dynident_iteration::{
-    Iteration, IterationError, IterationStatus, IterationStore, IterationTask, RunRecord, iterate,
+    Iteration, IterationError, IterationStatus, IterationStore, IterationTask, Leg, NextMotion, RunRecord, StopSignal,
+    Supervisor, iterate_supervised,
 };
 use dynident_iteration::{Robot, RobotRun};
 use fnv::FnvHasher;
+use model::{EndedStage, MODEL_FILES, RobotFiles, robot_found};
 use report::{IterationReport, Stage, joined};
 use std::hash::Hasher;
 use std::path::Path;
@@ -33,6 +36,45 @@ pub struct IterationWatch<'a> {
     pub design: &'a (dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
     /// Every new run.
     pub run: &'a mut dyn FnMut(&RunRecord, &[RobotRun]),
+    /// Who asks for a stop: the robot is stopped, what was recorded is kept, and no further run is commanded.
+    pub stop: StopSignal,
+    /// Whether a motion of a robot outside may be commanded, asked before each; without it all may.
+    pub allow: Option<&'a mut dyn FnMut(&NextMotion) -> bool>,
+}
+
+impl<'a> IterationWatch<'a> {
+    /// Hears only; nobody stops it, and every motion may be commanded.
+    pub fn new(
+        design: &'a (dyn Fn(&DesignProgress) -> ControlFlow<()> + Sync),
+        run: &'a mut dyn FnMut(&RunRecord, &[RobotRun]),
+    ) -> Self {
+        Self { design, run, stop: StopSignal::default(), allow: None }
+    }
+}
+
+/// Hears of a stage's runs, and asks for permission.
+struct Watched<'a, 'b> {
+    stop: &'a StopSignal,
+    allow: &'a mut Option<&'b mut dyn FnMut(&NextMotion) -> bool>,
+    made: &'a mut dyn FnMut(&RunRecord, &[RobotRun]),
+}
+
+impl Supervisor for Watched<'_, '_> {
+    fn stop(&self) -> Option<&StopSignal> {
+        Some(self.stop)
+    }
+
+    fn asks(&self) -> bool {
+        self.allow.is_some()
+    }
+
+    fn allows(&mut self, motion: &NextMotion) -> bool {
+        self.allow.as_mut().is_none_or(|allow| allow(motion))
+    }
+
+    fn made(&mut self, record: &RunRecord, runs: &[RobotRun]) {
+        (self.made)(record, runs);
+    }
 }
 
 /// Iterates a study's robot. What is found stands in `out`: `trajectory.json` (the trajectories at the controller's
@@ -70,6 +112,7 @@ pub fn iterate_study(
         _ => None,
     };
     section.check_legs(&robot).map_err(in_section)?;
+    section.check_gains(study, &robot).map_err(in_section)?;
 
     // What an earlier call has left in the folder.
     let fingerprint = fingerprint(study, &robot, options);
@@ -78,15 +121,24 @@ pub fn iterate_study(
     let folder = |stage: usize| if one { out.to_owned() } else { out.join(format!("leg_{}", stage + 1)) };
     // What an earlier call found goes before its runs do.
     if !resume {
-        OutputSet::new(out).absent(ITERATIONS).absent(PAGE).absent(TRAJECTORY).write()?;
+        let set = OutputSet::new(out).absent(ITERATIONS).absent(PAGE).absent(TRAJECTORY);
+        MODEL_FILES.into_iter().fold(set, OutputSet::absent).write()?;
     }
     // All of them first: with --fresh no run of an earlier call may be left in any.
     let stores = (0..stages.len())
         .map(|stage| IterationStore::open(&folder(stage), &fingerprint, resume))
         .collect::<Result<Vec<_>, _>>()
         .map_err(in_iteration)?;
-    let rate_hz = simulation.rate_hz;
-    let make = || legs::trajectories(study, study_path, &robot, rate_hz, options, watch.design);
+    let rate_hz = section.rate_hz.unwrap_or(simulation.rate_hz);
+    let stop = watch.stop.clone();
+    let make = || {
+        let found = legs::trajectories(study, study_path, &robot, rate_hz, options, watch.design)?;
+        // A search that was cut short would be this folder's trajectory for ever.
+        if stop.is_requested() {
+            return Err(Error::Interrupted { what: "the search for the trajectory" });
+        }
+        Ok(found)
+    };
     let trajectories = kept(&out.join(TRAJECTORY), &fingerprint, resume, make)?;
 
     // What is believed of the robot, what it runs, and what the file says of it.
@@ -98,8 +150,9 @@ pub fn iterate_study(
         }
     };
     let legs = section.legs(&trajectories, &robot).map_err(in_section)?;
-    let efforts = robot.model().joints().iter().map(|joint| joint.limits.effort.unwrap_or(f64::INFINITY)).collect();
-    let torque_limits: Option<Vec<f64>> = simulation.effort_limits.then_some(efforts);
+    let references: Vec<_> = legs.iter().map(Leg::reference).collect();
+    let settings = section.guarded(settings, study, &robot, &references).map_err(in_section)?;
+    let torque_limits = torque_limits(&simulation, &robot, truth.is_some());
     let simulated = truth.is_some();
     let report = IterationReport {
         study,
@@ -115,7 +168,7 @@ pub fn iterate_study(
     // The stages, each with what those before it have found held.
     let mut known_std: Vec<Option<f64>> = vec![None; robot.layout().columns().len()];
     let mut known: Vec<(usize, f64)> = Vec::new();
-    let (mut files, mut traces, mut made) = (Vec::new(), Vec::new(), 0);
+    let (mut files, mut traces, mut made, mut ended) = (Vec::new(), Vec::new(), 0, Vec::new());
     for (number, members) in stages.iter().enumerate() {
         let own: Vec<_> = members.iter().map(|&leg| legs[leg].clone()).collect();
         let task = IterationTask {
@@ -133,38 +186,48 @@ pub fn iterate_study(
         let mut unwritten = None;
         let run = &mut *watch.run;
         // The runs; the file is written after each.
-        let outcome = iterate(&iteration, &mut robots, Some(&stores[number]), &mut |record, runs| {
+        let mut made_one = |record: &RunRecord, runs: &[RobotRun]| {
             so_far.push(record.clone());
             let status = IterationStatus::Waiting { reason: "for the next run".to_owned() };
             unwritten = match iteration.robot(&so_far) {
                 Ok(robot) => {
                     let (robot, records) = (&*robot, &so_far[..]);
-                    let now = report.file(&Stage { leg, robot, records, status: &status, known_std: &known_std });
+                    let stage = Stage { leg, robot, records, status: &status, shortfalls: &[], known_std: &known_std };
+                    let now = report.file(&stage);
                     let all: Vec<IterationsFile> = files.iter().cloned().chain([now]).collect();
-                    joined(all).and_then(|file| write_set(out, &file, None).err())
+                    joined(all).and_then(|file| write_set(out, &file, None, RobotFiles::none()).err())
                 }
                 Err(error) => Some(in_iteration(error)),
             };
             run(record, runs);
-        });
+        };
+        let mut watched = Watched { stop: &watch.stop, allow: &mut watch.allow, made: &mut made_one };
+        let outcome = iterate_supervised(&iteration, &mut robots, Some(&stores[number]), &mut watched);
         let outcome = outcome.map_err(in_iteration)?;
         if let Some(error) = unwritten {
             return Err(error);
         }
         // What the stage has found.
         made += outcome.runs.len() - runs_before;
-        let (records, status) = (&outcome.runs[..], &outcome.status);
+        let (records, status, shortfalls) = (&outcome.runs[..], &outcome.status, &outcome.shortfalls[..]);
         let in_force = &iteration.robot(records).map_err(in_iteration)?;
-        files.push(report.file(&Stage { leg, robot: in_force, records, status, known_std: &known_std }));
+        files.push(report.file(&Stage { leg, robot: in_force, records, status, shortfalls, known_std: &known_std }));
         for record in records {
             for (place, own) in iteration.task().legs.iter().enumerate() {
                 let name = RunName { run: record.run, leg: leg.or((members.len() > 1).then_some(place + 1)), place };
                 traces.push(RunTrace::new(name, &stores[number], own.reference(), &robot.parametric.joint_names()));
             }
         }
+        let is_over = match status {
+            IterationStatus::Refused { .. } | IterationStatus::Waiting { .. } | IterationStatus::Interrupted { .. } => {
+                true
+            }
+            IterationStatus::Converged | IterationStatus::Settled | IterationStatus::RunsUsedUp => false,
+        };
+        ended.push(EndedStage { records: outcome.runs.clone(), iteration, store: &stores[number] });
         // What the next one holds.
-        let last = records.iter().rev().find(|record| record.accepted).and_then(|record| record.estimate.as_ref());
-        if matches!(status, IterationStatus::Refused { .. } | IterationStatus::Waiting { .. }) {
+        let last = records.iter().rev().find(|record| record.accepted).and_then(RunRecord::knowledge);
+        if is_over {
             break;
         }
         let Some(last) = last else { break };
@@ -181,20 +244,37 @@ pub fn iterate_study(
     let mut file = joined(files).ok_or_else(|| in_section(StudyError::missing("leg", "there is none")))?;
     file.converged &= file.runs.last().is_some_and(|run| run.leg.is_none_or(|leg| leg == stages.len()));
     let time = TimeSpent { before_runs_s, all_s: begin.elapsed().as_secs_f64(), runs: made };
-    write_set(out, &file, Some(iteration_report(&file, &traces, &time)?))?;
+    // Runs are not lost because their robot cannot be written.
+    let found = robot_found((study, study_path), &robot, &ended, options, in_iteration).unwrap_or_else(|why| {
+        file.no_result = Some(why.to_string());
+        RobotFiles::none()
+    });
+    file.base_parameters.clone_from(&found.base_parameters);
+    write_set(out, &file, Some(iteration_report(&file, &traces, &time)?), found)?;
     Ok(file)
 }
 
-/// The file and its page; while runs are still being made there is no page, and none of an earlier call.
-fn write_set(out: &Path, file: &IterationsFile, page: Option<String>) -> Result<(), Error> {
+/// The file, its page and the robot that was found; while runs are still being made there is no page and no robot, and
+/// none of an earlier call.
+fn write_set(out: &Path, file: &IterationsFile, page: Option<String>, found: RobotFiles) -> Result<(), Error> {
     let bytes = serde_json::to_vec_pretty(file)
         .map_err(|error| Error::Result { path: out.join(ITERATIONS), message: error.to_string() })?;
-    let set = OutputSet::new(out).file(ITERATIONS, bytes);
+    let set = found.added_to(OutputSet::new(out).file(ITERATIONS, bytes));
     match page {
         Some(page) => set.file(PAGE, page),
         None => set.absent(PAGE),
     }
     .write()
+}
+
+/// What each drive gives at most: of a simulated robot the stated limits, or else the description's.
+fn torque_limits(simulation: &SimulationSection, robot: &StudyRobot, simulated: bool) -> Option<Vec<f64>> {
+    let dof = robot.model().dof();
+    if let Some(stated) = simulation.limits.torque.as_ref().filter(|_| simulated) {
+        return Some((0..dof).map(|joint| stated.of(joint)).collect());
+    }
+    let efforts = robot.model().joints().iter().map(|joint| joint.limits.effort.unwrap_or(f64::INFINITY));
+    simulation.effort_limits.then(|| efforts.collect())
 }
 
 /// The files of an iteration as a whole.
@@ -204,6 +284,8 @@ const PAGE: &str = "report.html";
 
 /// Everything that runs depend on, in one number: study, robot, and the version of the program (FNV-1a, 64 bits).
 fn fingerprint(study: &Study, robot: &StudyRobot, options: &RunOptions<'_>) -> String {
+    let mut study = study.clone();
+    study.iteration = study.iteration.map(|section| section.of_runs());
     let text = format!("{study:?} {:?} {:?} {}", robot.model(), options.data, env!("CARGO_PKG_VERSION"));
     let mut hasher = FnvHasher::default();
     hasher.write(text.as_bytes());

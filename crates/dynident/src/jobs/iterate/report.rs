@@ -1,18 +1,19 @@
 //! From records to what `iterations.json` holds.
 
 use crate::jobs::options::study_name;
-use crate::result::{ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, Provenance};
+use crate::result::{
+    INTERRUPTED, ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, Provenance, UnmetCondition,
+};
 use crate::study::{Study, StudyRobot};
 use dynident_dynamics::ParametricModel;
-use dynident_iteration::{IterationStatus, RunEstimate, RunRecord};
+use dynident_iteration::{IterationStatus, RunEstimate, RunRecord, Shortfall};
 use std::path::Path;
 
 /// The newest run before `record` whose robot its controller had.
 fn model_of_run(record: &RunRecord, records: &[RunRecord]) -> Option<usize> {
     let model = record.controller.model.as_ref()?;
     let with_model = |before: &&RunRecord| {
-        before.run < record.run
-            && before.estimate.as_ref().and_then(RunEstimate::for_controller).as_ref() == Some(model)
+        before.run < record.run && before.knowledge().and_then(RunEstimate::for_controller).as_ref() == Some(model)
     };
     records.iter().rfind(with_model).map(|before| before.run)
 }
@@ -39,20 +40,22 @@ pub(super) struct Stage<'a> {
     pub(super) robot: &'a ParametricModel,
     pub(super) records: &'a [RunRecord],
     pub(super) status: &'a IterationStatus,
+    /// What is not met after the last record.
+    pub(super) shortfalls: &'a [Shortfall],
     /// For each base parameter the error bar by an earlier leg, if that determined it.
     pub(super) known_std: &'a [Option<f64>],
 }
 
 impl IterationReport<'_> {
     pub(super) fn file(&self, stage: &Stage<'_>) -> IterationsFile {
-        let Stage { leg, robot, records, status, known_std } = *stage;
+        let Stage { leg, robot, records, status, shortfalls, known_std } = *stage;
         // The truth of a simulated robot is one of the stated terms.
         let stated = robot.terms() == self.robot.terms();
         let (bound, truth) = (self.bound.as_deref().filter(|_| stated), self.truth.as_ref().filter(|_| stated));
         let columns = robot.layout().columns();
         let expressions = robot.base().expressions();
-        let parameters = |record: &RunRecord| {
-            let Some(estimate) = &record.estimate else { return Vec::new() };
+        let parameters = |estimate: Option<&RunEstimate>| {
+            let Some(estimate) = estimate else { return Vec::new() };
             let one = |k: usize| IterationParameter {
                 symbol: columns[k].symbol(),
                 expression: expressions[k].clone(),
@@ -81,7 +84,10 @@ impl IterationReport<'_> {
                 outcome: record.outcome.clone(),
                 reason: record.reason.clone(),
                 max_tracking_error_rad: record.max_tracking_error_rad.clone(),
-                parameters: parameters(record),
+                parameters: parameters(record.estimate.as_ref()),
+                pooled: parameters(record.pooled.as_ref()),
+                evidence: record.evidence.clone(),
+                torque_lags: record.estimate.as_ref().map_or_else(Vec::new, |own| own.torque_lags.clone()),
             })
             .collect();
         let good: Vec<&RunRecord> = records.iter().filter(|record| record.accepted).collect();
@@ -89,8 +95,10 @@ impl IterationReport<'_> {
             [first, .., last] if last.tracking_error() > 0.0 => Some(first.tracking_error() / last.tracking_error()),
             _ => None,
         };
-        let last = good.last().and_then(|record| record.estimate.as_ref());
-        let error_over_bound = last.zip(truth).zip(bound).and_then(|((estimate, truth), bound)| {
+        let last = good.last().and_then(|record| record.knowledge());
+        // The bound is one run's.
+        let own = good.last().and_then(|record| record.estimate.as_ref());
+        let error_over_bound = own.zip(truth).zip(bound).and_then(|((estimate, truth), bound)| {
             let ratios: Vec<f64> = (0..bound.len())
                 .filter(|&k| bound[k] > 0.0 && !estimate.fixed.contains(&k))
                 .map(|k| ((estimate.values[k] - truth[k]) / bound[k]).powi(2))
@@ -104,27 +112,50 @@ impl IterationReport<'_> {
             converged: status.is_converged(),
             status: match status {
                 IterationStatus::Converged => "converged",
+                IterationStatus::Settled => "settled",
                 IterationStatus::RunsUsedUp => "runs-used-up",
                 IterationStatus::Refused { .. } => "refused",
+                IterationStatus::Interrupted { .. } => INTERRUPTED,
                 IterationStatus::Waiting { .. } => "waiting",
             }
             .to_owned(),
-            reason: status.to_string(),
+            reason: in_words(status, shortfalls),
+            unmet: shortfalls.iter().map(unmet).collect(),
             joints: self.robot.parametric.joint_names(),
             duration_s: self.duration_s,
             runs,
             tracking_improvement,
             error_over_bound,
             bound: bound.map(<[f64]>::to_vec),
+            base_parameters: Vec::new(),
+            no_result: None,
             possible_parameters: last.and_then(|estimate| estimate.possible.clone()),
         }
     }
+}
+
+/// The status, with what is not met where that ended it.
+fn in_words(status: &IterationStatus, shortfalls: &[Shortfall]) -> String {
+    match (status, shortfalls) {
+        (IterationStatus::Settled | IterationStatus::RunsUsedUp, [first, rest @ ..]) => {
+            let more = if rest.is_empty() { String::new() } else { format!(" (and {} more)", rest.len()) };
+            format!("{status}; {first}{more}")
+        }
+        _ => status.to_string(),
+    }
+}
+
+fn unmet(shortfall: &Shortfall) -> UnmetCondition {
+    let (message, remedy) = (shortfall.to_string(), shortfall.remedy().to_owned());
+    UnmetCondition { shortfall: shortfall.clone(), message, remedy }
 }
 
 /// Iterations of one leg after another as one: converged if all are, with the verdict of the last.
 pub(super) fn joined(stages: Vec<IterationsFile>) -> Option<IterationsFile> {
     let converged = stages.iter().all(|stage| stage.converged);
     let improvement = stages.iter().filter_map(|stage| stage.tracking_improvement).reduce(f64::min);
+    let unmet =
+        stages.iter().find(|stage| !stage.unmet.is_empty()).map(|stage| stage.unmet.clone()).unwrap_or_default();
     let unsettled =
         stages.iter().find(|stage| !stage.converged).map(|stage| (stage.status.clone(), stage.reason.clone()));
     let mut runs = Vec::new();
@@ -139,5 +170,5 @@ pub(super) fn joined(stages: Vec<IterationsFile>) -> Option<IterationsFile> {
         (true, Some(unsettled)) => unsettled,
         _ => (last.status.clone(), last.reason.clone()),
     };
-    Some(IterationsFile { converged, status, reason, runs, tracking_improvement: improvement, ..last })
+    Some(IterationsFile { converged, status, reason, unmet, runs, tracking_improvement: improvement, ..last })
 }

@@ -1,6 +1,7 @@
 //! `[iteration]`: how a study's robot is run, identified and run again.
 
 mod legs;
+mod safety;
 
 pub use legs::{LegOrder, LegSection};
 
@@ -9,10 +10,12 @@ use super::Study;
 use crate::error::StudyError;
 use dynident_identification::IdentificationSettings;
 use dynident_identification::estimators::Estimator;
-use dynident_iteration::robot::{FolderSettings, ProcessSettings};
-use dynident_iteration::{IterationSettings, RunIdentificationSettings, Scheme, SettledSettings, StartWith};
+use dynident_iteration::robot::{EnvelopeSettings, FolderSettings, ProcessSettings};
+use dynident_iteration::{
+    IterationSettings, RehearsalSettings, RunIdentificationSettings, SafetySettings, Scheme, SettledSettings, StartWith,
+};
 use dynident_recording::{DecimationSettings, DifferentiatorSettings};
-use dynident_simulation::ControllerSettings;
+use dynident_simulation::{ControllerSettings, PerJoint};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -61,6 +64,7 @@ pub enum PriorChoice {
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
+#[allow(clippy::struct_excessive_bools, reason = "keys of a file, each a choice of its own")]
 pub struct IterationSection {
     /// A trajectory to run (`t_s, q1.., dq1.., ddq1..`), in place of the one that `[design]` leads to.
     pub trajectory: Option<PathBuf>,
@@ -74,31 +78,48 @@ pub struct IterationSection {
     pub robot: RobotChoice,
     /// What is believed of the bodies before any run; what the description says by default.
     pub prior: PriorChoice,
-    /// Under what the first run is: `"model-free"` (the default) or `"prior"`.
-    pub start: StartWith,
+    /// Under what the first run is: `"model-free"` (the default; `"prior"` with `bandwidth_hz`) or `"prior"`.
+    pub start: Option<StartWith>,
     /// The controller of a first run with the prior, in place of `[controller]`.
     pub first: Option<ControllerSettings>,
     /// All joints at once, or step by step.
     pub scheme: Scheme,
     /// Every sample of every joint counts, also where a windowed design names windows; false by default.
     pub every_sample: bool,
-    /// The paper's scheme as it stands: no physically consistent set is asked for and nothing is rejected. False by
-    /// default.
+    /// The paper's scheme as it stands: no physically consistent set is asked for, nothing is rejected and runs are not
+    /// pooled. False by default.
     pub literal: bool,
+    /// Whether the model is fitted to all good runs together, each weighted by its own noise; true by default.
+    /// Otherwise to the newest alone.
+    pub pool: bool,
     /// From positions to velocities and accelerations; `deviation` from the trajectory by default.
     pub differentiator: DifferentiatorSettings,
     /// Low-pass and decimation of torque and regressor alike; none by default.
     pub parallel_filter: Option<DecimationSettings>,
     /// Whether recorded torques are held from sample to sample; true by default.
     pub held_torque: bool,
-    /// The controller without a model; joint PD.
-    pub model_free: ControllerSettings,
+    /// The controller without a model; joint PD with 16 and 8 by default, of the simulator only: a robot outside has no
+    /// default gains.
+    pub model_free: Option<ControllerSettings>,
+    /// Gains that are not stated come from the description's inertials, critically damped, with this natural frequency
+    /// of each joint, Hz: for all joints one number, or a list.
+    pub bandwidth_hz: Option<PerJoint>,
+    /// What no sample of a run may leave: a run that does is stopped. Of a robot outside by default the description's
+    /// limits with some room, and a distance from the path of 0.3 rad (0.1 m).
+    pub envelope: EnvelopeSettings,
+    /// How every motion of a robot outside is rehearsed before it is commanded.
+    pub rehearsal: RehearsalSettings,
+    /// Samples a second of the robot's control loop and of what is handed over; `[simulation] rate_hz` (1000) by
+    /// default.
+    pub rate_hz: Option<f64>,
+    /// Shares of its speed at which the motion is run before the first run, as `[0.1, 0.5, 1.0]`; none by default.
+    pub speed_steps: Vec<f64>,
     /// Tracking this many times worse than that of the last good run rejects a run.
     pub worse_factor: f64,
     /// How often a step is halved before the controller without a model comes back.
     pub most_halvings: usize,
-    /// By how much its gains grow each time.
-    pub stiffen: f64,
+    /// By how much its gains grow each time; 2 by default, and 1 (not at all) of a robot outside.
+    pub stiffen: Option<f64>,
     /// Failed runs without a model before the robot counts as one that cannot follow.
     pub most_model_free: usize,
     /// Most runs.
@@ -111,15 +132,13 @@ impl Default for IterationSection {
     fn default() -> Self {
         let IterationSettings {
             identification,
-            start,
             first,
-            model_free,
             worse_factor,
             most_halvings,
-            stiffen,
             most_model_free,
             max_runs,
             settled,
+            pool,
             ..
         } = IterationSettings::default();
         Self {
@@ -128,18 +147,24 @@ impl Default for IterationSection {
             order: LegOrder::default(),
             robot: RobotChoice::default(),
             prior: PriorChoice::default(),
-            start,
+            start: None,
             first,
             scheme: identification.scheme,
             every_sample: false,
             literal: false,
+            pool,
             differentiator: identification.differentiator,
             parallel_filter: identification.parallel_filter,
             held_torque: identification.held_torque,
-            model_free,
+            model_free: None,
+            bandwidth_hz: None,
+            envelope: EnvelopeSettings::default(),
+            rehearsal: RehearsalSettings::default(),
+            speed_steps: Vec::new(),
+            rate_hz: None,
             worse_factor,
             most_halvings,
-            stiffen,
+            stiffen: None,
             most_model_free,
             max_runs,
             settled,
@@ -190,17 +215,20 @@ impl IterationSection {
                 consistency: consistency.filter(|_| !self.literal),
                 payloads: study.payloads(),
             },
-            start: self.start,
+            start: self.start.unwrap_or_default(),
             first: self.first.clone(),
-            model_free: self.model_free.clone(),
+            model_free: self.model_free.clone().unwrap_or(default.model_free),
             controller: study.controller.clone().unwrap_or(default.controller),
             reject: !self.literal,
+            pool: self.pool && !self.literal,
             worse_factor: self.worse_factor,
             most_halvings: self.most_halvings,
-            stiffen: self.stiffen,
+            // Nobody's gains are raised who did not ask for it.
+            stiffen: self.stiffen.unwrap_or(if self.is_outside() { 1.0 } else { default.stiffen }),
             most_model_free: self.most_model_free,
             max_runs: self.max_runs,
             settled: self.settled.clone(),
+            safety: SafetySettings::default(),
         })
     }
 }

@@ -1,0 +1,204 @@
+//! `iterate` with a robot outside, from outside: permission, Ctrl-C, and what is left running. The robot is a shell
+//! script that speaks the line protocol.
+#![cfg(unix)]
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+
+/// Says hello, sends one sample of each run, marks its place, and does then what `rest` says.
+fn robot(folder: &Path, rest: &str) -> PathBuf {
+    let script = folder.join("robot.sh");
+    let text = format!(
+        r#"printf '%s\n' '{{"type":"hello","protocol":"dynident-robot/1","name":"script","joints":["joint1","joint2"],"modes":["run"]}}'
+while read -r line; do
+    case "$line" in
+    *'"type":"run"'*)
+        printf '%s\n' '{{"type":"sample","t_s":0.0,"q":[0.0,0.0],"tau":[0.0,0.0]}}'
+        {rest}
+        ;;
+    *'"type":"bye"'*) exit 0 ;;
+    esac
+done
+"#
+    );
+    std::fs::write(&script, text).unwrap();
+    script
+}
+
+/// A study of the planar arm with that robot, at rest for a second.
+fn study(folder: &Path, further: &str) -> PathBuf {
+    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/planar2r.urdf");
+    let mut rows = vec!["t_s,q1,q2,dq1,dq2,ddq1,ddq2".to_owned()];
+    rows.extend((0..101).map(|k| format!("{},0,0,0,0,0,0", f64::from(k) * 0.01)));
+    std::fs::write(folder.join("still.csv"), rows.join("\n") + "\n").unwrap();
+    let script = folder.join("robot.sh");
+    let text = format!(
+        "[robot]\nfile = \"{urdf}\"\n[simulation]\nrate_hz = 1000.0\n[controller]\nkind = \"joint-pd\"\nkp = [200.0, 60.0]\nkd = [10.0, 1.0]\n\
+         [iteration]\ntrajectory = \"still.csv\"\nmodel_free = {{ kind = \"joint-pd\", kp = [200.0, 60.0], kd = [10.0, 1.0] }}\n\
+         robot = {{ kind = \"process\", command = [\"sh\", \"{script}\", \"{folder}\"]{further} }}\n",
+        urdf = urdf.display(),
+        script = script.display(),
+        folder = folder.display()
+    );
+    let path = folder.join("study.toml");
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+fn iterate(study: &Path, further: &[&str]) -> Child {
+    let out = study.with_file_name("result");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dynident"));
+    command.arg("iterate").arg(study).arg("--out").arg(out).args(further);
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// Waits for a file, as long as the program lives.
+fn awaited(file: &Path, program: &mut Child) {
+    while !file.exists() {
+        assert!(program.try_wait().unwrap().is_none(), "it ended before {}", file.display());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+fn interrupt(program: &Child) {
+    assert!(Command::new("kill").args(["-INT", &program.id().to_string()]).status().unwrap().success());
+}
+
+fn said(output: &Output) -> String {
+    format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
+}
+
+/// Whether a process by the number in the file runs.
+fn runs(file: &Path) -> bool {
+    let id = std::fs::read_to_string(file).unwrap();
+    let state = Command::new("ps").args(["-o", "stat=", "-p", id.trim()]).output().unwrap();
+    let state = String::from_utf8_lossy(&state.stdout).trim().to_owned();
+    !state.is_empty() && !state.starts_with('Z')
+}
+
+/// Ctrl-C in the middle of a run: the robot hears a stop, what was recorded is kept, the exit status is that of an
+/// interruption, the words say how to go on, and no further run is commanded.
+#[test]
+fn an_interrupted_run_stops_the_robot() {
+    let folder = tempfile::tempdir().unwrap();
+    let rest = r#"printf '%s' "$$" >"$1/pid"; mv "$1/pid" "$1/begun"; read -r stop; printf '%s\n' "$stop" >>"$1/heard"
+        printf '%s\n' '{"type":"end","status":"stopped","reason":"as asked"}'"#;
+    robot(folder.path(), rest);
+    let study = study(folder.path(), "");
+    let mut program = iterate(&study, &["--allow-command"]);
+    awaited(&folder.path().join("begun"), &mut program);
+    interrupt(&program);
+    let output = program.wait_with_output().unwrap();
+    let said = said(&output);
+    assert_eq!(output.status.code(), Some(130), "{said}");
+    assert!(said.contains("interrupted") && said.contains("goes on with run 1"), "{said}");
+    let heard = std::fs::read_to_string(folder.path().join("heard")).unwrap();
+    assert!(heard.lines().count() == 1 && heard.contains(r#""type":"stop""#), "{heard}");
+    let result = folder.path().join("result");
+    assert_eq!(std::fs::read_to_string(result.join("runs/interrupted_1/log.csv")).unwrap().lines().count(), 2);
+    assert!(!result.join("runs/run_1").exists());
+    let file: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(result.join("iterations.json")).unwrap()).unwrap();
+    assert_eq!((&file["status"], &file["converged"]), (&"interrupted".into(), &false.into()));
+    assert!(!runs(&folder.path().join("begun")));
+}
+
+/// A robot that hears nothing: the second Ctrl-C ends everything, its children too.
+#[test]
+fn a_second_interruption_kills_the_robot() {
+    let folder = tempfile::tempdir().unwrap();
+    let rest = r#"sleep 3600 & printf '%s' "$!" >"$1/pid"; mv "$1/pid" "$1/begun"; wait"#;
+    robot(folder.path(), rest);
+    let study = study(folder.path(), ", limits = { stop_s = 3000.0 }");
+    let mut program = iterate(&study, &["--allow-command"]);
+    let begun = folder.path().join("begun");
+    awaited(&begun, &mut program);
+    interrupt(&program);
+    // Both presses are to be seen: signals that wait are one.
+    while program.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(200));
+        interrupt(&program);
+    }
+    assert_eq!(program.wait_with_output().unwrap().status.code(), Some(130));
+    assert!(!runs(&begun));
+}
+
+/// Whose study it is may be somebody else: without permission nothing is started, and the words say what would be.
+#[test]
+fn a_studys_command_needs_permission() {
+    let folder = tempfile::tempdir().unwrap();
+    robot(folder.path(), r#"touch "$1/begun""#);
+    let output = iterate(&study(folder.path(), ""), &[]).wait_with_output().unwrap();
+    let said = said(&output);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("robot.sh") && said.contains("--allow-command"), "{said}");
+    assert!(!folder.path().join("begun").exists());
+    let output = iterate(&study(folder.path(), ""), &["--allow-command", "--confirm"]).wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(!folder.path().join("begun").exists());
+}
+
+/// Ctrl-C while the trajectory is looked for ends the command: a search cut short is nobody's trajectory for ever.
+#[test]
+fn an_interrupted_search_keeps_no_trajectory() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let text = std::fs::read_to_string(root.join("examples/iterate_ur10.toml")).unwrap();
+    let urdf = root.join("robots/ur10.urdf");
+    let text = text.replace("../robots/ur10.urdf", urdf.to_str().unwrap()).replace("starts = 2", "starts = 500");
+    let study = folder.path().join("study.toml");
+    std::fs::write(&study, text).unwrap();
+    let mut program = iterate(&study, &[]);
+    let result = folder.path().join("result");
+    awaited(&result.join("runs"), &mut program);
+    interrupt(&program);
+    let output = program.wait_with_output().unwrap();
+    let said = said(&output);
+    assert_eq!(output.status.code(), Some(130), "{said}");
+    assert!(said.contains("interrupted") && !result.join("trajectory.json").exists(), "{said}");
+}
+
+/// Nobody's gains are guessed: the words say what to write instead.
+#[test]
+fn a_robot_outside_has_no_default_gains() {
+    let folder = tempfile::tempdir().unwrap();
+    let stopped = r#"touch "$1/begun"; printf '%s\n' '{"type":"end","status":"stopped","reason":"as asked"}'"#;
+    robot(folder.path(), stopped);
+    let study = study(folder.path(), "");
+    let text = std::fs::read_to_string(&study).unwrap();
+    let text = text.replace("[controller]\nkind = \"joint-pd\"\nkp = [200.0, 60.0]\nkd = [10.0, 1.0]\n", "");
+    let text = text.replace("model_free = { kind = \"joint-pd\", kp = [200.0, 60.0], kd = [10.0, 1.0] }\n", "");
+    std::fs::write(&study, &text).unwrap();
+    let output = iterate(&study, &["--allow-command"]).wait_with_output().unwrap();
+    let said = said(&output);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("no default gains") && said.contains("bandwidth_hz"), "{said}");
+    assert!(!folder.path().join("begun").exists());
+    // A bandwidth is enough where the description has inertials.
+    std::fs::write(&study, text.replace("[iteration]\n", "[iteration]\nbandwidth_hz = 2.0\n")).unwrap();
+    let output = iterate(&study, &["--allow-command"]).wait_with_output().unwrap();
+    assert!(folder.path().join("begun").exists(), "{}", self::said(&output));
+}
+
+/// A command that was wrong, a limit that was too short, another envelope: corrected, the folder goes on.
+#[test]
+fn a_corrected_command_is_no_other_iteration() {
+    let folder = tempfile::tempdir().unwrap();
+    let stopped = r#"touch "$1/begun"; printf '%s\n' '{"type":"end","status":"stopped","reason":"protective stop"}'"#;
+    let script = robot(folder.path(), stopped);
+    let study = study(folder.path(), "");
+    let text = std::fs::read_to_string(&study).unwrap();
+    std::fs::write(&study, text.replace("robot.sh", "robto.sh")).unwrap();
+    let output = iterate(&study, &["--allow-command"]).wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert!(!folder.path().join("begun").exists() && folder.path().join("result/trajectory.json").exists());
+    let corrected = text.replace("\"]", "\"], limits = { message_s = 90.0 }");
+    std::fs::write(&study, format!("{corrected}[iteration.envelope]\ntracking_error = 0.25\n")).unwrap();
+    let output = iterate(&study, &["--allow-command"]).wait_with_output().unwrap();
+    let said = said(&output);
+    // The robot stopped: somebody is to look, and the run is there.
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("protective stop") && said.contains("ended early"), "{said}");
+    assert!(folder.path().join("result/runs/run_1/run.json").exists() && script.exists());
+}

@@ -1,0 +1,282 @@
+//! What an iteration still falls short of: converged is only what meets everything.
+
+use crate::estimate::RunEstimate;
+use crate::evidence::Clipping;
+use crate::record::RunRecord;
+use crate::settings::IterationSettings;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Samples at the drive's limit that a run may have, as a share: a limit that is touched at a reversal moves nothing.
+const MOST_CLIPPED: f64 = 2e-3;
+
+/// The share of the torque that a 95 % band has to hold, in a run that was not fitted to. Residuals that are correlated
+/// over seconds let the share vary by some percent; a prediction that is off by its own noise throughout has 83 %.
+const LEAST_INSIDE: f64 = 0.85;
+
+/// What is not met after the last run, with its numbers; [`remedy`](Self::remedy) says what would help.
+#[derive(Clone, Debug, PartialEq, Error, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(tag = "condition", rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Shortfall {
+    /// One good run cannot be compared with another.
+    #[error("{good} good runs: nothing to compare the last one with")]
+    TooFewRuns {
+        /// How many there are.
+        good: usize,
+    },
+    /// The last run does not count as good.
+    #[error("the last run does not count: {reason}")]
+    LastRunRejected {
+        /// Why.
+        reason: String,
+    },
+    /// The last run was under another controller than the model-based one with the whole of the newest model.
+    #[error("the last run was not under the controller with the newest model")]
+    NoModel,
+    /// A run of an earlier version, without what the verdict rests on.
+    #[error("run {run} was made by an earlier version, which did not keep what its log shows")]
+    NoEvidence {
+        /// The run.
+        run: usize,
+    },
+    /// A joint was farther from its trajectory than asked, and than can be explained.
+    #[error("joint {joint} was {error_rad:.2e} rad from its trajectory, asked is {tolerance_rad:.2e}{}", floor_words(*.floor_rad))]
+    Tracking {
+        /// The joint.
+        joint: String,
+        /// Its largest distance, rad (m).
+        error_rad: f64,
+        /// What was asked for.
+        tolerance_rad: f64,
+        /// What noise, friction and delay explain; none where that cannot be told.
+        floor_rad: Option<f64>,
+    },
+    /// A parameter that the last run moved.
+    #[error("{parameter} moved by {bars:.1} error bars with the last run, {allowed:.1} are allowed")]
+    ParameterMoves {
+        /// The base parameter.
+        parameter: String,
+        /// By how many error bars.
+        bars: f64,
+        /// How many count as standing still.
+        allowed: f64,
+    },
+    /// A parameter that is hardly known.
+    #[error(
+        "the error bar of {parameter} is {percent:.0} % of the largest parameter, {allowed_percent:.0} % are allowed"
+    )]
+    ParameterUncertain {
+        /// The base parameter.
+        parameter: String,
+        /// Its error bar (one standard deviation) as a share of the largest parameter.
+        percent: f64,
+        /// The widest that is allowed.
+        allowed_percent: f64,
+    },
+    /// Torque at the drive's limit.
+    #[error("torque of joint {joint} stands at {torque:.3} Nm in {percent:.1} % of the samples: {}", clipping_words(*.stated))]
+    Clipping {
+        /// The joint.
+        joint: String,
+        /// Share of its samples.
+        percent: f64,
+        /// The torque, Nm (N).
+        torque: f64,
+        /// Whether it is a stated limit.
+        stated: bool,
+    },
+    /// Torque and positions of the log belong to different instants.
+    #[error("torque of joint {joint} comes {:.1} +- {:.1} ms {} the motion (95 %), unexplained", 1e3 * .lag_s.abs(), 1e3 * .half_width_95_s, if *.lag_s > 0.0 { "after" } else { "before" })]
+    Lag {
+        /// The joint.
+        joint: String,
+        /// The lag, s.
+        lag_s: f64,
+        /// Half the width of its 95 % interval.
+        half_width_95_s: f64,
+    },
+    /// The model of the runs before does not predict the last one.
+    #[error(
+        "the model of the runs before holds {inside_percent:.0} % of joint {joint}'s torque in its 95 % band, off by {rms_error_nm:.3} Nm where the band is {half_width_nm:.3}"
+    )]
+    Prediction {
+        /// The joint.
+        joint: String,
+        /// Share inside the band.
+        inside_percent: f64,
+        /// Root mean square error of the prediction, Nm (N).
+        rms_error_nm: f64,
+        /// Mean half width of the band.
+        half_width_nm: f64,
+    },
+    /// Torque that no parameter of the model explains.
+    #[error(
+        "{percent:.1} % of joint {joint}'s torque is left unexplained beyond its noise, {allowed_percent:.1} % are allowed"
+    )]
+    Unexplained {
+        /// The joint.
+        joint: String,
+        /// Share of its torque, of root mean squares.
+        percent: f64,
+        /// What is allowed.
+        allowed_percent: f64,
+    },
+}
+
+fn floor_words(floor_rad: Option<f64>) -> String {
+    floor_rad.map_or_else(
+        || "; what the loop could reach is not known".to_owned(),
+        |floor| format!(", and noise, friction and delay explain {floor:.2e}"),
+    )
+}
+
+fn clipping_words(stated: bool) -> &'static str {
+    if stated { "its limit" } else { "as if its drive gave no more" }
+}
+
+impl Shortfall {
+    /// What would help.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::TooFewRuns { .. } | Self::NoModel => "allow more runs (max_runs)",
+            Self::LastRunRejected { .. } => {
+                "see the reason; a first controller that holds the robot is the commonest cure"
+            }
+            Self::NoEvidence { .. } => "begin anew with this version",
+            Self::Tracking { .. } => {
+                "look for what the model has no term for (sticking, backlash, elasticity, a controller that is not the stated one); or give stiffer gains or a larger settled.tracking_tolerance"
+            }
+            Self::ParameterMoves { .. } => {
+                "allow more runs (max_runs); a parameter that keeps moving changes with temperature, or hangs on a term that the model has not"
+            }
+            Self::ParameterUncertain { .. } => "a motion that excites it: a longer one, or another design",
+            Self::Clipping { .. } => "a slower motion, a limit of torque in [design.limits], or the right effort limit",
+            Self::Lag { .. } => {
+                "take positions and torques at the same instant, or correct the delay where the log is made"
+            }
+            Self::Prediction { .. } => {
+                "look for what changed between the runs: temperature, load, sticking friction, sensor zeros"
+            }
+            Self::Unexplained { .. } => {
+                "other friction terms (friction = \"auto\"), the right lengths and axes in the description, or a larger settled.most_unexplained_percent"
+            }
+        }
+    }
+}
+
+/// Names that sentences take.
+pub(crate) struct Names {
+    pub(crate) joints: Vec<String>,
+    pub(crate) parameters: Vec<String>,
+}
+
+/// What is not met after the last of `records`; nothing if the iteration has converged.
+pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, names: &Names) -> Vec<Shortfall> {
+    let good: Vec<&RunRecord> = records.iter().filter(|record| record.accepted).collect();
+    let Some(last) = records.last() else { return vec![Shortfall::TooFewRuns { good: 0 }] };
+    if !last.accepted {
+        let reason = last.reason.clone().unwrap_or_else(|| last.outcome.clone());
+        return vec![Shortfall::LastRunRejected { reason }];
+    }
+    let [.., before, _] = good[..] else { return vec![Shortfall::TooFewRuns { good: good.len() }] };
+    let Some(evidence) = &last.evidence else { return vec![Shortfall::NoEvidence { run: last.run }] };
+    let mut found = Vec::new();
+    if last.controller.model.is_none() || last.controller.damping != 1.0 {
+        found.push(Shortfall::NoModel);
+    }
+    let limits = &settings.settled;
+    let joint = |place: usize| names.joints[place].clone();
+    for (place, (&error_rad, shown)) in last.max_tracking_error_rad.iter().zip(&evidence.joints).enumerate() {
+        let (tolerance_rad, floor_rad) = (limits.tracking_tolerance, shown.tracking_floor_rad);
+        let explained = floor_rad.map_or(0.0, |floor| limits.floor_ratio * floor);
+        if error_rad > tolerance_rad.max(explained) {
+            found.push(Shortfall::Tracking { joint: joint(place), error_rad, tolerance_rad, floor_rad });
+        }
+    }
+    if let (Some(old), Some(new)) = (before.knowledge(), last.knowledge()) {
+        parameters(&mut found, (old, new), settings, names);
+    }
+    let own = last.estimate.as_ref();
+    let lags = own.map_or(&[][..], |estimate| &estimate.torque_lags);
+    for (place, shown) in evidence.joints.iter().enumerate() {
+        if let Some(Clipping { share, torque, stated }) =
+            shown.clipping.filter(|clipping| clipping.share > MOST_CLIPPED)
+        {
+            let beyond = last.max_tracking_error_rad[place] > limits.tracking_tolerance;
+            // Without a stated limit a flat top is a matter of the drive only where the joint does not follow.
+            if stated || beyond {
+                found.push(Shortfall::Clipping { joint: joint(place), percent: 100.0 * share, torque, stated });
+            }
+        }
+        if let Some(lag) = lags.get(place).copied().flatten().filter(|lag| lag.matters) {
+            let (lag_s, half_width_95_s) = (lag.lag_s, lag.half_width_95_s);
+            found.push(Shortfall::Lag { joint: joint(place), lag_s, half_width_95_s });
+        }
+        if let Some(prediction) = shown.prediction.filter(|prediction| prediction.inside < LEAST_INSIDE) {
+            found.push(Shortfall::Prediction {
+                joint: joint(place),
+                inside_percent: 100.0 * prediction.inside,
+                rms_error_nm: prediction.rms_error,
+                half_width_nm: prediction.half_width,
+            });
+        }
+        let sigma = own.map_or(0.0, |estimate| estimate.joint_sigma[place]);
+        let beyond_noise = (sigma * sigma - shown.row_noise * shown.row_noise).max(0.0).sqrt();
+        let (percent, allowed_percent) = (100.0 * beyond_noise / shown.torque_rms, limits.most_unexplained_percent);
+        if shown.torque_rms > 0.0 && percent > allowed_percent {
+            found.push(Shortfall::Unexplained { joint: joint(place), percent, allowed_percent });
+        }
+    }
+    found
+}
+
+/// The parameter that moved most, if one moved too far, and the one that is least known, if it is hardly known.
+fn parameters(
+    found: &mut Vec<Shortfall>,
+    (old, new): (&RunEstimate, &RunEstimate),
+    settings: &IterationSettings,
+    names: &Names,
+) {
+    let limits = &settings.settled;
+    let largest = largest(new);
+    let count = new.values.len().min(old.values.len());
+    let name =
+        |place: usize| names.parameters.get(place).cloned().unwrap_or_else(|| format!("parameter {}", place + 1));
+    let moved = |k: usize| {
+        let beyond = (new.values[k] - old.values[k]).abs() - limits.parameter_tolerance * largest;
+        let bar = new.std[k].hypot(old.std[k]);
+        if beyond <= 0.0 { 0.0 } else { beyond / bar.max(f64::MIN_POSITIVE) }
+    };
+    let most = (0..count).map(|k| (k, moved(k))).max_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((k, bars)) = most.filter(|(_, bars)| *bars > limits.parameter_sigmas) {
+        let (parameter, allowed) = (name(k), limits.parameter_sigmas);
+        found.push(Shortfall::ParameterMoves { parameter, bars, allowed });
+    }
+    let widest = (0..count).map(|k| (k, new.std[k].max(old.std[k]))).max_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((k, bar)) = widest.filter(|(_, bar)| *bar > limits.most_uncertain * largest) {
+        let (percent, allowed_percent) = (100.0 * bar / largest.max(f64::MIN_POSITIVE), 100.0 * limits.most_uncertain);
+        found.push(Shortfall::ParameterUncertain { parameter: name(k), percent, allowed_percent });
+    }
+}
+
+fn largest(estimate: &RunEstimate) -> f64 {
+    estimate.values.iter().fold(0.0_f64, |most, value| most.max(value.abs()))
+}
+
+/// Whether a further run of the same motion would tell little: the last two good runs have one model-based controller,
+/// no parameter moved beyond its bars or is hardly known, and tracking is inside the tolerance or no longer falls.
+pub(crate) fn stands_still(records: &[RunRecord], settings: &IterationSettings) -> bool {
+    let [.., before, last] = records else { return false };
+    if !(before.accepted && last.accepted && last.controller.model.is_some() && last.controller.damping == 1.0) {
+        return false;
+    }
+    let (Some(old), Some(new)) = (before.knowledge(), last.knowledge()) else { return false };
+    let mut moving = Vec::new();
+    let names = Names { joints: Vec::new(), parameters: Vec::new() };
+    parameters(&mut moving, (old, new), settings, &names);
+    let limits = &settings.settled;
+    let (now, then) = (last.tracking_error(), before.tracking_error());
+    moving.is_empty() && (now <= limits.tracking_tolerance || limits.tracking_ratio * now >= then)
+}

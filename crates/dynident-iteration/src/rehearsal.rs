@@ -1,0 +1,227 @@
+//! A motion is rehearsed before it is commanded: its torque, the mass matrix of the controller's model, and the closed
+//! loop in simulation with robots that are not quite the model.
+
+use crate::leg::Leg;
+use crate::posture::{at_sample, inertia_matrix};
+use crate::robot::{Breach, Envelope};
+use dynident_dynamics::ParametricModel;
+use dynident_model::InertialParameters;
+use dynident_model::sample::Random;
+use dynident_simulation::controllers::{ControllerModel, ControllerSettings};
+use dynident_simulation::{LoopSettings, Plant, RunLimits, RunStatus, SimulationError, closed_loop, require};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// A smaller share of the largest eigenvalue counts as none: rounding alone makes it.
+const SINGULAR: f64 = 1e-12;
+
+/// How a motion is rehearsed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
+pub struct RehearsalSettings {
+    /// How far the true robot may be from the model: every mass and every parameter of friction and drives by so many
+    /// percent up or down. Default 30.
+    pub uncertainty_percent: f64,
+    /// Robots within that which are simulated beside the model itself. Default 4.
+    pub robots: usize,
+    /// Postures at which the mass matrix is looked at: so many over the workspace, and so many along the motion.
+    /// Default 200.
+    pub postures: usize,
+    /// Seed of robots and postures. Default 1.
+    pub seed: u64,
+}
+
+impl Default for RehearsalSettings {
+    fn default() -> Self {
+        Self { uncertainty_percent: 30.0, robots: 4, postures: 200, seed: 1 }
+    }
+}
+
+impl RehearsalSettings {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// Numbers out of range.
+    pub fn validate(&self) -> Result<(), SimulationError> {
+        let percent = self.uncertainty_percent;
+        require((0.0..=90.0).contains(&percent), "rehearsal.uncertainty_percent", percent, "give 0 to 90")?;
+        require(self.robots <= 1000, "rehearsal.robots", self.robots as f64, "give at most 1000")?;
+        require(self.postures <= 1_000_000, "rehearsal.postures", self.postures as f64, "give at most 1000000")
+    }
+}
+
+/// What a rehearsal has shown.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Rehearsal {
+    /// Smallest eigenvalue of the model's mass matrix over all postures, kg m² (kg).
+    pub smallest_eigenvalue: f64,
+    /// Per joint: the largest torque of the model along the motion, Nm (N).
+    pub largest_torque: Vec<f64>,
+    /// Per joint: the largest distance from the path of any simulated robot, rad (m).
+    pub largest_tracking_error_rad: Vec<f64>,
+}
+
+/// Why a motion is not commanded.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum RehearsalFailure {
+    /// The motion itself leaves the envelope.
+    #[error("the motion itself leaves the envelope: {0}; give another motion, or the limit in [iteration.envelope]")]
+    Path(Breach),
+    /// No body moves like that.
+    #[error(
+        "the model's mass matrix is not positive definite (eigenvalue {eigenvalue:.3e} kg m^2) at the positions {q:.3?}: a controller with it may push the wrong way"
+    )]
+    MassMatrix {
+        /// The eigenvalue.
+        eigenvalue: f64,
+        /// Where, rad (m).
+        q: Vec<f64>,
+    },
+    /// The motion asks for more than there is.
+    #[error("the model's torque along the motion leaves the envelope: {0}; give a slower motion")]
+    Torque(Breach),
+    /// A robot that may be the true one is not held.
+    #[error(
+        "in simulation {robot} is not held: {verdict}; give other gains (kp, kd, or bandwidth_hz), compensate gravity (start = \"prior\"), or state rehearsal.uncertainty_percent and [iteration.envelope]"
+    )]
+    Loop {
+        /// Which robot.
+        robot: String,
+        /// How its run ended.
+        verdict: RunStatus,
+    },
+}
+
+/// What is rehearsed.
+pub(crate) struct Rehearsed<'a> {
+    pub(crate) robot: &'a ParametricModel,
+    pub(crate) legs: &'a [Leg],
+    pub(crate) controller: &'a ControllerSettings,
+    /// The controller's model.
+    pub(crate) model: Option<&'a ControllerModel>,
+    /// What is believed of the robot, all parameters: what is simulated.
+    pub(crate) believed: Option<&'a [f64]>,
+    pub(crate) envelope: Option<&'a Envelope>,
+}
+
+impl Rehearsed<'_> {
+    /// Rehearses.
+    ///
+    /// # Errors
+    /// Numbers that do not fit; that the rehearsal fails is inside.
+    pub(crate) fn run(
+        &self,
+        settings: &RehearsalSettings,
+    ) -> Result<Result<Rehearsal, RehearsalFailure>, SimulationError> {
+        let dof = self.robot.dof();
+        let names = self.robot.joint_names();
+        let mut shown = Rehearsal {
+            smallest_eigenvalue: f64::INFINITY,
+            largest_torque: vec![0.0; dof],
+            largest_tracking_error_rad: vec![0.0; dof],
+        };
+        let path = self.legs.iter().find_map(|leg| self.envelope?.broken_by(leg.reference(), &names));
+        if let Some(breach) = path {
+            return Ok(Err(RehearsalFailure::Path(breach)));
+        }
+        let (model, terms) = (self.robot.model(), self.robot.terms());
+        let own = self.believed.map(|all| ControllerModel::from_parameters(model, terms, all)).transpose()?;
+        let Some(mut known) = self.model.cloned().or(own) else { return Ok(Ok(shown)) };
+        // The mass matrix, where the robot may come to stand and where it moves.
+        let mut random = Random::new(settings.seed);
+        for q in self.postures(settings.postures, &mut random) {
+            let eigenvalues = inertia_matrix(&mut known, &q).symmetric_eigenvalues();
+            let (smallest, largest) = (eigenvalues.min(), eigenvalues.max());
+            if smallest.is_nan() || smallest <= SINGULAR * largest.abs() {
+                return Ok(Err(RehearsalFailure::MassMatrix { eigenvalue: smallest, q }));
+            }
+            shown.smallest_eigenvalue = shown.smallest_eigenvalue.min(smallest);
+        }
+        // The torque along the motion.
+        let mut tau = vec![0.0; dof];
+        for reference in self.legs.iter().map(Leg::reference) {
+            for sample in 0..reference.samples() {
+                let [q, dq, ddq] = at_sample(reference, sample);
+                known.reference_torque(&q, &dq, &ddq, &mut tau);
+                let time_s = sample as f64 / reference.rate_hz();
+                if let Some(breach) = self.envelope.and_then(|own| own.torque_breach(&tau, &names, time_s)) {
+                    return Ok(Err(RehearsalFailure::Torque(breach)));
+                }
+                shown.largest_torque.iter_mut().zip(&tau).for_each(|(most, tau)| *most = most.max(tau.abs()));
+            }
+        }
+        // The closed loop.
+        if let Some(believed) = self.believed.filter(|_| self.controller.can_be_simulated()) {
+            for number in 0..=settings.robots {
+                if let Err(failure) = self.simulate(believed, (number, settings), &mut random, &mut shown)? {
+                    return Ok(Err(failure));
+                }
+            }
+        }
+        Ok(Ok(shown))
+    }
+
+    /// One robot: the model itself, or one that differs.
+    fn simulate(
+        &self,
+        believed: &[f64],
+        (number, settings): (usize, &RehearsalSettings),
+        random: &mut Random,
+        shown: &mut Rehearsal,
+    ) -> Result<Result<(), RehearsalFailure>, SimulationError> {
+        let (model, dof) = (self.robot.model(), self.robot.dof());
+        let off = if number == 0 { 0.0 } else { 0.01 * settings.uncertainty_percent };
+        let mut factor = || if random.bits() & 1 == 0 { 1.0 + off } else { 1.0 - off };
+        let bodies: Vec<InertialParameters> = believed[..10 * dof]
+            .chunks_exact(10)
+            .map(|own| {
+                let factor = factor();
+                InertialParameters(core::array::from_fn(|k| factor * own[k]))
+            })
+            .collect();
+        let terms: Vec<f64> = believed[10 * dof..].iter().map(|value| factor() * value).collect();
+        let mut plant = Plant::new(&model.with_inertials(&bodies)?, self.robot.terms(), &terms)?;
+        let mut limits = RunLimits::default();
+        if let Some(envelope) = self.envelope {
+            envelope.limit(&mut limits);
+        }
+        let looped = LoopSettings { limits, ..LoopSettings::default() };
+        for leg in self.legs {
+            let mut controller = self.controller.build(dof, self.model)?;
+            let run = closed_loop(&mut plant, controller.as_mut(), leg.reference(), &looped)?;
+            let largest = shown.largest_tracking_error_rad.iter_mut().zip(&run.max_error);
+            largest.for_each(|(most, error)| *most = most.max(*error));
+            if !run.status.is_done() {
+                let robot = match number {
+                    0 => "the model itself".to_owned(),
+                    _ => format!(
+                        "a robot up to {} % off the model ({number} of {})",
+                        settings.uncertainty_percent, settings.robots
+                    ),
+                };
+                return Ok(Err(RehearsalFailure::Loop { robot, verdict: run.status }));
+            }
+        }
+        Ok(Ok(()))
+    }
+
+    /// Postures over the workspace (within the envelope, or a turn, or 1 m, to either side) and along the motions.
+    fn postures(&self, count: usize, random: &mut Random) -> Vec<Vec<f64>> {
+        let joints = self.robot.model().joints();
+        let mut range = |joint: usize| {
+            let most = if joints[joint].turns() { core::f64::consts::PI } else { 1.0 };
+            let lower = self.envelope.and_then(|own| own.lower[joint]).unwrap_or(-most);
+            let upper = self.envelope.and_then(|own| own.upper[joint]).unwrap_or(most);
+            random.uniform(lower, upper.max(lower))
+        };
+        let mut postures: Vec<Vec<f64>> = (0..count).map(|_| (0..joints.len()).map(&mut range).collect()).collect();
+        for reference in self.legs.iter().map(Leg::reference) {
+            let step = (reference.samples() / count.max(1)).max(1);
+            let along = (0..reference.samples()).step_by(step);
+            postures.extend(along.map(|sample| at_sample(reference, sample)).map(|[q, ..]| q));
+        }
+        postures
+    }
+}

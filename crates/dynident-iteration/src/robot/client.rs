@@ -1,0 +1,354 @@
+//! A started robot program: lines there and back, in time, until it ends or is ended.
+
+use super::RobotFault;
+use super::process_group::ProcessGroup;
+use super::process_settings::{ProcessLimits, ProcessMode, ProcessSettings};
+use super::protocol::{LoggedTorque, PROTOCOL, ToClient, ToHost};
+use super::stop_reason::Stopping;
+use super::stop_signal::{Listening, StopSignal};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{ChildStdin, Command, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+use thiserror::Error;
+
+/// Longest line that is read, bytes: a sample of a thousand joints is a tenth of it.
+const LONGEST_LINE: u64 = 1 << 20;
+/// Lines that wait to be read.
+const QUEUE: usize = 1024;
+/// What is kept of standard error, bytes.
+const LAST_WORDS: usize = 2000;
+/// How often a silent program is looked at: whether it still lives.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Why a line cannot be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+enum LineError {
+    #[error("longer than a megabyte")]
+    TooLong,
+    #[error("not UTF-8")]
+    NotText,
+}
+
+/// A line, or why there is none.
+type Line = Result<String, LineError>;
+
+/// What comes out of the queue of a client.
+#[derive(Debug)]
+enum Event {
+    /// A line of its standard output.
+    Line(Line),
+    /// Its standard output has ended.
+    Closed,
+    /// Somebody asks for a stop: the queue is only woken.
+    Woken,
+}
+
+/// What a client was heard to say.
+#[derive(Debug)]
+pub(super) enum Heard {
+    /// A message.
+    Message(ToHost),
+    /// Nothing: somebody asks for a stop, and no stop message has been sent yet.
+    StopRequested,
+}
+
+/// What came of starting a client.
+#[derive(Debug)]
+pub(super) enum Started {
+    /// It has said hello.
+    Ready(Box<Client>),
+    /// A stop was asked for while its hello was awaited.
+    StopRequested,
+}
+
+/// The started program. Killed with all of its group when dropped, if it does not end by itself.
+#[derive(Debug)]
+pub(super) struct Client {
+    group: ProcessGroup,
+    input: Option<ChildStdin>,
+    events: Receiver<Event>,
+    waker: SyncSender<Event>,
+    last_words: Arc<Mutex<Vec<u8>>>,
+    limits: ProcessLimits,
+    /// For each joint of the model, its place in the client's vectors.
+    pub(super) places: Vec<usize>,
+    /// Torque of each of the client's joints for what it logs as 1.
+    pub(super) torque_per_unit: Vec<f64>,
+    run_ends: Option<(Instant, f64)>,
+    stop: Option<StopSignal>,
+    /// Deregisters when dropped.
+    listening: Option<Listening>,
+    /// Whether a motion was asked for and has not been heard to end.
+    moving: bool,
+    stop_sent: bool,
+}
+
+impl Client {
+    pub(super) fn start(
+        settings: &ProcessSettings,
+        joints: &[String],
+        stop: Option<&StopSignal>,
+    ) -> Result<Started, RobotFault> {
+        let program = &settings.command[0];
+        let mut command = Command::new(program);
+        command.args(&settings.command[1..]).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut group = ProcessGroup::start(&mut command)
+            .map_err(|error| RobotFault::NotStarted { program: program.clone(), reason: error.to_string() })?;
+        // A queue that a client in a hurry fills, so that it waits and memory does not grow.
+        let (sender, events) = sync_channel(QUEUE);
+        let waker = sender.clone();
+        let child = group.program();
+        if let Some(output) = child.stdout.take() {
+            std::thread::spawn(move || read_lines(output, &sender));
+        }
+        let last_words = Arc::new(Mutex::new(Vec::new()));
+        if let Some(errors) = child.stderr.take() {
+            let words = Arc::clone(&last_words);
+            std::thread::spawn(move || read_last_words(errors, &words));
+        }
+        let input = child.stdin.take();
+        let mut client = Self {
+            group,
+            input,
+            events,
+            waker,
+            last_words,
+            limits: settings.limits.clone(),
+            places: Vec::new(),
+            torque_per_unit: Vec::new(),
+            run_ends: None,
+            stop: None,
+            listening: None,
+            moving: false,
+            stop_sent: false,
+        };
+        client.follow(stop);
+        let hello = match client.next("hello", settings.limits.hello_s)? {
+            Heard::Message(message) => message,
+            Heard::StopRequested => return Ok(Started::StopRequested),
+        };
+        let ToHost::Hello { protocol, joints: found, modes, logs, .. } = hello else {
+            return Err(RobotFault::OutOfTurn { found: hello.kind().to_owned(), expected: "hello".to_owned() });
+        };
+        if protocol != PROTOCOL {
+            return Err(RobotFault::Protocol { found: protocol, expected: PROTOCOL.to_owned() });
+        }
+        let wanted = match settings.mode {
+            ProcessMode::Run => "run",
+            ProcessMode::Step => "step",
+        };
+        if !modes.iter().any(|mode| mode == wanted) {
+            let expected = format!("the mode {wanted}");
+            return Err(RobotFault::Protocol { found: format!("the modes {}", modes.join(", ")), expected });
+        }
+        let places: Option<Vec<usize>> =
+            joints.iter().map(|joint| found.iter().position(|other| other == joint)).collect();
+        client.places = places
+            .filter(|_| found.len() == joints.len())
+            .ok_or(RobotFault::OtherJoints { expected: joints.to_vec(), found })?;
+        client.torque_per_unit = torque_per_unit(&logs, joints.len())?;
+        Ok(Started::Ready(Box::new(client)))
+    }
+
+    /// From now on this signal stops the client.
+    pub(super) fn follow(&mut self, stop: Option<&StopSignal>) {
+        let (waker, id) = (self.waker.clone(), self.group.id());
+        // A full queue is woken enough.
+        let wake = move || drop(waker.try_send(Event::Woken));
+        self.listening = stop.map(|stop| stop.listen(Box::new(wake), Box::new(move || id.kill())));
+        self.stop = stop.cloned();
+    }
+
+    /// The longest that a run may take, and when that is over.
+    pub(super) fn limit_run(&mut self, run_ends: Option<(Instant, f64)>) {
+        self.run_ends = run_ends;
+    }
+
+    /// How long each message may take, s.
+    pub(super) fn message_s(&self) -> f64 {
+        self.limits.message_s
+    }
+
+    pub(super) fn send(&mut self, message: &ToClient, waiting_for: &'static str) -> Result<(), RobotFault> {
+        match message {
+            ToClient::Run { .. } | ToClient::Begin { .. } => (self.moving, self.stop_sent) = (true, false),
+            ToClient::Stop { .. } => self.stop_sent = true,
+            ToClient::Torque { .. } | ToClient::Finish {} | ToClient::Bye {} => {}
+        }
+        let sent = serde_json::to_string(message).ok().and_then(|mut text| {
+            text.push('\n');
+            let input = self.input.as_mut()?;
+            input.write_all(text.as_bytes()).and_then(|()| input.flush()).ok()
+        });
+        sent.ok_or(()).map_err(|()| self.died(waiting_for))
+    }
+
+    /// Sends a stop and hears the client out until its end, which says that the robot stands. Samples on the way go to
+    /// `keep`.
+    pub(super) fn stop(&mut self, reason: &str, keep: &mut dyn FnMut(ToHost)) -> Stopping {
+        let stop = ToClient::Stop { reason: reason.to_owned() };
+        let ends = Instant::now() + Duration::from_secs_f64(self.limits.stop_s);
+        self.run_ends = None;
+        let mut sent = self.send(&stop, "end").is_ok();
+        while sent {
+            let left_s = ends.saturating_duration_since(Instant::now()).as_secs_f64();
+            match self.next("end", left_s) {
+                Ok(Heard::Message(ToHost::End { .. })) => return Stopping::Confirmed,
+                Ok(Heard::Message(message)) => keep(message),
+                Ok(Heard::StopRequested) => {}
+                Err(_) => sent = false,
+            }
+        }
+        self.limits.bye_s = 0.0;
+        Stopping::Unanswered
+    }
+
+    /// The next message, in time; or that somebody asks for a stop, as long as none was sent.
+    pub(super) fn next(&mut self, waiting_for: &'static str, limit_s: f64) -> Result<Heard, RobotFault> {
+        let begin = Instant::now();
+        let mut limit = (Duration::from_secs_f64(limit_s), limit_s);
+        if let Some((ends, run_s)) = self.run_ends {
+            let left = ends.saturating_duration_since(begin);
+            if left < limit.0 {
+                limit = (left, run_s);
+            }
+        }
+        let mut seen_dead = false;
+        loop {
+            if !self.stop_sent && self.stop.as_ref().is_some_and(StopSignal::is_requested) {
+                return Ok(Heard::StopRequested);
+            }
+            let left = limit.0.saturating_sub(begin.elapsed());
+            match self.events.recv_timeout(left.min(LOOK)) {
+                Ok(Event::Line(line)) => return self.heard(line).map(Heard::Message),
+                Ok(Event::Closed) | Err(RecvTimeoutError::Disconnected) => return Err(self.died(waiting_for)),
+                // Its pipe may be held open by a process that it has started. What it wrote last may still be on its
+                // way when it is first seen dead.
+                Err(RecvTimeoutError::Timeout) if self.group.exit().is_some() => {
+                    if seen_dead {
+                        return Err(self.died(waiting_for));
+                    }
+                    seen_dead = true;
+                }
+                Err(RecvTimeoutError::Timeout) if left.is_zero() => {
+                    return Err(RobotFault::Hung { waiting_for: waiting_for.to_owned(), limit_s: limit.1 });
+                }
+                Ok(Event::Woken) | Err(RecvTimeoutError::Timeout) => {}
+            }
+        }
+    }
+
+    fn heard(&mut self, line: Line) -> Result<ToHost, RobotFault> {
+        let line = line.map_err(|error| RobotFault::Garbage { line: String::new(), reason: error.to_string() })?;
+        let message = message(&line)
+            .map_err(|error| RobotFault::Garbage { line: shortened(&line), reason: error.to_string() })?;
+        if matches!(message, ToHost::End { .. }) {
+            self.moving = false;
+        }
+        Ok(message)
+    }
+
+    fn died(&mut self, waiting_for: &'static str) -> RobotFault {
+        // Its output is closed: it has ended, is about to, or has closed it on purpose.
+        let exit = self.group.exit_within(Duration::from_millis(500));
+        let exit = exit.unwrap_or_else(|| "its standard output is closed".to_owned());
+        // The other thread may still be reading what was written last.
+        std::thread::sleep(Duration::from_millis(20));
+        let words = self.last_words.lock().map(|words| String::from_utf8_lossy(&words).trim().to_owned());
+        let said = words.ok().filter(|words| !words.is_empty()).map(|words| format!("; it said: {words}"));
+        RobotFault::Died { waiting_for: waiting_for.to_owned(), exit, said: said.unwrap_or_default() }
+    }
+}
+
+impl Drop for Client {
+    fn drop(&mut self) {
+        if self.moving && !self.stop_sent {
+            // Given up in the middle of a motion: whoever still listens is to stop the robot.
+            let _ = self.send(&ToClient::Stop { reason: "the run was given up".to_owned() }, "end");
+        }
+        let _ = self.send(&ToClient::Bye {}, "end");
+        self.input = None;
+        let grace = Duration::from_secs_f64(self.limits.bye_s);
+        self.group.exit_within(grace);
+        self.group.end(grace);
+        // Its number may be another's from here on.
+        self.listening = None;
+    }
+}
+
+/// Factors from what a client logs to torque.
+fn torque_per_unit(logs: &LoggedTorque, joints: usize) -> Result<Vec<f64>, RobotFault> {
+    let fault = |what: String, fix: &str| RobotFault::LoggedTorque { what, fix: fix.to_owned() };
+    match logs {
+        LoggedTorque::Drive => Ok(vec![1.0; joints]),
+        LoggedTorque::Current { torque_per_ampere } => {
+            if torque_per_ampere.len() != joints || torque_per_ampere.iter().any(|k| !k.is_finite() || *k == 0.0) {
+                let fix = "give torque_per_ampere at the joint (torque constant times gear ratio) for each joint";
+                return Err(fault(
+                    format!("as currents with {} factors for {joints} joints", torque_per_ampere.len()),
+                    fix,
+                ));
+            }
+            Ok(torque_per_ampere.clone())
+        }
+        LoggedTorque::Reduced { without } => {
+            let fix = "what is missing belongs to the robot that is looked for; log the whole torque of the drives (a \
+                       Franka's tau_J, not tau_J_d), or add what the robot adds before you send it";
+            Err(fault(format!("without {}", without.join(" and ")), fix))
+        }
+    }
+}
+
+fn read_lines(output: impl Read, sender: &SyncSender<Event>) {
+    pass_lines(output, sender);
+    let _ = sender.send(Event::Closed);
+}
+
+fn pass_lines(output: impl Read, sender: &SyncSender<Event>) {
+    let mut reader = BufReader::new(output);
+    loop {
+        let mut bytes = Vec::new();
+        let read = reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut bytes);
+        let line = match read {
+            Ok(0) | Err(_) => return,
+            Ok(count) if count as u64 >= LONGEST_LINE => Err(LineError::TooLong),
+            Ok(_) => String::from_utf8(bytes).map_err(|_| LineError::NotText),
+        };
+        if line.as_ref().is_ok_and(|line| line.trim().is_empty()) {
+            continue;
+        }
+        let last = line.is_err();
+        // Nobody listens any more: the robot was given up.
+        if sender.send(Event::Line(line)).is_err() || last {
+            return;
+        }
+    }
+}
+
+fn read_last_words(mut errors: impl Read, words: &Mutex<Vec<u8>>) {
+    let mut buffer = [0; 512];
+    while let Ok(count) = errors.read(&mut buffer) {
+        if count == 0 {
+            return;
+        }
+        let Ok(mut words) = words.lock() else { return };
+        words.extend_from_slice(&buffer[..count]);
+        let excess = words.len().saturating_sub(LAST_WORDS);
+        words.drain(..excess);
+    }
+}
+
+/// A message. JSON has no NaN and no infinity, but many programs write them: they are read as missing numbers, so that
+/// the verdict can name the sample.
+fn message(line: &str) -> Result<ToHost, serde_json::Error> {
+    serde_json::from_str(line).or_else(|error| {
+        let fixed = line.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null");
+        if fixed == line { Err(error) } else { serde_json::from_str(&fixed) }
+    })
+}
+
+fn shortened(line: &str) -> String {
+    line.trim().chars().take(200).collect()
+}

@@ -1,0 +1,319 @@
+//! What no sample of a run may leave: a run that does is stopped.
+
+use super::stop_reason::{Breach, EnvelopeQuantity};
+use dynident_model::Model;
+use dynident_simulation::{PerJoint, Record, Reference, RunLimits, SimulationError};
+use serde::{Deserialize, Serialize};
+
+/// Speeds that no robot measures come from positions at least this far apart, s: quantised positions of neighbouring
+/// samples say nothing.
+const SPEED_SPAN_S: f64 = 0.01;
+
+/// The default distance from the path that stops a joint that turns, rad.
+const TRACKING_RAD: f64 = 0.3;
+/// The same of a joint that slides, m.
+const TRACKING_M: f64 = 0.1;
+/// Room above the description's velocity and effort: controllers overshoot, and sensors are noisy.
+const ROOM: f64 = 1.1;
+
+/// `[iteration.envelope]`: in place of the defaults, which are the description's limits: positions as they stand,
+/// velocity and effort with a tenth of room, and a distance from the path of 0.3 rad (0.1 m). Each is one number for
+/// all joints or a list.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
+pub struct EnvelopeSettings {
+    /// Lowest position, rad (m).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lower: Option<PerJoint>,
+    /// Highest position, rad (m).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub upper: Option<PerJoint>,
+    /// Highest velocity, rad/s (m/s).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speed: Option<PerJoint>,
+    /// Largest torque, Nm (N).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque: Option<PerJoint>,
+    /// Largest distance from the path, rad (m).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tracking_error: Option<PerJoint>,
+}
+
+impl EnvelopeSettings {
+    /// The envelope of a robot: what is stated, else what its description says, else the defaults.
+    ///
+    /// # Errors
+    /// Lists of another length; limits that are not positive, positions that are not numbers.
+    pub fn envelope(&self, model: &Model) -> Result<Envelope, SimulationError> {
+        let joints = model.joints();
+        let each = |what: &str, stated: &Option<PerJoint>, positive: bool, own: &dyn Fn(usize) -> Option<f64>| {
+            let Some(stated) = stated else { return Ok((0..joints.len()).map(own).collect()) };
+            let (fix, holds): (_, fn(f64) -> bool) = if positive {
+                ("give a positive number", |x| x > 0.0 && x.is_finite())
+            } else {
+                ("give a finite number", f64::is_finite)
+            };
+            let values = stated.values(&format!("envelope.{what}"), joints.len(), fix, holds)?;
+            Ok::<Vec<Option<f64>>, SimulationError>(values.into_iter().map(Some).collect())
+        };
+        let limits = |joint: usize| &joints[joint].limits;
+        let path = |joint: usize| Some(if joints[joint].turns() { TRACKING_RAD } else { TRACKING_M });
+        Ok(Envelope {
+            lower: each("lower", &self.lower, false, &|joint| limits(joint).lower)?,
+            upper: each("upper", &self.upper, false, &|joint| limits(joint).upper)?,
+            speed: each("speed", &self.speed, true, &|joint| limits(joint).velocity.map(|limit| ROOM * limit))?,
+            torque: each("torque", &self.torque, true, &|joint| limits(joint).effort.map(|limit| ROOM * limit))?,
+            tracking_error: each("tracking_error", &self.tracking_error, true, &path)?,
+        })
+    }
+}
+
+/// What no sample of a run may leave, joint by joint in the model's order; `None` where nothing is known.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Envelope {
+    /// Lowest position, rad (m).
+    pub lower: Vec<Option<f64>>,
+    /// Highest position, rad (m).
+    pub upper: Vec<Option<f64>>,
+    /// Highest velocity, rad/s (m/s).
+    pub speed: Vec<Option<f64>>,
+    /// Largest torque, Nm (N).
+    pub torque: Vec<Option<f64>>,
+    /// Largest distance from the path, rad (m).
+    pub tracking_error: Vec<Option<f64>>,
+}
+
+impl Envelope {
+    /// The same with joint `j` at `places[j]`.
+    pub(super) fn in_order(&self, places: &[usize]) -> Self {
+        let sorted = |values: &[Option<f64>]| {
+            let mut out = vec![None; values.len()];
+            for (value, &place) in values.iter().zip(places) {
+                out[place] = *value;
+            }
+            out
+        };
+        Self {
+            lower: sorted(&self.lower),
+            upper: sorted(&self.upper),
+            speed: sorted(&self.speed),
+            torque: sorted(&self.torque),
+            tracking_error: sorted(&self.tracking_error),
+        }
+    }
+
+    /// Puts the envelope in place of the limits of a simulated run that are not stated: torques are cut by the
+    /// simulator, the others stop the run.
+    pub(crate) fn limit(&self, limits: &mut RunLimits) {
+        // Infinity has no place in files; the largest number has.
+        let each = |values: &[Option<f64>], none: f64| {
+            Some(PerJoint::Each(values.iter().map(|value| value.unwrap_or(none)).collect()))
+        };
+        let RunLimits { torque, lower, upper, speed, tracking_error } = limits;
+        for (limit, own, none) in [
+            (torque, &self.torque, f64::MAX),
+            (lower, &self.lower, f64::MIN),
+            (upper, &self.upper, f64::MAX),
+            (speed, &self.speed, f64::MAX),
+            (tracking_error, &self.tracking_error, f64::MAX),
+        ] {
+            if limit.is_none() {
+                *limit = each(own, none);
+            }
+        }
+    }
+
+    /// How a motion itself, followed without error, leaves the envelope, if it does.
+    pub fn broken_by(&self, reference: &Reference, names: &[String]) -> Option<Breach> {
+        let motion = reference.motion();
+        (0..motion.samples).find_map(|sample| {
+            let time_s = sample as f64 / reference.rate_hz();
+            (0..motion.joints).find_map(|joint| {
+                let at = joint * motion.samples + sample;
+                let place = self.of_position(joint, motion.q[at]);
+                place.or_else(|| self.of_speed(joint, motion.dq[at])).map(|broken| broken.breach(names, time_s))
+            })
+        })
+    }
+
+    /// Whether torques, joint by joint, are inside; the breach if not.
+    pub fn torque_breach(&self, tau: &[f64], names: &[String], time_s: f64) -> Option<Breach> {
+        (0..tau.len()).find_map(|joint| Some(self.of_torque(joint, tau[joint])?.breach(names, time_s)))
+    }
+
+    fn of_position(&self, joint: usize, q: f64) -> Option<Broken> {
+        let lower = self.lower[joint].filter(|limit| q < *limit);
+        let upper = self.upper[joint].filter(|limit| q > *limit);
+        let limit = lower.or(upper)?;
+        Some(Broken { joint, quantity: EnvelopeQuantity::Position, value: q, limit })
+    }
+
+    fn of_speed(&self, joint: usize, dq: f64) -> Option<Broken> {
+        let limit = self.speed[joint].filter(|limit| dq.abs() > *limit)?;
+        Some(Broken { joint, quantity: EnvelopeQuantity::Speed, value: dq, limit })
+    }
+
+    fn of_torque(&self, joint: usize, tau: f64) -> Option<Broken> {
+        let limit = self.torque[joint].filter(|limit| tau.abs() > *limit)?;
+        Some(Broken { joint, quantity: EnvelopeQuantity::Torque, value: tau, limit })
+    }
+
+    fn of_error(&self, joint: usize, error: f64) -> Option<Broken> {
+        let limit = self.tracking_error[joint].filter(|limit| error.abs() > *limit)?;
+        Some(Broken { joint, quantity: EnvelopeQuantity::TrackingError, value: error, limit })
+    }
+}
+
+struct Broken {
+    joint: usize,
+    quantity: EnvelopeQuantity,
+    value: f64,
+    limit: f64,
+}
+
+impl Broken {
+    fn breach(self, names: &[String], time_s: f64) -> Breach {
+        let Self { joint, quantity, value, limit } = self;
+        Breach { joint: names[joint].clone(), quantity, value, limit, time_s }
+    }
+}
+
+/// Where the reference is at a time, rad (m), between its samples by straight lines, at its ends outside.
+pub(super) fn target_at(reference: &Reference, joint: usize, time_s: f64) -> f64 {
+    let samples = reference.samples();
+    let target = &reference.motion().q[joint * samples..(joint + 1) * samples];
+    let place = (time_s * reference.rate_hz()).clamp(0.0, (samples - 1) as f64);
+    let from = place.floor() as usize;
+    let next = (from + 1).min(samples - 1);
+    target[from] + (place - from as f64) * (target[next] - target[from])
+}
+
+/// Looks at every sample as it comes.
+#[derive(Debug)]
+pub(super) struct EnvelopeWatch<'a> {
+    envelope: Option<&'a Envelope>,
+    reference: &'a Reference,
+    /// The sample that speeds are taken from.
+    from: usize,
+}
+
+impl<'a> EnvelopeWatch<'a> {
+    pub(super) fn new(envelope: Option<&'a Envelope>, reference: &'a Reference) -> Self {
+        Self { envelope, reference, from: 0 }
+    }
+
+    /// How the last sample of a record leaves the envelope, if it does. The record's arrays are sample-major; `dq` are
+    /// measured velocities, where there are any.
+    pub(super) fn look(&mut self, record: &Record, dq: Option<&[f64]>) -> Option<Breach> {
+        let envelope = self.envelope?;
+        let (joints, last) = (record.joints.len(), record.samples.checked_sub(1)?);
+        let time_s = record.times_s[last];
+        while self.from + 1 < last && time_s - record.times_s[self.from + 1] >= SPEED_SPAN_S {
+            self.from += 1;
+        }
+        let span_s = time_s - record.times_s[self.from];
+        for joint in 0..joints {
+            let at = last * joints + joint;
+            let q = record.q[at];
+            let speed = match dq {
+                Some(dq) => Some(dq[joint]),
+                None => (span_s >= SPEED_SPAN_S).then(|| (q - record.q[self.from * joints + joint]) / span_s),
+            };
+            let broken = envelope
+                .of_position(joint, q)
+                .or_else(|| envelope.of_error(joint, target_at(self.reference, joint, time_s) - q))
+                .or_else(|| envelope.of_speed(joint, speed?))
+                .or_else(|| envelope.of_torque(joint, record.tau[at]));
+            if let Some(broken) = broken {
+                return Some(broken.breach(&record.joints, time_s));
+            }
+        }
+        None
+    }
+
+    /// The first breach of a whole record, joint-major: for logs that come when the run is over.
+    pub(super) fn first(envelope: Option<&Envelope>, reference: &Reference, record: &Record) -> Option<Breach> {
+        envelope?;
+        let mut watch = EnvelopeWatch::new(envelope, reference);
+        let joints = record.joints.len();
+        let major = |values: &[f64]| -> Vec<f64> {
+            (0..joints * record.samples).map(|at| values[at % joints * record.samples + at / joints]).collect()
+        };
+        let mut growing = Record { q: major(&record.q), tau: major(&record.tau), ..record.clone() };
+        (1..=record.samples).find_map(|samples| {
+            growing.samples = samples;
+            watch.look(&growing, None)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynident_model::sample::planar_2r;
+
+    fn envelope() -> Envelope {
+        let none = vec![None, None];
+        Envelope {
+            lower: vec![Some(-1.0), None],
+            upper: vec![Some(1.0), None],
+            speed: vec![None, Some(0.5)],
+            torque: vec![Some(9.0), None],
+            tracking_error: none,
+        }
+    }
+
+    fn record(rows: &[[f64; 5]]) -> Record {
+        let pick = |from: usize| rows.iter().flat_map(|row| row[from..from + 2].to_vec()).collect();
+        Record {
+            joints: vec!["a".to_owned(), "b".to_owned()],
+            rate_hz: 100.0,
+            samples: rows.len(),
+            times_s: rows.iter().map(|row| row[0]).collect(),
+            q: pick(1),
+            tau: pick(3),
+        }
+    }
+
+    fn broken(rows: &[[f64; 5]]) -> Option<(String, EnvelopeQuantity, f64, f64)> {
+        let reference = Reference::standing(&[0.0, 0.0], 100.0, 1.0).unwrap();
+        let envelope = envelope();
+        let breach = EnvelopeWatch::new(Some(&envelope), &reference).look(&record(rows), None)?;
+        Some((breach.joint, breach.quantity, breach.limit, breach.time_s))
+    }
+
+    #[test]
+    fn the_quantity_that_leaves_is_named() {
+        assert_eq!(broken(&[[0.0, 0.9, 5.0, 9.0, 1e3]]), None);
+        let position = Some(("a".to_owned(), EnvelopeQuantity::Position, -1.0, 0.0));
+        assert_eq!(broken(&[[0.0, -1.1, 0.0, 0.0, 0.0]]), position);
+        let torque = Some(("a".to_owned(), EnvelopeQuantity::Torque, 9.0, 0.0));
+        assert_eq!(broken(&[[0.0, 0.0, 0.0, -9.1, 0.0]]), torque);
+    }
+
+    /// A step of quantised positions from one sample to the next is no speed; a speed that lasts is.
+    #[test]
+    fn speeds_come_from_positions_apart() {
+        let step = [[0.0, 0.0, 0.0, 0.0, 0.0], [0.001, 0.0, 0.004, 0.0, 0.0]];
+        assert_eq!(broken(&step), None);
+        let moving: Vec<[f64; 5]> =
+            (0..21).map(|k| f64::from(k) * 0.001).map(|t| [t, 0.0, 0.6 * t, 0.0, 0.0]).collect();
+        let speed = broken(&moving).unwrap();
+        assert_eq!((speed.1, speed.2), (EnvelopeQuantity::Speed, 0.5));
+    }
+
+    #[test]
+    fn the_descriptions_limits_are_the_default() {
+        let tip = dynident_model::InertialParameters([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0]);
+        let arm = planar_2r(1.0, tip, tip);
+        let envelope = EnvelopeSettings::default().envelope(&arm).unwrap();
+        assert_eq!(envelope.tracking_error, vec![Some(TRACKING_RAD); 2]);
+        let efforts: Vec<_> = arm.joints().iter().map(|joint| joint.limits.effort.map(|x| ROOM * x)).collect();
+        assert_eq!(envelope.torque, efforts);
+        let stated = EnvelopeSettings { tracking_error: Some(vec![0.1, 0.2].into()), ..EnvelopeSettings::default() };
+        assert_eq!(stated.envelope(&arm).unwrap().tracking_error, vec![Some(0.1), Some(0.2)]);
+        let wrong = EnvelopeSettings { speed: Some((-1.0).into()), ..EnvelopeSettings::default() };
+        assert!(wrong.envelope(&arm).unwrap_err().to_string().contains("envelope.speed"));
+    }
+}

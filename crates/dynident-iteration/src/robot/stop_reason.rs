@@ -1,0 +1,78 @@
+//! Why a run was stopped from here, and what became of the stop.
+
+use serde::{Deserialize, Serialize};
+
+/// What left its envelope, where and when.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Breach {
+    /// The joint.
+    pub joint: String,
+    /// What of it.
+    pub quantity: EnvelopeQuantity,
+    /// Its value, rad, rad/s, Nm (m, m/s, N).
+    pub value: f64,
+    /// The limit.
+    pub limit: f64,
+    /// When, s from the trajectory's begin.
+    pub time_s: f64,
+}
+
+impl core::fmt::Display for Breach {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Self { joint, quantity, value, limit, time_s } = self;
+        write!(f, "{} of {joint} is {value:.4} at {time_s:.3} s, its limit {limit:.4}", quantity.name())
+    }
+}
+
+/// What an envelope limits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum EnvelopeQuantity {
+    /// Position, rad (m).
+    Position,
+    /// Velocity, rad/s (m/s).
+    Speed,
+    /// Torque, Nm (N).
+    Torque,
+    /// Distance from the path, rad (m).
+    TrackingError,
+}
+
+impl EnvelopeQuantity {
+    /// Its name in messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Position => "position",
+            Self::Speed => "speed",
+            Self::Torque => "torque",
+            Self::TrackingError => "tracking error",
+        }
+    }
+}
+
+/// What became of a stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum Stopping {
+    /// The robot's program said that the robot stands, or no motion had begun.
+    Confirmed,
+    /// The program did not answer in time and was killed: nobody knows whether the robot stands.
+    Unanswered,
+    /// Nobody was there to be stopped: it was seen in the log afterwards.
+    SeenAfterwards,
+}
+
+impl core::fmt::Display for Stopping {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Confirmed => write!(f, "the robot has stopped"),
+            Self::Unanswered => {
+                write!(f, "its program did not answer the stop and was killed: look at the robot before anything else")
+            }
+            Self::SeenAfterwards => write!(f, "seen in the log when the run was over"),
+        }
+    }
+}

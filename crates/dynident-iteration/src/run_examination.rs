@@ -1,0 +1,161 @@
+//! What the log of a run shows: clipping, noise, and what the model of the runs before says of it.
+
+use crate::clipping::clipping;
+use crate::error::IterationError;
+use crate::estimate::{RunEstimate, RunLog, identification_settings, recordings};
+use crate::evidence::{JointEvidence, RunEvidence};
+use crate::leg::IterationTask;
+use crate::prediction::{Known, predictions};
+use crate::settings::{IterationSettings, RunIdentificationSettings};
+use crate::tracking_floor::{KnownLoop, tracking_floor};
+use dynident_identification::payload::known_payloads;
+use dynident_identification::{Execution, Logs, RegressorModel};
+use dynident_recording::{cutoff, position_noise};
+use dynident_simulation::Record;
+
+/// The farthest that a joint counts as following its trajectory, rad (m): half of what it moves through, at least and
+/// at most this much. Beyond, other laws may hold than those of the motion that was asked for: stops, other contact,
+/// friction at other speeds.
+const FOLLOWING: [f64; 2] = [0.1, 1.0];
+
+/// The largest tracking error of each joint with which it still follows, rad (m).
+pub(crate) fn following_limits(task: &IterationTask) -> Vec<f64> {
+    let range = |joint: usize| {
+        let of_leg = |leg: &crate::leg::Leg| {
+            let motion = leg.reference().motion();
+            let q = &motion.q[motion.of(joint)];
+            let (low, high) = q.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| (l.min(*q), h.max(*q)));
+            high - low
+        };
+        task.legs.iter().map(of_leg).fold(0.0, f64::max)
+    };
+    (0..task.robot.dof()).map(|joint| (0.5 * range(joint)).clamp(FOLLOWING[0], FOLLOWING[1])).collect()
+}
+
+/// What the records of a run show, with the prediction by `known`, what was known before it; `task` with the friction
+/// in force.
+///
+/// # Errors
+/// Records that do not belong to the task.
+pub(crate) fn examined(
+    task: &IterationTask,
+    records: &[Record],
+    settings: &RunIdentificationSettings,
+    known: Option<&RunEstimate>,
+) -> Result<RunEvidence, IterationError> {
+    let dof = task.robot.dof();
+    let noise = torque_noise(records, dof);
+    let mut joints = Vec::with_capacity(dof);
+    for (joint, &torque_noise) in noise.iter().enumerate() {
+        let (mut square, mut count) = (0.0, 0.0);
+        for record in records {
+            square += record.tau[record.of(joint)].iter().map(|tau| tau * tau).sum::<f64>();
+            count += record.samples as f64;
+        }
+        let limit = task.torque_limits.as_ref().map(|limits| limits[joint]);
+        joints.push(JointEvidence {
+            torque_rms: if count > 0.0 { (square / count).sqrt() } else { 0.0 },
+            torque_noise,
+            row_noise: torque_noise * filtered_share(records, settings),
+            clipping: clipping(records, joint, limit, torque_noise),
+            prediction: None,
+            tracking_floor_rad: None,
+        });
+    }
+    if let Some(known) = known.filter(|known| known.values.len() == task.robot.layout().columns().len()) {
+        predict(&mut joints, task, records, (settings, known))?;
+    }
+    Ok(RunEvidence { log_rates_hz: records.iter().map(|record| record.rate_hz).collect(), joints })
+}
+
+/// The largest noise of one torque over the legs, joint by joint.
+fn torque_noise(records: &[Record], dof: usize) -> Vec<f64> {
+    let mut most = vec![0.0_f64; dof];
+    for record in records.iter().filter(|record| record.samples > 0) {
+        let columns =
+            |values: &[f64]| -> Vec<Vec<f64>> { values.chunks_exact(record.samples).map(<[f64]>::to_vec).collect() };
+        let (q, tau) = (columns(&record.q), columns(&record.tau));
+        // Torque has faded where positions have: friction at reversals alone goes beyond.
+        let found = position_noise(&tau, record.rate_hz, cutoff(&q, record.rate_hz).cutoff_hz);
+        most.iter_mut().zip(found).for_each(|(most, noise)| *most = most.max(noise));
+    }
+    most
+}
+
+/// What the parallel filter leaves of white noise.
+fn filtered_share(records: &[Record], settings: &RunIdentificationSettings) -> f64 {
+    let (Some(filter), Some(record)) = (&settings.parallel_filter, records.first()) else { return 1.0 };
+    let cutoff_hz = filter.cutoff_hz.unwrap_or(0.4 * record.rate_hz / filter.factor.max(1) as f64);
+    (2.0 * cutoff_hz / record.rate_hz).min(1.0).sqrt()
+}
+
+/// Predictions of the legs that carry nothing unknown.
+fn predict(
+    joints: &mut [JointEvidence],
+    task: &IterationTask,
+    records: &[Record],
+    (settings, known): (&RunIdentificationSettings, &RunEstimate),
+) -> Result<(), IterationError> {
+    let recordings = recordings(task, &[RunLog { run: 1, records, joint_sigma: &[] }], settings)?;
+    let identification = identification_settings(task, settings, 1);
+    let all: Vec<usize> = (0..recordings.len()).collect();
+    let logs = Logs::new(task.robot.model(), &recordings, identification.filters(), &all, None, Execution::default())?;
+    let model = RegressorModel::from(task.robot.clone());
+    let model = model.clone().with_load_of(&model, &known.values);
+    let added =
+        known_payloads(&settings.payloads, &model).map_err(dynident_identification::IdentificationError::from)?;
+    // Legs with the same payload together.
+    let mut groups: Vec<(Vec<f64>, Vec<usize>)> = Vec::new();
+    for index in all {
+        let theta = match &recordings[index].payload {
+            None => known.values.clone(),
+            Some(name) => {
+                let Some((_, added)) = added.iter().find(|(known, _)| known == name) else { continue };
+                known.values.iter().zip(added).map(|(value, added)| value + added).collect()
+            }
+        };
+        match groups.iter_mut().find(|(other, _)| *other == theta) {
+            Some((_, legs)) => legs.push(index),
+            None => groups.push((theta, vec![index])),
+        }
+    }
+    for (theta, legs) in groups {
+        let known = Known { theta: &theta, covariance: &known.covariance, joint_sigma: &known.joint_sigma };
+        for (joint, found) in joints.iter_mut().zip(predictions(&logs, &model, &legs, &known)?) {
+            // The worst of several.
+            let better = |old: &crate::evidence::Prediction| found.is_none_or(|new| old.inside <= new.inside);
+            joint.prediction = joint.prediction.filter(better).or(found);
+        }
+    }
+    Ok(())
+}
+
+/// Adds what noise, friction and delay explain of each joint's tracking error, where one is beyond the tolerance. `own`
+/// is the run's own estimate, `known` what is known after it.
+pub(crate) fn add_tracking_floors(
+    evidence: &mut RunEvidence,
+    task: &IterationTask,
+    records: &[Record],
+    settings: &IterationSettings,
+    (own, known): (&RunEstimate, &RunEstimate),
+    errors_rad: &[f64],
+) {
+    let Some(parameters) = &known.possible else { return };
+    if errors_rad.iter().all(|error| *error <= settings.settled.tracking_tolerance) {
+        return;
+    }
+    let beyond = own.torque_lags.iter().flatten().filter(|lag| lag.lag_s.abs() > lag.half_width_95_s);
+    let delay_s = beyond.map(|lag| lag.lag_s.abs()).fold(0.0, f64::max);
+    let mut floors = vec![0.0_f64; task.robot.dof()];
+    for (leg, record) in task.legs.iter().zip(records) {
+        let q: Vec<&[f64]> = record.q.chunks_exact(record.samples.max(1)).collect();
+        let position_noise = &position_noise(&q, record.rate_hz, cutoff(&q, record.rate_hz).cutoff_hz)[..];
+        let (robot, controller) = (&task.robot, &settings.controller);
+        let known = KnownLoop { robot, parameters, controller, position_noise, delay_s };
+        let Some(of_leg) = tracking_floor(leg.reference(), &known) else { return };
+        floors.iter_mut().zip(of_leg).for_each(|(most, floor)| *most = most.max(floor));
+    }
+    for (joint, floor) in evidence.joints.iter_mut().zip(floors) {
+        joint.tracking_floor_rad = Some(floor);
+    }
+}

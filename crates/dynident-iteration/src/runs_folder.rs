@@ -1,0 +1,111 @@
+//! What stands in `runs/`, and what of it may be removed: only what an iteration wrote there.
+
+use crate::error::IterationError;
+use std::fs::{self, DirEntry};
+use std::path::{Path, PathBuf};
+
+/// What a run's folder begins with until it is whole.
+pub(crate) const UNFINISHED: &str = ".unfinished-";
+/// What a run's folder begins with.
+const RUN: &str = "run_";
+/// What the folder of a run that a stop cut short begins with.
+pub(crate) const INTERRUPTED: &str = "interrupted_";
+/// The file of a run.
+pub(crate) const RUN_FILE: &str = "run.json";
+/// The file of a run that a stop cut short.
+pub(crate) const INTERRUPTED_FILE: &str = "interrupted.json";
+
+/// The folders of an iteration that are there.
+pub(crate) struct RunsFolder {
+    runs: PathBuf,
+    kept: Vec<PathBuf>,
+    unfinished: Vec<PathBuf>,
+}
+
+impl RunsFolder {
+    /// Looks, and changes nothing.
+    ///
+    /// # Errors
+    /// Something of another's in the place of a run: nothing could be kept there.
+    pub(crate) fn look(runs: &Path) -> Result<Self, IterationError> {
+        let (mut kept, mut unfinished) = (Vec::new(), Vec::new());
+        for entry in fs::read_dir(runs).map_err(IterationError::file(runs))? {
+            let entry = entry.map_err(IterationError::file(runs))?;
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if name.starts_with(UNFINISHED) && is_folder(&entry) {
+                unfinished.push(entry.path());
+            } else if let Some(number) = name.strip_prefix(RUN)
+                && number.parse::<usize>().is_ok()
+            {
+                if !is_folder(&entry) || !entry.path().join(RUN_FILE).is_file() {
+                    let problem = "stands where a run is to be kept, and no iteration wrote it: move it away";
+                    return Err(IterationError::State { path: entry.path(), problem: problem.to_owned() });
+                }
+                kept.push(entry.path());
+            } else if name.starts_with(INTERRUPTED) && is_folder(&entry) {
+                kept.push(entry.path());
+            }
+        }
+        Ok(Self { runs: runs.to_owned(), kept, unfinished })
+    }
+
+    /// Removes the runs, if nothing but an iteration's files is in them.
+    ///
+    /// # Errors
+    /// A folder behind a symbolic link, files of somebody else's: then nothing is removed.
+    pub(crate) fn remove_runs(&self) -> Result<(), IterationError> {
+        if self.kept.is_empty() {
+            return Ok(());
+        }
+        if self.runs.is_symlink() {
+            let problem =
+                "is a symbolic link, and runs are not removed through one: give another --out, or remove them";
+            return Err(IterationError::State { path: self.runs.clone(), problem: problem.to_owned() });
+        }
+        for folder in &self.kept {
+            for file in files(folder)? {
+                if !is_own(&file) {
+                    let problem = "is no file of an iteration, so its folder is not removed: move it away";
+                    return Err(IterationError::State { path: file, problem: problem.to_owned() });
+                }
+            }
+        }
+        self.kept.iter().try_for_each(|folder| remove(folder))
+    }
+
+    /// Removes what a killed iteration left half written.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub(crate) fn remove_unfinished(&self) -> Result<(), IterationError> {
+        let own = |folder: &&PathBuf| files(folder).is_ok_and(|files| files.iter().all(|file| is_own(file)));
+        self.unfinished.iter().filter(own).try_for_each(|folder| remove(folder))
+    }
+}
+
+/// A folder itself, not a link to one.
+fn is_folder(entry: &DirEntry) -> bool {
+    entry.file_type().is_ok_and(|kind| kind.is_dir())
+}
+
+fn files(folder: &Path) -> Result<Vec<PathBuf>, IterationError> {
+    let entries = fs::read_dir(folder).map_err(IterationError::file(folder))?;
+    entries.map(|entry| Ok(entry.map_err(IterationError::file(folder))?.path())).collect()
+}
+
+/// Whether it is a file by a name that an iteration gives.
+fn is_own(file: &Path) -> bool {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let numbered = |rest: &str| rest.strip_suffix(".csv").is_some_and(|number| number.parse::<usize>().is_ok());
+    let known =
+        matches!(&*name, RUN_FILE | INTERRUPTED_FILE | "log.csv") || name.strip_prefix("log_").is_some_and(numbered);
+    known && file.symlink_metadata().is_ok_and(|meta| meta.is_file())
+}
+
+/// Removes the files, then the folder, which is empty now.
+fn remove(folder: &Path) -> Result<(), IterationError> {
+    for file in files(folder)? {
+        fs::remove_file(&file).map_err(IterationError::file(&file))?;
+    }
+    fs::remove_dir(folder).map_err(IterationError::file(folder))
+}

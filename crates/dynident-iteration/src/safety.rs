@@ -1,0 +1,33 @@
+//! What keeps runs safe, apart from the robot itself.
+
+use crate::rehearsal::RehearsalSettings;
+use crate::robot::Envelope;
+use dynident_simulation::{SimulationError, require};
+
+/// What keeps runs safe, apart from the robot itself.
+#[derive(Clone, Debug, Default)]
+pub struct SafetySettings {
+    /// Whether the robot is one outside. A run of it that was stopped early ends the iteration until somebody has
+    /// looked and calls again, unless every run is allowed one by one anyhow. Default false.
+    pub outside: bool,
+    /// What no sample may leave. Default none.
+    pub envelope: Option<Envelope>,
+    /// How every motion is rehearsed before it is commanded. Default not at all.
+    pub rehearsal: Option<RehearsalSettings>,
+    /// Shares of its speed at which the motion is run before the first run, slowest first; those of 1 are the run
+    /// itself. Default none. These runs are not identified.
+    pub speed_steps: Vec<f64>,
+}
+
+impl SafetySettings {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// Shares that are not within (0, 1]; [`RehearsalSettings::validate`].
+    pub fn validate(&self) -> Result<(), SimulationError> {
+        for &step in &self.speed_steps {
+            require(step > 0.0 && step <= 1.0, "speed_steps", step, "give shares of the speed: above 0, at most 1")?;
+        }
+        self.rehearsal.as_ref().map_or(Ok(()), RehearsalSettings::validate)
+    }
+}

@@ -1,0 +1,391 @@
+//! Stops: asked for, or because a sample leaves its envelope; in every mode, with a robot that answers and with one
+//! that does not; and no process of a robot is left.
+
+use super::robots::{client, joints, pd, reference};
+use dynident_dynamics::ParametricModel;
+use dynident_iteration::robot::{
+    Breach, Envelope, EnvelopeQuantity, FolderRobot, FolderSettings, ProcessLimits, ProcessMode, ProcessRobot,
+    ProcessSettings, Stopping,
+};
+use dynident_iteration::{
+    Iteration, IterationSettings, IterationStatus, IterationStore, IterationTask, NextMotion, Robot, RobotFault,
+    RobotRun, RobotStatus, RunRecord, RunRequest, SafetySettings, SimulatedRobot, StopSignal, Supervisor,
+    iterate_supervised,
+};
+use dynident_model::load_robot;
+use dynident_simulation::{LoopSettings, Plant, Reference};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+const BOTH: [ProcessMode; 2] = [ProcessMode::Run, ProcessMode::Step];
+
+fn urdf() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/planar2r.urdf")
+}
+
+/// The example program with a fault and a marker file in the folder.
+fn command(fault: &str, folder: &Path) -> Vec<String> {
+    let marker = folder.join("marker");
+    let words = [&client(), &urdf(), Path::new("--fault"), Path::new(fault), Path::new("--marker"), &marker];
+    words.iter().map(|word| word.to_str().unwrap().to_owned()).collect()
+}
+
+fn settings(mode: ProcessMode, command: Vec<String>) -> ProcessSettings {
+    let limits = ProcessLimits { message_s: 60.0, stop_s: 60.0, bye_s: 0.2, ..ProcessLimits::default() };
+    ProcessSettings { command, mode, limits, folder: None }
+}
+
+/// What the program wrote into its marker file, once it has.
+fn marked(folder: &Path) -> String {
+    // A program that never comes to its mark is a failure, not a test without an end.
+    for _ in 0..30_000 {
+        match std::fs::read_to_string(folder.join("marker")) {
+            Ok(word) => return word,
+            Err(_) => std::thread::sleep(Duration::from_millis(2)),
+        }
+    }
+    panic!("the program never came to its mark");
+}
+
+/// Whether a process by this number runs: one that has ended and that nobody has asked for does not.
+fn runs(id: &str) -> bool {
+    let state = Command::new("ps").args(["-o", "stat=", "-p", id]).output().unwrap();
+    let state = String::from_utf8_lossy(&state.stdout).trim().to_owned();
+    !state.is_empty() && !state.starts_with('Z')
+}
+
+/// A run that is stopped once the program has marked its place.
+fn stopped_at_the_mark(robot: &mut ProcessRobot, folder: &Path) -> RobotRun {
+    let stop = StopSignal::default();
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            marked(folder);
+            stop.request();
+        });
+        let (reference, controller) = (reference(), pd());
+        robot.run(&RunRequest { stop: Some(&stop), ..RunRequest::new(1, &reference, &controller) }).unwrap()
+    })
+}
+
+/// The program is silent in the middle of a motion: the stop is the next message it gets, and the samples are kept.
+#[test]
+fn a_stop_reaches_the_robot_in_every_mode() {
+    for mode in BOTH {
+        let folder = tempfile::tempdir().unwrap();
+        let mut robot = ProcessRobot::new(settings(mode, command("wait", folder.path())), joints()).unwrap();
+        let run = stopped_at_the_mark(&mut robot, folder.path());
+        assert_eq!(run.status, RobotStatus::Interrupted { stopping: Stopping::Confirmed }, "{mode:?}");
+        assert_eq!((run.record.samples, run.record.q.len()), (50, 100), "{mode:?}");
+        // The next run is not begun.
+        let stop = StopSignal::default();
+        stop.request();
+        let (reference, controller) = (reference(), pd());
+        let again =
+            robot.run(&RunRequest { stop: Some(&stop), ..RunRequest::new(2, &reference, &controller) }).unwrap();
+        assert_eq!((again.status.is_done(), again.record.samples), (false, 0));
+    }
+}
+
+/// A program that does not answer its stop is killed, behind a shell as well, and the verdict says that nobody knows.
+#[test]
+fn a_robot_that_ignores_its_stop_is_killed() {
+    for shell in [false, true] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut own = command("ignore", folder.path());
+        if shell {
+            let line = format!("'{}'; echo over >&2", own.join("' '"));
+            own = ["sh", "-c", &line].map(str::to_owned).to_vec();
+        }
+        let mut settings = settings(ProcessMode::Run, own);
+        settings.limits.stop_s = 0.2;
+        let mut robot = ProcessRobot::new(settings, joints()).unwrap();
+        let run = stopped_at_the_mark(&mut robot, folder.path());
+        assert_eq!(run.status, RobotStatus::Interrupted { stopping: Stopping::Unanswered });
+        assert!(run.status.to_string().contains("look at the robot"));
+        assert!(!runs(&marked(folder.path())), "behind a shell: {shell}");
+    }
+}
+
+/// Who hangs behind a shell is given up with all of its group; a program that dies while a process of its own holds its
+/// output is known to be dead, and that process goes as well.
+#[test]
+fn no_process_of_a_robot_is_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let line = format!("'{}'; echo over >&2", command("hang", folder.path()).join("' '"));
+    let mut settings = settings(ProcessMode::Run, ["sh", "-c", &line].map(str::to_owned).to_vec());
+    settings.limits.run_s = Some(2.0);
+    let (reference, controller) = (reference(), pd());
+    let request = RunRequest::new(1, &reference, &controller);
+    let run = ProcessRobot::new(settings.clone(), joints()).unwrap().run(&request).unwrap();
+    assert!(matches!(run.status, RobotStatus::Failed { fault: RobotFault::Hung { .. } }), "{}", run.status);
+    assert!(!runs(&marked(folder.path())));
+
+    let folder = tempfile::tempdir().unwrap();
+    settings = self::settings(ProcessMode::Run, command("orphan", folder.path()));
+    // Far longer than this test may last: death is seen by the process.
+    settings.limits.message_s = 3000.0;
+    let run = ProcessRobot::new(settings, joints()).unwrap().run(&request).unwrap();
+    let RobotStatus::Failed { fault: RobotFault::Died { exit, said, .. } } = &run.status else {
+        panic!("{}", run.status)
+    };
+    assert!(exit.contains('4') && said.contains("left alone"), "{}", run.status);
+    assert!(!runs(&marked(folder.path())));
+}
+
+/// A second Ctrl-C does not wait: the program's group is killed from another thread.
+#[test]
+fn robots_can_be_killed_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut settings = settings(ProcessMode::Run, command("hang", folder.path()));
+    settings.limits.message_s = 3000.0;
+    let mut robot = ProcessRobot::new(settings, joints()).unwrap();
+    let stop = StopSignal::default();
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            marked(folder.path());
+            stop.kill_robots();
+        });
+        let (reference, controller) = (reference(), pd());
+        let run = robot.run(&RunRequest { stop: Some(&stop), ..RunRequest::new(1, &reference, &controller) }).unwrap();
+        let RobotStatus::Failed { fault: RobotFault::Died { exit, .. } } = &run.status else {
+            panic!("{}", run.status)
+        };
+        assert!(exit.contains('9'), "{exit}");
+    });
+    assert!(!runs(&marked(folder.path())));
+}
+
+fn envelope() -> Envelope {
+    let none = vec![None, None];
+    Envelope {
+        lower: none.clone(),
+        upper: none.clone(),
+        speed: none.clone(),
+        torque: none.clone(),
+        tracking_error: none,
+    }
+}
+
+fn watched(mode: ProcessMode, envelope: &Envelope, folder: &Path, unwatched: bool) -> RobotRun {
+    let mut own = command("", folder);
+    if unwatched {
+        own.extend(["--unwatched", "yes"].map(str::to_owned));
+    }
+    let (reference, controller) = (reference(), pd());
+    let mut robot = ProcessRobot::new(settings(mode, own), joints()).unwrap();
+    robot.run(&RunRequest { envelope: Some(envelope), ..RunRequest::new(1, &reference, &controller) }).unwrap()
+}
+
+/// The arm sags under joint PD: the first sample that is too far from the path ends the run, with joint, quantity,
+/// value, limit and time, whether the program watches or not; and in the mode step the next thing the program hears is
+/// a stop.
+#[test]
+fn a_sample_outside_of_the_envelope_stops_the_run() {
+    let tight = Envelope { tracking_error: vec![None, Some(0.01)], ..envelope() };
+    for (mode, unwatched) in [(ProcessMode::Run, false), (ProcessMode::Run, true), (ProcessMode::Step, false)] {
+        let folder = tempfile::tempdir().unwrap();
+        let run = watched(mode, &tight, folder.path(), unwatched);
+        let RobotStatus::LeftEnvelope { breach, stopping: Stopping::Confirmed } = &run.status else {
+            panic!("{mode:?}: {}", run.status)
+        };
+        let Breach { joint, quantity, value, limit, time_s } = breach.clone();
+        assert_eq!((&*joint, quantity, limit), ("joint2", EnvelopeQuantity::TrackingError, 0.01));
+        assert!(value.abs() > 0.01 && time_s > 0.0, "{breach}");
+        let text = run.status.to_string();
+        assert!(text.contains("tracking error of joint2") && text.contains("its limit 0.0100"), "{text}");
+        if mode == ProcessMode::Step {
+            // The state of sample k follows k torques: none came after the breach.
+            let last = run.record.samples - 1;
+            assert!(marked(folder.path()).ends_with(&format!("after {last} torques")));
+        }
+    }
+    // A torque beyond the envelope is never sent.
+    let folder = tempfile::tempdir().unwrap();
+    let weak = Envelope { torque: vec![Some(1.0), Some(1.0)], ..envelope() };
+    let run = watched(ProcessMode::Step, &weak, folder.path(), false);
+    assert!(matches!(&run.status, RobotStatus::LeftEnvelope { breach, .. }
+        if breach.quantity == EnvelopeQuantity::Torque && breach.value.abs() > 1.0));
+    assert!(run.record.samples > 1, "at rest on the path a joint PD asks for nothing");
+    // Inside a wide one nothing happens.
+    let wide = Envelope { tracking_error: vec![Some(3.0); 2], speed: vec![Some(50.0); 2], ..envelope() };
+    for mode in BOTH {
+        assert!(watched(mode, &wide, folder.path(), false).status.is_done());
+    }
+}
+
+/// Nobody can stop a person's robot, but a log that leaves the envelope is no good run.
+#[test]
+fn a_folders_log_is_watched_afterwards() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut robot =
+        FolderRobot::new(FolderSettings { folder: folder.path().to_owned(), wait_s: 0.0 }, joints()).unwrap();
+    let (reference, controller) = (reference(), pd());
+    let tight = Envelope { tracking_error: vec![Some(0.01); 2], ..envelope() };
+    let request = RunRequest { envelope: Some(&tight), ..RunRequest::new(1, &reference, &controller) };
+    assert!(matches!(robot.run(&request).unwrap().status, RobotStatus::Waiting { .. }));
+    let file = std::fs::read_to_string(robot.run_folder(1).join("controller.json")).unwrap();
+    let file: serde_json::Value = serde_json::from_str(&file).unwrap();
+    assert_eq!(file["envelope"]["tracking_error"][1], 0.01);
+    let plant = Plant::new(&load_robot(urdf()).unwrap().model, &[], &[]).unwrap();
+    let mut simulator = SimulatedRobot::new(plant, LoopSettings::default()).unwrap();
+    let simulated = simulator.run(&RunRequest::new(1, &reference, &controller)).unwrap();
+    std::fs::write(robot.run_folder(1).join("log.csv"), simulated.record.csv()).unwrap();
+    let status = robot.run(&request).unwrap().status;
+    assert!(matches!(status, RobotStatus::LeftEnvelope { stopping: Stopping::SeenAfterwards, .. }), "{status}");
+    // Another envelope is no other run: the log is taken.
+    let wide = Envelope { tracking_error: vec![Some(3.0); 2], ..envelope() };
+    let run = robot.run(&RunRequest { envelope: Some(&wide), ..request }).unwrap();
+    assert!(run.status.is_done(), "{}", run.status);
+}
+
+/// Samples may come when the motion is over: its length counts on top of the limit for messages.
+#[test]
+fn samples_may_come_afterwards() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut settings = settings(ProcessMode::Run, command("afterwards", folder.path()));
+    // The program is silent for three quarters of the motion, 4.5 s; 2 + 6 s are allowed.
+    settings.limits.message_s = 2.0;
+    let reference = Reference::standing(&[-0.4, 0.3], 100.0, 6.0).unwrap();
+    let controller = pd();
+    let run = ProcessRobot::new(settings, joints()).unwrap().run(&RunRequest::new(1, &reference, &controller)).unwrap();
+    assert!(run.status.is_done(), "{}", run.status);
+}
+
+/// Stops after so many runs; notes what it was asked.
+struct Watcher {
+    stop: StopSignal,
+    stop_after: usize,
+    asked: Vec<NextMotion>,
+    made: usize,
+}
+
+impl Supervisor for Watcher {
+    fn stop(&self) -> Option<&StopSignal> {
+        Some(&self.stop)
+    }
+
+    fn allows(&mut self, motion: &NextMotion) -> bool {
+        self.asked.push(motion.clone());
+        true
+    }
+
+    fn made(&mut self, _: &RunRecord, _: &[RobotRun]) {
+        self.made += 1;
+        if self.made == self.stop_after {
+            self.stop.request();
+        }
+    }
+}
+
+fn iteration(safety: SafetySettings) -> Iteration {
+    let robot = ParametricModel::new(load_robot(urdf()).unwrap().model, Vec::new()).unwrap();
+    let mut settings = IterationSettings { model_free: pd(), controller: pd(), safety, ..IterationSettings::default() };
+    // Never settled: it is stops that end these.
+    settings.settled.most_uncertain = 0.0;
+    Iteration::new(IterationTask::new(robot, reference()).unwrap(), settings).unwrap()
+}
+
+fn watcher(stop_after: usize) -> Watcher {
+    Watcher { stop: StopSignal::default(), stop_after, asked: Vec::new(), made: 0 }
+}
+
+/// Between two runs: the next one is not commanded, and a later call goes on with it.
+#[test]
+fn a_stop_between_runs_ends_the_iteration() {
+    let folder = tempfile::tempdir().unwrap();
+    let iteration = iteration(SafetySettings { outside: true, ..SafetySettings::default() });
+    let store = IterationStore::open(folder.path(), "test", true).unwrap();
+    let mut robot = ProcessRobot::new(settings(ProcessMode::Run, command("", folder.path())), joints()).unwrap();
+    for runs in [1, 2] {
+        let mut watcher = watcher(1);
+        let outcome = iterate_supervised(&iteration, &mut [&mut robot], Some(&store), &mut watcher).unwrap();
+        let IterationStatus::Interrupted { reason } = &outcome.status else { panic!("{}", outcome.status) };
+        assert!(reason.contains(&format!("goes on with run {}", runs + 1)), "{reason}");
+        assert_eq!((outcome.runs.len(), watcher.asked.len()), (runs, 1));
+        assert_eq!(watcher.asked[0].run, runs);
+    }
+}
+
+/// In the middle of a run: the run does not count, what was recorded of it is kept beside the runs, and a fresh start
+/// removes it with them.
+#[test]
+fn a_run_that_is_cut_short_is_kept_aside() {
+    let folder = tempfile::tempdir().unwrap();
+    let iteration = iteration(SafetySettings { outside: true, ..SafetySettings::default() });
+    let store = IterationStore::open(folder.path(), "test", true).unwrap();
+    let mut robot = ProcessRobot::new(settings(ProcessMode::Run, command("wait", folder.path())), joints()).unwrap();
+    let mut watcher = watcher(0);
+    let stop = watcher.stop.clone();
+    let outcome = std::thread::scope(|scope| {
+        scope.spawn(|| {
+            marked(folder.path());
+            stop.request();
+        });
+        iterate_supervised(&iteration, &mut [&mut robot], Some(&store), &mut watcher).unwrap()
+    });
+    let IterationStatus::Interrupted { reason } = &outcome.status else { panic!("{}", outcome.status) };
+    assert!(reason.contains("goes on with run 1") && outcome.runs.is_empty(), "{reason}");
+    let kept = folder.path().join("runs/interrupted_1");
+    assert_eq!(std::fs::read_to_string(kept.join("log.csv")).unwrap().lines().count(), 51);
+    assert!(store.records().unwrap().is_empty());
+    IterationStore::open(folder.path(), "test", false).unwrap();
+    assert!(!kept.exists());
+}
+
+/// A run of a robot outside that ends early is looked at by a person before the next one: one run for each call.
+#[test]
+fn after_an_early_end_somebody_looks() {
+    let folder = tempfile::tempdir().unwrap();
+    let tight = Envelope { tracking_error: vec![Some(0.01); 2], ..envelope() };
+    let iteration = iteration(SafetySettings { outside: true, envelope: Some(tight), ..SafetySettings::default() });
+    let store = IterationStore::open(folder.path(), "test", true).unwrap();
+    let mut robot = ProcessRobot::new(settings(ProcessMode::Run, command("", folder.path())), joints()).unwrap();
+    for runs in [1, 2] {
+        let outcome = iterate_supervised(&iteration, &mut [&mut robot], Some(&store), &mut watcher(0)).unwrap();
+        let IterationStatus::Waiting { reason } = &outcome.status else { panic!("{}", outcome.status) };
+        assert!(reason.contains("out of the envelope") && reason.contains("Look at the robot"), "{reason}");
+        assert_eq!(outcome.runs.len(), runs);
+        assert!(outcome.runs.iter().all(|run| !run.done && !run.accepted));
+    }
+}
+
+/// A fresh start removes what an iteration wrote, and nothing else: not through a link, not what a person put there.
+#[cfg(unix)]
+#[test]
+fn a_fresh_start_removes_only_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let iteration = iteration(SafetySettings::default());
+    let plant = Plant::new(&load_robot(urdf()).unwrap().model, &[], &[]).unwrap();
+    let mut robot = SimulatedRobot::new(plant, LoopSettings::default()).unwrap();
+    let make = |folder: &Path, robot: &mut SimulatedRobot| {
+        let store = IterationStore::open(folder, "test", true).unwrap();
+        iterate_supervised(&iteration, &mut [robot], Some(&store), &mut watcher(1)).unwrap();
+    };
+    let own = folder.path().join("own");
+    make(&own, &mut robot);
+    let refused = |folder: &Path, what: &str| {
+        let error = IterationStore::open(folder, "other", false).unwrap_err().to_string();
+        assert!(error.contains(what), "{error}");
+    };
+    // Notes of a person stay, and so does everything else.
+    let notes = own.join("runs/run_1/notes.txt");
+    std::fs::write(&notes, "cable loose").unwrap();
+    refused(&own, "notes.txt");
+    assert!(own.join("runs/run_1/run.json").exists());
+    std::fs::remove_file(notes).unwrap();
+    // Runs behind a link stay.
+    let link = folder.path().join("linked");
+    std::fs::create_dir(&link).unwrap();
+    std::os::unix::fs::symlink(own.join("runs"), link.join("runs")).unwrap();
+    refused(&link, "symbolic link");
+    assert!(own.join("runs/run_1/run.json").exists());
+    std::fs::remove_file(link.join("runs")).unwrap();
+    std::fs::create_dir(link.join("runs")).unwrap();
+    std::os::unix::fs::symlink(own.join("runs/run_1"), link.join("runs/run_1")).unwrap();
+    refused(&link, "move it away");
+    // Of somebody else's folder that is no run's nothing is touched.
+    std::fs::create_dir(own.join("runs/run_fast")).unwrap();
+    IterationStore::open(&own, "other", false).unwrap();
+    assert!(own.join("runs/run_fast").exists() && !own.join("runs/run_1").exists());
+}

@@ -1,0 +1,119 @@
+//! The position loop that a robot's drives have themselves, with or without torque (or current) fed forward.
+
+use super::{Controller, ControllerModel, FrictionCompensation, JointPd, JointPdSettings, Measured, Target};
+use crate::error::SimulationError;
+use crate::per_joint::PerJoint;
+use serde::{Deserialize, Serialize};
+
+pub(super) const NAME: &str = "position-loop";
+
+/// Settings of [`PositionLoop`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct PositionLoopSettings {
+    /// Whether the model's torque along the reference is handed to the drives; true by default. Without it they get
+    /// nothing but a path.
+    #[serde(default = "fed_forward")]
+    pub feed_forward: bool,
+    /// What the loop's stiffness is believed to be, Nm/rad (N/m), for simulations. The robot's own is in force.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kp: Option<PerJoint>,
+    /// The same of its damping, Nm s/rad (N s/m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kd: Option<PerJoint>,
+}
+
+fn fed_forward() -> bool {
+    true
+}
+
+impl PositionLoopSettings {
+    /// The drives' own loop, with the model's torque or with nothing but a path.
+    pub fn of_robot(feed_forward: bool) -> Self {
+        Self { feed_forward, kp: None, kd: None }
+    }
+
+    /// Checks the gains for so many joints, if they are stated.
+    ///
+    /// # Errors
+    /// Gains that are negative or not finite, lists of another length.
+    pub fn validate(&self, joints: usize) -> Result<(), SimulationError> {
+        self.believed().map_or(Ok(()), |gains| gains.validate(joints))
+    }
+
+    /// Whether both gains are stated.
+    pub fn can_be_simulated(&self) -> bool {
+        self.kp.is_some() && self.kd.is_some()
+    }
+
+    /// What is stated, none elsewhere.
+    fn believed(&self) -> Option<JointPdSettings> {
+        let none = || PerJoint::All(0.0);
+        (self.kp.is_some() || self.kd.is_some()).then(|| JointPdSettings {
+            kp: self.kp.clone().unwrap_or_else(none),
+            kd: self.kd.clone().unwrap_or_else(none),
+        })
+    }
+}
+
+/// The loop as it is believed to be, `τ = K_p e + K_d ė + τ̂(q_d, q̇_d, q̈_d)` with the model's torque along the
+/// reference where it is fed forward. On a robot it runs in the drives: what is handed over is the path, and that
+/// torque.
+#[derive(Clone, Debug)]
+pub struct PositionLoop {
+    pd: JointPd,
+    model: Option<ControllerModel>,
+    ahead: Vec<f64>,
+}
+
+impl PositionLoop {
+    /// The loop of so many joints; `model` is what is fed forward.
+    ///
+    /// # Errors
+    /// Gains that are not stated, or as [`PositionLoopSettings::validate`].
+    pub fn new(
+        joints: usize,
+        settings: &PositionLoopSettings,
+        model: Option<ControllerModel>,
+    ) -> Result<Self, SimulationError> {
+        let Some(gains) = settings.believed().filter(|_| settings.can_be_simulated()) else {
+            return Err(SimulationError::OwnLoop);
+        };
+        Ok(Self { pd: JointPd::new(joints, &gains)?, model, ahead: vec![0.0; joints] })
+    }
+}
+
+impl Controller for PositionLoop {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn joints(&self) -> usize {
+        self.ahead.len()
+    }
+
+    fn reset(&mut self) {
+        if let Some(model) = &mut self.model {
+            model.restart();
+        }
+    }
+
+    fn torque(&mut self, time_s: f64, target: Target<'_>, measured: Measured<'_>, tau: &mut [f64]) {
+        self.pd.torque(time_s, target, measured, tau);
+        let Some(model) = &mut self.model else { return };
+        let along = Measured { q: target.q, dq: target.dq };
+        model.torque(along, target, target.ddq, FrictionCompensation::Reference, &mut self.ahead);
+        for (tau, ahead) in tau.iter_mut().zip(&self.ahead) {
+            *tau += ahead;
+        }
+    }
+
+    fn set_model(&mut self, model: &ControllerModel) -> Result<(), SimulationError> {
+        model.check_joints(self.joints())?;
+        if self.model.is_some() {
+            self.model = Some(model.clone());
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,135 @@
+//! The robot that an iteration found, as `identify` writes one: result.json, the description with the new values,
+//! pages.
+
+use crate::error::Error;
+use crate::jobs::identify::{IdentificationOutcome, Made, written};
+use crate::jobs::options::RunOptions;
+use crate::jobs::provenance::{now, provenance, seen_from};
+use crate::output_set::OutputSet;
+use crate::result::{BaseParameterResult, Timings};
+use crate::study::{Study, StudyRobot};
+use dynident_identification::{IdentificationError, IdentificationTask, identify};
+use dynident_iteration::robot::{RunRequest, controller_json};
+use dynident_iteration::{Iteration, IterationError, IterationStore, ModelParameters, RunRecord, friction_chosen};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// The files of the robot that was found.
+const RESULT: &str = "result.json";
+const URDF: &str = "identified.urdf";
+const TABLE: &str = "identified.toml";
+const CONTROLLER: &str = "controller.json";
+const PAGE: &str = "identification.html";
+
+/// All of them: what the iteration writes when it ends, and what is absent until then.
+pub(super) const MODEL_FILES: [&str; 5] = [RESULT, URDF, TABLE, CONTROLLER, PAGE];
+
+/// An iteration of legs that are identified together, as it ended.
+pub(super) struct EndedStage<'a> {
+    pub(super) iteration: Iteration,
+    pub(super) records: Vec<RunRecord>,
+    pub(super) store: &'a IterationStore,
+}
+
+/// The files, by their names.
+pub(super) struct RobotFiles {
+    files: Vec<(&'static str, Vec<u8>)>,
+    /// The base parameters, with names, units and bars.
+    pub(super) base_parameters: Vec<BaseParameterResult>,
+}
+
+impl RobotFiles {
+    /// Of no robot: no run was good.
+    pub(super) fn none() -> Self {
+        Self { files: Vec::new(), base_parameters: Vec::new() }
+    }
+
+    /// The set with these files, and without the others.
+    pub(super) fn added_to(self, mut set: OutputSet) -> OutputSet {
+        for name in MODEL_FILES {
+            if self.files.iter().all(|(written, _)| *written != name) {
+                set = set.absent(name);
+            }
+        }
+        self.files.into_iter().fold(set, |set, (name, bytes)| set.file(name, bytes))
+    }
+}
+
+/// The robot that all good runs tell, all joints at once; none without a good run.
+///
+/// # Errors
+/// Logs that are not there any more, rows that carry no estimate.
+pub(super) fn robot_found(
+    (study, study_path): (&Study, &Path),
+    robot: &StudyRobot,
+    stages: &[EndedStage<'_>],
+    options: &RunOptions<'_>,
+    failed: impl Fn(IterationError) -> Error + Copy,
+) -> Result<RobotFiles, Error> {
+    let start = Instant::now();
+    let mut whole: Option<IdentificationTask> = None;
+    let mut logs: Vec<PathBuf> = Vec::new();
+    for stage in stages {
+        let Some(task) = stage.iteration.identification_task(&stage.records, stage.store).map_err(failed)? else {
+            continue;
+        };
+        let legs = stage.iteration.task().legs.len();
+        logs.extend(task.recordings.iter().enumerate().map(|(place, recording)| {
+            // Named `run 3, leg 2`.
+            let run = recording.name.split([' ', ',']).nth(1).and_then(|run| run.parse().ok()).unwrap_or(1);
+            stage.store.log_path(run, place % legs)
+        }));
+        match &mut whole {
+            Some(whole) => whole.recordings.extend(task.recordings),
+            None => whole = Some(task),
+        }
+    }
+    let (Some(task), Some(last)) = (whole, stages.last()) else { return Ok(RobotFiles::none()) };
+    let in_study = Error::identification::<IdentificationError>(study_path);
+    let mut found = identify(&task, options.execution()).map_err(&in_study)?;
+    found.training.friction_choice = friction_chosen(&last.records);
+    let mut read = vec![("robot", robot.robot.path.clone())];
+    read.extend(logs.iter().map(|log| ("log", log.clone())));
+    let timings = Timings {
+        logs: found.times.logs_s,
+        estimation: found.times.estimation_s,
+        validation: found.times.examination_s,
+        total: start.elapsed().as_secs_f64(),
+        made_at: now(),
+        ..Timings::default()
+    };
+    let parameters = found.consistent.parameters.clone();
+    let made = Made { timings, provenance: provenance(study, study_path, &read)?, is_payload: false };
+    let mut outcome = written((study, study_path), robot, &task, found, made)?;
+    let folder = study_path.parent().unwrap_or(Path::new(""));
+    for (summary, path) in outcome.result.logs.iter_mut().zip(&logs) {
+        summary.import.file = seen_from(folder, path);
+    }
+    let mut files = vec![
+        (RESULT, json(&outcome.result)?),
+        (CONTROLLER, json(&controller(last, &parameters).map_err(failed)?)?),
+        (PAGE, outcome.report()?.into_bytes()),
+    ];
+    let IdentificationOutcome { urdf, table, result, .. } = outcome;
+    files
+        .extend([(URDF, urdf), (TABLE, table)].into_iter().filter_map(|(name, text)| Some((name, text?.into_bytes()))));
+    Ok(RobotFiles { files, base_parameters: result.base_parameters })
+}
+
+fn json(value: &impl serde::Serialize) -> Result<Vec<u8>, Error> {
+    let mut bytes = serde_json::to_vec_pretty(value)
+        .map_err(|error| Error::Result { path: PathBuf::from(RESULT), message: error.to_string() })?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+/// The controller of a next run, with these parameters as its model.
+fn controller(stage: &EndedStage<'_>, parameters: &[f64]) -> Result<serde_json::Value, IterationError> {
+    let EndedStage { iteration, records, .. } = stage;
+    let model = iteration.controller_model(records, &ModelParameters::All(parameters.to_vec()))?;
+    let controller = &iteration.settings().controller;
+    let joints = iteration.task().robot.joint_names();
+    let reference = iteration.task().legs[0].reference();
+    let request = RunRequest { model: Some(&model), ..RunRequest::new(records.len() + 1, reference, controller) };
+    Ok(controller_json(&request, &joints))
+}

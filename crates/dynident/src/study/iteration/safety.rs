@@ -1,0 +1,128 @@
+//! What `[iteration]` says of a robot that moves for real: its gains, its envelope, the rehearsal.
+
+use super::{IterationSection, RobotChoice, Study};
+use crate::error::StudyError;
+use crate::study::StudyRobot;
+use dynident_iteration::robot::{EnvelopeSettings, ProcessLimits, ProcessMode};
+use dynident_iteration::{IterationSettings, SafetySettings, StartWith, derived_controllers};
+use dynident_simulation::controllers::PositionLoopSettings;
+use dynident_simulation::{ControllerSettings, Reference};
+
+impl IterationSection {
+    /// Whether the robot is not the simulator.
+    pub(crate) fn is_outside(&self) -> bool {
+        match self.robot {
+            RobotChoice::Simulation => false,
+            RobotChoice::Process(_) | RobotChoice::Folder(_) => true,
+        }
+    }
+
+    /// That a robot outside has gains that somebody stands for: stated, or by a stated bandwidth from a description
+    /// with bodies.
+    ///
+    /// # Errors
+    /// What is missing, and what to write.
+    pub(crate) fn check_gains(&self, study: &Study, robot: &StudyRobot) -> Result<(), StudyError> {
+        let controllers = [study.controller.as_ref(), self.model_free.as_ref(), self.first.as_ref()];
+        let own_loop = controllers.into_iter().flatten().any(|controller| !controller.can_be_simulated());
+        let steps = match &self.robot {
+            RobotChoice::Simulation => true,
+            RobotChoice::Process(process) => process.mode == ProcessMode::Step,
+            RobotChoice::Folder(_) => false,
+        };
+        if own_loop && steps {
+            let fix = "here Dynident computes every torque: state what kp and kd of the drives' loop are, or let a \
+                       program run it (mode = \"run\")";
+            return Err(StudyError::conflict("kind = \"position-loop\"", fix));
+        }
+        if !self.is_outside() {
+            return Ok(());
+        }
+        if self.bandwidth_hz.is_some() {
+            let unknown = robot.model().bodies_without_prior();
+            if unknown.is_empty() {
+                return Ok(());
+            }
+            let fix = "bandwidth_hz makes gains of the description's inertials: give them there, or state the gains";
+            return Err(StudyError::NoInertials { bodies: unknown.into_iter().map(str::to_owned).collect(), fix });
+        }
+        let missing = match (&self.model_free, &study.controller) {
+            (Some(_), Some(_)) | (None, Some(ControllerSettings::PositionLoop(_))) => return Ok(()),
+            (None, Some(_)) => "model_free",
+            (Some(_), None) => "[controller]",
+            (None, None) => "model_free and [controller]",
+        };
+        Err(StudyError::missing(
+            format!("gains ({missing})"),
+            "a robot outside has no default gains: what holds one arm drops another. Give bandwidth_hz (gains from the \
+             description's inertials, critically damped, say 2.0), [controller] with kind = \"position-loop\" (the \
+             drives' own loop), or model_free = { kind = \"joint-pd\", kp = [..], \
+             kd = [..] } and [controller] with gains that this robot has run under",
+        ))
+    }
+
+    /// The settings with controllers, envelope and rehearsal of the robot that is to move along `references`.
+    ///
+    /// # Errors
+    /// Numbers that do not fit.
+    pub(crate) fn guarded(
+        &self,
+        mut settings: IterationSettings,
+        study: &Study,
+        robot: &StudyRobot,
+        references: &[&Reference],
+    ) -> Result<IterationSettings, StudyError> {
+        self.rehearsal.validate()?;
+        let (outside, model) = (self.is_outside(), robot.model());
+        // Before there is a model the drives' loop gets nothing but the path.
+        if let (Some(ControllerSettings::PositionLoop(own)), None) = (&study.controller, &self.model_free) {
+            let own = PositionLoopSettings { feed_forward: false, ..own.clone() };
+            settings.model_free = ControllerSettings::PositionLoop(own);
+        }
+        if let Some(bandwidth) = &self.bandwidth_hz {
+            let uncertainty = self.rehearsal.uncertainty_percent;
+            let derived = derived_controllers(&robot.parametric, references, bandwidth, uncertainty)?;
+            let is_own = matches!(settings.model_free, ControllerSettings::PositionLoop(_));
+            if self.model_free.is_none() && !is_own {
+                settings.model_free = derived.model_free;
+            }
+            // Gains of the description's bodies: their weight is known as well.
+            if self.start.is_none() && self.model_free.is_none() {
+                settings.start = StartWith::Prior;
+            }
+            let open = self.start.is_none() || study.controller.is_none();
+            if self.first.is_none() && settings.start == StartWith::Prior && open {
+                settings.first = Some(derived.first);
+            }
+            if study.controller.is_none() {
+                settings.controller = derived.model_based;
+            }
+        }
+        let stated = self.envelope != EnvelopeSettings::default();
+        settings.safety = SafetySettings {
+            outside,
+            envelope: (outside || stated).then(|| self.envelope.envelope(model)).transpose()?,
+            rehearsal: outside.then(|| self.rehearsal.clone()),
+            speed_steps: self.speed_steps.clone(),
+        };
+        settings.safety.validate()?;
+        Ok(settings)
+    }
+
+    /// The section without what a run does not depend on: who speaks for the robot, how long that may take, and what
+    /// stops it. Runs made before these were corrected are still this iteration's.
+    pub(crate) fn of_runs(&self) -> Self {
+        let mut own = self.clone();
+        match &mut own.robot {
+            RobotChoice::Simulation => {}
+            RobotChoice::Process(process) => {
+                process.command.clear();
+                process.limits = ProcessLimits::default();
+                process.folder = None;
+            }
+            RobotChoice::Folder(folder) => folder.wait_s = 0.0,
+        }
+        own.envelope = EnvelopeSettings::default();
+        own
+    }
+}
