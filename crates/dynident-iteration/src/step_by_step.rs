@@ -77,10 +77,8 @@ pub(crate) fn step_by_step(
                 }
                 narrow_panel.extend_from_slice(&torque);
                 wide_panel.extend_from_slice(&torque);
-                for panel in [&mut narrow_panel, &mut wide_panel] {
-                    for value in panel.iter_mut() {
-                        *value *= weights[joint];
-                    }
+                for value in narrow_panel.iter_mut().chain(&mut wide_panel) {
+                    *value *= weights[joint];
                 }
                 factor.absorb(&narrow_panel, rows)?;
                 wide.absorb(&wide_panel, rows)?;

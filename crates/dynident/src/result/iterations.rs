@@ -3,7 +3,6 @@
 use super::identification::BaseParameterResult;
 use super::provenance::Provenance;
 use crate::error::Error;
-use core::fmt::Write as _;
 use dynident_identification::examination::TorqueLag;
 use dynident_iteration::{RunEvidence, Shortfall};
 use serde::{Deserialize, Serialize};
@@ -83,13 +82,13 @@ impl IterationsFile {
     /// The state in one line: how it stands, runs, tracking, what is unmet.
     pub fn status_line(&self) -> String {
         let good = self.runs.iter().filter(|run| run.accepted).count();
-        let mut line = format!("{}: {}; {good} good of {} runs", self.name, self.reason, self.runs.len());
-        if let Some(last) = self.runs.iter().rfind(|run| run.accepted) {
+        let last = self.runs.iter().rfind(|run| run.accepted);
+        let tracking = last.map_or_else(String::new, |last| {
             let worst = last.max_tracking_error_rad.iter().fold(0.0_f64, |most, error| most.max(*error));
-            // Writing to a string cannot fail.
-            let _ = write!(line, "; tracking {worst:.2e} rad (m)");
-        }
-        if self.converged { line } else { format!("{line}; {} unmet", self.unmet.len()) }
+            format!("; tracking {worst:.2e} rad (m)")
+        });
+        let unmet = if self.converged { String::new() } else { format!("; {} unmet", self.unmet.len()) };
+        format!("{}: {}; {good} good of {} runs{tracking}{unmet}", self.name, self.reason, self.runs.len())
     }
 }
 

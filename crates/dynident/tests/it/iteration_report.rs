@@ -134,7 +134,14 @@ fn an_iteration_ends_with_the_robot_it_found() {
     let study = folder.path().join("test.toml");
     let text = std::fs::read_to_string(folder.path().join("study.toml")).unwrap();
     let (head, _) = text.split_once("[iteration]").unwrap();
-    let log = "[[log]]\nfile = \"out/runs/run_2/log.csv\"\n";
+    let log = r#"
+        [format]
+        time = { column = "t_s" }
+        position = { columns = "q{1..2}" }
+        torque = { columns = "tau{1..2}" }
+        [[log]]
+        file = "out/runs/run_2/log.csv"
+        "#;
     std::fs::write(&study, format!("{head}\n[parallel_filter]\ncutoff_hz = 5.0\nfactor = 20\n{log}")).unwrap();
     let options = RunOptions { data: None, threads: 1, progress: &Silent };
     let tested = validate(&out.join("result.json"), &Study::load(&study).unwrap(), &study, &options).unwrap();
