@@ -29,13 +29,15 @@ def send(kind, **fields):
     print(json.dumps({"type": kind, **fields}, allow_nan=False), flush=True)
 
 
-def load(path, friction, damping, armature):
+def load(path, friction, damping, armature, step_s):
     tree = ElementTree.parse(path)
     extension = ElementTree.SubElement(tree.getroot(), "mujoco")
     ElementTree.SubElement(extension, "compiler", fusestatic="false", balanceinertia="false", boundmass="0", boundinertia="0",
                            discardvisual="true")
     model = mujoco.MjModel.from_xml_string(ElementTree.tostring(tree.getroot(), encoding="unicode"))
     model.dof_frictionloss[:], model.dof_damping[:], model.dof_armature[:] = friction, damping, armature
+    # Dry friction is a soft constraint here: as stiff as the steps allow, or it comes 20 ms late.
+    model.dof_solref[:], model.dof_solimp[:] = (2 * step_s, 1.0), (0.999, 0.999, 1e-3, 0.5, 2.0)
     # Limits of joints are the controller's business, and links may overlap at their joints.
     model.jnt_limited[:] = 0
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
@@ -264,14 +266,15 @@ def breach(envelope, joints, q, dq, tau, q_d):
 
 
 class Robot:
-    def __init__(self, model, messages, most, own_loop):
+    def __init__(self, model, messages, most, own_loop, step_s):
+        self.step_s = step_s
         self.model, self.data, self.messages, self.most = model, mujoco.MjData(model), messages, most
         self.own_loop = [np.broadcast_to(gains, model.nv) for gains in own_loop]
         self.joints = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, j) for j in range(model.njnt)]
 
     def start(self, rate_hz, q, dq):
-        # Whole steps of at most 1 ms from one sample of the controller to the next.
-        self.steps = max(1, int(np.ceil(1000.0 / rate_hz)))
+        # Whole steps from one sample of the controller to the next.
+        self.steps = max(1, int(np.ceil(1.0 / (rate_hz * self.step_s) - 1e-9)))
         self.model.opt.timestep = 1.0 / rate_hz / self.steps
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:], self.data.qvel[:] = q, dq
@@ -337,10 +340,11 @@ def main():
     parser.add_argument("--torque", type=numbers, default=np.inf, help="largest torque of the drives, Nm")
     parser.add_argument("--kp", type=numbers, default=0.0, help="stiffness of the drives' own position loop, Nm/rad")
     parser.add_argument("--kd", type=numbers, default=0.0, help="damping of the drives' own position loop, Nm s/rad")
+    parser.add_argument("--step", type=float, default=1e-3, help="longest step of the integration, s; a torque seems half of it late")
     options = parser.parse_args()
     messages = Messages()
-    robot = Robot(load(options.urdf, options.friction, options.damping, options.armature), messages, options.torque,
-                  (options.kp, options.kd))
+    robot = Robot(load(options.urdf, options.friction, options.damping, options.armature, options.step), messages, options.torque,
+                  (options.kp, options.kd), options.step)
     send("hello", protocol=PROTOCOL, name=f"MuJoCo {mujoco.__version__}: {options.urdf.name}", joints=robot.joints,
          modes=["run", "step"])
     while (message := messages.next()) is not None:

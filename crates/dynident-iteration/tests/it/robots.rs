@@ -7,7 +7,10 @@ use dynident_iteration::robot::{
     controller_json, trajectory_csv,
 };
 use dynident_iteration::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, SimulatedRobot};
-use dynident_model::terms::{TorqueTerm, Viscous};
+use dynident_model::terms::{
+    Coulomb, CoulombShape, Direction, DirectionalCoulomb, DirectionalViscous, DriveInertia, LoadFriction, Offset, Power,
+    PowerExponent, Sigmoid, Stribeck, TorqueTerm, Viscous,
+};
 use dynident_model::{Model, load_robot};
 use dynident_simulation::controllers::{ComputedTorqueSettings, FiniteTimeSettings, JointPdSettings};
 use dynident_simulation::{ControllerModel, ControllerSettings, LoopSettings, Plant, Reference};
@@ -281,7 +284,23 @@ fn mujoco_is_a_robot() {
     }
     let reference = Reference::new(1000.0, motion).unwrap();
     let terms: Vec<TorqueTerm> = (0..7).map(|joint| TorqueTerm::Viscous(Viscous { joint })).collect();
-    let believed = ControllerModel::new(&model, &terms, &[0.4; 7]).unwrap();
+    // What the controller believes of friction, one law of each kind that has no memory.
+    let shape = CoulombShape::Smooth { width: 0.05 };
+    let mut laws = terms.clone();
+    laws.extend([
+        TorqueTerm::Coulomb(Coulomb { joint: 0, shape }),
+        TorqueTerm::Stribeck(Stribeck { joint: 0, speed: 0.2, exponent: 1.5, shape }),
+        TorqueTerm::Sigmoid(Sigmoid { joint: 1, steepness: 8.0, offset_speed: 0.1 }),
+        TorqueTerm::Power(Power { joint: 2, exponent: PowerExponent::CubeRoot, rounding: 1e-3 }),
+        TorqueTerm::Power(Power { joint: 3, exponent: PowerExponent::Quadratic, rounding: 1e-3 }),
+        TorqueTerm::Load(LoadFriction { joint: 3, shape }),
+        TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { joint: 4, direction: Direction::Forward, shape }),
+        TorqueTerm::DirectionalViscous(DirectionalViscous { joint: 5, direction: Direction::Backward }),
+        TorqueTerm::DriveInertia(DriveInertia { joint: 6 }),
+        TorqueTerm::Offset(Offset { joint: 6 }),
+    ]);
+    let values: Vec<f64> = core::iter::repeat_n(0.4, 7).chain(core::iter::repeat_n(0.1, laws.len() - 7)).collect();
+    let believed = ControllerModel::new(&model, &laws, &values).unwrap();
     let friction = dynident_simulation::FrictionCompensation::Measured;
     let gains = JointPdSettings { kp: vec![300.0, 300.0, 200.0, 200.0, 60.0, 60.0, 10.0].into(), kd: 0.5.into() };
     let controllers = [
