@@ -1,7 +1,7 @@
 //! The whole way from recordings to an identified model, stage by stage.
 
-use crate::bandwidth::{CutoffByError, choose_cutoff};
-use crate::chosen_friction::{ChosenFriction, choose_friction};
+use crate::bandwidth::CutoffByError;
+use crate::between_logs::BetweenLogs;
 use crate::consistent::{
     ConsistencyError, ParameterInterval, consistent_intervals, consistent_with_estimate, inconsistent_nominal_bodies,
     inertials, nearest_to_nominal,
@@ -9,37 +9,27 @@ use crate::consistent::{
 use crate::diagnosis::{Diagnosis, diagnose};
 use crate::doubt::{break_limits, have_jumps, is_doubtful};
 use crate::error::IdentificationError;
-use crate::estimators::{Estimation, Estimator, InstrumentSource, estimate};
+use crate::estimators::{Estimation, Estimator, InstrumentSource};
 use crate::examination::{
     FrictionSign, HeldOutExamination, LogTrace, LogValidation, ModelUnderTest, PriorAgreement, TorqueLag,
     TorqueSignCheck, Uncertainty, examine_training, friction_signs, pooled_delay, sign_evidence, tested_on,
 };
 use crate::execution::Execution;
-use crate::less_noise::{Estimated, with_less_noise};
+use crate::fitted::{Fitted, Job, StageTimes, fitted};
+use crate::lag::LagChoice;
 use crate::logs::{Logs, of_role};
 use crate::payload::{KnownArm, PayloadResult, payload_results, with_gain_error};
 use crate::recording::Role;
 use crate::regressor_model::RegressorModel;
 use crate::settings::{DiagnosisChoice, GainChoice, IdentificationSettings};
 use crate::task::IdentificationTask;
-use crate::training::{Training, training_rows};
+use crate::training::Training;
 use dynident_estimation::consistent::PhysicalFit;
 use dynident_estimation::{EssentialReport, Estimate, LinearProblem, essential};
 use dynident_model::InertialParameters;
 use dynident_recording::MotionSettings;
 use rayon::prelude::*;
 use std::time::Instant;
-
-/// Where the time went, seconds.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StageTimes {
-    /// From logs to factors.
-    pub logs_s: f64,
-    /// From factors to parameters.
-    pub estimation_s: f64,
-    /// Delays, traces and held-out recordings.
-    pub examination_s: f64,
-}
 
 /// Physically consistent parameters beside an estimate, or why there are none.
 #[derive(Clone, Debug)]
@@ -101,6 +91,11 @@ pub struct Identification {
     /// Other readings of the recordings beside the task's; none where there was no reason to try them, and for
     /// payloads.
     pub diagnosis: Option<Diagnosis>,
+    /// The lag of the torque that was taken off the rows, and how well the rest is known.
+    pub torque_lag: LagChoice,
+    /// By how much training logs differ beyond their own error bars, which the estimate's bars hold; none for a single
+    /// one.
+    pub between_logs: Option<BetweenLogs>,
     /// Where the time went.
     pub times: StageTimes,
 }
@@ -171,29 +166,6 @@ pub fn identify_payload(
     execution.install(|| identified(task, execution, &mut Job::Payload(arm)))
 }
 
-/// What is looked for.
-enum Job<'a, 's> {
-    Model(Option<&'s mut dyn InstrumentSource>),
-    Payload(&'a KnownArm),
-}
-
-impl Job<'_, '_> {
-    fn arm(&self) -> Option<&KnownArm> {
-        match self {
-            Self::Model(_) => None,
-            Self::Payload(arm) => Some(arm),
-        }
-    }
-}
-
-/// The logs with a cut-off that was chosen.
-fn with_choice<'a>(logs: Logs<'a>, settings: &IdentificationSettings, cutoff_hz: Option<f64>) -> Logs<'a> {
-    match cutoff_hz {
-        Some(cutoff_hz) => logs.with_cutoff(&settings.motion, cutoff_hz),
-        None => logs,
-    }
-}
-
 fn identified(
     task: &IdentificationTask,
     execution: Execution<'_>,
@@ -206,45 +178,10 @@ fn identified(
     }
     settings.check_names(robot).map_err(IdentificationError::Consistency)?;
 
-    // Rows and factors, with the filters in force and the friction that the logs choose; then the estimate. Where noise
-    // in the regressor biases least squares, both once more with less of it.
-    let cutoff_hz = job.arm().and_then(KnownArm::cutoff_hz);
-    let logs = Logs::new(robot.model(), recordings, settings.filters(), &chosen, cutoff_hz, execution)?;
-    let first = RegressorModel::from(robot.clone());
-    let cutoff = choose_cutoff((&logs, settings), &first, &chosen)?;
-    let started = Instant::now();
-    let (logs, cutoff, friction) = if settings.friction.is_empty() {
-        let friction = ChosenFriction { model: first, joints: Vec::new(), stated: None };
-        (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
-    } else {
-        let logs = with_choice(logs, settings, cutoff.as_ref().map(CutoffByError::highest_alike_hz));
-        let friction = choose_friction((&logs, settings), robot, (&chosen, payloads))?;
-        let cutoff = choose_cutoff((&logs, settings), &friction.model, &chosen)?.or(cutoff);
-        (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
-    };
-    let choice_s = started.elapsed().as_secs_f64();
-    let refit = job.arm().map(KnownArm::refit);
-    let mut training = training_rows((&logs, settings), friction.model, &chosen, payloads, refit)?;
-    training.friction_choice = friction.joints;
-    let mut times = StageTimes {
-        logs_s: training.timings_s[0],
-        estimation_s: training.timings_s[1] + choice_s,
-        examination_s: 0.0,
-    };
-    let started = Instant::now();
-    let estimation = match job {
-        Job::Payload(arm) => {
-            let (model, columns) = (&training.model, &training.columns);
-            Estimation::plain(arm.estimate(model, columns, &training.problem, &settings.estimation)?)
-        }
-        Job::Model(source) => match &training.gains {
-            Some((found, _)) => Estimation::plain(found.clone()),
-            None => estimate(&training.rows((&logs, settings), &chosen), source.take())?,
-        },
-    };
-    let found = Estimated { logs, training, estimation, settings: settings.clone() };
-    let Estimated { logs, training, mut estimation, settings } = with_less_noise(task, &chosen, found)?;
-    let settings = &settings;
+    // Rows and factors, with filters and friction stated or chosen and the torque's lag taken off; then the estimate.
+    let Fitted { logs, training, mut estimation, settings, cutoff, stated_friction, lag, between_logs, mut times } =
+        fitted(task, &chosen, execution, job)?;
+    let (settings, started) = (&settings, Instant::now());
     let mut dropped = None;
     if let Some(essential_settings) = &settings.estimation.essential {
         let (rest, report) = essential(&estimation.estimate, essential_settings)?;
@@ -266,7 +203,7 @@ fn identified(
     };
     // Beside that, what training recordings say of the estimate.
     // Friction that was chosen has no wrong sign: where it would, there is none. The stated terms tell.
-    let signs = || match &friction.stated {
+    let signs = || match &stated_friction {
         _ if held => Ok((None, Vec::new())),
         Some((stated, plain)) => torque_signs(stated, plain),
         None => torque_signs(&training, &estimation.estimate),
@@ -323,6 +260,8 @@ fn identified(
         examination,
         held_out,
         diagnosis,
+        torque_lag: lag,
+        between_logs,
         times,
     })
 }

@@ -43,10 +43,11 @@ pub(crate) fn with_less_noise<'a>(
     };
     let own = InstrumentSettings { cutoff_hz: Some(cutoff_hz), ..own };
     found.settings.estimation.estimator = Estimator::Instrumental(own);
-    let IdentificationTask { robot, recordings, payloads, settings } = task;
+    let IdentificationTask { robot, recordings, payloads, .. } = task;
+    let filters = (&found.settings.motion, &task.settings.parallel_filter);
     let lower_hz = CUTOFF_OVER_INSTRUMENTS * cutoff_hz;
     let before_hz = found.logs.motion.differentiator.cutoff_hz();
-    let is_lower = settings.motion.differentiator.wants_cutoff()
+    let is_lower = found.settings.motion.differentiator.wants_cutoff()
         && before_hz.is_some_and(|before_hz| lower_hz < WORTH_LOWERING * before_hz);
     if !is_lower && found.training.friction_choice.is_empty() {
         return Ok(found);
@@ -54,7 +55,7 @@ pub(crate) fn with_less_noise<'a>(
     let (logs, before) = if is_lower {
         // What is above the lower cut-off is noise and no motion: held-out figures are for what is below.
         let execution = found.logs.execution;
-        let lower = Logs::new(robot.model(), recordings, settings.filters(), chosen, Some(lower_hz), execution)?;
+        let lower = Logs::new(robot.model(), recordings, filters, chosen, Some(lower_hz), execution)?;
         (lower, Some(found.logs))
     } else {
         (found.logs, None)

@@ -116,6 +116,7 @@
 #![forbid(unsafe_code)]
 
 mod bandwidth;
+mod between_logs;
 mod check;
 mod chosen_friction;
 mod conditional;
@@ -126,8 +127,10 @@ mod error;
 pub mod estimators;
 pub mod examination;
 mod execution;
+mod fitted;
 pub mod friction;
 mod identify;
+mod lag;
 mod less_noise;
 mod log_noise;
 mod logs;
@@ -141,15 +144,17 @@ mod task;
 mod training;
 
 pub use bandwidth::{CutoffByError, CutoffCandidate, choose_cutoff};
+pub use between_logs::BetweenLogs;
 pub use check::{StudyExamination, examine_study};
 pub use chosen_friction::{ChosenFriction, choose_friction};
 pub use conditional::{Condition, Conditional, conditionals, resting_joints};
 pub use error::IdentificationError;
 pub use estimators::EstimationSettings;
 pub use execution::Execution;
+pub use fitted::StageTimes;
 pub use identify::{
-    ConsistentParameters, Identification, StageTimes, TrainingExamination, consistent_stage, identify,
-    identify_payload, identify_with_instruments,
+    ConsistentParameters, Identification, TrainingExamination, consistent_stage, identify, identify_payload,
+    identify_with_instruments,
 };
 pub use log_noise::LogNoise;
 pub use logs::Logs;

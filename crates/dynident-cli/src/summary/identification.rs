@@ -8,7 +8,7 @@ use core::fmt::Write;
 use dynident::ResultFile;
 use dynident::identification::CutoffCandidate;
 use dynident::identification::consistent::ParameterInterval;
-use dynident::identification::examination::LogValidation;
+use dynident::identification::examination::{LagKind, LogValidation};
 use dynident::identification::friction::FrictionCandidate;
 use dynident::result::{BaseParameterResult, LogSummary};
 use std::path::Path;
@@ -17,6 +17,8 @@ use std::path::Path;
 const SHOWN: usize = 6;
 /// Held-out logs up to which the table shows their root mean squares and priors.
 const WITH_DETAILS: usize = 2;
+/// Times their bars that logs differ from which on it is said.
+const DIFFERING: f64 = 1.5;
 /// Held-out logs that have a column.
 const COLUMNS: usize = 5;
 /// Columns that are left for an expression.
@@ -48,6 +50,7 @@ pub(crate) fn identification(r: &ResultFile, out: &Path, models: &[&str]) -> Str
         text += &residuals(log);
     }
     text += &lags(r);
+    text += &between_logs(r);
     text += &super::load::loads(r);
     text.push('\n');
     if !r.friction_choice.is_empty() {
@@ -200,21 +203,34 @@ fn joints(r: &ResultFile) -> String {
     text
 }
 
+/// Where training logs differ beyond their own bars.
+fn between_logs(r: &ResultFile) -> String {
+    let Some(found) = r.method.between_logs else { return String::new() };
+    let of = |what: &str, k: Option<f64>| {
+        k.filter(|k| *k >= DIFFERING)
+            .map(|k| format!("{what} differ {k:.1} times as much as their own error bars allow"))
+    };
+    let said: Vec<String> =
+        [of("bodies", found.bodies), of("friction parameters", found.friction)].into_iter().flatten().collect();
+    if said.is_empty() {
+        return String::new();
+    }
+    wrapped(&format!("from log to log {}; theirs hold it", said.join(", ")), 2)
+}
+
 /// How late the torque comes, where it matters at any joint; else that it does not.
 fn lags(r: &ResultFile) -> String {
     let known = || r.joints.iter().filter_map(|joint| joint.torque_lag.map(|lag| (&joint.name, lag)));
-    if known().next().is_none() {
-        return String::new();
-    }
-    if known().all(|(_, lag)| !lag.matters) {
-        return "\n  torque lag: none that matters at any joint (result.json has them)\n".to_owned();
+    let text = r.method.torque_lag.sentence().map_or_else(String::new, |what| format!("\n  torque lag: {what}\n"));
+    if r.method.torque_lag.kind != LagKind::Joints && known().all(|(_, lag)| !lag.matters) {
+        return text;
     }
     let header = ["torque lag behind motion", "ms", "+- (95 %)"].map(str::to_owned);
     let rows = known().map(|(joint, lag)| {
         let [value, half] = with_deviation(1e3 * lag.lag_s, 1e3 * lag.half_width_95_s);
         vec![name(joint), value, half]
     });
-    format!("\n{}", table(&header, 1..3, rows.collect()))
+    format!("{text}\n{}", table(&header, 1..3, rows.collect()))
 }
 
 /// What friction the training logs chose, against the plain one; and whose they did not, with the reason.

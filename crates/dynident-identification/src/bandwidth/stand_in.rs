@@ -113,7 +113,8 @@ impl StandIn {
             } else if (rate_hz / log_rate_hz - 1.0).abs() > 0.01 {
                 continue;
             }
-            let motion = MotionSettings { smooth_torque: false, ..settings.motion.clone() };
+            let motion = recording.in_log_order(model.model(), &settings.motion)?.into_owned();
+            let motion = MotionSettings { smooth_torque: false, ..motion };
             let faded = &spectrum.faded_hz;
             let asked = spectrum.joints_hz.iter().flatten().copied().fold(f64::INFINITY, f64::min);
             let build = || -> Result<Box<dyn Differentiator>, FilterError> {

@@ -125,6 +125,29 @@ impl Estimator {
     }
 }
 
+impl Estimator {
+    /// Whether it is made from rows of the measured motion, filtered as the torque is, so that a lag measured on these
+    /// rows is the one that it suffers.
+    pub(crate) fn reads_filtered_rows(&self) -> bool {
+        match self {
+            Self::Ordinary
+            | Self::Weighted
+            | Self::Auto(_)
+            | Self::Generalized
+            | Self::Huber
+            | Self::Tukey
+            | Self::NoiseWeighted(_) => true,
+            Self::Instrumental(_)
+            | Self::MaximumLikelihood(_)
+            | Self::Simultaneous(_)
+            | Self::SplineMotion(_)
+            | Self::Didim(_)
+            | Self::Clie(_)
+            | Self::Cloe(_) => false,
+        }
+    }
+}
+
 /// What an estimator alone can determine, beside its estimate. Exhaustive, so that whoever writes results is asked for
 /// a new kind.
 #[derive(Clone, Debug, Default)]

@@ -3,9 +3,9 @@
 use super::motion_band::MotionBand;
 use super::nominal_agreement::{Evidence, PriorAgreement};
 use super::residuals::{JointResiduals, JointWatch, Uncertainty};
-use super::torque_delay::{DelayCheck, TorqueLag};
 use super::torque_trace::{LogTrace, TraceConsumer};
 use crate::estimators::EstimationSettings;
+use crate::lag::{DelayCheck, TorqueLag, lags_of_log};
 use crate::logs::Logs;
 use crate::recording::{LogError, Role, Samples};
 use crate::regressor_model::RegressorModel;
@@ -224,7 +224,7 @@ pub(crate) fn tested_on(
             residuals,
         },
         nominal_agreement: test.evidence.as_ref().map(|evidence| evidence.agreement(&joints)),
-        delays: test.delay.delays(logs, settings),
+        delays: lags_of_log(test.delay, (logs, settings)),
         trace: test.trace.map(|trace| trace.finished(name.clone(), Role::Validate, statistics.filtered_rate_hz)),
         statistics,
     })

@@ -1,22 +1,20 @@
 //! What the logs say of an estimate: delays of the torque, its sign, residuals, and how well it predicts what it was
 //! not fitted to.
 
-mod delay_rows;
 mod friction_sign;
 mod held_out;
 mod motion_band;
 mod nominal_agreement;
 mod residuals;
-mod torque_delay;
 mod torque_sign;
 mod torque_trace;
 mod training;
 
+pub use crate::lag::{LagChoice, LagKind, TorqueLag, delay_findings, pooled_delay};
 pub use friction_sign::{FrictionSign, friction_sign_findings, friction_signs};
 pub use held_out::{HeldOutExamination, LogValidation, ModelUnderTest, examine_held_out};
 pub use nominal_agreement::{PriorAgreement, agreement_findings};
 pub use residuals::{JointResiduals, TorqueBand, Uncertainty};
-pub use torque_delay::{TorqueLag, delay_findings, pooled_delay};
 pub use torque_sign::{TorqueSignCheck, sign_evidence, sign_findings};
 pub use torque_trace::{JointTrace, LogTrace};
 pub use training::examine_training;

@@ -1,8 +1,8 @@
 //! A second pass over the first samples of a training log, now that there is a model to predict them with.
 
-use super::torque_delay::{DELAY_SAMPLES, DelayCheck, TorqueLag};
 use super::torque_trace::{LogTrace, TraceConsumer};
 use crate::estimators::EstimationSettings;
+use crate::lag::{DELAY_SAMPLES, DelayCheck, TorqueLag, lags_of_log};
 use crate::logs::Logs;
 use crate::progress::Silent;
 use crate::recording::{LogError, Role};
@@ -43,7 +43,7 @@ pub fn examine_training(
     let most_samples = Some(DELAY_SAMPLES as u64);
     let pass = LogPass { most_samples, progress: &Silent, ..logs.pass(model, index) };
     let statistics = pass.run(&mut second)?;
-    let delays = second.delay.delays(logs, settings);
+    let delays = lags_of_log(second.delay, (logs, settings));
     let name = logs.recordings[index].name.clone();
     Ok((delays, second.trace.finished(name, Role::Identify, statistics.filtered_rate_hz)))
 }

@@ -7,8 +7,10 @@ pub use error::LogError;
 pub use motion_record::MotionRecord;
 
 use dynident_model::Model;
+use dynident_recording::log::OneOrMany;
 use dynident_recording::{Log, MotionSettings, MotionStream, Reference};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// What a recording is for.
@@ -135,6 +137,27 @@ impl Recording {
         }
     }
 
+    /// Settings whose lags stand in the order of the recording's joints.
+    ///
+    /// # Errors
+    /// A joint that the recording does not have.
+    pub(crate) fn in_log_order<'m>(
+        &self,
+        model: &Model,
+        motion: &'m MotionSettings,
+    ) -> Result<Cow<'m, MotionSettings>, LogError> {
+        let Some(OneOrMany::Many(lags)) = &motion.torque_lag_s else { return Ok(Cow::Borrowed(motion)) };
+        let places = self.places(model)?;
+        if places.iter().enumerate().all(|(joint, place)| joint == *place) || lags.len() != places.len() {
+            return Ok(Cow::Borrowed(motion));
+        }
+        let mut ordered = vec![0.0; lags.len().max(places.iter().max().map_or(0, |place| place + 1))];
+        for (lag, place) in lags.iter().zip(places) {
+            ordered[place] = *lag;
+        }
+        Ok(Cow::Owned(MotionSettings { torque_lag_s: Some(OneOrMany::Many(ordered)), ..motion.clone() }))
+    }
+
     /// Its log on the way to a motion, with these settings; the commanded motion goes along where the differentiator
     /// needs it. `None` for a motion that is made already and whose raw samples are not at hand.
     ///
@@ -159,7 +182,7 @@ impl Recording {
             // The differentiator says that it needs one.
             _ => None,
         };
-        let stream = MotionStream::following(log, motion, reference.as_ref());
+        let stream = MotionStream::following(log, &*self.in_log_order(model, motion)?, reference.as_ref());
         stream.map(Some).map_err(|source| LogError::recording(&self.name, source))
     }
 }

@@ -179,7 +179,7 @@ fn every_condition_counts_by_itself() {
     let clipped = |stated| Clipping { share: 0.59, torque: 8.0, stated };
     let message = with(&|record| joint(record, &|shown| shown.clipping = Some(clipped(true))));
     assert!(message.contains("joint2") && message.contains("59.0 %") && message.contains("8.000 Nm"), "{message}");
-    let late = TorqueLag { lag_s: -8e-3, std_s: 1e-4, half_width_95_s: 2e-4, matters: true };
+    let late = TorqueLag { lag_s: -8e-3, std_s: 1e-4, half_width_95_s: 2e-4, matters: true, taken_off_s: 0.0 };
     let message = with(&|record| record.estimate.as_mut().unwrap().torque_lags = vec![None, Some(late)]);
     assert!(message.contains("8.0 +- 0.2 ms before"), "{message}");
     let poor = Prediction { rows: 1000, inside: 0.6, rms_error: 0.4, half_width: 0.2 };

@@ -8,8 +8,8 @@ use dynident_iteration::robot::{
 };
 use dynident_iteration::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, SimulatedRobot};
 use dynident_model::terms::{
-    Coulomb, CoulombShape, Direction, DirectionalCoulomb, DirectionalViscous, DriveInertia, LoadFriction, Offset, Power,
-    PowerExponent, Sigmoid, Stribeck, TorqueTerm, Viscous,
+    Coulomb, CoulombShape, Direction, DirectionalCoulomb, DirectionalViscous, DriveInertia, LoadFriction, Offset,
+    Power, PowerExponent, Sigmoid, Stribeck, TorqueTerm, Viscous,
 };
 use dynident_model::{Model, load_robot};
 use dynident_simulation::controllers::{ComputedTorqueSettings, FiniteTimeSettings, JointPdSettings};

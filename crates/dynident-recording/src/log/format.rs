@@ -96,7 +96,8 @@ pub enum OneOrMany<T> {
 }
 
 impl<T: Clone> OneOrMany<T> {
-    pub(crate) fn at(&self, index: usize) -> Option<T> {
+    /// The value of number `index`; none where a list is shorter.
+    pub fn at(&self, index: usize) -> Option<T> {
         match self {
             Self::One(value) => Some(value.clone()),
             Self::Many(values) => values.get(index).cloned(),
@@ -107,7 +108,7 @@ impl<T: Clone> OneOrMany<T> {
         matches!(self, Self::One(_)) || matches!(self, Self::Many(values) if values.len() == count)
     }
 
-    fn values(&self) -> &[T] {
+    pub(crate) fn values(&self) -> &[T] {
         match self {
             Self::One(value) => core::slice::from_ref(value),
             Self::Many(values) => values,

@@ -2,6 +2,7 @@
 
 use crate::derivative::DifferentiatorSettings;
 use crate::error::{FilterError, require};
+use crate::log::OneOrMany;
 use core::ops::Range;
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +22,15 @@ pub struct MotionSettings {
     /// repeated while its joint moves do not count, and lone spikes of a position are replaced; see
     /// [`SetAside`](crate::SetAside).
     pub keep_outliers: bool,
+    /// Seconds by which torque comes after its motion, one for all joints or one for each; it is taken at the time of
+    /// the motion that it belongs to. Negative where it comes before; -0.5 to 0.5. Left out, it is taken as logged:
+    /// then `identify` estimates it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque_lag_s: Option<OneOrMany<f64>>,
 }
+
+/// Longest lag that can be stated, seconds.
+const LONGEST_LAG_S: f64 = 0.5;
 
 impl MotionSettings {
     /// Checks the settings.
@@ -30,7 +39,24 @@ impl MotionSettings {
     /// A [`FilterError`] that names the setting.
     pub fn validate(&self) -> Result<(), FilterError> {
         require((0.0..=60.0).contains(&self.trim_s), "trim_s", self.trim_s, "give seconds, 0 to 60")?;
+        for lag_s in self.torque_lag_s.iter().flat_map(OneOrMany::values) {
+            let fix = "give seconds, -0.5 to 0.5";
+            require((-LONGEST_LAG_S..=LONGEST_LAG_S).contains(lag_s), "torque_lag_s", *lag_s, fix)?;
+        }
         self.differentiator.validate()
+    }
+
+    /// The lags of so many joints, none where nothing is stated.
+    ///
+    /// # Errors
+    /// A list of another length.
+    pub(crate) fn torque_lags_s(&self, joints: usize) -> Result<Vec<f64>, FilterError> {
+        let Some(stated) = &self.torque_lag_s else { return Ok(Vec::new()) };
+        let lags: Vec<f64> = (0..joints).filter_map(|joint| stated.at(joint)).collect();
+        let fits = lags.len() == joints && (stated.values().len() == 1 || stated.values().len() == joints);
+        let fix = "give one number, or one for each joint of the log";
+        require(fits, "torque_lag_s (how many)", stated.values().len() as f64, fix)?;
+        Ok(lags)
     }
 }
 

@@ -6,6 +6,7 @@
 mod block;
 mod marks;
 mod stream;
+mod torque_lag;
 
 pub use block::{MotionBlock, MotionSettings};
 pub use stream::MotionStream;

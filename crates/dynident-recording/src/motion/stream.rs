@@ -2,6 +2,7 @@
 
 use super::block::{MotionBlock, MotionSettings};
 use super::marks::kept_runs;
+use super::torque_lag::TorqueShift;
 use crate::cleaning::{CleanBlock, CleanRows, replace_spikes};
 use crate::clock::segments::{PlacedRows, Segmenter};
 use crate::clock::timeline::Timeline;
@@ -46,6 +47,7 @@ pub struct MotionStream {
     position_noise: Vec<f64>,
     differentiator: Box<dyn Differentiator>,
     smooth_torque: bool,
+    torque_shift: TorqueShift,
     trim: usize,
     /// Samples at the ends of a piece that rest on invented ones.
     unsettled: usize,
@@ -194,6 +196,8 @@ impl MotionStream {
         let (velocity, acceleration) =
             (comparisons(format.velocity.is_some()), comparisons(format.acceleration.is_some()));
         let temperature = if format.temperature.is_some() { joints.len() } else { 0 };
+        let torque_shift = TorqueShift::new(settings.torque_lags_s(joints.len())?.into_iter(), clock.rate_hz);
+        let context = differentiator.context_samples(clock.rate_hz);
         let channels = 2 * joints.len() + velocity.len() + acceleration.len() + temperature;
         Ok(Self {
             rows_in: CleanRows::new(LogReader::open(log)?, timeline, joints, settings.keep_outliers),
@@ -201,10 +205,10 @@ impl MotionStream {
             clean_at: 0,
             joints: joints.clone(),
             trim: (settings.trim_s * clock.rate_hz).round() as usize,
-            context: differentiator.context_samples(clock.rate_hz),
+            context: context.map(|samples| samples.max(torque_shift.reach())),
             unsettled: {
                 let cutoff_hz = settings.differentiator.cutoff_hz().unwrap_or(cutoff.cutoff_hz);
-                let reach = differentiator.context_samples(clock.rate_hz).unwrap_or(0);
+                let reach = context.unwrap_or(0);
                 ((UNSETTLED_PERIODS * clock.rate_hz / cutoff_hz) as usize).min(reach)
             },
             segmenter: Segmenter::new(channels),
@@ -214,6 +218,7 @@ impl MotionStream {
             position_noise,
             differentiator,
             smooth_torque: settings.smooth_torque,
+            torque_shift,
             uniform: vec![Vec::new(); channels],
             done: 0,
             passed: 0,
@@ -348,11 +353,8 @@ impl MotionStream {
         for (joint, marked) in marked.iter().enumerate() {
             let first = marked.partition_point(|row| *row < from);
             for row in marked[first..].iter().take_while(|row| **row < self.clean_at) {
-                // A sample on the grid is copied, one beside it enters the points before and after it.
                 let place = self.segmenter.place_in_piece(places.steps[*row]);
-                let on_grid = (place - place.round()).abs() <= 1e-6;
-                let (low, high) = if on_grid { (place.round(), place.round()) } else { (place.floor(), place.ceil()) };
-                grid.extend([low as u64, high as u64].map(|sample| (sample, joint)));
+                grid.extend(self.torque_shift.rows_of_mark(joint, place).map(|sample| (sample, joint)));
             }
         }
         if !grid.is_empty() {
@@ -443,10 +445,13 @@ impl MotionStream {
                 block.dq.extend_from_slice(&dq[inside.clone()]);
                 block.ddq.extend_from_slice(&ddq[inside.clone()]);
                 let tau = &self.uniform[joints + joint];
-                block.tau.extend_from_slice(&tau[from..end]);
+                for row in self.torque_shift.append(joint, tau, from..end, &mut block.tau) {
+                    block.set_aside.resize(joints * rows, false);
+                    block.set_aside[joint * rows + row] = true;
+                }
                 if self.smooth_torque {
                     self.differentiator.smooth(rate, &tau[window_from..window_to], other)?;
-                    block.tau_smooth.extend_from_slice(&other[inside.clone()]);
+                    self.torque_shift.append(joint, other, inside.clone(), &mut block.tau_smooth);
                 }
                 let first = 2 * joints + self.velocity.len() + self.acceleration.len();
                 if let Some(temperature) = self.uniform.get(first + joint) {

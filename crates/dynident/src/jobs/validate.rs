@@ -24,7 +24,7 @@ pub fn validate(
     study.require_log(study_path)?;
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let stored = ResultFile::read(result_path)?;
-    let study = &stored.friction_of(study);
+    let study = &stored.as_fitted(study);
     let robot = StudyRobot::new(study, study_path, &folders)?;
     let theta = stored.base_values(result_path, &robot.parametric)?;
     let consistent = stored.consistent_values(result_path)?;

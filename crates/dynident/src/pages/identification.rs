@@ -346,9 +346,12 @@ fn lags(page: &mut Report, r: &ResultFile) {
         Some(vec![Cell::from(&joint.name), Cell::judged(short(1e3 * lag.lag_s, 3), tone), ms(lag.half_width_95_s)])
     });
     let table = Table::new("Lag of the torque behind the motion", ["joint", "lag, ms", "± (95 %), ms"])
-        .note("estimated together with the model, log by log; marked where it moves more torque than the model leaves unexplained")
+        .note("estimated together with the model, log by log, with what was taken off before; marked where the rest moves more torque than the model leaves unexplained")
         .rows(rows);
     page.add(table);
+    if let Some(what) = r.method.torque_lag.sentence() {
+        page.add(Text::new(format!("Lag of the torque: {what}.")));
+    }
 }
 
 /// What the marks behind values of bodies mean.

@@ -10,10 +10,12 @@ use dynident_identification::consistent::ParameterInterval;
 use dynident_identification::estimators::{
     GrossErrors, NoiseInRegressor, PeriodicFit, SeriesFit, SimulatedFit, SplineFit,
 };
-use dynident_identification::examination::{LogValidation, PriorAgreement, TorqueBand, TorqueLag, TorqueSignCheck};
+use dynident_identification::examination::{
+    LagChoice, LogValidation, PriorAgreement, TorqueBand, TorqueLag, TorqueSignCheck,
+};
 use dynident_identification::friction::FrictionCandidate;
 use dynident_identification::payload::{DriveGain, PayloadResult};
-use dynident_identification::{Condition, CutoffByError, Role};
+use dynident_identification::{BetweenLogs, Condition, CutoffByError, Role};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
 use serde::{Deserialize, Serialize};
 
@@ -151,6 +153,13 @@ pub struct MethodSummary {
     /// How that cut-off was chosen; none where the study states it, or the logs are too short to try any.
     #[serde(default)]
     pub cutoff: Option<CutoffByError>,
+    /// The lag of the torque behind the motion: what was taken off before the fit, and how well it is known.
+    #[serde(default)]
+    pub torque_lag: LagChoice,
+    /// By how much the parameters of two training logs differ, in units of what the logs' own error bars allow; the
+    /// bars of `base_parameters` hold what is beyond. None for a single log.
+    #[serde(default)]
+    pub between_logs: Option<BetweenLogs>,
     /// Held-out figures are for the torque below 0.7 of this, the cut-off that the motion's spectrum asks for; none
     /// where they are for the fit's own band.
     #[serde(default)]
@@ -316,8 +325,8 @@ pub struct JointResult {
     pub residual_std_nm: f64,
     /// How strongly its residual is correlated in time: the lag-1 correlation that matters for the error bars.
     pub residual_correlation: Option<f64>,
-    /// Lag of its torque behind the motion by all training logs; none where they do not determine one. The model itself
-    /// is fitted to the torque as logged.
+    /// Lag of its torque behind the motion by all training logs, what was taken off included; none where they do not
+    /// determine one. It matters where what is left of it does.
     pub torque_lag: Option<TorqueLag>,
 }
 

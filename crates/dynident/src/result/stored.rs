@@ -50,9 +50,12 @@ impl ResultFile {
         Ok(stored)
     }
 
-    /// The study with the friction that was chosen when the model was made.
-    pub(crate) fn friction_of(&self, study: &Study) -> Study {
+    /// The study with the friction that was chosen and the lag that was taken off when the model was made.
+    pub(crate) fn as_fitted(&self, study: &Study) -> Study {
         let mut study = study.clone();
+        if study.motion.torque_lag_s.is_none() {
+            study.motion.torque_lag_s.clone_from(&self.method.motion.torque_lag_s);
+        }
         for joint in &self.friction_choice {
             if let Some(drive) = &joint.drive {
                 let own = study.drive.joints.entry(joint.joint.clone()).or_default();

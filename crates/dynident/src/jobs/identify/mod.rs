@@ -99,7 +99,7 @@ fn identified(
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let arm = study.arm.as_ref().map(|section| known_arm(section, &folders)).transpose()?;
     // With the friction that was chosen when the arm was identified.
-    let with_arm = arm.as_ref().map(|(_, stored)| stored.friction_of(study));
+    let with_arm = arm.as_ref().map(|(_, stored)| stored.as_fitted(study));
     let study = with_arm.as_ref().unwrap_or(study);
     let robot = StudyRobot::new(study, study_path, &folders)?;
     let in_study = Error::identification::<IdentificationError>(study_path);

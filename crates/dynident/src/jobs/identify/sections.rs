@@ -47,6 +47,8 @@ pub(super) fn method_summary(identification: &Identification, estimator: &str) -
         clusters: estimate.clusters,
         motion: motion.clone(),
         cutoff: identification.cutoff.clone(),
+        torque_lag: identification.torque_lag.clone(),
+        between_logs: identification.between_logs,
         motion_hz: identification.motion_hz,
         condition_number: estimate.condition_number_raw,
         condition_number_scaled: estimate.condition_number_scaled,

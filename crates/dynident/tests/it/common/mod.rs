@@ -28,6 +28,7 @@ impl Random {
 }
 
 /// Bodies, and per joint drive inertia, viscous friction, Coulomb friction, offset.
+#[derive(Clone)]
 pub(crate) struct Truth {
     pub(crate) model: Model,
     pub(crate) drive: Vec<[f64; 4]>,

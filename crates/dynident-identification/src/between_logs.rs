@@ -1,0 +1,130 @@
+//! What varies between logs, as part of the error bars: friction is another on another day.
+//!
+//! Each training log is fitted alone. Where two logs differ by more than their own bars, the parameters themselves vary
+//! from log to log: with `z² = (θ_a − θ_b)² / (σ_a² + σ_b²)` and its mean k² over the pairs of logs and the parameters
+//! of one kind (bodies and drives; friction), their variance between logs is `τ² = (k² − 1) σ̄²`, σ̄² the mean variance
+//! of a single log's fit. An estimate from L logs then errs by τ²/L more about the mean of all days, and by τ² more
+//! about what a further day will show: its bar is for that, `Σ + (1 + 1/L) τ²`. Method of moments as by DerSimonian and
+//! Laird, Controlled Clinical Trials 7 (1986) 177, with one k for parameters of one kind.
+
+use crate::training::Training;
+use dynident_dynamics::Column;
+use dynident_estimation::{
+    Estimate, EstimationError, LinearProblem, WeightedSettings, student_half_width, weighted_least_squares,
+};
+use dynident_model::terms::TorqueTerm;
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// Pairs of a parameter's values that a kind needs for its k.
+const FEWEST: usize = 5;
+/// A single log's variance that was found from fewer squares says too little of the parameter.
+const FEWEST_SQUARES: f64 = 4.5;
+/// Times the typical value of its kind that one pair counts at most: one slip of a log is not what all logs vary by.
+const MOST: f64 = 25.0;
+
+/// By how much parameters of two logs differ, in units of what the logs' own error bars allow: 1 where they do not
+/// vary.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct BetweenLogs {
+    /// Bodies and drive inertias; none where too few are known from single logs.
+    pub bodies: Option<f64>,
+    /// Friction, offsets and other torques of the joints; likewise.
+    pub friction: Option<f64>,
+}
+
+/// The estimate with what varies between the training logs in its covariance, and by how much that was. `None` for a
+/// single log.
+pub(crate) fn with_variation(
+    training: &Training,
+    settings: &WeightedSettings,
+    estimate: &Estimate,
+) -> Option<(Estimate, BetweenLogs)> {
+    let problem = &training.problem;
+    if problem.logs().len() < 2 || !training.columns.is_plain() {
+        return None;
+    }
+    let count = training.columns.base();
+    let alone: Vec<Estimate> =
+        (0..problem.logs().len()).filter_map(|log| fit_alone(problem, log, settings, estimate).ok()).collect();
+    let is_friction: Vec<bool> = training.model.layout().columns()[..count].iter().map(of_friction).collect();
+    let [bodies, friction] = [false, true].map(|kind| {
+        let columns: Vec<usize> = (0..count).filter(|&column| is_friction[column] == kind).collect();
+        variation(&alone, &columns)
+    });
+    let found = BetweenLogs { bodies, friction };
+
+    // Σ + (1 + 1/L) τ², with the correlations of the single fits.
+    let k = |column: usize| if is_friction[column] { friction } else { bodies }.unwrap_or(1.0).max(1.0);
+    let of_a_day = 1.0 + (alone.len().max(1) as f64).recip();
+    let apart = |column: usize| (of_a_day * (k(column).powi(2) - 1.0).max(0.0)).sqrt();
+    let of_one: DMatrix<f64> = alone.iter().fold(DMatrix::zeros(count, count), |sum, one| {
+        sum + one.covariance.view((0, 0), (count, count)) / alone.len().max(1) as f64
+    });
+    let mut wider = estimate.clone();
+    let normal = student_half_width(0.95, f64::INFINITY);
+    for row in 0..count {
+        for column in 0..count {
+            wider.covariance[(row, column)] += of_one[(row, column)] * apart(row) * apart(column);
+        }
+        let before = estimate.std[row];
+        let added = wider.covariance[(row, row)] - before * before;
+        if added > 0.0 && before > 0.0 {
+            wider.std[row] = before.hypot(added.sqrt());
+            wider.half_width_95[row] = estimate.half_width_95[row].hypot(normal * added.sqrt());
+            let grown = wider.std[row] / before;
+            wider.relative_std_percent[row] = estimate.relative_std_percent[row].map(|percent| percent * grown);
+        }
+    }
+    Some((wider, found))
+}
+
+/// Least squares on one log, with what it does not excite as in the estimate of all.
+fn fit_alone(
+    problem: &LinearProblem,
+    log: usize,
+    settings: &WeightedSettings,
+    estimate: &Estimate,
+) -> Result<Estimate, EstimationError> {
+    let mut alone = LinearProblem::new(problem.columns().to_vec(), problem.joints().to_vec())
+        .with_fallback(estimate.values.clone())?
+        .with_unexcited(problem.unexcited().clone())?;
+    for rows in problem.equations().iter().filter(|rows| rows.log == log) {
+        alone.add(&problem.logs()[log], rows.joint, rows.columns.clone(), rows.factor.clone())?;
+    }
+    weighted_least_squares(&alone, settings)
+}
+
+/// Whether a base parameter is a joint's own torque: what may be another on another day.
+fn of_friction(column: &Column) -> bool {
+    !matches!(column, Column::Body { .. } | Column::Term(TorqueTerm::DriveInertia(_)))
+}
+
+/// k of some parameters: the root of the mean of z² over pairs of logs, each by what Student's distribution makes of
+/// it.
+fn variation(alone: &[Estimate], columns: &[usize]) -> Option<f64> {
+    let is_fixed = |one: &Estimate, column: usize| one.rank.fixed.iter().any(|fixed| fixed.column == column);
+    let mut squares = Vec::new();
+    for (number, a) in alone.iter().enumerate() {
+        for b in &alone[number + 1..] {
+            for &column in columns {
+                let freedoms = a.std_degrees_of_freedom[column].min(b.std_degrees_of_freedom[column]);
+                let variance = a.std[column].powi(2) + b.std[column].powi(2);
+                if is_fixed(a, column) || is_fixed(b, column) || freedoms < FEWEST_SQUARES || variance <= 0.0 {
+                    continue;
+                }
+                let z2 = (a.values[column] - b.values[column]).powi(2) / variance;
+                squares.push(z2 * (freedoms - 2.0) / freedoms);
+            }
+        }
+    }
+    if squares.len() < FEWEST {
+        return None;
+    }
+    squares.sort_by(f64::total_cmp);
+    // Of a square of a normal number the median is 0.455.
+    let typical = (squares[squares.len() / 2] / 0.455).max(1.0);
+    let bounded = squares.iter().map(|z2| z2.min(MOST * typical));
+    Some((bounded.sum::<f64>() / squares.len() as f64).sqrt())
+}

@@ -1,0 +1,232 @@
+//! Lags and parameters together, from the samples of one log or of several.
+//!
+//! A model that was fitted to late torque has absorbed a part of the lag (the inertia's column a quarter period on is
+//! the viscous one), and what a prior's wrong inertias leave looks like a lag of many milliseconds. So lag and
+//! parameters are estimated together: `τ(t + d) = Y(t) θ − (δ − d) ∂(Yθ)/∂t` with the torque taken `d` later, until `d`
+//! is the lag `δ` itself. The last step's covariance, from time segments, is the lag's. What the model cannot say
+//! (backlash, elasticity) is in it as far as it differs from segment to segment.
+
+use super::measured::TorqueLag;
+use super::rows::{DelayRows, NODES, lagrange};
+use super::samples::DelayCheck;
+use crate::estimators::EstimationSettings;
+use crate::logs::Logs;
+use crate::regressor_model::RegressorModel;
+use dynident_estimation::{
+    CovarianceMethod, Estimate, EstimationError, LinearProblem, SegmentedFactor, WeightedSettings,
+    weighted_least_squares,
+};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Longest lag looked for, seconds: drives and buses stay below.
+const LONGEST_DELAY_S: f64 = 0.1;
+/// Steps at most; two to four are usual.
+const MOST_STEPS: usize = 12;
+/// The steps end when no lag moves by more than this share of its standard deviation, or by so many samples.
+const SETTLED: (f64, f64) = (0.02, 1.0e-6);
+
+/// Lags by joint, with the parameters that were estimated with them.
+pub(crate) struct LagFit {
+    /// Base parameters, then what the last step adds to each joint's lag, seconds.
+    pub(crate) last: Estimate,
+    /// Number of base parameters.
+    pub(crate) base: usize,
+    /// Lag of torque behind motion by joint; `None` where the samples do not determine it.
+    pub(crate) joints: Vec<Option<TorqueLag>>,
+    /// Filtered rows by joint.
+    pub(crate) rows: Vec<usize>,
+}
+
+impl LagFit {
+    /// Covariance of the lags of some joints, s².
+    pub(crate) fn covariance(&self, joints: &[usize]) -> DMatrix<f64> {
+        let of = |row: usize, column: usize| (self.base + joints[row], self.base + joints[column]);
+        DMatrix::from_fn(joints.len(), joints.len(), |row, column| self.last.covariance[of(row, column)])
+    }
+
+    /// How the base parameters answer to each joint's lag, `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`: what they are estimated to
+    /// be where the lag is taken to be larger, per second; zero for a lag that the samples do not determine.
+    pub(crate) fn answers(&self) -> DMatrix<f64> {
+        let known: Vec<usize> = (0..self.joints.len()).filter(|&joint| self.joints[joint].is_some()).collect();
+        let mut answers = DMatrix::zeros(self.base, self.joints.len());
+        let white = &self.last.covariance_white;
+        let own =
+            DMatrix::from_fn(known.len(), known.len(), |a, b| white[(self.base + known[a], self.base + known[b])]);
+        let Some(own) = own.cholesky() else { return answers };
+        for row in 0..self.base {
+            let with_lags = DVector::from_fn(known.len(), |place, _| white[(row, self.base + known[place])]);
+            for (place, answer) in own.solve(&with_lags).iter().enumerate() {
+                answers[(row, known[place])] = *answer;
+            }
+        }
+        answers
+    }
+
+    /// The share of the torque's square that the model leaves which a joint's own lag takes off.
+    pub(crate) fn share(&self, joint: usize) -> f64 {
+        let Some(lag) = self.joints[joint] else { return 0.0 };
+        let column = self.base + joint;
+        let gained = lag.lag_s.powi(2) / self.last.covariance_white[(column, column)].max(f64::MIN_POSITIVE);
+        gained / (gained + self.rows[joint] as f64)
+    }
+}
+
+/// The samples of some logs with the rows made of them, about one lag for each joint.
+struct Samples<'a> {
+    checks: &'a [DelayCheck<'a>],
+    with: (&'a Logs<'a>, &'a EstimationSettings),
+    /// Log by log, joint by joint.
+    rows: Vec<Vec<DelayRows>>,
+    /// Seconds.
+    lag_s: Vec<f64>,
+}
+
+/// Fits the lags of the joints, the same in all logs. `None` for logs too short to fit to.
+pub(crate) fn fit_lags(
+    checks: &[DelayCheck<'_>],
+    (logs, settings): (&Logs<'_>, &EstimationSettings),
+) -> Option<LagFit> {
+    fitted(checks.first()?.model(), checks, (logs, settings)).ok()
+}
+
+/// The lags of one log alone with what was taken off before it was read, by joint; `None` where it does not determine
+/// one. A lag matters where its rest does.
+pub(crate) fn lags_of_log(check: DelayCheck<'_>, with: (&Logs<'_>, &EstimationSettings)) -> Vec<Option<TorqueLag>> {
+    let joints = check.model().model().dof();
+    let taken_off = &with.0.motion.torque_lag_s;
+    let before = |joint: usize| taken_off.as_ref().and_then(|lags| lags.at(joint)).unwrap_or(0.0);
+    let rest = fit_lags(&[check], with).map_or_else(|| vec![None; joints], |fit| fit.joints);
+    let total = |(joint, rest): (usize, Option<TorqueLag>)| {
+        rest.map(|rest| TorqueLag { lag_s: before(joint) + rest.lag_s, taken_off_s: before(joint), ..rest })
+    };
+    rest.into_iter().enumerate().map(total).collect()
+}
+
+fn fitted(
+    model: &RegressorModel,
+    checks: &[DelayCheck<'_>],
+    with: (&Logs<'_>, &EstimationSettings),
+) -> Result<LagFit, EstimationError> {
+    let (logs, settings) = with;
+    let cutoff_hz = logs.motion.differentiator.cutoff_hz();
+    let dof = model.model().dof();
+    let start = |joint: usize| {
+        let coarse = |check: &DelayCheck<'_>| Some(check.coarse(joint, cutoff_hz, LONGEST_DELAY_S)? / check.rate_hz());
+        checks.iter().find_map(coarse).unwrap_or(0.0).clamp(-LONGEST_DELAY_S, LONGEST_DELAY_S)
+    };
+    let mut samples = Samples::new(checks, with, (0..dof).into_par_iter().map(start).collect())?;
+    let quick =
+        WeightedSettings { rank: settings.rank, covariance: CovarianceMethod::White, ..WeightedSettings::default() };
+    let base = model.layout().columns().len();
+    let fastest_hz = checks.iter().map(DelayCheck::rate_hz).fold(0.0, f64::max);
+    for _ in 0..MOST_STEPS {
+        let step = weighted_least_squares(&samples.problem(|rows| &rows.merged)?, &quick)?;
+        let mut has_settled = true;
+        for joint in 0..dof {
+            let (rest, std) = (step.values[base + joint], step.std[base + joint]);
+            has_settled &= rest.abs() <= (SETTLED.0 * std).max(SETTLED.1 / fastest_hz);
+            samples.lag_s[joint] = (samples.lag_s[joint] + rest).clamp(-LONGEST_DELAY_S, LONGEST_DELAY_S);
+        }
+        samples.follow()?;
+        if has_settled {
+            break;
+        }
+    }
+    let last_step = WeightedSettings { covariance: settings.covariance, ..quick };
+    let last = weighted_least_squares(&samples.problem(|rows| &rows.factor)?, &last_step)?;
+    let joints = (0..dof).map(|joint| samples.joint_lag(&last, base, joint, fastest_hz)).collect();
+    let of_joint = |joint: usize| samples.rows.iter().map(|log| log[joint].factor.rows()).sum();
+    Ok(LagFit { base, joints, rows: (0..dof).map(of_joint).collect(), last })
+}
+
+impl<'a> Samples<'a> {
+    fn new(
+        checks: &'a [DelayCheck<'a>],
+        with: (&'a Logs<'a>, &'a EstimationSettings),
+        lag_s: Vec<f64>,
+    ) -> Result<Self, EstimationError> {
+        let of_log = |check: &DelayCheck<'_>| -> Result<Vec<DelayRows>, EstimationError> {
+            let of_joint = |joint: usize| check.rows(with, joint, lag_s[joint] * check.rate_hz());
+            (0..lag_s.len()).into_par_iter().map(of_joint).collect()
+        };
+        let rows = checks.par_iter().map(of_log).collect::<Result<_, _>>()?;
+        Ok(Self { checks, with, rows, lag_s })
+    }
+
+    /// Makes the rows again whose nodes no longer surround their lag.
+    fn follow(&mut self) -> Result<(), EstimationError> {
+        for (check, rows) in self.checks.iter().zip(&mut self.rows) {
+            for (joint, rows) in rows.iter_mut().enumerate() {
+                let shift = self.lag_s[joint] * check.rate_hz();
+                if !rows.reaches(shift) {
+                    *rows = check.rows(self.with, joint, shift)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The lag of one joint from the last step, if it settled.
+    fn joint_lag(&self, last: &Estimate, base: usize, joint: usize, fastest_hz: f64) -> Option<TorqueLag> {
+        let column = base + joint;
+        let (rest, std) = (last.values[column], last.std[column]);
+        let lag_s = self.lag_s[joint] + rest;
+        let excited = last.rank.fixed.iter().all(|fixed| fixed.column != column);
+        let settled = rest.abs() <= (0.5 * std).max(1.0e3 * SETTLED.1 / fastest_hz);
+        let half_width = last.half_width_95[column];
+        if !excited || !settled || lag_s.abs() >= 0.999 * LONGEST_DELAY_S || half_width >= LONGEST_DELAY_S {
+            return None;
+        }
+        let of_log = |(check, rows): (&DelayCheck<'_>, &Vec<DelayRows>)| {
+            let per_second = rows[joint].slope_rms * check.rate_hz();
+            [per_second * per_second, 1.0].map(|value| value * rows[joint].factor.rows() as f64)
+        };
+        let [squares, rows] =
+            self.checks.iter().zip(&self.rows).map(of_log).fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y]);
+        let moved = lag_s.abs() * (squares / rows.max(1.0)).sqrt();
+        Some(TorqueLag {
+            lag_s,
+            std_s: std,
+            half_width_95_s: half_width,
+            matters: lag_s.abs() > half_width && moved > last.joint_sigma[joint],
+            taken_off_s: 0.0,
+        })
+    }
+
+    /// Parameters, then the rest of every joint's lag in seconds.
+    fn problem(
+        &self,
+        factor: impl Fn(&DelayRows) -> &SegmentedFactor + Sync,
+    ) -> Result<LinearProblem, EstimationError> {
+        let model = self.checks[0].model();
+        let layout = model.layout();
+        let (base, dof) = (layout.columns().len(), self.lag_s.len());
+        let names = (0..base + dof).map(|column| format!("column {column}")).collect();
+        let joints = (0..dof).map(|joint| format!("joint {joint}")).collect();
+        // What the logs do not determine stays as it was fitted, for the slope was made with it.
+        let fallback = self.checks[0].theta().iter().copied().chain(vec![0.0; dof]).collect();
+        let mut problem = LinearProblem::new(names, joints).with_fallback(fallback)?;
+        for (number, (check, rows)) in self.checks.iter().zip(&self.rows).enumerate() {
+            let mapped = |(joint, rows): (usize, &DelayRows)| {
+                let own = layout.joint_columns(joint);
+                let mut map = DMatrix::zeros(own.len() + 1 + NODES, own.len() + 2);
+                for column in 0..own.len() {
+                    map[(column, column)] = 1.0;
+                }
+                map[(own.len(), own.len())] = check.rate_hz();
+                let shift = self.lag_s[joint] * check.rate_hz();
+                for (node, weight) in lagrange(shift - rows.centre as f64).into_iter().enumerate() {
+                    map[(own.len() + 1 + node, own.len() + 1)] = weight;
+                }
+                factor(rows).mapped(&map)
+            };
+            let mapped: Vec<_> = rows.par_iter().enumerate().map(mapped).collect::<Result<_, _>>()?;
+            for (joint, mapped) in mapped.into_iter().enumerate() {
+                let columns = layout.joint_columns(joint).iter().copied().chain([base + joint]).collect();
+                problem.add(&format!("log {number}"), joint, columns, mapped)?;
+            }
+        }
+        Ok(problem)
+    }
+}

@@ -1,0 +1,79 @@
+//! By how much torque comes after its motion, as a number with its error bar.
+
+use dynident_recording::{Finding, Level};
+use serde::{Deserialize, Serialize};
+
+/// Lags below a picosecond are rounding, and so are their error bars.
+const ROUNDING_S: f64 = 1.0e-12;
+
+/// By how much one joint's torque comes after the motion.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct TorqueLag {
+    /// Seconds; negative where the torque comes before.
+    pub lag_s: f64,
+    /// Its standard deviation.
+    pub std_s: f64,
+    /// Half the width of its 95 % interval.
+    pub half_width_95_s: f64,
+    /// Whether what was not taken off is beyond its interval and moves more torque than the model leaves unexplained.
+    pub matters: bool,
+    /// What of it was taken off the rows before the fit, seconds.
+    #[serde(default)]
+    pub taken_off_s: f64,
+}
+
+/// One lag from those of several logs: the mean weighted by their variances. Where logs differ by more than their error
+/// bars say, the bar grows to what they differ by (Birge, Phys. Rev. 40 (1932) 207).
+pub fn pooled_delay(lags: &[TorqueLag]) -> Option<TorqueLag> {
+    let weight = |lag: &TorqueLag| lag.std_s.max(ROUNDING_S).powi(-2);
+    let total: f64 = lags.iter().map(weight).sum();
+    let first = lags.first()?;
+    let mean = lags.iter().map(|lag| weight(lag) * lag.lag_s).sum::<f64>() / total;
+    let scatter: f64 = lags.iter().map(|lag| weight(lag) * (lag.lag_s - mean).powi(2)).sum();
+    let inflation = if lags.len() > 1 { (scatter / (lags.len() - 1) as f64).sqrt().max(1.0) } else { 1.0 };
+    let half: f64 = lags.iter().map(|lag| (weight(lag) * lag.half_width_95_s).powi(2)).sum();
+    let half_width_95_s = if lags.len() > 1 { inflation * half.sqrt() / total } else { first.half_width_95_s };
+    let std_s = if lags.len() > 1 { inflation / total.sqrt() } else { first.std_s };
+    let taken_off_s = first.taken_off_s;
+    let matters = lags.iter().any(|lag| lag.matters) && (mean - taken_off_s).abs() > half_width_95_s;
+    Some(TorqueLag { lag_s: mean, std_s, half_width_95_s, matters, taken_off_s })
+}
+
+/// The lags that matter as sentences.
+pub fn delay_findings(lags: &[Option<TorqueLag>], joints: &[String]) -> Vec<Finding> {
+    let of_joint = |(joint, lag): (&String, &Option<TorqueLag>)| {
+        lag.filter(|lag| lag.matters || lag.taken_off_s != 0.0).map(|lag| {
+            let side = if lag.lag_s > 0.0 { "after" } else { "before" };
+            let taken_off = match lag.taken_off_s {
+                0.0 => String::new(),
+                taken_off_s => format!("; {:.1} ms were taken off", 1e3 * taken_off_s.abs()),
+            };
+            let message = format!(
+                "comes {:.1} +- {:.1} ms {side} the motion (95 %), estimated together with the model{taken_off}",
+                1e3 * lag.lag_s.abs(),
+                1e3 * lag.half_width_95_s
+            );
+            Finding { level: Level::Info, channel: format!("torque {joint}"), message }
+        })
+    };
+    joints.iter().zip(lags).filter_map(of_joint).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn logs_that_agree_sharpen_the_lag_and_logs_that_do_not_widen_it() {
+        let lag = |lag_s| TorqueLag { lag_s, std_s: 1e-3, half_width_95_s: 2e-3, matters: true, taken_off_s: 0.0 };
+        assert_eq!(pooled_delay(&[]), None);
+        assert_eq!(pooled_delay(&[lag(5e-3)]), Some(lag(5e-3)));
+        let agreeing = pooled_delay(&[lag(5e-3), lag(5e-3)]).unwrap_or(lag(0.0));
+        // Two equal measurements: the mean's deviation is that of one by √2.
+        assert!((agreeing.std_s - 1e-3 / 2_f64.sqrt()).abs() < 1e-12 && (agreeing.lag_s - 5e-3).abs() < 1e-12);
+        let apart = pooled_delay(&[lag(0.0), lag(10e-3)]).unwrap_or(lag(0.0));
+        // Half the difference of two is the deviation of their mean.
+        assert!((apart.std_s - 5e-3).abs() < 1e-12 && !apart.matters);
+    }
+}

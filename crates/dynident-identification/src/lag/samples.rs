@@ -1,0 +1,112 @@
+//! The samples of a log that its lags are estimated from.
+
+use super::rows::{DelayRows, FilteredRows, Piece};
+use crate::estimators::EstimationSettings;
+use crate::logs::Logs;
+use crate::regressor_model::RegressorModel;
+use crate::rows::{JointRows, RawSamples, motion_band_hz, predicted_torque};
+use dynident_estimation::EstimationError;
+use dynident_recording::{DecimationSettings, Decimator, best_lag};
+
+/// Samples that are looked at: some tens of seconds of any log.
+pub(crate) const DELAY_SAMPLES: usize = 20_000;
+/// Numbers that are kept at most, 64 MB.
+const MOST_NUMBERS: usize = 8_000_000;
+
+/// Gathers a log's first samples, then determines their lags.
+pub(crate) struct DelayCheck<'a> {
+    model: &'a RegressorModel,
+    theta: &'a [f64],
+    pieces: Vec<Piece>,
+    samples: usize,
+    numbers: usize,
+    full: bool,
+    rate_hz: f64,
+    buffer: Vec<f64>,
+}
+
+impl<'a> DelayCheck<'a> {
+    pub(crate) fn new(model: &'a RegressorModel, theta: &'a [f64]) -> Self {
+        let (pieces, buffer) = (Vec::new(), Vec::new());
+        Self { model, theta, pieces, samples: 0, numbers: 0, full: false, rate_hz: 0.0, buffer }
+    }
+
+    /// Rows as they leave the parallel filter; the samples that they belong to came before.
+    pub(crate) fn filtered(&mut self, rows: &JointRows<'_>) {
+        let Some(piece) = self.pieces.last_mut().filter(|_| !self.full) else { return };
+        let regressor = &rows.panel[..self.model.layout().joint_columns(rows.joint).len() * rows.rows];
+        self.numbers += regressor.len();
+        let (regressor, coverage) = (regressor.to_vec(), rows.coverage.to_vec());
+        piece.rows[rows.joint].push(FilteredRows { rows: rows.rows, regressor, coverage });
+    }
+
+    pub(crate) fn raw(&mut self, samples: &RawSamples<'_>) {
+        self.full |= self.samples >= DELAY_SAMPLES || self.numbers >= MOST_NUMBERS;
+        if self.full {
+            return;
+        }
+        self.rate_hz = samples.rate_hz;
+        let joints = self.model.model().dof();
+        if self.pieces.last().is_none_or(|piece| piece.segment != samples.segment) {
+            self.pieces.push(Piece::new(samples.segment, joints));
+        }
+        let rows = samples.panels.samples();
+        self.samples += rows;
+        let Some(piece) = self.pieces.last_mut() else { return };
+        for joint in 0..joints {
+            let columns = self.model.layout().joint_columns(joint);
+            let panel = samples.panels.joint(joint);
+            predicted_torque(panel, rows, columns, self.theta, &mut self.buffer);
+            piece.model[joint].extend_from_slice(&self.buffer);
+            piece.measured[joint].extend_from_slice(&panel[columns.len() * rows..]);
+            piece.leave_out(joint, samples.set_aside.get(joint).map_or(&[], Vec::as_slice));
+            self.numbers += 2 * rows;
+        }
+    }
+
+    /// What makes its rows.
+    pub(crate) fn model(&self) -> &'a RegressorModel {
+        self.model
+    }
+
+    /// The base parameters that the rest is predicted with.
+    pub(crate) fn theta(&self) -> &'a [f64] {
+        self.theta
+    }
+
+    /// Samples a second.
+    pub(crate) fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
+    /// Where to begin: the best match of prediction and torque, where a shift matters; samples.
+    pub(crate) fn coarse(&self, joint: usize, cutoff_hz: Option<f64>, longest_s: f64) -> Option<f64> {
+        let piece = self.pieces.iter().max_by_key(|piece| piece.measured[joint].len())?;
+        let settings = DecimationSettings { factor: 1, cutoff_hz, ..DecimationSettings::default() };
+        let smooth = |signal: &[f64]| -> Option<Vec<f64>> {
+            let mut out = Vec::new();
+            let rows = Decimator::new(&settings, self.rate_hz, 1).ok()?.push(signal, signal.len(), &mut out);
+            out.truncate(rows);
+            Some(out)
+        };
+        let (model, measured) = (smooth(&piece.model[joint])?, smooth(&piece.measured[joint])?);
+        let longest = (longest_s * self.rate_hz).ceil() as usize;
+        let lag = best_lag(&model, &measured, longest, self.rate_hz)?;
+        lag.matters().then_some(lag.samples)
+    }
+
+    /// A joint's rows about a lag of `shift` samples.
+    ///
+    /// # Errors
+    /// Too few rows.
+    pub(crate) fn rows(
+        &self,
+        (logs, settings): (&Logs<'_>, &EstimationSettings),
+        joint: usize,
+        shift: f64,
+    ) -> Result<DelayRows, EstimationError> {
+        let columns = self.model.layout().joint_columns(joint).len();
+        let filter = logs.filter.decimation(self.rate_hz, motion_band_hz(&logs.motion));
+        DelayRows::new(&self.pieces, joint, columns, (self.rate_hz, filter.as_ref()), shift, settings.segments)
+    }
+}

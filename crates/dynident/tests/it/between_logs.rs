@@ -1,0 +1,60 @@
+//! Error bars that hold on another day: what varies between logs is part of them.
+use crate::common::{Job, Motion, Random, Truth, format, header, repository, write_log};
+
+/// Mean χ² per friction parameter of what a fit to three logs says of a fourth day, and by how much the logs were found
+/// to differ; friction of each log off its mean by `spread` (standard deviation, a share of itself).
+fn of_another_day(spread: f64, runs: u64) -> (f64, f64) {
+    let folder = tempfile::tempdir().unwrap();
+    let description = repository("examples/robots/paper_2r.toml");
+    let mean = Truth::near(&description, 0.3, false);
+    let logs: Vec<String> = (0..3).map(|log| format!("{{ file = \"{log}.csv\" }}")).collect();
+    let study = format!(
+        "robot.file = {:?}\ndrive.friction = \"stated\"\nlog = [{}]\nestimator.physical = false\n\
+         parallel_filter.factor = 2\n{}",
+        description.display().to_string(),
+        logs.join(", "),
+        format(2).replace("[motion]", "[motion]\ntorque_lag_s = 0.0")
+    );
+    let job = Job::new(folder.path(), &study);
+    let robot = job.robot();
+    let mut random = Random(11);
+    let (mut squares, mut count, mut differing) = (0.0, 0_usize, 0.0);
+    for run in 0..runs {
+        let mut day = || {
+            let mut truth = mean.clone();
+            let viscous_coulomb_offset = truth.drive.iter_mut().flat_map(|drive| &mut drive[1..]);
+            viscous_coulomb_offset.for_each(|value| *value *= 1.0 + spread * random.normal());
+            truth
+        };
+        let days: Vec<Truth> = (0..3).map(|_| day()).collect();
+        let another = day().base_values(&robot);
+        for (log, truth) in days.iter().enumerate() {
+            let path = folder.path().join(format!("{log}.csv"));
+            let motion = Motion::new(2, 10 * run + log as u64);
+            write_log(&path, truth, &motion, (100.0, 30.0), &header(2), |q, tau| {
+                let noisy = tau.iter().map(|tau| tau + 0.3 * random.normal());
+                q.iter().copied().chain(noisy).collect()
+            });
+        }
+        let result = job.identify().result;
+        differing += result.method.between_logs.unwrap().friction.unwrap() / runs as f64;
+        for (found, truth) in result.base_parameters.iter().zip(&another) {
+            if ["fv", "fc", "off"].iter().any(|symbol| found.expression.starts_with(symbol)) {
+                squares += ((found.value - truth) / found.std).powi(2);
+                count += 1;
+            }
+        }
+    }
+    (squares / count as f64, differing)
+}
+
+#[test]
+fn friction_of_another_day_is_inside_its_bars() {
+    // Some 80 squares whose k comes from 18 differences each: the mean is 1 to some 0.3, and a k that is too small by
+    // chance makes it larger.
+    let (chi_square, differing) = of_another_day(0.1, 14);
+    assert!((0.6..=1.8).contains(&chi_square) && differing > 2.0, "{chi_square} {differing}");
+    // The same friction every day: the bars are those of one day's noise, k is 1 but for chance.
+    let (chi_square, differing) = of_another_day(0.0, 8);
+    assert!((0.4..=1.5).contains(&chi_square) && (0.7..=1.3).contains(&differing), "{chi_square} {differing}");
+}
