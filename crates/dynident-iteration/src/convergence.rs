@@ -4,6 +4,7 @@ use crate::estimate::RunEstimate;
 use crate::evidence::Clipping;
 use crate::record::RunRecord;
 use crate::settings::IterationSettings;
+use dynident_identification::examination::TorqueLag;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -200,6 +201,9 @@ pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, na
     }
     let own = last.estimate.as_ref();
     let lags = own.map_or(&[][..], |estimate| &estimate.torque_lags);
+    // A torque that is held from sample to sample is half a sample late by itself.
+    let slowest_hz = evidence.log_rates_hz.iter().copied().filter(|hz| *hz > 0.0).fold(f64::INFINITY, f64::min);
+    let sampled_s = 0.5 / slowest_hz;
     for (place, shown) in evidence.joints.iter().enumerate() {
         if let Some(Clipping { share, torque, stated }) =
             shown.clipping.filter(|clipping| clipping.share > MOST_CLIPPED)
@@ -210,7 +214,8 @@ pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, na
                 found.push(Shortfall::Clipping { joint: joint(place), percent: 100.0 * share, torque, stated });
             }
         }
-        if let Some(lag) = lags.get(place).copied().flatten().filter(|lag| lag.matters) {
+        let is_beyond_sampling = |lag: &TorqueLag| lag.matters && lag.lag_s.abs() > sampled_s + lag.half_width_95_s;
+        if let Some(lag) = lags.get(place).copied().flatten().filter(is_beyond_sampling) {
             let (lag_s, half_width_95_s) = (lag.lag_s, lag.half_width_95_s);
             found.push(Shortfall::Lag { joint: joint(place), lag_s, half_width_95_s });
         }
