@@ -129,8 +129,8 @@ impl Identification {
 
 /// Fits a robot's model to its recordings with the role [`Identify`](Role::Identify) and tests it on the others: rows
 /// and factors, estimate, consistent parameters, examination, held-out examination. Each of these stages can be called
-/// alone: [`Logs::new`], [`training_rows`], [`estimate`](crate::estimators::estimate()), [`consistent_stage`],
-/// [`examine_training`], [`examine_held_out`](crate::examination::examine_held_out).
+/// alone: [`Logs::new`], [`training_rows`](crate::training_rows), [`estimate`](crate::estimators::estimate()),
+/// [`consistent_stage`], [`examine_training`], [`examine_held_out`](crate::examination::examine_held_out).
 ///
 /// # Errors
 /// [`IdentificationError`]: recordings, settings that do not go together. A poor fit is not an error.
