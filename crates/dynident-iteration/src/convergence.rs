@@ -4,7 +4,7 @@ use crate::estimate::RunEstimate;
 use crate::evidence::Clipping;
 use crate::record::RunRecord;
 use crate::settings::IterationSettings;
-use dynident_identification::examination::TorqueLag;
+use dynident_identification::examination::{TorqueLag, pooled_delay};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -201,9 +201,13 @@ pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, na
     }
     let own = last.estimate.as_ref();
     let lags = own.map_or(&[][..], |estimate| &estimate.torque_lags);
-    // A torque that is held from sample to sample is half a sample late by itself.
+    // A torque that is held from sample to sample is half a sample late by itself. A recorder is as late at each joint:
+    // what friction leaves looks like another lag at each, and is judged as unexplained torque.
     let slowest_hz = evidence.log_rates_hz.iter().copied().filter(|hz| *hz > 0.0).fold(f64::INFINITY, f64::min);
     let sampled_s = 0.5 / slowest_hz;
+    let is_beyond_sampling = |lag: &TorqueLag| lag.matters && lag.lag_s.abs() > sampled_s + lag.half_width_95_s;
+    let known: Vec<TorqueLag> = lags.iter().copied().flatten().collect();
+    let is_late = pooled_delay(&known).as_ref().is_some_and(is_beyond_sampling);
     for (place, shown) in evidence.joints.iter().enumerate() {
         if let Some(Clipping { share, torque, stated }) =
             shown.clipping.filter(|clipping| clipping.share > MOST_CLIPPED)
@@ -214,8 +218,7 @@ pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, na
                 found.push(Shortfall::Clipping { joint: joint(place), percent: 100.0 * share, torque, stated });
             }
         }
-        let is_beyond_sampling = |lag: &TorqueLag| lag.matters && lag.lag_s.abs() > sampled_s + lag.half_width_95_s;
-        if let Some(lag) = lags.get(place).copied().flatten().filter(is_beyond_sampling) {
+        if let Some(lag) = lags.get(place).copied().flatten().filter(|lag| is_late && is_beyond_sampling(lag)) {
             let (lag_s, half_width_95_s) = (lag.lag_s, lag.half_width_95_s);
             found.push(Shortfall::Lag { joint: joint(place), lag_s, half_width_95_s });
         }
