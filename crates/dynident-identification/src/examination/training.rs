@@ -5,7 +5,7 @@ use crate::estimators::EstimationSettings;
 use crate::lag::{DELAY_SAMPLES, DelayCheck, TorqueLag, lags_of_log};
 use crate::logs::Logs;
 use crate::progress::Silent;
-use crate::recording::{LogError, Role};
+use crate::recording::{LogError, Role, Samples};
 use crate::regressor_model::RegressorModel;
 use crate::rows::{JointRows, LogPass, RawSamples, RowConsumer};
 
@@ -29,7 +29,8 @@ impl RowConsumer for SecondPass<'_> {
     }
 }
 
-/// The delays of the torque of recording number `index`, and its torque over time, with the base parameters `theta`.
+/// The delays of the torque of recording number `index` (none where rows of a motion are left out), and its torque over
+/// time, with the base parameters `theta`.
 ///
 /// # Errors
 /// What reading it can give.
@@ -43,7 +44,11 @@ pub fn examine_training(
     let most_samples = Some(DELAY_SAMPLES as u64);
     let pass = LogPass { most_samples, progress: &Silent, ..logs.pass(model, index) };
     let statistics = pass.run(&mut second)?;
-    let delays = lags_of_log(second.delay, (logs, settings));
+    // Rows that are left out would move those behind them.
+    let delays = match &logs.recordings[index].samples {
+        Samples::Motion(record) if !record.usable.is_empty() || record.windows.is_some() => vec![None; model.dof()],
+        Samples::Motion(_) | Samples::Log(_) => lags_of_log(second.delay, (logs, settings)),
+    };
     let name = logs.recordings[index].name.clone();
     Ok((delays, second.trace.finished(name, Role::Identify, statistics.filtered_rate_hz)))
 }
