@@ -9,9 +9,7 @@
 
 use crate::training::Training;
 use dynident_dynamics::Column;
-use dynident_estimation::{
-    Estimate, EstimationError, LinearProblem, WeightedSettings, student_half_width, weighted_least_squares,
-};
+use dynident_estimation::{Estimate, EstimationError, LinearProblem, WeightedSettings, weighted_least_squares};
 use dynident_model::terms::TorqueTerm;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -62,22 +60,8 @@ pub(crate) fn with_variation(
     let of_one: DMatrix<f64> = alone.iter().fold(DMatrix::zeros(count, count), |sum, one| {
         sum + one.covariance.view((0, 0), (count, count)) / alone.len().max(1) as f64
     });
-    let mut wider = estimate.clone();
-    let normal = student_half_width(0.95, f64::INFINITY);
-    for row in 0..count {
-        for column in 0..count {
-            wider.covariance[(row, column)] += of_one[(row, column)] * apart(row) * apart(column);
-        }
-        let before = estimate.std[row];
-        let added = wider.covariance[(row, row)] - before * before;
-        if added > 0.0 && before > 0.0 {
-            wider.std[row] = before.hypot(added.sqrt());
-            wider.half_width_95[row] = estimate.half_width_95[row].hypot(normal * added.sqrt());
-            let grown = wider.std[row] / before;
-            wider.relative_std_percent[row] = estimate.relative_std_percent[row].map(|percent| percent * grown);
-        }
-    }
-    Some((wider, found))
+    let further = DMatrix::from_fn(count, count, |row, column| of_one[(row, column)] * apart(row) * apart(column));
+    Some((estimate.with_further_error(&further), found))
 }
 
 /// Least squares on one log, with what it does not excite as in the estimate of all.

@@ -33,6 +33,35 @@ impl EstimateStatus {
     }
 }
 
+impl Estimate {
+    /// The same with a `further` error in its covariance, independent of its own and normally distributed: `Σ + F`,
+    /// `std` and the intervals with it, `h' = √(h² + (1.96 σ_F)²)`. `further` is as large as the covariance, or belongs
+    /// to the first columns; columns with a variance of zero there (those that are held) stay as they are.
+    #[must_use]
+    pub fn with_further_error(&self, further: &DMatrix<f64>) -> Self {
+        let mut wider = self.clone();
+        let count = further.nrows().min(self.std.len());
+        let normal = student_half_width(0.95, f64::INFINITY);
+        for row in 0..count {
+            for column in 0..count {
+                wider.covariance[(row, column)] += further[(row, column)];
+            }
+            let added = further[(row, row)].max(0.0).sqrt();
+            if added == 0.0 {
+                continue;
+            }
+            let before = self.std[row];
+            wider.std[row] = before.hypot(added);
+            wider.half_width_95[row] = self.half_width_95[row].hypot(normal * added);
+            if before > 0.0 {
+                let grown = wider.std[row] / before;
+                wider.relative_std_percent[row] = self.relative_std_percent[row].map(|percent| percent * grown);
+            }
+        }
+        wider
+    }
+}
+
 /// The covariance of all columns from that of the `free` ones, zero for the others, and the roots of its diagonal.
 ///
 /// # Errors

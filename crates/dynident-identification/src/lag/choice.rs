@@ -8,7 +8,7 @@
 
 use super::fit::LagFit;
 use super::measured::TorqueLag;
-use dynident_estimation::{Estimate, student_half_width};
+use dynident_estimation::Estimate;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -46,7 +46,8 @@ pub struct LagChoice {
     pub kind: LagKind,
     /// Seconds that were taken off, joint by joint; empty for none.
     pub lag_s: Vec<f64>,
-    /// One lag for all joints by all training logs; none where they determine none.
+    /// One lag for all joints by all training logs, with what was taken off where that is the same for all (of joints
+    /// of their own what is left after it); none where the logs determine none.
     pub common: Option<TorqueLag>,
     /// χ² of the joints' lags about the common one, per degree of freedom: far above 1 where they differ.
     pub scatter: Option<f64>,
@@ -84,6 +85,10 @@ impl LagChoice {
 pub(crate) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate) -> LagChoice {
     let dof = fit.joints.len();
     let before = |joint: usize| taken_off.get(joint).copied().unwrap_or(0.0);
+    let taken_off_s = match taken_off {
+        [first, others @ ..] if others.iter().all(|other| other == first) => *first,
+        _ => 0.0,
+    };
     let total = |rest: &dyn Fn(usize) -> f64| (0..dof).map(|joint| before(joint) + rest(joint)).collect::<Vec<f64>>();
     let as_before = LagChoice { lag_s: taken_off.to_vec(), ..LagChoice::default() };
     let all: Vec<usize> = (0..dof).filter(|&joint| fit.joints[joint].is_some()).collect();
@@ -92,7 +97,7 @@ pub(crate) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate) -
         let moved = fit.answers() * DVector::from_column_slice(rest);
         moved.iter().zip(&estimate.std).any(|(moved, std)| moved.abs() > MATTERS * std)
     };
-    let choice = LagChoice { common: Some(lag), scatter, ..as_before };
+    let choice = LagChoice { common: Some(lag.after(taken_off_s)), scatter, ..as_before };
 
     // Joints whose own lag explains much of what the model leaves, where one lag for all does not do.
     let freedoms = all.len().saturating_sub(1) as f64;
@@ -135,26 +140,12 @@ pub(crate) fn with_lag_error(fit: &LagFit, choice: &LagChoice, estimate: &Estima
             DMatrix::from_column_slice(of_all.len(), 1, of_all.as_slice())
         }
     };
-    let mut wider = estimate.clone();
-    let normal = student_half_width(0.95, f64::INFINITY);
-    for row in 0..fit.base {
-        let is_fixed = estimate.rank.fixed.iter().any(|fixed| fixed.column == row);
-        if is_fixed {
-            continue;
-        }
-        for column in 0..fit.base {
-            wider.covariance[(row, column)] += half.row(row).dot(&half.row(column));
-        }
-        let of_lag = half.row(row).norm();
-        let before = wider.std[row];
-        wider.std[row] = before.hypot(of_lag);
-        wider.half_width_95[row] = estimate.half_width_95[row].hypot(normal * of_lag);
-        if before > 0.0 {
-            let grown = wider.std[row] / before;
-            wider.relative_std_percent[row] = wider.relative_std_percent[row].map(|percent| percent * grown);
-        }
+    let mut further = &half * half.transpose();
+    for fixed in estimate.rank.fixed.iter().filter(|fixed| fixed.column < fit.base) {
+        further.row_mut(fixed.column).fill(0.0);
+        further.column_mut(fixed.column).fill(0.0);
     }
-    wider
+    estimate.with_further_error(&further)
 }
 
 fn is_beyond_its_bar(lag: &TorqueLag) -> bool {

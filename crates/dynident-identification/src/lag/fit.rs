@@ -97,9 +97,7 @@ pub(crate) fn lags_of_log(check: DelayCheck<'_>, with: (&Logs<'_>, &EstimationSe
     let taken_off = &with.0.motion.torque_lag_s;
     let before = |joint: usize| taken_off.as_ref().and_then(|lags| lags.at(joint)).unwrap_or(0.0);
     let rest = fit_lags(&[check], with).map_or_else(|| vec![None; joints], |fit| fit.joints);
-    let total = |(joint, rest): (usize, Option<TorqueLag>)| {
-        rest.map(|rest| TorqueLag { lag_s: before(joint) + rest.lag_s, taken_off_s: before(joint), ..rest })
-    };
+    let total = |(joint, rest): (usize, Option<TorqueLag>)| rest.map(|rest| rest.after(before(joint)));
     rest.into_iter().enumerate().map(total).collect()
 }
 

@@ -23,6 +23,13 @@ pub struct TorqueLag {
     pub taken_off_s: f64,
 }
 
+impl TorqueLag {
+    /// The whole lag, of which `taken_off_s` was taken off before this rest was measured.
+    pub(crate) fn after(self, taken_off_s: f64) -> Self {
+        Self { lag_s: taken_off_s + self.lag_s, taken_off_s, ..self }
+    }
+}
+
 /// One lag from those of several logs: the mean weighted by their variances. Where logs differ by more than their error
 /// bars say, the bar grows to what they differ by (Birge, Phys. Rev. 40 (1932) 207).
 pub fn pooled_delay(lags: &[TorqueLag]) -> Option<TorqueLag> {

@@ -1,7 +1,7 @@
 //! What an error of stated drive gains does to a payload.
 
 use super::columns::LoadColumns;
-use dynident_estimation::{Estimate, EstimationError, LinearProblem, student_half_width};
+use dynident_estimation::{Estimate, EstimationError, LinearProblem};
 use nalgebra::{DMatrix, DVector};
 
 /// The estimate with the error of the joints' gains in the covariance of its payloads.
@@ -19,11 +19,10 @@ pub(crate) fn with_gain_error(
     (estimate, held): (&Estimate, &[usize]),
     share: f64,
 ) -> Result<Estimate, EstimationError> {
-    let mut wider = estimate.clone();
     let count = problem.columns().len();
     let payload: Vec<usize> = columns.payloads.iter().flat_map(|own| own.first..own.first + own.kept.len()).collect();
     if share <= 0.0 || payload.is_empty() {
-        return Ok(wider);
+        return Ok(estimate.clone());
     }
     let fixed = |column: usize| estimate.rank.fixed.iter().any(|fixed| fixed.column == column);
     let free: Vec<usize> = (0..count).filter(|&column| !held.contains(&column) && !fixed(column)).collect();
@@ -36,6 +35,7 @@ pub(crate) fn with_gain_error(
     }
     let r = triangle.qr().r();
     let known = DVector::from_fn(count, |column, _| if held.contains(&column) { estimate.values[column] } else { 0.0 });
+    let mut further = DMatrix::zeros(count, count);
     for joint in 0..problem.joints().len() {
         let mut score = DVector::<f64>::zeros(count);
         for equation in problem.equations().iter().filter(|equation| equation.joint == joint) {
@@ -54,23 +54,13 @@ pub(crate) fn with_gain_error(
         for (place, &column) in free.iter().enumerate() {
             of_joint[column] = part[place] / norms[place];
         }
-        add(&mut wider.covariance, &payload, &of_joint, share);
-        add(&mut wider.covariance_white, &payload, &of_joint, share);
-    }
-    let normal = student_half_width(0.95, f64::INFINITY);
-    for &column in &payload {
-        let variance = wider.covariance[(column, column)].max(0.0);
-        let of_gains = (variance - estimate.covariance[(column, column)]).max(0.0).sqrt();
-        wider.std[column] = variance.sqrt();
-        wider.half_width_95[column] = estimate.half_width_95[column].hypot(normal * of_gains);
-    }
-    Ok(wider)
-}
-
-fn add(covariance: &mut DMatrix<f64>, columns: &[usize], part: &DVector<f64>, share: f64) {
-    for &row in columns {
-        for &column in columns {
-            covariance[(row, column)] += share * share * part[row] * part[column];
+        for &row in &payload {
+            for &column in &payload {
+                further[(row, column)] += share * share * of_joint[row] * of_joint[column];
+            }
         }
     }
+    let mut wider = estimate.with_further_error(&further);
+    wider.covariance_white += further;
+    Ok(wider)
 }

@@ -115,6 +115,11 @@ fn an_iteration_ends_with_the_robot_it_found() {
     assert!(result.problems.is_empty(), "{:?}", result.problems);
     let good: Vec<String> = file.runs.iter().filter(|run| run.accepted).map(|run| format!("run {}", run.run)).collect();
     assert_eq!(result.training.logs, good);
+    // Rows at the ends that do not count must not move those behind them: a lag that a row is long is none.
+    let row_s = result.logs[0].filtered_rate_hz.recip();
+    for lag in result.joints.iter().filter_map(|joint| joint.torque_lag) {
+        assert!(lag.lag_s.abs() < 0.5 * row_s, "{lag:?}");
+    }
     // The same numbers as the last run's pooled ones, with their names on the page.
     let last = file.runs.last().unwrap();
     assert_eq!(result.base_parameters.len(), last.pooled.len());

@@ -174,6 +174,8 @@ fn a_lag_is_taken_off_found_or_stated_and_the_test_does_the_same() {
         // Its own bar is some hundredth of a millisecond; a tenth is far below a sample (4 ms).
         assert!((lag_s - 5.0e-3).abs() < 1.0e-4, "{lag_s}");
     }
+    let common = found.method.torque_lag.common.unwrap();
+    assert!((common.lag_s - 5.0e-3).abs() < 1.0e-4 && common.taken_off_s > 4.9e-3, "{common:?}");
     let (stated, with_lag_stated) = held_out(Some(0.005));
     assert_eq!((stated.method.torque_lag.kind, stated.method.torque_lag.lag_s.len()), (LagKind::Stated, 6));
     let (as_logged, with_lag_left) = held_out(Some(0.0));
