@@ -43,9 +43,19 @@ run 0 "$dynident" design examples/design_paper.toml --out "$out/paper_motion"
 # One run, the iteration, the paper.
 run 0 "$dynident" simulate examples/iterate_ur10.toml --out "$out/run"
 run 0 "$dynident" iterate examples/iterate_paper_2r.toml --out "$out/iteration"
-# A robot outside: MuJoCo behind the line protocol, by the Python of the environment. One run, as an iteration that may make no more ends with status 1.
-sed -e "s#\"python3\"#\"$venv/bin/python\"#" -e 's#"\.\./robots#"'"$PWD"'/robots#' -e 's/max_runs = 5/max_runs = 1/' examples/iterate_ur10_mujoco.toml >"$out/mujoco.toml"
-run 1 "$dynident" iterate "$out/mujoco.toml" --out "$out/outside" --allow-command
+run 0 "$dynident" iterate examples/iterate_paper_2r_friction.toml --out "$out/friction"
+# A robot outside: MuJoCo behind the line protocol, by the Python of the environment. The robot found is tested on a run of another motion; an iteration that
+# may make one run only ends with status 1.
+sed -e "s#\"python3\"#\"$venv/bin/python\"#" -e 's#"\.\./robots#"'"$PWD"'/robots#' examples/iterate_ur10_mujoco.toml >"$out/mujoco.toml"
+run 0 "$dynident" iterate "$out/mujoco.toml" --out "$out/outside" --allow-command
+sed -e 's/max_runs = 5/max_runs = 1/' -e 's/^seed = 1/seed = 2/' "$out/mujoco.toml" >"$out/mujoco_other.toml"
+run 1 "$dynident" iterate "$out/mujoco_other.toml" --out "$out/outside_other" --allow-command
+{
+    sed -n '/^\[robot\]/,/^offset/p' "$out/mujoco.toml"
+    printf '\n[format]\ntime = { column = "t_s" }\nposition = { columns = "q{1..6}" }\ntorque = { columns = "tau{1..6}" }\n'
+    printf '\n[[log]]\nfile = "outside_other/runs/run_1/log.csv"\nrole = "validate"\n'
+} >"$out/mujoco_test.toml"
+run 0 "$dynident" validate "$out/outside/result.json" --study "$out/mujoco_test.toml" --max-validation-error 5
 run 0 "$dynident" reproduce --out "$out/paper"
 
 # The programs behind the tables of the book, with the least work that they take.
@@ -55,6 +65,7 @@ run 0 "$examples/designs" --seconds 0.2 --criteria d-optimal --families Fourier 
 run 0 "$examples/iterations" 1 examples/iterate_paper_2r_noise.toml
 run 0 "$examples/cutoffs" 1 1
 run 0 "$examples/friction" 1 1
+run 0 "$examples/default_study" --quick --out "$out/default"
 run 0 "$examples/basin" 2 601
 run 0 "$examples/logistic_against_fourier" 2 0.3
 run 0 "$examples/differentiators" 1 12

@@ -115,13 +115,140 @@ def designs(robots, suffix):
     return table(header, rows)
 
 
+def default_motion(cell):
+    noise = f"{cell['encoder_bits']} bits" if cell["encoder_bits"] else f"{float(cell['position_noise_rad']):.0e} rad".replace("e-0", "e-")
+    torque = f"{100 * float(cell['torque_noise']):g} %"
+    colour = f", {1000 * float(cell['torque_colour_s']):g} ms" if float(cell["torque_colour_s"]) else ""
+    outliers = ", outliers" if float(cell["outlier_share"]) else ""
+    return f"{cell['harmonics']} × 0.1 Hz, {cell['length_s']} s, {cell['rate_hz']} Hz", f"{noise}, {torque}{colour}{outliers}"
+
+
+def default_names():
+    return [column.removesuffix("_settled") for column in data("default.csv")[0] if column.endswith("_settled")]
+
+
+def percent(part, whole):
+    return f"{100 * int(part) / int(whole):.0f}" if int(whole) else "-"
+
+
+def default_cases():
+    """One row a case: the default beside the truth in hand and beside plain least squares, its bars, laws and lag."""
+    rows = []
+    for cell in data("default.csv"):
+        motion, noise = default_motion(cell)
+        default, stated, best = (float(cell[f"{name}_percent"]) for name in ("default", "laws_stated", "best"))
+        row = [cell["robot"], motion, cell["friction"], noise, f"{float(cell['lag_ms']):g}"]
+        row += [f"{default:.2f}", f"{stated:.2f}", f"{best:.2f}", f"{default / best:.2f}", f"{stated / best:.2f}"]
+        row += [f"{float(cell['plain_percent']):.1f}", f"{float(cell['plain_weighted_percent']):.1f}"]
+        row.append(f"{float(cell['error_over_bound']):.2f}" if cell["error_over_bound"] else "-")
+        row += [percent(cell["bodies_covered"], cell["bodies_intervals"]), percent(cell["friction_covered"], cell["friction_intervals"])]
+        row.append(f"{cell['law_told']} of {cell['law_tellable']}")
+        row.append(f"{float(cell['lag_found_ms']):.1f}" if cell["lag_found_ms"] else "-")
+        rows.append([entry.replace("-0.0", "0.0") if entry == "-0.0" else entry for entry in row])
+    header = ["robot", "motion", "friction", "noise", "lag, ms", "default, %", "laws stated, %", "best, %", "over best", "laws stated over best"]
+    header += ["plain, %", "plain weighted, %", "over bound", "bodies cover, %", "friction covers, %", "law chosen", "lag found, ms"]
+    return table(header, rows)
+
+
+def default_goals():
+    """What the default is to reach, one row a goal, as in crates/dynident-benchmark/src/default_study/table.rs."""
+    cells = data("default.csv")
+
+    def ratios(what, over):
+        return [float(cell[what]) / float(cell[over]) for cell in cells]
+
+    def within(what, values, most):
+        inside = sum(value <= most for value in values)
+        counts = f"{inside} of {len(values)} cases, median {statistics.median(values):.2f}, worst {max(values):.3g}"
+        return [what, f"at most {most}", counts, "reached" if inside == len(values) else "**missed**"]
+
+    def total(column):
+        return sum(int(cell[column]) for cell in cells)
+
+    def covered(what, name):
+        share = 100 * total(f"{name}_covered") / total(f"{name}_intervals")
+        verdict = "reached" if 93 <= share <= 97 else "**missed**, too wide" if share > 97 else "**missed**, too narrow"
+        return [f"95 % intervals of {what} hold the truth", "93 to 97 %", f"{share:.1f} % of {total(f'{name}_intervals')}", verdict]
+
+    told, tellable = total("law_told"), total("law_tellable")
+    wins = [min(float(cell["plain_percent"]), float(cell["plain_weighted_percent"])) > float(cell["default_percent"]) for cell in cells]
+    ordinary = sum(float(cell["plain_percent"]) > float(cell["default_percent"]) for cell in cells)
+    bounds = [float(cell["error_over_bound"]) for cell in cells if cell["error_over_bound"]]
+    rows = [
+        within("cut-off and lag: laws stated over best", ratios("laws_stated_percent", "best_percent"), 1.15),
+        within("laws chosen: default over laws stated", ratios("default_percent", "laws_stated_percent"), 1.3),
+        within("all by default: default over best", ratios("default_percent", "best_percent"), 1.15),
+        within("error of the bodies over the Cramér-Rao bound", bounds, 1.2),
+        covered("bodies", "bodies"),
+        covered("friction whose laws are chosen as they are", "friction"),
+    ]
+    chosen = f"{told} of {tellable}, {100 * told / tellable:.0f} %"
+    rows.append(["law chosen where it can be told", "at least 90 %", chosen, "reached" if told >= 0.9 * tellable else "**missed**"])
+    won = f"{sum(wins)} of {len(cells)} cases (ordinary alone: {ordinary})"
+    rows.append(["better than plain least squares, ordinary and weighted", "all cases", won, "reached" if all(wins) else "**missed**"])
+    rows.append(["95 % bar of the lag holds it", "", f"{total('lag_held_runs')} of {total('runs')} recordings", ""])
+    return table(["", "to reach", "reached", ""], rows)
+
+
+def default_estimators():
+    """One row an estimator by name: its error over that of the default's estimate, where it settled in all runs."""
+    cells, rows = data("default.csv"), []
+    for name in default_names():
+        asked = [cell for cell in cells if cell[f"{name}_settled"]]
+        settled = [cell for cell in asked if cell[f"{name}_settled"] == cell["runs"]]
+        ratios = [float(cell[f"{name}_percent"]) / float(cell["default_free_percent"]) for cell in settled]
+        row = [f"`{name}`", f"{len(settled)} of {len(asked)}"]
+        row += [f"{value:.2f}" for value in (statistics.geometric_mean(ratios), min(ratios), max(ratios))] if ratios else ["-"] * 3
+        row += [str(sum(ratio < 0.95 for ratio in ratios)), str(sum(ratio > 1.05 for ratio in ratios))]
+        rows.append(row)
+    return table(["estimator", "settled in", "over default", "least", "largest", "better by 5 %", "worse by 5 %"], rows)
+
+
+def default_picture():
+    """The default's error over the best, case by case, with that of the laws stated, plain least squares and the best by name."""
+    cells = sorted(data("default.csv"), key=lambda cell: float(cell["default_percent"]) / float(cell["best_percent"]))
+    left, right, top, step = 330, 700, 62, 17
+    lowest, highest = 0.7, 400.0
+
+    def x(value):
+        value = min(max(value, lowest), highest)
+        return left + (right - left) * math.log(value / lowest) / math.log(highest / lowest)
+
+    bottom = top + step * len(cells)
+    out = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 720 {bottom + 56}" font-family="sans-serif" font-size="11">',
+        f'<rect width="720" height="{bottom + 56}" fill="white"/>',
+        f'<text x="12" y="22" fill="{INK}" font-size="14">Error of the model over the best with the truth in hand</text>',
+        f'<text x="12" y="40" fill="{INK}">laws, lag and best cut-off stated: 1</text>',
+    ]
+    for tick in [1, 2, 5, 10, 20, 50, 100, 200]:
+        out.append(f'<line x1="{x(tick):.1f}" y1="{top - 6}" x2="{x(tick):.1f}" y2="{bottom}" stroke="{GRID}"/>')
+        out.append(f'<text x="{x(tick):.1f}" y="{bottom + 16}" fill="{INK}" text-anchor="middle">{tick}</text>')
+    for number, cell in enumerate(cells):
+        y = top + step * number + step / 2
+        motion, noise = default_motion(cell)
+        best = float(cell["best_percent"])
+        default, stated = float(cell["default_percent"]) / best, float(cell["laws_stated_percent"]) / best
+        plain = min(float(cell["plain_percent"]), float(cell["plain_weighted_percent"])) / best
+        label = f"{cell['robot']}, {cell['friction']}, {cell['length_s']} s, {noise}, {float(cell['lag_ms']):g} ms"
+        out.append(f'<text x="{left - 10}" y="{y + 4:.1f}" fill="{INK}" text-anchor="end">{label}</text>')
+        out.append(f'<line x1="{x(1):.1f}" y1="{y:.1f}" x2="{x(default):.1f}" y2="{y:.1f}" stroke="{BAR}" stroke-width="7"/>')
+        out.append(f'<circle cx="{x(default):.1f}" cy="{y:.1f}" r="4" fill="{DOT}"/>')
+        out.append(f'<line x1="{x(stated):.1f}" y1="{y - 6:.1f}" x2="{x(stated):.1f}" y2="{y + 6:.1f}" stroke="#2e7d32" stroke-width="2"/>')
+        out.append(f'<path d="M{x(plain) - 3:.1f} {y - 3:.1f}l6 6m0 -6l-6 6" stroke="#b03030" stroke-width="1.5"/>')
+    words = "dot: default; green: true laws stated, all else by default; cross: plain least squares, the better of ordinary and weighted"
+    out.append(f'<text x="12" y="{bottom + 40}" fill="{INK}">{words}</text>')
+    return "\n".join(out + ["</svg>", ""])
+
+
 ARMS = ["ur10", "panda", "iiwa14"]
 TABLES = {
     "estimators-compared.md": [estimators],
+    "default-compared.md": [default_goals, default_cases, default_estimators],
     "differentiators.md": [differentiators],
     "designs-compared.md": [lambda: designs(ARMS, ""), lambda: designs(ARMS, ", cell"), lambda: designs(ARMS, ", friction")],
 }
-PICTURES = {"estimators.svg": estimators_picture}
+PICTURES = {"estimators.svg": estimators_picture, "default.svg": default_picture}
 
 wrong = []
 for page, tables in TABLES.items():

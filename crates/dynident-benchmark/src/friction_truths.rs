@@ -5,10 +5,11 @@
 
 use crate::accuracy::BenchmarkError;
 use crate::simulated_logs::{
-    PANDA, PERIOD_S, SimulatedLog, SimulatedRobot, UR10, excitation, model_error, panels, recording, rms, torque, truth,
+    PANDA, PERIOD_S, SimulatedLog, SimulatedRobot, UR10, excitation, left_unsaid, model_error, recording, rms, torque,
+    truth,
 };
 use dynident_dynamics::ParametricModel;
-use dynident_estimation::{EstimationError, TriangularFactor};
+use dynident_estimation::EstimationError;
 use dynident_excitation::Motion;
 use dynident_identification::friction::FrictionSearch;
 use dynident_identification::{
@@ -46,7 +47,7 @@ const SIGMOID: (f64, f64) = (50.0, 0.015);
 const LOAD: f64 = 0.1;
 /// A term can be told if what it adds to the best fit without it is so many standard deviations of the noise, over all
 /// samples together.
-const TOLD: f64 = 10.0;
+pub(crate) const TOLD: f64 = 10.0;
 
 impl FrictionTruth {
     /// All of them.
@@ -63,7 +64,8 @@ impl FrictionTruth {
         }
     }
 
-    fn terms(self, joint: usize) -> Vec<TorqueTerm> {
+    /// Its terms at a joint.
+    pub(crate) fn terms(self, joint: usize) -> Vec<TorqueTerm> {
         let shape = CoulombShape::Smooth { width: WIDTH };
         let (viscous, coulomb) =
             (TorqueTerm::Viscous(Viscous { joint }), TorqueTerm::Coulomb(Coulomb { joint, shape }));
@@ -93,7 +95,7 @@ impl FrictionTruth {
     }
 
     /// The term by which this truth is told from others.
-    fn is_told_by(self, term: &TorqueTerm) -> bool {
+    pub(crate) fn is_told_by(self, term: &TorqueTerm) -> bool {
         match self {
             Self::Plain => matches!(term, TorqueTerm::Coulomb(_)),
             Self::Asymmetric => {
@@ -107,7 +109,7 @@ impl FrictionTruth {
 }
 
 /// How much larger than usual a term of the truth is.
-fn share(term: &TorqueTerm) -> f64 {
+pub(crate) fn share(term: &TorqueTerm) -> f64 {
     match term {
         TorqueTerm::DirectionalViscous(DirectionalViscous { direction: Direction::Backward, .. }) => 1.3,
         TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { direction: Direction::Backward, .. }) => 1.4,
@@ -194,7 +196,7 @@ pub fn friction_figures(cell: &FrictionCell, runs: u64) -> Result<FrictionFigure
 }
 
 /// The step of a study that says nothing.
-const USUAL_STEP: CoulombShape = CoulombShape::Smooth { width: 0.02 };
+pub(crate) const USUAL_STEP: CoulombShape = CoulombShape::Smooth { width: 0.02 };
 
 /// For plain friction: the robot without its Coulomb step; none for others.
 fn plain_without(plain: &ParametricModel, truth: FrictionTruth) -> Option<ParametricModel> {
@@ -233,16 +235,9 @@ impl Made {
 
     /// Joints whose exact torque is further from what `without` can say than noise could be.
     fn tellable(&self, without: &ParametricModel) -> Result<Vec<bool>, EstimationError> {
-        let panels = panels(&RegressorModel::from(without.clone()), &self.motion);
-        let of_joint = |joint: usize| {
-            let own = &self.exact[self.motion.of(joint)];
-            let columns = without.layout().joint_columns(joint).len();
-            let mut factor = TriangularFactor::new(columns);
-            let rows = [&panels.joint(joint)[..columns * self.motion.samples], own].concat();
-            factor.absorb(&rows, self.motion.samples)?;
-            Ok(factor.entry(columns, columns).abs() > TOLD * self.torque_noise * rms(own))
-        };
-        (0..without.dof()).map(of_joint).collect()
+        let left = left_unsaid(&RegressorModel::from(without.clone()), &self.motion, &self.exact)?;
+        let noise = |joint: usize| self.torque_noise * rms(&self.exact[self.motion.of(joint)]);
+        Ok(left.into_iter().enumerate().map(|(joint, left)| left > TOLD * noise(joint)).collect())
     }
 
     fn fit(&self, robot: &ParametricModel, chosen: bool) -> Result<Identification, IdentificationError> {

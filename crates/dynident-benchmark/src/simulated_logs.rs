@@ -1,6 +1,7 @@
 //! Recordings whose truth is known: a random Fourier motion, exact torque with friction, white noise on both.
 
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
+use dynident_estimation::{EstimationError, TriangularFactor};
 use dynident_excitation::families::{Fourier, FourierSettings};
 use dynident_excitation::{Family, Motion};
 use dynident_identification::RegressorModel;
@@ -16,7 +17,7 @@ pub(crate) const PERIOD_S: f64 = 10.0;
 const RANGE: f64 = 3.0;
 const SPEED: f64 = 2.0;
 /// Viscous and dry friction at the root mean square velocity, and offsets, in units of what the bodies ask of the
-/// joint.
+/// joint; friction that grows with the load is a share of it.
 const VISCOUS: f64 = 0.15;
 const DRY: f64 = 0.15;
 const OFFSET: f64 = 0.03;
@@ -33,6 +34,9 @@ pub struct SimulatedRobot {
 
 /// Universal Robots UR10.
 pub(crate) const UR10: SimulatedRobot = SimulatedRobot { name: "UR10", urdf: include_str!("../robots/ur10.urdf") };
+/// Two links in a vertical plane.
+pub(crate) const PLANAR: SimulatedRobot =
+    SimulatedRobot { name: "planar 2R", urdf: include_str!("../robots/planar2r.urdf") };
 /// Franka Panda without its hand.
 pub(crate) const PANDA: SimulatedRobot =
     SimulatedRobot { name: "Panda", urdf: include_str!("../robots/panda_arm7.urdf") };
@@ -65,6 +69,16 @@ pub(crate) fn excitation(
     (duration_s, rate_hz): (f64, f64),
     seed: u64,
 ) -> Result<Motion, String> {
+    let (family, parameters) = random_series(model, harmonics, &mut Random::new(seed))?;
+    Ok(sampled(&family, &parameters, (duration_s, rate_hz), 0.0))
+}
+
+/// A Fourier series of that many harmonics, and random parameters of it within the robot's ranges and speeds.
+pub(crate) fn random_series(
+    model: &Model,
+    harmonics: usize,
+    random: &mut Random,
+) -> Result<(Fourier, Vec<f64>), String> {
     let settings = FourierSettings { harmonics, ..FourierSettings::default() };
     let family = Fourier::new(model.dof(), PERIOD_S, &settings).map_err(|source| source.to_string())?;
     let limits = || model.joints().iter().map(|joint| joint.limits);
@@ -72,11 +86,19 @@ pub(crate) fn excitation(
         .map(|limits| [limits.lower.unwrap_or(-RANGE).max(-RANGE), limits.upper.unwrap_or(RANGE).min(RANGE)])
         .collect();
     let speeds: Vec<f64> = limits().map(|limits| limits.velocity.unwrap_or(SPEED).min(SPEED)).collect();
-    let parameters = family.random(&ranges, &speeds, &mut Random::new(seed));
-    let times: Vec<f64> = (0..=(duration_s * rate_hz) as usize).map(|sample| sample as f64 / rate_hz).collect();
+    let parameters = family.random(&ranges, &speeds, random);
+    Ok((family, parameters))
+}
+
+/// A motion at an even rate, everything `late_s` later than the series says, which repeats before and after its period.
+pub(crate) fn sampled(family: &Fourier, parameters: &[f64], (duration_s, rate_hz): (f64, f64), late_s: f64) -> Motion {
+    let samples = 0..=(duration_s * rate_hz) as usize;
+    // A family stands still outside of its duration.
+    let phase_s = |sample: usize| (sample as f64 / rate_hz - late_s).rem_euclid(family.duration_s());
+    let times: Vec<f64> = samples.map(phase_s).collect();
     let mut motion = Motion::default();
-    family.motion(&parameters, &times, &mut motion);
-    Ok(motion)
+    family.motion(parameters, &times, &mut motion);
+    motion
 }
 
 /// The description's bodies, friction and offsets in proportion to what the bodies ask of the joint; `share` says by
@@ -90,6 +112,7 @@ pub(crate) fn truth(regressor: &RegressorModel, motion: &Motion, share: impl Fn(
         let own = motion.of(term.joints()[0]);
         let torque = rms(&bodies[own.clone()]).max(LEAST_TORQUE);
         let usual = match term.action() {
+            _ if matches!(term, TorqueTerm::Load(_)) => 1.0,
             TermAction::Damping { .. } => VISCOUS * torque / rms(&motion.dq[own]),
             TermAction::Friction(_) => DRY * torque,
             _ => OFFSET * torque,
@@ -154,6 +177,23 @@ pub(crate) fn torque(regressor: &RegressorModel, motion: &Motion, theta: &[f64])
     all
 }
 
+/// What the best fit of a model leaves of each joint's exact torque along a motion: the root of its sum of squares, Nm.
+pub(crate) fn left_unsaid(
+    regressor: &RegressorModel,
+    motion: &Motion,
+    exact: &[f64],
+) -> Result<Vec<f64>, EstimationError> {
+    let panels = panels(regressor, motion);
+    let of_joint = |joint: usize| {
+        let columns = regressor.layout().joint_columns(joint).len();
+        let mut factor = TriangularFactor::new(columns);
+        let rows = [&panels.joint(joint)[..columns * motion.samples], &exact[motion.of(joint)]].concat();
+        factor.absorb(&rows, motion.samples)?;
+        Ok(factor.entry(columns, columns).abs())
+    };
+    (0..regressor.dof()).map(of_joint).collect()
+}
+
 /// The regressor on a motion.
 pub(crate) fn panels(regressor: &RegressorModel, motion: &Motion) -> Panels {
     let (mut panels, mut workspace) = (Panels::default(), BatchWorkspace::new(regressor.model()));
@@ -165,4 +205,30 @@ pub(crate) fn panels(regressor: &RegressorModel, motion: &Motion) -> Panels {
 
 pub(crate) fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Recordings of more than one period stood still after the first: two thirds of 30 s said nothing.
+    #[test]
+    fn a_motion_repeats_as_long_as_it_is_recorded() {
+        let model = PLANAR.model().unwrap();
+        let (family, parameters) = random_series(&model, 5, &mut Random::new(1)).unwrap();
+        let (rate_hz, late_s) = (100.0, 0.008);
+        let long = sampled(&family, &parameters, (3.0 * PERIOD_S, rate_hz), 0.0);
+        let late = sampled(&family, &parameters, (PERIOD_S, rate_hz), late_s);
+        let period = (PERIOD_S * rate_hz) as usize;
+        for joint in 0..model.dof() {
+            let (dq, late) = (&long.dq[long.of(joint)], &late.dq[late.of(joint)]);
+            assert!(rms(&dq[..period]) > 0.1);
+            for k in 0..2 * period {
+                // Rounding of the time.
+                assert!((dq[k] - dq[k + period]).abs() < 1e-9, "joint {joint}, sample {k}");
+            }
+            // What is late begins in the middle of its motion.
+            assert!((late[0] - late[period]).abs() < 1e-9 && late[0] != 0.0);
+        }
+    }
 }

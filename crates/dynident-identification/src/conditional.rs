@@ -34,8 +34,13 @@ pub struct Conditional {
 
 /// For every base parameter what it hangs on: `θ_F` is estimated with the others at `θ_H = nominal`, and answers to
 /// them by `∂θ_F/∂θ_H = −(W_FᵀW_F)⁻¹W_FᵀW_H`. Its variance with theirs is `σ² + ∂ C_H ∂ᵀ`, C_H being how far a
-/// description may be wrong ([`nominal_covariance`]). Empty where all parameters are excited.
-pub fn conditionals(training: &Training, estimate: &Estimate, knowledge: &ConsistencySettings) -> Vec<Conditional> {
+/// description may be wrong ([`nominal_covariance`]). What matters is judged by the intervals of the noise alone,
+/// `noise_half_width_95`: a lag that is hardly known does not hide it. Empty where all parameters are excited.
+pub fn conditionals(
+    training: &Training,
+    (estimate, noise_half_width_95): (&Estimate, &[f64]),
+    knowledge: &ConsistencySettings,
+) -> Vec<Conditional> {
     let robot = &training.model.parametric;
     let count = training.columns.base();
     let fixed: Vec<_> = estimate.rank.fixed.iter().filter(|fixed| fixed.column < count).collect();
@@ -47,6 +52,7 @@ pub fn conditionals(training: &Training, estimate: &Estimate, knowledge: &Consis
     let of_free = |column: usize| {
         let answers: Vec<f64> = fixed.iter().map(|fixed| fixed.answers.get(column).copied().unwrap_or(0.0)).collect();
         let own = estimate.half_width_95[column];
+        let matters = MATTERS * noise_half_width_95.get(column).copied().unwrap_or(own);
         let part = |place: usize| match &spread {
             Some(spread) => {
                 let variance: f64 = spread[(fixed[place].column, fixed[place].column)];
@@ -61,8 +67,8 @@ pub fn conditionals(training: &Training, estimate: &Estimate, knowledge: &Consis
             pairs.map(of).sum::<f64>().max(0.0)
         });
         let total = variance.map_or(f64::INFINITY, |variance| HALF_WIDTH_95 * variance.sqrt());
-        let mut places: Vec<usize> = (0..fixed.len()).filter(|&place| part(place) > MATTERS * own).collect();
-        if total <= MATTERS * own || places.is_empty() {
+        let mut places: Vec<usize> = (0..fixed.len()).filter(|&place| part(place) > matters).collect();
+        if total <= matters || places.is_empty() {
             return Conditional::default();
         }
         let largest = places.iter().map(|&place| part(place)).fold(0.0, f64::max);

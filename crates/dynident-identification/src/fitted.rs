@@ -6,24 +6,17 @@ use crate::chosen_friction::{ChosenFriction, choose_friction};
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
 use crate::execution::Execution;
-use crate::lag::{DELAY_SAMPLES, DelayCheck, LagChoice, LagFit, LagKind, choose_lag, fit_lags, with_lag_error};
+use crate::lag::{LagChoice, LagKind, LagRounds, lag_fit};
 use crate::less_noise::{Estimated, with_less_noise};
 use crate::logs::Logs;
 use crate::payload::KnownArm;
-use crate::progress::Silent;
-use crate::recording::{LogError, Samples};
 use crate::regressor_model::RegressorModel;
-use crate::rows::{JointRows, LogPass, RawSamples, RowConsumer};
 use crate::settings::IdentificationSettings;
 use crate::task::IdentificationTask;
 use crate::training::{Training, training_rows};
 use dynident_estimation::Estimate;
 use dynident_recording::log::OneOrMany;
-use rayon::prelude::*;
 use std::time::Instant;
-
-/// Rounds of measuring the lag and making the rows again without it, at most; one or two are usual.
-const LAG_ROUNDS: usize = 3;
 
 /// Where the time went, seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -69,6 +62,8 @@ pub(crate) struct Fitted<'a> {
     pub(crate) lag: LagChoice,
     /// None for a single log.
     pub(crate) between_logs: Option<BetweenLogs>,
+    /// Halves of the 95 % intervals before lag and logs have widened them.
+    pub(crate) noise_half_width_95: Vec<f64>,
     pub(crate) times: StageTimes,
 }
 
@@ -101,32 +96,30 @@ fn without_lag<'a>(
 ) -> Result<Fitted<'a>, IdentificationError> {
     let mut settings = task.settings.clone();
     let is_free = settings.motion.torque_lag_s.is_none() && job.is_plain();
-    let mut found = fitted_once(task, &settings, chosen, execution, job)?;
-    found.lag = stated_lag(&settings, found.training.model.dof());
-    if !is_free {
-        return Ok(found);
-    }
-    let mut times = found.times;
-    for round in 0..=LAG_ROUNDS {
-        let started = Instant::now();
-        let fit = has_free_lag(task, &found, chosen).then(|| lag_fit(&found, chosen)).transpose()?.flatten();
-        times.estimation_s += started.elapsed().as_secs_f64();
-        // Noise that biases least squares biases the lag that is measured by it.
-        let Some(fit) = fit else { break };
-        let next = choose_lag(&fit, &found.lag.lag_s, &found.estimation.estimate);
-        if next.kind == LagKind::None || round == LAG_ROUNDS {
-            found.lag = LagChoice { kind: found.lag.kind, lag_s: found.lag.lag_s, ..next };
-            found.estimation.estimate = with_lag_error(&fit, &found.lag, &found.estimation.estimate);
-            break;
-        }
-        settings.motion.torque_lag_s = Some(OneOrMany::Many(next.lag_s.clone()));
-        found = fitted_once(task, &settings, chosen, execution, job)?;
-        found.lag = next;
+    let mut times = StageTimes::default();
+    let mut rounds = LagRounds::default();
+    loop {
+        let mut found = fitted_once(task, &settings, chosen, execution, job)?;
         times.logs_s += found.times.logs_s;
         times.estimation_s += found.times.estimation_s;
+        let started = Instant::now();
+        let fit = if is_free && has_free_lag(&found) {
+            let Fitted { logs, training, estimation, settings, .. } = &found;
+            let theta = &estimation.estimate.values[..training.columns.base()];
+            lag_fit((logs, &settings.estimation), &training.model, theta, chosen)?
+        } else {
+            None
+        };
+        found.noise_half_width_95.clone_from(&found.estimation.estimate.half_width_95);
+        let again = rounds.again(fit.as_ref(), &mut found.estimation.estimate);
+        times.estimation_s += started.elapsed().as_secs_f64();
+        if !again {
+            found.times = times;
+            found.lag = if is_free { rounds.choice() } else { stated_lag(&settings, found.training.model.dof()) };
+            return Ok(found);
+        }
+        settings.motion.torque_lag_s = rounds.torque_lag_s();
     }
-    found.times = times;
-    Ok(found)
 }
 
 /// A lag that the study states.
@@ -139,14 +132,13 @@ fn stated_lag(settings: &IdentificationSettings, dof: usize) -> LagChoice {
     LagChoice { kind: LagKind::Stated, lag_s, ..LagChoice::default() }
 }
 
-/// Whether a lag can be taken off and tells of the robot: rows of logs, whose every column is the arm's own.
-fn has_free_lag(task: &IdentificationTask, found: &Fitted<'_>, chosen: &[usize]) -> bool {
-    let of_log = |&index: &usize| matches!(task.recordings[index].samples, Samples::Log(_));
+/// Whether a lag can be taken off and tells of the robot: rows whose every column is the arm's own, by an estimator
+/// that noise of the positions does not bias, for that biases the lag that is measured by it.
+fn has_free_lag(found: &Fitted<'_>) -> bool {
     found.training.columns.is_plain()
         && found.training.gains.is_none()
         && found.training.joints.len() == found.training.model.dof()
         && found.settings.estimation.estimator.reads_filtered_rows()
-        && chosen.iter().all(of_log)
 }
 
 /// One way from logs to an estimate, with the lag of the settings taken off.
@@ -206,6 +198,7 @@ fn fitted_once<'a>(
         stated_friction: friction.stated,
         lag: LagChoice::default(),
         between_logs: None,
+        noise_half_width_95: Vec::new(),
         times: StageTimes { logs_s, estimation_s, examination_s: 0.0 },
     })
 }
@@ -216,41 +209,4 @@ fn with_choice<'a>(logs: Logs<'a>, settings: &IdentificationSettings, cutoff_hz:
         Some(cutoff_hz) => logs.with_cutoff(&settings.motion, cutoff_hz),
         None => logs,
     }
-}
-
-/// Gathers the samples that lags are estimated from.
-struct LagPass<'a>(DelayCheck<'a>);
-
-impl RowConsumer for LagPass<'_> {
-    fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
-        self.0.filtered(rows);
-        Ok(())
-    }
-
-    fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), LogError> {
-        self.0.raw(samples);
-        Ok(())
-    }
-}
-
-/// The joints' lags by all training logs together.
-fn lag_fit(found: &Fitted<'_>, chosen: &[usize]) -> Result<Option<LagFit>, LogError> {
-    let Fitted { logs, training, estimation, settings, .. } = found;
-    let theta = &estimation.estimate.values[..training.columns.base()];
-    let of_log = |&index: &usize| -> Result<DelayCheck<'_>, LogError> {
-        let mut samples = LagPass(DelayCheck::new(&training.model, theta));
-        let pass = LogPass {
-            most_samples: Some(DELAY_SAMPLES as u64),
-            progress: &Silent,
-            ..logs.pass(&training.model, index)
-        };
-        pass.run(&mut samples)?;
-        Ok(samples.0)
-    };
-    let checks: Vec<DelayCheck<'_>> = if logs.execution.parallel() {
-        chosen.par_iter().map(of_log).collect::<Result<_, _>>()?
-    } else {
-        chosen.iter().map(of_log).collect::<Result<_, _>>()?
-    };
-    Ok(fit_lags(&checks, (logs, &settings.estimation)))
 }

@@ -96,6 +96,9 @@ pub struct Identification {
     /// By how much training logs differ beyond their own error bars, which the estimate's bars hold; none for a single
     /// one.
     pub between_logs: Option<BetweenLogs>,
+    /// Halves of the 95 % intervals of the estimate by its residuals alone, before what is unknown of the lag and what
+    /// varies between logs have widened them.
+    pub noise_half_width_95: Vec<f64>,
     /// Where the time went.
     pub times: StageTimes,
 }
@@ -179,8 +182,18 @@ fn identified(
     settings.check_names(robot).map_err(IdentificationError::Consistency)?;
 
     // Rows and factors, with filters and friction stated or chosen and the torque's lag taken off; then the estimate.
-    let Fitted { logs, training, mut estimation, settings, cutoff, stated_friction, lag, between_logs, mut times } =
-        fitted(task, &chosen, execution, job)?;
+    let Fitted {
+        logs,
+        training,
+        mut estimation,
+        settings,
+        cutoff,
+        stated_friction,
+        lag,
+        between_logs,
+        noise_half_width_95,
+        mut times,
+    } = fitted(task, &chosen, execution, job)?;
     let (settings, started) = (&settings, Instant::now());
     let mut dropped = None;
     if let Some(essential_settings) = &settings.estimation.essential {
@@ -262,6 +275,7 @@ fn identified(
         diagnosis,
         torque_lag: lag,
         between_logs,
+        noise_half_width_95,
         times,
     })
 }

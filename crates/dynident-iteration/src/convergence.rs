@@ -4,7 +4,7 @@ use crate::estimate::RunEstimate;
 use crate::evidence::Clipping;
 use crate::record::RunRecord;
 use crate::settings::IterationSettings;
-use dynident_identification::examination::{TorqueLag, pooled_delay};
+use dynident_identification::examination::{LagChoice, TorqueLag};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -14,6 +14,10 @@ const MOST_CLIPPED: f64 = 2e-3;
 /// The share of the torque that a 95 % band has to hold, in a run that was not fitted to. Residuals that are correlated
 /// over seconds let the share vary by some percent; a prediction that is off by its own noise throughout has 83 %.
 const LEAST_INSIDE: f64 = 0.85;
+
+/// Lags of two runs differ clearly beyond so many times the 95 % interval of their difference: with six joints in some
+/// runs chance alone goes beyond once.
+const CLEARLY_OTHER: f64 = 1.5;
 
 /// What is not met after the last run, with its numbers; [`remedy`](Self::remedy) says what would help.
 #[derive(Clone, Debug, PartialEq, Error, Serialize, Deserialize)]
@@ -88,14 +92,33 @@ pub enum Shortfall {
         /// Whether it is a stated limit.
         stated: bool,
     },
-    /// Torque and positions of the log belong to different instants.
-    #[error("torque of joint {joint} comes {:.1} +- {:.1} ms {} the motion (95 %), unexplained", 1e3 * .lag_s.abs(), 1e3 * .half_width_95_s, if *.lag_s > 0.0 { "after" } else { "before" })]
+    /// Torque and positions of the last log belong to different instants, by another lag than the one that was taken
+    /// off.
+    #[error("torque comes {:.1} +- {:.1} ms {} the motion at all joints (95 %), unexplained", 1e3 * .lag_s.abs(), 1e3 * .half_width_95_s, if *.lag_s > 0.0 { "after" } else { "before" })]
     Lag {
-        /// The joint.
-        joint: String,
-        /// The lag, s.
+        /// What is left of the lag, s.
         lag_s: f64,
         /// Half the width of its 95 % interval.
+        half_width_95_s: f64,
+    },
+    /// A lag that was taken off the rows, but so long that the robot is not where its log says.
+    #[error("torque and motion of the log are {:.1} ms apart, {:.1} ms are allowed", 1e3 * .lag_s, 1e3 * .allowed_s)]
+    LongLag {
+        /// The longest lag of a joint, s.
+        lag_s: f64,
+        /// What is allowed.
+        allowed_s: f64,
+    },
+    /// A lag was taken off, but runs differ in it: a recorder's would be the same in all of them.
+    #[error("what looks like a lag of joint {joint}'s torque is {:.1} ms in the last run and {:.1} ms in one before, +- {:.1} ms (95 %)", 1e3 * .lag_s, 1e3 * .before_s, 1e3 * .half_width_95_s)]
+    LagChanges {
+        /// The joint.
+        joint: String,
+        /// The lag of the last run, s.
+        lag_s: f64,
+        /// That of the good run that differs most.
+        before_s: f64,
+        /// Half the width of the 95 % interval of their difference.
         half_width_95_s: f64,
     },
     /// The model of the runs before does not predict the last one.
@@ -154,8 +177,11 @@ impl Shortfall {
             }
             Self::ParameterUncertain { .. } => "a motion that excites it: a longer one, or another design",
             Self::Clipping { .. } => "a slower motion, a limit of torque in [design.limits], or the right effort limit",
-            Self::Lag { .. } => {
-                "take positions and torques at the same instant, or correct the delay where the log is made"
+            Self::Lag { .. } | Self::LongLag { .. } => {
+                "take positions and torques at the same instant, or correct the delay where the log is made; a constant delay that is meant to be there may be allowed with settled.most_lag_s"
+            }
+            Self::LagChanges { .. } => {
+                "look for friction that the model has no term for, or elasticity: at reversals both look like a lag (friction = \"auto\")"
             }
             Self::Prediction { .. } => {
                 "look for what changed between the runs: temperature, load, sticking friction, sensor zeros"
@@ -200,15 +226,19 @@ pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, na
         parameters(&mut found, (old, new), settings, names);
     }
     let own = last.estimate.as_ref();
-    let lags = own.map_or(&[][..], |estimate| &estimate.torque_lags);
-    // A torque that is held from sample to sample is half a sample late by itself. A recorder is as late at each joint:
-    // what friction leaves looks like another lag at each, and is judged as unexplained torque.
-    let slowest_hz = evidence.log_rates_hz.iter().copied().filter(|hz| *hz > 0.0).fold(f64::INFINITY, f64::min);
-    let sampled_s = 0.5 / slowest_hz;
-    let is_beyond_sampling = |lag: &TorqueLag| lag.matters && lag.lag_s.abs() > sampled_s + lag.half_width_95_s;
-    let known: Vec<TorqueLag> = lags.iter().copied().flatten().collect();
-    let is_late = pooled_delay(&known).as_ref().is_some_and(is_beyond_sampling);
+    if let Some(lag) = own.and_then(|own| unexplained_lag(&own.lag, &evidence.log_rates_hz)) {
+        found.push(Shortfall::Lag { lag_s: lag.lag_s, half_width_95_s: lag.half_width_95_s });
+    }
+    if let Some(lag_s) = last.knowledge().map(|known| known.lag.longest_s()).filter(|lag_s| *lag_s > limits.most_lag_s)
+    {
+        found.push(Shortfall::LongLag { lag_s, allowed_s: limits.most_lag_s });
+    }
     for (place, shown) in evidence.joints.iter().enumerate() {
+        if let Some((now, then)) = changed_lag(&good, place) {
+            let half_width_95_s = now.half_width_95_s.hypot(then.half_width_95_s);
+            let (lag_s, before_s) = (now.lag_s, then.lag_s);
+            found.push(Shortfall::LagChanges { joint: joint(place), lag_s, before_s, half_width_95_s });
+        }
         if let Some(Clipping { share, torque, stated }) =
             shown.clipping.filter(|clipping| clipping.share > MOST_CLIPPED)
         {
@@ -217,10 +247,6 @@ pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, na
             if stated || beyond {
                 found.push(Shortfall::Clipping { joint: joint(place), percent: 100.0 * share, torque, stated });
             }
-        }
-        if let Some(lag) = lags.get(place).copied().flatten().filter(|lag| is_late && is_beyond_sampling(lag)) {
-            let (lag_s, half_width_95_s) = (lag.lag_s, lag.half_width_95_s);
-            found.push(Shortfall::Lag { joint: joint(place), lag_s, half_width_95_s });
         }
         if let Some(prediction) = shown.prediction.filter(|prediction| prediction.inside < LEAST_INSIDE) {
             found.push(Shortfall::Prediction {
@@ -238,6 +264,30 @@ pub(crate) fn shortfalls(records: &[RunRecord], settings: &IterationSettings, na
         }
     }
     found
+}
+
+/// What is left of the lag that all joints share, where it is beyond its bar and moves torque. A torque that is held
+/// from sample to sample is half a sample late by itself. What joints do not share is friction's, and is judged as
+/// unexplained torque.
+fn unexplained_lag(lag: &LagChoice, log_rates_hz: &[f64]) -> Option<TorqueLag> {
+    let slowest_hz = log_rates_hz.iter().copied().filter(|hz| *hz > 0.0).fold(f64::INFINITY, f64::min);
+    let rest = lag.common.map(|common| TorqueLag { lag_s: common.lag_s - common.taken_off_s, ..common })?;
+    (rest.matters && rest.lag_s.abs() > 0.5 / slowest_hz + rest.half_width_95_s).then_some(rest)
+}
+
+/// The lags of a joint in the last of some good runs and in the one that it differs most from, each by itself, where
+/// one was taken off and they differ clearly.
+fn changed_lag(good: &[&RunRecord], joint: usize) -> Option<(TorqueLag, TorqueLag)> {
+    let (last, before) = good.split_last()?;
+    let taken_off = good.iter().filter_map(|record| record.estimate.as_ref()).chain(last.knowledge());
+    if taken_off.into_iter().all(|estimate| estimate.lag.taken_off().is_none()) {
+        return None;
+    }
+    let lag_of = |record: &RunRecord| record.estimate.as_ref()?.torque_lags.get(joint).copied().flatten();
+    let now = lag_of(last)?;
+    let bars = |then: &TorqueLag| (now.lag_s - then.lag_s).abs() / now.half_width_95_s.hypot(then.half_width_95_s);
+    let then = before.iter().filter_map(|record| lag_of(record)).max_by(|a, b| bars(a).total_cmp(&bars(b)))?;
+    (bars(&then) > CLEARLY_OTHER).then_some((now, then))
 }
 
 /// The parameter that moved most, if one moved too far, and the one that is least known, if it is hardly known.

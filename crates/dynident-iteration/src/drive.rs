@@ -3,19 +3,21 @@
 use crate::before_motion::{motions, next_motion, rehearsed};
 use crate::convergence::{Names, Shortfall, shortfalls};
 use crate::error::IterationError;
-use crate::estimate::{RunEstimate, RunLog, identify_run, identify_runs};
+use crate::estimate::{RunEstimate, identify_run, identify_runs};
 use crate::leg::{IterationTask, Leg};
 use crate::model_parameters::ModelParameters;
 use crate::policy::{self, Next, RunPlan};
 use crate::record::{RunRecord, UsedController};
 use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest, StopSignal};
 use crate::run_examination::{add_tracking_floors, examined, following_limits};
+use crate::run_logs::RunLog;
 use crate::settings::{IterationSettings, RunIdentificationSettings};
 use crate::status::IterationStatus;
 use crate::store::IterationStore;
 use crate::supervision::{Supervisor, Watching};
 use dynident_dynamics::ParametricModel;
 use dynident_identification::friction::chosen_model;
+use dynident_recording::DifferentiatorSettings;
 use dynident_simulation::Record;
 use dynident_simulation::controllers::ControllerModel;
 use dynident_simulation::{SimulationError, require_length};
@@ -288,7 +290,10 @@ impl Iteration {
             Err(error) => record.reason = Some(error.to_string()),
         }
         let known = before.iter().rev().find(|record| record.accepted).and_then(RunRecord::knowledge);
-        match examined(&task, records, &settings, known) {
+        let chosen = record.estimate.as_ref().and_then(|estimate| estimate.differentiator.as_ref());
+        let of_run =
+            chosen.map_or(Cow::Borrowed(&*settings), |way| Cow::Owned(settings.with_differentiator(&way.taken)));
+        match examined(&task, records, &of_run, known) {
             Ok(evidence) => record.evidence = Some(evidence),
             Err(error) if fatal(&error) => return Err(error),
             Err(error) => record.reason = record.reason.take().or_else(|| Some(error.to_string())),
@@ -296,7 +301,8 @@ impl Iteration {
         self.judge(record, before)?;
         let Some(own) = record.estimate.clone().filter(|_| record.accepted) else { return Ok(()) };
         if self.settings.pool && !earlier.is_empty() {
-            let own = RunLog { run: record.run, records, joint_sigma: &own.joint_sigma };
+            let differentiator = own.differentiator.as_ref().map(|way| &way.taken);
+            let own = RunLog { run: record.run, records, joint_sigma: &own.joint_sigma, differentiator };
             let runs: Vec<RunLog<'_>> = earlier.iter().map(GoodLog::as_run).chain([own]).collect();
             // Where all together cannot be fitted the newest stands alone.
             record.pooled = identify_runs(&task, &runs, &settings).ok().filter(|found| found.impossible.is_none());
@@ -308,7 +314,7 @@ impl Iteration {
         // The first good run is not judged, whatever it was under.
         let is_judged = known.is_some() && record.controller.model.is_some();
         if let (Some(evidence), true) = (&mut record.evidence, is_judged) {
-            add_tracking_floors(evidence, &task, records, &self.settings, (&own, after), errors);
+            add_tracking_floors(evidence, &task, records, &self.settings, after, errors);
         }
         Ok(())
     }
@@ -387,16 +393,20 @@ pub(crate) struct GoodLog {
     run: usize,
     records: Vec<Record>,
     joint_sigma: Vec<f64>,
+    differentiator: Option<DifferentiatorSettings>,
 }
 
 impl GoodLog {
     fn new(record: &RunRecord, records: Vec<Record>) -> Self {
         let joint_sigma = record.estimate.as_ref().map(|estimate| estimate.joint_sigma.clone()).unwrap_or_default();
-        Self { run: record.run, records, joint_sigma }
+        let way = record.estimate.as_ref().and_then(|estimate| estimate.differentiator.as_ref());
+        let differentiator = way.map(|way| way.taken.clone());
+        Self { run: record.run, records, joint_sigma, differentiator }
     }
 
     pub(crate) fn as_run(&self) -> RunLog<'_> {
-        RunLog { run: self.run, records: &self.records, joint_sigma: &self.joint_sigma }
+        let differentiator = self.differentiator.as_ref();
+        RunLog { run: self.run, records: &self.records, joint_sigma: &self.joint_sigma, differentiator }
     }
 }
 

@@ -1,25 +1,25 @@
 //! The identification of one run, and of several together.
 
+use crate::differentiator_choice::{DifferentiatorChoice, choose_differentiator};
 use crate::error::IterationError;
 use crate::leg::IterationTask;
 use crate::model_parameters::ModelParameters;
-use crate::motion::measured_motion;
+use crate::run_logs::{RunLog, identification_settings, recordings};
 use crate::settings::{RunIdentificationSettings, Scheme};
 use crate::step_by_step::step_by_step;
 use dynident_dynamics::ParametricModel;
-use dynident_estimation::LinearProblem;
+use dynident_estimation::{Estimate, LinearProblem};
 use dynident_identification::consistent::{ConsistencySettings, consistent_parameters};
 use dynident_identification::estimators::estimate;
-use dynident_identification::examination::{TorqueLag, examine_training, pooled_delay};
-use dynident_identification::friction::JointFriction;
-use dynident_identification::rows::ParallelFilterSettings;
-use dynident_identification::{
-    EstimationSettings, Execution, IdentificationSettings, LogNoise, Logs, Recording, Training, choose_friction,
-    consistent_stage, training_rows,
+use dynident_identification::examination::{
+    LagCandidates, LagChoice, LagRounds, TorqueLag, lag_fit, lags_of_recordings,
 };
-use dynident_simulation::{Record, require_length};
+use dynident_identification::friction::JointFriction;
+use dynident_identification::{
+    Execution, IdentificationSettings, Logs, Training, choose_friction, consistent_stage, training_rows,
+};
+use dynident_simulation::Record;
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// What a run says about the base parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -45,10 +45,16 @@ pub struct RunEstimate {
     /// The friction that this run chose, for itself and the runs after it; empty where it was stated or chosen before.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub friction: Vec<JointFriction>,
-    /// By how much each joint's torque comes after the motion, where the run determines it; empty where windows leave
-    /// rows out.
+    /// By how much each joint's torque comes after the motion, with what was taken off; none where the rows do not
+    /// determine it. Empty step by step.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub torque_lags: Vec<Option<TorqueLag>>,
+    /// The lag that was taken off the rows, and what all joints share.
+    #[serde(default)]
+    pub lag: LagChoice,
+    /// The differentiator that the run chose; none where it was stated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub differentiator: Option<DifferentiatorChoice>,
 }
 
 impl RunEstimate {
@@ -72,21 +78,9 @@ impl RunEstimate {
     }
 }
 
-/// The records of one run with its number.
-#[derive(Clone, Copy, Debug)]
-pub struct RunLog<'a> {
-    /// The run's number, from 1.
-    pub run: usize,
-    /// One record for each leg of the task.
-    pub records: &'a [Record],
-    /// Standard deviation of each joint's residual by the run alone, Nm (N); for step-by-step identification, which
-    /// weights runs by it.
-    pub joint_sigma: &'a [f64],
-}
-
 /// Base parameters from the records of one run, one record for each leg of the task: the same identification as of any
 /// log ([`dynident_identification`]), on records in memory. Rows count within the windows; joints without rows are left
-/// out; known columns are held.
+/// out; known columns are held. The differentiator is chosen where the settings leave it to the run.
 ///
 /// # Errors
 /// Records that do not belong to the task, a differentiator that cannot be applied, rows that do not carry an estimate.
@@ -96,7 +90,13 @@ pub fn identify_run(
     records: &[Record],
     settings: &RunIdentificationSettings,
 ) -> Result<RunEstimate, IterationError> {
-    identify_runs(task, &[RunLog { run: 1, records, joint_sigma: &[] }], settings)
+    let log = RunLog { run: 1, records, joint_sigma: &[], differentiator: None };
+    if !settings.choose_differentiator {
+        return identify_runs(task, &[log], settings);
+    }
+    let choice = choose_differentiator(task, records, settings)?;
+    let found = identify_runs(task, &[log], &settings.with_differentiator(&choice.taken))?;
+    Ok(RunEstimate { differentiator: Some(choice), ..found })
 }
 
 /// As [`identify_run`] from several runs together, each weighted by its own noise joint by joint
@@ -112,42 +112,30 @@ pub fn identify_runs(
 ) -> Result<RunEstimate, IterationError> {
     let recordings = recordings(task, runs, settings)?;
     let all: Vec<usize> = (0..recordings.len()).collect();
-    let identification = identification_settings(task, settings, runs.len());
+    let mut identification = identification_settings(task, settings, runs.len());
     let (robot, execution) = (&task.robot, Execution::default());
-    let logs = Logs::new(robot.model(), &recordings, identification.filters(), &all, None, execution)?;
-    let chosen = choose_friction((&logs, &identification), robot, (&all, &settings.payloads))?;
-    let mut training = training_rows((&logs, &identification), chosen.model, &all, &settings.payloads, None)?;
-    training.friction_choice = chosen.joints;
-    if training.problem.joint_rows().iter().sum::<usize>() == 0 {
-        let problem = "no sample counts: the differentiator applies nowhere in the windows; look at its settings and at the tracking error".to_owned();
-        return Err(IterationError::Record { joints: robot.joint_names(), problem });
-    }
-    match settings.scheme {
-        Scheme::AllJoints => all_joints((&logs, &identification), training, &all),
-        Scheme::StepByStep => joint_by_joint(task, &logs, &training, (settings, &run_weights(task, runs))),
-    }
-}
-
-/// The records as recordings of motions that are made already, leg after leg of run after run.
-pub(crate) fn recordings(
-    task: &IterationTask,
-    runs: &[RunLog<'_>],
-    settings: &RunIdentificationSettings,
-) -> Result<Vec<Recording>, IterationError> {
-    let legs = task.legs.len();
-    let mut recordings = Vec::with_capacity(runs.len() * legs);
-    for log in runs {
-        require_length("records of the run's legs", legs, log.records.len())?;
-        for (number, (leg, record)) in task.legs.iter().zip(log.records).enumerate() {
-            let motion = measured_motion(record, leg, settings)?;
-            let of_leg = if legs > 1 { format!(", leg {}", number + 1) } else { String::new() };
-            let mut recording = Recording::of_motion(format!("run {}{of_leg}", log.run), motion);
-            recording.commanded = Some(Arc::clone(leg.commanded()));
-            recording.payload = leg.payload().map(str::to_owned);
-            recordings.push(recording);
+    let mut rounds = LagRounds::of(LagCandidates::Common);
+    loop {
+        let logs = Logs::new(robot.model(), &recordings, identification.filters(), &all, None, execution)?;
+        let chosen = choose_friction((&logs, &identification), robot, (&all, &settings.payloads))?;
+        let mut training = training_rows((&logs, &identification), chosen.model, &all, &settings.payloads, None)?;
+        training.friction_choice = chosen.joints;
+        if training.problem.joint_rows().iter().sum::<usize>() == 0 {
+            let problem = "no sample counts: the differentiator applies nowhere in the windows; look at its settings and at the tracking error".to_owned();
+            return Err(IterationError::Record { joints: robot.joint_names(), problem });
         }
+        if settings.scheme == Scheme::StepByStep {
+            return joint_by_joint(task, &logs, &training, (settings, &run_weights(task, runs)));
+        }
+        let mut found = estimate(&training.rows((&logs, &identification), &all), None)?.estimate;
+        let with = (&logs, &identification.estimation);
+        let theta = &found.values[..training.columns.base()];
+        let fit = if training.columns.is_plain() { lag_fit(with, &training.model, theta, &all)? } else { None };
+        if !rounds.again(fit.as_ref(), &mut found) {
+            return all_joints((&logs, &identification), training, (&all, found, rounds.choice()));
+        }
+        identification.motion.torque_lag_s = rounds.torque_lag_s();
     }
-    Ok(recordings)
 }
 
 /// For each recording and joint what its rows are multiplied by: the noise of the last run over that of its own.
@@ -160,36 +148,19 @@ fn run_weights(task: &IterationTask, runs: &[RunLog<'_>]) -> Vec<Vec<f64>> {
     runs.iter().flat_map(|log| core::iter::repeat_n(of_run(log), task.legs.len())).collect()
 }
 
-/// What the identification is given.
-pub(crate) fn identification_settings(
-    task: &IterationTask,
-    settings: &RunIdentificationSettings,
-    runs: usize,
-) -> IdentificationSettings {
-    let mut identification = IdentificationSettings::default();
-    identification.motion.differentiator = settings.differentiator.clone();
-    identification.parallel_filter = ParallelFilterSettings::from(settings.parallel_filter.as_ref());
-    identification.estimation = settings.estimation.clone();
-    identification.estimation.held.clone_from(&task.known);
-    identification.consistency.clone_from(&settings.consistency);
-    identification.friction.clone_from(&settings.friction);
-    identification.log_noise = if runs > 1 { LogNoise::Own } else { LogNoise::Shared };
-    identification
-}
-
 /// All joints at once.
 fn all_joints(
     (logs, settings): (&Logs<'_>, &IdentificationSettings),
     training: Training,
-    all: &[usize],
+    (all, estimate, lag): (&[usize], Estimate, LagChoice),
 ) -> Result<RunEstimate, IterationError> {
-    let estimate = estimate(&training.rows((logs, settings), all), None)?.estimate;
     let consistent = consistent_stage((logs, settings), &training, &estimate)?;
     let arm = training.columns.arm_estimate(&estimate);
     let mut joint_sigma = vec![0.0; training.model.dof()];
     training.joints.iter().zip(&arm.joint_sigma).for_each(|(&joint, sigma)| joint_sigma[joint] = *sigma);
     let fixed = arm.rank.fixed.iter().map(|fixed| fixed.column).filter(|&column| column < arm.values.len()).collect();
-    let torque_lags = torque_lags((logs, &settings.estimation), &training, &estimate.values, all)?;
+    let theta = |index: usize| training.columns.base_values(index, &estimate.values);
+    let torque_lags = lags_of_recordings((logs, &settings.estimation), &training.model, &theta, all)?;
     Ok(RunEstimate {
         std: (0..arm.values.len()).map(|k| arm.covariance[(k, k)].max(0.0).sqrt()).collect(),
         covariance: arm.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
@@ -200,6 +171,8 @@ fn all_joints(
         impossible: consistent.failure,
         friction: training.friction_choice,
         torque_lags,
+        lag,
+        differentiator: None,
         values: arm.values,
     })
 }
@@ -233,6 +206,8 @@ fn joint_by_joint(
         impossible,
         friction: Vec::new(),
         torque_lags: Vec::new(),
+        lag: LagChoice::default(),
+        differentiator: None,
     })
 }
 
@@ -247,25 +222,4 @@ fn consistent(
         Ok(fit) => (Some(fit.parameters), None),
         Err(reason) => (None, Some(reason.to_string())),
     }
-}
-
-/// Delays of the torque over all legs, where every row counts; nothing otherwise, for they need rows without a gap.
-fn torque_lags(
-    (logs, settings): (&Logs<'_>, &EstimationSettings),
-    training: &Training,
-    values: &[f64],
-    all: &[usize],
-) -> Result<Vec<Option<TorqueLag>>, IterationError> {
-    let Some(whole) = logs.recordings.iter().map(Recording::with_every_row).collect::<Option<Vec<_>>>() else {
-        return Ok(Vec::new());
-    };
-    let (robot, execution) = (training.model.model(), logs.execution);
-    let whole = Logs::new(robot, &whole, (&logs.motion, logs.filter), all, None, execution)?;
-    let of_leg = |&index: &usize| {
-        let theta = training.columns.base_values(index, values);
-        examine_training((&whole, settings), &training.model, index, &theta).map(|(delays, _)| delays)
-    };
-    let delays: Vec<Vec<Option<TorqueLag>>> = all.iter().map(of_leg).collect::<Result<_, _>>()?;
-    let of_joint = |joint: usize| -> Vec<TorqueLag> { delays.iter().filter_map(|leg| leg[joint]).collect() };
-    Ok((0..training.model.dof()).map(|joint| pooled_delay(&of_joint(joint))).collect())
 }

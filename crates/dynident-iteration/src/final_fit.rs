@@ -2,8 +2,8 @@
 
 use crate::drive::Iteration;
 use crate::error::IterationError;
-use crate::estimate::{identification_settings, recordings};
 use crate::record::RunRecord;
+use crate::run_logs::{identification_settings, recordings};
 use crate::store::IterationStore;
 use dynident_identification::IdentificationTask;
 use dynident_identification::friction::JointFriction;

@@ -2,6 +2,7 @@
 
 use crate::error::IterationError;
 use crate::leg::Leg;
+use crate::rests::rests;
 use crate::settings::RunIdentificationSettings;
 use core::ops::Range;
 use dynident_identification::MotionRecord;
@@ -16,7 +17,8 @@ const UNIFORM: f64 = 1e-6;
 /// Differentiates a record along `leg`. Where the record's times are not uniform, positions and torques are taken
 /// between samples by straight lines. Torques held from a sample to the next count at a sample's instant as the mean of
 /// the values before and after, less a twelfth of its second difference (the acceleration jumps there, and positions
-/// see both steps).
+/// see both steps). Torques of joints with `dry` friction are set aside while the joint rests, slower than 2 % of its
+/// highest speed: friction there is whatever holds it.
 ///
 /// # Errors
 /// A record of other joints or of too few samples, a differentiator that does not exist at its rate or lacks what it
@@ -25,6 +27,7 @@ pub fn measured_motion(
     record: &Record,
     leg: &Leg,
     settings: &RunIdentificationSettings,
+    dry: &[bool],
 ) -> Result<MotionRecord, IterationError> {
     let joints = record.joints.len();
     let wrong = |problem: String| IterationError::Record { joints: record.joints.clone(), problem };
@@ -43,14 +46,15 @@ pub fn measured_motion(
     // The nominal rate where the times are its own: their last digits are not to matter.
     let rate_hz = if (rate_hz / record.rate_hz - 1.0).abs() < UNIFORM { record.rate_hz } else { rate_hz };
     let first_time_s = record.times_s[0];
+    let chosen = differentiator(&settings.differentiator, &q, joints, rate_hz);
     let built;
-    let differentiator = if let Some(own) = leg.differentiator() {
-        own
+    let (differentiator, cutoff_hz) = if let Some(own) = leg.differentiator() {
+        (own, None)
     } else {
-        built = differentiator(&settings.differentiator, &q, joints, rate_hz)
-            .build_following(0.1 * rate_hz, Some(leg.commanded()))?;
-        &*built
+        built = chosen.build_following(0.1 * rate_hz, Some(leg.commanded()))?;
+        (&*built, chosen.cutoff_hz())
     };
+    let smoothing = cutoff_hz.map_or(0, |cutoff_hz| (rate_hz / cutoff_hz).ceil() as usize);
     if samples < differentiator.minimum_samples() {
         return Err(wrong(format!(
             "{samples} samples are too few for {}, which needs {}",
@@ -84,11 +88,17 @@ pub fn measured_motion(
         for sample in unusable.into_iter().flatten() {
             all_usable[sample] = false;
         }
-        let (from, to) = (&tau[own.clone()], &mut motion.tau[own]);
+        let (from, to) = (&tau[own.clone()], &mut motion.tau[own.clone()]);
         to.copy_from_slice(from);
         if settings.held_torque {
             for sample in 2..samples - 1 {
                 to[sample] = held_torque(from, sample);
+            }
+        }
+        if dry.get(joint).is_some_and(|dry| *dry) {
+            for rest in rests(&motion.dq[own.clone()], smoothing) {
+                motion.set_aside.resize(joints * samples, false);
+                motion.set_aside[own.start + rest.start..own.start + rest.end].fill(true);
             }
         }
     }

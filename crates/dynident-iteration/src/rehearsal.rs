@@ -3,6 +3,7 @@
 
 use crate::leg::Leg;
 use crate::posture::{at_sample, inertia_matrix};
+use crate::rests::{highest_speeds, with_dry_steps};
 use crate::robot::{Breach, Envelope};
 use dynident_dynamics::ParametricModel;
 use dynident_model::InertialParameters;
@@ -182,7 +183,9 @@ impl Rehearsed<'_> {
             })
             .collect();
         let terms: Vec<f64> = believed[10 * dof..].iter().map(|value| factor() * value).collect();
-        let mut plant = Plant::new(&model.with_inertials(&bodies)?, self.robot.terms(), &terms)?;
+        let fastest = highest_speeds(self.legs.iter().map(Leg::reference));
+        let laws = with_dry_steps(self.robot.terms(), &fastest);
+        let mut plant = Plant::new(&model.with_inertials(&bodies)?, &laws, &terms)?;
         let mut limits = RunLimits::default();
         if let Some(envelope) = self.envelope {
             envelope.limit(&mut limits);

@@ -2,10 +2,11 @@
 
 use crate::clipping::clipping;
 use crate::error::IterationError;
-use crate::estimate::{RunEstimate, RunLog, identification_settings, recordings};
+use crate::estimate::RunEstimate;
 use crate::evidence::{JointEvidence, RunEvidence};
 use crate::leg::IterationTask;
 use crate::prediction::{Known, predictions};
+use crate::run_logs::{RunLog, identification_settings, recordings};
 use crate::settings::{IterationSettings, RunIdentificationSettings};
 use crate::tracking_floor::{KnownLoop, tracking_floor};
 use dynident_identification::payload::known_payloads;
@@ -96,8 +97,11 @@ fn predict(
     records: &[Record],
     (settings, known): (&RunIdentificationSettings, &RunEstimate),
 ) -> Result<(), IterationError> {
-    let recordings = recordings(task, &[RunLog { run: 1, records, joint_sigma: &[] }], settings)?;
-    let identification = identification_settings(task, settings, 1);
+    let log = RunLog { run: 1, records, joint_sigma: &[], differentiator: None };
+    let recordings = recordings(task, &[log], settings)?;
+    let mut identification = identification_settings(task, settings, 1);
+    // The rows that the model was fitted to were without it.
+    identification.motion.torque_lag_s = known.lag.taken_off();
     let all: Vec<usize> = (0..recordings.len()).collect();
     let logs = Logs::new(task.robot.model(), &recordings, identification.filters(), &all, None, Execution::default())?;
     let model = RegressorModel::from(task.robot.clone());
@@ -130,22 +134,21 @@ fn predict(
     Ok(())
 }
 
-/// Adds what noise, friction and delay explain of each joint's tracking error, where one is beyond the tolerance. `own`
-/// is the run's own estimate, `known` what is known after it.
+/// Adds what noise, friction and delay explain of each joint's tracking error, where one is beyond the tolerance.
+/// `known` is what is known after the run.
 pub(crate) fn add_tracking_floors(
     evidence: &mut RunEvidence,
     task: &IterationTask,
     records: &[Record],
     settings: &IterationSettings,
-    (own, known): (&RunEstimate, &RunEstimate),
+    known: &RunEstimate,
     errors_rad: &[f64],
 ) {
     let Some(parameters) = &known.possible else { return };
     if errors_rad.iter().all(|error| *error <= settings.settled.tracking_tolerance) {
         return;
     }
-    let beyond = own.torque_lags.iter().flatten().filter(|lag| lag.lag_s.abs() > lag.half_width_95_s);
-    let delay_s = beyond.map(|lag| lag.lag_s.abs()).fold(0.0, f64::max);
+    let delay_s = known.lag.longest_s();
     let mut floors = vec![0.0_f64; task.robot.dof()];
     for (leg, record) in task.legs.iter().zip(records) {
         let q: Vec<&[f64]> = record.q.chunks_exact(record.samples.max(1)).collect();

@@ -33,6 +33,9 @@ pub struct RunIdentificationSettings {
     /// From positions to velocities and accelerations. Default `deviation`: the commanded motion's own derivatives and
     /// those of the smoothed deviation from it.
     pub differentiator: DifferentiatorSettings,
+    /// Whether each run chooses its differentiator among several, the paper's map among them: the one whose motion
+    /// leaves the least of the run's torques ([`DifferentiatorChoice`](super::DifferentiatorChoice)). Default false.
+    pub choose_differentiator: bool,
     /// Torque and every column pass the same low-pass and lose the same rows; default none.
     pub parallel_filter: Option<DecimationSettings>,
     /// Whether recorded torques are held from one sample to the next, as digital drives do: at a sample's instant the
@@ -58,6 +61,7 @@ impl Default for RunIdentificationSettings {
                 smoother: Box::default(),
                 max_lag_s: None,
             },
+            choose_differentiator: false,
             parallel_filter: None,
             held_torque: true,
             estimation: EstimationSettings::default(),
@@ -65,6 +69,14 @@ impl Default for RunIdentificationSettings {
             consistency: Some(ConsistencySettings::default()),
             payloads: Vec::new(),
         }
+    }
+}
+
+impl RunIdentificationSettings {
+    /// The same with this differentiator, stated.
+    #[must_use]
+    pub(crate) fn with_differentiator(&self, differentiator: &DifferentiatorSettings) -> Self {
+        Self { differentiator: differentiator.clone(), choose_differentiator: false, ..self.clone() }
     }
 }
 
@@ -106,6 +118,9 @@ pub struct SettledSettings {
     /// Torque of a joint that the model leaves unexplained beyond the log's own noise, as a percentage of the joint's
     /// torque (root mean squares). Default 5.
     pub most_unexplained_percent: f64,
+    /// Longest lag between torque and motion that is taken off and still lets the iteration converge, seconds: with a
+    /// longer one the robot is not where its log says, whatever the tracking is. Default 0.01.
+    pub most_lag_s: f64,
 }
 
 impl Default for SettledSettings {
@@ -118,6 +133,7 @@ impl Default for SettledSettings {
             tracking_ratio: 1.5,
             floor_ratio: 2.0,
             most_unexplained_percent: 5.0,
+            most_lag_s: 0.01,
         }
     }
 }
@@ -228,6 +244,7 @@ impl IterationSettings {
         within("settled.tracking_ratio", settled.tracking_ratio, 1.0, 1e6, "give 1 or more")?;
         within("settled.floor_ratio", settled.floor_ratio, 1.0, 1e6, "give 1 or more")?;
         let unexplained = settled.most_unexplained_percent;
+        within("settled.most_lag_s", settled.most_lag_s, 0.0, 0.5, "give seconds, 0 to 0.5")?;
         within("settled.most_unexplained_percent", unexplained, 0.0, 1e6, "give 0 or a positive percentage")
     }
 }

@@ -1,7 +1,7 @@
 //! Fig. 7 and Table 3: the paper's genetic algorithm on the paper's problem, and the optimum beside it.
 
 use crate::arm::Arm;
-use crate::piece::{PaperCell, PaperFigure, PaperTable};
+use crate::piece::{PaperCell, PaperFigure, PaperTable, shown};
 use crate::problem;
 use core::ops::ControlFlow;
 use dynident::result::{StrokeFile, WindowedFile};
@@ -64,6 +64,7 @@ fn figure_7(history: &[Generation], optimum: f64) -> PaperFigure {
     PaperFigure::new(7, plot, "the paper's genetic algorithm: 20 bits, 40 individuals, roulette by 1/H, crossover 0.5, mutation 0.01, 500 generations, penalty 1000")
         .value("genetic_algorithm", last)
         .value("optimum", optimum)
+        .caption(format!("Last H of the genetic algorithm: {}; the optimum inside (18): {}", shown(last), shown(optimum)))
 }
 
 fn table_3(file: &WindowedFile, optimum: [Stroke; 2], genetic: [Stroke; 2]) -> PaperTable {

@@ -1,6 +1,6 @@
 //! Figs. 2 to 6: the logistic function, the splice, what ω and T do to it, and the windows.
 
-use crate::piece::PaperFigure;
+use crate::piece::{PaperFigure, rough, shown};
 use dynident_excitation::families::{SplicedLogistic, SplicedLogisticSettings};
 use dynident_excitation::{Family, Motion, grid};
 use dynident_report::LinePlot;
@@ -21,6 +21,7 @@ pub(crate) fn figure_2() -> PaperFigure {
     let plot = LinePlot::new("Logistic function", "t", "f", times).line("f", f).line("f'", first).line("f''", second);
     PaperFigure::new(2, plot, "with its derivatives, which follow from its value alone")
         .value("largest_derivative_at_minus_10", rest)
+        .caption(format!("At t = −10 no derivative is above {} (the paper: below 1e-4)", rough(rest)))
 }
 
 /// Position of one spliced stroke with A = 1, h = 0, and its largest rate at the start.
@@ -40,6 +41,7 @@ pub(crate) fn figure_3() -> PaperFigure {
     let plot = LinePlot::new("Spliced logistic function", "t, s", "q, rad", grid(40.0, POINTS)).line("A = 1, ω = 1", q);
     PaperFigure::new(3, plot, "velocity and acceleration at both ends and at the splice are below 1e-4")
         .value("largest_rate_at_rest", rest)
+        .caption(format!("Largest speed (rad/s) and acceleration (rad/s²) at the start: {}", rough(rest)))
 }
 
 /// Fig. 4: different ω at T = 80.
@@ -87,5 +89,7 @@ pub(crate) fn figure_6(amplitude: f64, omega: f64, window_s: f64) -> PaperFigure
     let plot = LinePlot::new("Areas involved in the identification", "t, s", "q, rad", times)
         .dashed("whole stroke", q)
         .line("used", used);
-    PaperFigure::new(6, plot, "mid-points ± δ of the optimum inside (18)").value("delta_s", window_s)
+    PaperFigure::new(6, plot, "the solid part is used: mid-points ± δ, of the optimum inside (18)")
+        .value("delta_s", window_s)
+        .caption(format!("δ = {} s", shown(window_s)))
 }

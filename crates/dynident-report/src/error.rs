@@ -4,6 +4,14 @@
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReportError {
+    /// A cell leads to a section that the page does not have.
+    #[error("table `{section}`: a cell leads to `{to}`, which is the title of no section: give a title of this page")]
+    Link {
+        /// The table's title.
+        section: String,
+        /// The title that was looked for.
+        to: String,
+    },
     /// Lists that do not belong together.
     #[error("section `{section}`: {what} has {found} entries where {expected} are needed; give one for each")]
     Shape {

@@ -3,6 +3,7 @@
 use crate::bar_plot::BarPlot;
 use crate::convergence_plot::ConvergencePlot;
 use crate::curve_picture::{CurvePicture, Place};
+use crate::diagram::Diagram;
 use crate::error::ReportError;
 use crate::heading::Heading;
 use crate::heat_map::HeatMap;
@@ -12,6 +13,7 @@ use crate::table::Table;
 use crate::templates::{TEMPLATES, rendered};
 use crate::text::Text;
 use minijinja::{Value, context};
+use std::collections::BTreeMap;
 
 /// One section of a page; the registry of what there is.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +34,8 @@ pub enum Section {
     BarPlot(BarPlot),
     /// A matrix in colours.
     HeatMap(HeatMap),
+    /// Boxes, arrows and words.
+    Diagram(Diagram),
 }
 
 macro_rules! sections {
@@ -43,7 +47,7 @@ macro_rules! sections {
         })*
     };
 }
-sections!(Heading, Text, KeyFigures, Table, LinePlot, ConvergencePlot, BarPlot, HeatMap);
+sections!(Heading, Text, KeyFigures, Table, LinePlot, ConvergencePlot, BarPlot, HeatMap, Diagram);
 
 /// A page: a title and its sections in order.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -89,12 +93,13 @@ impl Report {
     /// A section whose lists do not belong together, or whose axis runs backwards; the message names it.
     pub fn html(&self) -> Result<String, ReportError> {
         let mut contents = Vec::new();
+        let links = self.links();
         let mut parts = Vec::with_capacity(self.sections.len());
         for (number, section) in self.sections.iter().enumerate() {
             if let Section::Heading(heading) = section {
                 contents.push(context! { id => number, text => heading.text });
             }
-            parts.push(Value::from_safe_string(section.html(number)?));
+            parts.push(Value::from_safe_string(section.html(number, &links)?));
         }
         let safe = |text: &str| Value::from_safe_string(text.to_owned());
         let source = |wanted: &str| TEMPLATES.iter().find(|(name, _)| *name == wanted).map_or("", |(_, text)| *text);
@@ -116,11 +121,39 @@ impl Report {
     }
 }
 
+impl Report {
+    /// Where each title stands; the first of equal ones counts.
+    fn links(&self) -> BTreeMap<&str, String> {
+        let mut links = BTreeMap::new();
+        for (number, section) in self.sections.iter().enumerate() {
+            let id = if matches!(section, Section::Heading(_)) { "section" } else { "part" };
+            if !section.title().is_empty() {
+                links.entry(section.title()).or_insert_with(|| format!("#{id}-{number}"));
+            }
+        }
+        links
+    }
+}
+
 impl Section {
-    fn html(&self, number: usize) -> Result<String, ReportError> {
+    /// The headline; empty for sections that have none.
+    fn title(&self) -> &str {
+        match self {
+            Self::Heading(heading) => &heading.text,
+            Self::Text(_) | Self::KeyFigures(_) => "",
+            Self::Table(table) => &table.title,
+            Self::LinePlot(plot) => &plot.title,
+            Self::ConvergencePlot(plot) => &plot.title,
+            Self::BarPlot(plot) => &plot.title,
+            Self::HeatMap(map) => &map.title,
+            Self::Diagram(diagram) => &diagram.title,
+        }
+    }
+
+    fn html(&self, number: usize, links: &BTreeMap<&str, String>) -> Result<String, ReportError> {
         let picture = |title: &str, note: &str, svg: String, legend: &str| {
             let svg = Value::from_safe_string(svg);
-            rendered("picture.html", &context! { title, note, svg, legend })
+            rendered("picture.html", &context! { number, title, note, svg, legend })
         };
         let plot = |title: &str, note: &str, data: String, picture: CurvePicture<'_>| {
             let data = Value::from_safe_string(data);
@@ -134,7 +167,11 @@ impl Section {
             Self::KeyFigures(figures) => rendered("key_figures.html", figures),
             Self::Table(table) => {
                 table.check()?;
-                rendered("table.html", &context! { table, numeric => table.numeric() })
+                let targets = table.rows.iter().flatten().filter_map(|cell| cell.to.as_deref());
+                if let Some(to) = targets.into_iter().find(|to| !links.contains_key(to)) {
+                    return Err(ReportError::Link { section: table.title.clone(), to: to.to_owned() });
+                }
+                rendered("table.html", &context! { number, table, links, numeric => table.numeric() })
             }
             Self::LinePlot(section) => plot(&section.title, &section.note, section.data()?, section.picture()),
             Self::ConvergencePlot(section) => {
@@ -143,6 +180,7 @@ impl Section {
             }
             Self::BarPlot(section) => picture(&section.title, &section.note, section.svg()?, &section.reference_label),
             Self::HeatMap(section) => picture(&section.title, &section.note, section.svg()?, ""),
+            Self::Diagram(section) => picture(&section.title, &section.note, section.picture(Place::Page)?, ""),
         }
     }
 }

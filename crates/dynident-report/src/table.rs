@@ -11,18 +11,25 @@ pub struct Cell {
     pub text: String,
     /// How it is to be taken.
     pub tone: Tone,
+    /// The title of a section of the same page that it leads to.
+    pub to: Option<String>,
 }
 
 impl<T: Into<String>> From<T> for Cell {
     fn from(text: T) -> Self {
-        Self { text: text.into(), tone: Tone::Plain }
+        Self { text: text.into(), tone: Tone::Plain, to: None }
     }
 }
 
 impl Cell {
     /// A cell that is to be taken in some way.
     pub fn judged(text: impl Into<String>, tone: Tone) -> Self {
-        Self { text: text.into(), tone }
+        Self { text: text.into(), tone, to: None }
+    }
+
+    /// A cell that leads to the section of this page with the title `to`.
+    pub fn link(text: impl Into<String>, to: impl Into<String>) -> Self {
+        Self { text: text.into(), tone: Tone::Plain, to: Some(to.into()) }
     }
 }
 

@@ -1,10 +1,10 @@
 //! The templates of pages and pictures, and how they are filled in.
 
 use crate::error::ReportError;
-use minijinja::{AutoEscape, Environment};
+use minijinja::{AutoEscape, Environment, HtmlEscape, Value};
 use serde::Serialize;
 
-pub(crate) const TEMPLATES: [(&str, &str); 15] = [
+pub(crate) const TEMPLATES: [(&str, &str); 16] = [
     ("page.html", include_str!("templates/page.html")),
     ("heading.html", include_str!("templates/heading.html")),
     ("text.html", include_str!("templates/text.html")),
@@ -14,6 +14,7 @@ pub(crate) const TEMPLATES: [(&str, &str); 15] = [
     ("picture.html", include_str!("templates/picture.html")),
     ("bar_plot.svg", include_str!("templates/bar_plot.svg")),
     ("heat_map.svg", include_str!("templates/heat_map.svg")),
+    ("diagram.svg", include_str!("templates/diagram.svg")),
     ("line_plot.svg", include_str!("templates/line_plot.svg")),
     ("motion_picture.svg", include_str!("templates/motion_picture.svg")),
     ("path_picture.svg", include_str!("templates/path_picture.svg")),
@@ -22,10 +23,24 @@ pub(crate) const TEMPLATES: [(&str, &str); 15] = [
     ("report.js", include_str!("templates/report.js")),
 ];
 
+/// Text as HTML: escaped, and what stands between back-ticks set as code. A back-tick without its partner stays.
+fn prose(text: &str) -> Value {
+    let parts: Vec<&str> = text.split('`').collect();
+    if parts.len().is_multiple_of(2) {
+        return Value::from_safe_string(HtmlEscape(text).to_string());
+    }
+    let part = |(k, part): (usize, &&str)| match k % 2 {
+        0 => HtmlEscape(part).to_string(),
+        _ => format!("<code>{}</code>", HtmlEscape(part)),
+    };
+    Value::from_safe_string(parts.iter().enumerate().map(part).collect())
+}
+
 /// A template filled in; everything that is not marked safe is escaped, in SVG as in HTML.
 pub(crate) fn rendered(name: &str, view: &impl Serialize) -> Result<String, ReportError> {
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
+    environment.add_filter("prose", prose);
     environment.set_trim_blocks(true);
     environment.set_lstrip_blocks(true);
     for (name, source) in TEMPLATES.iter().filter(|(name, _)| !name.starts_with("report.")) {
@@ -37,4 +52,17 @@ pub(crate) fn rendered(name: &str, view: &impl Serialize) -> Result<String, Repo
         text.retain(|letter| letter == '\n' || !letter.is_control());
     }
     Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn code_is_marked_and_nothing_else_is() {
+        let shown = |text: &str| prose(text).to_string();
+        assert_eq!(shown("run `a <b>` & `c`"), "run <code>a &lt;b&gt;</code> &amp; <code>c</code>");
+        assert_eq!(shown("a ` alone <i>"), "a ` alone &lt;i&gt;");
+        assert_eq!(shown("none"), "none");
+    }
 }

@@ -5,7 +5,7 @@ use super::nominal_agreement::{Evidence, PriorAgreement};
 use super::residuals::{JointResiduals, JointWatch, Uncertainty};
 use super::torque_trace::{LogTrace, TraceConsumer};
 use crate::estimators::EstimationSettings;
-use crate::lag::{DelayCheck, TorqueLag, lags_of_log};
+use crate::lag::{DelayCheck, TorqueLag, lags_after_pass};
 use crate::logs::Logs;
 use crate::recording::{LogError, Role, Samples};
 use crate::regressor_model::RegressorModel;
@@ -104,8 +104,7 @@ impl RowConsumer for Test<'_> {
         if let Some(trace) = &mut self.trace {
             trace.filtered(rows);
         }
-        self.delay.filtered(rows);
-        Ok(())
+        self.delay.filtered(rows)
     }
 
     fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), LogError> {
@@ -129,8 +128,7 @@ impl RowConsumer for Test<'_> {
         if let Some(trace) = &mut self.trace {
             trace.raw(samples);
         }
-        self.delay.raw(samples);
-        Ok(())
+        self.delay.raw(samples)
     }
 }
 
@@ -224,7 +222,7 @@ pub(crate) fn tested_on(
             residuals,
         },
         nominal_agreement: test.evidence.as_ref().map(|evidence| evidence.agreement(&joints)),
-        delays: lags_of_log(test.delay, (logs, settings)),
+        delays: lags_after_pass(test.delay, (logs, settings), index)?,
         trace: test.trace.map(|trace| trace.finished(name.clone(), Role::Validate, statistics.filtered_rate_hz)),
         statistics,
     })

@@ -10,7 +10,10 @@ mod torque_sign;
 mod torque_trace;
 mod training;
 
-pub use crate::lag::{LagChoice, LagKind, TorqueLag, delay_findings, pooled_delay};
+pub use crate::lag::{
+    LagCandidates, LagChoice, LagFit, LagKind, LagRounds, TorqueLag, delay_findings, lag_fit, lags_of_recordings,
+    pooled_delay,
+};
 pub use friction_sign::{FrictionSign, friction_sign_findings, friction_signs};
 pub use held_out::{HeldOutExamination, LogValidation, ModelUnderTest, examine_held_out};
 pub use nominal_agreement::{PriorAgreement, agreement_findings};

@@ -2,10 +2,10 @@
 
 use super::torque_trace::{LogTrace, TraceConsumer};
 use crate::estimators::EstimationSettings;
-use crate::lag::{DELAY_SAMPLES, DelayCheck, TorqueLag, lags_of_log};
+use crate::lag::{DELAY_SAMPLES, DelayCheck, TorqueLag, lags_after_pass};
 use crate::logs::Logs;
 use crate::progress::Silent;
-use crate::recording::{LogError, Role, Samples};
+use crate::recording::{LogError, Role};
 use crate::regressor_model::RegressorModel;
 use crate::rows::{JointRows, LogPass, RawSamples, RowConsumer};
 
@@ -18,19 +18,17 @@ struct SecondPass<'a> {
 impl RowConsumer for SecondPass<'_> {
     fn filtered(&mut self, rows: &JointRows<'_>) -> Result<(), LogError> {
         self.trace.filtered(rows);
-        self.delay.filtered(rows);
-        Ok(())
+        self.delay.filtered(rows)
     }
 
     fn raw(&mut self, samples: &RawSamples<'_>) -> Result<(), LogError> {
         self.trace.raw(samples);
-        self.delay.raw(samples);
-        Ok(())
+        self.delay.raw(samples)
     }
 }
 
-/// The delays of the torque of recording number `index` (none where rows of a motion are left out), and its torque over
-/// time, with the base parameters `theta`.
+/// The delays of the torque of recording number `index` (none where rows inside of a motion are left out), and its
+/// torque over time, with the base parameters `theta`.
 ///
 /// # Errors
 /// What reading it can give.
@@ -44,11 +42,7 @@ pub fn examine_training(
     let most_samples = Some(DELAY_SAMPLES as u64);
     let pass = LogPass { most_samples, progress: &Silent, ..logs.pass(model, index) };
     let statistics = pass.run(&mut second)?;
-    // Rows that are left out would move those behind them.
-    let delays = match &logs.recordings[index].samples {
-        Samples::Motion(record) if !record.usable.is_empty() || record.windows.is_some() => vec![None; model.dof()],
-        Samples::Motion(_) | Samples::Log(_) => lags_of_log(second.delay, (logs, settings)),
-    };
+    let delays = lags_after_pass(second.delay, (logs, settings), index)?;
     let name = logs.recordings[index].name.clone();
     Ok((delays, second.trace.finished(name, Role::Identify, statistics.filtered_rate_hz)))
 }

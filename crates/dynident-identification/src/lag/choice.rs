@@ -1,14 +1,17 @@
 //! Which lag is taken off the rows: none, one for all joints, or joints with one of their own.
 //!
 //! A lag of a recorder or a bus is the same for all joints, so their common lag is what is looked for first: the
-//! generalised mean of the joints' lags, its bar widened by what the joints differ by beyond their own bars (Birge,
-//! Phys. Rev. 40 (1932) 207). What friction or elasticity leaves looks like a lag too, another in every joint: it
-//! widens the bar and is not taken off. A lag that is not known leaves its mark on the parameters in any case,
-//! `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`, and the error bars hold it.
+//! generalised mean of the joints' lags, its bar widened by what the joints differ by beyond their own bars (Paule and
+//! Mandel, J. Res. NBS 87 (1982) 377). What friction or elasticity leaves looks like a lag too, another in every joint:
+//! it widens the bar and is not taken off. Joints get lags of their own only once a common one has been taken off, for
+//! friction that was chosen with a lag in the rows makes up for some of it, at each joint for another part. A lag that
+//! is not known leaves its mark on the parameters in any case, `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`, and the error bars
+//! hold it.
 
 use super::fit::LagFit;
 use super::measured::TorqueLag;
 use dynident_estimation::Estimate;
+use dynident_recording::log::OneOrMany;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -16,9 +19,11 @@ use serde::{Deserialize, Serialize};
 const MATTERS: f64 = 0.3;
 /// Joints have lags of their own where one common lag is as unlikely as this many standard deviations, ...
 const UNLIKE: f64 = 4.0;
-/// ... and those where their own takes off this share of the torque's square that the model leaves: what friction
-/// leaves looks like a lag and takes off less.
-const OWN_SHARE: f64 = 0.2;
+/// ... and those where their own takes off this share of the torque's square that the model leaves, more than all that
+/// stays: what friction leaves looks like a lag and takes off less.
+const OWN_SHARE: f64 = 0.5;
+/// Halvings of the interval that holds the spread between joints: to a millionth of what they differ by.
+const BISECTIONS: usize = 20;
 /// Standard deviation of a lag of which nothing is known but that it is one of a drive or a bus, seconds.
 const USUAL_LAG_S: f64 = 5.0e-3;
 
@@ -38,6 +43,17 @@ pub enum LagKind {
     Stated,
 }
 
+/// Which lags may be taken off.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LagCandidates {
+    /// One for all joints, or joints with one of their own where the rows say so.
+    #[default]
+    CommonOrJoints,
+    /// One for all joints: of runs under one controller friction leaves a lag of its own at each joint, and not the
+    /// same in every run.
+    Common,
+}
+
 /// What was taken off the rows, and how well the rest is known.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -54,6 +70,17 @@ pub struct LagChoice {
 }
 
 impl LagChoice {
+    /// What was taken off, for rows that are made alike:
+    /// [`MotionSettings::torque_lag_s`](dynident_recording::MotionSettings::torque_lag_s). None where nothing was.
+    pub fn taken_off(&self) -> Option<OneOrMany<f64>> {
+        (!self.lag_s.is_empty()).then(|| OneOrMany::Many(self.lag_s.clone()))
+    }
+
+    /// The longest lag that was taken off a joint, either way; seconds, 0 where nothing was.
+    pub fn longest_s(&self) -> f64 {
+        self.lag_s.iter().fold(0.0, |longest, lag_s| longest.max(lag_s.abs()))
+    }
+
     /// What was done, in a sentence without a full stop; none where there is nothing to tell.
     pub fn sentence(&self) -> Option<String> {
         let ms = |seconds: f64| format!("{:.1}", 1e3 * seconds);
@@ -82,7 +109,7 @@ impl LagChoice {
 
 /// The choice that a fit's lags ask for, beyond what was `taken_off` before (seconds, joint by joint, or empty);
 /// `estimate` is the one whose parameters are to be kept from harm.
-pub(crate) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate) -> LagChoice {
+pub(super) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate, candidates: LagCandidates) -> LagChoice {
     let dof = fit.joints.len();
     let before = |joint: usize| taken_off.get(joint).copied().unwrap_or(0.0);
     let taken_off_s = match taken_off {
@@ -91,7 +118,7 @@ pub(crate) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate) -
     };
     let total = |rest: &dyn Fn(usize) -> f64| (0..dof).map(|joint| before(joint) + rest(joint)).collect::<Vec<f64>>();
     let as_before = LagChoice { lag_s: taken_off.to_vec(), ..LagChoice::default() };
-    let all: Vec<usize> = (0..dof).filter(|&joint| fit.joints[joint].is_some()).collect();
+    let all = telling_joints(fit);
     let Some(Mean { lag, scatter }) = common(fit, &all) else { return as_before };
     let matters = |rest: &[f64]| {
         let moved = fit.answers() * DVector::from_column_slice(rest);
@@ -99,10 +126,17 @@ pub(crate) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate) -
     };
     let choice = LagChoice { common: Some(lag.after(taken_off_s)), scatter, ..as_before };
 
+    let rest = vec![lag.lag_s; dof];
+    let is_common = is_beyond_its_bar(&lag) && matters(&rest);
+    if is_common && taken_off.is_empty() {
+        return LagChoice { kind: LagKind::Common, lag_s: rest, ..choice };
+    }
+
     // Joints whose own lag explains much of what the model leaves, where one lag for all does not do.
     let freedoms = all.len().saturating_sub(1) as f64;
     let unlike = scatter.is_some_and(|scatter| (scatter - 1.0) * freedoms > UNLIKE * (2.0 * freedoms).sqrt());
-    let own: Vec<usize> = all.iter().copied().filter(|&joint| unlike && fit.share(joint) > OWN_SHARE).collect();
+    let may_own = unlike && candidates == LagCandidates::CommonOrJoints;
+    let own: Vec<usize> = all.iter().copied().filter(|&joint| may_own && fit.share(joint) > OWN_SHARE).collect();
     if !own.is_empty() {
         let others: Vec<usize> = all.iter().copied().filter(|joint| !own.contains(joint)).collect();
         let of_others =
@@ -113,8 +147,7 @@ pub(crate) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate) -
         };
         return LagChoice { kind: LagKind::Joints, lag_s: total(&rest), ..choice };
     }
-    let rest = vec![lag.lag_s; dof];
-    if is_beyond_its_bar(&lag) && matters(&rest) {
+    if is_common {
         return LagChoice { kind: LagKind::Common, lag_s: total(&|_| lag.lag_s), ..choice };
     }
     choice
@@ -148,6 +181,14 @@ pub(crate) fn with_lag_error(fit: &LagFit, choice: &LagChoice, estimate: &Estima
     estimate.with_further_error(&further)
 }
 
+/// The joints whose lags tell more than what is known beforehand, or all that have one where none does: a joint at rest
+/// has a lag of its noise.
+fn telling_joints(fit: &LagFit) -> Vec<usize> {
+    let lags = fit.joints.iter().enumerate().filter_map(|(joint, lag)| Some((joint, lag.as_ref()?)));
+    let telling: Vec<usize> = lags.clone().filter(|(_, lag)| lag.std_s < USUAL_LAG_S).map(|(joint, _)| joint).collect();
+    if telling.is_empty() { lags.map(|(joint, _)| joint).collect() } else { telling }
+}
+
 fn is_beyond_its_bar(lag: &TorqueLag) -> bool {
     lag.lag_s.abs() > lag.half_width_95_s
 }
@@ -158,25 +199,58 @@ struct Mean {
     scatter: Option<f64>,
 }
 
-/// The generalised mean of some joints' lags.
+/// The lag that some joints share: the generalised mean with a spread τ between the joints beside their own errors,
+/// `χ²(τ) = n − 1` (Paule and Mandel, J. Res. NBS 87 (1982) 377). What friction leaves has one sign at all joints, so
+/// that it does not average out: the whole spread is in the interval by which a lag is judged; its standard deviation,
+/// by which parameters' bars are widened, is that of the mean.
 fn common(fit: &LagFit, joints: &[usize]) -> Option<Mean> {
     let lags: Vec<TorqueLag> = joints.iter().filter_map(|&joint| fit.joints[joint]).collect();
     let covariance = fit.covariance(joints);
     let values = DVector::from_iterator(lags.len(), lags.iter().map(|lag| lag.lag_s));
-    let ones = DVector::from_element(lags.len(), 1.0);
-    let weighted = |matrix: DMatrix<f64>| matrix.cholesky().map(|factor| factor.solve(&ones));
     // Few segments: lags of all joints together may be less than independent.
-    let weights = weighted(covariance.clone()).filter(|weights| weights.sum() > 0.0);
-    let weights = weights.or_else(|| weighted(DMatrix::from_diagonal(&covariance.diagonal())))?;
-    let total = weights.sum();
-    let mean = weights.dot(&values) / total;
-    let rest = values.add_scalar(-mean);
-    let chi_square = covariance.cholesky().map(|factor| rest.dot(&factor.solve(&rest)));
-    let scatter = chi_square.filter(|_| lags.len() > 1).map(|sum| sum / (lags.len() - 1) as f64);
-    let std_s = total.powf(-0.5) * scatter.unwrap_or(1.0).max(1.0).sqrt();
+    let covariance = match covariance.clone().cholesky() {
+        Some(_) => covariance,
+        None => DMatrix::from_diagonal(&covariance.diagonal()),
+    };
+    let alone = SharedLag::with_spread(&covariance, &values, 0.0)?;
+    let freedoms = lags.len().saturating_sub(1) as f64;
+    let (mut spread, mut shared) = (0.0, alone);
+    if alone.chi_square > freedoms && freedoms > 0.0 {
+        // χ² falls as the spread grows, and is below n − 1 where the spread is that of the values themselves.
+        let mut bounds = [0.0, values.iter().fold(0.0_f64, |most, value| most.max((value - alone.mean).abs()))];
+        bounds[1] *= (lags.len() as f64).sqrt();
+        for _ in 0..BISECTIONS {
+            spread = 0.5 * (bounds[0] + bounds[1]);
+            shared = SharedLag::with_spread(&covariance, &values, spread)?;
+            bounds[usize::from(shared.chi_square <= freedoms)] = spread;
+        }
+    }
+    let std_s = shared.variance.sqrt();
     let quantile = lags.iter().map(|lag| lag.half_width_95_s / lag.std_s).fold(0.0, f64::max);
-    let half_width_95_s = quantile * std_s;
-    let matters = mean.abs() > half_width_95_s && lags.iter().any(|lag| lag.matters);
-    (std_s.is_finite() && mean.is_finite())
-        .then_some(Mean { lag: TorqueLag { lag_s: mean, std_s, half_width_95_s, matters, taken_off_s: 0.0 }, scatter })
+    let (lag_s, half_width_95_s) = (shared.mean, quantile * std_s.hypot(spread));
+    let matters = lag_s.abs() > half_width_95_s && lags.iter().any(|lag| lag.matters);
+    let scatter = (freedoms > 0.0).then(|| alone.chi_square / freedoms);
+    (std_s.is_finite() && lag_s.is_finite())
+        .then_some(Mean { lag: TorqueLag { lag_s, std_s, half_width_95_s, matters, taken_off_s: 0.0 }, scatter })
+}
+
+/// The generalised mean for one spread between the joints.
+#[derive(Clone, Copy)]
+struct SharedLag {
+    mean: f64,
+    variance: f64,
+    chi_square: f64,
+}
+
+impl SharedLag {
+    fn with_spread(covariance: &DMatrix<f64>, values: &DVector<f64>, spread: f64) -> Option<Self> {
+        let count = values.len();
+        let factor = (covariance + DMatrix::from_diagonal_element(count, count, spread * spread)).cholesky()?;
+        let ones = DVector::from_element(count, 1.0);
+        let weights = factor.solve(&ones);
+        let total = weights.sum();
+        let mean = weights.dot(values) / total;
+        let rest = values.add_scalar(-mean);
+        (total > 0.0).then(|| Self { mean, variance: 1.0 / total, chi_square: rest.dot(&factor.solve(&rest)) })
+    }
 }

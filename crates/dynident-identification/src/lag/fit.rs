@@ -27,7 +27,8 @@ const MOST_STEPS: usize = 12;
 const SETTLED: (f64, f64) = (0.02, 1.0e-6);
 
 /// Lags by joint, with the parameters that were estimated with them.
-pub(crate) struct LagFit {
+#[derive(Debug)]
+pub struct LagFit {
     /// Base parameters, then what the last step adds to each joint's lag, seconds.
     pub(crate) last: Estimate,
     /// Number of base parameters.

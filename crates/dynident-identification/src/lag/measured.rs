@@ -14,7 +14,7 @@ pub struct TorqueLag {
     pub lag_s: f64,
     /// Its standard deviation.
     pub std_s: f64,
-    /// Half the width of its 95 % interval.
+    /// Half the width of its 95 % interval; of a lag of all joints with the whole spread between them.
     pub half_width_95_s: f64,
     /// Whether what was not taken off is beyond its interval and moves more torque than the model leaves unexplained.
     pub matters: bool,

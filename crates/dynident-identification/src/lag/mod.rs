@@ -4,12 +4,16 @@
 mod choice;
 mod fit;
 mod measured;
+mod pass;
+mod rounds;
 mod rows;
 mod samples;
 
-pub use choice::{LagChoice, LagKind};
+pub use choice::{LagCandidates, LagChoice, LagKind};
+pub use fit::LagFit;
 pub use measured::{TorqueLag, delay_findings, pooled_delay};
+pub use pass::{lag_fit, lags_of_recordings};
+pub use rounds::LagRounds;
 
-pub(crate) use choice::{choose_lag, with_lag_error};
-pub(crate) use fit::{LagFit, fit_lags, lags_of_log};
+pub(crate) use pass::lags_after_pass;
 pub(crate) use samples::{DELAY_SAMPLES, DelayCheck};

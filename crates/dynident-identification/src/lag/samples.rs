@@ -32,7 +32,7 @@ impl<'a> DelayCheck<'a> {
     }
 
     /// Rows as they leave the parallel filter; the samples that they belong to came before.
-    pub(crate) fn filtered(&mut self, rows: &JointRows<'_>) {
+    pub(super) fn take_filtered(&mut self, rows: &JointRows<'_>) {
         let Some(piece) = self.pieces.last_mut().filter(|_| !self.full) else { return };
         let regressor = &rows.panel[..self.model.layout().joint_columns(rows.joint).len() * rows.rows];
         self.numbers += regressor.len();
@@ -40,7 +40,7 @@ impl<'a> DelayCheck<'a> {
         piece.rows[rows.joint].push(FilteredRows { rows: rows.rows, regressor, coverage });
     }
 
-    pub(crate) fn raw(&mut self, samples: &RawSamples<'_>) {
+    pub(super) fn take_raw(&mut self, samples: &RawSamples<'_>) {
         self.full |= self.samples >= DELAY_SAMPLES || self.numbers >= MOST_NUMBERS;
         if self.full {
             return;

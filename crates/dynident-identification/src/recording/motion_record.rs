@@ -1,6 +1,7 @@
 //! A motion that is made already.
 
-use dynident_recording::{Log, MotionBlock};
+use dynident_recording::{Log, MotionBlock, MotionSettings};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// A motion that is made already, with its torques: joints in the model's order, one uninterrupted piece.
@@ -19,6 +20,17 @@ pub struct MotionRecord {
 }
 
 impl MotionRecord {
+    /// The record as `settings` ask for it: without the lag of the torque that they state.
+    pub(crate) fn as_set(&self, settings: &MotionSettings) -> Cow<'_, Self> {
+        match &settings.torque_lag_s {
+            Some(lag_s) => {
+                let motion = Arc::new(self.motion.without_torque_lag(lag_s));
+                Cow::Owned(Self { motion, ..self.clone() })
+            }
+            None => Cow::Borrowed(self),
+        }
+    }
+
     /// The same with every row, where only samples at the ends do not count.
     pub(crate) fn with_every_row(&self) -> Option<Self> {
         let first = self.usable.iter().position(|usable| *usable).unwrap_or(0);

@@ -3,7 +3,7 @@
 use super::coverage::set_aside;
 use super::joint_filters::JointFilters;
 use super::mask::RowMask;
-use super::{JointRows, PANEL_SAMPLES, RawSamples, RowConsumer};
+use super::{PANEL_SAMPLES, RawSamples, RowConsumer};
 use crate::recording::LogError;
 use crate::regressor_model::RegressorModel;
 use dynident_dynamics::{BatchWorkspace, Panels, TermHistory, regressor_panels_following};
@@ -142,10 +142,8 @@ impl<'a> RowBuilder<'a> {
                     }
                 }
             }
-            // A record of a motion says itself which of its samples can be used.
-            let counts_all = block.set_aside.is_empty() || self.mask.is_some();
             self.set_aside.clear();
-            if !counts_all {
+            if !block.set_aside.is_empty() {
                 let of_joints = self.places.iter().map(|&place| set_aside(block, place, from, samples).to_vec());
                 self.set_aside.extend(of_joints);
             }
@@ -162,10 +160,7 @@ impl<'a> RowBuilder<'a> {
                 let all = self.filters.push(joint, self.panels.joint(joint), samples, left_out);
                 rows = all.rows;
                 let counted = match &mut self.mask {
-                    Some(mask) if rows > 0 => {
-                        let (rows, panel) = mask.apply(joint, rows, all.panel);
-                        JointRows { rows, panel, ..all }
-                    }
+                    Some(mask) if rows > 0 => mask.apply(&all),
                     _ => all,
                 };
                 if counted.rows > 0 {

@@ -1,5 +1,6 @@
 //! Which rows of a motion that is made already count.
 
+use super::JointRows;
 use crate::recording::MotionRecord;
 use dynident_recording::MotionBlock;
 
@@ -15,6 +16,7 @@ pub(crate) struct RowMask<'a> {
     done: Vec<usize>,
     places: Vec<usize>,
     kept: Vec<f64>,
+    coverage: Vec<f64>,
 }
 
 impl<'a> RowMask<'a> {
@@ -32,12 +34,22 @@ impl<'a> RowMask<'a> {
             unusable_before.push(unusable_before[sample] + usize::from(spoilt));
         }
         let done = vec![0; record.motion.joints];
-        Some(Self { record, unusable_before, half, factor, done, places: Vec::new(), kept: Vec::new() })
+        Some(Self {
+            record,
+            unusable_before,
+            half,
+            factor,
+            done,
+            places: Vec::new(),
+            kept: Vec::new(),
+            coverage: Vec::new(),
+        })
     }
 
-    /// The rows that count of the next `rows` rows of a joint, as a panel of their own.
-    pub(crate) fn apply(&mut self, joint: usize, rows: usize, panel: &[f64]) -> (usize, &[f64]) {
-        let Self { record, unusable_before, half, factor, done, places, kept } = self;
+    /// The rows that count of a joint's next `all`.
+    pub(crate) fn apply<'s>(&'s mut self, all: &JointRows<'_>) -> JointRows<'s> {
+        let Self { record, unusable_before, half, factor, done, places, kept, coverage } = self;
+        let &JointRows { joint, rows, .. } = all;
         let MotionBlock { rows: samples, first_time_s, rate_hz, .. } = *record.motion;
         let first = done[joint];
         done[joint] += rows;
@@ -52,9 +64,11 @@ impl<'a> RowMask<'a> {
         places.clear();
         places.extend((0..rows).filter(counts));
         kept.clear();
-        for column in panel.chunks_exact(rows) {
+        for column in all.panel.chunks_exact(rows) {
             kept.extend(places.iter().map(|&row| column[row]));
         }
-        (places.len(), kept)
+        coverage.clear();
+        coverage.extend(places.iter().filter_map(|&row| all.coverage.get(row)));
+        JointRows { joint, rows: places.len(), panel: kept, coverage }
     }
 }

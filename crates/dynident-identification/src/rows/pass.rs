@@ -84,8 +84,12 @@ impl LogPass<'_> {
             return Err(LogError::NoTemperature { log: name.clone(), joint });
         }
         let places = self.recording.places(self.model.model())?;
+        let set;
         let mut motion = match (samples, self.kept.and_then(OnceLock::get)) {
-            (Samples::Motion(record), _) => Motion::Record(record),
+            (Samples::Motion(record), _) => {
+                set = record.as_set(self.motion);
+                Motion::Record(&set)
+            }
             (_, Some(kept)) => Motion::Kept(kept),
             _ => match self.recording.open(self.model.model(), self.motion)? {
                 Some(stream) => Motion::Stream(Box::new(stream)),
@@ -149,7 +153,7 @@ impl LogPass<'_> {
     ) -> Result<Option<ImportReport>, LogError> {
         let Recording { name, samples, .. } = self.recording;
         match (samples, self.kept.and_then(OnceLock::get)) {
-            (Samples::Motion(record), _) => take(&record.motion).map(|()| None),
+            (Samples::Motion(record), _) => take(&record.as_set(self.motion).motion).map(|()| None),
             (_, Some(kept)) => {
                 kept.blocks.iter().try_for_each(take)?;
                 Ok(Some(kept.report.clone()))

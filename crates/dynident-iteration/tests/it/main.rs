@@ -1,6 +1,7 @@
 //! The integration tests of this crate, linked once.
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
+mod differentiators;
 mod identification;
 mod iteration;
 mod policy;

@@ -2,6 +2,7 @@
 
 use dynident_dynamics::ParametricModel;
 use dynident_excitation::Motion;
+use dynident_identification::examination::{LagChoice, TorqueLag};
 use dynident_iteration::{
     Clipping, Iteration, IterationSettings, IterationStatus, IterationTask, JointEvidence, ModelParameters, Next,
     Prediction, RunEstimate, RunEvidence, RunPlan, RunRecord, Shortfall, UsedController,
@@ -32,6 +33,8 @@ fn estimate(value: f64, std: f64) -> RunEstimate {
         impossible: None,
         friction: Vec::new(),
         torque_lags: Vec::new(),
+        lag: LagChoice::default(),
+        differentiator: None,
     }
 }
 
@@ -162,7 +165,6 @@ fn tracking_at_its_floor_is_met() {
 /// Each condition alone keeps the iteration from converging, and is named with joint and numbers.
 #[test]
 fn every_condition_counts_by_itself() {
-    use dynident_identification::examination::TorqueLag;
     assert!(shortfalls(&good_pair()).is_empty());
     let with = |spoil: &dyn Fn(&mut RunRecord)| {
         let mut records = good_pair();
@@ -180,8 +182,10 @@ fn every_condition_counts_by_itself() {
     let message = with(&|record| joint(record, &|shown| shown.clipping = Some(clipped(true))));
     assert!(message.contains("joint2") && message.contains("59.0 %") && message.contains("8.000 Nm"), "{message}");
     let late = TorqueLag { lag_s: -8e-3, std_s: 1e-4, half_width_95_s: 2e-4, matters: true, taken_off_s: 0.0 };
-    let message = with(&|record| record.estimate.as_mut().unwrap().torque_lags = vec![None, Some(late)]);
+    let message = with(&|record| record.estimate.as_mut().unwrap().lag.common = Some(late));
     assert!(message.contains("8.0 +- 0.2 ms before"), "{message}");
+    let message = with(&|record| record.estimate.as_mut().unwrap().lag.lag_s = vec![0.0, -0.011]);
+    assert!(message.contains("11.0 ms apart"), "{message}");
     let poor = Prediction { rows: 1000, inside: 0.6, rms_error: 0.4, half_width: 0.2 };
     let message = with(&|record| joint(record, &|shown| shown.prediction = Some(poor)));
     assert!(message.contains("60 %") && message.contains("0.400 Nm"), "{message}");

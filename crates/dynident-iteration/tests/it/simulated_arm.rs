@@ -92,6 +92,32 @@ pub(crate) fn reference() -> Reference {
     Reference::new(RATE_HZ, motion).unwrap()
 }
 
+/// The joints take turns: joint 2 makes two strokes there and back while joint 1 rests, then the other way round; 24 s.
+pub(crate) fn strokes_in_turn() -> Reference {
+    let samples = (24.0 * RATE_HZ) as usize;
+    let mut motion = Motion { samples, joints: 2, ..Motion::default() };
+    // A quintic of 3 s from rest to rest, as position, velocity and acceleration of the share of the way.
+    let quintic = |t: f64| {
+        let (s, per_s) = ((t / 3.0).clamp(0.0, 1.0), 1.0 / 3.0_f64);
+        [
+            s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s),
+            per_s * 30.0 * s * s * (1.0 - s).powi(2),
+            per_s * per_s * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s),
+        ]
+    };
+    for (begin_s, way) in [(12.0, 1.4), (0.0, 1.8)] {
+        for sample in 0..samples {
+            let t = sample as f64 / RATE_HZ - begin_s;
+            let starts = [(0.0, way), (3.0, -way), (6.0, 0.5 * way), (9.0, -0.5 * way)];
+            let sum = |k: usize| starts.iter().map(|(start, way)| way * quintic(t - start)[k]).sum();
+            motion.q.push(sum(0));
+            motion.dq.push(sum(1));
+            motion.ddq.push(sum(2));
+        }
+    }
+    Reference::new(RATE_HZ, motion).unwrap()
+}
+
 pub(crate) fn task() -> IterationTask {
     IterationTask::new(described(), reference()).unwrap()
 }

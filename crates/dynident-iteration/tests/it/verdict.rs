@@ -1,8 +1,9 @@
 //! Success means success: what an iteration says of robots that follow, clip, log late, fall, stick, or are another
 //! arm.
 
-use crate::simulated_arm::{Simulated, iterated, settings};
-use dynident_iteration::{IterationOutcome, IterationStatus, Shortfall};
+use crate::simulated_arm::{Simulated, described, friction, iterated, settings, strokes_in_turn};
+use dynident_dynamics::ParametricModel;
+use dynident_iteration::{Iteration, IterationOutcome, IterationStatus, IterationTask, Shortfall, iterate};
 use dynident_model::terms::CoulombShape;
 use dynident_simulation::controllers::JointPdSettings;
 use dynident_simulation::{ControllerSettings, RunLimits, SensorSettings};
@@ -44,19 +45,48 @@ fn a_robot_that_clips_never_converges() {
     assert!(words.contains("torque of joint joint2"), "{words}");
 }
 
+fn logged_late(delay_s: f64) -> (Simulated, IterationOutcome) {
+    let sensors = SensorSettings { position_delay_s: delay_s.into(), ..Simulated::default().sensors };
+    let simulated = Simulated { sensors, ..Simulated::default() };
+    let mut settings = settings();
+    // Where the log is late the tracking that it shows is not small.
+    settings.settled.floor_ratio = 3.0;
+    let (_, outcome) = iterated(&simulated, settings);
+    (simulated, outcome)
+}
+
+/// A lag of some milliseconds is found, taken off the rows, and said; the parameters are the arm's.
 #[test]
-fn positions_that_are_logged_late_are_said_and_are_no_success() {
-    let sensors = SensorSettings { position_delay_s: 8e-3.into(), ..Simulated::default().sensors };
-    let (_, outcome) = iterated(&Simulated { sensors, ..Simulated::default() }, settings());
+fn a_lag_is_taken_off_and_the_arm_is_found() {
+    for delay_s in [2e-3, 8e-3] {
+        let (simulated, outcome) = logged_late(delay_s);
+        let words = words(&outcome);
+        assert_eq!(outcome.status, IterationStatus::Converged, "{words}");
+        let known = outcome.runs.last().unwrap().knowledge().unwrap();
+        // Late positions are early torque; a lag is measured to a hundredth of a sample or so.
+        for lag in &known.torque_lags {
+            let lag = lag.unwrap();
+            assert!((lag.lag_s + delay_s).abs() < 0.2e-3 && lag.taken_off_s < -0.8 * delay_s, "{lag:?}");
+        }
+        let truth = simulated.truth(&described());
+        for ((value, truth), std) in known.values.iter().zip(&truth).zip(&known.std) {
+            // Four deviations: the mean of ten parameters' largest error is at 1.5.
+            assert!((value - truth).abs() <= 4.0 * std, "{value} for {truth} +- {std}: {words}");
+        }
+    }
+}
+
+/// A robot that is far from where its log says: whatever the fit makes of it, this is no success.
+#[test]
+fn a_long_lag_is_no_success() {
+    let (_, outcome) = logged_late(25e-3);
     let words = words(&outcome);
     assert!(!outcome.status.is_converged(), "{words}");
-    let lags: Vec<f64> = outcome
-        .shortfalls
-        .iter()
-        .filter_map(|unmet| if let Shortfall::Lag { lag_s, .. } = unmet { Some(*lag_s) } else { None })
-        .collect();
-    // Late positions are early torque.
-    assert!(!lags.is_empty() && lags.iter().all(|lag| (lag + 8e-3).abs() < 1e-3), "{words}");
+    let lags = outcome.shortfalls.iter().filter_map(|unmet| match unmet {
+        Shortfall::LongLag { lag_s, .. } | Shortfall::Lag { lag_s, .. } => Some(lag_s.abs()),
+        _ => None,
+    });
+    assert!(lags.into_iter().any(|lag_s| (lag_s - 25e-3).abs() < 1e-3), "{words}");
 }
 
 /// The first controller cannot hold the arm: its run is no good one, and the iteration goes on from what it told.
@@ -95,4 +125,28 @@ fn a_joint_that_sticks_never_converges() {
         Simulated { shape: CoulombShape::Smooth { width: 0.002 }, coulomb: [6.0, 4.0], ..Simulated::default() };
     let (_, outcome) = iterated(&sticking, settings());
     assert!(!outcome.status.is_converged(), "{}", words(&outcome));
+}
+
+/// Dry friction with stiction, and joints that rest while another moves: the torque at rest is whatever holds the
+/// joint. The model's step is a narrow smooth one.
+#[test]
+fn an_arm_that_rests_with_dry_friction_is_found() {
+    let narrow = CoulombShape::Smooth { width: 5e-3 };
+    let robot = ParametricModel::new(described().model().clone(), friction(narrow)).unwrap();
+    let task = IterationTask::new(robot.clone(), strokes_in_turn()).unwrap();
+    let simulated = Simulated { shape: CoulombShape::Sign { dead_band: 0.0 }, ..Simulated::default() };
+    let iteration = Iteration::new(task, settings()).unwrap();
+    let outcome = iterate(&iteration, &mut [&mut simulated.robot()], None, &mut |_, _| {}).unwrap();
+    let words = words(&outcome);
+    assert_eq!(outcome.status, IterationStatus::Converged, "{words}");
+    let known = outcome.runs.last().unwrap().knowledge().unwrap();
+    let errors = known.values.iter().zip(simulated.truth(&robot)).zip(&known.std).map(|((value, truth), std)| {
+        // What is not excited has no bar.
+        if *std > 0.0 { (value - truth) / std } else { 0.0 }
+    });
+    let errors: Vec<f64> = errors.collect();
+    // Of ten independent numbers the root mean square is beyond 1.6 once in some two hundred times. With the rows at
+    // rest it was 2.4 here, and bodies of the paper's arm were off by 15 bars.
+    let rms = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
+    assert!(rms < 1.6, "{errors:?} {words}");
 }

@@ -157,6 +157,35 @@ impl TorqueTerm {
         self.kind().constants()
     }
 
+    /// The same law with another step near zero velocity, where it has one.
+    #[must_use]
+    pub fn with_step(self, other: impl Fn(CoulombShape) -> CoulombShape) -> Self {
+        match self {
+            Self::Coulomb(term) => Self::Coulomb(Coulomb { shape: other(term.shape), ..term }),
+            Self::DirectionalCoulomb(term) => {
+                Self::DirectionalCoulomb(DirectionalCoulomb { shape: other(term.shape), ..term })
+            }
+            Self::Stribeck(term) => Self::Stribeck(Stribeck { shape: other(term.shape), ..term }),
+            Self::Load(term) => Self::Load(LoadFriction { shape: other(term.shape), ..term }),
+            Self::TemperatureCoulomb(term) => {
+                Self::TemperatureCoulomb(TemperatureCoulomb { shape: other(term.shape), ..term })
+            }
+            Self::Coupling(Coupling { effect: CouplingEffect::Coulomb(shape), name, first, second, ratios }) => {
+                let effect = CouplingEffect::Coulomb(other(shape));
+                Self::Coupling(Coupling { name, first, second, ratios, effect })
+            }
+            Self::Viscous(_)
+            | Self::DirectionalViscous(_)
+            | Self::Sigmoid(_)
+            | Self::Power(_)
+            | Self::MaxwellSlip(_)
+            | Self::TemperatureViscous(_)
+            | Self::Offset(_)
+            | Self::DriveInertia(_)
+            | Self::Coupling(_) => self,
+        }
+    }
+
     /// The joints that feel this term.
     pub fn joints(&self) -> Vec<usize> {
         match self.kind().joints() {

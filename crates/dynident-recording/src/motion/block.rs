@@ -1,5 +1,6 @@
 //! A motion in blocks, and how a log is to become one.
 
+use super::torque_lag::TorqueShift;
 use crate::derivative::DifferentiatorSettings;
 use crate::error::{FilterError, require};
 use crate::log::OneOrMany;
@@ -103,6 +104,29 @@ impl MotionBlock {
     /// One joint's part of `values` (one of this block's own fields).
     pub fn joint<'a>(&self, values: &'a [f64], joint: usize) -> &'a [f64] {
         &values[joint * self.rows..(joint + 1) * self.rows]
+    }
+
+    /// The same with each joint's torque taken at the time of the motion that it belongs to, `lag_s` later (seconds,
+    /// one for all joints or one for each; joints without one keep theirs), as [`MotionSettings::torque_lag_s`] does
+    /// while a log is read. Samples whose torque comes from outside are set aside.
+    #[must_use]
+    pub fn without_torque_lag(&self, lag_s: &OneOrMany<f64>) -> Self {
+        let lags = (0..self.joints).map(|joint| lag_s.at(joint).unwrap_or(0.0));
+        let shift = TorqueShift::new(lags, self.rate_hz);
+        let mut shifted = self.clone();
+        shifted.tau.clear();
+        shifted.tau_smooth.clear();
+        for joint in 0..self.joints {
+            for row in shift.append(joint, self.joint(&self.tau, joint), 0..self.rows, &mut shifted.tau) {
+                shifted.set_aside.resize(self.joints * self.rows, false);
+                shifted.set_aside[joint * self.rows + row] = true;
+            }
+            if !self.tau_smooth.is_empty() {
+                let smooth = self.joint(&self.tau_smooth, joint);
+                shift.append(joint, smooth, 0..self.rows, &mut shifted.tau_smooth);
+            }
+        }
+        shifted
     }
 
     /// Some of its rows.

@@ -1,11 +1,10 @@
 //! The whole page: nothing that it is given becomes markup or script, and it asks nothing of any network.
 use dynident_report::{
-    BarPlot, Cell, ConvergencePlot, Heading, HeatMap, KeyFigures, LinePlot, Report, Table, Text, Tone,
+    BarPlot, Cell, ConvergencePlot, Diagram, Heading, HeatMap, KeyFigures, LinePlot, Report, Table, Text, Tone,
 };
 
 /// Ends every context that a page has: element, attribute, script, comment.
-const HOSTILE: &str =
-    "</script><script>alert(1)</script><!-- \"'><img src=x onerror=alert(2)> ${x} {{ 7*7 }} {% raw %} */";
+const HOSTILE: &str = "</script><script>alert(1)</script><!-- \"'><img src=x onerror=alert(2)> `<b onclick=alert(3)>` ${x} {{ 7*7 }} {% raw %} */";
 
 fn page_of(text: &str) -> String {
     let mut report = Report::new(text).subtitle(text);
@@ -17,13 +16,15 @@ fn page_of(text: &str) -> String {
     report.add(ConvergencePlot::new(text, text).note(text).curve(text, vec![1.0]));
     report.add(BarPlot::new(text, text).note(text).reference_label(text).bar(text, 1.0, Some(0.5), Some(2.0)));
     report.add(HeatMap::new(text, [text], [text], vec![vec![1.0]]).note(text));
+    report.add(Diagram::new(text, text, [300.0, 100.0]).note(text).boxed([150.0, 50.0], [9.0, 9.0], &[text]));
+    report.add(Table::new("links", [text]).row([Cell::link(text, text)]));
     report.html().unwrap()
 }
 
 #[test]
 fn names_never_become_markup_or_script() {
     let (harmless, hostile) = (page_of("name"), page_of(HOSTILE));
-    for what in ["<script", "</script", "<img", "<!--", "onerror=alert(2)>"] {
+    for what in ["<script", "</script", "<img", "<!--", "onerror=alert(2)>", "<b "] {
         assert_eq!(hostile.matches(what).count(), harmless.matches(what).count(), "{what}");
     }
     assert!(!hostile.contains("49 {%"), "a template ran twice");
@@ -56,6 +57,30 @@ fn a_section_that_does_not_fit_is_named() {
     report.add(LinePlot::new("Elbow", "", "", vec![0.0, 1.0]).line("measured", vec![1.0]));
     let message = report.html().unwrap_err().to_string();
     assert!(message.contains("Elbow") && message.contains("measured"), "{message}");
+}
+
+#[test]
+fn a_cell_leads_to_the_section_that_it_names() {
+    let table = |to: &str| Table::new("index", ["what"]).row([Cell::link("Fig. 1", to)]);
+    let mut report = Report::new("t");
+    report.add(table("The arm & its axes")).add(Diagram::new("The arm & its axes", "words", [9.0, 9.0]));
+    let page = report.html().unwrap();
+    let target = page.split_once("<a href=\"#part-").unwrap().1.split_once('"').unwrap().0;
+    let section = page.split_once(&format!("<section id=\"part-{target}\"")).unwrap().1;
+    assert!(section.split_once("</h3>").unwrap().0.ends_with("The arm &amp; its axes"), "{section}");
+    let mut lost = Report::new("t");
+    lost.add(table("nowhere"));
+    let message = lost.html().unwrap_err().to_string();
+    assert!(message.contains("index") && message.contains("nowhere"), "{message}");
+}
+
+#[test]
+fn code_between_back_ticks_is_set_as_code() {
+    let mut report = Report::new("t").subtitle("by `dynident identify`");
+    report.add(Text::new("see `[motion]`")).add(Table::new("t", ["a"]).note("`note`").row(["`cell`"]));
+    let page = report.html().unwrap();
+    let shown = page.split_once("</style>").unwrap().1.split_once("<script").unwrap().0;
+    assert!(!shown.contains('`') && shown.matches("<code>").count() == 4, "{shown}");
 }
 
 #[test]
@@ -113,7 +138,7 @@ fn text_and_curves_stand_out_from_the_paper() {
 fn every_plot_is_a_picture_with_words_before_any_script_runs() {
     let page = page_of("name");
     let pictures = page.matches("<svg").count();
-    assert_eq!(pictures, 4, "two plots, bars, a map");
+    assert_eq!(pictures, 5, "two plots, bars, a map, a diagram");
     assert_eq!(page.matches("role=\"img\" aria-label=\"name: ").count(), pictures);
     for plot in page.split("class=\"chart\"").skip(1) {
         let before = plot.split_once("<script").unwrap().0;

@@ -37,7 +37,7 @@ pub fn simulate_study(
     let simulation = study.simulation.clone().unwrap_or_default();
     let folders = Folders::new(study, study_path, options.data.as_deref());
     let robot = StudyRobot::new(study, study_path, &folders)?;
-    let mut truth = simulation.truth(&robot).map_err(Error::section(study_path, "simulation"))?;
+    let mut truth = simulation.truth(&study.coupling, &robot).map_err(Error::section(study_path, "simulation"))?;
     let controller = study
         .controller
         .clone()
@@ -78,8 +78,8 @@ pub fn simulate_study(
             .collect(),
         terms: own(
             &truth.parameters[10 * robot.model().dof()..],
-            robot.terms().iter().map(dynident_model::terms::TorqueTerm::symbol).collect(),
-            robot.terms().iter().map(dynident_model::terms::TorqueTerm::unit).collect(),
+            truth.terms.iter().map(dynident_model::terms::TorqueTerm::symbol).collect(),
+            truth.terms.iter().map(dynident_model::terms::TorqueTerm::unit).collect(),
         ),
         base_parameters: own(
             &truth.base_values,

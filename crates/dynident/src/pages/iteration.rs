@@ -98,6 +98,13 @@ pub(crate) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time:
         page.add(Heading::new("What the last log shows"));
         page.add(shown);
     }
+    let ways =
+        file.runs.iter().filter_map(|run| run.differentiator.as_ref().map(|way| (run_name(run), way.sentence())));
+    let points: Vec<(Tone, String)> = ways.map(|(run, way)| (Tone::Plain, format!("run {run}: {way}"))).collect();
+    if !points.is_empty() {
+        page.add(Heading::new("From positions to velocities and accelerations"));
+        page.add(Text { paragraphs: Vec::new(), points });
+    }
     page.add(Heading::new("Tracking"));
     tracking(&mut page, file, traces);
     page.add(Heading::new("Parameters"));
@@ -127,6 +134,7 @@ fn last_shown(file: &IterationsFile) -> Option<Table> {
         "its floor",
         "at the torque limit",
         "torque after motion, ms",
+        "of it taken off, ms",
         "predicted inside the 95 % band",
     ];
     let mut table = Table::new(format!("Run {}", run_name(run)), columns).note(
@@ -140,6 +148,7 @@ fn last_shown(file: &IterationsFile) -> Option<Table> {
             optional(shown.tracking_floor_rad.map(|floor| short(floor, 3))),
             optional(shown.clipping.map(|clipping| format!("{} %", short(100.0 * clipping.share, 3)))),
             optional(lag.map(|lag| format!("{:.2} ± {:.2}", 1e3 * lag.lag_s, 1e3 * lag.half_width_95_s))),
+            optional(lag.filter(|lag| lag.taken_off_s != 0.0).map(|lag| format!("{:.2}", 1e3 * lag.taken_off_s))),
             optional(shown.prediction.map(|prediction| format!("{} %", short(100.0 * prediction.inside, 3)))),
         ]]);
     }

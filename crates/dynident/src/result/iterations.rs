@@ -4,7 +4,7 @@ use super::identification::BaseParameterResult;
 use super::provenance::Provenance;
 use crate::error::Error;
 use dynident_identification::examination::TorqueLag;
-use dynident_iteration::{RunEvidence, Shortfall};
+use dynident_iteration::{DifferentiatorChoice, RunEvidence, Shortfall};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -141,9 +141,14 @@ pub struct IterationRun {
     /// What its log shows beside parameters, joint by joint; none where it did not get to its end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub evidence: Option<RunEvidence>,
-    /// By how much each joint's torque comes after the motion, by this run alone; empty where windows leave rows out.
+    /// By how much each joint's torque comes after the motion, by this run alone; none where the run does not
+    /// determine it or windows leave rows out, empty step by step.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub torque_lags: Vec<Option<TorqueLag>>,
+    /// The way from positions to velocities and accelerations that the run chose, and the others; none where it was
+    /// stated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub differentiator: Option<DifferentiatorChoice>,
 }
 
 impl IterationRun {

@@ -22,7 +22,7 @@ pub enum CoulombChoice {
 }
 
 /// `[drive]`: the laws of every joint, and exceptions by joint.
-#[derive(Clone, Debug, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct DriveSection {

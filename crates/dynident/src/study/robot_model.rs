@@ -1,7 +1,7 @@
 //! The robot of a study: its description, and the parametric model with joints locked, gravity and torque terms in
 //! force.
 
-use super::{CoulombChoice, Folders, JointDrive, Study};
+use super::{CoulombChoice, CouplingSection, DriveSection, Folders, JointDrive, Study};
 use crate::error::{Error, StudyError};
 use dynident_dynamics::{BaseParameters, PanelLayout, ParametricModel};
 use dynident_model::terms::{CoulombShape, Coupling, CouplingEffect, DriveChoice, TorqueTerm, terms_per_joint};
@@ -73,39 +73,7 @@ impl StudyRobot {
         if let Some(joint) = model.joints().iter().find(|joint| !log_joints.contains(&joint.name)) {
             return Err(unknown(&joint.name));
         }
-        for joint in study.drive.joints.keys() {
-            model.joint_index(joint).ok_or_else(|| unknown(joint))?;
-        }
-
-        // Torque terms: of each joint, then of drives that turn with two.
-        let mut terms = terms_per_joint(&model, |joint| drive_choice(study, &model.joints()[joint].name));
-        for (joint, description) in model.joints().iter().enumerate() {
-            let own = study.drive.joints.get(&description.name);
-            let step = friction_step(study, &description.name);
-            let further = own.and_then(|own| own.terms.as_ref()).unwrap_or(&study.drive.terms);
-            terms.extend(further.iter().flat_map(|term| term.terms(joint, step)));
-        }
-        for section in &study.coupling {
-            let [first, second] = &section.joints;
-            let first = model.joint_index(first).ok_or_else(|| unknown(first))?;
-            let second = model.joint_index(second).ok_or_else(|| unknown(second))?;
-            let coulomb = shape(section.coulomb.unwrap_or(study.drive.coulomb), study, &JointDrive::default());
-            let effects = [
-                section.inertia.then_some(CouplingEffect::Inertia),
-                section.viscous.then_some(CouplingEffect::Viscous),
-                coulomb.map(CouplingEffect::Coulomb),
-            ];
-            let couplings = effects.into_iter().flatten().map(|effect| {
-                TorqueTerm::Coupling(Coupling {
-                    name: section.name.clone(),
-                    first,
-                    second,
-                    ratios: section.ratios,
-                    effect,
-                })
-            });
-            terms.extend(couplings);
-        }
+        let terms = torque_terms(&study.drive, &study.coupling, &model).map_err(&in_study)?;
         let parametric = ParametricModel::new(model, terms).map_err(Error::study(study_path))?;
         Ok(Self { robot, parametric, log_joints })
     }
@@ -142,31 +110,72 @@ impl StudyRobot {
     }
 }
 
-pub(crate) fn drive_choice(study: &Study, joint: &str) -> DriveChoice {
+/// The torque terms that `[drive]` and `[[coupling]]` ask for: of each joint, then of drives that turn with
+/// two.
+///
+/// # Errors
+/// A joint that the model does not have.
+pub(super) fn torque_terms(
+    drive: &DriveSection,
+    coupling: &[CouplingSection],
+    model: &Model,
+) -> Result<Vec<TorqueTerm>, ModelError> {
+    let unknown = |joint: &str| ModelError::UnknownJoint {
+        joint: joint.to_owned(),
+        known: model.joints().iter().map(|joint| joint.name.clone()).collect(),
+    };
+    for joint in drive.joints.keys() {
+        model.joint_index(joint).ok_or_else(|| unknown(joint))?;
+    }
+
+    let mut terms = terms_per_joint(model, |joint| drive_choice(drive, &model.joints()[joint].name));
+    for (joint, description) in model.joints().iter().enumerate() {
+        let own = drive.joints.get(&description.name);
+        let step = friction_step(drive, &description.name);
+        let further = own.and_then(|own| own.terms.as_ref()).unwrap_or(&drive.terms);
+        terms.extend(further.iter().flat_map(|term| term.terms(joint, step)));
+    }
+    for section in coupling {
+        let [first, second] = &section.joints;
+        let first = model.joint_index(first).ok_or_else(|| unknown(first))?;
+        let second = model.joint_index(second).ok_or_else(|| unknown(second))?;
+        let coulomb = shape(section.coulomb.unwrap_or(drive.coulomb), drive, &JointDrive::default());
+        let effects = [
+            section.inertia.then_some(CouplingEffect::Inertia),
+            section.viscous.then_some(CouplingEffect::Viscous),
+            coulomb.map(CouplingEffect::Coulomb),
+        ];
+        let couplings = effects.into_iter().flatten().map(|effect| {
+            TorqueTerm::Coupling(Coupling { name: section.name.clone(), first, second, ratios: section.ratios, effect })
+        });
+        terms.extend(couplings);
+    }
+    Ok(terms)
+}
+
+pub(crate) fn drive_choice(drive: &DriveSection, joint: &str) -> DriveChoice {
     let default = JointDrive::default();
-    let own = study.drive.joints.get(joint).unwrap_or(&default);
+    let own = drive.joints.get(joint).unwrap_or(&default);
     DriveChoice {
-        drive_inertia: own.drive_inertia.unwrap_or(study.drive.drive_inertia),
-        viscous: own.viscous.unwrap_or(study.drive.viscous),
-        coulomb: shape(own.coulomb.unwrap_or(study.drive.coulomb), study, own),
-        offset: own.offset.unwrap_or(study.drive.offset),
+        drive_inertia: own.drive_inertia.unwrap_or(drive.drive_inertia),
+        viscous: own.viscous.unwrap_or(drive.viscous),
+        coulomb: shape(own.coulomb.unwrap_or(drive.coulomb), drive, own),
+        offset: own.offset.unwrap_or(drive.offset),
     }
 }
 
 /// The step of friction that is no Coulomb friction: the joint's Coulomb step, or a smooth one where it has none.
-pub(crate) fn friction_step(study: &Study, joint: &str) -> CoulombShape {
-    let width = study.drive.joints.get(joint).and_then(|own| own.coulomb_width).unwrap_or(study.drive.coulomb_width);
-    drive_choice(study, joint).coulomb.unwrap_or(CoulombShape::Smooth { width })
+pub(crate) fn friction_step(drive: &DriveSection, joint: &str) -> CoulombShape {
+    let width = drive.joints.get(joint).and_then(|own| own.coulomb_width).unwrap_or(drive.coulomb_width);
+    drive_choice(drive, joint).coulomb.unwrap_or(CoulombShape::Smooth { width })
 }
 
-fn shape(choice: CoulombChoice, study: &Study, own: &JointDrive) -> Option<CoulombShape> {
+fn shape(choice: CoulombChoice, drive: &DriveSection, own: &JointDrive) -> Option<CoulombShape> {
     match choice {
         CoulombChoice::None => None,
         CoulombChoice::Sign => {
-            Some(CoulombShape::Sign { dead_band: own.coulomb_dead_band.unwrap_or(study.drive.coulomb_dead_band) })
+            Some(CoulombShape::Sign { dead_band: own.coulomb_dead_band.unwrap_or(drive.coulomb_dead_band) })
         }
-        CoulombChoice::Smooth => {
-            Some(CoulombShape::Smooth { width: own.coulomb_width.unwrap_or(study.drive.coulomb_width) })
-        }
+        CoulombChoice::Smooth => Some(CoulombShape::Smooth { width: own.coulomb_width.unwrap_or(drive.coulomb_width) }),
     }
 }

@@ -1,6 +1,7 @@
 //! `[simulation]`: the robot that is simulated, where it differs from its description, its sensors and limits.
 
-use super::StudyRobot;
+use super::drive::{CouplingSection, DriveSection};
+use super::robot_model::{StudyRobot, torque_terms};
 use crate::error::{Expected, StudyError};
 use dynident_iteration::SimulatedRobot;
 use dynident_model::sample::Random;
@@ -35,7 +36,10 @@ pub struct SimulationSection {
     /// By how many percent the bodies differ from the description: every mass is that much larger or smaller, and
     /// lengths within bodies by up to a third of it; always consistent bodies. 0 by default.
     pub off_percent: f64,
-    /// Viscous friction of the joints, Nm s/rad (N s/m); 0 by default. It is there if `[drive]` has it, as are the
+    /// The laws that the joints truly have, with the keys of `[drive]`: friction that the study's model does not know.
+    /// By default those of the study.
+    pub drive: Option<DriveSection>,
+    /// Viscous friction of the joints, Nm s/rad (N s/m); 0 by default. It is there if `drive` has it, as are the
     /// following.
     pub viscous: PerJoint,
     /// Coulomb friction, Nm (N); 0 by default.
@@ -70,6 +74,7 @@ impl Default for SimulationSection {
         Self {
             rate_hz: 1000.0,
             off_percent: 0.0,
+            drive: None,
             viscous: 0.0.into(),
             coulomb: 0.0.into(),
             drive_inertia: 0.0.into(),
@@ -94,9 +99,11 @@ pub struct SimulatedTruth {
     pub robot: SimulatedRobot,
     /// Its bodies.
     pub model: Model,
+    /// The laws of its joints.
+    pub terms: Vec<TorqueTerm>,
     /// All parameters: ten for each body, one for each law.
     pub parameters: Vec<f64>,
-    /// The same in the base parameters that the study looks for.
+    /// The same in the base parameters that the study looks for: of laws that the robot does not have, zero.
     pub base_values: Vec<f64>,
 }
 
@@ -132,13 +139,20 @@ impl SimulationSection {
         }
     }
 
-    /// The robot that a robot's description becomes.
+    /// The robot that a robot's description becomes; `coupling` are the study's drives that turn with two joints.
     ///
     /// # Errors
     /// Numbers that do not fit, bodies without inertials, laws without a parameter, a robot that cannot be
     /// simulated.
-    pub fn truth(&self, robot: &StudyRobot) -> Result<SimulatedTruth, StudyError> {
+    pub fn truth(&self, coupling: &[CouplingSection], robot: &StudyRobot) -> Result<SimulatedTruth, StudyError> {
         let described = robot.model();
+        let terms = match &self.drive {
+            Some(drive) => {
+                drive.validate()?;
+                torque_terms(drive, coupling, described)?
+            }
+            None => robot.terms().to_vec(),
+        };
         self.validate(described.dof())?;
         let unknown = described.bodies_without_prior();
         if !unknown.is_empty() {
@@ -148,12 +162,11 @@ impl SimulationSection {
         let bodies = self.bodies(described);
         let model = described.with_inertials(&bodies)?;
         let model = with_length_errors(&model, self.length_std_m, self.angle_std_rad, self.seed)?;
-        let symbols: Vec<String> = robot.terms().iter().map(TorqueTerm::symbol).collect();
+        let symbols: Vec<String> = terms.iter().map(TorqueTerm::symbol).collect();
         if let Some(other) = self.terms.keys().find(|symbol| !symbols.contains(symbol)) {
             return Err(StudyError::Unknown { key: "laws", what: "law", name: other.clone(), known: symbols });
         }
-        let term_parameters = robot
-            .terms()
+        let term_parameters = terms
             .iter()
             .zip(&symbols)
             .map(|(term, symbol)| {
@@ -176,12 +189,17 @@ impl SimulationSection {
                 })
             })
             .collect::<Result<Vec<f64>, StudyError>>()?;
-        let mut parameters = model.parameter_vector();
-        parameters.extend_from_slice(&term_parameters);
-        let plant = Plant::new(&model, robot.terms(), &term_parameters)?;
+        let plant = Plant::new(&model, &terms, &term_parameters)?;
         let simulated = SimulatedRobot::new(plant, self.loop_settings(Some(described)))?;
-        let base_values = robot.base().values(&parameters);
-        Ok(SimulatedTruth { robot: simulated, model, parameters, base_values })
+        let of_law = |term: &TorqueTerm| {
+            let place = symbols.iter().position(|symbol| *symbol == term.symbol());
+            place.map_or(0.0, |place| term_parameters[place])
+        };
+        let of_bodies = model.parameter_vector();
+        let looked_for = of_bodies.iter().copied().chain(robot.terms().iter().map(of_law)).collect::<Vec<f64>>();
+        let base_values = robot.base().values(&looked_for);
+        let parameters = [of_bodies, term_parameters].concat();
+        Ok(SimulatedTruth { robot: simulated, model, terms, parameters, base_values })
     }
 
     /// The bodies as they truly are. The pseudo-inertia P becomes s D P D with a diagonal D: still a mass distribution.

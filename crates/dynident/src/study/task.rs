@@ -160,7 +160,7 @@ impl Study {
         };
         let names = robot.model().joints().iter().map(|joint| &joint.name).filter(|name| is_chosen(name));
         let search = |name: &String| FrictionSearch {
-            coulomb: drive_choice(self, name).coulomb,
+            coulomb: drive_choice(&self.drive, name).coulomb,
             dead_band: self.drive.coulomb_dead_band,
             width: self.drive.coulomb_width,
             ..FrictionSearch::of(name)

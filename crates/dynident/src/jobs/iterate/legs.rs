@@ -3,7 +3,9 @@
 use super::trajectory::Trajectory;
 use crate::error::{Error, Expected, StudyError};
 use crate::jobs::options::RunOptions;
-use crate::study::{IterationSection, LegOrder, LegSection, RobotChoice, SimulationSection, Study, StudyRobot};
+use crate::study::{
+    CouplingSection, IterationSection, LegOrder, LegSection, RobotChoice, SimulationSection, Study, StudyRobot,
+};
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
 use dynident_iteration::Leg;
@@ -107,7 +109,7 @@ impl IterationSection {
     /// The robots of one iteration: the simulator for each of its legs, or the one outside.
     pub(super) fn robots(
         &self,
-        simulation: &SimulationSection,
+        (simulation, coupling): (&SimulationSection, &[CouplingSection]),
         robot: &StudyRobot,
         stage: usize,
         members: &[usize],
@@ -130,7 +132,7 @@ impl IterationSection {
                 simulation.sensors.seed ^= (stage as u64).wrapping_mul(SEED_OF_LEG);
                 let mut robots: Vec<Box<dyn Robot>> = Vec::new();
                 for &member in members {
-                    let robot = simulation.truth(robot)?.robot;
+                    let robot = simulation.truth(coupling, robot)?.robot;
                     let section = self.leg.get(member).filter(|leg| leg.locked && !leg.hold.is_empty());
                     robots.push(Box::new(match section {
                         Some(leg) => {

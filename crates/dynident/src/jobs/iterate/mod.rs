@@ -108,7 +108,9 @@ pub fn iterate_study(
     let identification = study.settings(study_path, &robot)?;
     let settings = section.settings(study, identification).map_err(Error::study(study_path))?;
     let truth = match section.robot {
-        RobotChoice::Simulation => Some(simulation.truth(&robot).map_err(Error::section(study_path, "simulation"))?),
+        RobotChoice::Simulation => {
+            Some(simulation.truth(&study.coupling, &robot).map_err(Error::section(study_path, "simulation"))?)
+        }
         _ => None,
     };
     section.check_legs(&robot).map_err(in_section)?;
@@ -178,7 +180,7 @@ pub fn iterate_study(
             torque_limits: torque_limits.clone(),
         };
         let iteration = Iteration::new(task, settings.clone()).map_err(|why| in_section(why.into()))?;
-        let mut robots = section.robots(&simulation, &robot, number, members).map_err(in_section)?;
+        let mut robots = section.robots((&simulation, &study.coupling), &robot, number, members).map_err(in_section)?;
         let mut robots: Vec<&mut dyn Robot> = robots.iter_mut().map(|robot| &mut **robot as &mut dyn Robot).collect();
         let leg = (!one).then_some(number + 1);
         let mut so_far = stores[number].records().map_err(in_iteration)?;

@@ -87,6 +87,7 @@ impl IterationReport<'_> {
                 parameters: parameters(record.estimate.as_ref()),
                 pooled: parameters(record.pooled.as_ref()),
                 evidence: record.evidence.clone(),
+                differentiator: record.estimate.as_ref().and_then(|own| own.differentiator.clone()),
                 torque_lags: record.estimate.as_ref().map_or_else(Vec::new, |own| own.torque_lags.clone()),
             })
             .collect();

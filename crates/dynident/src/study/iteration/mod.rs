@@ -1,8 +1,10 @@
 //! `[iteration]`: how a study's robot is run, identified and run again.
 
+mod differentiator_key;
 mod legs;
 mod safety;
 
+pub use differentiator_key::{Automatic, DifferentiatorKey};
 pub use legs::{LegOrder, LegSection};
 
 use super::FrictionChoice;
@@ -14,7 +16,7 @@ use dynident_iteration::robot::{EnvelopeSettings, FolderSettings, ProcessSetting
 use dynident_iteration::{
     IterationSettings, RehearsalSettings, RunIdentificationSettings, SafetySettings, Scheme, SettledSettings, StartWith,
 };
-use dynident_recording::{DecimationSettings, DifferentiatorSettings};
+use dynident_recording::DecimationSettings;
 use dynident_simulation::{ControllerSettings, PerJoint};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -92,8 +94,9 @@ pub struct IterationSection {
     /// Whether the model is fitted to all good runs together, each weighted by its own noise; true by default.
     /// Otherwise to the newest alone.
     pub pool: bool,
-    /// From positions to velocities and accelerations; `deviation` from the trajectory by default.
-    pub differentiator: DifferentiatorSettings,
+    /// From positions to velocities and accelerations; `deviation` from the trajectory by default. With `"auto"` each
+    /// run takes the way that leaves the least of its torques, the paper's map among them.
+    pub differentiator: DifferentiatorKey,
     /// Low-pass and decimation of torque and regressor alike; none by default.
     pub parallel_filter: Option<DecimationSettings>,
     /// Whether recorded torques are held from sample to sample; true by default.
@@ -153,7 +156,7 @@ impl Default for IterationSection {
             every_sample: false,
             literal: false,
             pool,
-            differentiator: identification.differentiator,
+            differentiator: DifferentiatorKey::Stated(identification.differentiator),
             parallel_filter: identification.parallel_filter,
             held_torque: identification.held_torque,
             model_free: None,
@@ -183,7 +186,12 @@ impl IterationSection {
         study: &Study,
         identification: IdentificationSettings,
     ) -> Result<IterationSettings, StudyError> {
-        self.differentiator.validate().map_err(StudyError::at("iteration.differentiator"))?;
+        let default = IterationSettings::default();
+        let (differentiator, choose_differentiator) = match &self.differentiator {
+            DifferentiatorKey::Automatic(Automatic::Auto) => (default.identification.differentiator, true),
+            DifferentiatorKey::Stated(stated) => (stated.clone(), false),
+        };
+        differentiator.validate().map_err(StudyError::at("iteration.differentiator"))?;
         let IdentificationSettings { mut estimation, consistency, mut friction, .. } = identification;
         // A controller is to have the friction that the study states, unless a key says otherwise.
         friction.retain(|search| study.drive.friction_of(&search.joint) == Some(FrictionChoice::Auto));
@@ -203,11 +211,11 @@ impl IterationSection {
         if let Estimator::Auto(_) = estimation.estimator {
             estimation.estimator = Estimator::Weighted;
         }
-        let default = IterationSettings::default();
         Ok(IterationSettings {
             identification: RunIdentificationSettings {
                 scheme: self.scheme,
-                differentiator: self.differentiator.clone(),
+                differentiator,
+                choose_differentiator,
                 parallel_filter: self.parallel_filter.clone(),
                 held_torque: self.held_torque,
                 estimation,

@@ -1,0 +1,229 @@
+#!/usr/bin/env python3
+"""pages.py CHROMIUM LIBRARIES PAGE.html...: the reports in a browser.
+
+Every plot is seen before anything is scrolled to, nothing is said on the console, axe-core finds nothing (light and dark, wide and narrow, before and after
+scrolling), and on paper each headline stands on the page of its plot or table. LIBRARIES is a folder with axe_playwright_python (for its axe.min.js) and pypdf.
+
+The browser is spoken to by its own protocol through two pipes, so nothing else is needed.
+"""
+
+import base64
+import io
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+
+# Longest wait for an answer, s.
+PATIENCE = 60.0
+
+# A plot is seen if its still picture or its canvas shows something. Of sections with a headline all have one of them.
+UNSEEN = """(() => {
+  const shown = (element) => {
+    const box = element.getBoundingClientRect();
+    return box.width > 100 && box.height > 15 && getComputedStyle(element).visibility === "visible";
+  };
+  const drawn = (svg) => [...svg.querySelectorAll("path, rect")].some((part) => {
+    const box = part.getBoundingClientRect();
+    return box.width > 5 || box.height > 5;
+  });
+  const inked = (canvas) => {
+    // Of a copy: reading a page's own canvas makes the browser complain on the console that is looked at below.
+    const copy = document.createElement("canvas");
+    [copy.width, copy.height] = [canvas.width, canvas.height];
+    const pen = copy.getContext("2d", { willReadFrequently: true });
+    pen.drawImage(canvas, 0, 0);
+    const data = pen.getImageData(0, 0, copy.width, copy.height).data;
+    for (let i = 3; i < data.length; i += 4) if (data[i]) return true;
+    return false;
+  };
+  return [...document.querySelectorAll("section.plot, section.picture")].filter((section) => {
+    const stills = [...section.querySelectorAll("svg")].some((svg) => shown(svg) && drawn(svg));
+    return !stills && ![...section.querySelectorAll("canvas")].some((canvas) => shown(canvas) && inked(canvas));
+  }).map((section) => section.querySelector("h3")?.textContent ?? section.id);
+})()"""
+
+# Every plot that a person can steer is reached by the tabulator key and has a name.
+WITHOUT_KEYS = """[...document.querySelectorAll("section.plot .chart")].filter((chart) =>
+  chart.tabIndex !== 0 || !chart.getAttribute("aria-label")).map((chart) => chart.id)"""
+
+SCROLL = """(async () => {
+  for (let y = 0; y < document.body.scrollHeight; y += 600) {
+    scrollTo(0, y);
+    await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  }
+  scrollTo(0, 0);
+  return document.querySelectorAll(".chart:not(.live)").length;
+})()"""
+
+AXE = """axe.run(document, { resultTypes: ["violations"] }).then((found) => found.violations.flatMap((rule) =>
+  rule.nodes.map((node) => `${rule.id}: ${node.target.join(" ")}: ${node.failureSummary}`)))"""
+
+# Words that are found again on the pages of the PDF: one in each headline, one at either end of what belongs to it.
+MARK = """(() => {
+  const marks = [];
+  document.querySelectorAll("section.plot, section.picture, section:has(> .wide > table)").forEach((section, number) => {
+    const head = section.querySelector("h3");
+    if (!head) return;
+    head.append(` QQH${number}Q`);
+    const svg = section.querySelector("svg");
+    if (svg) {
+      const { width, height } = svg.viewBox.baseVal;
+      for (const [end, y] of [["A", 12], ["Z", height - 2]]) {
+        const text = document.createElementNS("http://www.w3.org/2000/svg", "text");
+        text.setAttribute("x", width / 2);
+        text.setAttribute("y", y);
+        text.textContent = `QQ${end}${number}Q`;
+        svg.append(text);
+      }
+      marks.push([head.textContent, `QQH${number}Q`, [`QQA${number}Q`, `QQZ${number}Q`]]);
+    } else {
+      const cell = section.querySelector("tbody td");
+      if (!cell) return;
+      cell.append(` QQA${number}Q`);
+      marks.push([head.textContent, `QQH${number}Q`, [`QQA${number}Q`]]);
+    }
+  });
+  return marks;
+})()"""
+
+
+class Browser:
+    """A headless Chromium, and one page in it."""
+
+    def __init__(self, program, folder):
+        to_browser, ours_to = os.pipe()
+        ours_from, from_browser = os.pipe()
+        options = ["--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-pipe", f"--user-data-dir={folder}"]
+        # The protocol's pipes are numbers 3 and 4.
+        command = f'exec "$0" "$@" 3<&{to_browser} 4>&{from_browser}'
+        self.process = subprocess.Popen(
+            ["bash", "-c", command, program, *options],
+            pass_fds=(to_browser, from_browser),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        os.close(to_browser)
+        os.close(from_browser)
+        self.writer, self.reader = ours_to, ours_from
+        os.set_blocking(self.reader, False)
+        self.rest, self.number, self.session, self.events = b"", 0, None, []
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Log"):
+            self.call(f"{domain}.enable")
+        # axe-core is put into the page from outside; the page's own policy would forbid nothing else.
+        self.call("Page.setBypassCSP", enabled=True)
+
+    def message(self, deadline):
+        while b"\0" not in self.rest:
+            if time.monotonic() > deadline or self.process.poll() is not None:
+                raise SystemExit("the browser does not answer")
+            try:
+                self.rest += os.read(self.reader, 1 << 20)
+            except BlockingIOError:
+                time.sleep(0.005)
+        message, self.rest = self.rest.split(b"\0", 1)
+        return json.loads(message)
+
+    def call(self, method, **parameters):
+        self.number += 1
+        request = {"id": self.number, "method": method, "params": parameters}
+        if self.session:
+            request["sessionId"] = self.session
+        data = json.dumps(request).encode() + b"\0"
+        while data:
+            data = data[os.write(self.writer, data):]
+        deadline = time.monotonic() + PATIENCE
+        while True:
+            message = self.message(deadline)
+            if message.get("id") == self.number:
+                if "error" in message:
+                    raise SystemExit(f"{method}: {message['error']}")
+                return message["result"]
+            self.events.append(message)
+
+    def wait_for(self, event):
+        deadline = time.monotonic() + PATIENCE
+        while not any(message.get("method") == event for message in self.events):
+            self.events.append(self.message(deadline))
+
+    def value(self, script):
+        result = self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
+        if "exceptionDetails" in result:
+            raise SystemExit(f"a check failed: {result['exceptionDetails']}")
+        return result["result"].get("value")
+
+    def size(self, width, height):
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+
+    def scheme(self, name):
+        self.call("Emulation.setEmulatedMedia", media="", features=[{"name": "prefers-color-scheme", "value": name}])
+
+    def close(self):
+        self.call("Browser.close")
+        self.process.wait(PATIENCE)
+
+    def console(self):
+        kinds = ("Runtime.consoleAPICalled", "Runtime.exceptionThrown", "Log.entryAdded")
+        return [json.dumps(message["params"])[:400] for message in self.events if message.get("method") in kinds]
+
+
+def checked(browser, page, axe, reader):
+    """What is wrong with a page, and how many plots and sheets of paper it has."""
+    wrong = []
+    browser.events.clear()
+    browser.size(1200, 900)
+    browser.scheme("light")
+    browser.call("Page.navigate", url=page.resolve().as_uri())
+    browser.wait_for("Page.loadEventFired")
+    plots = browser.value('document.querySelectorAll("section.plot, section.picture").length')
+    wrong += [f"not seen before it is scrolled to: {title}" for title in browser.value(UNSEEN)]
+    wrong += [f"not reached by keys: {name}" for name in browser.value(WITHOUT_KEYS)]
+    browser.value(axe + ";0")
+    for width, scheme, scrolled in [(400, "light", False), (1200, "light", False), (1200, "light", True), (1200, "dark", True), (400, "light", True)]:
+        browser.size(width, 900)
+        browser.scheme(scheme)
+        if scrolled:
+            left = browser.value(SCROLL)
+            wrong += [f"{left} plots were not drawn when they were scrolled to"] if left else []
+            wrong += [f"not seen after it was scrolled to: {title}" for title in browser.value(UNSEEN)]
+        wrong += [f"axe-core, {width} px, {scheme}: {finding}" for finding in browser.value(AXE)]
+    browser.size(1200, 900)
+    marks = browser.value(MARK)
+    pdf = base64.b64decode(browser.call("Page.printToPDF", preferCSSPageSize=True, printBackground=True)["data"])
+    sheets = [sheet.extract_text() for sheet in reader(io.BytesIO(pdf)).pages]
+    where = lambda mark: [number for number, text in enumerate(sheets, 1) if mark in text]
+    for title, head, ends in marks:
+        headed = where(head)
+        for end in ends:
+            if not headed or where(end)[:1] != headed[:1]:
+                wrong.append(f"on paper: `{title}` stands on sheet {headed}, and what belongs to it on {where(end)}")
+    wrong += [f"console: {message}" for message in browser.console()]
+    return wrong, plots, len(sheets)
+
+
+def main():
+    program, libraries, *pages = sys.argv[1:]
+    sys.path.insert(0, libraries)
+    from pypdf import PdfReader
+
+    axe = (pathlib.Path(libraries) / "axe_playwright_python" / "axe.min.js").read_text(encoding="utf-8")
+    failed = False
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        browser = Browser(program, folder)
+        for page in map(pathlib.Path, pages):
+            wrong, plots, sheets = checked(browser, page, axe, PdfReader)
+            print(f"{page}: {plots} plots, {sheets} sheets of paper, {len(wrong)} findings")
+            for finding in wrong:
+                print(f"    {finding}")
+            failed |= bool(wrong)
+        browser.close()
+    sys.exit(failed)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,148 @@
+//! **Is the default the expert?** A study of files and columns alone against the best that can be had with the truth in
+//! hand, against plain least squares and against each estimator by name: robots × motions × friction × noise × lag.
+//!
+//! Every run has a robot whose bodies are not those of its description, a motion designed for it, exact torque with
+//! friction (some milliseconds late), and noise on both. The error of a model is that of its torque on another random
+//! motion without noise: root mean square over joints, each in units of its torque's spread. The same seed for the same
+//! case, so that figures do not depend on which cases are run, in which order or on how many threads.
+
+mod bound;
+mod cases;
+mod figures;
+mod fits;
+mod simulated;
+mod table;
+
+pub use cases::{CaseFriction, CaseMotion, CaseNoise, DEFAULT_CASES, DefaultCase};
+pub use figures::{CaseFigures, Covered, ErrorOfName};
+pub use fits::{NamedEstimator, default_settings};
+pub use table::{TABLE_HEADER, csv_header, csv_line, goals, table_line};
+
+use crate::accuracy::BenchmarkError;
+use dynident_dynamics::Column;
+use dynident_estimation::EstimationError;
+use dynident_identification::Identification;
+use dynident_identification::estimators::Estimator;
+use figures::{NamedRun, RunFigures, summed};
+use fits::MULTIPLES;
+use rayon::prelude::*;
+use simulated::{CaseRobot, Simulated};
+
+/// Fits `runs` recordings of a case in all ways; the estimators by name only if `by_name`.
+///
+/// # Errors
+/// A robot, motion or recording that cannot be made, a default fit that fails. What else fails is a figure.
+pub fn case_figures(case: &DefaultCase, runs: u64, by_name: bool) -> Result<CaseFigures, BenchmarkError> {
+    let failed = |reason: String| BenchmarkError::Excitation { robot: case.label(), reason };
+    let robot = CaseRobot::new(case).map_err(failed)?;
+    let done: Vec<(Simulated, RunFigures)> = (0..runs)
+        .into_par_iter()
+        .map(|run| {
+            let made = Simulated::new(case, &robot, run).map_err(failed)?;
+            let figures = run_figures(case, &robot, &made, by_name)?;
+            Ok((made, figures))
+        })
+        .collect::<Result<_, BenchmarkError>>()?;
+    let (made, figures): (Vec<Simulated>, Vec<RunFigures>) = done.into_iter().unzip();
+    // The best cut-off is the same in all runs: an expert who knows what to expect, not one who is lucky each time.
+    let square = |place: usize| figures.iter().map(|run| run.with_truth[place].powi(2)).sum::<f64>();
+    let best = (0..MULTIPLES.len()).min_by(|a, b| square(*a).total_cmp(&square(*b))).unwrap_or(0);
+    let written = |made: &Simulated| {
+        let found = made.with_truth(case, &robot, MULTIPLES[best], true);
+        found.map_or(f64::NAN, |found| made.written_error(&found))
+    };
+    let of_best: Vec<f64> = made.par_iter().map(written).collect();
+    Ok(summed(&figures, (best, MULTIPLES[best]), &of_best))
+}
+
+fn run_figures(
+    case: &DefaultCase,
+    robot: &CaseRobot,
+    made: &Simulated,
+    by_name: bool,
+) -> Result<RunFigures, BenchmarkError> {
+    let failed =
+        |source: EstimationError| BenchmarkError::Excitation { robot: case.label(), reason: source.to_string() };
+    let default = made.by_default(robot)?;
+    // A filter that leaves no rows, or that does not exist at this rate, is no candidate.
+    let ladder = MULTIPLES.map(|multiple| made.with_truth(case, robot, multiple, false));
+    let with_truth =
+        ladder.each_ref().map(|found| found.as_ref().map_or(f64::INFINITY, |found| made.free_error(found)));
+    let bound = bound::bound(case, made).map_err(failed)?;
+    let over_bound = |found: &Identification| {
+        let bound = bound.as_ref()?;
+        let ratios = bodies(made, found).map(|(place, truth)| {
+            let own = made.regressor.layout().columns();
+            let symbol = found.model().layout().columns()[place].symbol();
+            let at = own.iter().position(|column| column.symbol() == symbol).unwrap_or(place);
+            ((found.base_values()[place] - truth) / bound[at]).powi(2)
+        });
+        let ratios: Vec<f64> = ratios.collect();
+        Some(ratios.iter().sum::<f64>() / ratios.len() as f64)
+    };
+    let tellable = made.tellable(case, robot).map_err(failed)?;
+    let terms_of = |joint: usize| {
+        let name = &robot.described.model().joints()[joint].name;
+        let own = default.training.friction_choice.iter().find(|one| one.joint == *name);
+        own.and_then(|own| own.terms.clone())
+    };
+    let is_told = |joint: &usize| {
+        let truth = case.friction.of(*joint);
+        tellable[*joint] && terms_of(*joint).is_some_and(|terms| terms.iter().any(|term| truth.is_told_by(term)))
+    };
+    let covered = |place: usize, truth: f64| {
+        let estimate = default.estimate();
+        let is_free = estimate.rank.fixed.iter().all(|fixed| fixed.column != place);
+        let inside = (estimate.values[place] - truth).abs() <= estimate.half_width_95[place];
+        Covered { inside: usize::from(is_free && inside), all: usize::from(is_free) }
+    };
+    let of_bodies = bodies(made, &default).map(|(place, truth)| covered(place, truth)).sum();
+    let of_friction = frictions(case, made, &default, robot.described.dof());
+    let named = |estimator: &NamedEstimator| match estimator.of(case, robot.described.dof()).filter(|_| by_name) {
+        Some(asked) => made.by_name(robot, &default, asked).map_or(NamedRun::Failed, NamedRun::Settled),
+        None => NamedRun::NotAsked,
+    };
+    let plain = |estimator| made.plain(robot, estimator).map(|found| made.free_error(&found));
+    Ok(RunFigures {
+        written: made.written_error(&default),
+        free: made.free_error(&default),
+        laws_stated: made.written_error(&made.with_laws_stated(robot)?),
+        with_truth,
+        plain: plain(Estimator::Ordinary),
+        plain_weighted: plain(Estimator::Weighted),
+        by_name: NamedEstimator::ALL.iter().map(named).collect(),
+        square_over_bound: over_bound(&default),
+        bodies: of_bodies,
+        friction: of_friction.into_iter().map(|(place, truth)| covered(place, truth)).sum(),
+        tellable: tellable.iter().filter(|tellable| **tellable).count(),
+        told: (0..tellable.len()).filter(is_told).count(),
+        lag_found_s: default.torque_lag.common.map(|common| common.lag_s),
+        lag_is_held: default.torque_lag.common.is_some_and(|lag| (lag.lag_s - case.lag_s).abs() <= lag.half_width_95_s),
+        instruments: default.estimator.name() == "instrumental",
+        cutoff_hz: default.cutoff.as_ref().map_or(f64::NAN, |choice| choice.cutoff_hz),
+        asked_hz: made.asked_hz,
+    })
+}
+
+/// Places of the bodies' base parameters in a fit, with their true values.
+fn bodies<'a>(made: &'a Simulated, found: &'a Identification) -> impl Iterator<Item = (usize, f64)> + 'a {
+    let columns = found.model().layout().columns().iter().enumerate();
+    let bodies = columns.filter(|(_, column)| matches!(column, Column::Body { .. }));
+    bodies.filter_map(|(place, column)| Some((place, made.true_value(column)?)))
+}
+
+/// Places of the friction parameters of joints whose laws are all true, with their true values.
+fn frictions(case: &DefaultCase, made: &Simulated, found: &Identification, dof: usize) -> Vec<(usize, f64)> {
+    let columns = found.model().layout().columns();
+    let of_joint = |joint: usize| {
+        let own = columns.iter().enumerate().filter(move |(_, column)| {
+            matches!(column, Column::Term(term) if term.own_joint() == Some(joint) && term.is_joint_friction())
+        });
+        let values: Option<Vec<(usize, f64)>> =
+            own.map(|(place, column)| Some((place, made.true_value(column)?))).collect();
+        let laws = case.friction.of(joint).terms(joint);
+        let as_many = laws.iter().filter(|term| term.is_joint_friction()).count();
+        values.filter(|values| values.len() == as_many).unwrap_or_default()
+    };
+    (0..dof).flat_map(of_joint).collect()
+}

@@ -1,0 +1,97 @@
+//! Samples at which a joint rests: its dry friction there is whatever holds it, and no model of its velocity tells it.
+
+use core::ops::Range;
+use dynident_dynamics::ParametricModel;
+use dynident_identification::friction::FrictionSearch;
+use dynident_model::terms::{CoulombShape, TermAction, TorqueTerm};
+use dynident_simulation::Reference;
+
+/// A joint moves faster than this share of its highest speed, or it rests.
+pub(crate) const MOVING: f64 = 0.02;
+
+/// Whether each joint has friction that is not known at rest: in the model, or among what may be chosen.
+pub(crate) fn has_dry_friction(robot: &ParametricModel, friction: &[FrictionSearch]) -> Vec<bool> {
+    let names = robot.joint_names();
+    let in_model = |joint: usize| {
+        let of_joint = robot.terms().iter().filter(|term| term.own_joint() == Some(joint));
+        let mut actions = of_joint.map(|term| term.action());
+        actions.any(|action| matches!(action, TermAction::Friction(_) | TermAction::Hysteresis))
+    };
+    let may_be_chosen = |name: &String| friction.iter().any(|search| search.joint == *name);
+    names.iter().enumerate().map(|(joint, name)| in_model(joint) || may_be_chosen(name)).collect()
+}
+
+/// The samples at which a joint with these velocities `dq` rests: slower than [`MOVING`] of its highest speed. Around a
+/// rest that lasts longer than the differentiator's smoothing, `smoothing` samples, half of that does not count
+/// either: the joint breaks loose and stops at once, and the smoothed motion does not.
+pub(crate) fn rests(dq: &[f64], smoothing: usize) -> Vec<Range<usize>> {
+    let fastest = dq.iter().fold(0.0_f64, |most, dq| most.max(dq.abs()));
+    let mut found: Vec<Range<usize>> = Vec::new();
+    for (sample, _) in dq.iter().enumerate().filter(|(_, dq)| dq.abs() <= MOVING * fastest) {
+        match found.last_mut() {
+            Some(last) if last.end == sample => last.end += 1,
+            _ => found.push(sample..sample + 1),
+        }
+    }
+    for rest in &mut found {
+        if rest.len() > smoothing {
+            *rest = rest.start.saturating_sub(smoothing / 2)..(rest.end + smoothing / 2).min(dq.len());
+        }
+    }
+    found
+}
+
+/// The highest speed of each joint along some references, rad/s (m/s).
+pub(crate) fn highest_speeds<'a>(references: impl IntoIterator<Item = &'a Reference>) -> Vec<f64> {
+    let mut fastest = Vec::new();
+    for motion in references.into_iter().map(Reference::motion) {
+        fastest.resize(motion.joints, 0.0);
+        for (joint, fastest) in fastest.iter_mut().enumerate() {
+            *fastest = motion.dq[motion.of(joint)].iter().fold(*fastest, |most: f64, dq| most.max(dq.abs()));
+        }
+    }
+    fastest
+}
+
+/// The laws of a robot that is simulated along a motion with these highest speeds: a step of friction that is narrower
+/// than the speed below which a joint rests is dry friction with stiction. Runs cannot tell it from one, it holds a
+/// joint that the controller does not move, and it needs no short steps of the integrator.
+pub(crate) fn with_dry_steps(terms: &[TorqueTerm], fastest: &[f64]) -> Vec<TorqueTerm> {
+    let dry = |term: &TorqueTerm| {
+        let fastest = term.joints().into_iter().map(|joint| fastest[joint]).fold(0.0, f64::max);
+        term.clone().with_step(|step| match step {
+            CoulombShape::Smooth { width } if width > MOVING * fastest => step,
+            CoulombShape::Smooth { .. } | CoulombShape::Sign { .. } => CoulombShape::Sign { dead_band: 0.0 },
+        })
+    };
+    terms.iter().map(dry).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reversal_is_passed_and_a_rest_is_left_wide() {
+        // Up, through zero, and at rest from sample 60.
+        let dq: Vec<f64> = (0..100).map(|k| if k < 60 { 1.0 - f64::from(k) / 25.0 } else { 0.0 }).collect();
+        let found = rests(&dq, 10);
+        // |1 - k/25| ≤ 0.02 · 1.36 at k = 25 alone.
+        assert_eq!(found, [25..26, 55..100]);
+        assert_eq!(rests(&[0.0; 4], 10).len(), 1);
+    }
+
+    #[test]
+    fn a_step_that_no_run_can_tell_from_dry_friction_is_dry() {
+        use dynident_model::terms::{Coulomb, Stribeck, Viscous};
+        let sign = CoulombShape::Sign { dead_band: 0.0 };
+        let (narrow, wide) = (CoulombShape::Smooth { width: 0.02 }, CoulombShape::Smooth { width: 0.05 });
+        let coulomb = |joint, shape| TorqueTerm::Coulomb(Coulomb { joint, shape });
+        let stribeck = |shape| TorqueTerm::Stribeck(Stribeck { joint: 0, speed: 0.1, exponent: 2.0, shape });
+        let viscous = TorqueTerm::Viscous(Viscous { joint: 0 });
+        // The first joint reaches 2 rad/s and rests below 0.04, the second 0.5 and below 0.01.
+        let terms = [coulomb(0, narrow), coulomb(0, wide), coulomb(1, narrow), stribeck(narrow), viscous.clone()];
+        let simulated = with_dry_steps(&terms, &[2.0, 0.5]);
+        assert_eq!(simulated, [coulomb(0, sign), coulomb(0, wide), coulomb(1, narrow), stribeck(sign), viscous]);
+    }
+}

@@ -1,0 +1,68 @@
+//! The records of runs as recordings of motions, and what they are identified with.
+
+use crate::error::IterationError;
+use crate::leg::IterationTask;
+use crate::motion::measured_motion;
+use crate::rests::has_dry_friction;
+use crate::settings::RunIdentificationSettings;
+use dynident_identification::rows::ParallelFilterSettings;
+use dynident_identification::{IdentificationSettings, LogNoise, Recording};
+use dynident_recording::DifferentiatorSettings;
+use dynident_simulation::{Record, require_length};
+use std::sync::Arc;
+
+/// The records of one run with its number.
+#[derive(Clone, Copy, Debug)]
+pub struct RunLog<'a> {
+    /// The run's number, from 1.
+    pub run: usize,
+    /// One record for each leg of the task.
+    pub records: &'a [Record],
+    /// Standard deviation of each joint's residual by the run alone, Nm (N); for step-by-step identification, which
+    /// weights runs by it.
+    pub joint_sigma: &'a [f64],
+    /// The differentiator that the run chose for itself; none for that of the settings.
+    pub differentiator: Option<&'a DifferentiatorSettings>,
+}
+
+/// The records as recordings of motions that are made already, leg after leg of run after run.
+pub(crate) fn recordings(
+    task: &IterationTask,
+    runs: &[RunLog<'_>],
+    settings: &RunIdentificationSettings,
+) -> Result<Vec<Recording>, IterationError> {
+    let legs = task.legs.len();
+    let dry = has_dry_friction(&task.robot, &settings.friction);
+    let mut recordings = Vec::with_capacity(runs.len() * legs);
+    for log in runs {
+        require_length("records of the run's legs", legs, log.records.len())?;
+        let own = log.differentiator.map(|differentiator| settings.with_differentiator(differentiator));
+        let settings = own.as_ref().unwrap_or(settings);
+        for (number, (leg, record)) in task.legs.iter().zip(log.records).enumerate() {
+            let motion = measured_motion(record, leg, settings, &dry)?;
+            let of_leg = if legs > 1 { format!(", leg {}", number + 1) } else { String::new() };
+            let mut recording = Recording::of_motion(format!("run {}{of_leg}", log.run), motion);
+            recording.commanded = Some(Arc::clone(leg.commanded()));
+            recording.payload = leg.payload().map(str::to_owned);
+            recordings.push(recording);
+        }
+    }
+    Ok(recordings)
+}
+
+/// What the identification is given.
+pub(crate) fn identification_settings(
+    task: &IterationTask,
+    settings: &RunIdentificationSettings,
+    runs: usize,
+) -> IdentificationSettings {
+    let mut identification = IdentificationSettings::default();
+    identification.motion.differentiator = settings.differentiator.clone();
+    identification.parallel_filter = ParallelFilterSettings::from(settings.parallel_filter.as_ref());
+    identification.estimation = settings.estimation.clone();
+    identification.estimation.held.clone_from(&task.known);
+    identification.consistency.clone_from(&settings.consistency);
+    identification.friction.clone_from(&settings.friction);
+    identification.log_noise = if runs > 1 { LogNoise::Own } else { LogNoise::Shared };
+    identification
+}
