@@ -105,8 +105,9 @@ fn without_lag<'a>(
         let started = Instant::now();
         let fit = if is_free && has_free_lag(&found) {
             let Fitted { logs, training, estimation, settings, .. } = &found;
-            let theta = &estimation.estimate.values[..training.columns.base()];
-            lag_fit((logs, &settings.estimation), &training.model, theta, chosen)?
+            let gains = training.gains.as_ref().map_or(&[][..], |(_, gains)| gains);
+            let found = (&training.columns, &estimation.estimate.values[..], gains);
+            lag_fit((logs, &settings.estimation), &training.model, found, chosen)?
         } else {
             None
         };
@@ -132,12 +133,10 @@ fn stated_lag(settings: &IdentificationSettings, dof: usize) -> LagChoice {
     LagChoice { kind: LagKind::Stated, lag_s, ..LagChoice::default() }
 }
 
-/// Whether a lag can be taken off and tells of the robot: rows whose every column is the arm's own, by an estimator
-/// that noise of the positions does not bias, for that biases the lag that is measured by it.
+/// Whether a lag can be taken off and tells of the robot: rows of all joints, by an estimator that noise of the
+/// positions does not bias, for that biases the lag that is measured by it.
 fn has_free_lag(found: &Fitted<'_>) -> bool {
-    found.training.columns.is_plain()
-        && found.training.gains.is_none()
-        && found.training.joints.len() == found.training.model.dof()
+    found.training.joints.len() == found.training.model.dof()
         && found.settings.estimation.estimator.reads_filtered_rows()
 }
 

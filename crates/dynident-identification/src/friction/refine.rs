@@ -1,6 +1,6 @@
 //! Constants of chosen friction between and beyond the grid: by a quadratic function through the errors around them.
 
-use super::choice::{cross_validation, weights};
+use super::choice::{cross_validation, further_columns, weights};
 use super::constants::{at, coordinates};
 use crate::regressor_model::RegressorModel;
 use dynident_dynamics::Column;
@@ -127,7 +127,8 @@ pub(crate) fn refined(
             !is_own && fit.rank.fixed.iter().all(|fixed| fixed.column != *index)
         };
         let columns = model.layout().columns().iter().enumerate();
-        let common: Vec<usize> = columns.filter(is_common).filter_map(|(_, column)| place(column)).collect();
+        let of_model = columns.filter(is_common).filter_map(|(_, column)| place(column));
+        let common: Vec<usize> = of_model.chain(further_columns((model, fit), (wide, wide_problem))).collect();
         match validation.joint(*joint, &common, &variable, &weights) {
             Ok(folds) => Ok(own.best(&folds, &terms)),
             Err(EstimationError::TooFewRows { .. }) => Ok(own.centre.clone()),

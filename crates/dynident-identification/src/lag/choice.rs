@@ -174,7 +174,7 @@ pub(crate) fn with_lag_error(fit: &LagFit, choice: &LagChoice, estimate: &Estima
         }
     };
     let mut further = &half * half.transpose();
-    for fixed in estimate.rank.fixed.iter().filter(|fixed| fixed.column < fit.base) {
+    for fixed in estimate.rank.fixed.iter().filter(|fixed| fixed.column < fit.parameters) {
         further.row_mut(fixed.column).fill(0.0);
         further.column_mut(fixed.column).fill(0.0);
     }

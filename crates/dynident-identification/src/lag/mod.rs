@@ -8,6 +8,7 @@ mod pass;
 mod rounds;
 mod rows;
 mod samples;
+mod unknowns;
 
 pub use choice::{LagCandidates, LagChoice, LagKind};
 pub use fit::LagFit;
