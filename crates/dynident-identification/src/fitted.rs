@@ -6,10 +6,10 @@ use crate::chosen_friction::{ChosenFriction, choose_friction};
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
 use crate::execution::Execution;
-use crate::lag::{LagChoice, LagKind, LagRounds, lag_fit};
+use crate::lag::{LagChoice, LagKind, LagRounds, gain_errors, lag_fit};
 use crate::less_noise::{Estimated, with_less_noise};
 use crate::logs::Logs;
-use crate::payload::KnownArm;
+use crate::payload::{KnownArm, free_gains};
 use crate::regressor_model::RegressorModel;
 use crate::settings::IdentificationSettings;
 use crate::task::IdentificationTask;
@@ -117,6 +117,11 @@ fn without_lag<'a>(
         if !again {
             found.times = times;
             found.lag = if is_free { rounds.choice() } else { stated_lag(&settings, found.training.model.dof()) };
+            if let (Some(fit), Some((_, gains))) = (&fit, &mut found.training.gains) {
+                for (joint, share) in free_gains(gains).into_iter().zip(gain_errors(fit, &found.lag)) {
+                    gains[joint].widen(share);
+                }
+            }
             return Ok(found);
         }
         settings.motion.torque_lag_s = rounds.torque_lag_s();

@@ -49,16 +49,16 @@ impl LagFit {
         DMatrix::from_fn(joints.len(), joints.len(), |row, column| self.last.covariance[of(row, column)])
     }
 
-    /// How the parameters answer to each joint's lag, `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`: what they are estimated to
+    /// How parameters and unknown gains answer to each joint's lag, `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`: what they are estimated to
     /// be where the lag is taken to be larger, per second; zero for a lag that the samples do not determine.
     pub(crate) fn answers(&self) -> DMatrix<f64> {
         let known: Vec<usize> = (0..self.joints.len()).filter(|&joint| self.joints[joint].is_some()).collect();
-        let mut answers = DMatrix::zeros(self.parameters, self.joints.len());
+        let mut answers = DMatrix::zeros(self.first, self.joints.len());
         let white = &self.last.covariance_white;
         let own =
             DMatrix::from_fn(known.len(), known.len(), |a, b| white[(self.first + known[a], self.first + known[b])]);
         let Some(own) = own.cholesky() else { return answers };
-        for row in 0..self.parameters {
+        for row in 0..self.first {
             let with_lags = DVector::from_fn(known.len(), |place, _| white[(row, self.first + known[place])]);
             for (place, answer) in own.solve(&with_lags).iter().enumerate() {
                 answers[(row, known[place])] = *answer;
