@@ -102,8 +102,8 @@ pub(super) fn weights(plain: &Estimate, equal: bool) -> Vec<f64> {
     plain.joint_sigma.iter().map(of_sigma).collect()
 }
 
-/// The columns behind the base parameters (payloads, offsets of single logs, gains), which every candidate has: by their
-/// place among the columns of `wide_problem`, as far as the fit `plain` of `model` excites them.
+/// The columns behind the base parameters (payloads, offsets of single logs, gains), which every candidate has: their
+/// places among the columns of `wide_problem`, as far as the fit `plain` of `model` excites them.
 pub(super) fn further_columns(
     (model, plain): (&RegressorModel, &Estimate),
     (wide, wide_problem): (&RegressorModel, &LinearProblem),

@@ -180,7 +180,7 @@ fn lag_error(fit: &LagFit, choice: &LagChoice) -> Option<DMatrix<f64>> {
 pub(crate) fn with_lag_error(fit: &LagFit, choice: &LagChoice, estimate: &Estimate) -> Estimate {
     let Some(half) = lag_error(fit, choice) else { return estimate.clone() };
     let half = half.rows(0, fit.parameters);
-    let mut further = &half * half.transpose();
+    let mut further = half * half.transpose();
     for fixed in estimate.rank.fixed.iter().filter(|fixed| fixed.column < fit.parameters) {
         further.row_mut(fixed.column).fill(0.0);
         further.column_mut(fixed.column).fill(0.0);

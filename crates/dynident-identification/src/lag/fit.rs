@@ -49,8 +49,9 @@ impl LagFit {
         DMatrix::from_fn(joints.len(), joints.len(), |row, column| self.last.covariance[of(row, column)])
     }
 
-    /// How parameters and unknown gains answer to each joint's lag, `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`: what they are estimated to
-    /// be where the lag is taken to be larger, per second; zero for a lag that the samples do not determine.
+    /// How parameters and unknown gains answer to each joint's lag, `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`: what they are
+    /// estimated to be where the lag is taken to be larger, per second; zero for a lag that the samples do not
+    /// determine.
     pub(crate) fn answers(&self) -> DMatrix<f64> {
         let known: Vec<usize> = (0..self.joints.len()).filter(|&joint| self.joints[joint].is_some()).collect();
         let mut answers = DMatrix::zeros(self.first, self.joints.len());

@@ -26,9 +26,9 @@ impl RowConsumer for DelayCheck<'_> {
     }
 }
 
-/// The lags of the joints by all recordings `chosen` together, beyond what the settings of `logs` take off; `values` are
-/// what a fit to them found over the `columns`: base parameters of the model, payloads, offsets of single logs. Of the
-/// `gains` that were found with them, those that the logs determine are unknowns beside the lags. None where the
+/// The lags of the joints by all recordings `chosen` together, beyond what the settings of `logs` take off. `values`
+/// are what a fit to them found over the `columns`: base parameters of the model, payloads, offsets of single logs. Of
+/// the `gains` that were found with them, those that the logs determine are unknowns beside the lags. None where the
 /// recordings are too short, and where rows inside of a motion are left out.
 ///
 /// # Errors

@@ -34,7 +34,7 @@ fn planar() -> std::path::PathBuf {
 
 /// The arm with a body in its hand.
 fn arm(carried: Option<(f64, [f64; 2])>) -> Model {
-    let model = load_robot(&planar()).unwrap().model;
+    let model = load_robot(planar()).unwrap().model;
     let Some((mass, [x, y])) = carried else { return model };
     let inertia = Mat3([[0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.01]]);
     let body = InertialParameters::from_centre_of_mass(mass, Vec3([x, y, 0.0]), &inertia);
