@@ -16,7 +16,7 @@ pub struct MotionForecast {
     /// Why it is not, although another was looked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// By how much the run is to narrow the bars of the worst directions (geometric mean), percent.
+    /// By how much the run is to narrow the bars of the worst directions (their root mean square), percent.
     pub gain_percent: f64,
     /// The same of the motion of the good run before, once more.
     pub repeat_gain_percent: f64,
@@ -37,53 +37,60 @@ pub struct MotionForecast {
 pub struct ForecastDirection {
     /// v, one number for each base parameter, 1 over its unit.
     pub weights: Vec<f64>,
-    /// `√(vᵀ C v)` by the covariance before the run. 1 is the bar that a run of mean information has of a parameter
-    /// that is its only unknown.
+    /// `√(vᵀ C v)` by the covariance before the run: the torque error that it makes over all that the arm may do (root
+    /// mean square, all joints), in units of the torque's noise.
     pub before: f64,
     /// What was expected after it.
     pub after: f64,
 }
 
 impl MotionForecast {
-    /// By how much a run has narrowed the bars of the directions (geometric mean), percent, from what is known after
-    /// it; none where there is nothing to compare.
+    /// By how much a run has narrowed the bars of the directions (their root mean square), percent, from what is known
+    /// after it; none where there is nothing to compare.
     pub fn reached_gain_percent(&self, known: &RunEstimate) -> Option<f64> {
         let covariance = covariance(known);
-        let ratio = |direction: &ForecastDirection| {
+        let bars = |direction: &ForecastDirection| {
             let weights = Some(DVector::from_vec(direction.weights.clone()));
             let weights = weights.filter(|weights| weights.len() == covariance.nrows())?;
-            let after = bar(&covariance, &weights);
-            (direction.before > 0.0 && after > 0.0).then(|| after / direction.before)
+            Some((direction.before, bar(&covariance, &weights)))
         };
-        let ratios: Option<Vec<f64>> = self.directions.iter().map(ratio).collect();
-        ratios.filter(|ratios| !ratios.is_empty()).map(|ratios| gain_percent(&ratios))
+        let bars: Option<Vec<(f64, f64)>> = self.directions.iter().map(bars).collect();
+        gain_percent(&bars?)
     }
 }
 
-/// The information of all good runs so far, and what counts as one unit of every parameter.
+/// The information of all good runs so far, and what errors of the parameters are measured by.
 #[derive(Clone, Debug)]
 pub(crate) struct KnownInformation {
     /// Sum over the good runs.
     pub(crate) total: DMatrix<f64>,
-    /// One unit of every parameter: the bar that a run of mean information would have of it if it were the only unknown,
-    /// `1/√(D_kk / runs)`, which is what makes the joints' torque noise along the motions so far. A parameter that no
-    /// run excites has the geometric mean of the others' units.
-    pub(crate) scale: Vec<f64>,
+    /// T with `T Tᵀ = M⁻¹`: its columns are steps of the parameters that make as much torque as the joints' noise, over
+    /// all that the arm may do.
+    pub(crate) units: DMatrix<f64>,
+    /// `T⁻ᵀ`.
+    weights: DMatrix<f64>,
 }
 
 impl KnownInformation {
-    pub(crate) fn new(total: DMatrix<f64>, runs: usize) -> Self {
-        let excited = |d: f64| d > 0.0 && d.is_finite();
-        let unit = |d: f64| (runs.max(1) as f64 / d).sqrt();
-        let logs: Vec<f64> = total.diagonal().iter().filter(|d| excited(**d)).map(|d| unit(*d).ln()).collect();
-        let typical = (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp();
-        let scale = total.diagonal().iter().map(|&d| if excited(d) { unit(d) } else { typical }).collect();
-        Self { total, scale }
+    /// `needed` is M, the mean information of a sample over all that the arm may do.
+    pub(crate) fn new(total: DMatrix<f64>, needed: &DMatrix<f64>) -> Self {
+        let count = total.nrows();
+        let scale: Vec<f64> = needed.diagonal().iter().map(|d| if *d > 0.0 { d.sqrt() } else { 1.0 }).collect();
+        let eigen = SymmetricEigen::new(DMatrix::from_fn(count, count, |i, j| needed[(i, j)] / (scale[i] * scale[j])));
+        // What makes no torque anywhere is measured by what makes the least.
+        let least = f64::EPSILON.sqrt() * eigen.eigenvalues.amax();
+        let root = eigen.eigenvalues.map(|value| value.max(least).sqrt());
+        let vectors = eigen.eigenvectors;
+        let units = DMatrix::from_fn(count, count, |i, j| vectors[(i, j)] / (scale[i] * root[j]));
+        let weights = DMatrix::from_fn(count, count, |i, j| vectors[(i, j)] * scale[i] * root[j]);
+        Self { total, units, weights }
     }
 
-    /// `S M S`.
-    fn scaled(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
-        DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| self.scale[i] * matrix[(i, j)] * self.scale[j])
+    /// `Tᵀ D T`.
+    fn measured(&self, information: &DMatrix<f64>) -> DMatrix<f64> {
+        let measured = self.units.tr_mul(information) * &self.units;
+        // Symmetric to the last bit, as eigenvalues expect.
+        0.5 * (&measured + measured.transpose())
     }
 
     /// What a run adds: the worst directions with their bars before and after it, the ratio of these for each, and the
@@ -91,27 +98,28 @@ impl KnownInformation {
     /// whose covariance says so; the run multiplies them by what information alone would.
     pub(crate) fn after(&self, run: &DMatrix<f64>, known: &RunEstimate) -> Expected {
         let count = self.total.nrows();
-        let (before, after) = (Inverse::of(self.scaled(&self.total)), Inverse::of(self.scaled(&(&self.total + run))));
+        let (before, after) =
+            (Inverse::of(self.measured(&self.total)), Inverse::of(self.measured(&(&self.total + run))));
         let found = covariance(known);
         let mut order: Vec<usize> = (0..count).collect();
         order.sort_by(|&a, &b| before.values[a].total_cmp(&before.values[b]));
-        let mut expected = Expected { directions: Vec::new(), ratios: Vec::new(), std: Vec::new() };
+        let mut expected = Expected { directions: Vec::new(), bars: Vec::new(), std: Vec::new() };
         for &place in order.iter().take(WORST) {
             let direction = before.vectors.column(place).into_owned();
-            let ratio = (after.variance(&direction) * before.values[place]).sqrt().min(1.0);
-            let weights = DVector::from_fn(count, |k, _| direction[k] / self.scale[k]);
+            let information_alone = (before.values[place].sqrt().recip(), after.variance(&direction).sqrt());
+            let ratio = (information_alone.1 / information_alone.0).min(1.0);
+            let weights = &self.weights * &direction;
             let bar = bar(&found, &weights);
-            expected.ratios.push(ratio);
+            expected.bars.push(information_alone);
             let weights = weights.iter().copied().collect();
             expected.directions.push(ForecastDirection { weights, before: bar, after: ratio * bar });
         }
         for k in 0..count {
-            let mut unit = DVector::zeros(count);
-            unit[k] = 1.0;
-            let (then, now) = (before.variance(&unit).sqrt(), after.variance(&unit).sqrt());
+            let parameter = self.units.row(k).transpose();
+            let (then, now) = (before.variance(&parameter).sqrt(), after.variance(&parameter).sqrt());
             let undetermined = known.fixed.contains(&k) || known.std[k] <= 0.0;
-            let std = if undetermined { now * self.scale[k] } else { known.std[k] * (now / then).min(1.0) };
-            expected.std.push(after.determines(k).then_some(std));
+            let std = if undetermined { now } else { known.std[k] * (now / then).min(1.0) };
+            expected.std.push(after.determines(&parameter).then_some(std));
         }
         expected
     }
@@ -120,22 +128,22 @@ impl KnownInformation {
 /// What is expected of a run.
 pub(crate) struct Expected {
     pub(crate) directions: Vec<ForecastDirection>,
-    /// Bars after over bars before, direction by direction.
-    ratios: Vec<f64>,
+    /// Bars before and after by information alone, direction by direction.
+    bars: Vec<(f64, f64)>,
     pub(crate) std: Vec<Option<f64>>,
 }
 
 impl Expected {
     /// By how much the bars of the directions narrow, percent.
     pub(crate) fn gain_percent(&self) -> f64 {
-        gain_percent(&self.ratios)
+        gain_percent(&self.bars).unwrap_or(0.0)
     }
 }
 
-/// `100 (1 - geometric mean)`.
-fn gain_percent(ratios: &[f64]) -> f64 {
-    let mean = ratios.iter().map(|ratio| ratio.ln()).sum::<f64>() / ratios.len().max(1) as f64;
-    100.0 * (1.0 - mean.exp())
+/// `100 (1 - √(Σ after² / Σ before²))`; none where nothing is to be narrowed.
+fn gain_percent(bars: &[(f64, f64)]) -> Option<f64> {
+    let sums = bars.iter().fold([0.0, 0.0], |[b, a], (before, after)| [b + before * before, a + after * after]);
+    (sums[0] > 0.0).then(|| 100.0 * (1.0 - (sums[1] / sums[0]).sqrt()))
 }
 
 /// `√(vᵀ C v)`.
@@ -170,10 +178,11 @@ impl Inverse {
         shares.iter().zip(&self.values).map(|(share, value)| share * share / value).sum()
     }
 
-    /// Whether parameter `k` has no part in what is not excited at all.
-    fn determines(&self, k: usize) -> bool {
+    /// Whether a direction has no part in what is not excited at all.
+    fn determines(&self, direction: &DVector<f64>) -> bool {
+        let most = f64::EPSILON.sqrt() * direction.norm_squared();
         let lost = self.values.iter().enumerate().filter(|(_, value)| **value <= self.least);
-        lost.into_iter().all(|(place, _)| self.vectors[(k, place)].powi(2) <= f64::EPSILON.sqrt())
+        lost.into_iter().all(|(place, _)| self.vectors.column(place).dot(direction).powi(2) <= most)
     }
 }
 
@@ -200,6 +209,12 @@ mod tests {
         }
     }
 
+    /// The mean information of what is to be predicted.
+    fn needed() -> DMatrix<f64> {
+        let root = DMatrix::from_row_slice(3, 3, &[1.0, 0.2, 0.5, 0.0, 2.0, -0.4, 0.3, 0.0, 9.0]);
+        root.tr_mul(&root)
+    }
+
     /// The same run again: every bar by 1/√2, whatever the covariance that was found is; and with runs enough of it, by
     /// the root of their number.
     #[test]
@@ -209,7 +224,7 @@ mod tests {
         let found = 4.0 * one.clone().try_inverse().unwrap();
         for runs in 1..4_u32 {
             let total = f64::from(runs) * &one;
-            let expected = KnownInformation::new(total, runs as usize).after(&one, &known(&found));
+            let expected = KnownInformation::new(total, &needed()).after(&one, &known(&found));
             let ratio = (f64::from(runs) / f64::from(runs + 1)).sqrt();
             assert!((expected.gain_percent() - 100.0 * (1.0 - ratio)).abs() < 1e-9);
             for (k, std) in expected.std.iter().enumerate() {
@@ -225,10 +240,10 @@ mod tests {
         let one = root.tr_mul(&root);
         let found = one.clone().try_inverse().unwrap();
         let run = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, 5.0, 2.0]));
-        let expected = KnownInformation::new(one.clone(), 1).after(&run, &known(&found));
+        let expected = KnownInformation::new(one.clone(), &needed()).after(&run, &known(&found));
         let units = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, 1e3, 1e-2]));
         let inverse = units.clone().try_inverse().unwrap();
-        let other = KnownInformation::new(&inverse * &one * &inverse, 1)
+        let other = KnownInformation::new(&inverse * &one * &inverse, &(&inverse * needed() * &inverse))
             .after(&(&inverse * &run * &inverse), &known(&(&units * &found * &units)));
         assert!((expected.gain_percent() - other.gain_percent()).abs() < 1e-7);
         for (a, b) in expected.directions.iter().zip(&other.directions) {
@@ -260,7 +275,7 @@ mod tests {
         let one = DMatrix::from_diagonal(&DVector::from_vec(vec![4.0, 0.0]));
         let mut known = known(&DMatrix::from_diagonal(&DVector::from_vec(vec![0.25, 0.0])));
         known.fixed = vec![1];
-        let information = KnownInformation::new(one.clone(), 1);
+        let information = KnownInformation::new(one.clone(), &DMatrix::identity(2, 2));
         assert_eq!(information.after(&one, &known).std[1], None);
         let both = information.after(&DMatrix::from_diagonal(&DVector::from_vec(vec![0.0, 9.0])), &known);
         assert!((both.std[1].unwrap() - 1.0 / 3.0).abs() < 1e-9);

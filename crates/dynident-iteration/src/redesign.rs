@@ -16,7 +16,8 @@ use dynident_excitation::criteria::{Criterion, WorstDirections};
 use dynident_excitation::families::{FamilyError, StartingAt};
 use dynident_excitation::limits::{JointLimit, LimitError, LimitSet, Limits};
 use dynident_excitation::optimisers::OptimiserError;
-use dynident_excitation::{Design, DesignSettings, DesignTask, Family, Motion, design};
+use dynident_excitation::{Design, DesignSettings, DesignTask, Family, Information, Motion, design};
+use dynident_model::sample::Random;
 use dynident_model::{InertialParameters, Model};
 use dynident_simulation::{Reference, SimulationError, require};
 use nalgebra::DMatrix;
@@ -24,9 +25,13 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Order of the norm of the variances along the worst directions: 1 would be their mean, infinity the largest alone. On
-/// the UR10 of the examples, after a D-optimal motion, two runs at order 1, 2 and 4 leave of the ten worst bars that the
-/// repeated motion would leave 80, 76 and 78 % (root mean squares).
-const ORDER: f64 = 2.0;
+/// the UR10 of the examples, after its D-optimal motion, two runs at order 1, 2 and 4 leave 65, 63 and 61 % of the ten
+/// worst bars that repeating it would leave (root mean squares).
+const ORDER: f64 = 4.0;
+
+/// States over all that the arm may do, and the seed that they are drawn by.
+const STATES: usize = 2_000;
+const STATES_SEED: u64 = 1;
 
 /// Searches, each with less torque than the one before, until every model keeps the limits.
 const SEARCHES: usize = 4;
@@ -99,8 +104,9 @@ enum NotRedesigned {
 }
 
 /// Designs the next motion with what is known. Its information adds to that of all good runs, `D = Σ Wᵀ Σ⁻¹ W` with the
-/// noise that their estimates found, and it is the best by [`WorstDirections`] of the sum, every parameter measured by
-/// the torque that it makes along the motions so far. Its limits hold for every model in the uncertainty (the 95 %
+/// noise that their estimates found, and it is the best by [`WorstDirections`] of the sum. What a controller needs of a
+/// model is torque, wherever the arm may be asked to move: directions are measured by the torque error that they make
+/// over random states within the limits of position, velocity and acceleration, in units of the joints' noise. Its limits hold for every model in the uncertainty (the 95 %
 /// ellipsoid of the parameters): the torque that friction and uncertainty may add to the bodies' is taken off the limits
 /// of the search, and what the search finds is looked at with all of them, again with less where one is beyond. It
 /// begins where the first motion began.
@@ -201,7 +207,7 @@ impl Redesign {
         (information, noise): (&KnownInformation, &RunNoise),
         set: &LimitSet,
     ) -> Result<Design, NotRedesigned> {
-        let criterion = WorstDirections::new(information.scale.clone(), ORDER);
+        let criterion = WorstDirections::new(information.units.clone(), ORDER);
         let criteria: [&dyn Criterion; 1] = [&criterion];
         let task = DesignTask {
             family: &self.family,
@@ -217,6 +223,36 @@ impl Redesign {
         let stopped = || before.stop.is_some_and(StopSignal::is_requested);
         let watch = |_: &_| if stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
         Ok(design(&task, &settings, watch)?)
+    }
+
+    /// Random states over all that the arm may do, joints independent of each other: a turn at most, or 1 m, within the
+    /// limits of position; velocities and accelerations within theirs, or as high as the motions so far went.
+    fn states(&self, before: &BeforeRun<'_>) -> Motion {
+        let joints = before.robot.model().joints();
+        let mut random = Random::new(STATES_SEED);
+        let mut states = Motion::default();
+        states.reset(joints.len(), STATES);
+        for (place, joint) in joints.iter().enumerate() {
+            let limit = self.limits.of(&joint.name);
+            let highest = |of: fn(&Motion) -> &[f64]| {
+                let own = before.good.iter().map(|run| run.legs[0].reference().motion());
+                let values = own.flat_map(|motion| &of(motion)[motion.of(place)]);
+                values.fold(0.0_f64, |most, value| most.max(value.abs()))
+            };
+            let free = if joint.turns() { core::f64::consts::PI } else { 0.5 };
+            let [lower, upper] = limit.and_then(|limit| limit.position).unwrap_or([-free, free]);
+            // A range that lies beyond half a turn is taken as it is.
+            let overlaps = lower < free && upper > -free;
+            let [lower, upper] = if overlaps { [lower.max(-free), upper.min(free)] } else { [lower, upper] };
+            let speed = limit.and_then(|limit| limit.speed).unwrap_or_else(|| highest(|motion| &motion.dq));
+            let rate = limit.and_then(|limit| limit.acceleration).unwrap_or_else(|| highest(|motion| &motion.ddq));
+            for place in states.of(place) {
+                states.q[place] = random.uniform(lower, upper);
+                states.dq[place] = random.uniform(-speed, speed);
+                states.ddq[place] = random.uniform(-rate, rate);
+            }
+        }
+        states
     }
 
     /// Every limit again, by the check that shares nothing with the search, and where the motion ends.
@@ -266,9 +302,11 @@ impl MotionPlanner for Redesign {
             let reference = run.legs[0].reference();
             total += run_information(before.robot, reference, &noise_of(run.estimate, reference));
         }
-        let information = KnownInformation::new(total, before.good.len());
         let repeated = last.legs[0].reference();
         let noise = noise_of(last.estimate, repeated);
+        let mut needed = Information::new(before.robot.model(), before.robot.layout(), &noise.joint_sigma, None);
+        let needed = needed.of(&self.states(before), 1.0 / STATES as f64);
+        let information = KnownInformation::new(total, &needed);
         let expected =
             |reference: &Reference| information.after(&run_information(before.robot, reference, &noise), before.known);
         // The motion before once more, and the best other.

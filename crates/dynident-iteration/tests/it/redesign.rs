@@ -1,6 +1,6 @@
 //! The next motion designed with what is known: bars, forecasts, limits, and the same again after a stop.
 
-use crate::simulated_arm::{RATE_HZ, Simulated, described, settings};
+use crate::simulated_arm::{RATE_HZ, Simulated, described, reference, settings};
 use dynident_excitation::criteria::DOptimal;
 use dynident_excitation::families::{Fourier, FourierSettings};
 use dynident_excitation::limits::{JointLimit, LimitSet, Limits};
@@ -15,7 +15,7 @@ use dynident_simulation::{Reference, SensorSettings};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::sync::Arc;
 
-const DURATION_S: f64 = 10.0;
+const DURATION_S: f64 = 20.0;
 
 /// The largest torque of each joint, Nm.
 const TORQUE_NM: [f64; 2] = [60.0, 25.0];
@@ -117,21 +117,48 @@ fn geometric_mean(values: &[f64]) -> f64 {
 
 #[test]
 fn trial() {
-    let first = first_motion();
+    let first = reference();
     for seed in 1..=3 {
+        let mut repeated = Vec::new();
         for redesigned in [false, true] {
             let iteration = iteration(&first, redesigned, runs(3));
             let outcome = run(&iteration, &mut robot(seed), None);
             let one = outcome.runs[0].estimate.as_ref().unwrap();
             for record in &outcome.runs {
-                println!("seed {seed} run {} accepted {} {:?} track {:?}", record.run, record.accepted, record.reason, record.max_tracking_error_rad);
+                println!(
+                    "seed {seed} run {} accepted {} {:?} track {:?}",
+                    record.run, record.accepted, record.reason, record.max_tracking_error_rad
+                );
                 let known = record.knowledge().unwrap();
                 let (a, b) = (bars_along(one, one), bars_along(one, known));
+                if !redesigned {
+                    repeated.push(known.clone());
+                } else {
+                    let (x, y) = (
+                        bars_along(&repeated[record.run - 1], &repeated[record.run - 1]),
+                        bars_along(&repeated[record.run - 1], known),
+                    );
+                    println!(
+                        "  against repeated: rms {:.3} gm {:.3}",
+                        (y.iter().map(|x| x * x).sum::<f64>() / x.iter().map(|x| x * x).sum::<f64>()).sqrt(),
+                        geometric_mean(&y) / geometric_mean(&x)
+                    );
+                    let s: Vec<f64> = known.std.iter().zip(&repeated[record.run - 1].std).map(|(a, b)| a / b).collect();
+                    println!("  std {s:.2?}");
+                }
                 let q: Vec<f64> = a.iter().zip(&b).map(|(a, b)| b / a).collect();
                 let rms = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
                 println!("  gm {:.3} rms {:.3} {q:.2?}", geometric_mean(&q), rms(&b) / rms(&a));
                 if let Some(f) = &record.forecast {
-                    println!("  forecast {} {:?} gain {:.1} repeat {:.1} reached {:?} torque {:.1?}", f.redesigned, f.reason, f.gain_percent, f.repeat_gain_percent, f.reached_gain_percent(known), f.largest_torque);
+                    println!(
+                        "  forecast {} {:?} gain {:.1} repeat {:.1} reached {:?} torque {:.1?}",
+                        f.redesigned,
+                        f.reason,
+                        f.gain_percent,
+                        f.repeat_gain_percent,
+                        f.reached_gain_percent(known),
+                        f.largest_torque
+                    );
                     let r: Vec<f64> = f.std.iter().zip(&known.std).map(|(f, s)| s / f.unwrap()).collect();
                     println!("  std reached/forecast {r:.2?}");
                 }
