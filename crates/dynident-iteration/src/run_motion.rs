@@ -22,8 +22,13 @@ pub struct RunMotion {
 }
 
 impl RunMotion {
-    /// The motion of these trajectories.
+    /// The motion of these trajectories, without their jerks, which no controller looks at and no table holds.
     pub fn new(references: Vec<Reference>) -> Self {
+        let kept = |reference: Reference| {
+            let motion = Motion { dddq: Vec::new(), ..reference.motion().clone() };
+            Reference::new(reference.rate_hz(), motion).unwrap_or(reference)
+        };
+        let references: Vec<Reference> = references.into_iter().map(kept).collect();
         Self { rates_hz: references.iter().map(Reference::rate_hz).collect(), references }
     }
 
