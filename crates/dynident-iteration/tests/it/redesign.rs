@@ -39,6 +39,7 @@ fn limits(torque_nm: [f64; 2]) -> Limits {
     Limits { joints: names.iter().zip(torque_nm).map(of_joint).collect(), ..Limits::default() }
 }
 
+/// Few evaluations, for what does not ask how good a motion is.
 fn search() -> DesignSettings {
     DesignSettings {
         starts: Some(2),
@@ -50,8 +51,12 @@ fn search() -> DesignSettings {
 }
 
 fn redesign(least_gain_percent: f64, torque_nm: [f64; 2]) -> Redesign {
+    searched(search(), least_gain_percent, torque_nm)
+}
+
+fn searched(search: DesignSettings, least_gain_percent: f64, torque_nm: [f64; 2]) -> Redesign {
     let leg = Leg::whole(reference()).unwrap();
-    Redesign::new(family(), limits(torque_nm), search(), RedesignSettings { least_gain_percent }, &leg).unwrap()
+    Redesign::new(family(), limits(torque_nm), search, RedesignSettings { least_gain_percent }, &leg).unwrap()
 }
 
 fn repeated(settings: IterationSettings) -> Iteration {
@@ -152,7 +157,9 @@ fn redesigned_runs_tell_more_and_as_much_as_was_forecast() {
         }
         first += after(&outcome, 1);
         thrice += after(&outcome, 3);
-        let outcome = run(&redesigned(runs(3)), &mut robot(seed), None);
+        let search = DesignSettings { evaluations_per_start: Some(300), polish_evaluations: 1_000, ..search() };
+        let planned = repeated(runs(3)).with_planner(Arc::new(searched(search, 20.0, AMPLE_NM)));
+        let outcome = run(&planned, &mut robot(seed), None);
         assert!(outcome.runs.len() == 3 && outcome.runs.iter().all(|run| run.accepted));
         other += after(&outcome, 3);
         for record in &outcome.runs[1..] {
