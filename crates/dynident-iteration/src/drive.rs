@@ -189,17 +189,16 @@ impl Iteration {
         }
         let run = records.len() + 1;
         let kept = store.map_or(Ok(None), |store| store.planned(run, self.task.robot.dof()))?;
-        let PlannedMotion { motion, forecast } = match kept {
-            Some(kept) => kept,
-            None => {
-                let (task, _) = self.in_force(records)?;
-                let planned = planned_motion(&**planner, &task, (records, self.settings.pool), stop)?;
-                // A search that was cut short is not this run's motion.
-                if let Some(store) = store.filter(|_| !stop.is_some_and(StopSignal::is_requested)) {
-                    store.keep_planned(run, &planned)?;
-                }
-                planned
+        let PlannedMotion { motion, forecast } = if let Some(kept) = kept {
+            kept
+        } else {
+            let (task, _) = self.in_force(records)?;
+            let planned = planned_motion(&**planner, &task, (records, self.settings.pool), stop)?;
+            // A search that was cut short is not this run's motion.
+            if let Some(store) = store.filter(|_| !stop.is_some_and(StopSignal::is_requested)) {
+                store.keep_planned(run, &planned)?;
             }
+            planned
         };
         Ok(NextRunMotion { motion: motion.or_else(|| good.motion.clone()), forecast: Some(forecast) })
     }
@@ -394,7 +393,7 @@ impl Iteration {
     /// Whether the run counts as good.
     fn judge(&self, record: &mut RunRecord, before: &[RunRecord]) -> Result<(), IterationError> {
         let names = names(&*self.robot(before)?);
-        let following = following_limits(&*self.legs_of(record)?, self.task.robot.dof());
+        let following = following_limits(&self.legs_of(record)?, self.task.robot.dof());
         match policy::verdict(record, before, &self.settings, (&following, &names)) {
             Ok(()) => record.accepted = true,
             Err(reason) => record.reason = Some(reason.to_string()),
