@@ -48,16 +48,22 @@ fn main() -> Result<(), Box<dyn Error>> {
             let records = runs(&study, &path)?;
             let bars = |record: &RunRecord| record.knowledge().map_or(f64::NAN, |known| worst_bars(known, &root));
             let first = bars(&records[0]);
-            let [mut expected, mut reached] = [String::new(), String::new()];
+            let (mut expected, mut reached) = (Vec::new(), Vec::new());
             for (sum, record) in sums.iter_mut().zip(&records) {
                 *sum += bars(record) / first;
                 if let (Some(forecast), Some(known)) = (&record.forecast, record.knowledge()) {
-                    expected += &format!("{:.0} ", forecast.gain_percent);
-                    reached += &forecast.reached_gain_percent(known).map_or_else(String::new, |by| format!("{by:.0} "));
+                    expected.push(format!("{:.0}", forecast.gain_percent));
+                    reached.extend(forecast.reached_gain_percent(known).map(|by| format!("{by:.0}")));
                 }
             }
             let ratio = |run: usize| records.get(run).map_or(f64::NAN, |record| bars(record) / first);
-            println!("| {seed} | {name} | {:.3} | {:.3} | {expected} | {reached} |", ratio(1), ratio(2));
+            println!(
+                "| {seed} | {name} | {:.3} | {:.3} | {} | {} |",
+                ratio(1),
+                ratio(2),
+                expected.join(", "),
+                reached.join(", ")
+            );
         }
     }
     let [repeated, redesigned] = sums.map(|sums| sums.map(|sum| sum / seeds as f64));

@@ -48,8 +48,8 @@ const RETURNED: f64 = 1e-6;
 #[serde(deny_unknown_fields, default)]
 pub struct RedesignSettings {
     /// A run is worth making for its motion alone if it is to narrow the bars of the worst directions by so many
-    /// percent; an iteration that has converged otherwise goes on while one is. Default 20: the second run of one motion
-    /// brings 29, the third 18.
+    /// percent; an iteration that has converged otherwise goes on while one is. Default 20: the second run of one
+    /// motion brings 29, the third 18.
     pub least_gain_percent: f64,
 }
 
@@ -106,10 +106,10 @@ enum NotRedesigned {
 /// Designs the next motion with what is known. Its information adds to that of all good runs, `D = Σ Wᵀ Σ⁻¹ W` with the
 /// noise that their estimates found, and it is the best by [`WorstDirections`] of the sum. What a controller needs of a
 /// model is torque, wherever the arm may be asked to move: directions are measured by the torque error that they make
-/// over random states within the limits of position, velocity and acceleration, in units of the joints' noise. Its limits hold for every model in the uncertainty (the 95 %
-/// ellipsoid of the parameters): the torque that friction and uncertainty may add to the bodies' is taken off the limits
-/// of the search, and what the search finds is looked at with all of them, again with less where one is beyond. It
-/// begins where the first motion began.
+/// over random states within the limits of position, velocity and acceleration, in units of the joints' noise. Its
+/// limits hold for every model in the uncertainty (the 95 % ellipsoid of the parameters): the torque that friction and
+/// uncertainty may add to the bodies' is taken off the limits of the search, and what the search finds is looked at
+/// with all of them, again with less where one is beyond. It begins where the first motion began.
 #[derive(Debug)]
 pub struct Redesign {
     family: StartingAt,

@@ -113,8 +113,8 @@ impl IterationStore {
         }
     }
 
-    /// Keeps a run: `run.json`, `log.csv` of each leg (`log_2.csv` and so on for further legs), and `motion.csv` of each
-    /// that is not the task's. What was planned for it is removed.
+    /// Keeps a run: `run.json`, `log.csv` of each leg (`log_2.csv` and so on for further legs), and `motion.csv` of
+    /// each that is not the task's. What was planned for it is removed.
     ///
     /// # Errors
     /// A folder that cannot be written; then the run is not there.
@@ -129,8 +129,8 @@ impl IterationStore {
         if plan.is_dir() { remove(&plan) } else { Ok(()) }
     }
 
-    /// Keeps the motion that was planned for a run, so that a further call runs the same: `planned_k/`, with `plan.json`
-    /// and `motion.csv`.
+    /// Keeps the motion that was planned for a run, so that a further call runs the same: `planned_k/`, with
+    /// `plan.json` and `motion.csv`.
     ///
     /// # Errors
     /// A folder that cannot be written.

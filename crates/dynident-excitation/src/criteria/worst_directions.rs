@@ -5,13 +5,13 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 /// `log ‖1/λ‖_p` of the eigenvalues λ of `Tᵀ D T`, with derivative `-T U diag(λ^(-p-1)) Uᵀ Tᵀ / Σ λ^-p`: the p-norm of
 /// the variances along the axes of the confidence ellipsoid of `x`, where `θ = T x`. Order 1 is A-optimality of x (the
-/// mean variance), infinity E-optimality (the largest); in between the worst directions have the say, and not one alone.
-/// Kiefer, Annals of Statistics 2 (1974) 849; Pukelsheim, Optimal Design of Experiments (1993), chapter 6.
+/// mean variance), infinity E-optimality (the largest); in between the worst directions have the say, and not one
+/// alone. Kiefer, Annals of Statistics 2 (1974) 849; Pukelsheim, Optimal Design of Experiments (1993), chapter 6.
 ///
-/// With `T Tᵀ = M⁻¹`, M the mean information of a sample of some motions, the variances are those of the torque predicted
-/// along them, and order 1 is [`Prediction`](super::Prediction). Unlike D-optimality it asks where information is
-/// missing: `-log det` gains as much by twice the information of a direction that is known well as by twice that of one
-/// that is hardly known.
+/// With `T Tᵀ = M⁻¹`, M the mean information of a sample of some motions, the variances are those of the torque
+/// predicted along them, and order 1 is [`Prediction`](super::Prediction). Unlike D-optimality it asks where
+/// information is missing: `-log det` gains as much by twice the information of a direction that is known well as by
+/// twice that of one that is hardly known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorstDirections {
     units: DMatrix<f64>,

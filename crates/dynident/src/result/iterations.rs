@@ -51,8 +51,8 @@ pub struct IterationsFile {
     /// Root mean square over the parameters of the error of what the last good run says alone, in units of the
     /// Cramér-Rao bound; for simulated robots with torque noise.
     pub error_over_bound: Option<f64>,
-    /// The Cramér-Rao bound of every parameter for one run of the first motion: white torque noise of the simulated sensors at every
-    /// recorded sample, exact positions.
+    /// The Cramér-Rao bound of every parameter for one run of the first motion: white torque noise of the simulated
+    /// sensors at every recorded sample, exact positions.
     pub bound: Option<Vec<f64>>,
     /// The base parameters by all good runs together, as in `result.json`; empty while runs are still being made.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

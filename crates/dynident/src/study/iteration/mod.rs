@@ -73,8 +73,8 @@ pub enum PriorChoice {
 pub struct IterationSection {
     /// A trajectory to run (`t_s, q1.., dq1.., ddq1..`), in place of the one that `[design]` leads to.
     pub trajectory: Option<PathBuf>,
-    /// Whether every run repeats the first motion (`"repeat"`, the default), or each from the second on is designed with
-    /// what is known (`"redesign"`). A name, or a table with a `kind` and its settings.
+    /// Whether every run repeats the first motion (`"repeat"`, the default), or each from the second on is designed
+    /// with what is known (`"redesign"`). A name, or a table with a `kind` and its settings.
     #[serde(deserialize_with = "name_or_table")]
     #[cfg_attr(feature = "schema", schemars(transform = super::design::name_or_table::schema))]
     pub motion: MotionChoice,
