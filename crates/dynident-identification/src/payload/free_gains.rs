@@ -38,6 +38,11 @@ pub(crate) fn with_free_gains(
         LinearProblem::new(problem.columns().iter().cloned().chain(names).collect(), problem.joints().to_vec())
             .with_fallback(fallback)?
             .with_unexcited(problem.unexcited().clone())?;
+    if let Some(prior) = problem.prior() {
+        let mean = prior.mean().iter().copied().chain(free.iter().map(|_| 0.0)).collect();
+        wider =
+            wider.with_prior(mean, prior.sqrt_information().clone().resize_horizontally(count + free.len(), 0.0))?;
+    }
     for equation in problem.equations() {
         let log = &problem.logs()[equation.log];
         let Some(place) = free.iter().position(|&joint| joint == equation.joint) else {
