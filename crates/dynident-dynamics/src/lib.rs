@@ -11,6 +11,7 @@
 //! | accelerations under torques | [`forward_dynamics()`] | articulated bodies (ABA) |
 //! | mass matrix | [`mass_matrix()`]; with the bias torque: [`mass_matrix_and_bias`] | composite bodies (CRBA) |
 //! | torque of gravity, energies | [`gravity_torque`], [`kinetic_energy`], [`potential_energy`] | |
+//! | torques and mass matrix over a scalar of your own | [`inverse_dynamics_over`], [`mass_matrix_over`] | the same |
 //! | derivatives of the torque by q, q̇, q̈ | [`inverse_dynamics_derivatives`] | analytic |
 //! | where the bodies are | [`body_placements`] | forward kinematics |
 //! | torque regressor, all ten parameters of each body | [`torque_regressor`] | linear in the parameters |
@@ -54,6 +55,7 @@ mod inverse_dynamics;
 mod kinematics;
 mod mass_matrix;
 mod motion_equation;
+mod over_scalar;
 mod parametric_model;
 mod regressor;
 mod regressor_adjoint;
@@ -74,6 +76,7 @@ pub use inverse_dynamics::{inverse_dynamics, inverse_dynamics_batch};
 pub use kinematics::body_placements;
 pub use mass_matrix::mass_matrix;
 pub use motion_equation::mass_matrix_and_bias;
+pub use over_scalar::{inverse_dynamics_over, mass_matrix_over};
 pub use parametric_model::{ParametricModel, ParametricModelError};
 pub use regressor::torque_regressor;
 pub use regressor_adjoint::{MotionGradient, regressor_panels_adjoint};

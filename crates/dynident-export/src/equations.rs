@@ -1,0 +1,159 @@
+//! The functions that every language gets, as graphs: the recursive Newton-Euler and composite-rigid-body algorithms
+//! run over symbols.
+
+use crate::drive_torque::{drive_inertia, friction};
+use crate::error::ExportError;
+use crate::graph::{Graph, Input};
+use crate::robot_model::RobotModel;
+use crate::symbol::{Symbol, record};
+use dynident_dynamics::{inverse_dynamics_over, mass_matrix_over};
+use dynident_lanes::Scalar;
+use dynident_model::Vec3;
+
+/// One function: inputs are joint vectors, the output is a joint vector or a square matrix by rows.
+#[derive(Debug)]
+pub(crate) struct Equation {
+    pub(crate) name: &'static str,
+    /// What it computes, in a line.
+    pub(crate) about: &'static str,
+    pub(crate) inputs: &'static [Input],
+    pub(crate) output: &'static str,
+    pub(crate) is_matrix: bool,
+    pub(crate) values: Vec<Symbol>,
+}
+
+/// All functions of a robot over one graph.
+#[derive(Debug)]
+pub(crate) struct Equations {
+    pub(crate) dof: usize,
+    pub(crate) graph: Graph,
+    pub(crate) functions: Vec<Equation>,
+}
+
+impl Equations {
+    /// # Errors
+    /// A torque term that is no function of the motion, a joint that moves no inertia.
+    pub(crate) fn of(robot: &RobotModel) -> Result<Self, ExportError> {
+        let reduced = robot.reduced()?;
+        let weightless = reduced.clone().with_gravity(Vec3::ZERO)?;
+        let dof = robot.model().dof();
+        let (graph, functions) = record(|| {
+            let [q, dq, ddq, tau] = [Input::Position, Input::Velocity, Input::Acceleration, Input::Torque]
+                .map(|input| Symbol::inputs(input, dof));
+            let rest = vec![Symbol::ZERO; dof];
+            let rotors = drive_inertia(robot);
+            let friction = friction(robot, &dq)?;
+
+            let mut mass_matrix = mass_matrix_over(&reduced, &q);
+            for (entry, &rotor) in mass_matrix.iter_mut().zip(&rotors) {
+                *entry += Symbol::splat(rotor);
+            }
+            let mut inverse = inverse_dynamics_over(&reduced, &q, &dq, &ddq);
+            for (row, torque) in inverse.iter_mut().enumerate() {
+                for (column, &ddq) in ddq.iter().enumerate() {
+                    *torque += Symbol::splat(rotors[row * dof + column]) * ddq;
+                }
+                *torque += friction[row];
+            }
+            let bias = inverse_dynamics_over(&reduced, &q, &dq, &rest);
+            let left = (0..dof).map(|joint| tau[joint] - (bias[joint] + friction[joint])).collect();
+            let forward = solved(mass_matrix.clone(), left)
+                .map_err(|joint| ExportError::NoInertia { joint: reduced.joints()[joint].name.clone() })?;
+            let function = |name, about, inputs, output, values: Vec<Symbol>| Equation {
+                name,
+                about,
+                inputs,
+                output,
+                is_matrix: name == "mass_matrix",
+                values,
+            };
+            Ok::<_, ExportError>(vec![
+                function(
+                    "inverse_dynamics",
+                    "Torque of a motion: tau = M(q) ddq + C(q, dq) dq + g(q) + friction(dq).",
+                    &[Input::Position, Input::Velocity, Input::Acceleration],
+                    "tau",
+                    inverse,
+                ),
+                function(
+                    "gravity",
+                    "Torque against gravity, g(q).",
+                    &[Input::Position],
+                    "tau",
+                    inverse_dynamics_over(&reduced, &q, &rest, &rest),
+                ),
+                function(
+                    "coriolis",
+                    "Coriolis and centrifugal torque, the vector C(q, dq) dq.",
+                    &[Input::Position, Input::Velocity],
+                    "tau",
+                    inverse_dynamics_over(&weightless, &q, &dq, &rest),
+                ),
+                function(
+                    "friction",
+                    "Friction and constant offsets of the drives.",
+                    &[Input::Velocity],
+                    "tau",
+                    friction,
+                ),
+                function(
+                    "mass_matrix",
+                    "Mass matrix M(q) with the inertia of the drives, row by row.",
+                    &[Input::Position],
+                    "mass",
+                    mass_matrix,
+                ),
+                function(
+                    "forward_dynamics",
+                    "Accelerations under torques: M(q) ddq = tau - C(q, dq) dq - g(q) - friction(dq).",
+                    &[Input::Position, Input::Velocity, Input::Torque],
+                    "ddq",
+                    forward,
+                ),
+            ])
+        });
+        Ok(Self { dof, graph, functions: functions? })
+    }
+}
+
+/// `M⁻¹ b` by `M = Lᵀ D L`, from the tip to the base, so that branches that do not see each other stay zero
+/// (Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 6.5). The number of the joint whose pivot is no
+/// positive number, if one is a number at all.
+fn solved(mut m: Vec<Symbol>, mut b: Vec<Symbol>) -> Result<Vec<Symbol>, usize> {
+    let dof = b.len();
+    let mut inverses = vec![Symbol::ZERO; dof];
+    for k in (0..dof).rev() {
+        let pivot = m[k * dof + k];
+        if pivot.number().is_some_and(|pivot| pivot <= 0.0) {
+            return Err(k);
+        }
+        inverses[k] = pivot.recip();
+        for i in 0..k {
+            let factor = m[k * dof + i] * inverses[k];
+            if factor.is_zero() {
+                continue;
+            }
+            for j in 0..=i {
+                let taken = factor * m[k * dof + j];
+                m[i * dof + j] -= taken;
+            }
+        }
+        for i in 0..k {
+            m[k * dof + i] = m[k * dof + i] * inverses[k];
+        }
+    }
+    for k in (0..dof).rev() {
+        for i in 0..k {
+            let taken = m[k * dof + i] * b[k];
+            b[i] -= taken;
+        }
+    }
+    for k in 0..dof {
+        b[k] = b[k] * inverses[k];
+        for i in 0..k {
+            let taken = m[k * dof + i] * b[i];
+            b[k] -= taken;
+        }
+    }
+    Ok(b)
+}

@@ -1,0 +1,59 @@
+//! What cannot be exported, and why.
+
+use dynident_dynamics::ParametricModelError;
+use dynident_model::ModelError;
+use thiserror::Error;
+
+/// Why a model could not be written.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    /// Values of another number than there are terms.
+    #[error("{found} values for {expected} torque terms: give one for each")]
+    Values {
+        /// Number of terms.
+        expected: usize,
+        /// Number of values.
+        found: usize,
+    },
+    /// A value that is no number.
+    #[error("the value of {symbol} is {value}, not a finite number")]
+    NotFinite {
+        /// The term's symbol.
+        symbol: String,
+        /// Its value.
+        value: f64,
+    },
+    /// Bodies whose dynamics are unknown.
+    #[error("the bodies {} have no inertial: their dynamics are unknown", bodies.join(", "))]
+    Unknown {
+        /// Their names.
+        bodies: Vec<String>,
+    },
+    /// A torque term that needs more than the motion of this moment.
+    #[error(
+        "{symbol} ({kind}) cannot be written as a function of q, dq and ddq: it needs {needs}; identify with another friction law ([drive] of the study) to export"
+    )]
+    Term {
+        /// The term's symbol.
+        symbol: String,
+        /// Its kind.
+        kind: &'static str,
+        /// What it needs beside.
+        needs: &'static str,
+    },
+    /// A joint that moves nothing.
+    #[error(
+        "joint `{joint}` moves no inertia, so it has no acceleration under a torque: give its body a mass, or lock it"
+    )]
+    NoInertia {
+        /// The joint.
+        joint: String,
+    },
+    /// Terms that do not belong to the model.
+    #[error(transparent)]
+    Terms(#[from] ParametricModelError),
+    /// Numbers that are no model.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+}

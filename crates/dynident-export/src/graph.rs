@@ -1,0 +1,284 @@
+//! The expression graph: every value once, constants folded, zeros gone.
+//!
+//! A node is made only where the algebra leaves one: `x + 0`, `x · 0`, `x · 1` and sums of constants are folded, signs
+//! are moved outward so that `a b` and `-a b` share their product, and equal nodes are the same node. Adding zero and
+//! moving a sign change no bit of a finite result; two constant factors in a row become one, which rounds once less.
+
+use std::collections::HashMap;
+
+/// Place of a node in its graph. Smaller places never depend on larger ones.
+pub(crate) type Id = u32;
+
+/// What a generated function is given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Input {
+    Position,
+    Velocity,
+    Acceleration,
+    Torque,
+}
+
+impl Input {
+    /// Its name in every language.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Position => "q",
+            Self::Velocity => "dq",
+            Self::Acceleration => "ddq",
+            Self::Torque => "tau",
+        }
+    }
+}
+
+/// Functions of one value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Function {
+    Sin,
+    Cos,
+    Tanh,
+    Exp,
+    Abs,
+}
+
+/// One value. Numbers are kept as bits, so that equal ones are found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Node {
+    Constant(u64),
+    Input(Input, u32),
+    Add(Id, Id),
+    Sub(Id, Id),
+    Mul(Id, Id),
+    Neg(Id),
+    /// `1 / x`.
+    Recip(Id),
+    Call(Function, Id),
+    /// `x^p` of a positive x.
+    Power(Id, u64),
+    /// The sign of x, zero while `|x|` is at most the band.
+    Step(Id, u64),
+}
+
+impl Node {
+    /// The nodes that it is made of.
+    pub(crate) fn parts(self) -> impl Iterator<Item = Id> {
+        let (a, b) = match self {
+            Self::Constant(_) | Self::Input(..) => (None, None),
+            Self::Add(a, b) | Self::Sub(a, b) | Self::Mul(a, b) => (Some(a), Some(b)),
+            Self::Neg(a) | Self::Recip(a) | Self::Call(_, a) | Self::Power(a, _) | Self::Step(a, _) => (Some(a), None),
+        };
+        a.into_iter().chain(b)
+    }
+}
+
+/// The graph of one robot. Zero and one stand at the first two places.
+#[derive(Debug)]
+pub(crate) struct Graph {
+    nodes: Vec<Node>,
+    places: HashMap<Node, Id>,
+}
+
+impl Graph {
+    pub(crate) const ZERO: Id = 0;
+    pub(crate) const ONE: Id = 1;
+
+    pub(crate) fn new() -> Self {
+        let mut graph = Self { nodes: Vec::new(), places: HashMap::new() };
+        graph.constant(0.0);
+        graph.constant(1.0);
+        graph
+    }
+
+    /// Whether a function of this kind is in it.
+    pub(crate) fn has(&self, kind: impl Fn(Node) -> bool) -> bool {
+        self.nodes.iter().any(|&node| kind(node))
+    }
+
+    pub(crate) fn node(&self, id: Id) -> Node {
+        self.nodes[id as usize]
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    fn place(&mut self, node: Node) -> Id {
+        let next = self.nodes.len() as Id;
+        let place = *self.places.entry(node).or_insert(next);
+        if place == next {
+            self.nodes.push(node);
+        }
+        place
+    }
+
+    /// The value of a constant.
+    pub(crate) fn number(&self, id: Id) -> Option<f64> {
+        match self.node(id) {
+            Node::Constant(bits) => Some(f64::from_bits(bits)),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn constant(&mut self, value: f64) -> Id {
+        // Minus zero is zero: the two differ in no sum.
+        self.place(Node::Constant((value + 0.0).to_bits()))
+    }
+
+    pub(crate) fn input(&mut self, input: Input, joint: usize) -> Id {
+        self.place(Node::Input(input, joint as u32))
+    }
+
+    pub(crate) fn neg(&mut self, a: Id) -> Id {
+        match self.node(a) {
+            Node::Constant(bits) => self.constant(-f64::from_bits(bits)),
+            Node::Neg(inner) => inner,
+            _ => self.place(Node::Neg(a)),
+        }
+    }
+
+    /// The value without its sign, and whether it had one.
+    fn sign(&mut self, a: Id) -> (Id, bool) {
+        match self.node(a) {
+            Node::Neg(inner) => (inner, true),
+            Node::Constant(bits) if f64::from_bits(bits) < 0.0 => (self.constant(-f64::from_bits(bits)), true),
+            _ => (a, false),
+        }
+    }
+
+    pub(crate) fn add(&mut self, a: Id, b: Id) -> Id {
+        if let (Some(a), Some(b)) = (self.number(a), self.number(b)) {
+            return self.constant(a + b);
+        }
+        if a == Self::ZERO {
+            return b;
+        }
+        if b == Self::ZERO {
+            return a;
+        }
+        let ((a, minus_a), (b, minus_b)) = (self.sign(a), self.sign(b));
+        let sum = if minus_a == minus_b { self.place(Node::Add(a.min(b), a.max(b))) } else { self.difference(a, b) };
+        if minus_a { self.neg(sum) } else { sum }
+    }
+
+    pub(crate) fn sub(&mut self, a: Id, b: Id) -> Id {
+        let b = self.neg(b);
+        self.add(a, b)
+    }
+
+    /// `a - b` of values without a sign: always with the earlier one first, so that `b - a` shares it.
+    fn difference(&mut self, a: Id, b: Id) -> Id {
+        match a.cmp(&b) {
+            core::cmp::Ordering::Less => self.place(Node::Sub(a, b)),
+            core::cmp::Ordering::Equal => Self::ZERO,
+            core::cmp::Ordering::Greater => {
+                let turned = self.place(Node::Sub(b, a));
+                self.neg(turned)
+            }
+        }
+    }
+
+    pub(crate) fn mul(&mut self, a: Id, b: Id) -> Id {
+        if let (Some(a), Some(b)) = (self.number(a), self.number(b)) {
+            return self.constant(a * b);
+        }
+        if a == Self::ZERO || b == Self::ZERO {
+            return Self::ZERO;
+        }
+        let ((a, minus_a), (b, minus_b)) = (self.sign(a), self.sign(b));
+        let product = match (a, b) {
+            (Self::ONE, other) | (other, Self::ONE) => other,
+            _ => self.product(a, b),
+        };
+        if minus_a == minus_b { product } else { self.neg(product) }
+    }
+
+    /// Of values without a sign, neither zero nor one.
+    fn product(&mut self, a: Id, b: Id) -> Id {
+        let (constant, other) = match (self.number(a), self.number(b)) {
+            (Some(value), _) => (Some(value), b),
+            (_, Some(value)) => (Some(value), a),
+            _ => (None, a),
+        };
+        if let (Some(outer), Node::Mul(x, y)) = (constant, self.node(other)) {
+            let inner = [(x, y), (y, x)].into_iter().find_map(|(c, rest)| Some((self.number(c)?, rest)));
+            if let Some((inner, rest)) = inner {
+                let factor = self.constant(outer * inner);
+                return self.mul(factor, rest);
+            }
+        }
+        self.place(Node::Mul(a.min(b), a.max(b)))
+    }
+
+    pub(crate) fn recip(&mut self, a: Id) -> Id {
+        match self.number(a) {
+            Some(value) => self.constant(1.0 / value),
+            None => self.place(Node::Recip(a)),
+        }
+    }
+
+    pub(crate) fn call(&mut self, function: Function, a: Id) -> Id {
+        match self.number(a) {
+            Some(value) => self.constant(match function {
+                Function::Sin => value.sin(),
+                Function::Cos => value.cos(),
+                Function::Tanh => value.tanh(),
+                Function::Exp => value.exp(),
+                Function::Abs => value.abs(),
+            }),
+            None => self.place(Node::Call(function, a)),
+        }
+    }
+
+    pub(crate) fn power(&mut self, a: Id, exponent: f64) -> Id {
+        if exponent == 1.0 {
+            return a;
+        }
+        match self.number(a) {
+            Some(value) => self.constant(value.powf(exponent)),
+            None => self.place(Node::Power(a, exponent.to_bits())),
+        }
+    }
+
+    pub(crate) fn step(&mut self, a: Id, dead_band: f64) -> Id {
+        match self.number(a) {
+            Some(value) if value.abs() <= dead_band => Self::ZERO,
+            Some(value) => self.constant(value.signum()),
+            None => self.place(Node::Step(a, dead_band.to_bits())),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zeros_ones_and_signs_leave_no_nodes() {
+        let mut graph = Graph::new();
+        let x = graph.input(Input::Position, 0);
+        let y = graph.input(Input::Velocity, 0);
+        let before = graph.len();
+        let minus_zero = graph.constant(-0.0);
+        assert_eq!(minus_zero, Graph::ZERO);
+        assert_eq!([graph.add(x, Graph::ZERO), graph.mul(x, Graph::ONE)], [x, x]);
+        assert_eq!([graph.mul(x, Graph::ZERO), graph.sub(x, x)], [Graph::ZERO; 2]);
+        assert_eq!(graph.len(), before + 1, "only the sign of x");
+        let product = graph.mul(x, y);
+        let minus = graph.neg(x);
+        let turned = graph.mul(minus, y);
+        assert_eq!(graph.node(turned), Node::Neg(product));
+        let (forth, back) = (graph.sub(x, y), graph.sub(y, x));
+        assert_eq!(graph.node(back), Node::Neg(forth));
+    }
+
+    #[test]
+    fn constant_factors_become_one() {
+        let mut graph = Graph::new();
+        let x = graph.input(Input::Position, 0);
+        let (two, minus_four) = (graph.constant(2.0), graph.constant(-4.0));
+        let twice = graph.mul(x, two);
+        let all = graph.mul(minus_four, twice);
+        let eight = graph.constant(8.0);
+        let expected = graph.mul(x, eight);
+        assert_eq!(graph.node(all), Node::Neg(expected));
+    }
+}

@@ -1,0 +1,58 @@
+//! One file for each language: how it writes expressions, and what it writes around them.
+
+mod c;
+mod cpp;
+mod matlab;
+mod python;
+mod rust;
+
+pub(crate) use c::c_header;
+pub(crate) use cpp::cpp_header;
+pub(crate) use matlab::matlab_function;
+pub(crate) use python::python_module;
+pub(crate) use rust::rust_module;
+
+use crate::equations::{Equation, Equations};
+use crate::graph::Input;
+use crate::robot_model::RobotModel;
+use crate::statements::{Statements, Syntax, statements};
+
+/// What a language writes, with its own names around it.
+pub(crate) struct Source<'a> {
+    pub(crate) robot: &'a RobotModel,
+    pub(crate) equations: &'a Equations,
+    /// Lines of the comment at its head.
+    pub(crate) notes: &'a [String],
+}
+
+impl Source<'_> {
+    fn dof(&self) -> usize {
+        self.equations.dof
+    }
+
+    /// The statements of a function.
+    fn statements(&self, function: &Equation, syntax: &dyn Syntax) -> Statements {
+        statements(&self.equations.graph, &function.values, syntax)
+    }
+
+    /// The comment at the head, each line after `mark`.
+    fn comment(&self, mark: &str) -> String {
+        let title = format!(
+            "Dynamics of {} ({} joints), written by dynident {}.",
+            self.robot.model().name().replace(['\n', '\r'], " "),
+            self.dof(),
+            env!("CARGO_PKG_VERSION")
+        );
+        let units = "SI units: rad, Nm (m, N at joints that slide); joint vectors in this order:".to_owned();
+        let joints = self.robot.model().joints().iter().enumerate();
+        let joints = joints.map(|(place, joint)| format!("  {place}  {}", joint.name.replace(['\n', '\r'], " ")));
+        let lines = [title, units].into_iter().chain(joints).chain(self.notes.iter().cloned());
+        // A name may hold what would end a comment of C.
+        lines.map(|line| format!("{mark} {}", line.replace("*/", "* /"))).collect::<Vec<_>>().join("\n")
+    }
+}
+
+/// The inputs of a function that its statements do not use.
+fn unused<'a>(function: &'a Equation, statements: &'a Statements) -> impl Iterator<Item = &'static str> + 'a {
+    function.inputs.iter().filter(|input| !statements.used.contains(input)).map(|input| Input::name(*input))
+}

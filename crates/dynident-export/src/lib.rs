@@ -1,0 +1,38 @@
+//! **In which form does a controller or a simulator read the model?** A [`RobotModel`] in, text out.
+//!
+//! The recursive Newton-Euler and composite-rigid-body algorithms of `dynident-dynamics` run over symbols in place of
+//! numbers. What they leave is an expression graph with the constants of this one robot folded in (its base parameters,
+//! so that as few of them as possible are left), zeros gone and equal values shared. Every language prints that graph
+//! as straight-line code:
+//!
+//! | target | what it is |
+//! | --- | --- |
+//! | [`Target::C`] | one header, C99, nothing but math.h |
+//! | [`Target::Cpp`] | one header, C++17, a namespace, `std::array` |
+//! | [`Target::Rust`] | one module, no `std`, no dependency |
+//! | [`Target::Python`] | one module over NumPy, many states at once |
+//! | [`Target::Matlab`] | one function file for MATLAB and Octave |
+//!
+//! Functions: `inverse_dynamics`, `gravity`, `coriolis`, `friction` (with constant offsets), `mass_matrix` (with the
+//! inertia of drives) and `forward_dynamics`, so that `inverse_dynamics = mass_matrix · ddq + coriolis + gravity +
+//! friction`.
+
+#![forbid(unsafe_code)]
+
+mod drive_torque;
+mod equations;
+mod error;
+mod graph;
+mod languages;
+mod robot_model;
+mod statements;
+mod symbol;
+mod target;
+
+pub use error::ExportError;
+pub use robot_model::RobotModel;
+pub use target::{Exported, Target, export};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}

@@ -1,0 +1,116 @@
+//! A number that is not known yet: the scalar with which the algorithms of dynamics write the graph of their result.
+
+use crate::graph::{Function, Graph, Id, Input};
+use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
+use dynident_lanes::Scalar;
+use std::cell::RefCell;
+
+thread_local! {
+    /// The graph that is being written: scalars are copied by value, so they cannot carry it.
+    static GRAPH: RefCell<Graph> = RefCell::new(Graph::new());
+}
+
+/// A node of this thread's graph.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Symbol(Id);
+
+/// Runs `write` on an empty graph; gives the graph with what `write` returns.
+pub(crate) fn record<R>(write: impl FnOnce() -> R) -> (Graph, R) {
+    let before = GRAPH.replace(Graph::new());
+    let written = write();
+    (GRAPH.replace(before), written)
+}
+
+fn in_graph(make: impl FnOnce(&mut Graph) -> Id) -> Symbol {
+    GRAPH.with_borrow_mut(|graph| Symbol(make(graph)))
+}
+
+impl Symbol {
+    pub(crate) fn id(self) -> Id {
+        self.0
+    }
+
+    /// One input of every joint.
+    pub(crate) fn inputs(input: Input, dof: usize) -> Vec<Self> {
+        (0..dof).map(|joint| in_graph(|graph| graph.input(input, joint))).collect()
+    }
+
+    pub(crate) fn is_zero(self) -> bool {
+        self == Self::ZERO
+    }
+
+    /// Its value, if it is a constant.
+    pub(crate) fn number(self) -> Option<f64> {
+        GRAPH.with_borrow(|graph| graph.number(self.0))
+    }
+
+    pub(crate) fn call(self, function: Function) -> Self {
+        in_graph(|graph| graph.call(function, self.0))
+    }
+
+    /// `self^exponent`, for positive values.
+    pub(crate) fn power(self, exponent: f64) -> Self {
+        in_graph(|graph| graph.power(self.0, exponent))
+    }
+
+    /// The sign, zero while the size is at most `dead_band`.
+    pub(crate) fn step(self, dead_band: f64) -> Self {
+        in_graph(|graph| graph.step(self.0, dead_band))
+    }
+}
+
+impl Scalar for Symbol {
+    const ZERO: Self = Self(Graph::ZERO);
+    const ONE: Self = Self(Graph::ONE);
+
+    fn splat(value: f64) -> Self {
+        in_graph(|graph| graph.constant(value))
+    }
+
+    fn mul_add(self, factor: Self, addend: Self) -> Self {
+        self * factor + addend
+    }
+
+    fn sin_cos(self) -> (Self, Self) {
+        (self.call(Function::Sin), self.call(Function::Cos))
+    }
+
+    fn recip(self) -> Self {
+        in_graph(|graph| graph.recip(self.0))
+    }
+}
+
+impl Add for Symbol {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        in_graph(|graph| graph.add(self.0, other.0))
+    }
+}
+impl Sub for Symbol {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        in_graph(|graph| graph.sub(self.0, other.0))
+    }
+}
+impl Mul for Symbol {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        in_graph(|graph| graph.mul(self.0, other.0))
+    }
+}
+impl Neg for Symbol {
+    type Output = Self;
+    fn neg(self) -> Self {
+        in_graph(|graph| graph.neg(self.0))
+    }
+}
+impl AddAssign for Symbol {
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+impl SubAssign for Symbol {
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}

@@ -1,0 +1,7 @@
+//! Tests of the crate, one program.
+
+#![allow(clippy::unwrap_used, reason = "a test that fails says where")]
+
+mod common;
+mod compiled;
+mod refused;

@@ -1,0 +1,50 @@
+//! What cannot be written is named.
+
+use super::common::{all_terms, tree};
+use dynident_export::{RobotModel, Target, export};
+use dynident_model::read_urdf;
+use dynident_model::terms::{CoulombShape, LoadFriction, MaxwellSlip, Offset, TorqueTerm};
+
+fn message(term: TorqueTerm) -> String {
+    let model = tree().model().clone();
+    let robot = RobotModel::new(model, vec![term], vec![1.0]).unwrap();
+    export(&robot, Target::C).unwrap_err().to_string()
+}
+
+#[test]
+fn terms_that_need_more_than_the_motion() {
+    let load = message(TorqueTerm::Load(LoadFriction { joint: 1, shape: CoulombShape::Smooth { width: 0.1 } }));
+    assert!(load.contains("fl2 (load)") && load.contains("the torque that the gear carries"), "{load}");
+    let slip = message(TorqueTerm::MaxwellSlip(MaxwellSlip { joint: 0, yield_displacement: 0.01 }));
+    assert!(slip.contains("slip1_0.01 (maxwell-slip)") && slip.contains("the motion before"), "{slip}");
+}
+
+#[test]
+fn values_that_are_none() {
+    let model = tree().model().clone();
+    let offset = || vec![TorqueTerm::Offset(Offset { joint: 0 })];
+    let error = RobotModel::new(model.clone(), offset(), Vec::new()).unwrap_err();
+    assert_eq!(error.to_string(), "0 values for 1 torque terms: give one for each");
+    let error = RobotModel::new(model.clone(), offset(), vec![f64::NAN]).unwrap_err();
+    assert_eq!(error.to_string(), "the value of off1 is NaN, not a finite number");
+    let far = vec![TorqueTerm::Offset(Offset { joint: 9 })];
+    assert!(RobotModel::new(model, far, vec![0.0]).unwrap_err().to_string().contains("off10"));
+}
+
+#[test]
+fn a_joint_that_moves_nothing() {
+    let text = r#"<robot name="ghost"><link name="base"/><link name="arm"><inertial><mass value="0"/>
+        <inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial></link>
+        <joint name="hinge" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/></joint></robot>"#;
+    let model = read_urdf(text).unwrap().model;
+    let robot = RobotModel::new(model, Vec::new(), Vec::new()).unwrap();
+    assert!(export(&robot, Target::C).unwrap_err().to_string().contains("joint `hinge` moves no inertia"));
+}
+
+#[test]
+fn a_term_by_temperature_is_noted() {
+    let exported = export(&all_terms("ur10.urdf"), Target::Python).unwrap();
+    let note = "fvT1 is left out: the drive counts as being at 25 °C.";
+    assert_eq!(exported.notes, [note]);
+    assert!(exported.text.contains(note));
+}
