@@ -6,9 +6,9 @@
 
 use dynident::iteration::{RUN_SCHEMA, RunFile};
 use dynident::result::{
-    CHECK_SCHEMA, CheckFile, DESIGN_SCHEMA, DesignFile, EVALUATION_SCHEMA, EvaluationFile, INSPECTION_SCHEMA,
-    ITERATIONS_SCHEMA, Inspection, IterationsFile, RESULT_SCHEMA, ResultFile, SIMULATION_SCHEMA, SimulationFile,
-    VALIDATION_SCHEMA, ValidationFile,
+    CHECK_SCHEMA, CheckFile, DESIGN_SCHEMA, DesignFile, EVALUATION_SCHEMA, EXPORT_SCHEMA, EvaluationFile, ExportFile,
+    INSPECTION_SCHEMA, ITERATIONS_SCHEMA, Inspection, IterationsFile, RESULT_SCHEMA, ResultFile, SIMULATION_SCHEMA,
+    SimulationFile, VALIDATION_SCHEMA, ValidationFile,
 };
 use dynident_benchmark::accuracy::{BENCHMARK_SCHEMA, BenchmarkFile};
 use dynident_paper::{PAPER_SCHEMA, PaperFile};
@@ -27,6 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         (CHECK_SCHEMA, written::<CheckFile>()),
         (DESIGN_SCHEMA, written::<DesignFile>()),
         (EVALUATION_SCHEMA, written::<EvaluationFile>()),
+        (EXPORT_SCHEMA, written::<ExportFile>()),
         (INSPECTION_SCHEMA, written::<Inspection>()),
         (ITERATIONS_SCHEMA, written::<IterationsFile>()),
         (PAPER_SCHEMA, written::<PaperFile>()),

@@ -62,6 +62,8 @@ enum Command {
     Identify(commands::identify::Options),
     /// Test a finished model on other logs.
     Validate(commands::validate::Options),
+    /// Write a finished model as C, C++, Rust, Python or MATLAB.
+    Export(commands::export::Options),
     /// Let a simulated robot run a trajectory under a controller: a log, and the truth beside it.
     Simulate(commands::simulate::Options),
     /// Run, identify, load the better model and run again, until all has settled.
@@ -107,6 +109,7 @@ fn main() -> ExitCode {
         Command::Check(options) => commands::check::run(&options, &context),
         Command::Identify(options) => commands::identify::run(&options, &context),
         Command::Validate(options) => commands::validate::run(&options, &context),
+        Command::Export(options) => commands::export::run(&options, &context),
         Command::Simulate(options) => commands::simulate::run(&options, &context),
         Command::Iterate(options) => commands::iterate::run(&options, &context),
         Command::Reproduce(options) => commands::reproduce::run(&options, &context),

@@ -30,16 +30,16 @@ pub struct Exported {
     pub notes: Vec<String>,
 }
 
-/// Writes the robot in the form `target`.
+/// Writes the robot in the form `target`; `further` are notes of the caller's own, that is where the model comes from.
 ///
 /// # Errors
 /// A torque term that is no function of `q`, `dq` and `ddq` (load, Maxwell slip); a joint that moves no inertia.
-pub fn export(robot: &RobotModel, target: Target) -> Result<Exported, ExportError> {
+pub fn export(robot: &RobotModel, target: Target, further: &[String]) -> Result<Exported, ExportError> {
     let temperatures = reference_temperatures(robot);
-    let notes: Vec<String> = temperatures
+    let at_reference = temperatures
         .iter()
-        .map(|(symbol, reference)| format!("{symbol} is left out: the drive counts as being at {reference} °C."))
-        .collect();
+        .map(|(symbol, reference)| format!("{symbol} is left out: the drive counts as being at {reference} °C."));
+    let notes: Vec<String> = further.iter().cloned().chain(at_reference).collect();
     let equations = Equations::of(robot)?;
     let source = Source { robot, equations: &equations, notes: &notes };
     let text = match target {

@@ -6,6 +6,7 @@
 //! | logs to a model | [`identify()`]; its result: [`ResultFile`], a page: [`IdentificationOutcome::report`] |
 //! | a finished model on other logs | [`validate()`] |
 //! | look at a robot description | [`inspect()`]; undo its slips: [`mended()`] |
+//! | a finished model as C, C++, Rust, Python, MATLAB | [`export_model()`] |
 //! | dynamics for a table of states | [`evaluate()`] |
 //! | the motion to record | [`design_study()`]; judge one that is there: [`check_trajectory()`], [`check_log()`] |
 //! | one run of a simulated robot | [`simulate_study()`] |
@@ -15,7 +16,7 @@
 //!
 //! Who has samples in memory needs no study: [`identification`] takes arrays. The crates below are re-exported:
 //! [`model`], [`dynamics`], [`recording`], [`estimation`], [`excitation`], [`simulation`], [`identification`],
-//! [`iteration`].
+//! [`iteration`], [`export`].
 //!
 //! ```
 //! use dynident::{RunOptions, Silent, Study, identify};
@@ -50,6 +51,7 @@ pub mod study;
 pub use dynident_dynamics as dynamics;
 pub use dynident_estimation as estimation;
 pub use dynident_excitation as excitation;
+pub use dynident_export as export;
 pub use dynident_identification as identification;
 pub use dynident_iteration as iteration;
 pub use dynident_model as model;
@@ -62,6 +64,7 @@ pub use inputs::{refuse_overwriting, study_inputs};
 pub use jobs::check::check;
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};
 pub use jobs::evaluate::{Quantity, evaluate};
+pub use jobs::export::export_model;
 pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instruments};
 pub use jobs::inspect::{InspectSettings, MendedDescription, inspect, inspect_with, mended};
 pub use jobs::iterate::{IterationWatch, iterate_study};

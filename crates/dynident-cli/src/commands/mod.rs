@@ -4,6 +4,7 @@ pub(crate) mod benchmark;
 pub(crate) mod check;
 pub(crate) mod design;
 pub(crate) mod evaluate;
+pub(crate) mod export;
 pub(crate) mod identify;
 pub(crate) mod inspect;
 pub(crate) mod interruption;

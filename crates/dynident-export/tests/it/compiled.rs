@@ -51,7 +51,7 @@ fn c_computes_what_the_core_computes() {
              const double *q = v, *dq = v + {dof}, *ddq = v + 2 * {dof}, *tau = v + 3 * {dof};\n{calls}    printf(\"\\n\");\n  }}\n}}\n"
         );
         let folder = tempfile::tempdir().unwrap();
-        let text = export(&robot, Target::C).unwrap().text;
+        let text = export(&robot, Target::C, &[]).unwrap().text;
         let flags = ["cc", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O2", "-ffp-contract=off"];
         let compiler: Vec<&str> = flags.into_iter().collect();
         // The library of mathematics stands behind the program.
@@ -91,7 +91,7 @@ fn cpp_computes_what_the_core_computes() {
              {calls}    std::printf(\"\\n\");\n  }}\n}}\n"
         );
         let folder = tempfile::tempdir().unwrap();
-        let text = export(&robot, Target::Cpp).unwrap().text;
+        let text = export(&robot, Target::Cpp, &[]).unwrap().text;
         let compiler = ["c++", "-std=c++17", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O1"];
         let mut program = compiled(folder.path(), ("robot.hpp", &text), ("main.cpp", &program), &compiler);
         compare(&mut program, &robot, &expected(&robot));
@@ -125,7 +125,7 @@ fn rust_computes_what_the_core_computes() {
              let (q, dq, ddq, tau) = (part(0), part(1), part(2), part(3));\n{calls}        println!();\n    }}\n}}\n"
         );
         let folder = tempfile::tempdir().unwrap();
-        let text = export(&robot, Target::Rust).unwrap().text;
+        let text = export(&robot, Target::Rust, &[]).unwrap().text;
         let compiler = [rustc.as_str(), "--edition", "2021", "-O", "-D", "warnings"];
         let mut run = compiled(folder.path(), ("robot.rs", &text), ("main.rs", &program), &compiler);
         compare(&mut run, &robot, &expected(&robot));

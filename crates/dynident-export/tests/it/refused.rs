@@ -8,7 +8,7 @@ use dynident_model::terms::{CoulombShape, LoadFriction, MaxwellSlip, Offset, Tor
 fn message(term: TorqueTerm) -> String {
     let model = tree().model().clone();
     let robot = RobotModel::new(model, vec![term], vec![1.0]).unwrap();
-    export(&robot, Target::C).unwrap_err().to_string()
+    export(&robot, Target::C, &[]).unwrap_err().to_string()
 }
 
 #[test]
@@ -38,12 +38,12 @@ fn a_joint_that_moves_nothing() {
         <joint name="hinge" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/></joint></robot>"#;
     let model = read_urdf(text).unwrap().model;
     let robot = RobotModel::new(model, Vec::new(), Vec::new()).unwrap();
-    assert!(export(&robot, Target::C).unwrap_err().to_string().contains("joint `hinge` moves no inertia"));
+    assert!(export(&robot, Target::C, &[]).unwrap_err().to_string().contains("joint `hinge` moves no inertia"));
 }
 
 #[test]
 fn a_term_by_temperature_is_noted() {
-    let exported = export(&all_terms("ur10.urdf"), Target::Python).unwrap();
+    let exported = export(&all_terms("ur10.urdf"), Target::Python, &[]).unwrap();
     let note = "fvT1 is left out: the drive counts as being at 25 °C.";
     assert_eq!(exported.notes, [note]);
     assert!(exported.text.contains(note));

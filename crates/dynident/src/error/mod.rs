@@ -4,6 +4,7 @@ mod study;
 
 pub use study::{Expected, StudyError};
 
+use dynident_export::ExportError;
 use dynident_identification::IdentificationError;
 use dynident_model::ReadError;
 use dynident_recording::RecordingError;
@@ -82,6 +83,14 @@ pub enum Error {
         path: PathBuf,
         /// What is wrong, and the fix.
         message: String,
+    },
+    /// A model that a form cannot hold.
+    #[error("{}: {source}", path.display())]
+    Export {
+        /// The result file.
+        path: PathBuf,
+        /// What cannot be written.
+        source: Box<ExportError>,
     },
     /// A table of states that cannot be used.
     #[error("{}:{line}: {message}", path.display())]

@@ -4,6 +4,7 @@
 mod check;
 mod design;
 mod evaluation;
+mod export;
 mod identification;
 mod inspection;
 mod iterations;
@@ -19,6 +20,7 @@ pub use design::{
     DESIGN_SCHEMA, DesignFile, DirectionForecast, ParameterForecast, StrokeFile, StrokeLimitFile, WindowedFile,
 };
 pub use evaluation::{EVALUATION_SCHEMA, EvaluationFile};
+pub use export::{EXPORT_SCHEMA, ExportFile};
 pub use identification::{
     BaseParameterResult, BodyResult, JointFrictionResult, JointResult, LogOffset, LogSummary, MethodSummary,
     PhysicalBodyResult, PhysicalFitResult, PhysicalVerdict, RESULT_SCHEMA, ResultFile, RobotSummary, TermResult,

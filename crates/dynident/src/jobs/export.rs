@@ -1,0 +1,75 @@
+//! A finished model in the form that a controller or a simulator reads.
+
+use crate::error::Error;
+use crate::result::ResultFile;
+use crate::study::{Folders, Study, StudyRobot};
+use dynident_export::{ExportError, Exported, RobotModel, Target, export};
+use dynident_model::InertialParameters;
+use std::path::Path;
+
+/// Writes the model of a `result.json` in the form `target`: bodies, friction and drives as `identified.urdf` has
+/// them, the physically consistent set unless the study asked for none. `study` is the study that the result was made
+/// with; `data` a folder in which its robot is looked for as well.
+///
+/// # Errors
+/// If the result does not belong to the study's robot; [`Error::Export`] for what the form cannot hold at all.
+pub fn export_model(
+    result_path: &Path,
+    (study, study_path): (&Study, &Path),
+    data: Option<&Path>,
+    target: Target,
+) -> Result<Exported, Error> {
+    let stored = ResultFile::read(result_path)?;
+    let robot = robot_model(&stored, result_path, (study, study_path), data)?;
+    let cannot = |source: ExportError| Error::Export { path: result_path.to_owned(), source: Box::new(source) };
+    let mut exported = export(&robot, target, &reservations(&stored)).map_err(cannot)?;
+    exported.notes.dedup();
+    Ok(exported)
+}
+
+/// What a user of the model has to know of the result.
+fn reservations(stored: &ResultFile) -> Vec<String> {
+    let mut notes: Vec<String> =
+        stored.problems.iter().map(|problem| format!("The result has a PROBLEM: {problem}")).collect();
+    if let Some(provenance) = &stored.provenance {
+        notes.insert(0, format!("From the result {} of study {}.", provenance.identity, stored.name));
+    }
+    if stored.drive_gains.is_some() {
+        notes.push("Torques are in Nm, by the drive gains that were identified.".to_owned());
+    }
+    if !stored.payloads.is_empty() {
+        let names: Vec<&str> = stored.payloads.iter().map(|payload| payload.name.as_str()).collect();
+        notes.push(format!("The arm without its payloads ({}).", names.join(", ")));
+    }
+    notes
+}
+
+/// The robot with the values that the result holds.
+fn robot_model(
+    stored: &ResultFile,
+    path: &Path,
+    (study, study_path): (&Study, &Path),
+    data: Option<&Path>,
+) -> Result<RobotModel, Error> {
+    let wrong = |message: String| Error::Result { path: path.to_owned(), message };
+    let study = &stored.as_fitted(study);
+    let robot = StudyRobot::new(study, study_path, &Folders::new(study, study_path, data))?;
+    // That study and result belong together.
+    stored.base_values(path, &robot.parametric)?;
+    let of = |name: &str| {
+        let body = stored.bodies.iter().find(|body| body.name == name);
+        body.map(|body| InertialParameters(body.parameters))
+            .ok_or_else(|| wrong(format!("no body `{name}`: use the study that the result was made with")))
+    };
+    let inertials: Vec<_> = robot.model().bodies().iter().map(|body| of(body.name())).collect::<Result<_, _>>()?;
+    let model = robot.model().with_inertials(&inertials).map_err(|error| wrong(error.to_string()))?;
+    let known = stored.joints.iter().flat_map(|joint| &joint.terms).chain(&stored.couplings);
+    let value = |symbol: String| {
+        let term = known.clone().find(|term| term.symbol == symbol);
+        term.map(|term| term.value)
+            .ok_or_else(|| wrong(format!("no value of `{symbol}`: use the study that the result was made with")))
+    };
+    let values = robot.terms().iter().map(|term| value(term.symbol())).collect::<Result<_, _>>()?;
+    let made = RobotModel::new(model, robot.terms().to_vec(), values);
+    made.map_err(|source| Error::Export { path: path.to_owned(), source: Box::new(source) })
+}
