@@ -5,7 +5,7 @@ use crate::graph::Function;
 use crate::robot_model::RobotModel;
 use crate::symbol::Symbol;
 use dynident_lanes::Scalar;
-use dynident_model::terms::{CoulombShape, CouplingEffect, Direction, PowerExponent, TorqueTerm};
+use dynident_model::terms::{CoulombShape, CouplingEffect, Direction, JointMotion, PowerExponent, TorqueTerm};
 
 /// Torque of friction and offsets of every joint at the velocities `dq`: what the terms add that does not follow
 /// accelerations. Terms that change with temperature count as being at their reference.
@@ -122,4 +122,20 @@ fn part(direction: Direction, x: Symbol) -> Symbol {
 /// Powers of one and two, which are usual, without a call.
 fn power(x: Symbol, exponent: f64) -> Symbol {
     if exponent == 2.0 { x * x } else { x.power(exponent) }
+}
+
+/// Friction and offset of a joint at the velocity `dq`, by its own terms alone: couplings, load, hysteresis and changes
+/// with temperature are left out.
+pub(crate) fn own_friction(robot: &RobotModel, joint: usize, dq: f64) -> f64 {
+    let zeros = vec![0.0; robot.model().dof()];
+    let mut velocities = zeros.clone();
+    velocities[joint] = dq;
+    let motion = JointMotion { samples: 1, q: &zeros, dq: &velocities, ddq: &zeros };
+    let own = robot.terms().filter(|(term, _)| term.own_joint() == Some(joint) && !term.is_drive_inertia());
+    own.map(|(term, value)| {
+        let mut column = [0.0];
+        term.column(joint, &motion, &mut column);
+        value * column[0]
+    })
+    .sum()
 }

@@ -50,6 +50,14 @@ pub enum ExportError {
         /// The joint.
         joint: String,
     },
+    /// A body that a simulator refuses.
+    #[error(
+        "body `{body}` can not be real (mass or moments not positive, or a moment larger than the two others together), so MuJoCo would refuse it: identify with physical consistency, which is the default"
+    )]
+    NotPhysical {
+        /// The body.
+        body: String,
+    },
     /// Terms that do not belong to the model.
     #[error(transparent)]
     Terms(#[from] ParametricModelError),

@@ -12,6 +12,7 @@
 //! | [`Target::Rust`] | one module, no `std`, no dependency |
 //! | [`Target::Python`] | one module over NumPy, many states at once |
 //! | [`Target::Matlab`] | one function file for MATLAB and Octave |
+//! | [`Target::Mjcf`], [`Target::Urdf`] | descriptions for simulators, with the nearest friction that they know |
 //!
 //! Functions: `inverse_dynamics`, `gravity`, `coriolis`, `friction` (with constant offsets), `mass_matrix` (with the
 //! inertia of drives) and `forward_dynamics`, so that `inverse_dynamics = mass_matrix · ddq + coriolis + gravity +
@@ -19,19 +20,24 @@
 
 #![forbid(unsafe_code)]
 
+mod descriptions;
 mod drive_torque;
 mod equations;
 mod error;
+mod exported;
 mod graph;
 mod languages;
+mod nearest_friction;
 mod robot_model;
 mod statements;
 mod symbol;
 mod target;
 
 pub use error::ExportError;
+pub use exported::Exported;
+pub use nearest_friction::NearestFriction;
 pub use robot_model::RobotModel;
-pub use target::{Exported, Target, export};
+pub use target::{Target, export};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -1,8 +1,10 @@
 //! What can be written, and the one function that writes it.
 
+use crate::descriptions::{mjcf, urdf};
 use crate::drive_torque::reference_temperatures;
 use crate::equations::Equations;
 use crate::error::ExportError;
+use crate::exported::Exported;
 use crate::languages::{Source, c_header, cpp_header, matlab_function, python_module, rust_module};
 use crate::robot_model::RobotModel;
 
@@ -19,15 +21,28 @@ pub enum Target {
     Python,
     /// One function file for MATLAB and Octave.
     Matlab,
+    /// MuJoCo's MJCF.
+    Mjcf,
+    /// URDF.
+    Urdf,
 }
 
-/// A model in a form.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Exported {
-    /// The file's text.
-    pub text: String,
-    /// What the form does not hold, or holds differently, a sentence each; the text has them as comments.
-    pub notes: Vec<String>,
+impl Target {
+    /// All of them.
+    pub const ALL: [Self; 7] = [Self::C, Self::Cpp, Self::Rust, Self::Python, Self::Matlab, Self::Mjcf, Self::Urdf];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::C => "c",
+            Self::Cpp => "cpp",
+            Self::Rust => "rust",
+            Self::Python => "python",
+            Self::Matlab => "matlab",
+            Self::Mjcf => "mjcf",
+            Self::Urdf => "urdf",
+        }
+    }
 }
 
 /// Writes the robot in the form `target`; `further` are notes of the caller's own, that is where the model comes from.
@@ -40,14 +55,18 @@ pub fn export(robot: &RobotModel, target: Target, further: &[String]) -> Result<
         .iter()
         .map(|(symbol, reference)| format!("{symbol} is left out: the drive counts as being at {reference} °C."));
     let notes: Vec<String> = further.iter().cloned().chain(at_reference).collect();
-    let equations = Equations::of(robot)?;
-    let source = Source { robot, equations: &equations, notes: &notes };
-    let text = match target {
-        Target::C => c_header(&source),
-        Target::Cpp => cpp_header(&source),
-        Target::Rust => rust_module(&source),
-        Target::Python => python_module(&source),
-        Target::Matlab => matlab_function(&source),
+    let code = |write: fn(&Source<'_>) -> String, notes: Vec<String>| {
+        let equations = Equations::of(robot)?;
+        let text = write(&Source { robot, equations: &equations, notes: &notes });
+        Ok(Exported { text, notes })
     };
-    Ok(Exported { text, notes })
+    match target {
+        Target::C => code(c_header, notes),
+        Target::Cpp => code(cpp_header, notes),
+        Target::Rust => code(rust_module, notes),
+        Target::Python => code(python_module, notes),
+        Target::Matlab => code(matlab_function, notes),
+        Target::Mjcf => mjcf(robot, notes),
+        Target::Urdf => urdf(robot, notes),
+    }
 }

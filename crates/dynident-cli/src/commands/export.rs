@@ -39,6 +39,10 @@ enum Form {
     Python,
     /// MATLAB and Octave, one function file.
     Matlab,
+    /// MuJoCo's MJCF.
+    Mjcf,
+    /// URDF.
+    Urdf,
 }
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
@@ -55,6 +59,8 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         Form::Rust => Target::Rust,
         Form::Python => Target::Python,
         Form::Matlab => Target::Matlab,
+        Form::Mjcf => Target::Mjcf,
+        Form::Urdf => Target::Urdf,
     };
     let exported =
         export_model(&options.result, (&study, &options.study), data, target).map_err(known_in(&options.study))?;

@@ -4,4 +4,5 @@
 
 mod common;
 mod compiled;
+mod descriptions;
 mod refused;

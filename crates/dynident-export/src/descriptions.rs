@@ -1,0 +1,235 @@
+//! Descriptions for simulators: MJCF and URDF, with what they cannot hold said.
+
+use crate::drive_torque::drive_inertia;
+use crate::error::ExportError;
+use crate::exported::Exported;
+use crate::nearest_friction::NearestFriction;
+use crate::robot_model::RobotModel;
+use core::fmt::Write;
+use dynident_model::terms::{CouplingEffect, TorqueTerm};
+use dynident_model::{Body, Joint, Mat3, Model, STANDARD_GRAVITY, Transform, write_urdf};
+
+/// Friction errors below this share of the friction are not worth a sentence: a law that is one of the simulator's own
+/// leaves rounding, a narrow smooth step in place of a sign some thousandth.
+const WORTH_SAYING: f64 = 1e-3;
+
+/// MuJoCo's MJCF: bodies with their inertials, joints with limits, `armature`, `damping` and `frictionloss`, a motor
+/// for each joint. No shapes.
+pub(crate) fn mjcf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
+    let (model, dof) = (robot.model(), robot.model().dof());
+    let friction = frictions(robot, "frictionloss", &mut notes);
+    notes.extend(left_out(robot));
+    notes.push("MJCF has no velocity limits; shapes are left out.".to_owned());
+    let rotors = drive_inertia(robot);
+    let [gx, gy, gz] = model.gravity().0;
+    let mut text = format!(
+        "<mujoco model=\"{}\">\n{}  <compiler angle=\"radian\" autolimits=\"true\"/>\n  <option gravity=\"{gx:?} {gy:?} {gz:?}\"/>\n  \
+         <worldbody>\n    <body name=\"{}\">\n",
+        attribute(model.name()),
+        comment(&notes),
+        attribute(model.base().name())
+    );
+    for joint in (0..dof).filter(|&joint| model.joints()[joint].parent.is_none()) {
+        write_body(&mut text, robot, joint, (&friction, &rotors), 3)?;
+    }
+    text += "    </body>\n  </worldbody>\n  <actuator>\n";
+    for joint in model.joints() {
+        let range = joint.limits.effort.filter(|effort| *effort > 0.0);
+        let range = range.map_or(String::new(), |effort| format!(" ctrlrange=\"{:?} {effort:?}\"", -effort));
+        let name = attribute(&joint.name);
+        let _ = writeln!(text, "    <motor name=\"{name}\" joint=\"{name}\"{range}/>");
+    }
+    text += "  </actuator>\n</mujoco>\n";
+    Ok(Exported { text, notes })
+}
+
+/// URDF: links with their inertials, joints with limits, damping and friction. No shapes.
+pub(crate) fn urdf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exported, ExportError> {
+    let model = robot.model();
+    let friction = frictions(robot, "friction", &mut notes);
+    notes.extend(left_out(robot));
+    for (term, value) in robot.terms().filter(|(term, _)| term.is_drive_inertia()) {
+        notes.push(format!("URDF has no drive inertia: {} = {value:?} kg m² is left out.", term.symbol()));
+    }
+    if model.gravity() != STANDARD_GRAVITY {
+        notes.push(format!("URDF has no gravity: it is {:?} m/s² in the base frame.", model.gravity().0));
+    }
+    let joints = model.joints().iter().zip(&friction).map(|(joint, friction)| Joint {
+        damping: Some(friction.viscous),
+        friction: Some(friction.coulomb),
+        ..joint.clone()
+    });
+    let written = Model::new(model.name(), model.base().clone(), joints.collect(), model.bodies().to_vec())?;
+    let text = write_urdf(&written.with_gravity(model.gravity())?);
+    let (head, rest) = text.split_once('\n').unwrap_or(("", &text));
+    Ok(Exported { text: format!("{head}\n{}{rest}", comment(&notes)), notes })
+}
+
+/// The nearest friction of every joint, and a sentence on each that is not the law itself.
+fn frictions(robot: &RobotModel, coulomb: &str, notes: &mut Vec<String>) -> Vec<NearestFriction> {
+    let joints = robot.model().joints();
+    let nearest: Vec<_> = (0..joints.len()).map(|joint| NearestFriction::of(robot, joint)).collect();
+    for (joint, found) in joints.iter().zip(&nearest) {
+        if found.most_error > WORTH_SAYING * (found.coulomb + found.viscous * found.most_speed) {
+            notes.push(format!(
+                "Joint {}: {coulomb} and damping are the nearest to its friction and offset for velocities up to {:?} {}: off by {:.3} {unit} rms, {:.3} {unit} at most.",
+                joint.name,
+                found.most_speed,
+                if joint.turns() { "rad/s" } else { "m/s" },
+                found.rms_error,
+                found.most_error,
+                unit = if joint.turns() { "Nm" } else { "N" },
+            ));
+        }
+    }
+    nearest
+}
+
+/// Terms that no joint of a description has.
+fn left_out(robot: &RobotModel) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (term, value) in robot.terms() {
+        let (symbol, unit) = (term.symbol(), term.unit());
+        match term {
+            TorqueTerm::Coupling(coupling) => {
+                let effect = match coupling.effect {
+                    CouplingEffect::Inertia => "inertia",
+                    CouplingEffect::Viscous | CouplingEffect::Coulomb(_) => "friction",
+                };
+                notes.push(format!(
+                    "{effect} of a drive that turns with two joints, {symbol} = {value:?} {unit}, is left out."
+                ));
+            }
+            TorqueTerm::Load(_) | TorqueTerm::MaxwellSlip(_) => {
+                notes.push(format!("{symbol} = {value:?} {unit} ({}) is left out.", term.kind_name()));
+            }
+            TorqueTerm::Viscous(_)
+            | TorqueTerm::Coulomb(_)
+            | TorqueTerm::DirectionalViscous(_)
+            | TorqueTerm::DirectionalCoulomb(_)
+            | TorqueTerm::Stribeck(_)
+            | TorqueTerm::Sigmoid(_)
+            | TorqueTerm::Power(_)
+            | TorqueTerm::TemperatureViscous(_)
+            | TorqueTerm::TemperatureCoulomb(_)
+            | TorqueTerm::Offset(_)
+            | TorqueTerm::DriveInertia(_) => {}
+        }
+    }
+    notes
+}
+
+fn write_body(
+    text: &mut String,
+    robot: &RobotModel,
+    index: usize,
+    (friction, rotors): (&[NearestFriction], &[f64]),
+    depth: usize,
+) -> Result<(), ExportError> {
+    let model = robot.model();
+    let (joint, body) = (&model.joints()[index], &model.bodies()[index]);
+    let pad = "  ".repeat(depth);
+    let _ = writeln!(text, "{pad}<body name=\"{}\"{}>", attribute(body.name()), placement(&joint.placement));
+    let _ = writeln!(text, "{pad}  {}", inertial(model, index, body)?);
+    let kind = if joint.turns() { "hinge" } else { "slide" };
+    let limits = joint.limits.lower.zip(joint.limits.upper).filter(|(lower, upper)| lower < upper);
+    let range = limits.map_or(String::new(), |(lower, upper)| format!(" range=\"{lower:?} {upper:?}\""));
+    let ([x, y, z], found) = (joint.axis.0, &friction[index]);
+    let _ = writeln!(
+        text,
+        "{pad}  <joint name=\"{}\" type=\"{kind}\" axis=\"{x:?} {y:?} {z:?}\"{range} armature=\"{:?}\" damping=\"{:?}\" frictionloss=\"{:?}\"/>",
+        attribute(&joint.name),
+        rotors[index * model.dof() + index],
+        found.viscous,
+        found.coulomb
+    );
+    for link in &body.links[1..] {
+        let _ = writeln!(text, "{pad}  <body name=\"{}\"{}/>", attribute(&link.name), placement(&link.placement));
+    }
+    for child in (index + 1..model.dof()).filter(|&child| model.joints()[child].parent == Some(index)) {
+        write_body(text, robot, child, (friction, rotors), depth + 1)?;
+    }
+    let _ = writeln!(text, "{pad}</body>");
+    Ok(())
+}
+
+/// Mass, centre of mass and inertia about it, which MuJoCo reads only of a body that can be real.
+fn inertial(model: &Model, index: usize, body: &Body) -> Result<String, ExportError> {
+    let parameters = &model.inertials()[index];
+    let moments =
+        parameters.principal_moments().filter(|[a, b, c]| parameters.mass_kg() > 0.0 && *a > 0.0 && a + b >= *c);
+    let (Some(_), Some(com), Some(inertia)) = (moments, parameters.com_m(), parameters.inertia_at_com()) else {
+        return Err(ExportError::NotPhysical { body: body.name().to_owned() });
+    };
+    let ([x, y, z], i) = (com.0, inertia.0);
+    Ok(format!(
+        "<inertial mass=\"{:?}\" pos=\"{x:?} {y:?} {z:?}\" fullinertia=\"{:?} {:?} {:?} {:?} {:?} {:?}\"/>",
+        parameters.mass_kg(),
+        i[0][0],
+        i[1][1],
+        i[2][2],
+        i[0][1],
+        i[0][2],
+        i[1][2]
+    ))
+}
+
+fn placement(placement: &Transform) -> String {
+    let ([x, y, z], [a, b, c, d]) = (placement.translation.0, quaternion(&placement.rotation));
+    format!(" pos=\"{x:?} {y:?} {z:?}\" quat=\"{a:?} {b:?} {c:?} {d:?}\"")
+}
+
+/// The unit quaternion w x y z of a rotation, by its largest entry (Shepperd 1978).
+fn quaternion(r: &Mat3) -> [f64; 4] {
+    let m = &r.0;
+    let trace = m[0][0] + m[1][1] + m[2][2];
+    let squares = [trace, m[0][0], m[1][1], m[2][2]];
+    let largest = (1..4).fold(0, |best, k| if squares[k] > squares[best] { k } else { best });
+    let q = match largest {
+        0 => [1.0 + trace, m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]],
+        k => {
+            let (i, j, l) = (k - 1, k % 3, (k + 1) % 3);
+            let mut q = [m[l][j] - m[j][l], 0.0, 0.0, 0.0];
+            q[1 + i] = 1.0 + m[i][i] - m[j][j] - m[l][l];
+            q[1 + j] = m[i][j] + m[j][i];
+            q[1 + l] = m[i][l] + m[l][i];
+            q
+        }
+    };
+    let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+    q.map(|x| x / norm)
+}
+
+/// Notes as a comment of XML, in which two hyphens may not stand.
+fn comment(notes: &[String]) -> String {
+    if notes.is_empty() {
+        return String::new();
+    }
+    let lines: String =
+        notes.iter().map(|note| format!("    {}\n", note.replace("--", "- -").replace(['\n', '\r'], " "))).collect();
+    format!("  <!--\n{lines}  -->\n")
+}
+
+/// A name as the value of an attribute in double quotes.
+fn attribute(name: &str) -> String {
+    let plain: String = name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    plain.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynident_model::sample::Random;
+
+    #[test]
+    fn quaternions_give_the_rotation_back() {
+        let mut random = Random::new(3);
+        for _ in 0..200 {
+            let rotation = Mat3::from_axis_angle(random.direction(), random.uniform(-3.2, 3.2));
+            let [w, x, y, z] = quaternion(&rotation);
+            let back = Mat3::from_quaternion([x, y, z, w]);
+            let off = (back - rotation).0.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+            assert!(off < 1e-14, "{off}");
+        }
+    }
+}
