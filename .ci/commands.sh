@@ -31,6 +31,10 @@ run 0 "$dynident" inspect "$out/slip.urdf" --fix "$out/mended.urdf"
 run 0 cmp "$out/mended.urdf" robots/iiwa14.urdf
 run 0 "$dynident" identify examples/ur10_simulated.toml --out "$out/result"
 run 0 "$dynident" validate "$out/result/result.json" --study examples/ur10_simulated.toml
+for form in c cpp rust python matlab mjcf urdf; do
+    run 0 "$dynident" export "$out/result/result.json" --study examples/ur10_simulated.toml --to "$form" --out "$out/exported.$form"
+done
+run 0 "$venv/bin/python" .ci/export.py "$dynident" "$out/result/result.json" examples/ur10_simulated.toml "$out/export"
 run 0 "$examples/simulate_ur10" "$out/ur10_simulated"
 
 # A designed motion, looked at again, and its torques.

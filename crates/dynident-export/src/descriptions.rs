@@ -24,15 +24,14 @@ pub(crate) fn mjcf(robot: &RobotModel, mut notes: Vec<String>) -> Result<Exporte
     let [gx, gy, gz] = model.gravity().0;
     let mut text = format!(
         "<mujoco model=\"{}\">\n{}  <compiler angle=\"radian\" autolimits=\"true\"/>\n  <option gravity=\"{gx:?} {gy:?} {gz:?}\"/>\n  \
-         <worldbody>\n    <body name=\"{}\">\n",
+         <worldbody>\n",
         attribute(model.name()),
-        comment(&notes),
-        attribute(model.base().name())
+        comment(&notes)
     );
     for joint in (0..dof).filter(|&joint| model.joints()[joint].parent.is_none()) {
-        write_body(&mut text, robot, joint, (&friction, &rotors), 3)?;
+        write_body(&mut text, robot, joint, (&friction, &rotors), 2)?;
     }
-    text += "    </body>\n  </worldbody>\n  <actuator>\n";
+    text += "  </worldbody>\n  <actuator>\n";
     for joint in model.joints() {
         let range = joint.limits.effort.filter(|effort| *effort > 0.0);
         let range = range.map_or(String::new(), |effort| format!(" ctrlrange=\"{:?} {effort:?}\"", -effort));
@@ -129,7 +128,7 @@ fn write_body(
     let model = robot.model();
     let (joint, body) = (&model.joints()[index], &model.bodies()[index]);
     let pad = "  ".repeat(depth);
-    let _ = writeln!(text, "{pad}<body name=\"{}\"{}>", attribute(body.name()), placement(&joint.placement));
+    let _ = writeln!(text, "{pad}<body name=\"{}\"{}>", body_name(body.name()), placement(&joint.placement));
     let _ = writeln!(text, "{pad}  {}", inertial(model, index, body)?);
     let kind = if joint.turns() { "hinge" } else { "slide" };
     let limits = joint.limits.lower.zip(joint.limits.upper).filter(|(lower, upper)| lower < upper);
@@ -144,13 +143,18 @@ fn write_body(
         found.coulomb
     );
     for link in &body.links[1..] {
-        let _ = writeln!(text, "{pad}  <body name=\"{}\"{}/>", attribute(&link.name), placement(&link.placement));
+        let _ = writeln!(text, "{pad}  <body name=\"{}\"{}/>", body_name(&link.name), placement(&link.placement));
     }
     for child in (index + 1..model.dof()).filter(|&child| model.joints()[child].parent == Some(index)) {
         write_body(text, robot, child, (friction, rotors), depth + 1)?;
     }
     let _ = writeln!(text, "{pad}</body>");
     Ok(())
+}
+
+/// A link's name, unless it is the one that MuJoCo keeps for what does not move.
+fn body_name(link: &str) -> String {
+    if link == "world" { "world_link".to_owned() } else { attribute(link) }
 }
 
 /// Mass, centre of mass and inertia about it, which MuJoCo reads only of a body that can be real.
