@@ -5,9 +5,10 @@ use crate::error::ExportError;
 use crate::exported::Exported;
 use crate::nearest_friction::NearestFriction;
 use crate::robot_model::RobotModel;
+use crate::rotation::quaternion;
 use core::fmt::Write;
 use dynident_model::terms::{CouplingEffect, TorqueTerm};
-use dynident_model::{Body, Joint, Mat3, Model, STANDARD_GRAVITY, Transform, write_urdf};
+use dynident_model::{Body, Joint, Model, STANDARD_GRAVITY, Transform, write_urdf};
 
 /// Friction errors below this share of the friction are not worth a sentence: a law that is one of the simulator's own
 /// leaves rounding, a narrow smooth step in place of a sign some thousandth.
@@ -183,27 +184,6 @@ fn placement(placement: &Transform) -> String {
     format!(" pos=\"{x:?} {y:?} {z:?}\" quat=\"{a:?} {b:?} {c:?} {d:?}\"")
 }
 
-/// The unit quaternion w x y z of a rotation, by its largest entry (Shepperd 1978).
-fn quaternion(r: &Mat3) -> [f64; 4] {
-    let m = &r.0;
-    let trace = m[0][0] + m[1][1] + m[2][2];
-    let squares = [trace, m[0][0], m[1][1], m[2][2]];
-    let largest = (1..4).fold(0, |best, k| if squares[k] > squares[best] { k } else { best });
-    let q = match largest {
-        0 => [1.0 + trace, m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]],
-        k => {
-            let (i, j, l) = (k - 1, k % 3, (k + 1) % 3);
-            let mut q = [m[l][j] - m[j][l], 0.0, 0.0, 0.0];
-            q[1 + i] = 1.0 + m[i][i] - m[j][j] - m[l][l];
-            q[1 + j] = m[i][j] + m[j][i];
-            q[1 + l] = m[i][l] + m[l][i];
-            q
-        }
-    };
-    let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
-    q.map(|x| x / norm)
-}
-
 /// Notes as a comment of XML, in which two hyphens may not stand.
 fn comment(notes: &[String]) -> String {
     if notes.is_empty() {
@@ -218,22 +198,4 @@ fn comment(notes: &[String]) -> String {
 fn attribute(name: &str) -> String {
     let plain: String = name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     plain.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use dynident_model::sample::Random;
-
-    #[test]
-    fn quaternions_give_the_rotation_back() {
-        let mut random = Random::new(3);
-        for _ in 0..200 {
-            let rotation = Mat3::from_axis_angle(random.direction(), random.uniform(-3.2, 3.2));
-            let [w, x, y, z] = quaternion(&rotation);
-            let back = Mat3::from_quaternion([x, y, z, w]);
-            let off = (back - rotation).0.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
-            assert!(off < 1e-14, "{off}");
-        }
-    }
 }

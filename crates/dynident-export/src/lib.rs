@@ -14,6 +14,8 @@
 //! | [`Target::Matlab`] | one function file for MATLAB and Octave |
 //! | [`Target::Mjcf`], [`Target::Urdf`] | descriptions for simulators, with the nearest friction that they know |
 //!
+//! A payload by itself becomes the command of a controller: [`payload_command`].
+//!
 //! Functions: `inverse_dynamics`, `gravity`, `coriolis`, `friction` (with constant offsets), `mass_matrix` (with the
 //! inertia of drives) and `forward_dynamics`, so that `inverse_dynamics = mass_matrix · ddq + coriolis + gravity +
 //! friction`.
@@ -28,7 +30,9 @@ mod exported;
 mod graph;
 mod languages;
 mod nearest_friction;
+mod payload;
 mod robot_model;
+mod rotation;
 mod statements;
 mod symbol;
 mod target;
@@ -36,6 +40,7 @@ mod target;
 pub use error::ExportError;
 pub use exported::Exported;
 pub use nearest_friction::NearestFriction;
+pub use payload::{PayloadBody, PayloadReader, payload_command};
 pub use robot_model::RobotModel;
 pub use target::{Target, export};
 

@@ -3,9 +3,9 @@
 use super::{Context, json, known_in, message_of};
 use crate::{Verdict, terminal};
 use clap::ValueEnum;
-use dynident::export::{Exported, Target};
+use dynident::export::{Exported, PayloadReader, Target};
 use dynident::result::{EXPORT_SCHEMA, ExportFile};
-use dynident::{Study, export_model, study_inputs};
+use dynident::{Study, export_model, export_payload, study_inputs};
 use std::path::PathBuf;
 
 /// Options of `export`.
@@ -13,12 +13,15 @@ use std::path::PathBuf;
 pub(crate) struct Options {
     /// The result.json of an identification.
     result: PathBuf,
-    /// The study that it was made with.
+    /// The study that it was made with; a payload needs none.
     #[arg(long, value_name = "STUDY.toml")]
-    study: PathBuf,
+    study: Option<PathBuf>,
     /// The form.
     #[arg(long, value_enum, value_name = "FORM")]
     to: Form,
+    /// Which payload, where the result has several.
+    #[arg(long, value_name = "NAME")]
+    payload: Option<String>,
     /// Write to this file instead of standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -43,27 +46,54 @@ enum Form {
     Mjcf,
     /// URDF.
     Urdf,
+    /// A payload for Universal Robots: a line of URScript.
+    PayloadUr,
+    /// A payload for Franka: JSON.
+    PayloadFranka,
+    /// A payload for KUKA: LOAD_DATA of KRL.
+    PayloadKuka,
+    /// A payload for ABB: loaddata of RAPID.
+    PayloadAbb,
+}
+
+impl Form {
+    /// What is written: the model, or a payload.
+    fn kind(self) -> Result<Target, PayloadReader> {
+        match self {
+            Self::C => Ok(Target::C),
+            Self::Cpp => Ok(Target::Cpp),
+            Self::Rust => Ok(Target::Rust),
+            Self::Python => Ok(Target::Python),
+            Self::Matlab => Ok(Target::Matlab),
+            Self::Mjcf => Ok(Target::Mjcf),
+            Self::Urdf => Ok(Target::Urdf),
+            Self::PayloadUr => Err(PayloadReader::UniversalRobots),
+            Self::PayloadFranka => Err(PayloadReader::Franka),
+            Self::PayloadKuka => Err(PayloadReader::Kuka),
+            Self::PayloadAbb => Err(PayloadReader::Abb),
+        }
+    }
 }
 
 pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
-    let study = Study::load(&options.study).map_err(message_of)?;
     let data = options.data.as_deref();
+    let study = options.study.as_deref().map(|path| Study::load(path).map(|study| (study, path)));
+    let study = study.transpose().map_err(message_of)?;
     if let Some(out) = &options.out {
-        let mut inputs = study_inputs(&study, &options.study, data, &["robot", "log"]);
+        let named = study.as_ref().map(|(study, path)| study_inputs(study, path, data, &["robot", "log"]));
+        let mut inputs = named.unwrap_or_default();
         inputs.push(options.result.clone());
         dynident::refuse_overwriting(core::slice::from_ref(out), &inputs).map_err(message_of)?;
     }
-    let target = match options.to {
-        Form::C => Target::C,
-        Form::Cpp => Target::Cpp,
-        Form::Rust => Target::Rust,
-        Form::Python => Target::Python,
-        Form::Matlab => Target::Matlab,
-        Form::Mjcf => Target::Mjcf,
-        Form::Urdf => Target::Urdf,
+    let exported = match options.to.kind() {
+        Ok(target) => {
+            let Some((study, path)) = &study else {
+                return Err("--study STUDY.toml is missing: name the study that the result was made with".to_owned());
+            };
+            export_model(&options.result, (study, path), data, target).map_err(known_in(path))?
+        }
+        Err(reader) => export_payload(&options.result, options.payload.as_deref(), reader).map_err(message_of)?,
     };
-    let exported =
-        export_model(&options.result, (&study, &options.study), data, target).map_err(known_in(&options.study))?;
     write(options, context, exported)
 }
 

@@ -152,3 +152,36 @@ fn accelerations_are_those_of_articulated_bodies() {
         assert!(largest < 1e-9, "{largest}");
     }
 }
+
+#[test]
+fn octave_computes_what_the_core_computes() {
+    if !has("octave-cli") {
+        println!("skipped: there is no `octave-cli`");
+        return;
+    }
+    // Octave takes milliseconds a state, so the tree alone: it has every term and a joint that slides.
+    let robot = tree();
+    let (name, dof) = (robot.identifier(), robot.model().dof());
+    let calls: String = FUNCTIONS
+        .iter()
+        .map(|(function, inputs)| {
+            // Rows of a matrix follow each other.
+            format!("  fprintf('%.17g ', {name}_dynamics('{function}', {}).');\n", inputs.join(", "))
+        })
+        .collect();
+    let parts = ["q", "dq", "ddq", "tau"].iter().enumerate();
+    let parts: String = parts.map(|(k, part)| format!("  {part} = v({}:{});\n", k * dof + 1, (k + 1) * dof)).collect();
+    let program = format!(
+        "while true\n  line = fgetl(stdin);\n  if ~ischar(line), break; end\n  v = sscanf(line, '%f');\n{parts}{calls}  fprintf('\\n');\nend\n"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let text = export(&robot, Target::Matlab, &[]).unwrap().text;
+    std::fs::write(folder.path().join(format!("{name}_dynamics.m")), text).unwrap();
+    std::fs::write(folder.path().join("run_states.m"), program).unwrap();
+    let mut octave = Command::new("octave-cli");
+    compare(
+        octave.args(["--quiet", "--no-init-file", "run_states.m"]).current_dir(folder.path()),
+        &robot,
+        &expected(&robot),
+    );
+}

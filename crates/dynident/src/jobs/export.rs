@@ -3,8 +3,8 @@
 use crate::error::Error;
 use crate::result::ResultFile;
 use crate::study::{Folders, Study, StudyRobot};
-use dynident_export::{ExportError, Exported, RobotModel, Target, export};
-use dynident_model::InertialParameters;
+use dynident_export::{ExportError, Exported, PayloadBody, PayloadReader, RobotModel, Target, export, payload_command};
+use dynident_model::{InertialParameters, Mat3, Vec3};
 use std::path::Path;
 
 /// Writes the model of a `result.json` in the form `target`: bodies, friction and drives as `identified.urdf` has
@@ -22,9 +22,7 @@ pub fn export_model(
     let stored = ResultFile::read(result_path)?;
     let robot = robot_model(&stored, result_path, (study, study_path), data)?;
     let cannot = |source: ExportError| Error::Export { path: result_path.to_owned(), source: Box::new(source) };
-    let mut exported = export(&robot, target, &reservations(&stored)).map_err(cannot)?;
-    exported.notes.dedup();
-    Ok(exported)
+    export(&robot, target, &reservations(&stored)).map_err(cannot)
 }
 
 /// What a user of the model has to know of the result.
@@ -72,4 +70,39 @@ fn robot_model(
     let values = robot.terms().iter().map(|term| value(term.symbol())).collect::<Result<_, _>>()?;
     let made = RobotModel::new(model, robot.terms().to_vec(), values);
     made.map_err(|source| Error::Export { path: path.to_owned(), source: Box::new(source) })
+}
+
+/// The payload called `name` of a `result.json` (where it has one only, `name` may be none) as the command by which the
+/// controller of `reader` takes it: the body that it may be, in the frame of the link that carries it.
+///
+/// # Errors
+/// A result without payloads or without this one, a payload without a body that can be real.
+pub fn export_payload(result_path: &Path, name: Option<&str>, reader: PayloadReader) -> Result<Exported, Error> {
+    let stored = ResultFile::read(result_path)?;
+    let wrong = |message: String| Error::Result { path: result_path.to_owned(), message };
+    let names = stored.payloads.iter().map(|payload| format!("`{}`", payload.name)).collect::<Vec<_>>().join(", ");
+    let found = match (name, &stored.payloads[..]) {
+        (_, []) => return Err(wrong("no payload was estimated: add [[payload]] to the study".to_owned())),
+        (None, [only]) => only,
+        (None, _) => return Err(wrong(format!("has the payloads {names}: name one with --payload"))),
+        (Some(name), all) => (all.iter().find(|payload| payload.name == name))
+            .ok_or_else(|| wrong(format!("no payload `{name}`; it has {names}")))?,
+    };
+    let none = || {
+        let why = found.failure.as_deref().unwrap_or("its mass is zero");
+        wrong(format!("payload `{}` has no body that can be real: {why}", found.name))
+    };
+    let body = found.possible.as_ref().ok_or_else(none)?;
+    let [xx, xy, xz, yy, yz, zz] = body.inertia_at_com_kgm2;
+    let inertia = Mat3([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]);
+    let inertial = InertialParameters::from_centre_of_mass(body.mass_kg, Vec3(body.com_m), &inertia);
+    let text = payload_command(&PayloadBody { name: found.name.clone(), inertial }, reader).ok_or_else(none)?;
+    let mut notes =
+        vec![format!("In the frame of the link {}: it has to be the frame that the controller means.", found.link)];
+    if let Some(mass) = &found.mass_kg {
+        notes.push(format!("Mass {:.4} ± {:.4} kg (95 %).", mass.value, mass.half_width_95));
+    }
+    notes.extend(found.not_identified.iter().map(|what| format!("Not measured: {what}")));
+    notes.extend(stored.problems.iter().map(|problem| format!("The result has a PROBLEM: {problem}")));
+    Ok(Exported { text, notes })
 }
