@@ -42,9 +42,11 @@ def compiled(header, prefix, dof, folder):
     for name, inputs in FUNCTIONS.items():
         arguments = ", ".join(f"const double *{vector}" for vector in inputs)
         calls.append(f"void call_{name}({arguments}, double *out) {{ {prefix}_{name}({', '.join(inputs)}, out); }}")
+    # By a pointer that the compiler cannot see through: what does not change would be taken out of the loop.
     calls.append(
+        "static void (*volatile called)(const double *, const double *, const double *, double *) = call_inverse_dynamics;\n"
         "void repeat(long n, const double *q, const double *dq, double *ddq, double *out) {"
-        f" for (long k = 0; k < n; k++) {{ {prefix}_inverse_dynamics(q, dq, ddq, out); ddq[0] += 1e-30 * out[0]; }} }}"
+        " for (long k = 0; k < n; k++) { called(q, dq, ddq, out); ddq[0] += 1e-30 * out[0]; } }"
     )
     (folder / "calls.c").write_text(f'#include "{header.name}"\n' + "\n".join(calls) + "\n")
     library = folder / "calls.so"

@@ -111,7 +111,9 @@ fn write(options: &Options, context: &Context, exported: Exported) -> Result<Ver
         terminal::print(&json(&ExportFile { schema, target, notes, file, text })?)?;
         return Ok(Verdict::Good);
     }
-    notes.iter().for_each(|note| terminal::remark(note));
+    // A problem of the result is said to whoever asks for quiet as well.
+    let said = notes.iter().filter(|note| !context.quiet || note.contains("PROBLEM"));
+    said.for_each(|note| terminal::remark(note));
     if options.out.is_none() {
         terminal::print(text.trim_end())?;
     }

@@ -8,6 +8,7 @@ mod design;
 mod design_check;
 mod design_paper;
 mod evaluation;
+mod export;
 mod files;
 mod iterate;
 mod reproduce;

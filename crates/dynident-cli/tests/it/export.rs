@@ -1,0 +1,101 @@
+//! `dynident export`: files, refusals, JSON; what is written is proved in `dynident-export`.
+
+use super::common::{CommandOutcome, broken, run_in};
+use serde_json::{Value, json};
+use std::path::Path;
+
+const FORMS: [(&str, &str); 7] = [
+    ("c", "arm_inverse_dynamics(const double q[2]"),
+    ("cpp", "inline Vector inverse_dynamics(const Vector& q"),
+    ("rust", "pub fn inverse_dynamics<M: Math>(q: &[f64; 2]"),
+    ("python", "def inverse_dynamics(q, dq, ddq):"),
+    ("matlab", "case 'inverse_dynamics'"),
+    ("mjcf", "<mujoco model=\"arm\">"),
+    ("urdf", "<robot name=\"arm\">"),
+];
+
+/// A folder with the fixture's study and the result of it.
+fn identified() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["arm.urdf", "log.csv", "good.toml"] {
+        std::fs::copy(broken().join(name), folder.path().join(name)).unwrap();
+    }
+    // The fixture is short and may have a PROBLEM: its result is there all the same.
+    run_in(folder.path(), &["identify", "good.toml", "--out", "r"]);
+    folder
+}
+
+fn export(folder: &Path, more: &[&str]) -> CommandOutcome {
+    run_in(folder, &[&["export", "r/result.json", "--study", "good.toml", "--to"], more].concat())
+}
+
+#[test]
+fn every_form_is_written() {
+    let folder = identified();
+    let at = folder.path();
+    for (form, holds) in FORMS {
+        let printed = export(at, &[form]);
+        assert_eq!(printed.status, 0, "{form}: {}", printed.stderr);
+        assert!(printed.stdout.contains(holds), "{form}: {}", printed.stdout);
+        let told = export(at, &[form, "--out", "robot.txt", "--json"]);
+        let told: Value = serde_json::from_str(&told.stdout).unwrap();
+        assert_eq!((&told["schema"], &told["target"]), (&json!("dynident/export/1"), &json!(form)));
+        assert_eq!((&told["file"], told.get("text")), (&json!("robot.txt"), None));
+        let written = std::fs::read_to_string(at.join("robot.txt")).unwrap();
+        assert_eq!(written.trim_end(), printed.stdout.trim_end(), "{form}");
+        for note in told["notes"].as_array().unwrap() {
+            assert!(printed.stderr.contains(note.as_str().unwrap()), "{form}: {note}");
+        }
+    }
+}
+
+#[test]
+fn what_does_not_belong_together_is_refused() {
+    let folder = identified();
+    let at = folder.path();
+    let refused = |outcome: CommandOutcome, says: &str| {
+        assert_eq!(outcome.status, 2, "{}", outcome.stderr);
+        assert!(outcome.stderr.contains(says), "{}", outcome.stderr);
+        assert_eq!(outcome.stdout, "");
+    };
+    refused(run_in(at, &["export", "r/result.json", "--to", "c"]), "--study STUDY.toml is missing");
+    refused(export(at, &["c", "--out", "arm.urdf"]), "arm.urdf");
+    refused(export(at, &["c", "--out", "r/result.json"]), "result.json");
+    refused(export(at, &["payload-ur"]), "no payload was estimated: add [[payload]] to the study");
+    refused(run_in(at, &["export", "good.toml", "--study", "good.toml", "--to", "c"]), "not a result");
+
+    let result = std::fs::read_to_string(at.join("r/result.json")).unwrap();
+    let mut other: Value = serde_json::from_str(&result).unwrap();
+    other["bodies"][1]["name"] = json!("hand");
+    std::fs::write(at.join("r/result.json"), other.to_string()).unwrap();
+    refused(export(at, &["c"]), "use the study that the result was made with");
+}
+
+#[test]
+fn a_payload_becomes_a_command() {
+    let folder = identified();
+    let at = folder.path();
+    let path = at.join("r/result.json");
+    let mut result: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    let possible = json!({
+        "mass_kg": 2.0, "com_m": [0.0, 0.0, 0.125], "inertia_at_com_kgm2": [0.25, 0.0, 0.0, 0.25, 0.0, 0.25],
+        "moved_sigma": 0.0, "on_the_boundary": false
+    });
+    let payload = |name: &str, possible: &Value| {
+        json!({
+            "name": name, "link": "tool0", "logs": [], "parameters": [], "mass_kg": null, "com_m": [null, null, null],
+            "inertia_at_com_kgm2": [null, null, null, null, null, null], "not_identified": ["Ixx"],
+            "possible": possible, "failure": "none fits", "base_parameters_added": []
+        })
+    };
+    result["payloads"] = json!([payload("box", &possible), payload("ghost", &Value::Null)]);
+    std::fs::write(&path, result.to_string()).unwrap();
+    let export = |more: &[&str]| run_in(at, &[&["export", "r/result.json", "--to"], more].concat());
+    let found = export(&["payload-ur", "--payload", "box"]);
+    assert_eq!(found.stdout.trim(), "set_target_payload(2.0, [0.0, 0.0, 0.125], [0.25, 0.25, 0.25, 0.0, 0.0, 0.0])");
+    assert!(found.stderr.contains("link tool0") && found.stderr.contains("Not measured: Ixx"), "{}", found.stderr);
+    let several = export(&["payload-kuka"]);
+    assert!(several.status == 2 && several.stderr.contains("`box`, `ghost`"), "{}", several.stderr);
+    let none = export(&["payload-abb", "--payload", "ghost"]);
+    assert!(none.status == 2 && none.stderr.contains("no body that can be real: none fits"), "{}", none.stderr);
+}
