@@ -189,8 +189,8 @@ fn comment(notes: &[String]) -> String {
     if notes.is_empty() {
         return String::new();
     }
-    let lines: String =
-        notes.iter().map(|note| format!("    {}\n", note.replace("--", "- -").replace(['\n', '\r'], " "))).collect();
+    let line = |note: &String| format!("    {}\n", note.replace("--", "- -").replace(['\n', '\r'], " "));
+    let lines = notes.iter().map(line).collect::<Vec<_>>().concat();
     format!("  <!--\n{lines}  -->\n")
 }
 

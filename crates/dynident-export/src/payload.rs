@@ -29,8 +29,8 @@ pub struct PayloadBody {
 /// The command, declaration or JSON that tells a controller of the payload. None for a body without mass.
 ///
 /// Units and axes are the reader's: UR and Franka take the inertia about the centre of mass in kg m² along the axes of
-/// the flange (UR in the order xx, yy, zz, xy, xz, yz; Franka all nine); KUKA and ABB take principal moments, the centre
-/// of mass in mm, and the principal axes, as angles A, B, C in degrees about Z, Y', X'' (KUKA) or as a quaternion (ABB).
+/// the flange (UR in the order xx, yy, zz, xy, xz, yz; Franka all nine); KUKA and ABB take the centre of mass in mm,
+/// principal moments, and their axes, as angles A, B, C in degrees about Z, Y', X'' (KUKA) or a quaternion (ABB).
 pub fn payload_command(payload: &PayloadBody, reader: PayloadReader) -> Option<String> {
     let (mass, com) = (payload.inertial.mass_kg(), payload.inertial.com_m()?.0);
     let i = payload.inertial.inertia_at_com()?.0;

@@ -142,7 +142,10 @@ pub(crate) fn expected(robot: &RobotModel) -> Vec<Expected> {
             let (q, mut dq, ddq) = (vector(3.0), vector(2.0), vector(8.0));
             if state % 10 == 0 {
                 // Rest, and inside of dead bands.
-                dq.iter_mut().for_each(|dq| *dq *= if state % 20 == 0 { 0.0 } else { 0.005 });
+                let share = if state % 20 == 0 { 0.0 } else { 0.005 };
+                for dq in &mut dq {
+                    *dq *= share;
+                }
             }
             let rigid = inverse_dynamics(model, &mut workspace, &q, &dq, &ddq).to_vec();
             let gravity = gravity_torque(model, &mut workspace, &q).to_vec();

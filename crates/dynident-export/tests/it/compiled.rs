@@ -1,6 +1,7 @@
 //! What is written, compiled with warnings as errors and run at a thousand states.
 
 use super::common::{all_terms, compare, expected, has, rigid_accelerations, tree};
+use core::fmt::Write;
 use dynident_export::{RobotModel, Target, export};
 use std::path::Path;
 use std::process::Command;
@@ -40,8 +41,9 @@ fn c_computes_what_the_core_computes() {
         let mut calls = String::new();
         for (function, inputs) in FUNCTIONS {
             let length = if function == "mass_matrix" { dof * dof } else { dof };
-            calls += &format!(
-                "    {{ double out[{length}]; {name}_{function}({}, out); for (int k = 0; k < {length}; k++) printf(\"%.17g \", out[k]); }}\n",
+            let _ = writeln!(
+                calls,
+                "    {{ double out[{length}]; {name}_{function}({}, out); for (int k = 0; k < {length}; k++) printf(\"%.17g \", out[k]); }}",
                 inputs.join(", ")
             );
         }
@@ -76,7 +78,7 @@ fn cpp_computes_what_the_core_computes() {
     }
     for robot in robots() {
         let (name, dof) = (robot.identifier(), robot.model().dof());
-        let calls: String = FUNCTIONS
+        let calls: Vec<String> = FUNCTIONS
             .iter()
             .map(|(function, inputs)| {
                 format!(
@@ -85,6 +87,7 @@ fn cpp_computes_what_the_core_computes() {
                 )
             })
             .collect();
+        let calls = calls.concat();
         let program = format!(
             "#include <cstdio>\n#include \"robot.hpp\"\nint main() {{\n  {name}_dynamics::Vector q, dq, ddq, tau;\n  for (;;) {{\n    \
              for (auto v : {{&q, &dq, &ddq, &tau}}) for (std::size_t k = 0; k < {dof}; k++) if (std::scanf(\"%lf\", &(*v)[k]) != 1) return 0;\n\
@@ -107,7 +110,7 @@ fn rust_computes_what_the_core_computes() {
     }
     for robot in robots() {
         let dof = robot.model().dof();
-        let calls: String = FUNCTIONS
+        let calls: Vec<String> = FUNCTIONS
             .iter()
             .map(|(function, inputs)| {
                 let inputs: Vec<String> = inputs.iter().map(|input| format!("&{input}")).collect();
@@ -117,6 +120,7 @@ fn rust_computes_what_the_core_computes() {
                 )
             })
             .collect();
+        let calls = calls.concat();
         let program = format!(
             "mod robot;\nstruct Std;\nimpl robot::Math for Std {{\n    fn sin(x: f64) -> f64 {{ x.sin() }}\n    fn cos(x: f64) -> f64 {{ x.cos() }}\n    \
              fn tanh(x: f64) -> f64 {{ x.tanh() }}\n    fn exp(x: f64) -> f64 {{ x.exp() }}\n    fn powf(x: f64, exponent: f64) -> f64 {{ x.powf(exponent) }}\n}}\n\
@@ -162,7 +166,7 @@ fn octave_computes_what_the_core_computes() {
     // Octave takes milliseconds a state, so the tree alone: it has every term and a joint that slides.
     let robot = tree();
     let (name, dof) = (robot.identifier(), robot.model().dof());
-    let calls: String = FUNCTIONS
+    let calls: Vec<String> = FUNCTIONS
         .iter()
         .map(|(function, inputs)| {
             // Rows of a matrix follow each other.
@@ -170,7 +174,9 @@ fn octave_computes_what_the_core_computes() {
         })
         .collect();
     let parts = ["q", "dq", "ddq", "tau"].iter().enumerate();
-    let parts: String = parts.map(|(k, part)| format!("  {part} = v({}:{});\n", k * dof + 1, (k + 1) * dof)).collect();
+    let parts: Vec<String> =
+        parts.map(|(k, part)| format!("  {part} = v({}:{});\n", k * dof + 1, (k + 1) * dof)).collect();
+    let (parts, calls) = (parts.concat(), calls.concat());
     let program = format!(
         "while true\n  line = fgetl(stdin);\n  if ~ischar(line), break; end\n  v = sscanf(line, '%f');\n{parts}{calls}  fprintf('\\n');\nend\n"
     );
