@@ -7,8 +7,8 @@
 use dynident::iteration::{RUN_SCHEMA, RunFile};
 use dynident::result::{
     CHECK_SCHEMA, CheckFile, DESIGN_SCHEMA, DesignFile, EVALUATION_SCHEMA, EvaluationFile, INSPECTION_SCHEMA,
-    ITERATIONS_SCHEMA, Inspection, IterationsFile, RESULT_SCHEMA, ResultFile, SIMULATION_SCHEMA, SimulationFile,
-    VALIDATION_SCHEMA, ValidationFile,
+    ITERATIONS_SCHEMA, Inspection, IterationsFile, LOG_SCHEMA, LogContents, RESULT_SCHEMA, ResultFile,
+    SIMULATION_SCHEMA, SimulationFile, VALIDATION_SCHEMA, ValidationFile,
 };
 use dynident_benchmark::accuracy::{BENCHMARK_SCHEMA, BenchmarkFile};
 use dynident_paper::{PAPER_SCHEMA, PaperFile};
@@ -29,6 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         (EVALUATION_SCHEMA, written::<EvaluationFile>()),
         (INSPECTION_SCHEMA, written::<Inspection>()),
         (ITERATIONS_SCHEMA, written::<IterationsFile>()),
+        (LOG_SCHEMA, written::<LogContents>()),
         (PAPER_SCHEMA, written::<PaperFile>()),
         (RESULT_SCHEMA, written::<ResultFile>()),
         (RUN_SCHEMA, written::<RunFile>()),

@@ -39,13 +39,15 @@ impl Array {
     }
 }
 
-/// The samples' length: that which most numbers share, the longer one of two with equally many.
+/// The samples' length: the longest side that arrays with half of all numbers share.
 fn length(arrays: &[Array]) -> usize {
     let numbers = |length: usize| -> usize {
         arrays.iter().filter(|array| array.shape.contains(&length)).map(|array| array.values.len()).sum()
     };
-    let sides = arrays.iter().flat_map(|array| array.shape).filter(|side| *side > 1);
-    sides.max_by_key(|side| (numbers(*side), *side)).unwrap_or(1)
+    let all: usize = arrays.iter().map(|array| array.values.len()).sum();
+    let sides = || arrays.iter().flat_map(|array| array.shape);
+    let shared = sides().filter(|side| 2 * numbers(*side) >= all).max();
+    shared.or_else(|| sides().max_by_key(|side| (numbers(*side), *side))).unwrap_or(0)
 }
 
 /// Arrays as columns: a vector by its name, a matrix by name and 0-based index, `q[0]`, whichever of its sides the
@@ -59,6 +61,7 @@ pub(crate) struct ArrayTable {
     wanted: Vec<usize>,
     rows: usize,
     next: usize,
+    notes: Vec<String>,
 }
 
 impl ArrayTable {
@@ -82,7 +85,18 @@ impl ArrayTable {
             }
         }
         let wanted = (0..columns.len()).collect();
-        (!columns.is_empty()).then_some(Self { arrays, names: Some(names), columns, wanted, rows, next: 0 })
+        let used: Vec<usize> = columns.iter().map(|column| column[0]).collect();
+        let left_out = arrays.iter().enumerate().filter(|(index, _)| !used.contains(index));
+        let notes = left_out
+            .map(|(_, array)| format!("{}: {} x {}, not of {rows} rows", array.name, array.shape[0], array.shape[1]))
+            .collect();
+        (!columns.is_empty()).then_some(Self { arrays, names: Some(names), columns, wanted, rows, next: 0, notes })
+    }
+
+    /// The same, with notes on what else the file holds.
+    pub(crate) fn with_notes(mut self, notes: Vec<String>) -> Self {
+        self.notes.extend(notes);
+        self
     }
 
     /// The same with columns that have indices only.
@@ -120,6 +134,10 @@ impl Table for ArrayTable {
     fn skip_row(&mut self) -> Result<bool, FileError> {
         self.next += 1;
         Ok(self.next <= self.rows)
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
     }
 
     fn estimated_rows(&self) -> Option<u64> {

@@ -16,8 +16,9 @@ pub(crate) use reading::open;
 mod reading {
     use super::{FileError, Path, Table};
     use crate::arrays::{Array, ArrayTable};
+    use crate::error::visible;
     use crate::kind::FileFormat;
-    use hdf5_pure::{DType, File, Group};
+    use hdf5_pure::{DType, Dataset, File, Group};
 
     /// Groups in groups.
     const DEEPEST: usize = 8;
@@ -38,7 +39,7 @@ mod reading {
             let fix = "save vectors or matrices of real numbers";
             FileError::no_columns(path, FileFormat::Hdf5, others, fix)
         })?;
-        Ok(Box::new(table))
+        Ok(Box::new(table.with_notes(found.others)))
     }
 
     struct Found<'a> {
@@ -64,38 +65,15 @@ mod reading {
                 }
                 self.sets += 1;
                 let place = name(&own);
-                let set = group.dataset(&own).map_err(|error| self.broken(&place, &error))?;
-                let numeric = matches!(
-                    set.dtype().map_err(|error| self.broken(&place, &error))?,
-                    DType::F32
-                        | DType::F64
-                        | DType::I8
-                        | DType::I16
-                        | DType::I32
-                        | DType::I64
-                        | DType::U8
-                        | DType::U16
-                        | DType::U32
-                        | DType::U64
-                );
-                let shape = set.shape().map_err(|error| self.broken(&place, &error))?;
-                let sides: Option<Vec<usize>> = shape.iter().map(|side| usize::try_from(*side).ok()).collect();
-                let numbers = shape.iter().try_fold(1_u64, |all, side| all.checked_mul(*side));
-                let (Some(sides), Some(numbers)) = (sides.and_then(|sides| Array::two_sides(&sides)), numbers) else {
-                    self.others.push(place);
-                    continue;
-                };
-                if !numeric || numbers > self.left {
-                    self.others.push(place);
-                    continue;
+                // One that cannot be read leaves the others readable.
+                let read = group.dataset(&own).map_err(|error| error.to_string());
+                match read.and_then(|set| array(&set, &place, self.left)) {
+                    Ok(array) => {
+                        self.left -= array.values.len() as u64;
+                        self.arrays.push(array);
+                    }
+                    Err(problem) => self.others.push(visible(&format!("{place}: {problem}"))),
                 }
-                self.left -= numbers;
-                let values = set.read_f64().map_err(|error| self.broken(&place, &error))?;
-                if values.len() != sides[0] * sides[1] {
-                    self.others.push(place);
-                    continue;
-                }
-                self.arrays.push(Array::row_major(place, sides, values));
             }
             if depth < DEEPEST {
                 for own in group.groups().map_err(|error| self.broken(at, &error))? {
@@ -109,5 +87,38 @@ mod reading {
             }
             Ok(())
         }
+    }
+
+    /// The numbers of a data set.
+    fn array(set: &Dataset, place: &str, most: u64) -> Result<Array, String> {
+        let text = |error: hdf5_pure::Error| error.to_string();
+        let kind = set.dtype().map_err(text)?;
+        if !matches!(
+            kind,
+            DType::F32
+                | DType::F64
+                | DType::I8
+                | DType::I16
+                | DType::I32
+                | DType::I64
+                | DType::U8
+                | DType::U16
+                | DType::U32
+                | DType::U64
+        ) {
+            return Err("no numbers".to_owned());
+        }
+        let shape = set.shape().map_err(text)?;
+        let sides: Option<Vec<usize>> = shape.iter().map(|side| usize::try_from(*side).ok()).collect();
+        let sides = sides.and_then(|sides| Array::two_sides(&sides)).ok_or("more than two sides")?;
+        let numbers = shape.iter().try_fold(1_u64, |all, side| all.checked_mul(*side));
+        if numbers.is_none_or(|numbers| numbers > most) {
+            return Err("more than 2 GiB of numbers".to_owned());
+        }
+        let values = set.read_f64().map_err(text)?;
+        if values.len() != sides[0] * sides[1] {
+            return Err("another count of numbers than its sides say".to_owned());
+        }
+        Ok(Array::row_major(place.to_owned(), sides, values))
     }
 }

@@ -89,7 +89,7 @@ mod reading {
             let fix = "save vectors or matrices of real numbers (timetable: `save` its table2array)";
             FileError::no_columns(path, FileFormat::Mat5, found, fix)
         })?;
-        Ok(Box::new(table))
+        Ok(Box::new(table.with_notes(others.into_iter().map(|name| format!("{name}: no real numbers")).collect())))
     }
 
     /// Kind and bytes of the next element, which begins at a multiple of eight.

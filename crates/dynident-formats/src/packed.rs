@@ -6,7 +6,6 @@ use std::io::Read;
 use std::path::Path;
 
 /// The unpacked bytes of `reader`, several packed members after each other included.
-#[cfg_attr(not(all(feature = "gzip", feature = "zstd")), allow(unused_variables, reason = "left out of this build"))]
 pub(crate) fn unpacked(
     path: &Path,
     format: FileFormat,

@@ -8,6 +8,7 @@
 //! | look at a robot description | [`inspect()`]; undo its slips: [`mended()`] |
 //! | dynamics for a table of states | [`evaluate()`] |
 //! | the motion to record | [`design_study()`]; judge one that is there: [`check_trajectory()`], [`check_log()`] |
+//! | what a recording holds | [`log_contents()`] |
 //! | one run of a simulated robot | [`simulate_study()`] |
 //! | run, identify, run again | [`iterate_study()`] |
 //! | the sections of a study, the parts of results | [`study`], [`result`] |
@@ -65,6 +66,7 @@ pub use jobs::evaluate::{Quantity, evaluate};
 pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instruments};
 pub use jobs::inspect::{InspectSettings, MendedDescription, inspect, inspect_with, mended};
 pub use jobs::iterate::{IterationWatch, iterate_study};
+pub use jobs::log::log_contents;
 pub use jobs::options::RunOptions;
 pub use jobs::simulate::{Simulation, simulate_study};
 pub use jobs::validate::validate;

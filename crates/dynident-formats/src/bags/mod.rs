@@ -59,7 +59,7 @@ mod left_out {
     use crate::{Contents, FileError};
     use std::path::Path;
 
-    fn not_built(path: &Path) -> Result<Contents, FileError> {
+    pub(crate) fn not_built(path: &Path) -> Result<Contents, FileError> {
         Err(FileError::NotBuilt { file: path.to_owned(), format: "a recording of messages", feature: "bags" })
     }
 
