@@ -72,5 +72,7 @@ pub use jobs::simulate::{Simulation, simulate_study};
 pub use jobs::validate::validate;
 pub use output::{check_writable, write_whole};
 pub use output_set::OutputSet;
-pub use result::{CheckFile, DesignFile, Inspection, IterationsFile, ResultFile, SimulationFile, ValidationFile};
+pub use result::{
+    CheckFile, DesignFile, Inspection, IterationsFile, LogContents, ResultFile, SimulationFile, ValidationFile,
+};
 pub use study::{Folders, Study, StudyRobot};
