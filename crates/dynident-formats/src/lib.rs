@@ -45,6 +45,7 @@ mod mat;
 mod npy;
 mod packed;
 mod parquet;
+mod recognition;
 #[cfg(feature = "bags")]
 mod ros;
 mod table;
@@ -98,15 +99,15 @@ pub fn open(path: &Path) -> Result<Opened, FileError> {
     }
     let file = File::open(path).map_err(refused)?;
     let mut reader = BufReader::with_capacity(1 << 18, file);
-    let head = kind::head(&mut reader).map_err(refused)?;
-    let format = kind::recognised(path, &head)?;
+    let head = recognition::head(&mut reader).map_err(refused)?;
+    let format = recognition::recognised(path, &head)?;
     let contents = match format {
         FileFormat::Text => Contents::Text(Box::new(reader)),
         FileFormat::GzipText | FileFormat::ZstdText => {
             let unpacked = packed::unpacked(path, format, reader)?;
             let mut reader = BufReader::with_capacity(1 << 18, unpacked);
-            let inner = kind::head(&mut reader).map_err(refused)?;
-            match kind::recognised(path, &inner)? {
+            let inner = recognition::head(&mut reader).map_err(refused)?;
+            match recognition::recognised(path, &inner)? {
                 FileFormat::Text => Contents::Text(Box::new(reader)),
                 FileFormat::JsonLines => Contents::Table(json_lines::open(path, Box::new(reader))?),
                 other => {

@@ -90,6 +90,7 @@ mod reading {
             rows_in_block: 0,
             next: 0,
         };
+        table.check_places()?;
         table.find_columns()?;
         if table.names.is_empty() {
             let fix = "write columns of numbers, or lists of them";
@@ -101,6 +102,29 @@ mod reading {
     }
 
     impl ParquetTable {
+        /// That columns lie at places and have lengths: the reader takes a negative one for a defect of its own.
+        fn check_places(&self) -> Result<(), FileError> {
+            for (group, rows) in self.file.metadata().row_groups().iter().enumerate() {
+                for (index, column) in rows.columns().iter().enumerate() {
+                    let places = [
+                        column.data_page_offset(),
+                        column.compressed_size(),
+                        column.uncompressed_size(),
+                        column.num_values(),
+                        column.dictionary_page_offset().unwrap_or(0),
+                        rows.num_rows(),
+                    ];
+                    if places.iter().any(|place| *place < 0) {
+                        let place = format!("row group {group}, column {index}");
+                        let problem = "its place or its length is negative";
+                        let fix = "write or copy it again";
+                        return Err(FileError::broken(&self.path, FileFormat::Parquet, place, problem, fix));
+                    }
+                }
+            }
+            Ok(())
+        }
+
         fn find_columns(&mut self) -> Result<(), FileError> {
             let schema = self.file.metadata().file_metadata().schema_descr_ptr();
             for index in 0..schema.num_columns() {

@@ -6,7 +6,8 @@ use super::parts;
 use super::topic::{Sample, Topic};
 use crate::Contents;
 use crate::error::FileError;
-use crate::kind::{self, FileFormat};
+use crate::kind::FileFormat;
+use crate::recognition;
 use crate::table::{ColumnGroup, Table};
 use std::collections::HashMap;
 use std::fs::File;
@@ -34,9 +35,9 @@ pub(crate) fn open_folder(path: &Path) -> Result<Contents, FileError> {
     let mut found = Vec::new();
     for part in parts(path)? {
         let file = File::open(&part).map_err(|source| FileError::Io { file: part.clone(), source })?;
-        let head = kind::head(&mut BufReader::new(file));
+        let head = recognition::head(&mut BufReader::new(file));
         let head = head.map_err(|source| FileError::Io { file: part.clone(), source })?;
-        match kind::recognised(&part, &head)? {
+        match recognition::recognised(&part, &head)? {
             format @ (FileFormat::Mcap | FileFormat::Rosbag2) => found.push((part, format)),
             FileFormat::ZstdText => {
                 return Err(FileError::OtherFormat {

@@ -153,3 +153,12 @@ fn formats_that_are_not_read_are_named() {
     let message = open(scratch.path()).unwrap_err().to_string();
     assert!(message.contains("`gone.mcap` is not in the folder; let `ros2 bag reindex`"), "{message}");
 }
+
+#[test]
+fn what_mutated_inputs_found_is_refused() {
+    // An attachment longer than its chunk; a column at a negative place.
+    for file in ["bags/wrong_length.mcap", "parquet/negative_place.parquet"] {
+        let path = folder().join("../../fuzz/corpus").join(file);
+        told(&drain(&path).expect_err(file), file.rsplit('/').next().unwrap());
+    }
+}
