@@ -29,8 +29,8 @@ const CONTROLLER_POINTS: [&[&str]; 3] = [
     &["desired", "actual", "error"],
 ];
 
-/// The definitions that a message type, `sensor_msgs/msg/JointState`, has had in
-/// the packages' versions: a message is read by the first that explains all its bytes. Empty for types that are not known here.
+/// The definitions that a message type, `sensor_msgs/msg/JointState`, has had in the packages'
+/// versions: a message is read by the first that explains all its bytes. Empty for types that are not known here.
 pub(crate) fn definitions_of(name: &str) -> Vec<String> {
     let joined = |parts: &[&str]| parts.join(SEPARATOR);
     match name {

@@ -33,8 +33,8 @@ impl ColumnSelection {
         Ok(self.fields.len() - 1)
     }
 
-    /// Data rows of the table's source: one pass without a look at the numbers. Which rows there are may hang on what is
-    /// asked for.
+    /// Data rows of the table's source: one pass without a look at the numbers. Which rows there are may hang on
+    /// what is asked for.
     pub(super) fn count_rows(&self, source: &dyn LogSource) -> Result<u64, RecordingError> {
         let (mut table, mut rows) = (source.open()?, 0);
         table.select(&self.fields);

@@ -35,7 +35,7 @@ fn rows(seed: u64) -> Vec<Row> {
 fn joint_state(row: &Row, at: usize) -> Vec<u8> {
     fn align(bytes: &mut Vec<u8>, size: usize) {
         // Counted from behind the four bytes of the encoding.
-        while (bytes.len() - 4) % size != 0 {
+        while !(bytes.len() - 4).is_multiple_of(size) {
             bytes.push(0);
         }
     }
@@ -48,14 +48,16 @@ fn joint_state(row: &Row, at: usize) -> Vec<u8> {
         bytes.extend_from_slice(value.as_bytes());
         bytes.push(0);
     }
-    let order = if at % 3 == 0 { [1, 0] } else { [0, 1] };
+    let order = if at.is_multiple_of(3) { [1, 0] } else { [0, 1] };
     let stamp = START_NS + row.0;
     let mut bytes = vec![0, 1, 0, 0];
     word(&mut bytes, (stamp / 1_000_000_000) as u32);
     word(&mut bytes, (stamp % 1_000_000_000) as u32);
     text(&mut bytes, "base");
     word(&mut bytes, 2);
-    order.iter().for_each(|joint| text(&mut bytes, NAMES[*joint]));
+    for joint in order {
+        text(&mut bytes, NAMES[joint]);
+    }
     for values in [&row.1[..], &[], &row.2[..]] {
         word(&mut bytes, values.len() as u32);
         for joint in order.iter().take(values.len()) {
