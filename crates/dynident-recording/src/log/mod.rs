@@ -2,8 +2,8 @@
 //!
 //! [`LogSource`] is where rows of numbers come from: [`FileLog`] (a file of any format that is read), [`MemoryLog`] and
 //! [`JointSamples`] (arrays), or a type of the caller. [`LogFormat`] says what the columns mean, and a [`Log`] is both
-//! together. [`LogReader`] is one pass over it: it pairs files, applies units, signs, gears and ranges ([`ChannelGroup`]), deals
-//! with missing values, and fills [`RawBlock`]s.
+//! together. [`LogReader`] is one pass over it: it pairs files, applies units, signs, gears and ranges
+//! ([`ChannelGroup`]), deals with missing values, and fills [`RawBlock`]s.
 //!
 //! What a file holds is the business of dynident-formats, where a further format goes; text becomes a table here.
 
