@@ -24,6 +24,9 @@ run() {
 # README and the first pages: the user's robot.
 run 0 "$dynident" inspect robots/ur10.urdf
 run 0 "$dynident" check examples/ur10_simulated.toml
+run 0 "$dynident" log examples/ur10_simulated/train.csv
+run 0 "$dynident" log golden/formats/two_clocks.mcap --json
+run 0 "$dynident" log golden/formats/bag
 # All moments negated, as exporters do: named, and undone in a copy.
 sed -E 's/(i[xyz][xyz]=")([1-9]|0\.0*[1-9])/\1-\2/g' robots/iiwa14.urdf >"$out/slip.urdf"
 run 1 "$dynident" inspect "$out/slip.urdf" --json

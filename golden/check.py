@@ -27,6 +27,7 @@ GENERATORS = {
     "newey-west": ("statsmodels_newey_west.py", "statsmodels_newey_west.json"),
     "statsmodels": ("statsmodels_estimators.py", "statsmodels_estimators.json"),
     "robust": ("statsmodels_robust.py", "statsmodels_robust.json"),
+    "formats": ("formats.py", "formats/*.json"),
     "cvxpy": ("cvxpy_physical.py", "cvxpy_*.json"),
 }
 

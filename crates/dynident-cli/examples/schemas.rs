@@ -7,7 +7,7 @@
 use dynident::iteration::{RUN_SCHEMA, RunFile};
 use dynident::result::{
     CHECK_SCHEMA, CheckFile, DESIGN_SCHEMA, DesignFile, EVALUATION_SCHEMA, EXPORT_SCHEMA, EvaluationFile, ExportFile,
-    INSPECTION_SCHEMA, ITERATIONS_SCHEMA, Inspection, IterationsFile, RESULT_SCHEMA, ResultFile, SIMULATION_SCHEMA,
+    INSPECTION_SCHEMA, ITERATIONS_SCHEMA, Inspection, IterationsFile, LOG_SCHEMA, LogContents, RESULT_SCHEMA, ResultFile, SIMULATION_SCHEMA,
     SimulationFile, VALIDATION_SCHEMA, ValidationFile,
 };
 use dynident_benchmark::accuracy::{BENCHMARK_SCHEMA, BenchmarkFile};
@@ -30,6 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         (EXPORT_SCHEMA, written::<ExportFile>()),
         (INSPECTION_SCHEMA, written::<Inspection>()),
         (ITERATIONS_SCHEMA, written::<IterationsFile>()),
+        (LOG_SCHEMA, written::<LogContents>()),
         (PAPER_SCHEMA, written::<PaperFile>()),
         (RESULT_SCHEMA, written::<ResultFile>()),
         (RUN_SCHEMA, written::<RunFile>()),

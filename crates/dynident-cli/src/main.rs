@@ -52,6 +52,8 @@ struct Common {
 enum Command {
     /// Read and audit a robot description (URDF, or D-H table in TOML).
     Inspect(commands::inspect::Options),
+    /// What a recording holds: format, channels with rates and ranges, and how a study could begin.
+    Log(commands::log::Options),
     /// Dynamics of a robot for a table of states, as CSV with 17 digits.
     Evaluate(commands::evaluate::Options),
     /// Find the motion that says most about a study's robot, inside every limit.
@@ -104,6 +106,7 @@ fn main() -> ExitCode {
     let context = commands::Context { json: arguments.common.json, quiet: arguments.common.quiet, threads };
     let outcome = commands::with_threads(threads, || match arguments.command {
         Command::Inspect(options) => commands::inspect::run(&options, &context),
+        Command::Log(options) => commands::log::run(&options, &context),
         Command::Evaluate(options) => commands::evaluate::run(&options, &context),
         Command::Design(options) => commands::design::run(&options, &context),
         Command::Check(options) => commands::check::run(&options, &context),

@@ -58,16 +58,9 @@ pub enum RecordingError {
         /// 1-based line.
         line: u64,
     },
-    /// A file of a format that is not read.
-    #[error("{}: this is {format}, not a text table; {fix}", file.display())]
-    OtherFormat {
-        /// The file.
-        file: PathBuf,
-        /// What it is.
-        format: &'static str,
-        /// How to make a text table of it.
-        fix: &'static str,
-    },
+    /// A file that cannot be read as what it is.
+    #[error(transparent)]
+    File(dynident_formats::FileError),
     /// A line beyond the limit.
     #[error("{}:{line}: the line is longer than {limit} bytes; is this a CSV file with one sample per line?", file.display())]
     LineTooLong {

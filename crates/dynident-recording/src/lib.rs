@@ -83,7 +83,7 @@ pub use cleaning::{Reason, SetAside};
 pub use derivative::{Derivatives, Differentiator, DifferentiatorSettings, Place, SampleRanges};
 pub use error::{FilterError, FormatError, RecordingError};
 pub use filter::{AveragedPeriods, DecimationSettings, Decimator, averaged_periods, cutoff, position_noise};
-pub use log::{JointSamples, Log, LogFormat, LogReader, LogSource, LogTable, MemoryLog, RawBlock};
+pub use log::{FileLog, JointSamples, Log, LogFormat, LogReader, LogSource, LogTable, MemoryLog, RawBlock};
 pub use motion::{MotionBlock, MotionSettings, MotionStream};
 pub use place::LogPlace;
 pub use reference::{LogisticPath, Reference, ReferenceSettings};

@@ -9,6 +9,7 @@
 //! | a finished model as C, C++, Rust, Python, MATLAB, MJCF, URDF; a payload for a controller | [`export_model()`], [`export_payload()`] |
 //! | dynamics for a table of states | [`evaluate()`] |
 //! | the motion to record | [`design_study()`]; judge one that is there: [`check_trajectory()`], [`check_log()`] |
+//! | what a recording holds | [`log_contents()`] |
 //! | one run of a simulated robot | [`simulate_study()`] |
 //! | run, identify, run again | [`iterate_study()`] |
 //! | the sections of a study, the parts of results | [`study`], [`result`] |
@@ -68,10 +69,13 @@ pub use jobs::export::{export_model, export_payload};
 pub use jobs::identify::{IdentificationOutcome, identify, identify_with_instruments};
 pub use jobs::inspect::{InspectSettings, MendedDescription, inspect, inspect_with, mended};
 pub use jobs::iterate::{IterationWatch, iterate_study};
+pub use jobs::log::log_contents;
 pub use jobs::options::RunOptions;
 pub use jobs::simulate::{Simulation, simulate_study};
 pub use jobs::validate::validate;
 pub use output::{check_writable, write_whole};
 pub use output_set::OutputSet;
-pub use result::{CheckFile, DesignFile, Inspection, IterationsFile, ResultFile, SimulationFile, ValidationFile};
+pub use result::{
+    CheckFile, DesignFile, Inspection, IterationsFile, LogContents, ResultFile, SimulationFile, ValidationFile,
+};
 pub use study::{Folders, Study, StudyRobot};

@@ -1,5 +1,6 @@
 //! What is run: one target for each parser, and the small commands on a folder of files.
 
+mod formats;
 mod jobs;
 mod parsers;
 
@@ -22,11 +23,16 @@ pub(crate) struct Target {
 }
 
 /// All targets.
-pub(crate) const TARGETS: [Target; 10] = [
+pub(crate) const TARGETS: [Target; 15] = [
     Target { name: "urdf", repetitions: 10, new: parsers::urdf },
     Target { name: "dh", repetitions: 20, new: parsers::dh },
     Target { name: "study", repetitions: 20, new: parsers::study },
     Target { name: "log", repetitions: 10, new: parsers::log },
+    Target { name: "packed_text", repetitions: 4, new: formats::any },
+    Target { name: "numpy", repetitions: 10, new: formats::any },
+    Target { name: "bags", repetitions: 4, new: formats::any },
+    Target { name: "parquet", repetitions: 4, new: formats::any },
+    Target { name: "matlab", repetitions: 10, new: formats::any },
     Target { name: "states", repetitions: 20, new: parsers::states },
     Target { name: "result", repetitions: 10, new: parsers::result },
     Target { name: "design", repetitions: 20, new: parsers::design },

@@ -9,6 +9,7 @@ pub(crate) mod identify;
 pub(crate) mod inspect;
 pub(crate) mod interruption;
 pub(crate) mod iterate;
+pub(crate) mod log;
 mod permission;
 pub(crate) mod reproduce;
 mod search;

@@ -1,8 +1,6 @@
 //! Lines of a text table: capped in length, counted, comments and blanks left out.
 
-use super::foreign::{Foreign, recognised};
 use crate::error::RecordingError;
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
@@ -10,10 +8,9 @@ use std::path::{Path, PathBuf};
 const MAX_LINE_BYTES: usize = 1 << 20;
 
 /// The lines that matter of one file.
-#[derive(Debug)]
 pub(super) struct Lines {
     path: PathBuf,
-    reader: BufReader<File>,
+    reader: BufReader<Box<dyn Read + Send>>,
     buffer: Vec<u8>,
     /// 1-based number of the line last read.
     number: u64,
@@ -21,20 +18,17 @@ pub(super) struct Lines {
     complete: bool,
 }
 
+impl core::fmt::Debug for Lines {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Lines").field("path", &self.path).field("number", &self.number).finish_non_exhaustive()
+    }
+}
+
 impl Lines {
-    pub(super) fn open(path: &Path) -> Result<Self, RecordingError> {
-        let refused = |source| RecordingError::Io { file: path.to_owned(), source };
-        let file = File::open(path).map_err(refused)?;
-        // Opening a folder succeeds on some systems and fails only when read, with a less clear reason.
-        if file.metadata().map_err(refused)?.is_dir() {
-            return Err(refused(std::io::Error::from(std::io::ErrorKind::IsADirectory)));
-        }
-        let mut reader = BufReader::with_capacity(1 << 18, file);
-        if let Some(foreign) = recognised(reader.fill_buf().map_err(refused)?) {
-            let Foreign { format, fix, .. } = foreign;
-            return Err(RecordingError::OtherFormat { file: path.to_owned(), format, fix });
-        }
-        Ok(Self { path: path.to_owned(), reader, buffer: Vec::new(), number: 0, complete: true })
+    /// The lines of `text`, which stands in the file at `path`.
+    pub(super) fn new(path: &Path, text: Box<dyn Read + Send>) -> Self {
+        let reader = BufReader::with_capacity(1 << 18, text);
+        Self { path: path.to_owned(), reader, buffer: Vec::new(), number: 0, complete: true }
     }
 
     pub(super) fn number(&self) -> u64 {

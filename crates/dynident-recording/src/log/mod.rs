@@ -1,15 +1,15 @@
 //! From where a log lies to joint values in SI.
 //!
-//! [`LogSource`] is where rows of numbers come from: [`TextLog`] (CSV and its kin), [`MemoryLog`] and [`JointSamples`]
-//! (arrays), or a type of the caller. [`LogFormat`] says what the columns mean, and a [`Log`] is both together.
-//! [`LogReader`] is one pass over it: it pairs files, applies units, signs, gears and ranges ([`ChannelGroup`]), deals
-//! with missing values, and fills [`RawBlock`]s.
+//! [`LogSource`] is where rows of numbers come from: [`FileLog`] (a file of any format that is read), [`MemoryLog`] and
+//! [`JointSamples`] (arrays), or a type of the caller. [`LogFormat`] says what the columns mean, and a [`Log`] is both
+//! together. [`LogReader`] is one pass over it: it pairs files, applies units, signs, gears and ranges
+//! ([`ChannelGroup`]), deals with missing values, and fills [`RawBlock`]s.
 //!
-//! A further file format is a file here with a [`LogSource`] and its [`LogTable`], and its line in `FILE_FORMATS`.
+//! What a file holds is the business of dynident-formats, where a further format goes; text becomes a table here.
 
 mod column_pattern;
 mod columns;
-mod foreign;
+mod file;
 mod format;
 mod lines;
 mod mapping;
@@ -20,32 +20,25 @@ mod source;
 mod text;
 mod units;
 
+pub use file::FileLog;
 pub use format::{
     ChannelGroup, ClockRule, ColumnRef, Columns, Header, LogFormat, Missing, OneOrMany, TimeColumn, TimeUnit,
 };
 pub use memory::{JointSamples, MemoryLog, SampleClock};
 pub use reader::{LinesDropped, LogReader, RawBlock};
 pub use row_rules::RowRule;
-pub use source::{LogSource, LogTable};
-pub use text::TextLog;
+pub use source::{LogGroup, LogSource, LogTable};
 pub use units::{Quantity, si_factor, unit_names};
 
 use std::path::Path;
 use std::sync::Arc;
 
-/// Makes the source of a file.
-type Opener = fn(&Path, &LogFormat) -> Arc<dyn LogSource>;
-
-/// File formats by the extension that names them; a file of any other extension is a text table.
-const FILE_FORMATS: &[(&str, Opener)] = &[];
-
-/// The source of the file at `path`. Nothing is read yet.
-fn file_source(path: &Path, format: &LogFormat) -> Arc<dyn LogSource> {
-    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-    match FILE_FORMATS.iter().find(|(name, _)| name.eq_ignore_ascii_case(extension)) {
-        Some((_, opener)) => opener(path, format),
-        None => Arc::new(TextLog::new(path, format)),
-    }
+/// The files that hold what `path` names: itself, or the parts of a rosbag2 recording's folder.
+///
+/// # Errors
+/// If a folder's list of parts cannot be read.
+pub fn files(path: &Path) -> Result<Vec<std::path::PathBuf>, crate::RecordingError> {
+    Ok(dynident_formats::files(path)?)
 }
 
 /// A recording: where its rows come from, what its columns mean, and which joints they are of.
@@ -73,7 +66,8 @@ impl Log {
 
     /// The log whose main file is at `path`; the `file` keys of channel groups are relative to its folder.
     pub fn file(path: &Path, format: LogFormat, joints: &[String]) -> Self {
-        Self::shared(file_source(path, &format), format, joints)
+        let source = Arc::new(FileLog::new(path, &format));
+        Self::shared(source, format, joints)
     }
 
     /// Where its rows come from: its label for messages, its estimated number of rows.

@@ -6,7 +6,7 @@ use super::mapping::Mapping;
 use super::row_rules::FoundRules;
 use super::source::LogSource;
 use super::units::Quantity;
-use super::{Log, file_source};
+use super::{FileLog, Log};
 use crate::error::RecordingError;
 use std::path::Path;
 
@@ -117,7 +117,7 @@ impl LogReader {
             };
             let table = paths.iter().position(|known| *known == path).unwrap_or(paths.len());
             if let (Some(path), true) = (&path, table == paths.len()) {
-                let source = file_source(path, format);
+                let source = FileLog::new(path, format);
                 tables.push(ColumnSelection::new(source.label(), source.open()?));
                 paths.push(Some(path.clone()));
             }
@@ -138,7 +138,7 @@ impl LogReader {
             }
             (None, Some([from, to])) => {
                 selection.push(format!("fraction = [{from}, {to}]"));
-                let count = row_count(main)? as f64;
+                let count = tables[0].count_rows(main)? as f64;
                 [(from * count).round() as u64, (to * count).round() as u64]
             }
             (None, None) => [0, u64::MAX],
@@ -335,13 +335,4 @@ impl LogReader {
         }
         Ok(())
     }
-}
-
-/// Data rows of a log: one cheap pass without reading numbers.
-fn row_count(source: &dyn LogSource) -> Result<u64, RecordingError> {
-    let (mut table, mut rows) = (source.open()?, 0);
-    while table.skip_row()? {
-        rows += 1;
-    }
-    Ok(rows)
 }

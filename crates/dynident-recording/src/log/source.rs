@@ -3,6 +3,7 @@
 use crate::error::RecordingError;
 use crate::place::LogPlace;
 use core::fmt;
+use core::ops::Range;
 use std::path::Path;
 
 /// Where raw rows come from: a file of some format, or samples in memory.
@@ -93,6 +94,17 @@ pub trait LogSource: fmt::Debug + Send + Sync {
     }
 }
 
+/// Columns of a [`LogTable`] that were recorded together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LogGroup {
+    /// What messages call it: a topic; `None` where there is only one.
+    pub name: Option<String>,
+    /// Its columns.
+    pub columns: Range<usize>,
+    /// Its column of time stamps in seconds, where the format has such a thing.
+    pub time: Option<usize>,
+}
+
 /// One pass over the rows of a [`LogSource`], from the first to the last.
 pub trait LogTable: fmt::Debug + Send {
     /// Number of columns.
@@ -101,6 +113,17 @@ pub trait LogTable: fmt::Debug + Send {
     /// Names of the columns, one for each; `None` if they can be addressed by 0-based index only.
     fn names(&self) -> Option<&[String]> {
         None
+    }
+
+    /// Which columns were recorded together, each on its own clock; rows are those of the group of the first column
+    /// that is selected. Every column stands in one group.
+    fn groups(&self) -> Vec<LogGroup> {
+        vec![LogGroup { name: None, columns: 0..self.width(), time: None }]
+    }
+
+    /// What the source holds beside its columns and why it is none, a sentence each.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
     }
 
     /// The columns, each once, that [`next_row`](Self::next_row) is to give, in this order. Called before the first

@@ -1,54 +1,16 @@
 //! Text tables (CSV and its kin): delimiter and header found out, rows of numbers read one by one.
 
 use super::columns::column_label;
-use super::format::{Header, LogFormat};
+use super::format::Header;
 use super::lines::Lines;
-use super::source::{LogSource, LogTable};
+use super::source::LogTable;
 use crate::error::RecordingError;
 use crate::place::LogPlace;
-use std::path::{Path, PathBuf};
-
-/// A text file with one row of numbers a line.
-#[derive(Clone, Debug)]
-pub struct TextLog {
-    path: PathBuf,
-    header: Header,
-    delimiter: Option<char>,
-}
-
-impl TextLog {
-    /// The file at `path`, with `header` and `delimiter` of `format`. Nothing is read yet.
-    pub fn new(path: &Path, format: &LogFormat) -> Self {
-        Self { path: path.to_owned(), header: format.header, delimiter: format.delimiter }
-    }
-}
-
-impl LogSource for TextLog {
-    fn label(&self) -> String {
-        self.path.display().to_string()
-    }
-
-    fn open(&self) -> Result<Box<dyn LogTable>, RecordingError> {
-        Ok(Box::new(TextTable::open(self)?))
-    }
-
-    fn path(&self) -> Option<&Path> {
-        Some(&self.path)
-    }
-
-    /// From the file's size and the length of its first lines.
-    fn estimated_rows(&self) -> Option<u64> {
-        use std::io::Read;
-        let size = std::fs::metadata(&self.path).ok()?.len();
-        let mut head = Vec::new();
-        std::fs::File::open(&self.path).ok()?.take(1 << 16).read_to_end(&mut head).ok()?;
-        let lines = head.split(|byte| *byte == b'\n').count().max(2) - 1;
-        Some(size * lines as u64 / (head.len() as u64).max(1))
-    }
-}
+use std::io::Read;
+use std::path::Path;
 
 #[derive(Debug)]
-struct TextTable {
+pub(super) struct TextTable {
     label: String,
     lines: Lines,
     delimiter: u8,
@@ -62,23 +24,29 @@ struct TextTable {
 }
 
 impl TextTable {
-    fn open(log: &TextLog) -> Result<Self, RecordingError> {
-        let label = log.label();
-        let mut lines = Lines::open(&log.path)?;
+    /// The table in `text`, which stands in the file at `path`.
+    pub(super) fn open(
+        path: &Path,
+        text: Box<dyn Read + Send>,
+        header: Header,
+        delimiter: Option<char>,
+    ) -> Result<Self, RecordingError> {
+        let label = path.display().to_string();
+        let mut lines = Lines::new(path, text);
         if !lines.advance()? {
             return Err(RecordingError::NoRows { place: LogPlace::Line { log: label, line: lines.number() } });
         }
         let first = lines.line();
         if first.contains(&0) {
-            return Err(RecordingError::Binary { file: log.path.clone(), line: lines.number() });
+            return Err(RecordingError::Binary { file: path.to_owned(), line: lines.number() });
         }
         if first.contains(&b'\r') {
-            return Err(RecordingError::CarriageReturns { file: log.path.clone(), line: lines.number() });
+            return Err(RecordingError::CarriageReturns { file: path.to_owned(), line: lines.number() });
         }
-        let delimiter = log.delimiter.map_or_else(|| guessed_delimiter(first), |delimiter| delimiter as u8);
+        let delimiter = delimiter.map_or_else(|| guessed_delimiter(first), |delimiter| delimiter as u8);
         let mut fields = Vec::new();
         split(first, delimiter, &mut fields);
-        let has_header = match log.header {
+        let has_header = match header {
             Header::Present => true,
             Header::Absent => false,
             Header::Auto => !fields.iter().all(|(from, to)| number(&first[*from..*to]).is_some()),

@@ -7,6 +7,7 @@ pub(crate) mod export;
 pub(crate) mod identify;
 pub(crate) mod inspect;
 pub(crate) mod iterate;
+pub(crate) mod log;
 mod log_summary;
 pub(crate) mod options;
 pub(crate) mod provenance;

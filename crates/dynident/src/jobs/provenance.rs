@@ -83,16 +83,20 @@ pub(crate) fn now() -> String {
 }
 
 fn input(what: &str, path: &Path, folder: &Path) -> Result<InputFile, Error> {
-    let cannot = |source| Error::File { path: path.to_owned(), source };
-    let mut file = File::open(path).map_err(cannot)?;
+    let cannot = |path: &Path, source| Error::File { path: path.to_owned(), source };
     let (mut hash, mut block, mut bytes) = (Sha256::new(), vec![0; BLOCK], 0);
-    loop {
-        let length = file.read(&mut block).map_err(cannot)?;
-        if length == 0 {
-            break;
+    // The folder of a recording is its parts, one after the other.
+    let parts = dynident_recording::log::files(path).map_err(|error| cannot(path, std::io::Error::other(error)))?;
+    for part in parts {
+        let mut file = File::open(&part).map_err(|error| cannot(&part, error))?;
+        loop {
+            let length = file.read(&mut block).map_err(|error| cannot(&part, error))?;
+            if length == 0 {
+                break;
+            }
+            hash.update(&block[..length]);
+            bytes += length as u64;
         }
-        hash.update(&block[..length]);
-        bytes += length as u64;
     }
     let sha256 = hexadecimal(&hash.finalize());
     Ok(InputFile { what: what.to_owned(), file: seen_from(folder, path), bytes, sha256 })

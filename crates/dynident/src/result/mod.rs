@@ -8,6 +8,7 @@ mod export;
 mod identification;
 mod inspection;
 mod iterations;
+mod log;
 mod numbers;
 mod problems;
 mod provenance;
@@ -32,6 +33,7 @@ pub use inspection::{
 pub use iterations::{
     INTERRUPTED, ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, RunForecast, UnmetCondition,
 };
+pub use log::{LOG_SCHEMA, LogChannel, LogContents, LogGroupContents};
 pub use provenance::{InputFile, Provenance};
 pub use simulation::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};
 // What the files hold of the crates below.

@@ -33,10 +33,15 @@ impl Folders {
             return Err(Error::File { path: folder.clone(), source });
         }
         let tried: Vec<PathBuf> = self.candidates.iter().map(|folder| folder.join(file)).collect();
-        tried.iter().find(|path| path.is_file()).cloned().ok_or_else(|| Error::Missing {
+        tried.iter().find(|path| path.is_file() || is_recording(path)).cloned().ok_or_else(|| Error::Missing {
             file: file.to_owned(),
             tried,
             source_of_data: source.map(str::to_owned),
         })
     }
+}
+
+/// Whether `path` is the folder of a rosbag2 recording.
+fn is_recording(path: &Path) -> bool {
+    path.join("metadata.yaml").is_file()
 }

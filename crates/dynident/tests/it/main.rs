@@ -19,6 +19,7 @@ mod friction_choice;
 mod instruments;
 mod iteration_legs;
 mod iteration_report;
+mod log_formats;
 mod masses;
 mod modules;
 mod mutated_studies;

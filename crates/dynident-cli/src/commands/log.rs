@@ -1,0 +1,18 @@
+//! `dynident log FILE`.
+
+use super::{Context, json, message_of};
+use crate::{Verdict, summary, terminal};
+use std::path::PathBuf;
+
+/// Options of `log`.
+#[derive(clap::Args)]
+pub(crate) struct Options {
+    /// A recording of any format that is read, or the folder of a rosbag2 recording.
+    file: PathBuf,
+}
+
+pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, String> {
+    let found = dynident::log_contents(&options.file).map_err(message_of)?;
+    terminal::print(&if context.json { json(&found)? } else { summary::log(&found) })?;
+    Ok(Verdict::Good)
+}

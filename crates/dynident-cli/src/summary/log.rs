@@ -1,0 +1,119 @@
+//! The summary of `log`.
+
+use super::text::{table, wrapped};
+use core::fmt::Write;
+use dynident::result::{LogChannel, LogContents};
+
+/// Channels of a group that are shown; JSON has all.
+const SHOWN: usize = 64;
+/// Widest name in the table.
+const NAME: usize = 34;
+/// Signs of a channel's course.
+const SIGNS: usize = 16;
+
+/// A recording: its groups, their channels with range and course, and a beginning of a study's `[format]`.
+pub(crate) fn log(found: &LogContents) -> String {
+    let mut text = wrapped(
+        &format!("{}: {}, {} bytes, {} channels", found.file, found.format, found.bytes, found.channels.len()),
+        2,
+    );
+    for (index, group) in found.groups.iter().enumerate() {
+        let mut line = group.name.as_ref().map_or_else(String::new, |name| format!("{name}: "));
+        let _ = write!(line, "{} rows", group.rows);
+        if let (Some(time), Some(span), Some(rate)) = (&group.time, group.span_s, group.rate_hz) {
+            let _ = write!(line, ", {span:.3} s at {rate:.2} Hz by {time}");
+        } else {
+            line += ", no clock was recognised";
+        }
+        text.push('\n');
+        text += &wrapped(&line, 2);
+        let channels: Vec<&LogChannel> = found.channels.iter().filter(|channel| channel.group == index).collect();
+        // The topic stands above.
+        let topic = group.name.as_ref().map_or_else(String::new, |name| format!("{name}."));
+        let rows = channels.iter().take(SHOWN).map(|channel| {
+            let name = channel.name.strip_prefix(&topic).unwrap_or(&channel.name);
+            let [low, high] = channel.range.map_or(["-".to_owned(), "-".to_owned()], |range| range.map(shown));
+            vec![
+                shortened(name),
+                channel.unit.clone().unwrap_or_default(),
+                low,
+                high,
+                if channel.missing > 0 { channel.missing.to_string() } else { String::new() },
+                course(channel),
+            ]
+        });
+        let header = ["channel", "unit", "lowest", "highest", "missing", "course"].map(str::to_owned);
+        text += &table(&header, 2..5, rows.collect());
+        if channels.len() > SHOWN {
+            let _ = writeln!(text, "  and {} more", channels.len() - SHOWN);
+        }
+    }
+    if let Some(place) = &found.truncated {
+        text += &wrapped(&format!("\nthe file is cut off behind {place}"), 2);
+    }
+    for note in &found.notes {
+        text += &wrapped(&format!("  not read: {note}"), 4);
+    }
+    text += "\na study could begin with\n\n";
+    text += &found.study_format;
+    text
+}
+
+/// The end of a long name is kept, as it distinguishes joints.
+fn shortened(name: &str) -> String {
+    let length = name.chars().count();
+    if length <= NAME {
+        return name.to_owned();
+    }
+    format!("..{}", name.chars().skip(length - NAME + 2).collect::<String>())
+}
+
+fn shown(value: f64) -> String {
+    if value == 0.0 || (1e-3..1e6).contains(&value.abs()) {
+        return format!("{value:.4}");
+    }
+    format!("{value:.2e}")
+}
+
+/// The course of a channel between its lowest and highest mean, as a line of bars; a blank where it has no value.
+fn course(channel: &LogChannel) -> String {
+    const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    let values = channel.course.iter().flatten();
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
+    let count = channel.course.len();
+    let bar = |sign: usize| {
+        // Every sign stands for some parts: the one in the middle speaks for them.
+        let part = channel.course[(2 * sign + 1) * count / (2 * count.min(SIGNS))];
+        part.map_or(' ', |value| {
+            let share = if high > low { (value - low) / (high - low) } else { 0.0 };
+            BARS[((share * 8.0) as usize).min(7)]
+        })
+    };
+    (0..count.min(SIGNS)).map(bar).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_course_is_drawn_between_its_ends() {
+        let course_of = |values: &[Option<f64>]| {
+            course(&LogChannel {
+                name: String::new(),
+                group: 0,
+                unit: None,
+                rate_hz: None,
+                samples: 0,
+                missing: 0,
+                range: None,
+                course: values.to_vec(),
+            })
+        };
+        assert_eq!(course_of(&[Some(-1.0), None, Some(1.0), Some(0.0)]), "▁ █▅");
+        assert_eq!(course_of(&[Some(2.0); 48]), "▁".repeat(16));
+        assert_eq!(course_of(&[]), "");
+        let ramp: Vec<Option<f64>> = (0..48).map(|k| Some(f64::from(k))).collect();
+        assert_eq!(course_of(&ramp), "▁▁▂▂▃▃▄▄▅▅▆▆▇▇██");
+    }
+}

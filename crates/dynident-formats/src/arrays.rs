@@ -1,0 +1,167 @@
+//! Arrays of one file as a table: those that share their longest length are its columns.
+
+use crate::error::FileError;
+use crate::table::Table;
+
+/// Columns of all arrays together, at most.
+pub(crate) const MOST_COLUMNS: usize = 1 << 14;
+
+/// An array of numbers with one or two sides.
+#[derive(Clone, Debug)]
+pub(crate) struct Array {
+    pub(crate) name: String,
+    /// Rows and columns; a vector has one column.
+    pub(crate) shape: [usize; 2],
+    /// Entry of row i and column k: `values[i * strides[0] + k * strides[1]]`.
+    pub(crate) values: Vec<f64>,
+    pub(crate) strides: [usize; 2],
+}
+
+impl Array {
+    /// Entries row after row.
+    pub(crate) fn row_major(name: String, shape: [usize; 2], values: Vec<f64>) -> Self {
+        Self { name, shape, values, strides: [shape[1], 1] }
+    }
+
+    /// Entries column after column.
+    pub(crate) fn column_major(name: String, shape: [usize; 2], values: Vec<f64>) -> Self {
+        Self { name, shape, values, strides: [1, shape[0]] }
+    }
+
+    /// Two sides of an array with any number of them, those of length one left out; `None` if more remain.
+    pub(crate) fn two_sides(sides: &[usize]) -> Option<[usize; 2]> {
+        match sides.iter().copied().filter(|side| *side != 1).collect::<Vec<_>>()[..] {
+            [] => Some([1, 1]),
+            [one] => Some([one, 1]),
+            [first, second] => Some([first, second]),
+            _ => None,
+        }
+    }
+}
+
+/// The samples' length: the longest side that arrays with half of all numbers share.
+fn length(arrays: &[Array]) -> usize {
+    let numbers = |length: usize| -> usize {
+        arrays.iter().filter(|array| array.shape.contains(&length)).map(|array| array.values.len()).sum()
+    };
+    let all: usize = arrays.iter().map(|array| array.values.len()).sum();
+    let sides = || arrays.iter().flat_map(|array| array.shape);
+    let shared = sides().filter(|side| 2 * numbers(*side) >= all).max();
+    shared.or_else(|| sides().max_by_key(|side| (numbers(*side), *side))).unwrap_or(0)
+}
+
+/// Arrays as columns: a vector by its name, a matrix by name and 0-based index, `q[0]`, whichever of its sides the
+/// samples lie along (its rows, if both fit). Arrays of another length are left out.
+#[derive(Debug)]
+pub(crate) struct ArrayTable {
+    arrays: Vec<Array>,
+    names: Option<Vec<String>>,
+    /// Array, offset and stride of each column.
+    columns: Vec<[usize; 3]>,
+    wanted: Vec<usize>,
+    rows: usize,
+    next: usize,
+    notes: Vec<String>,
+}
+
+impl ArrayTable {
+    /// The table of `arrays`; `None` if none of them has numbers.
+    pub(crate) fn new(arrays: Vec<Array>) -> Option<Self> {
+        let rows = length(&arrays);
+        let (mut names, mut columns) = (Vec::new(), Vec::new());
+        for (index, array) in arrays.iter().enumerate() {
+            let [down, across] = array.strides;
+            let (count, step, along) = match array.shape {
+                [first, second] if first == rows => (second, across, down),
+                [first, second] if second == rows => (first, down, across),
+                _ => continue,
+            };
+            if array.values.is_empty() || columns.len() + count > MOST_COLUMNS {
+                continue;
+            }
+            for k in 0..count {
+                names.push(if count == 1 { array.name.clone() } else { format!("{}[{k}]", array.name) });
+                columns.push([index, k * step, along]);
+            }
+        }
+        let wanted = (0..columns.len()).collect();
+        let used: Vec<usize> = columns.iter().map(|column| column[0]).collect();
+        let left_out = arrays.iter().enumerate().filter(|(index, _)| !used.contains(index));
+        let notes = left_out
+            .map(|(_, array)| format!("{}: {} x {}, not of {rows} rows", array.name, array.shape[0], array.shape[1]))
+            .collect();
+        (!columns.is_empty()).then_some(Self { arrays, names: Some(names), columns, wanted, rows, next: 0, notes })
+    }
+
+    /// The same, with notes on what else the file holds.
+    pub(crate) fn with_notes(mut self, notes: Vec<String>) -> Self {
+        self.notes.extend(notes);
+        self
+    }
+
+    /// The same with columns that have indices only.
+    pub(crate) fn nameless(mut self) -> Self {
+        self.names = None;
+        self
+    }
+}
+
+impl Table for ArrayTable {
+    fn width(&self) -> usize {
+        self.columns.len()
+    }
+
+    fn names(&self) -> Option<&[String]> {
+        self.names.as_deref()
+    }
+
+    fn select(&mut self, columns: &[usize]) {
+        self.wanted = columns.to_vec();
+    }
+
+    fn next_row(&mut self, values: &mut [f64]) -> Result<bool, FileError> {
+        if self.next >= self.rows {
+            return Ok(false);
+        }
+        for (value, column) in values.iter_mut().zip(&self.wanted) {
+            let [array, offset, stride] = self.columns[*column];
+            *value = self.arrays[array].values[offset + stride * self.next];
+        }
+        self.next += 1;
+        Ok(true)
+    }
+
+    fn skip_row(&mut self) -> Result<bool, FileError> {
+        self.next += 1;
+        Ok(self.next <= self.rows)
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
+    fn estimated_rows(&self) -> Option<u64> {
+        Some(self.rows as u64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arrays_of_one_length_are_columns_either_way_up() {
+        let q = Array::row_major("q".to_owned(), [2, 3], vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        let tau = Array::column_major("tau".to_owned(), [3, 2], vec![-1.0, -2.0, -3.0, -4.0, -5.0, -6.0]);
+        let other = Array::row_major("gain".to_owned(), [2, 1], vec![7.0, 8.0]);
+        let mut table = ArrayTable::new(vec![other, q, tau]).unwrap();
+        assert_eq!(table.names().unwrap(), ["q[0]", "q[1]", "tau[0]", "tau[1]"]);
+        let mut rows = Vec::new();
+        let mut row = [0.0; 4];
+        while table.next_row(&mut row).unwrap() {
+            rows.push(row);
+        }
+        assert_eq!(rows, [[1.0, 4.0, -1.0, -4.0], [2.0, 5.0, -2.0, -5.0], [3.0, 6.0, -3.0, -6.0]]);
+        assert!(ArrayTable::new(Vec::new()).is_none());
+    }
+}

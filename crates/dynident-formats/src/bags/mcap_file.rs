@@ -1,0 +1,193 @@
+//! MCAP, read from front to end: <https://mcap.dev/spec>.
+
+use super::messages::{Channel, Encoding, Part};
+use crate::bytes::Bytes;
+use crate::error::FileError;
+use crate::kind::FileFormat;
+use mcap::McapError;
+use mcap::records::{ChunkHeader, Record};
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// Longest record, and longest chunk once it is unpacked.
+const LONGEST_RECORD: usize = 1 << 28;
+/// Kind and length of a record.
+const RECORD_HEAD: usize = 9;
+
+pub(super) struct McapFile {
+    path: PathBuf,
+    file: File,
+    reader: LinearReader,
+    schemas: HashMap<u16, (String, String, String)>,
+    channels: HashMap<u16, Channel>,
+    /// The chunk under way, unpacked, and where its next record begins.
+    chunk: Vec<u8>,
+    at: usize,
+    records: u64,
+    truncated: bool,
+    ended: bool,
+}
+
+impl core::fmt::Debug for McapFile {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("McapFile").field("path", &self.path).field("records", &self.records).finish_non_exhaustive()
+    }
+}
+
+impl McapFile {
+    pub(super) fn open(path: &Path) -> Result<Self, FileError> {
+        let file = File::open(path).map_err(|source| FileError::Io { file: path.to_owned(), source })?;
+        // Chunks are unpacked here: lengths inside of them may lie.
+        let options = LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD).with_emit_chunks(true);
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+            reader: LinearReader::new_with_options(options),
+            schemas: HashMap::new(),
+            channels: HashMap::new(),
+            chunk: Vec::new(),
+            at: 0,
+            records: 0,
+            truncated: false,
+            ended: false,
+        })
+    }
+
+    fn broken(&self, error: &McapError) -> FileError {
+        let fix = "`mcap recover` keeps what is whole";
+        FileError::broken(&self.path, FileFormat::Mcap, format!("record {}", self.records), error.to_string(), fix)
+    }
+
+    /// Unpacks a chunk and checks what came out.
+    fn unpack(&mut self, header: &ChunkHeader, packed: &[u8]) -> Result<(), FileError> {
+        let size = header.uncompressed_size;
+        if size > LONGEST_RECORD as u64 {
+            return Err(self.broken(&McapError::ChunkTooLarge(size)));
+        }
+        let mut unpacked = Vec::new();
+        // One byte more than is claimed shows that the claim is wrong.
+        let most = size + 1;
+        let read = match header.compression.as_str() {
+            "" => packed.take(most).read_to_end(&mut unpacked),
+            "zstd" => zstd::stream::read::Decoder::new(packed)
+                .and_then(|decoder| decoder.take(most).read_to_end(&mut unpacked)),
+            "lz4" => lz4::Decoder::new(packed).and_then(|decoder| decoder.take(most).read_to_end(&mut unpacked)),
+            other => return Err(self.broken(&McapError::UnsupportedCompression(other.to_owned()))),
+        };
+        read.map_err(|error| self.broken(&McapError::DecompressionError(error.to_string())))?;
+        let calculated = crc32fast::hash(&unpacked);
+        if unpacked.len() as u64 != size {
+            return Err(self.broken(&McapError::UnexpectedEoc));
+        }
+        if header.uncompressed_crc != 0 && header.uncompressed_crc != calculated {
+            return Err(self.broken(&McapError::BadChunkCrc { saved: header.uncompressed_crc, calculated }));
+        }
+        (self.chunk, self.at) = (unpacked, 0);
+        Ok(())
+    }
+
+    /// The next record of the chunk under way; `None` at its end.
+    fn next_in_chunk(&mut self) -> Result<Option<Record<'static>>, FileError> {
+        let rest = &self.chunk[self.at..];
+        if rest.is_empty() {
+            return Ok(None);
+        }
+        let mut head = Bytes::new(rest, false);
+        let body = head.u8().zip(head.u64()).and_then(|(opcode, length)| {
+            let length = usize::try_from(length).ok()?;
+            Some((opcode, head.take(length)?))
+        });
+        let Some((opcode, body)) = body else { return Err(self.broken(&McapError::UnexpectedEoc)) };
+        let (length, record) = (body.len(), mcap::parse_record(opcode, body).map(Record::into_owned));
+        self.at += RECORD_HEAD + length;
+        self.records += 1;
+        record.map(Some).map_err(|error| self.broken(&error))
+    }
+
+    /// Takes note of a record; channel and time of a message, whose bytes go to `message`.
+    fn take(&mut self, record: Record, message: &mut Vec<u8>) -> Result<Option<(usize, i64)>, FileError> {
+        match record {
+            Record::Schema { header, data } => {
+                let text = String::from_utf8_lossy(&data).into_owned();
+                self.schemas.insert(header.id, (header.name, header.encoding, text));
+            }
+            Record::Channel(channel) => self.add_channel(&channel),
+            Record::Message { header, data } => {
+                if !self.channels.contains_key(&header.channel_id) {
+                    return Err(self.broken(&McapError::UnknownChannel(header.sequence, header.channel_id)));
+                }
+                *message = data.into_owned();
+                let log_ns = i64::try_from(header.log_time).unwrap_or(i64::MAX);
+                return Ok(Some((usize::from(header.channel_id), log_ns)));
+            }
+            _ => {}
+        }
+        Ok(None)
+    }
+
+    fn add_channel(&mut self, channel: &mcap::records::Channel) {
+        let none = (String::new(), String::new(), String::new());
+        let (kind, schema_encoding, text) = self.schemas.get(&channel.schema_id).cloned().unwrap_or(none);
+        let encoding = match (channel.message_encoding.as_str(), schema_encoding.as_str()) {
+            ("cdr", "ros2msg") => Encoding::Cdr(vec![text]),
+            ("json", _) => Encoding::Json,
+            (encoding, schema) => Encoding::Other(format!("{encoding} with a schema in {schema}")),
+        };
+        self.channels.insert(channel.id, Channel { topic: channel.topic.clone(), kind, encoding });
+    }
+}
+
+impl Part for McapFile {
+    fn next(&mut self, message: &mut Vec<u8>) -> Result<Option<(usize, i64)>, FileError> {
+        while !self.ended {
+            if let Some(record) = self.next_in_chunk()? {
+                if let Some(found) = self.take(record, message)? {
+                    return Ok(Some(found));
+                }
+                continue;
+            }
+            let wanted = match self.reader.next_event() {
+                None => break,
+                Some(Ok(LinearReadEvent::ReadRequest(wanted))) => wanted,
+                Some(Ok(LinearReadEvent::Record { data, opcode })) => {
+                    self.records += 1;
+                    let record = mcap::parse_record(opcode, data).map(Record::into_owned);
+                    match record.map_err(|error| self.broken(&error))? {
+                        Record::Chunk { header, data } => self.unpack(&header, &data)?,
+                        // Behind the data lie copies of channels and schemas, and indices.
+                        Record::DataEnd(_) => break,
+                        record => {
+                            if let Some(found) = self.take(record, message)? {
+                                return Ok(Some(found));
+                            }
+                        }
+                    }
+                    continue;
+                }
+                Some(Err(McapError::UnexpectedEof)) => {
+                    self.truncated = true;
+                    break;
+                }
+                Some(Err(error)) => return Err(self.broken(&error)),
+            };
+            // In steps: what a broken length asks for may not be there.
+            let space = self.reader.insert(wanted.clamp(1, 1 << 18));
+            let read = self.file.read(space);
+            let read = read.map_err(|source| FileError::Io { file: self.path.clone(), source })?;
+            self.reader.notify_read(read);
+        }
+        self.ended = true;
+        Ok(None)
+    }
+
+    fn channel(&self, index: usize) -> Option<&Channel> {
+        self.channels.get(&u16::try_from(index).ok()?)
+    }
+
+    fn truncated(&self) -> bool {
+        self.truncated
+    }
+}

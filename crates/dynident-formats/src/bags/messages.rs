@@ -1,0 +1,99 @@
+//! Messages one after the other, whatever file they lie in.
+
+use super::{database, mcap_file};
+use crate::error::FileError;
+use crate::kind::FileFormat;
+use core::fmt;
+use std::path::{Path, PathBuf};
+
+/// How messages of a channel are written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Encoding {
+    /// CDR; the texts of a definition that may explain it.
+    Cdr(Vec<String>),
+    /// JSON.
+    Json,
+    /// Any other, and what it is.
+    Other(String),
+}
+
+/// What a part of a recording calls one stream of messages.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Channel {
+    pub(super) topic: String,
+    pub(super) kind: String,
+    pub(super) encoding: Encoding,
+}
+
+/// One part of a recording, read from its beginning.
+pub(super) trait Part: fmt::Debug + Send {
+    /// The next message: its channel, the time at which it was recorded (ns), its bytes; `None` at the end.
+    fn next(&mut self, message: &mut Vec<u8>) -> Result<Option<(usize, i64)>, FileError>;
+
+    /// The channels met so far, by their number.
+    fn channel(&self, index: usize) -> Option<&Channel>;
+
+    /// Whether the part ended too early.
+    fn truncated(&self) -> bool;
+}
+
+/// The messages of all parts.
+#[derive(Debug)]
+pub(super) struct Messages {
+    parts: Vec<(PathBuf, FileFormat)>,
+    /// Number of the part under way, and the part.
+    current: usize,
+    part: Option<Box<dyn Part>>,
+    truncated: bool,
+}
+
+/// A message without its bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Header {
+    /// Number of the part, and of the channel in it.
+    pub(super) channel: (usize, usize),
+    /// When it was recorded, ns.
+    pub(super) log_ns: i64,
+}
+
+impl Messages {
+    pub(super) fn new(parts: &[(PathBuf, FileFormat)]) -> Self {
+        Self { parts: parts.to_vec(), current: 0, part: None, truncated: false }
+    }
+
+    pub(super) fn next(&mut self, message: &mut Vec<u8>) -> Result<Option<Header>, FileError> {
+        while let Some((path, format)) = self.parts.get(self.current) {
+            let part = match &mut self.part {
+                Some(part) => part,
+                None => self.part.insert(begin(path, *format)?),
+            };
+            if let Some((channel, log_ns)) = part.next(message)? {
+                return Ok(Some(Header { channel: (self.current, channel), log_ns }));
+            }
+            self.truncated |= part.truncated();
+            // The last part stays: its channels are still asked for.
+            if self.current + 1 == self.parts.len() {
+                return Ok(None);
+            }
+            self.part = None;
+            self.current += 1;
+        }
+        Ok(None)
+    }
+
+    /// The channel of the message last read.
+    pub(super) fn channel(&self, header: Header) -> Option<&Channel> {
+        self.part.as_ref()?.channel(header.channel.1)
+    }
+
+    pub(super) fn truncated(&self) -> bool {
+        self.truncated
+    }
+}
+
+fn begin(path: &Path, format: FileFormat) -> Result<Box<dyn Part>, FileError> {
+    match format {
+        FileFormat::Mcap => Ok(Box::new(mcap_file::McapFile::open(path)?)),
+        _ => Ok(Box::new(database::Database::open(path)?)),
+    }
+}

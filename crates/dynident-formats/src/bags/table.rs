@@ -1,0 +1,306 @@
+//! A recording as a table: a group of columns for each topic, joined where columns of several are asked for.
+
+use super::joined::Joined;
+use super::messages::{Header, Messages};
+use super::parts;
+use super::topic::{Sample, Topic};
+use crate::Contents;
+use crate::error::FileError;
+use crate::kind::FileFormat;
+use crate::recognition;
+use crate::table::{ColumnGroup, Table};
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+/// Messages, and their bytes, that are searched for topics and columns.
+const MOST_SEARCHED: u64 = 20_000;
+const MOST_SEARCHED_BYTES: usize = 1 << 26;
+/// Messages of a topic whose columns are looked at: several publishers may take turns.
+const SEARCHED_OF_TOPIC: u64 = 64;
+
+/// One MCAP file.
+pub(crate) fn open_mcap(path: &Path) -> Result<Contents, FileError> {
+    BagTable::open(path, &[(path.to_owned(), FileFormat::Mcap)])
+}
+
+/// One SQLite file.
+pub(crate) fn open_database(path: &Path) -> Result<Contents, FileError> {
+    BagTable::open(path, &[(path.to_owned(), FileFormat::Rosbag2)])
+}
+
+/// The parts in a rosbag2 folder.
+pub(crate) fn open_folder(path: &Path) -> Result<Contents, FileError> {
+    let mut found = Vec::new();
+    for part in parts(path)? {
+        let file = File::open(&part).map_err(|source| FileError::Io { file: part.clone(), source })?;
+        let head = recognition::head(&mut BufReader::new(file));
+        let head = head.map_err(|source| FileError::Io { file: part.clone(), source })?;
+        match recognition::recognised(&part, &head)? {
+            format @ (FileFormat::Mcap | FileFormat::Rosbag2) => found.push((part, format)),
+            FileFormat::ZstdText => {
+                return Err(FileError::OtherFormat {
+                    file: part,
+                    format: "a packed part of a rosbag2 recording",
+                    fix: "unpack it (`zstd -d`), and write its name without .zstd into metadata.yaml",
+                });
+            }
+            other => {
+                let problem = format!("it is {}, no part of a recording", other.name());
+                return Err(FileError::broken(&part, FileFormat::Rosbag2, "its beginning", problem, "copy it again"));
+            }
+        }
+    }
+    BagTable::open(path, &found)
+}
+
+#[derive(Debug)]
+struct BagTable {
+    path: PathBuf,
+    format: FileFormat,
+    messages: Messages,
+    topics: Vec<Topic>,
+    /// Topic of each channel that was met; none for those that are not read.
+    topic_of: HashMap<(usize, usize), Option<usize>>,
+    names: Vec<String>,
+    groups: Vec<ColumnGroup>,
+    notes: Vec<String>,
+    /// What was asked for.
+    plan: Plan,
+    buffer: Vec<u8>,
+    sample: Sample,
+}
+
+/// Which topics are read, and where their values go.
+#[derive(Debug)]
+struct Plan {
+    /// The topics, the first one's clock in force; and the columns of each.
+    topics: Vec<(usize, Vec<usize>)>,
+    /// Place in a joined row of each selected column.
+    places: Vec<usize>,
+    /// Whether topics are joined by the stamps of their messages.
+    by_stamp: bool,
+    joined: Joined,
+    ended: bool,
+}
+
+impl BagTable {
+    fn open(path: &Path, parts: &[(PathBuf, FileFormat)]) -> Result<Contents, FileError> {
+        let format = if parts.len() == 1 { parts[0].1 } else { FileFormat::Rosbag2 };
+        let mut table = Self {
+            path: path.to_owned(),
+            format,
+            messages: Messages::new(parts),
+            topics: Vec::new(),
+            topic_of: HashMap::new(),
+            names: Vec::new(),
+            groups: Vec::new(),
+            notes: Vec::new(),
+            plan: Plan {
+                topics: Vec::new(),
+                places: Vec::new(),
+                by_stamp: false,
+                joined: Joined::new(0),
+                ended: false,
+            },
+            buffer: Vec::new(),
+            sample: Sample::default(),
+        };
+        table.search()?;
+        table.messages = Messages::new(parts);
+        if table.names.is_empty() {
+            let found = if table.notes.is_empty() { "it has no messages".to_owned() } else { table.notes.join("; ") };
+            let fix = "record a topic with joint states";
+            return Err(FileError::no_columns(path, format, found, fix));
+        }
+        table.select(&(0..table.groups[0].columns.len()).collect::<Vec<_>>());
+        Ok(Contents::Table(Box::new(table)))
+    }
+
+    /// Finds topics and columns in the first messages.
+    fn search(&mut self) -> Result<(), FileError> {
+        let (mut searched, mut bytes) = (0, 0);
+        while searched < MOST_SEARCHED && bytes < MOST_SEARCHED_BYTES {
+            let header = match self.messages.next(&mut self.buffer) {
+                Ok(Some(header)) => header,
+                Ok(None) => break,
+                // Broken further on: reading will say so when it comes there.
+                Err(_) if searched > 0 => break,
+                Err(error) => return Err(error),
+            };
+            searched += 1;
+            bytes += self.buffer.len();
+            let Some(index) = self.topic(header) else { continue };
+            let topic = &mut self.topics[index];
+            if topic.messages < SEARCHED_OF_TOPIC {
+                topic.messages += 1;
+                if let Err(problem) = topic.explore(header.log_ns, &self.buffer) {
+                    let note = format!("{} ({}): {problem}", topic.name, topic.kind);
+                    if topic.messages == 1 {
+                        self.notes.push(note);
+                    }
+                }
+            }
+        }
+        self.topics.sort_by(|a, b| a.name.cmp(&b.name));
+        self.topic_of.clear();
+        let mut kept = Vec::new();
+        for mut topic in core::mem::take(&mut self.topics) {
+            // A topic with nothing but its own time has nothing to tell.
+            if topic.columns.len() == 1 {
+                let note = format!("{} ({}): no numbers", topic.name, topic.kind);
+                if !self.notes.iter().any(|known| known.starts_with(&format!("{} (", topic.name))) {
+                    self.notes.push(note);
+                }
+                continue;
+            }
+            topic.messages = 0;
+            let begin = self.names.len();
+            self.names.extend(topic.columns.iter().map(|column| format!("{}.{column}", topic.name)));
+            self.groups.push(ColumnGroup {
+                name: Some(topic.name.clone()),
+                columns: begin..self.names.len(),
+                time: Some(begin + topic.stamp_column().unwrap_or(0)),
+            });
+            kept.push(topic);
+        }
+        self.topics = kept;
+        Ok(())
+    }
+
+    /// The topic of the message last read; in search of columns, a new one where it is not known.
+    fn topic(&mut self, header: Header) -> Option<usize> {
+        if let Some(known) = self.topic_of.get(&header.channel) {
+            return *known;
+        }
+        let channel = self.messages.channel(header)?;
+        let mut found = self.topics.iter().position(|topic| topic.is_of(channel));
+        // Names are given once; what is met later has no columns.
+        if found.is_none() && self.groups.is_empty() {
+            match Topic::new(channel) {
+                Ok(topic) => {
+                    self.topics.push(topic);
+                    found = Some(self.topics.len() - 1);
+                }
+                Err(problem) => {
+                    let note = format!("{} ({}): {problem}", channel.topic, channel.kind);
+                    if !self.notes.contains(&note) {
+                        self.notes.push(note);
+                    }
+                }
+            }
+        }
+        self.topic_of.insert(header.channel, found);
+        found
+    }
+
+    /// Reads messages until a row is whole.
+    fn advance(&mut self) -> Result<Option<Vec<f64>>, FileError> {
+        loop {
+            if let Some(row) = self.plan.joined.next() {
+                return Ok(Some(row));
+            }
+            if self.plan.ended {
+                return Ok(None);
+            }
+            let Some(header) = self.messages.next(&mut self.buffer)? else {
+                self.plan.ended = true;
+                self.plan.joined.end();
+                continue;
+            };
+            let Some(index) = self.topic(header) else { continue };
+            let Some(at) = self.plan.topics.iter().position(|(topic, _)| *topic == index) else { continue };
+            let topic = &mut self.topics[index];
+            topic.read(header.log_ns, &self.buffer, &mut self.sample).map_err(|problem| {
+                let place = format!("message {} of {}", topic.messages, topic.name);
+                FileError::broken(&self.path, self.format, place, problem, "leave the topic out, or record it again")
+            })?;
+            let columns = &self.plan.topics[at].1;
+            let values: Vec<f64> = columns.iter().map(|column| self.sample.values[*column]).collect();
+            // Publishers that take turns on one topic: a message without any of what is asked for is no row.
+            let clocks = [Some(0), topic.stamp_column()];
+            let told = |(column, value): (&usize, &f64)| !clocks.contains(&Some(*column)) && !value.is_nan();
+            let only_clocks = columns.iter().all(|column| clocks.contains(&Some(*column)));
+            if !only_clocks && !columns.iter().zip(&values).any(told) {
+                continue;
+            }
+            let stamp = if self.plan.by_stamp { self.sample.stamp_ns } else { None };
+            let at_ns = stamp.unwrap_or(self.sample.log_ns);
+            if at > 0 {
+                self.plan.joined.push_side(at - 1, at_ns, values);
+            } else if let Err(silent) = self.plan.joined.push_row(at_ns, values) {
+                let name = self.plan.topics.get(silent + 1).map_or("", |(topic, _)| self.topics[*topic].name.as_str());
+                let problem = format!("it is silent for a million messages of {}", self.topics[index].name);
+                let place = format!("topic {name}");
+                return Err(FileError::broken(&self.path, self.format, place, problem, "name its columns in no log"));
+            }
+        }
+    }
+}
+
+impl Table for BagTable {
+    fn width(&self) -> usize {
+        self.names.len()
+    }
+
+    fn names(&self) -> Option<&[String]> {
+        Some(&self.names)
+    }
+
+    fn groups(&self) -> Vec<ColumnGroup> {
+        self.groups.clone()
+    }
+
+    fn select(&mut self, columns: &[usize]) {
+        let mut topics: Vec<(usize, Vec<usize>)> = Vec::new();
+        // Topic and column of each, and their place among what is read of the topic.
+        let mut slots = Vec::new();
+        for column in columns {
+            let Some(topic) = self.groups.iter().position(|group| group.columns.contains(column)) else { continue };
+            let own = column - self.groups[topic].columns.start;
+            let at = topics.iter().position(|(known, _)| *known == topic).unwrap_or_else(|| {
+                topics.push((topic, Vec::new()));
+                topics.len() - 1
+            });
+            slots.push((at, topics[at].1.len()));
+            topics[at].1.push(own);
+        }
+        let begins: Vec<usize> = topics
+            .iter()
+            .scan(0, |sum, (_, columns)| {
+                let begin = *sum;
+                *sum += columns.len();
+                Some(begin)
+            })
+            .collect();
+        let by_log_time = topics.first().is_some_and(|(_, columns)| columns.contains(&0));
+        self.plan = Plan {
+            places: slots.into_iter().map(|(at, slot)| begins[at] + slot).collect(),
+            by_stamp: !by_log_time && topics.iter().all(|(topic, _)| self.topics[*topic].stamped),
+            joined: Joined::new(topics.len().saturating_sub(1)),
+            ended: false,
+            topics,
+        };
+    }
+
+    fn next_row(&mut self, values: &mut [f64]) -> Result<bool, FileError> {
+        let Some(row) = self.advance()? else { return Ok(false) };
+        for (value, place) in values.iter_mut().zip(&self.plan.places) {
+            *value = row[*place];
+        }
+        Ok(true)
+    }
+
+    fn skip_row(&mut self) -> Result<bool, FileError> {
+        Ok(self.advance()?.is_some())
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
+    fn truncated(&self) -> bool {
+        self.messages.truncated()
+    }
+}

@@ -1,0 +1,182 @@
+//! One topic: its columns, found in its first messages, and the numbers of each message.
+
+use super::messages::{Channel, Encoding};
+use crate::arrays::MOST_COLUMNS;
+use crate::json_lines::flattened;
+use crate::ros::{Decoder, Definition, Leaves};
+use std::collections::HashMap;
+
+/// The stamp that ROS messages begin with.
+const STAMP: &str = "header.stamp";
+
+/// How a topic's messages are read.
+#[derive(Debug)]
+enum Reader {
+    /// Definitions that may explain the messages: the first that does is kept.
+    Cdr(Vec<Decoder>),
+    Json,
+}
+
+/// A topic under way.
+#[derive(Debug)]
+pub(super) struct Topic {
+    pub(super) name: String,
+    pub(super) kind: String,
+    reader: Reader,
+    /// Names of the columns without the topic's; the first is `log_time`.
+    pub(super) columns: Vec<String>,
+    column_of: HashMap<String, usize>,
+    leaves: Leaves,
+    /// Shape of the message before, and the column of each of its leaves.
+    shape: Vec<u8>,
+    column_of_leaf: Vec<Option<usize>>,
+    /// First value of each column that is a point in time, ns.
+    origins_ns: HashMap<usize, i64>,
+    /// Whether its messages carry stamps that are set.
+    pub(super) stamped: bool,
+    pub(super) messages: u64,
+}
+
+/// When a message was recorded and stamped, and its numbers.
+#[derive(Debug, Default)]
+pub(super) struct Sample {
+    pub(super) log_ns: i64,
+    pub(super) stamp_ns: Option<i64>,
+    /// One for each column, NaN where the message does not have it.
+    pub(super) values: Vec<f64>,
+}
+
+impl Topic {
+    /// The topic of a channel.
+    ///
+    /// # Errors
+    /// Why its messages cannot be read.
+    pub(super) fn new(channel: &Channel) -> Result<Self, String> {
+        let reader = match &channel.encoding {
+            Encoding::Json => Reader::Json,
+            Encoding::Other(what) => return Err(format!("its messages are {what}")),
+            Encoding::Cdr(texts) => {
+                let decoders = texts.iter().map(|text| Definition::parse(&channel.kind, text).map(Decoder::new));
+                Reader::Cdr(decoders.collect::<Result<_, _>>()?)
+            }
+        };
+        let log_time = "log_time".to_owned();
+        Ok(Self {
+            name: channel.topic.clone(),
+            kind: channel.kind.clone(),
+            reader,
+            column_of: HashMap::from([(log_time.clone(), 0)]),
+            columns: vec![log_time],
+            leaves: Leaves::default(),
+            shape: Vec::new(),
+            column_of_leaf: Vec::new(),
+            origins_ns: HashMap::new(),
+            stamped: false,
+            messages: 0,
+        })
+    }
+
+    /// Whether messages of `channel` are this topic's.
+    pub(super) fn is_of(&self, channel: &Channel) -> bool {
+        self.name == channel.topic && self.kind == channel.kind
+    }
+
+    /// Adds the columns of a message.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub(super) fn explore(&mut self, log_ns: i64, message: &[u8]) -> Result<(), String> {
+        self.origins_ns.entry(0).or_insert(log_ns);
+        let mut names = Vec::new();
+        match &mut self.reader {
+            Reader::Json => {
+                let value = serde_json::from_slice(message).map_err(|error| format!("it is not JSON ({error})"))?;
+                flattened(&value, &mut String::new(), &mut |name, _| names.push(name.to_owned()));
+            }
+            Reader::Cdr(decoders) => {
+                let mut outcome = Err("it has no definition".to_owned());
+                let fits = decoders.iter().position(|decoder| {
+                    outcome = decoder.read(message, true, &mut self.leaves);
+                    outcome.is_ok()
+                });
+                outcome?;
+                decoders.swap(0, fits.unwrap_or(0));
+                decoders.truncate(1);
+                names.clone_from(&self.leaves.paths);
+            }
+        }
+        for name in names {
+            if !self.column_of.contains_key(&name) && self.columns.len() < MOST_COLUMNS {
+                self.column_of.insert(name.clone(), self.columns.len());
+                self.columns.push(name);
+            }
+        }
+        if let Reader::Cdr(_) = self.reader {
+            for (leaf, stamp) in &self.leaves.stamps_ns {
+                if let Some(column) = self.column_of.get(&self.leaves.paths[*leaf]) {
+                    self.origins_ns.entry(*column).or_insert(*stamp);
+                    self.stamped |= self.leaves.paths[*leaf] == STAMP && *stamp != 0;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The column of the message's own stamp.
+    pub(super) fn stamp_column(&self) -> Option<usize> {
+        self.column_of.get(STAMP).copied().filter(|_| self.stamped)
+    }
+
+    /// Reads a message into `sample`.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub(super) fn read(&mut self, log_ns: i64, message: &[u8], sample: &mut Sample) -> Result<(), String> {
+        self.messages += 1;
+        sample.log_ns = log_ns;
+        sample.stamp_ns = None;
+        sample.values.clear();
+        sample.values.resize(self.columns.len(), f64::NAN);
+        sample.values[0] = seconds(log_ns, self.origins_ns.get(&0));
+        match &mut self.reader {
+            Reader::Json => {
+                let value = serde_json::from_slice(message).map_err(|error| format!("it is not JSON ({error})"))?;
+                flattened(&value, &mut String::new(), &mut |name, number| {
+                    if let Some(column) = self.column_of.get(name) {
+                        sample.values[*column] = number;
+                    }
+                });
+            }
+            Reader::Cdr(decoders) => {
+                let decoder = decoders.first().ok_or("it has no definition")?;
+                decoder.read(message, false, &mut self.leaves)?;
+                if self.leaves.shape != self.shape || self.column_of_leaf.len() != self.leaves.values.len() {
+                    decoder.read(message, true, &mut self.leaves)?;
+                    self.shape.clone_from(&self.leaves.shape);
+                    let column = |path: &String| self.column_of.get(path).copied();
+                    self.column_of_leaf = self.leaves.paths.iter().map(column).collect();
+                }
+                for (column, value) in self.column_of_leaf.iter().zip(&self.leaves.values) {
+                    if let Some(column) = column {
+                        sample.values[*column] = *value;
+                    }
+                }
+                let stamp_column = self.column_of.get(STAMP);
+                for (leaf, stamp) in &self.leaves.stamps_ns {
+                    if let Some(column) = self.column_of_leaf[*leaf] {
+                        sample.values[column] = seconds(*stamp, self.origins_ns.get(&column));
+                        if stamp_column == Some(&column) {
+                            sample.stamp_ns = Some(*stamp);
+                        }
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Seconds after the first value, from whole nanoseconds: what is lost is the last bit of a double.
+fn seconds(ns: i64, origin: Option<&i64>) -> f64 {
+    (i128::from(ns) - i128::from(origin.copied().unwrap_or(0))) as f64 / 1e9
+}

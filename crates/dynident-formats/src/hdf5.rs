@@ -1,0 +1,124 @@
+//! HDF5, and MATLAB's `save -v7.3`: data sets of one length.
+
+use crate::error::FileError;
+use crate::table::Table;
+use std::path::Path;
+
+#[cfg(not(feature = "hdf5"))]
+pub(crate) fn open(path: &Path) -> Result<Box<dyn Table>, FileError> {
+    Err(FileError::NotBuilt { file: path.to_owned(), format: "an HDF5 file", feature: "hdf5" })
+}
+
+#[cfg(feature = "hdf5")]
+pub(crate) use reading::open;
+
+#[cfg(feature = "hdf5")]
+mod reading {
+    use super::{FileError, Path, Table};
+    use crate::arrays::{Array, ArrayTable};
+    use crate::error::visible;
+    use crate::kind::FileFormat;
+    use hdf5_pure::{DType, Dataset, File, Group};
+
+    /// Groups in groups.
+    const DEEPEST: usize = 8;
+    /// Data sets at most.
+    const MOST_SETS: usize = 10_000;
+    /// Numbers of all data sets together, at most: 2 GiB.
+    const MOST_NUMBERS: u64 = 1 << 28;
+
+    pub(crate) fn open(path: &Path) -> Result<Box<dyn Table>, FileError> {
+        let error = |error: hdf5_pure::Error| {
+            FileError::broken(path, FileFormat::Hdf5, "the file", error.to_string(), "write or copy it again")
+        };
+        let file = File::open_streaming(path).map_err(error)?;
+        let mut found = Found { path, arrays: Vec::new(), others: Vec::new(), sets: 0, left: MOST_NUMBERS };
+        found.group(&file.root(), "", 0)?;
+        let others = if found.others.is_empty() { "no data sets".to_owned() } else { found.others.join(", ") };
+        let table = ArrayTable::new(found.arrays).ok_or_else(|| {
+            let fix = "save vectors or matrices of real numbers";
+            FileError::no_columns(path, FileFormat::Hdf5, others, fix)
+        })?;
+        Ok(Box::new(table.with_notes(found.others)))
+    }
+
+    struct Found<'a> {
+        path: &'a Path,
+        arrays: Vec<Array>,
+        others: Vec<String>,
+        sets: usize,
+        left: u64,
+    }
+
+    impl Found<'_> {
+        fn broken(&self, place: &str, error: &hdf5_pure::Error) -> FileError {
+            let fix = "write or copy it again";
+            FileError::broken(self.path, FileFormat::Hdf5, format!("`{place}`"), error.to_string(), fix)
+        }
+
+        fn group(&mut self, group: &Group, at: &str, depth: usize) -> Result<(), FileError> {
+            let name = |own: &str| if at.is_empty() { own.to_owned() } else { format!("{at}.{own}") };
+            for own in group.datasets().map_err(|error| self.broken(at, &error))? {
+                // MATLAB keeps what its references point to in #refs#.
+                if self.sets >= MOST_SETS || own.starts_with('#') {
+                    continue;
+                }
+                self.sets += 1;
+                let place = name(&own);
+                // One that cannot be read leaves the others readable.
+                let read = group.dataset(&own).map_err(|error| error.to_string());
+                match read.and_then(|set| array(&set, &place, self.left)) {
+                    Ok(array) => {
+                        self.left -= array.values.len() as u64;
+                        self.arrays.push(array);
+                    }
+                    Err(problem) => self.others.push(visible(&format!("{place}: {problem}"))),
+                }
+            }
+            if depth < DEEPEST {
+                for own in group.groups().map_err(|error| self.broken(at, &error))? {
+                    if own.starts_with('#') {
+                        continue;
+                    }
+                    let place = name(&own);
+                    let inner = group.group(&own).map_err(|error| self.broken(&place, &error))?;
+                    self.group(&inner, &place, depth + 1)?;
+                }
+            }
+            Ok(())
+        }
+    }
+
+    /// The numbers of a data set.
+    fn array(set: &Dataset, place: &str, most: u64) -> Result<Array, String> {
+        let text = |error: hdf5_pure::Error| error.to_string();
+        let kind = set.dtype().map_err(text)?;
+        if !matches!(
+            kind,
+            DType::F32
+                | DType::F64
+                | DType::I8
+                | DType::I16
+                | DType::I32
+                | DType::I64
+                | DType::U8
+                | DType::U16
+                | DType::U32
+                | DType::U64
+        ) {
+            return Err("no numbers".to_owned());
+        }
+        let shape = set.shape().map_err(text)?;
+        let sides: Option<Vec<usize>> = shape.iter().map(|side| usize::try_from(*side).ok()).collect();
+        let sides = sides.and_then(|sides| Array::two_sides(&sides)).ok_or("more than two sides")?;
+        let numbers = shape.iter().try_fold(1_u64, |all, side| all.checked_mul(*side));
+        if numbers.is_none_or(|numbers| numbers > most) {
+            return Err("more than 2 GiB of numbers".to_owned());
+        }
+        let values = set.read_f64().map_err(text)?;
+        if values.len() != sides[0] * sides[1] {
+            return Err("another count of numbers than its sides say".to_owned());
+        }
+        Ok(Array::row_major(place.to_owned(), sides, values))
+    }
+}

@@ -1,0 +1,189 @@
+//! JSON lines: one object a line, its numbers columns by their path.
+
+use crate::error::FileError;
+use crate::table::Table;
+use std::io::BufRead;
+use std::path::Path;
+
+#[cfg(not(feature = "json"))]
+pub(crate) fn open(path: &Path, _: Box<dyn BufRead + Send>) -> Result<Box<dyn Table>, FileError> {
+    Err(FileError::NotBuilt { file: path.to_owned(), format: "JSON lines", feature: "json" })
+}
+
+#[cfg(feature = "json")]
+pub(crate) use json::{flattened, open};
+
+#[cfg(feature = "json")]
+mod json {
+    use super::{BufRead, FileError, Path, Table};
+    use crate::arrays::MOST_COLUMNS;
+    use crate::kind::FileFormat;
+    use serde_json::Value;
+    use std::collections::{HashMap, VecDeque};
+    use std::io::Read;
+    use std::path::PathBuf;
+
+    /// A line with more bytes is none.
+    const LONGEST_LINE: u64 = 1 << 22;
+    /// Lines that are searched for columns.
+    const SEARCHED: usize = 64;
+
+    /// The numbers of `value` by their path; true and false are 1 and 0, null is a number that is missing.
+    pub(crate) fn flattened(value: &Value, path: &mut String, found: &mut impl FnMut(&str, f64)) {
+        let length = path.len();
+        match value {
+            Value::Number(number) => found(path, number.as_f64().unwrap_or(f64::NAN)),
+            Value::Bool(flag) => found(path, f64::from(u8::from(*flag))),
+            Value::Null => found(path, f64::NAN),
+            Value::String(_) => {}
+            Value::Array(items) => {
+                for (index, item) in items.iter().enumerate() {
+                    path.push('[');
+                    *path += &index.to_string();
+                    path.push(']');
+                    flattened(item, path, found);
+                    path.truncate(length);
+                }
+            }
+            Value::Object(entries) => {
+                for (key, entry) in entries {
+                    if length > 0 {
+                        path.push('.');
+                    }
+                    *path += key;
+                    flattened(entry, path, found);
+                    path.truncate(length);
+                }
+            }
+        }
+    }
+
+    struct JsonLines {
+        path: PathBuf,
+        reader: Box<dyn BufRead + Send>,
+        line: u64,
+        names: Vec<String>,
+        column_of: HashMap<String, usize>,
+        /// Lines that were read in search of columns.
+        waiting: VecDeque<(u64, Value)>,
+        /// Place of each column among those that are wanted.
+        slot_of: Vec<Option<usize>>,
+        truncated: bool,
+    }
+
+    impl core::fmt::Debug for JsonLines {
+        fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+            f.debug_struct("JsonLines").field("path", &self.path).field("line", &self.line).finish_non_exhaustive()
+        }
+    }
+
+    /// The table of `reader`. Its columns are those of its first lines.
+    pub(crate) fn open(path: &Path, reader: Box<dyn BufRead + Send>) -> Result<Box<dyn Table>, FileError> {
+        let mut table = JsonLines {
+            path: path.to_owned(),
+            reader,
+            line: 0,
+            names: Vec::new(),
+            column_of: HashMap::new(),
+            waiting: VecDeque::new(),
+            slot_of: Vec::new(),
+            truncated: false,
+        };
+        while table.waiting.len() < SEARCHED {
+            let Some(value) = table.read()? else { break };
+            flattened(&value, &mut String::new(), &mut |name, _| {
+                if !table.column_of.contains_key(name) && table.names.len() < MOST_COLUMNS {
+                    table.column_of.insert(name.to_owned(), table.names.len());
+                    table.names.push(name.to_owned());
+                }
+            });
+            table.waiting.push_back((table.line, value));
+        }
+        if table.names.is_empty() {
+            let fix = "each line should be an object with numbers, {\"t\": 0.0, \"q\": [0.1, 0.2]}";
+            return Err(FileError::no_columns(path, FileFormat::JsonLines, "objects only", fix));
+        }
+        table.slot_of = (0..table.names.len()).map(Some).collect();
+        Ok(Box::new(table))
+    }
+
+    impl JsonLines {
+        fn broken(&self, problem: impl Into<String>) -> FileError {
+            let fix = "write one whole object a line";
+            FileError::broken(&self.path, FileFormat::JsonLines, format!("line {}", self.line), problem, fix)
+        }
+
+        /// The next line that is not blank.
+        fn read(&mut self) -> Result<Option<Value>, FileError> {
+            loop {
+                let mut line = Vec::new();
+                let read = self.reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut line);
+                let read = read.map_err(|source| FileError::Io { file: self.path.clone(), source })?;
+                if read == 0 {
+                    return Ok(None);
+                }
+                self.line += 1;
+                if read as u64 == LONGEST_LINE {
+                    return Err(self.broken("it is longer than 4 MiB"));
+                }
+                let text = if self.line == 1 { line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&line) } else { &line };
+                if text.trim_ascii().is_empty() {
+                    continue;
+                }
+                return match serde_json::from_slice(text) {
+                    Ok(value @ Value::Object(_)) => Ok(Some(value)),
+                    // A last line without its end was cut off while it was written.
+                    Err(_) if !line.ends_with(b"\n") && self.line > 1 => {
+                        self.truncated = true;
+                        Ok(None)
+                    }
+                    Ok(_) => Err(self.broken("it is not an object")),
+                    Err(error) => Err(self.broken(format!("it is not JSON ({error})"))),
+                };
+            }
+        }
+
+        fn next(&mut self) -> Result<Option<Value>, FileError> {
+            match self.waiting.pop_front() {
+                Some((_, value)) => Ok(Some(value)),
+                None => self.read(),
+            }
+        }
+    }
+
+    impl Table for JsonLines {
+        fn width(&self) -> usize {
+            self.names.len()
+        }
+
+        fn names(&self) -> Option<&[String]> {
+            Some(&self.names)
+        }
+
+        fn select(&mut self, columns: &[usize]) {
+            self.slot_of = vec![None; self.names.len()];
+            for (slot, column) in columns.iter().enumerate() {
+                self.slot_of[*column] = Some(slot);
+            }
+        }
+
+        fn next_row(&mut self, values: &mut [f64]) -> Result<bool, FileError> {
+            let Some(value) = self.next()? else { return Ok(false) };
+            values.fill(f64::NAN);
+            flattened(&value, &mut String::new(), &mut |name, number| {
+                if let Some(slot) = self.column_of.get(name).and_then(|column| self.slot_of[*column]) {
+                    values[slot] = number;
+                }
+            });
+            Ok(true)
+        }
+
+        fn skip_row(&mut self) -> Result<bool, FileError> {
+            Ok(self.next()?.is_some())
+        }
+
+        fn truncated(&self) -> bool {
+            self.truncated
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! **What does this file hold?** A file is known by its content, never by its name, and becomes text, or a table of
+//! named columns of numbers.
+//!
+//! | format | columns | feature |
+//! | --- | --- | --- |
+//! | text, also packed by gzip or Zstandard | the caller's business: [`Contents::Text`] | `gzip`, `zstd` |
+//! | NumPy `.npy`, `.npz` | fields of a structured array, columns of a matrix, arrays of one length | `.npz`: `gzip` |
+//! | JSON, one object a line | numbers by their path: `arm.q[0]` | `json` |
+//! | MCAP, rosbag2 | numbers of ROS 2 messages by topic and path: `/joint_states.position[elbow]` | `bags` |
+//! | Parquet | columns, lists with their indices | `parquet` |
+//! | MATLAB 5, MATLAB 7.3 and HDF5 | variables of one length, matrices either way up | `gzip`, `hdf5` |
+//!
+//! Columns that were recorded on different clocks (topics of a bag) are joined on that of the first one selected: see
+//! [`Table::select`]. Indices in names count from 0. What is allocated is bounded by what the file holds.
+//!
+//! ```
+//! use dynident_formats::{Contents, open};
+//! # let folder = tempfile::tempdir()?;
+//! # let path = folder.path().join("log");
+//! std::fs::write(&path, "{\"t\": 0.5, \"q\": [1, 2]}\n{\"t\": 0.75, \"q\": [3, 4]}\n")?;
+//! let opened = open(&path)?;
+//! let Contents::Table(mut table) = opened.contents else { panic!("JSON lines are a table") };
+//! assert_eq!(table.names().unwrap(), ["q[0]", "q[1]", "t"]);
+//! table.select(&[1, 2]);
+//! let mut row = [0.0; 2];
+//! assert!(table.next_row(&mut row)? && row == [2.0, 0.5]);
+//! assert!(table.next_row(&mut row)? && row == [4.0, 0.75]);
+//! assert!(!table.next_row(&mut row)?);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(
+    not(all(feature = "gzip", feature = "zstd", feature = "bags", feature = "parquet", feature = "hdf5")),
+    allow(dead_code, unused_variables, clippy::needless_pass_by_value, reason = "what formats share is not all used")
+)]
+
+mod arrays;
+mod bags;
+mod bytes;
+mod error;
+mod hdf5;
+mod json_lines;
+mod kind;
+mod mat;
+mod npy;
+mod packed;
+mod parquet;
+mod recognition;
+#[cfg(feature = "bags")]
+mod ros;
+mod table;
+mod zip;
+
+pub use error::FileError;
+pub use kind::FileFormat;
+pub use table::{ColumnGroup, Table};
+
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+/// A file, opened.
+#[derive(Debug)]
+pub struct Opened {
+    /// What it is.
+    pub format: FileFormat,
+    /// What it holds.
+    pub contents: Contents,
+}
+
+/// What a file holds.
+pub enum Contents {
+    /// Text, unpacked.
+    Text(Box<dyn Read + Send>),
+    /// Columns of numbers.
+    Table(Box<dyn Table>),
+}
+
+impl core::fmt::Debug for Contents {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Text(_) => f.write_str("Text"),
+            Self::Table(table) => f.debug_tuple("Table").field(table).finish(),
+        }
+    }
+}
+
+/// Opens the file at `path`, or the folder of a rosbag2 recording, and finds out what it holds.
+///
+/// # Errors
+/// If it cannot be read, is of a format that is not read, or is broken where its columns are named.
+pub fn open(path: &Path) -> Result<Opened, FileError> {
+    let refused = |source| FileError::Io { file: path.to_owned(), source };
+    if std::fs::metadata(path).map_err(refused)?.is_dir() {
+        if path.join(bags::METADATA).is_file() {
+            return Ok(Opened { format: FileFormat::Rosbag2, contents: bags::open_folder(path)? });
+        }
+        return Err(refused(std::io::Error::from(std::io::ErrorKind::IsADirectory)));
+    }
+    let file = File::open(path).map_err(refused)?;
+    let mut reader = BufReader::with_capacity(1 << 18, file);
+    let head = recognition::head(&mut reader).map_err(refused)?;
+    let format = recognition::recognised(path, &head)?;
+    let contents = match format {
+        FileFormat::Text => Contents::Text(Box::new(reader)),
+        FileFormat::GzipText | FileFormat::ZstdText => {
+            let unpacked = packed::unpacked(path, format, reader)?;
+            let mut reader = BufReader::with_capacity(1 << 18, unpacked);
+            let inner = recognition::head(&mut reader).map_err(refused)?;
+            match recognition::recognised(path, &inner)? {
+                FileFormat::Text => Contents::Text(Box::new(reader)),
+                FileFormat::JsonLines => Contents::Table(json_lines::open(path, Box::new(reader))?),
+                other => {
+                    let problem = format!("it holds {}, which is read only as it is", other.name());
+                    return Err(FileError::broken(path, format, "its beginning", problem, "unpack it first"));
+                }
+            }
+        }
+        FileFormat::JsonLines => Contents::Table(json_lines::open(path, Box::new(reader))?),
+        FileFormat::Npy => Contents::Table(npy::open(path, reader)?),
+        FileFormat::Npz => Contents::Table(npy::open_archive(path)?),
+        FileFormat::Mcap => bags::open_mcap(path)?,
+        FileFormat::Rosbag2 => bags::open_database(path)?,
+        FileFormat::Parquet => Contents::Table(parquet::open(path)?),
+        FileFormat::Mat5 => Contents::Table(mat::open(path, reader)?),
+        FileFormat::Hdf5 => Contents::Table(hdf5::open(path)?),
+    };
+    Ok(Opened { format, contents })
+}
+
+/// The files that hold what `path` names: itself, or the parts of a rosbag2 recording's folder, its list of parts
+/// first.
+///
+/// # Errors
+/// If a folder's list of parts cannot be read.
+pub fn files(path: &Path) -> Result<Vec<std::path::PathBuf>, FileError> {
+    if !path.is_dir() {
+        return Ok(vec![path.to_owned()]);
+    }
+    let mut files = vec![path.join(bags::METADATA)];
+    files.extend(bags::parts(path)?);
+    Ok(files)
+}

@@ -1,0 +1,274 @@
+//! NumPy: one array (`.npy`) or several of one length (`.npz`). Format: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
+
+use crate::arrays::{Array, ArrayTable, MOST_COLUMNS};
+use crate::bytes::{Bytes, Number};
+use crate::error::FileError;
+use crate::kind::FileFormat;
+use crate::table::Table;
+use crate::zip;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+/// Unpacked arrays of one archive at most, bytes: what is packed may claim to be anything.
+const MOST_UNPACKED: u64 = 1 << 31;
+/// A header is a line or two; that of a structured array a few thousand bytes.
+const LONGEST_HEADER: usize = 1 << 20;
+
+/// One array as its header describes it.
+struct Header {
+    /// Name (none outside of structured arrays), offset in an item, entries, how they are written.
+    fields: Vec<Field>,
+    /// Bytes of an item.
+    item: usize,
+    fortran: bool,
+    shape: Vec<usize>,
+}
+
+struct Field {
+    name: Option<String>,
+    offset: usize,
+    number: Option<(Number, bool)>,
+    count: usize,
+}
+
+/// The array in `reader`.
+pub(crate) fn open(path: &Path, mut reader: impl Read) -> Result<Box<dyn Table>, FileError> {
+    let arrays = arrays(path, FileFormat::Npy, "", &mut reader, MOST_UNPACKED)?;
+    let named = arrays.iter().all(|array| !array.name.is_empty());
+    let table = ArrayTable::new(arrays).ok_or_else(|| nothing(path, FileFormat::Npy))?;
+    Ok(Box::new(if named { table } else { table.nameless() }))
+}
+
+/// The arrays of an archive, by their names there.
+pub(crate) fn open_archive(path: &Path) -> Result<Box<dyn Table>, FileError> {
+    let io = |source| FileError::Io { file: path.to_owned(), source };
+    let mut file = std::fs::File::open(path).map_err(io)?;
+    let members = zip::members(path, &mut file)?;
+    let (mut all, mut left, mut found) = (Vec::new(), MOST_UNPACKED, 0);
+    for member in &members {
+        let Some(name) = member.name.strip_suffix(".npy") else { continue };
+        found += 1;
+        let contents = zip::contents(path, &mut file, member)?;
+        let arrays = arrays(path, FileFormat::Npz, name, &mut BufReader::new(contents), left)?;
+        left = left.saturating_sub(arrays.iter().map(|array| array.values.len() as u64 * 8).sum());
+        all.extend(arrays);
+    }
+    if found == 0 {
+        return Err(FileError::OtherFormat {
+            file: path.to_owned(),
+            format: "a ZIP archive without NumPy arrays (a workbook is one, too)",
+            fix: "unpack it, or save the workbook's sheet as CSV",
+        });
+    }
+    Ok(Box::new(ArrayTable::new(all).ok_or_else(|| nothing(path, FileFormat::Npz))?))
+}
+
+fn nothing(path: &Path, format: FileFormat) -> FileError {
+    FileError::no_columns(path, format, "text, objects or complex numbers", "save columns of real numbers")
+}
+
+/// The numeric arrays that one `.npy` stream holds: one, or one for each field of a structured array.
+fn arrays(
+    path: &Path,
+    format: FileFormat,
+    name: &str,
+    reader: &mut impl Read,
+    most: u64,
+) -> Result<Vec<Array>, FileError> {
+    let place = if name.is_empty() { "the array".to_owned() } else { format!("array `{name}`") };
+    let broken =
+        |problem: String| FileError::broken(path, format, place.clone(), problem, "write it again with numpy.save");
+    let header = header(reader).map_err(&broken)?;
+    let items = header.shape.iter().try_fold(1_usize, |all, side| all.checked_mul(*side));
+    let bytes = items.and_then(|items| items.checked_mul(header.item)).filter(|bytes| *bytes as u64 <= most);
+    let (Some(items), Some(bytes)) = (items, bytes) else {
+        return Err(broken(format!("its shape {:?} is larger than 2 GiB", header.shape)));
+    };
+    if header.fields.iter().map(|field| field.count).sum::<usize>() > MOST_COLUMNS {
+        return Err(broken(format!("it has more than {MOST_COLUMNS} columns")));
+    }
+    // Grows with what is really there, not with what the header claims.
+    let mut data = Vec::new();
+    let read = reader.take(bytes as u64).read_to_end(&mut data);
+    read.map_err(|error| broken(format!("it cannot be unpacked ({error})")))?;
+    if data.len() < bytes {
+        return Err(broken(format!("{} bytes of {bytes} are there: the file is cut off", data.len())));
+    }
+    let mut arrays = Vec::new();
+    for field in &header.fields {
+        let Some((number, big_endian)) = field.number else { continue };
+        let mut values = Vec::with_capacity(items * field.count);
+        for item in data.chunks_exact(header.item) {
+            let mut entries = Bytes::new(&item[field.offset..], big_endian);
+            values.extend((0..field.count).map_while(|_| entries.number(number)));
+        }
+        let label = match (&field.name, name.is_empty()) {
+            (Some(field), true) => field.clone(),
+            (Some(field), false) => format!("{name}.{field}"),
+            (None, _) => name.to_owned(),
+        };
+        let mut shape = header.shape.clone();
+        if field.count > 1 {
+            shape.push(field.count);
+        }
+        let Some([rows, columns]) = Array::two_sides(&shape) else { continue };
+        // Entries of a field with several stand together, whatever the order of items; a vector has one order only.
+        let column_major = header.fortran && field.count == 1;
+        let make = if column_major { Array::column_major } else { Array::row_major };
+        arrays.push(make(label, [rows, columns], values));
+    }
+    Ok(arrays)
+}
+
+fn header(reader: &mut impl Read) -> Result<Header, String> {
+    let cut = |_| "its header is cut off".to_owned();
+    let mut begin = [0; 8];
+    reader.read_exact(&mut begin).map_err(cut)?;
+    if &begin[..6] != b"\x93NUMPY" {
+        return Err("it does not begin as a NumPy array".to_owned());
+    }
+    let mut length = [0; 4];
+    let wide = begin[6] >= 2;
+    reader.read_exact(&mut length[..if wide { 4 } else { 2 }]).map_err(cut)?;
+    let length = u32::from_le_bytes(length) as usize;
+    if length > LONGEST_HEADER {
+        return Err(format!("its header of {length} bytes is too long"));
+    }
+    let mut text = vec![0; length];
+    reader.read_exact(&mut text).map_err(cut)?;
+    let text = String::from_utf8_lossy(&text);
+    let wrong = || "its header is not understood".to_owned();
+    let mut literal = Literal { rest: text.trim() };
+    let Value::Dict(entries) = literal.value(0).ok_or_else(wrong)? else { return Err(wrong()) };
+    let entry = |key: &str| entries.iter().find(|(name, _)| name == key).map(|(_, value)| value);
+    let shape = match entry("shape") {
+        Some(Value::List(sides)) => sides.iter().map(|side| match side {
+            Value::Number(side) => usize::try_from(*side).ok(),
+            _ => None,
+        }),
+        _ => return Err(wrong()),
+    };
+    let shape = shape.collect::<Option<Vec<usize>>>().ok_or_else(wrong)?;
+    let (fields, item) = fields(entry("descr").ok_or_else(wrong)?).ok_or_else(wrong)?;
+    Ok(Header { fields, item, fortran: matches!(entry("fortran_order"), Some(Value::Word("True"))), shape })
+}
+
+/// Fields and bytes of an item.
+fn fields(descr: &Value) -> Option<(Vec<Field>, usize)> {
+    match descr {
+        Value::Text(kind) => {
+            let (number, size) = scalar(kind)?;
+            Some((vec![Field { name: None, offset: 0, number, count: 1 }], size))
+        }
+        Value::List(entries) => {
+            let (mut fields, mut offset) = (Vec::new(), 0_usize);
+            for entry in entries {
+                let Value::List(parts) = entry else { return None };
+                let (Some(Value::Text(name)), Some(Value::Text(kind))) = (parts.first(), parts.get(1)) else {
+                    return None;
+                };
+                let (number, size) = scalar(kind)?;
+                let sides = match parts.get(2) {
+                    None => Vec::new(),
+                    Some(Value::Number(side)) => vec![*side],
+                    Some(Value::List(sides)) => sides
+                        .iter()
+                        .map(|side| if let Value::Number(side) = side { Some(*side) } else { None })
+                        .collect::<Option<Vec<_>>>()?,
+                    Some(_) => return None,
+                };
+                let count =
+                    sides.iter().try_fold(1_usize, |all, side| all.checked_mul(usize::try_from(*side).ok()?))?;
+                fields.push(Field { name: Some(name.clone()), offset, number, count });
+                offset = offset.checked_add(size.checked_mul(count)?)?;
+            }
+            (offset > 0).then_some((fields, offset))
+        }
+        _ => None,
+    }
+}
+
+/// `<f8`: how it is written, big-endian or not, and its bytes; no number for text and the like.
+fn scalar(kind: &str) -> Option<(Option<(Number, bool)>, usize)> {
+    let (order, rest) = kind.split_at_checked(1)?;
+    let (letter, size) = rest.split_at_checked(1)?;
+    let size: usize = size.split('[').next()?.parse().ok()?;
+    let number = match (letter, size) {
+        ("f", 2) => Some(Number::F16),
+        ("f", 4) => Some(Number::F32),
+        ("f", 8) => Some(Number::F64),
+        ("i", 1) => Some(Number::I8),
+        ("i", 2) => Some(Number::I16),
+        ("i", 4) => Some(Number::I32),
+        ("i" | "m" | "M", 8) => Some(Number::I64),
+        ("u" | "b", 1) => Some(Number::U8),
+        ("u", 2) => Some(Number::U16),
+        ("u", 4) => Some(Number::U32),
+        ("u", 8) => Some(Number::U64),
+        _ => None,
+    };
+    let bytes = if letter == "U" { size.checked_mul(4)? } else { size };
+    (bytes > 0 && bytes <= 1 << 20).then_some((number.map(|number| (number, order == ">")), bytes))
+}
+
+/// A literal of Python, as far as headers have them.
+enum Value<'a> {
+    Dict(Vec<(String, Value<'a>)>),
+    List(Vec<Value<'a>>),
+    Text(String),
+    Number(i64),
+    Word(&'a str),
+}
+
+struct Literal<'a> {
+    rest: &'a str,
+}
+
+impl<'a> Literal<'a> {
+    fn eat(&mut self, sign: char) -> bool {
+        self.rest = self.rest.trim_start();
+        let rest = self.rest.strip_prefix(sign);
+        self.rest = rest.unwrap_or(self.rest);
+        rest.is_some()
+    }
+
+    fn value(&mut self, depth: usize) -> Option<Value<'a>> {
+        if depth > 8 {
+            return None;
+        }
+        if self.eat('{') {
+            let mut entries = Vec::new();
+            while !self.eat('}') {
+                let Value::Text(key) = self.value(depth + 1)? else { return None };
+                self.eat(':').then_some(())?;
+                entries.push((key, self.value(depth + 1)?));
+                self.eat(',');
+            }
+            return Some(Value::Dict(entries));
+        }
+        for (open, close) in [('(', ')'), ('[', ']')] {
+            if self.eat(open) {
+                let mut items = Vec::new();
+                while !self.eat(close) {
+                    items.push(self.value(depth + 1)?);
+                    self.eat(',');
+                }
+                return Some(Value::List(items));
+            }
+        }
+        for quote in ['\'', '"'] {
+            if self.eat(quote) {
+                let (text, rest) = self.rest.split_once(quote)?;
+                self.rest = rest;
+                return Some(Value::Text(text.to_owned()));
+            }
+        }
+        let end = self.rest.find(|c: char| !c.is_alphanumeric() && c != '-' && c != '_').unwrap_or(self.rest.len());
+        let (word, rest) = self.rest.split_at(end);
+        self.rest = rest;
+        match word {
+            "" => None,
+            word => Some(word.trim_end_matches('L').parse().map_or(Value::Word(word), Value::Number)),
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! Definitions of the messages that robots' joints are recorded in, for bags that carry none (rosbag2 before ROS 2
+//! Iron). The packages' own texts, comments left out.
+
+const SEPARATOR: &str = "================================================================================\n";
+
+const JOINT_STATE: &str =
+    "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n";
+const MULTI_ARRAY: &str = "MultiArrayLayout layout\nfloat64[] data\n";
+const DYNAMIC_STATE: &str = "std_msgs/Header header\nstring[] joint_names\nInterfaceValue[] interface_values\n";
+
+const LAYOUT: &str = "MSG: std_msgs/MultiArrayLayout\nMultiArrayDimension[] dim\nuint32 data_offset\n";
+const DIMENSION: &str = "MSG: std_msgs/MultiArrayDimension\nstring label\nuint32 size\nuint32 stride\n";
+const INTERFACE: &str = "MSG: control_msgs/InterfaceValue\nstring[] interface_names\nfloat64[] values\n";
+const HEADER: &str = "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n";
+const POINT: &str = "MSG: trajectory_msgs/JointTrajectoryPoint\nfloat64[] positions\nfloat64[] velocities\n\
+    float64[] accelerations\nfloat64[] effort\nbuiltin_interfaces/Duration time_from_start\n";
+const MULTI_POINT: &str = "MSG: trajectory_msgs/MultiDOFJointTrajectoryPoint\n\
+    geometry_msgs/Transform[] transforms\ngeometry_msgs/Twist[] velocities\ngeometry_msgs/Twist[] accelerations\n\
+    builtin_interfaces/Duration time_from_start\n";
+const TRANSFORM: &str = "MSG: geometry_msgs/Transform\nVector3 translation\nQuaternion rotation\n";
+const TWIST: &str = "MSG: geometry_msgs/Twist\nVector3 linear\nVector3 angular\n";
+const VECTOR: &str = "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n";
+const QUATERNION: &str = "MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n";
+
+/// `JointTrajectoryControllerState` with these points, in the versions that came after each other.
+const CONTROLLER_POINTS: [&[&str]; 3] = [
+    &["reference", "feedback", "error", "output", "desired", "actual"],
+    &["reference", "feedback", "error", "output"],
+    &["desired", "actual", "error"],
+];
+
+/// The definitions that a message type, `sensor_msgs/msg/JointState`, has had in the packages'
+/// versions: a message is read by the first that explains all its bytes. Empty for types that are not known here.
+pub(crate) fn definitions_of(name: &str) -> Vec<String> {
+    let joined = |parts: &[&str]| parts.join(SEPARATOR);
+    match name {
+        "sensor_msgs/msg/JointState" => vec![joined(&[JOINT_STATE, HEADER])],
+        "std_msgs/msg/Float64MultiArray" => vec![joined(&[MULTI_ARRAY, LAYOUT, DIMENSION])],
+        "control_msgs/msg/DynamicJointState" => vec![joined(&[DYNAMIC_STATE, INTERFACE, HEADER])],
+        "control_msgs/msg/JointTrajectoryControllerState" => {
+            let version = |points: &&[&str]| {
+                let mut own = "std_msgs/Header header\nstring[] joint_names\n".to_owned();
+                own.extend(points.iter().map(|point| format!("trajectory_msgs/JointTrajectoryPoint {point}\n")));
+                // The oldest version knows no joints with several degrees of freedom.
+                if points.len() > 3 {
+                    own += "string[] multi_dof_joint_names\n";
+                    own.extend(
+                        points
+                            .iter()
+                            .map(|point| format!("trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_{point}\n")),
+                    );
+                }
+                joined(&[&own, HEADER, POINT, MULTI_POINT, TRANSFORM, TWIST, VECTOR, QUATERNION])
+            };
+            CONTROLLER_POINTS.iter().map(version).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ros::Definition;
+
+    #[test]
+    fn every_definition_is_read() {
+        for (name, messages) in [
+            ("sensor_msgs/msg/JointState", &[2][..]),
+            ("std_msgs/msg/Float64MultiArray", &[3]),
+            ("control_msgs/msg/DynamicJointState", &[3]),
+            ("control_msgs/msg/JointTrajectoryControllerState", &[8, 8, 3]),
+        ] {
+            let found: Vec<usize> =
+                definitions_of(name).iter().map(|text| Definition::parse(name, text).unwrap().messages.len()).collect();
+            assert_eq!(found, messages, "{name}");
+        }
+    }
+}

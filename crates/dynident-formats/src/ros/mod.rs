@@ -1,0 +1,9 @@
+//! ROS 2 messages: their definitions, and the numbers in their bytes.
+
+mod built_in;
+mod cdr;
+mod definition;
+
+pub(crate) use built_in::definitions_of;
+pub(crate) use cdr::{Decoder, Leaves};
+pub(crate) use definition::Definition;

@@ -1,0 +1,164 @@
+//! Files that are cut off, altered or hostile: an error that names the file, the place and what to do, and never a
+//! panic, an endless loop or memory that the file cannot fill.
+
+use super::golden::folder;
+use dynident_formats::{Contents, FileError, open};
+use std::io::{Read, Write};
+use std::path::Path;
+
+/// Reads everything: how many rows, or what is wrong.
+fn drain(path: &Path) -> Result<usize, FileError> {
+    let mut rows = 0;
+    match open(path)?.contents {
+        Contents::Text(mut text) => {
+            let mut all = Vec::new();
+            let read = text.by_ref().take(1 << 26).read_to_end(&mut all);
+            read.map_err(|source| FileError::Io { file: path.to_owned(), source })?;
+        }
+        Contents::Table(mut table) => {
+            let width = table.groups()[0].columns.len();
+            table.select(&(0..width).collect::<Vec<_>>());
+            let mut row = vec![0.0; width];
+            while table.next_row(&mut row)? {
+                rows += 1;
+            }
+        }
+    }
+    Ok(rows)
+}
+
+fn files() -> Vec<std::path::PathBuf> {
+    let mut files: Vec<_> = std::fs::read_dir(folder())
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.is_file() && path.extension().is_none_or(|extension| extension != "json"))
+        .collect();
+    files.sort();
+    files
+}
+
+fn told(error: &FileError, file: &str) {
+    let message = error.to_string();
+    assert!(message.contains(file), "{message}");
+    assert!(message.contains(';') || message.contains('('), "no fix: {message}");
+    assert!(message.chars().all(|c| !c.is_control()) && message.len() < 2000, "{message:?}");
+}
+
+#[test]
+fn files_that_are_cut_off_anywhere_are_read_so_far_or_refused() {
+    let scratch = tempfile::tempdir().unwrap();
+    let path = scratch.path().join("cut.log");
+    for file in files() {
+        let whole = std::fs::read(&file).unwrap();
+        let steps = 60.min(whole.len());
+        for k in 0..steps {
+            std::fs::write(&path, &whole[..whole.len() * k / steps]).unwrap();
+            if let Err(error) = drain(&path) {
+                told(&error, "cut.log");
+            }
+        }
+    }
+}
+
+#[test]
+fn files_with_altered_bytes_are_read_or_refused() {
+    let scratch = tempfile::tempdir().unwrap();
+    let path = scratch.path().join("altered.log");
+    let mut state = 20261123_u64;
+    let mut draw = move || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 33) as usize
+    };
+    for file in files() {
+        let whole = std::fs::read(&file).unwrap();
+        for _ in 0..60 {
+            let mut bytes = whole.clone();
+            // The head more often than the rest: that is where lengths stand.
+            let within = if draw() % 2 == 0 { bytes.len().min(600) } else { bytes.len() };
+            for _ in 0..=draw() % 4 {
+                bytes[draw() % within] = [0, 0xFF, 0x7F, 0x80, draw() as u8][draw() % 5];
+            }
+            std::fs::write(&path, &bytes).unwrap();
+            if let Err(error) = drain(&path) {
+                told(&error, "altered.log");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_was_cut_off_while_it_was_recorded_is_read_so_far() {
+    let scratch = tempfile::tempdir().unwrap();
+    let path = scratch.path().join("crash.mcap");
+    let whole = std::fs::read(folder().join("zstd.mcap")).unwrap();
+    std::fs::write(&path, &whole[..whole.len() / 3]).unwrap();
+    let Contents::Table(mut table) = open(&path).unwrap().contents else { panic!() };
+    let mut rows = 0;
+    let mut row = vec![0.0; table.width()];
+    while table.next_row(&mut row).unwrap() {
+        rows += 1;
+    }
+    assert!(rows > 5 && rows < 40 && table.truncated(), "{rows}");
+    let path = scratch.path().join("crash.jsonl");
+    std::fs::write(&path, "{\"t\": 1}\n{\"t\": 2}\n{\"t\": 3").unwrap();
+    let Contents::Table(mut table) = open(&path).unwrap().contents else { panic!() };
+    let mut row = [0.0];
+    while table.next_row(&mut row).unwrap() {}
+    assert!(row == [2.0] && table.truncated());
+}
+
+#[test]
+fn claims_that_the_file_cannot_fill_take_no_memory() {
+    let scratch = tempfile::tempdir().unwrap();
+    let path = scratch.path().join("claims.npy");
+    let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (200000000, 1), }\n";
+    let mut file = std::fs::File::create(&path).unwrap();
+    file.write_all(b"\x93NUMPY\x01\x00").unwrap();
+    file.write_all(&(header.len() as u16).to_le_bytes()).unwrap();
+    file.write_all(header.as_bytes()).unwrap();
+    file.write_all(&[0; 80]).unwrap();
+    drop(file);
+    let message = drain(&path).unwrap_err().to_string();
+    assert!(message.contains("80 bytes of 1600000000 are there"), "{message}");
+    for (shape, words) in [("(9999999999999, 9999999999)", "larger than 2 GiB"), ("(-1,)", "not understood")] {
+        let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend_from_slice(&(header.len() as u16).to_le_bytes());
+        bytes.extend_from_slice(header.as_bytes());
+        std::fs::write(&path, bytes).unwrap();
+        let message = drain(&path).unwrap_err().to_string();
+        assert!(message.contains(words), "{message}");
+    }
+}
+
+#[test]
+fn formats_that_are_not_read_are_named() {
+    let scratch = tempfile::tempdir().unwrap();
+    let path = scratch.path().join("log.csv");
+    for (bytes, words) in [
+        (&b"#ROSBAG V2.0\n"[..], "a ROS 1 bag, which is not read; convert it to MCAP"),
+        (b"ARROW1\0\0", "write it as Parquet"),
+        (b"BZh91AY&SY", "unpack it first"),
+        (b"\xFF\xFEa\0", "save it as UTF-8"),
+        (b"PK\x03\x04nothing", "the list of members is missing"),
+        (b"\x1F\x8B\x08\0garbage beyond", "cannot be read"),
+    ] {
+        std::fs::write(&path, bytes).unwrap();
+        let message = drain(&path).unwrap_err().to_string();
+        assert!(message.contains(words), "{message}");
+    }
+    let message = open(scratch.path()).unwrap_err().to_string();
+    assert!(message.contains("cannot be read"), "{message}");
+    std::fs::write(scratch.path().join("metadata.yaml"), "relative_file_paths:\n  - gone.mcap\n").unwrap();
+    let message = open(scratch.path()).unwrap_err().to_string();
+    assert!(message.contains("`gone.mcap` is not in the folder; let `ros2 bag reindex`"), "{message}");
+}
+
+#[test]
+fn what_mutated_inputs_found_is_refused() {
+    // An attachment longer than its chunk; a column at a negative place.
+    for file in ["bags/wrong_length.mcap", "parquet/negative_place.parquet"] {
+        let path = folder().join("../../fuzz/corpus").join(file);
+        told(&drain(&path).expect_err(file), file.rsplit('/').next().unwrap());
+    }
+}

@@ -1,0 +1,5 @@
+//! Tests of what files hold, in one program.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod broken;
+mod golden;

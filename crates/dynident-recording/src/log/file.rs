@@ -1,0 +1,135 @@
+//! A file as a source of rows, whatever its format.
+
+use super::format::{Header, LogFormat};
+use super::source::{LogGroup, LogSource, LogTable};
+use super::text::TextTable;
+use crate::error::RecordingError;
+use crate::place::LogPlace;
+use dynident_formats::{Contents, FileError, FileFormat, Table};
+use std::path::{Path, PathBuf};
+
+/// A file that holds rows of numbers, of any format that is read (`docs/src/logs.md`), found out from its content. The
+/// folder of a rosbag2 recording counts as a file.
+#[derive(Clone, Debug)]
+pub struct FileLog {
+    path: PathBuf,
+    header: Header,
+    delimiter: Option<char>,
+}
+
+impl FileLog {
+    /// The file at `path`; `header` and `delimiter` of `format` hold for text. Nothing is read yet.
+    pub fn new(path: &Path, format: &LogFormat) -> Self {
+        Self { path: path.to_owned(), header: format.header, delimiter: format.delimiter }
+    }
+
+    /// The file at `path`, whose header and delimiter are found out if it is text.
+    pub fn described_by_itself(path: &Path) -> Self {
+        Self { path: path.to_owned(), header: Header::Auto, delimiter: None }
+    }
+
+    /// What the file is, and a pass over its rows.
+    ///
+    /// # Errors
+    /// If it cannot be read, or is no table.
+    pub fn open_with_format(&self) -> Result<(FileFormat, Box<dyn LogTable>), RecordingError> {
+        let opened = dynident_formats::open(&self.path)?;
+        let table: Box<dyn LogTable> = match opened.contents {
+            Contents::Text(text) => Box::new(TextTable::open(&self.path, text, self.header, self.delimiter)?),
+            Contents::Table(table) => Box::new(FileTable { label: self.label(), table, rows: 0 }),
+        };
+        Ok((opened.format, table))
+    }
+}
+
+impl LogSource for FileLog {
+    fn label(&self) -> String {
+        self.path.display().to_string()
+    }
+
+    fn open(&self) -> Result<Box<dyn LogTable>, RecordingError> {
+        self.open_with_format().map(|(_, table)| table)
+    }
+
+    fn path(&self) -> Option<&Path> {
+        Some(&self.path)
+    }
+
+    /// What the file says; for text, from its size and the length of its first lines.
+    fn estimated_rows(&self) -> Option<u64> {
+        use std::io::Read;
+        match dynident_formats::open(&self.path).ok()?.contents {
+            Contents::Table(table) => table.estimated_rows(),
+            Contents::Text(mut text) => {
+                let size = std::fs::metadata(&self.path).ok()?.len();
+                let mut head = Vec::new();
+                text.by_ref().take(1 << 16).read_to_end(&mut head).ok()?;
+                let lines = head.split(|byte| *byte == b'\n').count().max(2) - 1;
+                Some(size * lines as u64 / (head.len() as u64).max(1))
+            }
+        }
+    }
+}
+
+/// A table that dynident-formats reads.
+#[derive(Debug)]
+struct FileTable {
+    label: String,
+    table: Box<dyn Table>,
+    rows: u64,
+}
+
+impl LogTable for FileTable {
+    fn width(&self) -> usize {
+        self.table.width()
+    }
+
+    fn names(&self) -> Option<&[String]> {
+        self.table.names()
+    }
+
+    fn groups(&self) -> Vec<LogGroup> {
+        let groups = self.table.groups().into_iter();
+        groups.map(|group| LogGroup { name: group.name, columns: group.columns, time: group.time }).collect()
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.table.notes()
+    }
+
+    fn select(&mut self, fields: &[usize]) {
+        self.table.select(fields);
+    }
+
+    fn next_row(&mut self, values: &mut [f64]) -> Result<bool, RecordingError> {
+        let found = self.table.next_row(values)?;
+        self.rows += u64::from(found);
+        Ok(found)
+    }
+
+    fn skip_row(&mut self) -> Result<bool, RecordingError> {
+        let found = self.table.skip_row()?;
+        self.rows += u64::from(found);
+        Ok(found)
+    }
+
+    fn place(&self) -> LogPlace {
+        match self.rows.checked_sub(1) {
+            Some(row) => LogPlace::Row { log: self.label.clone(), row },
+            None => LogPlace::Whole { log: self.label.clone() },
+        }
+    }
+
+    fn truncated(&self) -> Option<LogPlace> {
+        self.table.truncated().then(|| self.place())
+    }
+}
+
+impl From<FileError> for RecordingError {
+    fn from(error: FileError) -> Self {
+        match error {
+            FileError::Io { file, source } => Self::Io { file, source },
+            other => Self::File(other),
+        }
+    }
+}

@@ -1,0 +1,504 @@
+"""Golden log files in the formats that dynident-formats reads, each made by another program, and the numbers in them.
+
+    python3 golden/formats.py [--out DIR]
+
+Writes formats/*: the files, and values.json with the columns that each must give, as hexadecimal floats. Seeded; the versions that
+made them are in values.json. Every file holds the same motion of two joints where its format can.
+"""
+import argparse
+import gzip
+import io
+import json
+import pathlib
+import sqlite3
+
+import h5py
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import scipy
+import scipy.io
+import zstandard
+import mcap
+from mcap.writer import CompressionType
+from mcap.writer import Writer as RawWriter
+from mcap_ros2.writer import Writer as Ros2Writer
+
+from write_json import write
+
+SEED = 20261123
+ROWS = 40
+JOINTS = ["shoulder", "elbow"]
+START_NS = 1_790_000_000_123_456_789
+
+SEPARATOR = "=" * 80
+JOINT_STATE = f"""std_msgs/Header header
+
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+{SEPARATOR}
+MSG: std_msgs/Header
+# comment
+builtin_interfaces/Time stamp
+string frame_id
+{SEPARATOR}
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+MULTI_ARRAY = f"""MultiArrayLayout  layout
+float64[]         data
+{SEPARATOR}
+MSG: std_msgs/MultiArrayLayout
+MultiArrayDimension[] dim
+uint32 data_offset
+{SEPARATOR}
+MSG: std_msgs/MultiArrayDimension
+string label
+uint32 size
+uint32 stride
+"""
+DYNAMIC_STATE = f"""std_msgs/Header header
+string[] joint_names
+InterfaceValue[] interface_values
+{SEPARATOR}
+MSG: control_msgs/InterfaceValue
+string[] interface_names
+float64[] values
+""" + JOINT_STATE[JOINT_STATE.index(SEPARATOR):]
+POINTS = f"""{SEPARATOR}
+MSG: trajectory_msgs/JointTrajectoryPoint
+float64[] positions
+float64[] velocities
+float64[] accelerations
+float64[] effort
+builtin_interfaces/Duration time_from_start
+{SEPARATOR}
+MSG: builtin_interfaces/Duration
+int32 sec
+uint32 nanosec
+"""
+CONTROLLER_STATE = """std_msgs/Header header
+string[] joint_names
+trajectory_msgs/JointTrajectoryPoint desired
+trajectory_msgs/JointTrajectoryPoint actual
+trajectory_msgs/JointTrajectoryPoint error  # Redundant, but useful
+""" + JOINT_STATE[JOINT_STATE.index(SEPARATOR):] + POINTS
+OWN = """uint8 MODE_IDLE=0
+string TEXT = "a # b"
+bool moving
+int8 step
+uint16 counter
+int32 ticks
+uint64 big
+float32 current
+float32[3] force
+string<=8 note
+int16[<=4] few
+"""
+
+rng = np.random.default_rng(SEED)
+T = np.arange(ROWS) / 100.0
+Q = np.array([np.sin(3.0 * T + 0.4), 0.7 * np.cos(5.0 * T)])
+TAU = np.array([8.0 * np.cos(2.0 * T), 3.0 * np.sin(7.0 * T)]) + 0.01 * rng.standard_normal((2, ROWS))
+DQ = np.gradient(Q, 0.01, axis=1)
+# Stamps with jitter; recorded a little later.
+STAMPS = [START_NS + 10_000_000 * i + int(rng.integers(-40_000, 40_000)) for i in range(ROWS)]
+LOGGED = [stamp + 300_000 + int(rng.integers(0, 50_000)) for stamp in STAMPS]
+F32 = Q.astype(np.float32)
+
+
+def seconds(stamps):
+    return [(stamp - stamps[0]) / 1e9 for stamp in stamps]
+
+
+def header(stamp):
+    return {"stamp": {"sec": stamp // 10**9, "nanosec": stamp % 10**9}, "frame_id": "base"}
+
+
+def joint_state(i, order=(0, 1)):
+    return {
+        "header": header(STAMPS[i]),
+        "name": [JOINTS[j] for j in order],
+        "position": [Q[j, i] for j in order],
+        "velocity": [DQ[j, i] for j in order],
+        "effort": [TAU[j, i] for j in order],
+    }
+
+
+STATE_COLUMNS = {
+    "/joint_states.log_time": seconds(LOGGED),
+    "/joint_states.header.stamp": seconds(STAMPS),
+    **{f"/joint_states.position[{name}]": Q[j] for j, name in enumerate(JOINTS)},
+    **{f"/joint_states.velocity[{name}]": DQ[j] for j, name in enumerate(JOINTS)},
+    **{f"/joint_states.effort[{name}]": TAU[j] for j, name in enumerate(JOINTS)},
+}
+
+
+def text_table():
+    lines = ["t_s,q1,q2,tau1,tau2"]
+    lines += [",".join(repr(float(x)) for x in (T[i], Q[0, i], Q[1, i], TAU[0, i], TAU[1, i])) for i in range(ROWS)]
+    return ("\n".join(lines) + "\n").encode()
+
+
+TEXT_COLUMNS = {"t_s": T, "q1": Q[0], "q2": Q[1], "tau1": TAU[0], "tau2": TAU[1]}
+
+
+def packed_text(out):
+    text = text_table()
+    with open(out / "table.csv.gz", "wb") as file:
+        # Two members after each other, as rotated logs are joined.
+        for part in (text[:900], text[900:]):
+            file.write(gzip.compress(part, mtime=0))
+    (out / "table.csv.zst").write_bytes(zstandard.ZstdCompressor(level=5).compress(text))
+    return {"table.csv.gz": TEXT_COLUMNS, "table.csv.zst": TEXT_COLUMNS}
+
+
+def numpy_files(out):
+    matrix = np.column_stack([T, Q.T, TAU.T])
+    np.save(out / "matrix.npy", matrix)
+    np.save(out / "fortran.npy", np.asfortranarray(matrix))
+    np.save(out / "big_endian_f4.npy", F32.T.astype(">f4"))
+    kind = np.dtype([("t", "<f8"), ("mode", "u1"), ("label", "S3"), ("q", "<f4", (2,)), ("ticks", ">i4")])
+    rows = np.zeros(ROWS, kind)
+    rows["t"], rows["mode"], rows["label"], rows["q"], rows["ticks"] = T, np.arange(ROWS) % 3, b"ab", F32.T, np.arange(ROWS) * -7
+    np.save(out / "structured.npy", rows)
+    # Savez stamps members with a fixed date.
+    np.savez_compressed(out / "packed.npz", t=T, q=Q, tau=TAU.T, gains=np.array([1.0, 2.0]), name=np.array("arm"))
+    np.savez(out / "stored.npz", t=T, q=Q.T, half=F32[0].astype(np.float16))
+    columns = {str(k): matrix[:, k] for k in range(5)}
+    return {
+        "matrix.npy": columns,
+        "fortran.npy": columns,
+        "big_endian_f4.npy": {"0": F32[0], "1": F32[1]},
+        "structured.npy": {"t": T, "mode": np.arange(ROWS) % 3, "q[0]": F32[0], "q[1]": F32[1], "ticks": np.arange(ROWS) * -7},
+        "packed.npz": {"t": T, "q[0]": Q[0], "q[1]": Q[1], "tau[0]": TAU[0], "tau[1]": TAU[1]},
+        "stored.npz": {"t": T, "q[0]": Q[0], "q[1]": Q[1], "half": F32[0].astype(np.float16)},
+    }
+
+
+def json_lines(out):
+    lines = []
+    for i in range(ROWS):
+        row = {"t": T[i], "arm": {"q": list(Q[:, i]), "moving": bool(i % 2)}, "note": "x", "n": i - 5, "maybe": None if i == 3 else 0.5}
+        lines.append(json.dumps(row))
+    (out / "rows.jsonl").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    maybe = np.full(ROWS, 0.5)
+    maybe[3] = np.nan
+    return {
+        "rows.jsonl": {
+            "t": T, "arm.q[0]": Q[0], "arm.q[1]": Q[1], "arm.moving": np.arange(ROWS) % 2, "n": np.arange(ROWS) - 5, "maybe": maybe,
+        }
+    }
+
+
+def own_message(i):
+    return {
+        "moving": bool(i % 2), "step": -i, "counter": i * 3, "ticks": -100_000 * i, "big": 2**40 + i, "current": float(F32[0, i]),
+        "force": [float(x) for x in (F32[0, i], F32[1, i], 0.5)], "note": "ab"[: i % 3], "few": [i, -i],
+    }
+
+
+OWN_COLUMNS = {
+    "/own.moving": np.arange(ROWS) % 2, "/own.step": -np.arange(ROWS), "/own.counter": np.arange(ROWS) * 3,
+    "/own.ticks": -100_000 * np.arange(ROWS), "/own.big": 2**40 + np.arange(ROWS), "/own.current": F32[0],
+    "/own.force[0]": F32[0], "/own.force[1]": F32[1], "/own.force[2]": np.full(ROWS, 0.5), "/own.few[0]": np.arange(ROWS),
+    "/own.few[1]": -np.arange(ROWS),
+}
+
+
+def controller_state(i):
+    point = lambda x, v: {
+        "positions": list(x), "velocities": list(v), "accelerations": [], "effort": [], "time_from_start": {"sec": 1, "nanosec": 500_000_000},
+    }
+    return {
+        "header": header(STAMPS[i]), "joint_names": JOINTS,
+        "desired": point(Q[:, i] + 0.01, DQ[:, i]), "actual": point(Q[:, i], DQ[:, i]), "error": point([0.01, 0.01], [0.0, 0.0]),
+    }
+
+
+CONTROLLER_COLUMNS = {
+    "/controller/state.header.stamp": seconds(STAMPS),
+    **{f"/controller/state.desired.positions[{name}]": Q[j] + 0.01 for j, name in enumerate(JOINTS)},
+    **{f"/controller/state.actual.positions[{name}]": Q[j] for j, name in enumerate(JOINTS)},
+    **{f"/controller/state.actual.velocities[{name}]": DQ[j] for j, name in enumerate(JOINTS)},
+    "/controller/state.error.time_from_start": np.full(ROWS, 1.5),
+}
+
+
+def dynamic_state(i):
+    return {
+        "header": header(STAMPS[i]), "joint_names": JOINTS,
+        "interface_values": [{"interface_names": ["position", "effort"], "values": [Q[j, i], TAU[j, i]]} for j in range(2)],
+    }
+
+
+DYNAMIC_COLUMNS = {
+    f"/dynamic_joint_states.interface_values[{name}].values[{what}]": values[j]
+    for j, name in enumerate(JOINTS)
+    for what, values in (("position", Q), ("effort", TAU))
+}
+
+
+def interpolated(at, times, values):
+    """What linear interpolation gives, in the order of operations that makes it exact to the last bit."""
+    k = np.searchsorted(times, at, side="right") - 1
+    share = [(a - times[i]) / (times[i + 1] - times[i]) if times[i] != a else 0.0 for a, i in zip(at, k)]
+    return np.array([values[i] if w == 0.0 else values[i] + (values[i + 1] - values[i]) * w for i, w in zip(k, share)])
+
+
+def bags(out):
+    golden = {}
+    schemas = {
+        "/joint_states": ("sensor_msgs/msg/JointState", JOINT_STATE), "/tau": ("std_msgs/msg/Float64MultiArray", MULTI_ARRAY),
+        "/dynamic_joint_states": ("control_msgs/msg/DynamicJointState", DYNAMIC_STATE), "/own": ("own_msgs/msg/Own", OWN),
+        "/controller/state": ("control_msgs/msg/JointTrajectoryControllerState", CONTROLLER_STATE),
+    }
+    for name, compression, chunk in [
+        ("zstd", CompressionType.ZSTD, 4000), ("lz4", CompressionType.LZ4, 4000), ("plain", CompressionType.NONE, 1 << 20),
+    ]:
+        buffer = io.BytesIO()
+        writer = Ros2Writer(buffer, chunk_size=chunk, compression=compression)
+        known = {topic: writer.register_msgdef(kind, text) for topic, (kind, text) in schemas.items()}
+        put = lambda topic, message, stamp: writer.write_message(topic, known[topic], message, log_time=stamp, publish_time=stamp)
+        for i in range(ROWS):
+            # The order of joints changes, as it does where a driver fills a map.
+            put("/joint_states", joint_state(i, (0, 1) if i % 3 else (1, 0)), LOGGED[i])
+            if name != "lz4":
+                continue
+            put("/dynamic_joint_states", dynamic_state(i), LOGGED[i] + 10)
+            put("/own", own_message(i), LOGGED[i] + 20)
+            put("/controller/state", controller_state(i), LOGGED[i] + 30)
+        writer.finish()
+        (out / f"{name}.mcap").write_bytes(buffer.getvalue())
+        golden[f"{name}.mcap"] = dict(STATE_COLUMNS)
+    golden["lz4.mcap"] |= DYNAMIC_COLUMNS | OWN_COLUMNS | CONTROLLER_COLUMNS
+
+    # Torques of their own topic at 40 Hz, without a header: joined by the times at which they were recorded.
+    buffer = io.BytesIO()
+    writer = Ros2Writer(buffer, compression=CompressionType.ZSTD)
+    known = {topic: writer.register_msgdef(kind, text) for topic, (kind, text) in schemas.items()}
+    times = [LOGGED[0] + 12_345_678 + 25_000_000 * k for k in range(13)]
+    values = np.array([np.cos(0.3 * np.arange(13)), np.sin(0.5 * np.arange(13))])
+    events = [(LOGGED[i], "/joint_states", joint_state(i)) for i in range(ROWS)]
+    layout = {"dim": [], "data_offset": 0}
+    events += [(at, "/tau", {"layout": layout, "data": list(values[:, k])}) for k, at in enumerate(times)]
+    for at, topic, message in sorted(events, key=lambda event: event[0]):
+        writer.write_message(topic, known[topic], message, log_time=at, publish_time=at)
+    writer.finish()
+    (out / "two_clocks.mcap").write_bytes(buffer.getvalue())
+    inside = [i for i in range(ROWS) if times[0] <= LOGGED[i] <= times[-1]]
+    at = [LOGGED[i] for i in inside]
+    golden["two_clocks.mcap"] = {
+        "joined": True,
+        "/joint_states.header.stamp": np.array(seconds(STAMPS))[inside],
+        "/joint_states.position[elbow]": Q[1][inside],
+        "/tau.data[0]": interpolated(at, np.array(times), values[0]),
+        "/tau.data[1]": interpolated(at, np.array(times), values[1]),
+    }
+
+    # JSON messages, as web tools write them.
+    buffer = io.BytesIO()
+    writer = RawWriter(buffer, compression=CompressionType.ZSTD)
+    writer.start()
+    schema = writer.register_schema(name="state", encoding="jsonschema", data=b'{"type": "object"}')
+    channel = writer.register_channel(topic="arm", message_encoding="json", schema_id=schema)
+    for i in range(ROWS):
+        data = json.dumps({"q": list(Q[:, i]), "mode": "run"}).encode()
+        writer.add_message(channel, log_time=LOGGED[i], publish_time=LOGGED[i], data=data)
+    writer.finish()
+    (out / "json.mcap").write_bytes(buffer.getvalue())
+    golden["json.mcap"] = {"arm.log_time": seconds(LOGGED), "arm.q[0]": Q[0], "arm.q[1]": Q[1]}
+    return golden
+
+
+def cdr_messages():
+    """Serialised messages by the writer's own CDR, for the databases."""
+    from mcap_ros2._dynamic import serialize_dynamic
+
+    def serialiser(kind, text):
+        return serialize_dynamic(kind.replace("/msg/", "/"), text)[kind.replace("/msg/", "/")]
+
+    state, controller = serialiser("sensor_msgs/msg/JointState", JOINT_STATE), serialiser(
+        "control_msgs/msg/JointTrajectoryControllerState", CONTROLLER_STATE
+    )
+    own = serialiser("own_msgs/msg/Own", OWN)
+    return (
+        [bytes(state(joint_state(i))) for i in range(ROWS)],
+        [bytes(controller(controller_state(i))) for i in range(ROWS)],
+        [bytes(own(own_message(i))) for i in range(ROWS)],
+    )
+
+
+def databases(out):
+    states, controllers, own = cdr_messages()
+    packer = zstandard.ZstdCompressor()
+    for name, definitions, packed in [("humble.db3", False, False), ("jazzy.db3", True, False), ("packed.db3", True, True)]:
+        path = out / name
+        path.unlink(missing_ok=True)
+        database = sqlite3.connect(path)
+        # Small pages, so that trees have inner pages and long messages go over to further ones.
+        database.execute("PRAGMA page_size = 512")
+        database.execute("PRAGMA journal_mode = MEMORY")
+        # The text of rosbag2_storage_sqlite3, in its two versions.
+        database.execute(
+            "CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT NOT NULL,type TEXT NOT NULL,serialization_format TEXT NOT NULL,"
+            "offered_qos_profiles TEXT NOT NULL" + (",type_description_hash TEXT NOT NULL)" if definitions else ")")
+        )
+        database.execute(
+            "CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT NULL,timestamp INTEGER NOT NULL, data BLOB NOT NULL)"
+        )
+        database.execute("CREATE INDEX timestamp_idx ON messages (timestamp ASC)")
+        if definitions:
+            database.execute(
+                "CREATE TABLE message_definitions(id INTEGER PRIMARY KEY,topic_type TEXT NOT NULL,encoding TEXT NOT NULL,"
+                "encoded_message_definition TEXT NOT NULL,type_description_hash TEXT NOT NULL)"
+            )
+        topics = [("/joint_states", "sensor_msgs/msg/JointState", JOINT_STATE, states)]
+        if not definitions:
+            topics.append(
+                ("/controller/state", "control_msgs/msg/JointTrajectoryControllerState", CONTROLLER_STATE, controllers)
+            )
+        else:
+            topics.append(("/own", "own_msgs/msg/Own", OWN, own))
+        for number, (topic, kind, text, _) in enumerate(topics, 1):
+            row = (number, topic, kind, "cdr", "") + (("RIHS01_0",) if definitions else ())
+            database.execute(f"INSERT INTO topics VALUES ({','.join('?' * len(row))})", row)
+            if definitions:
+                database.execute("INSERT INTO message_definitions VALUES (?,?,?,?,?)", (number, kind, "ros2msg", text, "RIHS01_0"))
+        for i in range(ROWS):
+            for number, (_, _, _, messages) in enumerate(topics, 1):
+                data = packer.compress(messages[i]) if packed else messages[i]
+                database.execute(
+                    "INSERT INTO messages (topic_id, timestamp, data) VALUES (?,?,?)", (number, LOGGED[i] + number - 1, data)
+                )
+        database.commit()
+        database.close()
+    return {
+        "humble.db3": STATE_COLUMNS | CONTROLLER_COLUMNS,
+        "jazzy.db3": STATE_COLUMNS | OWN_COLUMNS,
+        "packed.db3": STATE_COLUMNS | OWN_COLUMNS,
+    }
+
+
+def folder(out):
+    """A rosbag2 folder in two parts."""
+    bag = out / "bag"
+    bag.mkdir(exist_ok=True)
+    half = ROWS // 2
+    for part, rows in enumerate([range(half), range(half, ROWS)]):
+        buffer = io.BytesIO()
+        writer = Ros2Writer(buffer, compression=CompressionType.ZSTD)
+        schema = writer.register_msgdef("sensor_msgs/msg/JointState", JOINT_STATE)
+        for i in rows:
+            writer.write_message("/joint_states", schema, joint_state(i), log_time=LOGGED[i], publish_time=LOGGED[i])
+        writer.finish()
+        (bag / f"bag_{part}.mcap").write_bytes(buffer.getvalue())
+    (bag / "metadata.yaml").write_text(
+        "rosbag2_bagfile_information:\n  version: 9\n  storage_identifier: mcap\n  relative_file_paths:\n"
+        "    - bag_0.mcap\n    - bag_1.mcap\n  duration:\n    nanoseconds: 390000000\n",
+        encoding="utf-8",
+    )
+    return {"bag": STATE_COLUMNS}
+
+
+def parquet_files(out):
+    maybe = pa.array([None if i % 7 == 3 else float(TAU[0, i]) for i in range(ROWS)], pa.float64())
+    table = pa.table({
+        "t": T,
+        "stamp": pa.array(STAMPS, pa.timestamp("ns")),
+        "observation.state": pa.array([[float(x) for x in Q[:, i]] for i in range(ROWS)], pa.list_(pa.float64())),
+        "action": pa.array([[float(x) for x in F32[:, i]] for i in range(ROWS)], pa.list_(pa.float32(), 2)),
+        "maybe": maybe,
+        "flag": pa.array([bool(i % 2) for i in range(ROWS)]),
+        "n": pa.array(range(ROWS), pa.int32()),
+        "unsigned": pa.array([2**16 - 1 - i for i in range(ROWS)], pa.uint16()),
+        "task": pa.array(["push"] * ROWS),
+        "inner": pa.array([{"x": float(TAU[1, i])} for i in range(ROWS)]),
+    })
+    pq.write_table(table, out / "zstd.parquet", compression="zstd", row_group_size=15)
+    pq.write_table(table, out / "snappy.parquet", compression="snappy", use_dictionary=False, data_page_version="2.0")
+    columns = {
+        "t": T, "stamp": seconds(STAMPS), "observation.state[0]": Q[0], "observation.state[1]": Q[1], "action[0]": F32[0],
+        "action[1]": F32[1], "maybe": np.array([np.nan if i % 7 == 3 else TAU[0, i] for i in range(ROWS)]),
+        "flag": np.arange(ROWS) % 2, "n": np.arange(ROWS), "unsigned": 2**16 - 1 - np.arange(ROWS), "inner.x": TAU[1],
+    }
+    return {"zstd.parquet": columns, "snappy.parquet": columns}
+
+
+def matlab_files(out):
+    variables = {
+        "t": T[:, None], "q": Q.T, "tau": TAU, "ticks": np.arange(ROWS, dtype=np.int16)[:, None], "single_q": F32.T,
+        "robot": "arm", "gains": np.array([[1.0, 2.0]]), "log": {"dq": DQ, "inner": {"mode": np.arange(ROWS) % 3}},
+    }
+    for name, packed in [("plain.mat", False), ("packed.mat", True)]:
+        buffer = io.BytesIO()
+        scipy.io.savemat(buffer, variables, do_compression=packed)
+        # SciPy writes the date into the text of the header.
+        data = bytearray(buffer.getvalue())
+        data[:116] = b"MATLAB 5.0 MAT-file Platform: posix, made by SciPy".ljust(116)
+        (out / name).write_bytes(data)
+    columns = {
+        "t": T, "q[0]": Q[0], "q[1]": Q[1], "tau[0]": TAU[0], "tau[1]": TAU[1], "ticks": np.arange(ROWS), "single_q[0]": F32[0],
+        "single_q[1]": F32[1], "log.dq[0]": DQ[0], "log.dq[1]": DQ[1], "log.inner.mode": np.arange(ROWS) % 3,
+    }
+    return {"plain.mat": columns, "packed.mat": columns}
+
+
+def hdf5_files(out):
+    with h5py.File(out / "groups.h5", "w", libver=("v108", "v110")) as file:
+        file.create_dataset("t", data=T, track_times=False)
+        arm = file.create_group("arm")
+        arm.create_dataset("q", data=Q.T, chunks=(16, 2), compression="gzip", shuffle=True, track_times=False)
+        arm.create_dataset("tau", data=TAU.astype(np.float32), track_times=False)
+        arm.create_dataset("ticks", data=np.arange(ROWS, dtype=">i4"), track_times=False)
+        file.create_dataset("note", data="text")
+    # What MATLAB's save -v7.3 writes: 512 bytes before the HDF5 file, matrices with their sides exchanged.
+    with h5py.File(out / "v73.mat", "w", userblock_size=512) as file:
+        for name, values in [("t", T[None, :]), ("q", Q), ("tau", TAU)]:
+            data = file.create_dataset(name, data=values, track_times=False)
+            data.attrs["MATLAB_class"] = np.bytes_("double")
+    with open(out / "v73.mat", "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64, HDF5 schema 1.00 .".ljust(124) + b"\x00\x02IM")
+    single = TAU.astype(np.float32)
+    return {
+        "groups.h5": {
+            "t": T, "arm.q[0]": Q[0], "arm.q[1]": Q[1], "arm.tau[0]": single[0], "arm.tau[1]": single[1], "arm.ticks": np.arange(ROWS),
+        },
+        "v73.mat": {"t": T, "q[0]": Q[0], "q[1]": Q[1], "tau[0]": TAU[0], "tau[1]": TAU[1]},
+    }
+
+
+def pooled(files):
+    """Every series once, and which of them each column is."""
+    numbers, series = {}, []
+    for columns in files.values():
+        for name, values in columns.items():
+            if isinstance(values, bool):
+                continue
+            exact = [float(x).hex() for x in values]
+            key = tuple(exact)
+            if key not in numbers:
+                numbers[key] = len(series)
+                series.append(exact)
+            columns[name] = numbers[key]
+    return {"series": series, "files": files}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path(__file__).resolve().parent)
+    out = parser.parse_args().out / "formats"
+    out.mkdir(parents=True, exist_ok=True)
+    files = {}
+    for make in [packed_text, numpy_files, json_lines, bags, databases, folder, parquet_files, matlab_files, hdf5_files]:
+        files |= make(out)
+    versions = {module.__name__: module.__version__ for module in [h5py, mcap, np, pa, scipy, zstandard]}
+    files = {name: dict(columns) for name, columns in files.items()}
+    write(out / "values.json", {"seed": SEED, "versions": versions, **pooled(files)})
+
+
+if __name__ == "__main__":
+    main()
