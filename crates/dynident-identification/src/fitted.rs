@@ -6,6 +6,7 @@ use crate::chosen_friction::{ChosenFriction, choose_friction};
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
 use crate::execution::Execution;
+use crate::friction::ConstantsError;
 use crate::lag::{LagChoice, LagKind, LagRounds, lag_fit};
 use crate::less_noise::{Estimated, with_less_noise};
 use crate::logs::Logs;
@@ -59,15 +60,18 @@ pub(crate) struct Fitted<'a> {
     pub(crate) cutoff: Option<CutoffByError>,
     /// Rows and fit with friction as stated, where it was chosen.
     pub(crate) stated_friction: Option<(Training, Estimate)>,
+    /// What the constants of chosen friction add to the bars.
+    constants_error: Option<ConstantsError>,
     pub(crate) lag: LagChoice,
     /// None for a single log.
     pub(crate) between_logs: Option<BetweenLogs>,
-    /// Halves of the 95 % intervals before lag and logs have widened them.
+    /// Halves of the 95 % intervals before lag, logs and constants of friction have widened them.
     pub(crate) noise_half_width_95: Vec<f64>,
     pub(crate) times: StageTimes,
 }
 
-/// Rows and estimate, with the lag of the torque and what varies between logs in its error bars.
+/// Rows and estimate, with the lag of the torque, what varies between logs and the constants of chosen friction in its
+/// error bars.
 pub(crate) fn fitted<'a>(
     task: &'a IdentificationTask,
     chosen: &[usize],
@@ -83,6 +87,9 @@ pub(crate) fn fitted<'a>(
             found.estimation.estimate = estimate;
             between
         });
+    }
+    if let Some(error) = &found.constants_error {
+        found.estimation.estimate = error.added_to(found.training.problem.columns(), &found.estimation.estimate);
     }
     Ok(found)
 }
@@ -159,7 +166,7 @@ fn fitted_once<'a>(
     let cutoff = choose_cutoff((&logs, settings), &first, chosen)?;
     let started = Instant::now();
     let (logs, cutoff, friction) = if settings.friction.is_empty() {
-        let friction = ChosenFriction { model: first, joints: Vec::new(), stated: None };
+        let friction = ChosenFriction::as_stated(first);
         (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
     } else {
         let logs = with_choice(logs, settings, cutoff.as_ref().map(CutoffByError::highest_alike_hz));
@@ -196,6 +203,7 @@ fn fitted_once<'a>(
         settings,
         cutoff,
         stated_friction: friction.stated,
+        constants_error: friction.constants_error,
         lag: LagChoice::default(),
         between_logs: None,
         noise_half_width_95: Vec::new(),

@@ -1,7 +1,7 @@
 //! The constants of a term's curve (width of a step, Stribeck velocity, ..) as coordinates that can be moved.
 
 use super::candidates::STRIBECK_WIDTH;
-use dynident_model::terms::{Coulomb, CoulombShape, DirectionalCoulomb, Sigmoid, Stribeck, TorqueTerm};
+use dynident_model::terms::{Coulomb, CoulombShape, DirectionalCoulomb, LoadFriction, Sigmoid, Stribeck, TorqueTerm};
 
 /// The constants of a term as coordinates on one scale: a step of ln r is a change by the factor r. Two at most.
 pub(super) fn coordinates(term: &TorqueTerm) -> Vec<f64> {
@@ -12,13 +12,13 @@ pub(super) fn coordinates(term: &TorqueTerm) -> Vec<f64> {
     match term {
         TorqueTerm::Coulomb(term) => of_shape(&term.shape),
         TorqueTerm::DirectionalCoulomb(term) => of_shape(&term.shape),
+        TorqueTerm::Load(term) => of_shape(&term.shape),
         TorqueTerm::Stribeck(term) => vec![term.speed.ln(), term.exponent.ln()],
         // The step's distance from rest in units of its width.
         TorqueTerm::Sigmoid(term) => vec![term.steepness.ln(), 0.5 * term.offset_speed * term.steepness],
         TorqueTerm::Viscous(_)
         | TorqueTerm::DirectionalViscous(_)
         | TorqueTerm::Power(_)
-        | TorqueTerm::Load(_)
         | TorqueTerm::MaxwellSlip(_)
         | TorqueTerm::TemperatureViscous(_)
         | TorqueTerm::TemperatureCoulomb(_)
@@ -50,6 +50,7 @@ pub(super) fn at(term: &TorqueTerm, coordinates: &[f64]) -> TorqueTerm {
         (TorqueTerm::DirectionalCoulomb(own), _) => {
             TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { shape: shape(own.shape), ..*own })
         }
+        (TorqueTerm::Load(own), _) => TorqueTerm::Load(LoadFriction { shape: shape(own.shape), ..*own }),
         (TorqueTerm::Stribeck(own), [speed, exponent]) => {
             let speed = within(*speed, VELOCITIES);
             let shape = CoulombShape::Smooth { width: STRIBECK_WIDTH * speed };
@@ -62,6 +63,34 @@ pub(super) fn at(term: &TorqueTerm, coordinates: &[f64]) -> TorqueTerm {
         }
         _ => term.clone(),
     }
+}
+
+/// The name of the constant behind a coordinate, and its value where the coordinates are these.
+pub(super) fn value_at(term: &TorqueTerm, place: usize, coordinates: &[f64]) -> (&'static str, f64) {
+    match (at(term, coordinates), place) {
+        (TorqueTerm::Stribeck(own), 0) => ("speed", own.speed),
+        (TorqueTerm::Stribeck(own), _) => ("exponent", own.exponent),
+        (TorqueTerm::Sigmoid(own), 0) => ("steepness", own.steepness),
+        (TorqueTerm::Sigmoid(own), _) => ("offset_speed", own.offset_speed),
+        _ => ("width", coordinates[place].exp()),
+    }
+}
+
+/// The terms of a joint with one width for all that step at rest.
+pub(super) fn with_one_width(mut terms: Vec<TorqueTerm>) -> Vec<TorqueTerm> {
+    let of_step = |term: &TorqueTerm| match term {
+        TorqueTerm::Coulomb(own) => Some(own.shape),
+        TorqueTerm::DirectionalCoulomb(own) => Some(own.shape),
+        _ => None,
+    };
+    if let Some(step @ CoulombShape::Smooth { .. }) = terms.iter().find_map(of_step) {
+        for term in &mut terms {
+            if let TorqueTerm::Load(own) = term {
+                own.shape = step;
+            }
+        }
+    }
+    terms
 }
 
 /// One term in place of several that differ in their constants: at the mean of their coordinates, by their weights.
