@@ -7,10 +7,10 @@ use crate::friction::{
     choose_friction as choose_terms, chosen_model, step_columns,
 };
 use crate::logs::Logs;
-use crate::payload::Payload;
+use crate::payload::{Payload, free_gains, with_free_gains};
 use crate::regressor_model::RegressorModel;
 use crate::settings::IdentificationSettings;
-use crate::training::{Training, TrainingPasses, plain_estimate};
+use crate::training::{LogFactors, Training, TrainingPasses, plain_estimate};
 use dynident_dynamics::{Column, ParametricModel};
 use dynident_estimation::{CovarianceMethod, Estimate, LinearProblem};
 use dynident_model::terms::{Coulomb, CoulombShape, TorqueTerm};
@@ -71,55 +71,77 @@ pub fn choose_friction(
     }
     let passes = TrainingPasses { logs, settings, training, payloads, known_arm: None };
     let equal_weights = matches!(settings.estimation.estimator, Estimator::Ordinary);
-    // No error bars are wanted on the way.
-    let estimation = EstimationSettings { covariance: CovarianceMethod::White, ..settings.estimation.clone() };
 
-    // The stated terms first: the load, the noise of every joint, what is excited.
-    let first = passes.rows_once(stated)?;
-    let plain = plain_estimate(&estimation, &first.problem)?;
+    // The stated terms first: the load, the noise of every joint, what is excited; with gains that nobody knows the
+    // torque in newton metres.
+    let first = passes.with_gains(passes.rows_once(stated)?)?;
+    let plain = match &first.gains {
+        Some((with_gains, _)) => with_gains.clone(),
+        None => plain_estimate(&without_bars(settings), &first.problem)?,
+    };
+    let gains = first.gains.as_ref().map_or_else(Vec::new, |(_, gains)| free_gains(gains));
 
     // All candidates as columns of one set of factors, from which each candidate model is a selection.
     let chosen_among = |candidates: &[(usize, Vec<CandidateColumn>)]| -> Result<_, IdentificationError> {
         let further = candidates.iter().flat_map(|(_, columns)| columns).map(|column| column.term.clone());
         let wide = with_terms(&first.model, further).with_load_of(&first.model, &plain.values);
-        let factors = passes.read(&wide)?;
-        let wide_problem = passes.stated_problem(&wide, &passes.columns(&wide)?, &factors)?;
+        let wide_problem = passes.free_problem(&wide, &passes.read(&wide)?, (&first.model, &plain, &gains))?;
         Ok(choose_terms(&first.model, &wide, &wide_problem, candidates, (&plain, equal_weights))?)
     };
-    // How wide the step is; then all that friction may be.
+    // How wide the step is; then all that friction may be. With payloads the load would be the bare arm's.
     let steps: Vec<_> = searches.iter().map(|(joint, search)| (*joint, step_columns(search, *joint))).collect();
     let widths: Vec<Option<f64>> = chosen_among(&steps)?.iter().map(step_width).collect();
+    let is_loaded = logs.recordings.iter().any(|recording| recording.payload.is_some());
     let all = |((joint, search), width): (&(usize, &FrictionSearch), &Option<f64>)| {
-        (*joint, candidate_columns(search, *joint, *width))
+        let mut columns = candidate_columns(search, *joint, *width);
+        columns.retain(|column| !(is_loaded && column.term.needs_load()));
+        (*joint, columns)
     };
     let candidates: Vec<_> = searches.iter().zip(&widths).map(all).collect();
     let mut joints = chosen_among(&candidates)?;
-    let mut model = RegressorModel::from(chosen_model(robot, &joints)?).with_load_of(&first.model, &plain.values);
+    let model = with_friction_of(robot, &joints, (&first.model, &plain))?;
+    let (mut model, constants_error) = with_constants(&passes, robot, &mut joints, (model, &gains))?;
+    // What follows finds the gains with the friction that was chosen.
+    model.torque_gains.clear();
+    Ok(ChosenFriction { model, joints, stated: Some((first, plain)), constants_error })
+}
 
-    // Their constants, and the load with them: steps that are halved where one was too long.
+/// The model with the constants of the terms that its joints chose, and without terms that are not seen with the
+/// constants free; and what the error of the constants adds to the bars. Gains of some joints are unknowns, too.
+fn with_constants(
+    passes: &TrainingPasses<'_>,
+    robot: &ParametricModel,
+    joints: &mut [JointFriction],
+    (mut model, gains): (RegressorModel, &[usize]),
+) -> Result<(RegressorModel, Option<ConstantsError>), IdentificationError> {
+    let settings = &passes.settings.estimation;
+    let equal_weights = matches!(settings.estimator, Estimator::Ordinary);
     let mut last: Option<LastPass> = None;
     let mut error = None;
     for pass in 1..=MOST_PASSES {
-        let constants = FrictionConstants::new(&model, &joints);
+        let constants = FrictionConstants::new(&model, joints);
         if !model.needs_load() && constants.is_empty() {
             break;
         }
         let wide = with_terms(&model, constants.neighbours().into_iter());
         let factors = passes.read(&wide)?;
-        let wide_problem = passes.stated_problem(&wide, &passes.columns(&wide)?, &factors)?;
-        let own = factors.into_iter().map(|log| log.of(&wide, &model)).collect::<Result<Vec<_>, _>>()?;
+        let own = factors.iter().map(|log| log.clone().of(&wide, &model)).collect::<Result<Vec<_>, _>>()?;
         let problem = passes.stated_problem(&model, &passes.columns(&model)?, &own)?;
-        let fit = plain_estimate(&estimation, &problem)?;
+        let fit = plain_estimate(&without_bars(passes.settings), &problem)?;
+
+        // A step that made the fit worse was too long.
         let misfit = misfit(&problem, &fit, equal_weights);
         if let Some(before) = last.as_mut().filter(|before| misfit > before.misfit) {
             before.steps.iter_mut().for_each(|step| *step *= 0.5);
             let terms = before.constants.moved(&before.steps);
-            model = with_chosen(robot, &mut joints, &terms, (&model, &fit))?;
+            model = with_chosen(robot, joints, &terms, (&model, &fit))?;
             continue;
         }
-        // The last pass tells how well the constants are known, by the covariance that bars are made of.
-        let rows = (&wide, &wide_problem);
-        let step = constants.step((&model, &fit), rows, |problem| plain_estimate(&settings.estimation, problem))?;
+
+        // The step from here, and how well the constants are known, by the covariance that bars are made of.
+        let wide_problem = passes.free_problem(&wide, &factors, (&model, &fit, gains))?;
+        let solve = |problem: &LinearProblem| plain_estimate(settings, problem);
+        let step = constants.step((&model, &fit), (&wide, &wide_problem), solve)?;
         for (joint, found) in constants.with_intervals(&step) {
             let name = &model.model().joints()[joint].name;
             joints.iter_mut().filter(|one| one.joint == *name).for_each(|one| one.constants.clone_from(&found));
@@ -129,10 +151,11 @@ pub fn choose_friction(
         if pass == MOST_PASSES {
             break;
         }
+
         // Terms that are not seen once constants are free: the weakest of every joint, then again.
         let fewer = constants.without_weakest(&model, &step);
         if !fewer.is_empty() && (has_settled || pass >= DROP_PASSES) {
-            model = with_chosen(robot, &mut joints, &fewer, (&model, &fit))?;
+            model = with_chosen(robot, joints, &fewer, (&model, &fit))?;
             last = None;
             continue;
         }
@@ -140,10 +163,35 @@ pub fn choose_friction(
             break;
         }
         let terms = constants.moved(&step.steps);
-        model = with_chosen(robot, &mut joints, &terms, (&model, &fit))?;
+        model = with_chosen(robot, joints, &terms, (&model, &fit))?;
         last = Some(LastPass { constants, steps: step.steps, misfit });
     }
-    Ok(ChosenFriction { model, joints, stated: Some((first, plain)), constants_error: error })
+    Ok((model, error))
+}
+
+/// Settings of a fit whose error bars nobody wants.
+fn without_bars(settings: &IdentificationSettings) -> EstimationSettings {
+    EstimationSettings { covariance: CovarianceMethod::White, ..settings.estimation.clone() }
+}
+
+impl TrainingPasses<'_> {
+    /// The rows of `wide`, with the `free` gains of some joints as unknowns about `fit`, whose columns are those of
+    /// `model` and what logs add to them.
+    fn free_problem(
+        &self,
+        wide: &RegressorModel,
+        factors: &[LogFactors],
+        (model, fit, free): (&RegressorModel, &Estimate, &[usize]),
+    ) -> Result<LinearProblem, IdentificationError> {
+        let columns = self.columns(wide)?;
+        let problem = self.stated_problem(wide, &columns, factors)?;
+        let (base, wide_base) = (model.layout().columns().len(), wide.layout().columns().len());
+        let mut values = fit.values[..base].to_vec();
+        values.resize(wide_base, 0.0);
+        values.extend_from_slice(&fit.values[base..]);
+        let known: Vec<Vec<f64>> = self.training.iter().map(|&log| columns.known(log)).collect();
+        Ok(with_free_gains(problem, free, (&known, &values))?)
+    }
 }
 
 /// The robot with these terms at the joints that chose theirs, and the load of a fit of the model before.
@@ -157,7 +205,18 @@ fn with_chosen(
         let name = &before.model().joints()[*joint].name;
         joints.iter_mut().filter(|one| one.joint == *name).for_each(|one| one.choose(terms));
     }
-    Ok(RegressorModel::from(chosen_model(robot, joints)?).with_load_of(before, &fit.values))
+    with_friction_of(robot, joints, (before, fit))
+}
+
+/// The robot with the friction that its joints chose, and the gains and the load of a fit of the model before.
+fn with_friction_of(
+    robot: &ParametricModel,
+    joints: &[JointFriction],
+    (before, fit): (&RegressorModel, &Estimate),
+) -> Result<RegressorModel, IdentificationError> {
+    let torque_gains = before.torque_gains.clone();
+    let next = RegressorModel { torque_gains, ..RegressorModel::from(chosen_model(robot, joints)?) };
+    Ok(next.with_load_of(before, &fit.values))
 }
 
 /// The width of the smooth step that a joint's friction has.

@@ -7,10 +7,10 @@ use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
 use crate::execution::Execution;
 use crate::friction::ConstantsError;
-use crate::lag::{LagChoice, LagKind, LagRounds, lag_fit};
+use crate::lag::{LagChoice, LagKind, LagRounds, gain_errors, lag_fit};
 use crate::less_noise::{Estimated, with_less_noise};
 use crate::logs::Logs;
-use crate::payload::KnownArm;
+use crate::payload::{KnownArm, free_gains};
 use crate::regressor_model::RegressorModel;
 use crate::settings::IdentificationSettings;
 use crate::task::IdentificationTask;
@@ -112,8 +112,9 @@ fn without_lag<'a>(
         let started = Instant::now();
         let fit = if is_free && has_free_lag(&found) {
             let Fitted { logs, training, estimation, settings, .. } = &found;
-            let theta = &estimation.estimate.values[..training.columns.base()];
-            lag_fit((logs, &settings.estimation), &training.model, theta, chosen)?
+            let gains = training.gains.as_ref().map_or(&[][..], |(_, gains)| gains);
+            let found = (&training.columns, &estimation.estimate.values[..], gains);
+            lag_fit((logs, &settings.estimation), &training.model, found, chosen)?
         } else {
             None
         };
@@ -123,6 +124,11 @@ fn without_lag<'a>(
         if !again {
             found.times = times;
             found.lag = if is_free { rounds.choice() } else { stated_lag(&settings, found.training.model.dof()) };
+            if let (Some(fit), Some((_, gains))) = (&fit, &mut found.training.gains) {
+                for (joint, share) in free_gains(gains).into_iter().zip(gain_errors(fit, &found.lag)) {
+                    gains[joint].widen(share);
+                }
+            }
             return Ok(found);
         }
         settings.motion.torque_lag_s = rounds.torque_lag_s();
@@ -139,12 +145,10 @@ fn stated_lag(settings: &IdentificationSettings, dof: usize) -> LagChoice {
     LagChoice { kind: LagKind::Stated, lag_s, ..LagChoice::default() }
 }
 
-/// Whether a lag can be taken off and tells of the robot: rows whose every column is the arm's own, by an estimator
-/// that noise of the positions does not bias, for that biases the lag that is measured by it.
+/// Whether a lag can be taken off and tells of the robot: rows of all joints, by an estimator that noise of the
+/// positions does not bias, for that biases the lag that is measured by it.
 fn has_free_lag(found: &Fitted<'_>) -> bool {
-    found.training.columns.is_plain()
-        && found.training.gains.is_none()
-        && found.training.joints.len() == found.training.model.dof()
+    found.training.joints.len() == found.training.model.dof()
         && found.settings.estimation.estimator.reads_filtered_rows()
 }
 

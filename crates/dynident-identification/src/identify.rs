@@ -18,7 +18,7 @@ use crate::execution::Execution;
 use crate::fitted::{Fitted, Job, StageTimes, fitted};
 use crate::lag::LagChoice;
 use crate::logs::{Logs, of_role};
-use crate::payload::{KnownArm, PayloadResult, payload_results, with_gain_error};
+use crate::payload::{KnownArm, PayloadError, PayloadResult, payload_results, with_gain_error};
 use crate::recording::Role;
 use crate::regressor_model::RegressorModel;
 use crate::settings::{DiagnosisChoice, GainChoice, IdentificationSettings};
@@ -166,6 +166,9 @@ pub fn identify_payload(
     arm: &KnownArm,
     execution: Execution<'_>,
 ) -> Result<Identification, IdentificationError> {
+    if !task.settings.friction.is_empty() {
+        return Err(PayloadError::FrictionOfKnownArm.into());
+    }
     execution.install(|| identified(task, execution, &mut Job::Payload(arm)))
 }
 

@@ -95,14 +95,7 @@ pub fn training_rows(
     known_arm: Option<Refit>,
 ) -> Result<Training, IdentificationError> {
     let job = TrainingPasses { logs, settings, training, payloads, known_arm };
-    let mut fitted = job.fit(model)?;
-    if settings.gains == GainChoice::Unknown {
-        let known = known_loads(&fitted.columns, training)?;
-        let Gains { of_joints, estimate, problem } = drive_gains(&settings.estimation, &known, &fitted.problem)?;
-        fitted.model.torque_gains = of_joints.iter().map(|gain| gain.gain).collect();
-        fitted.problem = problem;
-        fitted.gains = Some((estimate, of_joints));
-    }
+    let mut fitted = job.with_gains(job.fit(model)?)?;
     if settings.log_noise == LogNoise::Own && fitted.gains.is_none() {
         fitted.problem = weighted_by_log(&settings.estimation, fitted.problem)?;
     }
@@ -171,6 +164,18 @@ impl TrainingPasses<'_> {
             found.timings_s[1] += chosen_s + estimated_s;
         }
         Ok(found)
+    }
+
+    /// The rows with their torque in newton metres, where gains are to be found.
+    pub(crate) fn with_gains(&self, mut rows: Training) -> Result<Training, IdentificationError> {
+        if self.settings.gains == GainChoice::Unknown {
+            let known = known_loads(&rows.columns, self.training)?;
+            let Gains { of_joints, estimate, problem } = drive_gains(&self.settings.estimation, &known, &rows.problem)?;
+            rows.model.torque_gains = of_joints.iter().map(|gain| gain.gain).collect();
+            rows.problem = problem;
+            rows.gains = Some((estimate, of_joints));
+        }
+        Ok(rows)
     }
 
     /// The rows with this model's columns.
@@ -262,7 +267,7 @@ impl TrainingPasses<'_> {
         let all_names = model.joint_names();
         let names = joints.iter().map(|&joint| all_names[joint].clone()).collect();
         let mut problem = LinearProblem::new(columns.symbols(model), names);
-        let keep_known = self.settings.gains == GainChoice::Unknown;
+        let keep_known = self.settings.gains == GainChoice::Unknown && model.torque_gains.is_empty();
         for log in logs {
             // Two recordings may share a name; their numbers keep them apart.
             let name = format!("{} ({})", self.logs.recordings[log.index].name, log.index + 1);

@@ -129,8 +129,7 @@ pub fn identify_runs(
         }
         let mut found = estimate(&training.rows((&logs, &identification), &all), None)?.estimate;
         let with = (&logs, &identification.estimation);
-        let theta = &found.values[..training.columns.base()];
-        let fit = if training.columns.is_plain() { lag_fit(with, &training.model, theta, &all)? } else { None };
+        let fit = lag_fit(with, &training.model, (&training.columns, &found.values, &[]), &all)?;
         if !rounds.again(fit.as_ref(), &mut found) {
             return all_joints((&logs, &identification), training, (&all, found, rounds.choice()));
         }

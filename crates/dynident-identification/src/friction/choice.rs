@@ -139,6 +139,18 @@ fn weights(plain: &Estimate, equal: bool) -> Vec<f64> {
     plain.joint_sigma.iter().map(of_sigma).collect()
 }
 
+/// The columns behind the base parameters (payloads, offsets of single logs, gains), which every candidate has: their
+/// places among the columns of `wide_problem`, as far as the fit `plain` of `model` excites them.
+pub(super) fn further_columns(
+    (model, plain): (&RegressorModel, &Estimate),
+    (wide, wide_problem): (&RegressorModel, &LinearProblem),
+) -> impl Iterator<Item = usize> {
+    let (base, wide_base) = (model.layout().columns().len(), wide.layout().columns().len());
+    let fixed: Vec<usize> = plain.rank.fixed.iter().map(|fixed| fixed.column).collect();
+    let further = wide_problem.columns().len() - wide_base;
+    (0..further).filter(move |place| !fixed.contains(&(base + place))).map(move |place| wide_base + place)
+}
+
 /// Chooses friction for joints whose `candidates` are among the columns of `wide_problem`; `plain` is the fit with the
 /// stated terms, in which joints count alike if `equal_weights`.
 pub(crate) fn choose_friction(
@@ -179,7 +191,8 @@ pub(crate) fn choose_friction(
         let fixed = |index: &usize| plain.rank.fixed.iter().any(|fixed| fixed.column == *index);
         let stated = (0..model.layout().columns().len()).filter(|index| kept(index) && !fixed(index));
         let others = choose.iter().filter(|&&other| other != joint).filter_map(|&other| chosen_before(other));
-        let common: Vec<usize> = stated.chain(others.flatten().copied()).collect();
+        let further = further_columns((model, plain), (wide, wide_problem));
+        let common: Vec<usize> = stated.chain(others.flatten().copied()).chain(further).collect();
         match validation.joint(joint, &common, &variable, &weights) {
             Ok(prepared) => Ok(search(name(joint), folds, &prepared, columns)),
             Err(EstimationError::TooFewRows { .. }) => {

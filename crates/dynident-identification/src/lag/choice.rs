@@ -122,7 +122,7 @@ pub(super) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate, c
     let Some(Mean { lag, scatter }) = common(fit, &all) else { return as_before };
     let matters = |rest: &[f64]| {
         let moved = fit.answers() * DVector::from_column_slice(rest);
-        moved.iter().zip(&estimate.std).any(|(moved, std)| moved.abs() > MATTERS * std)
+        moved.iter().take(fit.parameters).zip(&estimate.std).any(|(moved, std)| moved.abs() > MATTERS * std)
     };
     let choice = LagChoice { common: Some(lag.after(taken_off_s)), scatter, ..as_before };
 
@@ -153,13 +153,14 @@ pub(super) fn choose_lag(fit: &LagFit, taken_off: &[f64], estimate: &Estimate, c
     choice
 }
 
-/// The estimate with the error of the lags in its covariance, `Σ + S Σ_δ Sᵀ` with `S = ∂θ/∂δ`: of a lag for all joints,
-/// or of joints of their own. Where no lag was taken off, what is known of lags beforehand bounds it.
-pub(crate) fn with_lag_error(fit: &LagFit, choice: &LagChoice, estimate: &Estimate) -> Estimate {
+/// What is unknown of the lags, as it is in parameters and unknown gains: `S Σ_δ^½` with `S = ∂θ/∂δ`, of a lag for all
+/// joints, or of joints of their own. Where no lag was taken off, what is known of lags beforehand bounds it. None for
+/// a lag that the study states.
+fn lag_error(fit: &LagFit, choice: &LagChoice) -> Option<DMatrix<f64>> {
     let answers = fit.answers();
     let usual = |std_s: f64| (std_s.powi(-2) + USUAL_LAG_S.powi(-2)).powf(-0.5);
-    let half = match choice.kind {
-        LagKind::Stated => return estimate.clone(),
+    Some(match choice.kind {
+        LagKind::Stated => return None,
         LagKind::Joints => {
             // Joints of their own do not err together.
             let std = |joint: &Option<TorqueLag>| joint.map_or(0.0, |lag| lag.std_s);
@@ -167,18 +168,30 @@ pub(crate) fn with_lag_error(fit: &LagFit, choice: &LagChoice, estimate: &Estima
             answers * DMatrix::from_diagonal(&stds)
         }
         LagKind::None | LagKind::Common => {
-            let Some(common) = choice.common else { return estimate.clone() };
+            let common = choice.common?;
             let std_s = if choice.kind == LagKind::None { usual(common.std_s) } else { common.std_s };
             let of_all = answers.column_sum() * std_s;
             DMatrix::from_column_slice(of_all.len(), 1, of_all.as_slice())
         }
-    };
-    let mut further = &half * half.transpose();
-    for fixed in estimate.rank.fixed.iter().filter(|fixed| fixed.column < fit.base) {
+    })
+}
+
+/// The estimate with the error of the lags in its covariance, `Σ + S Σ_δ Sᵀ`.
+pub(crate) fn with_lag_error(fit: &LagFit, choice: &LagChoice, estimate: &Estimate) -> Estimate {
+    let Some(half) = lag_error(fit, choice) else { return estimate.clone() };
+    let half = half.rows(0, fit.parameters);
+    let mut further = half * half.transpose();
+    for fixed in estimate.rank.fixed.iter().filter(|fixed| fixed.column < fit.parameters) {
         further.row_mut(fixed.column).fill(0.0);
         further.column_mut(fixed.column).fill(0.0);
     }
     estimate.with_further_error(&further)
+}
+
+/// Standard deviations that the error of the lags makes in the gains that are unknown, as shares of them.
+pub(crate) fn gain_errors(fit: &LagFit, choice: &LagChoice) -> Vec<f64> {
+    let Some(half) = lag_error(fit, choice) else { return vec![0.0; fit.first - fit.parameters] };
+    (fit.parameters..fit.first).map(|row| half.row(row).norm()).collect()
 }
 
 /// The joints whose lags tell more than what is known beforehand, or all that have one where none does: a joint at rest

@@ -9,6 +9,7 @@
 use super::measured::TorqueLag;
 use super::rows::{DelayRows, NODES, lagrange};
 use super::samples::DelayCheck;
+use super::unknowns::Unknowns;
 use crate::estimators::EstimationSettings;
 use crate::logs::Logs;
 use crate::regressor_model::RegressorModel;
@@ -29,10 +30,12 @@ const SETTLED: (f64, f64) = (0.02, 1.0e-6);
 /// Lags by joint, with the parameters that were estimated with them.
 #[derive(Debug)]
 pub struct LagFit {
-    /// Base parameters, then what the last step adds to each joint's lag, seconds.
+    /// Parameters, gains that are unknown, then what the last step adds to each joint's lag, seconds.
     pub(crate) last: Estimate,
-    /// Number of base parameters.
-    pub(crate) base: usize,
+    /// Number of parameters: base parameters, payloads, offsets of single logs.
+    pub(crate) parameters: usize,
+    /// The first lag's column.
+    pub(crate) first: usize,
     /// Lag of torque behind motion by joint; `None` where the samples do not determine it.
     pub(crate) joints: Vec<Option<TorqueLag>>,
     /// Filtered rows by joint.
@@ -42,21 +45,22 @@ pub struct LagFit {
 impl LagFit {
     /// Covariance of the lags of some joints, s².
     pub(crate) fn covariance(&self, joints: &[usize]) -> DMatrix<f64> {
-        let of = |row: usize, column: usize| (self.base + joints[row], self.base + joints[column]);
+        let of = |row: usize, column: usize| (self.first + joints[row], self.first + joints[column]);
         DMatrix::from_fn(joints.len(), joints.len(), |row, column| self.last.covariance[of(row, column)])
     }
 
-    /// How the base parameters answer to each joint's lag, `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`: what they are estimated to
-    /// be where the lag is taken to be larger, per second; zero for a lag that the samples do not determine.
+    /// How parameters and unknown gains answer to each joint's lag, `∂θ/∂δ = Cov(θ, δ) Cov(δ, δ)⁻¹`: what they are
+    /// estimated to be where the lag is taken to be larger, per second; zero for a lag that the samples do not
+    /// determine.
     pub(crate) fn answers(&self) -> DMatrix<f64> {
         let known: Vec<usize> = (0..self.joints.len()).filter(|&joint| self.joints[joint].is_some()).collect();
-        let mut answers = DMatrix::zeros(self.base, self.joints.len());
+        let mut answers = DMatrix::zeros(self.first, self.joints.len());
         let white = &self.last.covariance_white;
         let own =
-            DMatrix::from_fn(known.len(), known.len(), |a, b| white[(self.base + known[a], self.base + known[b])]);
+            DMatrix::from_fn(known.len(), known.len(), |a, b| white[(self.first + known[a], self.first + known[b])]);
         let Some(own) = own.cholesky() else { return answers };
-        for row in 0..self.base {
-            let with_lags = DVector::from_fn(known.len(), |place, _| white[(row, self.base + known[place])]);
+        for row in 0..self.first {
+            let with_lags = DVector::from_fn(known.len(), |place, _| white[(row, self.first + known[place])]);
             for (place, answer) in own.solve(&with_lags).iter().enumerate() {
                 answers[(row, known[place])] = *answer;
             }
@@ -67,7 +71,7 @@ impl LagFit {
     /// The share of the torque's square that the model leaves which a joint's own lag takes off.
     pub(crate) fn share(&self, joint: usize) -> f64 {
         let Some(lag) = self.joints[joint] else { return 0.0 };
-        let column = self.base + joint;
+        let column = self.first + joint;
         let gained = lag.lag_s.powi(2) / self.last.covariance_white[(column, column)].max(f64::MIN_POSITIVE);
         gained / (gained + self.rows[joint] as f64)
     }
@@ -77,6 +81,7 @@ impl LagFit {
 struct Samples<'a> {
     checks: &'a [DelayCheck<'a>],
     with: (&'a Logs<'a>, &'a EstimationSettings),
+    unknowns: Unknowns<'a>,
     /// Log by log, joint by joint.
     rows: Vec<Vec<DelayRows>>,
     /// Seconds.
@@ -86,9 +91,10 @@ struct Samples<'a> {
 /// Fits the lags of the joints, the same in all logs. `None` for logs too short to fit to.
 pub(crate) fn fit_lags(
     checks: &[DelayCheck<'_>],
-    (logs, settings): (&Logs<'_>, &EstimationSettings),
+    unknowns: Unknowns<'_>,
+    with: (&Logs<'_>, &EstimationSettings),
 ) -> Option<LagFit> {
-    fitted(checks.first()?.model(), checks, (logs, settings)).ok()
+    fitted(checks.first()?.model(), (checks, unknowns), with).ok()
 }
 
 /// The lags of one log alone with what was taken off before it was read, by joint; `None` where it does not determine
@@ -97,14 +103,15 @@ pub(crate) fn lags_of_log(check: DelayCheck<'_>, with: (&Logs<'_>, &EstimationSe
     let joints = check.model().model().dof();
     let taken_off = &with.0.motion.torque_lag_s;
     let before = |joint: usize| taken_off.as_ref().and_then(|lags| lags.at(joint)).unwrap_or(0.0);
-    let rest = fit_lags(&[check], with).map_or_else(|| vec![None; joints], |fit| fit.joints);
+    let unknowns = Unknowns::of_log(check.theta());
+    let rest = fit_lags(&[check], unknowns, with).map_or_else(|| vec![None; joints], |fit| fit.joints);
     let total = |(joint, rest): (usize, Option<TorqueLag>)| rest.map(|rest| rest.after(before(joint)));
     rest.into_iter().enumerate().map(total).collect()
 }
 
 fn fitted(
     model: &RegressorModel,
-    checks: &[DelayCheck<'_>],
+    (checks, unknowns): (&[DelayCheck<'_>], Unknowns<'_>),
     with: (&Logs<'_>, &EstimationSettings),
 ) -> Result<LagFit, EstimationError> {
     let (logs, settings) = with;
@@ -114,16 +121,16 @@ fn fitted(
         let coarse = |check: &DelayCheck<'_>| Some(check.coarse(joint, cutoff_hz, LONGEST_DELAY_S)? / check.rate_hz());
         checks.iter().find_map(coarse).unwrap_or(0.0).clamp(-LONGEST_DELAY_S, LONGEST_DELAY_S)
     };
-    let mut samples = Samples::new(checks, with, (0..dof).into_par_iter().map(start).collect())?;
+    let mut samples = Samples::new((checks, unknowns), with, (0..dof).into_par_iter().map(start).collect())?;
     let quick =
         WeightedSettings { rank: settings.rank, covariance: CovarianceMethod::White, ..WeightedSettings::default() };
-    let base = model.layout().columns().len();
+    let first = unknowns.count();
     let fastest_hz = checks.iter().map(DelayCheck::rate_hz).fold(0.0, f64::max);
     for _ in 0..MOST_STEPS {
         let step = weighted_least_squares(&samples.problem(|rows| &rows.merged)?, &quick)?;
         let mut has_settled = true;
         for joint in 0..dof {
-            let (rest, std) = (step.values[base + joint], step.std[base + joint]);
+            let (rest, std) = (step.values[first + joint], step.std[first + joint]);
             has_settled &= rest.abs() <= (SETTLED.0 * std).max(SETTLED.1 / fastest_hz);
             samples.lag_s[joint] = (samples.lag_s[joint] + rest).clamp(-LONGEST_DELAY_S, LONGEST_DELAY_S);
         }
@@ -134,14 +141,15 @@ fn fitted(
     }
     let last_step = WeightedSettings { covariance: settings.covariance, ..quick };
     let last = weighted_least_squares(&samples.problem(|rows| &rows.factor)?, &last_step)?;
-    let joints = (0..dof).map(|joint| samples.joint_lag(&last, base, joint, fastest_hz)).collect();
+    let joints = (0..dof).map(|joint| samples.joint_lag(&last, first, joint, fastest_hz)).collect();
     let of_joint = |joint: usize| samples.rows.iter().map(|log| log[joint].factor.rows()).sum();
-    Ok(LagFit { base, joints, rows: (0..dof).map(of_joint).collect(), last })
+    let rows = (0..dof).map(of_joint).collect();
+    Ok(LagFit { parameters: unknowns.values.len(), first, joints, rows, last })
 }
 
 impl<'a> Samples<'a> {
     fn new(
-        checks: &'a [DelayCheck<'a>],
+        (checks, unknowns): (&'a [DelayCheck<'a>], Unknowns<'a>),
         with: (&'a Logs<'a>, &'a EstimationSettings),
         lag_s: Vec<f64>,
     ) -> Result<Self, EstimationError> {
@@ -150,7 +158,7 @@ impl<'a> Samples<'a> {
             (0..lag_s.len()).into_par_iter().map(of_joint).collect()
         };
         let rows = checks.par_iter().map(of_log).collect::<Result<_, _>>()?;
-        Ok(Self { checks, with, rows, lag_s })
+        Ok(Self { checks, with, unknowns, rows, lag_s })
     }
 
     /// Makes the rows again whose nodes no longer surround their lag.
@@ -167,8 +175,8 @@ impl<'a> Samples<'a> {
     }
 
     /// The lag of one joint from the last step, if it settled.
-    fn joint_lag(&self, last: &Estimate, base: usize, joint: usize, fastest_hz: f64) -> Option<TorqueLag> {
-        let column = base + joint;
+    fn joint_lag(&self, last: &Estimate, first: usize, joint: usize, fastest_hz: f64) -> Option<TorqueLag> {
+        let column = first + joint;
         let (rest, std) = (last.values[column], last.std[column]);
         let lag_s = self.lag_s[joint] + rest;
         let excited = last.rank.fixed.iter().all(|fixed| fixed.column != column);
@@ -193,36 +201,38 @@ impl<'a> Samples<'a> {
         })
     }
 
-    /// Parameters, then the rest of every joint's lag in seconds.
+    /// Parameters and unknown gains, then the rest of every joint's lag in seconds.
     fn problem(
         &self,
         factor: impl Fn(&DelayRows) -> &SegmentedFactor + Sync,
     ) -> Result<LinearProblem, EstimationError> {
         let model = self.checks[0].model();
         let layout = model.layout();
-        let (base, dof) = (layout.columns().len(), self.lag_s.len());
-        let names = (0..base + dof).map(|column| format!("column {column}")).collect();
+        let (first, dof) = (self.unknowns.count(), self.lag_s.len());
+        let names = (0..first + dof).map(|column| format!("column {column}")).collect();
         let joints = (0..dof).map(|joint| format!("joint {joint}")).collect();
         // What the logs do not determine stays as it was fitted, for the slope was made with it.
-        let fallback = self.checks[0].theta().iter().copied().chain(vec![0.0; dof]).collect();
+        let mut fallback = self.unknowns.values.to_vec();
+        fallback.resize(first + dof, 0.0);
         let mut problem = LinearProblem::new(names, joints).with_fallback(fallback)?;
         for (number, (check, rows)) in self.checks.iter().zip(&self.rows).enumerate() {
             let mapped = |(joint, rows): (usize, &DelayRows)| {
                 let own = layout.joint_columns(joint);
-                let mut map = DMatrix::zeros(own.len() + 1 + NODES, own.len() + 2);
-                for column in 0..own.len() {
-                    map[(column, column)] = 1.0;
-                }
-                map[(own.len(), own.len())] = check.rate_hz();
+                let mut seen = self.unknowns.seen(number, joint, own, check.theta());
+                let lag = seen.columns.len();
+                seen.columns.push(first + joint);
+                let mut map = DMatrix::zeros(own.len() + 1 + NODES, lag + 2);
+                map.view_mut((0, 0), (own.len(), lag)).copy_from(&seen.map);
+                map.view_mut((0, lag + 1), (own.len(), 1)).copy_from(&-seen.known);
+                map[(own.len(), lag)] = check.rate_hz();
                 let shift = self.lag_s[joint] * check.rate_hz();
                 for (node, weight) in lagrange(shift - rows.centre as f64).into_iter().enumerate() {
-                    map[(own.len() + 1 + node, own.len() + 1)] = weight;
+                    map[(own.len() + 1 + node, lag + 1)] = weight;
                 }
-                factor(rows).mapped(&map)
+                Ok((seen.columns, factor(rows).mapped(&map)?))
             };
-            let mapped: Vec<_> = rows.par_iter().enumerate().map(mapped).collect::<Result<_, _>>()?;
-            for (joint, mapped) in mapped.into_iter().enumerate() {
-                let columns = layout.joint_columns(joint).iter().copied().chain([base + joint]).collect();
+            let mapped: Vec<_> = rows.par_iter().enumerate().map(mapped).collect::<Result<_, EstimationError>>()?;
+            for (joint, (columns, mapped)) in mapped.into_iter().enumerate() {
                 problem.add(&format!("log {number}"), joint, columns, mapped)?;
             }
         }

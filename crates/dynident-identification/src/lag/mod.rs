@@ -8,6 +8,7 @@ mod pass;
 mod rounds;
 mod rows;
 mod samples;
+mod unknowns;
 
 pub use choice::{LagCandidates, LagChoice, LagKind};
 pub use fit::LagFit;
@@ -15,5 +16,6 @@ pub use measured::{TorqueLag, delay_findings, pooled_delay};
 pub use pass::{lag_fit, lags_of_recordings};
 pub use rounds::LagRounds;
 
+pub(crate) use choice::gain_errors;
 pub(crate) use pass::lags_after_pass;
 pub(crate) use samples::{DELAY_SAMPLES, DelayCheck};

@@ -3,8 +3,10 @@
 use super::fit::{LagFit, fit_lags, lags_of_log};
 use super::measured::{TorqueLag, pooled_delay};
 use super::samples::{DELAY_SAMPLES, DelayCheck};
+use super::unknowns::Unknowns;
 use crate::estimators::EstimationSettings;
 use crate::logs::Logs;
+use crate::payload::{DriveGain, LoadColumns, free_gains};
 use crate::progress::Silent;
 use crate::recording::{LogError, Recording, Samples};
 use crate::regressor_model::RegressorModel;
@@ -24,20 +26,25 @@ impl RowConsumer for DelayCheck<'_> {
     }
 }
 
-/// The lags of the joints by all recordings `chosen` together, beyond what the settings of `logs` take off; `theta` are
-/// the base parameters that a fit to them found. None where the recordings are too short, and where rows inside of a
-/// motion are left out.
+/// The lags of the joints by all recordings `chosen` together, beyond what the settings of `logs` take off. `values`
+/// are what a fit to them found over the `columns`: base parameters of the model, payloads, offsets of single logs. Of
+/// the `gains` that were found with them, those that the logs determine are unknowns beside the lags. None where the
+/// recordings are too short, and where rows inside of a motion are left out.
 ///
 /// # Errors
 /// What reading them can give.
 pub fn lag_fit(
     (logs, settings): (&Logs<'_>, &EstimationSettings),
     model: &RegressorModel,
-    theta: &[f64],
+    (columns, values, gains): (&LoadColumns, &[f64], &[DriveGain]),
     chosen: &[usize],
 ) -> Result<Option<LagFit>, LogError> {
-    let checks = checks(logs, model, chosen, &|_| theta)?;
-    Ok(checks.and_then(|checks| fit_lags(&checks, (logs, settings))))
+    let theta: Vec<Vec<f64>> = chosen.iter().map(|&index| columns.base_values(index, values)).collect();
+    let of = |place: usize| &theta[place][..];
+    let checks = checks(logs, model, chosen, &of)?;
+    let values = &values[..columns.count()];
+    let unknowns = Unknowns { values, loads: Some((columns, chosen)), gains: &free_gains(gains) };
+    Ok(checks.and_then(|checks| fit_lags(&checks, unknowns, (logs, settings))))
 }
 
 /// The whole lag of each joint by the recordings `chosen`, each with the base parameters that `theta` gives for it:

@@ -55,6 +55,24 @@ pub(crate) struct PayloadColumns {
     pub(crate) mass: Option<(f64, DVector<f64>)>,
 }
 
+/// What one joint's rows of one log are, `W (T x + c)`, in terms of the columns that they see.
+pub(crate) struct SeenColumns {
+    /// The columns of the problem.
+    pub(crate) columns: Vec<usize>,
+    /// Rows of `T` of the joint's own base columns, for those columns.
+    pub(crate) map: DMatrix<f64>,
+    /// `c` of its own base columns: a known payload.
+    pub(crate) known: DVector<f64>,
+}
+
+impl SeenColumns {
+    /// Of a log that sees the arm alone.
+    pub(crate) fn of_base(own: &[usize]) -> Self {
+        let count = own.len();
+        Self { columns: own.to_vec(), map: DMatrix::identity(count, count), known: DVector::zeros(count) }
+    }
+}
+
 /// Columns of a problem: the arm's base parameters, then payloads, then offsets of single logs.
 #[derive(Clone, Debug)]
 pub struct LoadColumns {
@@ -240,6 +258,16 @@ impl LoadColumns {
         known
     }
 
+    /// What a joint sees in log `index` of all columns by way of its `own` base columns.
+    pub(crate) fn seen(&self, index: usize, own: &[usize]) -> SeenColumns {
+        let Some((map, known)) = &self.logs[index] else { return SeenColumns::of_base(own) };
+        // Further columns that the joint does not feel would only be zeros.
+        let further = (self.base..self.count()).filter(|&column| own.iter().any(|&row| map[(row, column)] != 0.0));
+        let columns: Vec<usize> = own.iter().copied().chain(further).collect();
+        let known = DVector::from_iterator(own.len(), own.iter().map(|&global| known[global]));
+        SeenColumns { map: map.select_rows(own).select_columns(&columns), columns, known }
+    }
+
     /// Adds one joint's rows of a log to a problem over all columns; the known payload's torque is taken off unless the
     /// gain of the joint is not known yet.
     pub(crate) fn add(
@@ -250,18 +278,14 @@ impl LoadColumns {
         (own, factor): (&[usize], &SegmentedFactor),
         keep_known: bool,
     ) -> Result<(), EstimationError> {
-        let Some((map, known)) = &self.logs[index] else {
+        if self.logs[index].is_none() {
             return problem.add(log, joint, own.to_vec(), factor.clone());
-        };
-        // Further columns that the joint does not feel would only be zeros.
-        let further = (self.base..self.count()).filter(|&column| own.iter().any(|&row| map[(row, column)] != 0.0));
-        let columns: Vec<usize> = own.iter().copied().chain(further).collect();
+        }
+        let SeenColumns { columns, map, known } = self.seen(index, own);
         let mut local = DMatrix::zeros(own.len() + 1, columns.len() + 1);
-        for (row, &global) in own.iter().enumerate() {
-            for (to, &column) in columns.iter().enumerate() {
-                local[(row, to)] = map[(global, column)];
-            }
-            local[(row, columns.len())] = if keep_known { 0.0 } else { -known[global] };
+        local.view_mut((0, 0), map.shape()).copy_from(&map);
+        if !keep_known {
+            local.view_mut((0, columns.len()), (own.len(), 1)).copy_from(&-known);
         }
         local[(own.len(), columns.len())] = 1.0;
         problem.add(log, joint, columns, factor.mapped(&local)?)
@@ -352,9 +376,6 @@ fn check(
     let estimation = &settings.estimation;
     if !estimation.estimator.is_plain() || estimation.exogeneity_test.is_some() || estimation.essential.is_some() {
         return Err(PayloadError::Estimator);
-    }
-    if !settings.friction.is_empty() {
-        return Err(PayloadError::FrictionChoice);
     }
     if loaded && model.terms().iter().any(TorqueTerm::needs_load) {
         return Err(PayloadError::LoadFriction);

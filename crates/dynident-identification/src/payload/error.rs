@@ -47,12 +47,11 @@ pub enum PayloadError {
          leave those out"
     )]
     Estimator,
-    /// Friction that is to be chosen at the same time.
+    /// Friction that is to be chosen for an arm that is known.
     #[error(
-        "friction = \"auto\" does not go with payloads, offsets per log, a known arm or unknown gains: let the unloaded logs choose friction in a study of their own, and state what \
-         they chose (friction_choice of its result.json), or hold the arm by [arm]"
+        "[arm] and friction = \"auto\": a known arm has the friction of its result; leave friction out, with refit = \"friction\" to find its parameters again"
     )]
-    FrictionChoice,
+    FrictionOfKnownArm,
     /// Friction that depends on the bare arm's load.
     #[error(
         "load-dependent friction does not go with payloads, for its load is the bare arm's: leave out the law `load`"

@@ -29,6 +29,18 @@ pub struct DriveGain {
     pub reason: Option<String>,
 }
 
+impl DriveGain {
+    /// The gain with a further error, whose standard deviation is this `share` of it.
+    pub(crate) fn widen(&mut self, share: f64) {
+        let further = (share * self.gain).abs();
+        let wider = self.std.hypot(further);
+        if wider > self.std {
+            self.half_width_95 *= if self.std > 0.0 { wider / self.std } else { 1.0 };
+            self.std = wider;
+        }
+    }
+}
+
 /// What a fit with unknown gains found.
 pub(crate) struct Gains {
     pub(crate) of_joints: Vec<DriveGain>,

@@ -3,6 +3,7 @@
 mod body;
 mod columns;
 mod error;
+mod free_gains;
 mod gain_error;
 mod gains;
 mod known_arm;
@@ -14,5 +15,7 @@ pub use gains::DriveGain;
 pub use known_arm::{KnownArm, Refit};
 pub use result::{ConsistentPayload, Measured, PayloadParameter, PayloadResult, payload_results};
 
+pub(crate) use columns::SeenColumns;
+pub(crate) use free_gains::{free_gains, with_free_gains};
 pub(crate) use gain_error::with_gain_error;
 pub(crate) use gains::{Gains, drive_gains, known_loads};

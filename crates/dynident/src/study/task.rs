@@ -8,7 +8,7 @@ use crate::error::{Error, StudyError};
 use dynident_identification::estimators::SimulatedLoopSettings;
 use dynident_identification::friction::{FrictionSearch, JointFriction};
 use dynident_identification::payload::Payload;
-use dynident_identification::{GainChoice, IdentificationSettings, IdentificationTask, OffsetChoice, Recording};
+use dynident_identification::{IdentificationSettings, IdentificationTask, Recording};
 use dynident_recording::{FilterError, Log, RecordingError, Reference};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -181,12 +181,8 @@ impl Study {
     /// Why the logs do not choose friction that no key states; `None` where they do.
     fn why_friction_is_stated(&self) -> Option<&'static str> {
         let estimator = &self.estimator;
-        if self.arm.is_some() || !self.payload.is_empty() {
-            Some("with payloads it is not chosen; let a study of the unloaded logs choose it")
-        } else if self.drive.gains == GainChoice::Unknown {
-            Some("with gains that nobody knows it is not chosen")
-        } else if self.drive.offsets == OffsetChoice::PerLog {
-            Some("with offsets of each log it is not chosen")
+        if self.arm.is_some() {
+            Some("a known arm has the friction of its result")
         } else if !(estimator.method.is_least_squares() || estimator.method == EstimatorMethod::Instrumental) {
             Some("with this estimator it is not chosen unless friction = \"auto\" says so")
         } else if estimator.physical.settings().is_some_and(|knowledge| !knowledge.terms.is_empty()) {

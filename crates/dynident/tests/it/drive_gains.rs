@@ -35,7 +35,7 @@ fn currents<'a>(gains: &'a [f64], sigma: f64, random: &'a mut Random) -> impl Fn
 
 fn study(robot: &Path, link: &str, dof: usize, more: &str) -> String {
     format!(
-        "robot.file = {:?}\ndrive.gains = \"unknown\"\npayload = [{{ name = \"weight\", link = {link:?}, {PAYLOAD} }}]\n\
+        "robot.file = {:?}\ndrive.friction = \"stated\"\ndrive.gains = \"unknown\"\npayload = [{{ name = \"weight\", link = {link:?}, {PAYLOAD} }}]\n\
          log = [{{ file = \"empty.csv\" }}, {{ file = \"weight.csv\", payload = \"weight\" }}, {{ file = \"test.csv\", role = \"validate\", payload = \"weight\" }}]\n{more}\n{}",
         robot.display().to_string(),
         format(dof)

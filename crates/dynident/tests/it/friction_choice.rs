@@ -111,9 +111,11 @@ fn friction_is_chosen_by_default_where_no_key_states_it() {
     assert!(choice("friction = \"stated\"").is_empty() && choice("coulomb_width = 0.03").is_empty());
     let elbow_stated = choice("joints.elbow.viscous = true");
     assert!(elbow_stated.len() == 1 && elbow_stated[0].joint == "shoulder", "{elbow_stated:?}");
-    let refused = choice("offsets = \"per-log\"");
+    // A single log has no offset that differs from its own.
+    assert_eq!(text(&by_default), text(&choice("offsets = \"per-log\"")));
+    let refused = choice("[estimator.physical]\nlaws = { fv1 = [0.5, 1.5] }");
     assert_eq!(refused.len(), 2);
-    assert!(refused.iter().all(|joint| joint.chosen.contains("offsets") && joint.drive.is_none()), "{refused:?}");
+    assert!(refused.iter().all(|joint| joint.chosen.contains("known") && joint.drive.is_none()), "{refused:?}");
 }
 
 fn job_with_stated(folder: &Path) -> Job {

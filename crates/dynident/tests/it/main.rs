@@ -23,6 +23,7 @@ mod masses;
 mod modules;
 mod mutated_studies;
 mod payload;
+mod payload_unknowns;
 mod real_logs;
 mod real_mistakes;
 mod report;

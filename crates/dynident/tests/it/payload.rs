@@ -67,7 +67,7 @@ fn arm_and_payload_from_an_empty_and_a_loaded_log() {
     // The description's own bodies, which are physically consistent.
     let truth = three_logs(folder.path(), 0.0);
     let text = format!(
-        "robot.file = {:?}\n{BOX}\nparallel_filter.factor = 4\nlog = [{{ file = \"empty.csv\" }}, {{ file = \"box.csv\", payload = \"box\" }}, \
+        "robot.file = {:?}\ndrive.friction = \"stated\"\n{BOX}\nparallel_filter.factor = 4\nlog = [{{ file = \"empty.csv\" }}, {{ file = \"box.csv\", payload = \"box\" }}, \
          {{ file = \"test.csv\", payload = \"box\", role = \"validate\" }}]\n{}",
         ur10(),
         format(6)
@@ -107,7 +107,7 @@ fn a_known_payload_is_taken_off_and_a_second_one_found_with_the_arm_held() {
     );
     // The arm from a log with the known box.
     let text = format!(
-        "robot.file = {:?}\n{known}\nparallel_filter.factor = 4\nlog = [{{ file = \"box.csv\", payload = \"box\" }}]\n{}",
+        "robot.file = {:?}\ndrive.friction = \"stated\"\n{known}\nparallel_filter.factor = 4\nlog = [{{ file = \"box.csv\", payload = \"box\" }}]\n{}",
         ur10(),
         format(6)
     );
@@ -132,6 +132,16 @@ fn a_known_payload_is_taken_off_and_a_second_one_found_with_the_arm_held() {
         assert!(found.urdf.is_none() && found.result.no_urdf.as_ref().unwrap().contains("arm is known"));
         assert_eq!(found.result.base_parameters[0].value, arm.result.base_parameters[0].value);
     }
+    // Its friction is that of its result.
+    let text = format!(
+        "robot.file = {:?}\ndrive.friction = \"auto\"\n{BOX}\narm = {{ result = \"arm.json\" }}\n\
+         log = [{{ file = \"test.csv\", payload = \"box\" }}]\n{}",
+        ur10(),
+        format(6)
+    );
+    let job = Job::new(folder.path(), &text);
+    let refused = dynident::identify(&job.study, &job.path, &Job::options(1)).unwrap_err().to_string();
+    assert!(refused.contains("refit"), "{refused}");
 }
 
 #[test]
@@ -143,7 +153,7 @@ fn intervals_hold_the_payload_with_the_arm_free_and_held() {
     let with_box = loaded(&truth, &link);
     let study = |logs: &str, more: &str| {
         format!(
-            "robot.file = {:?}\npayload = [{{ name = \"box\", link = {link:?} }}]\nparallel_filter.factor = 2\nestimator.physical = false\n\
+            "robot.file = {:?}\ndrive.friction = \"stated\"\npayload = [{{ name = \"box\", link = {link:?} }}]\nparallel_filter.factor = 2\nestimator.physical = false\n\
              log = [{logs}]\n{more}\n{}",
             description.display().to_string(),
             format(2)
@@ -213,7 +223,7 @@ fn offsets_differ_from_log_to_log() {
     }
     truth.drive.iter_mut().zip(&mean).for_each(|(drive, mean)| drive[3] = *mean);
     let text = format!(
-        "robot.file = {:?}\ndrive.offsets = \"per-log\"\nparallel_filter.factor = 4\nlog = [{logs}]\n{}",
+        "robot.file = {:?}\ndrive.friction = \"stated\"\ndrive.offsets = \"per-log\"\nparallel_filter.factor = 4\nlog = [{logs}]\n{}",
         ur10(),
         format(6)
     );
@@ -249,7 +259,6 @@ fn what_does_not_go_together_is_refused_with_the_fix() {
         ("payload = [{ name = \"box\", link = \"tool0\", com_m = [0, 0, 0.1] }]", carrying, "mass_kg and com_m"),
         ("payload = [{ name = \"box\", link = \"tool0\", mass_kg = -2.0, com_m = [0, 0, 0] }]", carrying, "positive"),
         (&format!("{BOX}\nestimator.method = \"huber\""), carrying, "weighted"),
-        (&format!("{BOX}\ndrive.friction = \"auto\""), carrying, "friction_choice"),
         (&format!("{BOX}\ndrive.laws = [{{ law = \"load\" }}]"), carrying, "bare arm"),
         (&format!("{BOX}\narm = {{ result = \"nothing.json\" }}"), carrying, "nothing.json"),
         (
@@ -262,8 +271,11 @@ fn what_does_not_go_together_is_refused_with_the_fix() {
         assert!(said.contains(words), "{said}");
     }
     // A payload that is never off cannot be determined from the arm; that is a verdict, not an error.
-    let text =
-        format!("robot.file = {:?}\n{BOX}\nparallel_filter.factor = 4\nlog = [{carrying}]\n{}", ur10(), format(6));
+    let text = format!(
+        "robot.file = {:?}\ndrive.friction = \"stated\"\n{BOX}\nparallel_filter.factor = 4\nlog = [{carrying}]\n{}",
+        ur10(),
+        format(6)
+    );
     let result = Job::new(folder.path(), &text).identify().result;
     assert!(result.payloads[0].mass_kg.is_none());
     assert!(result.payloads[0].not_identified.iter().all(|words| words.contains("do not separate it from the arm")));
@@ -271,7 +283,7 @@ fn what_does_not_go_together_is_refused_with_the_fix() {
 
 fn with_box(payload: &str, more: &str) -> String {
     format!(
-        "robot.file = {:?}\npayload = [{{ name = \"box\", link = \"tool0\"{payload} }}]\nparallel_filter.factor = 4\n\
+        "robot.file = {:?}\ndrive.friction = \"stated\"\npayload = [{{ name = \"box\", link = \"tool0\"{payload} }}]\nparallel_filter.factor = 4\n\
          log = [{{ file = \"empty.csv\" }}, {{ file = \"box.csv\", payload = \"box\" }}]\n{more}\n{}",
         ur10(),
         format(6)

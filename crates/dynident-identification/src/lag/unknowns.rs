@@ -1,0 +1,43 @@
+//! What a lag is measured beside: the parameters of a fit, and what each joint's rows of each log are in terms of them.
+
+use crate::payload::{LoadColumns, SeenColumns};
+use nalgebra::DVector;
+
+/// The parameters of a fit that a lag is estimated together with.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Unknowns<'a> {
+    /// Values by the fit, in the order of the columns.
+    pub(crate) values: &'a [f64],
+    /// Columns of payloads and offsets with the numbers of the logs; none where the values are base parameters.
+    pub(crate) loads: Option<(&'a LoadColumns, &'a [usize])>,
+    /// Joints whose gain is an unknown too: the share by which it is larger than the torque was made with.
+    pub(crate) gains: &'a [usize],
+}
+
+impl<'a> Unknowns<'a> {
+    /// Base parameters of a single log.
+    pub(crate) fn of_log(theta: &'a [f64]) -> Self {
+        Self { values: theta, loads: None, gains: &[] }
+    }
+
+    /// Columns before those of the lags: parameters, then gains.
+    pub(crate) fn count(&self) -> usize {
+        self.values.len() + self.gains.len()
+    }
+
+    /// What a joint's `own` columns of the layout are made of in log number `place`, whose base parameters are `theta`.
+    pub(crate) fn seen(&self, place: usize, joint: usize, own: &[usize], theta: &[f64]) -> SeenColumns {
+        let mut seen = match self.loads {
+            Some((columns, logs)) => columns.seen(logs[place], own),
+            None => SeenColumns::of_base(own),
+        };
+        if let Some(gain) = self.gains.iter().position(|&free| free == joint) {
+            seen.columns.push(self.values.len() + gain);
+            let predicted = DVector::from_iterator(own.len(), own.iter().map(|&column| theta[column]));
+            let last = seen.map.ncols();
+            seen.map = seen.map.insert_column(last, 0.0);
+            seen.map.set_column(last, &predicted);
+        }
+        seen
+    }
+}
