@@ -4,25 +4,30 @@ use crate::before_motion::{motions, next_motion, rehearsed};
 use crate::convergence::{Names, Shortfall, shortfalls};
 use crate::error::IterationError;
 use crate::estimate::{RunEstimate, identify_run, identify_runs};
+use crate::forecast::MotionForecast;
+use crate::good_log::GoodLog;
 use crate::leg::{IterationTask, Leg};
 use crate::model_parameters::ModelParameters;
+use crate::planner::{MotionPlanner, PlannedMotion};
+use crate::planning::planned_motion;
 use crate::policy::{self, Next, RunPlan};
 use crate::record::{RunRecord, UsedController};
 use crate::robot::{Robot, RobotRun, RobotStatus, RunRequest, StopSignal};
 use crate::run_examination::{add_tracking_floors, examined, following_limits};
 use crate::run_logs::RunLog;
+use crate::run_motion::{RunMotion, legs_along};
 use crate::settings::{IterationSettings, RunIdentificationSettings};
 use crate::status::IterationStatus;
 use crate::store::IterationStore;
 use crate::supervision::{Supervisor, Watching};
 use dynident_dynamics::ParametricModel;
 use dynident_identification::friction::chosen_model;
-use dynident_recording::DifferentiatorSettings;
 use dynident_simulation::Record;
 use dynident_simulation::controllers::ControllerModel;
 use dynident_simulation::{SimulationError, require_length};
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 /// A torque this much above a limit is no matter of rounding or of the model's last digits.
 const BEYOND: f64 = 1.001;
@@ -32,6 +37,7 @@ const BEYOND: f64 = 1.001;
 pub struct Iteration {
     task: IterationTask,
     settings: IterationSettings,
+    planner: Option<Arc<dyn MotionPlanner>>,
 }
 
 /// How an iteration went.
@@ -43,6 +49,15 @@ pub struct IterationOutcome {
     pub shortfalls: Vec<Shortfall>,
     /// Every run.
     pub runs: Vec<RunRecord>,
+    /// Where motions are planned and everything is met: what a further run was expected to bring, too little for one.
+    pub declined: Option<MotionForecast>,
+}
+
+/// The motion of a run: its own trajectories, if they are not the task's, and what they are expected to bring.
+#[derive(Clone, Debug, Default)]
+struct NextRunMotion {
+    motion: Option<RunMotion>,
+    forecast: Option<MotionForecast>,
 }
 
 /// What came of a plan.
@@ -61,7 +76,14 @@ impl Iteration {
     pub fn new(task: IterationTask, settings: IterationSettings) -> Result<Self, SimulationError> {
         task.validate()?;
         settings.validate(task.robot.dof())?;
-        Ok(Self { task, settings })
+        Ok(Self { task, settings, planner: None })
+    }
+
+    /// The same with motions that are planned from what is known, in place of the task's in every run.
+    #[must_use]
+    pub fn with_planner(mut self, planner: Arc<dyn MotionPlanner>) -> Self {
+        self.planner = Some(planner);
+        self
     }
 
     /// The task.
@@ -74,7 +96,16 @@ impl Iteration {
         &self.settings
     }
 
-    /// What comes after these records: it depends on nothing else.
+    /// The legs of a run: the task's, along trajectories of its own where it had some.
+    ///
+    /// # Errors
+    /// A record of another task.
+    pub fn legs_of(&self, record: &RunRecord) -> Result<Cow<'_, [Leg]>, IterationError> {
+        legs_along(&self.task, record.motion.as_ref())
+    }
+
+    /// What comes after these records: it depends on nothing else. Where motions are planned an iteration that has
+    /// converged may still go on for a motion that is worth a run.
     ///
     /// # Errors
     /// Records of another robot.
@@ -107,7 +138,8 @@ impl Iteration {
         let mut model = self.controller_model(records, &parameters)?;
         let dof = self.task.robot.dof();
         let mut tau = vec![0.0; dof];
-        for leg in &self.task.legs {
+        let motion = records.last().and_then(|record| record.motion.as_ref());
+        for leg in &*legs_along(&self.task, motion)? {
             let (motion, rate_hz) = (leg.reference().motion(), leg.reference().rate_hz());
             for sample in 0..motion.samples {
                 let at = |values: &[f64]| -> Vec<f64> {
@@ -140,6 +172,35 @@ impl Iteration {
         };
         let chosen = chosen_model(&self.task.robot, choice);
         chosen.map(Cow::Owned).map_err(|source| IterationError::ChosenFriction { run, source })
+    }
+
+    /// The motion of the run after `records`, as an earlier call has planned it or planned now.
+    fn next_motion(
+        &self,
+        records: &[RunRecord],
+        store: Option<&IterationStore>,
+        stop: Option<&StopSignal>,
+    ) -> Result<NextRunMotion, IterationError> {
+        let good = records.iter().rev().find(|record| record.accepted && record.estimate.is_some());
+        let (Some(planner), Some(good)) = (&self.planner, good) else { return Ok(NextRunMotion::default()) };
+        // After a run that does not count, the motion that the robot is known to follow.
+        if good.run != records.len() {
+            return Ok(NextRunMotion { motion: good.motion.clone(), forecast: None });
+        }
+        let run = records.len() + 1;
+        let kept = store.map_or(Ok(None), |store| store.planned(run, self.task.robot.dof()))?;
+        let PlannedMotion { motion, forecast } = if let Some(kept) = kept {
+            kept
+        } else {
+            let (task, _) = self.in_force(records)?;
+            let planned = planned_motion(&**planner, &task, (records, self.settings.pool), stop)?;
+            // A search that was cut short is not this run's motion.
+            if let Some(store) = store.filter(|_| !stop.is_some_and(StopSignal::is_requested)) {
+                store.keep_planned(run, &planned)?;
+            }
+            planned
+        };
+        Ok(NextRunMotion { motion: motion.or_else(|| good.motion.clone()), forecast: Some(forecast) })
     }
 
     /// The task and how runs are identified, with the friction that a run before chose, if one did.
@@ -175,29 +236,36 @@ impl Iteration {
         })
     }
 
+    /// A run for its motion alone, if everything is met, motions are planned, and one is left.
+    fn further(&self, status: &IterationStatus, records: &[RunRecord]) -> Option<RunPlan> {
+        let open = self.planner.is_some() && status.is_converged() && records.len() < self.settings.max_runs;
+        open.then(|| policy::further(records)).flatten()
+    }
+
     /// Makes one run: every leg on its robot, then the identification.
     fn made(
         &self,
         robots: &mut [&mut dyn Robot],
-        plan: &RunPlan,
+        (plan, next): (&RunPlan, NextRunMotion),
         before: &[RunRecord],
         earlier: &[GoodLog],
         supervisor: &mut dyn Supervisor,
     ) -> Result<PlannedRun, IterationError> {
-        let legs = &self.task.legs;
+        let legs = legs_along(&self.task, next.motion.as_ref())?;
+        let task = &IterationTask { legs: legs.into_owned(), ..self.task.clone() };
+        let legs = &task.legs;
         let controller = plan.controller(&self.settings);
         let model = plan.model.as_ref().map(|parameters| self.controller_model(before, parameters)).transpose()?;
         let robot = self.robot(before)?;
-        let rehearsal =
-            match rehearsed(&self.task, &self.settings, &robot, (plan, &controller, model.as_ref()), before)? {
-                Ok(rehearsal) => rehearsal,
-                Err(failure) => {
-                    let reason = format!("run {} is not commanded: {failure}", plan.run);
-                    return Ok(PlannedRun::Stopped(IterationStatus::Refused { reason }));
-                }
-            };
+        let rehearsal = match rehearsed(task, &self.settings, &robot, (plan, &controller, model.as_ref()), before)? {
+            Ok(rehearsal) => rehearsal,
+            Err(failure) => {
+                let reason = format!("run {} is not commanded: {failure}", plan.run);
+                return Ok(PlannedRun::Stopped(IterationStatus::Refused { reason }));
+            }
+        };
         let mut runs: Vec<RobotRun> = Vec::with_capacity(legs.len());
-        for (number, leg, speed) in motions(&self.task, &self.settings, before) {
+        for (number, leg, speed) in motions(task, &self.settings, before) {
             let robot = if robots.len() == 1 { &mut robots[0] } else { &mut robots[number] };
             // Numbers of runs differ from leg to leg: noise and folders go by them.
             let run = (plan.run - 1) * legs.len() + number + 1;
@@ -207,7 +275,7 @@ impl Iteration {
             if stop.as_ref().is_some_and(StopSignal::is_requested) {
                 return Ok(PlannedRun::Interrupted(runs, "between two runs".to_owned()));
             }
-            let mut motion = next_motion(&self.task, plan, &controller, (number, reference, speed));
+            let mut motion = next_motion(task, plan, &controller, (number, reference, speed));
             motion.rehearsal.clone_from(&rehearsal);
             if !supervisor.allows(&motion) {
                 if stop.as_ref().is_some_and(StopSignal::is_requested) {
@@ -258,7 +326,7 @@ impl Iteration {
                 break;
             }
         }
-        let mut record = self.recorded(plan, controller.name(), &runs);
+        let mut record = self.recorded((plan, next), controller.name(), legs, &runs);
         record.rehearsal = rehearsal;
         if record.done {
             let records: Vec<Record> = runs.iter().map(|run| run.record.clone()).collect();
@@ -284,6 +352,8 @@ impl Iteration {
             )
         };
         let (task, settings) = self.in_force(before)?;
+        let legs = self.legs_of(record)?.into_owned();
+        let task = IterationTask { legs: legs.clone(), ..task.into_owned() };
         match identify_run(&task, records, &settings) {
             Ok(estimate) => record.estimate = Some(estimate),
             Err(error) if fatal(&error) => return Err(error),
@@ -302,13 +372,14 @@ impl Iteration {
         let Some(own) = record.estimate.clone().filter(|_| record.accepted) else { return Ok(()) };
         if self.settings.pool && !earlier.is_empty() {
             let differentiator = own.differentiator.as_ref().map(|way| &way.taken);
-            let own = RunLog { run: record.run, records, joint_sigma: &own.joint_sigma, differentiator };
+            let own = RunLog { run: record.run, legs: &legs, records, joint_sigma: &own.joint_sigma, differentiator };
             let runs: Vec<RunLog<'_>> = earlier.iter().map(GoodLog::as_run).chain([own]).collect();
             // Where all together cannot be fitted the newest stands alone.
             record.pooled = identify_runs(&task, &runs, &settings).ok().filter(|found| found.impossible.is_none());
         }
         let all: Vec<RunRecord> = before.iter().cloned().chain([record.clone()]).collect();
         let (task, _) = self.in_force(&all)?;
+        let task = IterationTask { legs, ..task.into_owned() };
         let after = record.pooled.as_ref().unwrap_or(&own);
         let errors = &record.max_tracking_error_rad;
         // The first good run is not judged, whatever it was under.
@@ -322,26 +393,35 @@ impl Iteration {
     /// Whether the run counts as good.
     fn judge(&self, record: &mut RunRecord, before: &[RunRecord]) -> Result<(), IterationError> {
         let names = names(&*self.robot(before)?);
-        match policy::verdict(record, before, &self.settings, (&following_limits(&self.task), &names)) {
+        let following = following_limits(&self.legs_of(record)?, self.task.robot.dof());
+        match policy::verdict(record, before, &self.settings, (&following, &names)) {
             Ok(()) => record.accepted = true,
             Err(reason) => record.reason = Some(reason.to_string()),
         }
         Ok(())
     }
 
-    fn recorded(&self, plan: &RunPlan, name: &str, runs: &[RobotRun]) -> RunRecord {
+    fn recorded(
+        &self,
+        (plan, next): (&RunPlan, NextRunMotion),
+        name: &str,
+        legs: &[Leg],
+        runs: &[RobotRun],
+    ) -> RunRecord {
         let joints = self.task.robot.dof();
         let mut worst = vec![0.0_f64; joints];
-        for (run, leg) in runs.iter().zip(&self.task.legs) {
+        for (run, leg) in runs.iter().zip(legs) {
             let own = match &run.truth {
                 Some(truth) => truth.max_error.clone(),
                 None => run.max_error(leg.reference()),
             };
             worst.iter_mut().zip(own).for_each(|(worst, own)| *worst = worst.max(own));
         }
-        let done = runs.len() == self.task.legs.len() && runs.iter().all(|run| run.status.is_done());
+        let done = runs.len() == legs.len() && runs.iter().all(|run| run.status.is_done());
         RunRecord {
             run: plan.run,
+            motion: next.motion,
+            forecast: next.forecast,
             controller: UsedController {
                 name: name.to_owned(),
                 model: plan.model.clone(),
@@ -374,39 +454,17 @@ impl Iteration {
         store: &IterationStore,
     ) -> Result<Vec<GoodLog>, IterationError> {
         let joints = self.task.robot.joint_names();
-        let rates = |record: &RunRecord| -> Vec<f64> {
+        let rates = |record: &RunRecord, legs: &[Leg]| -> Vec<f64> {
             let kept = record.evidence.as_ref().map(|evidence| evidence.log_rates_hz.clone()).unwrap_or_default();
             let of_leg = |(place, leg): (usize, &Leg)| kept.get(place).copied().unwrap_or(leg.reference().rate_hz());
-            self.task.legs.iter().enumerate().map(of_leg).collect()
+            legs.iter().enumerate().map(of_leg).collect()
         };
         let one = |record: &RunRecord| {
-            let records = store.logs(record.run, &joints, &rates(record))?;
-            Ok(GoodLog::new(record, records))
+            let legs = self.legs_of(record)?.into_owned();
+            let records = store.logs(record.run, &joints, &rates(record, &legs))?;
+            Ok(GoodLog::new(record, legs, records))
         };
         records.iter().copied().map(one).collect()
-    }
-}
-
-/// A good run's records, kept for those after it.
-#[derive(Clone, Debug)]
-pub(crate) struct GoodLog {
-    run: usize,
-    records: Vec<Record>,
-    joint_sigma: Vec<f64>,
-    differentiator: Option<DifferentiatorSettings>,
-}
-
-impl GoodLog {
-    fn new(record: &RunRecord, records: Vec<Record>) -> Self {
-        let joint_sigma = record.estimate.as_ref().map(|estimate| estimate.joint_sigma.clone()).unwrap_or_default();
-        let way = record.estimate.as_ref().and_then(|estimate| estimate.differentiator.as_ref());
-        let differentiator = way.map(|way| way.taken.clone());
-        Self { run: record.run, records, joint_sigma, differentiator }
-    }
-
-    pub(crate) fn as_run(&self) -> RunLog<'_> {
-        let differentiator = self.differentiator.as_ref();
-        RunLog { run: self.run, records: &self.records, joint_sigma: &self.joint_sigma, differentiator }
     }
 }
 
@@ -459,14 +517,28 @@ pub fn iterate_supervised(
     }
     let outcome = |status, records: Vec<RunRecord>| {
         let shortfalls = iteration.shortfalls(&records)?;
-        Ok(IterationOutcome { status, shortfalls, runs: records })
+        Ok(IterationOutcome { status, shortfalls, runs: records, declined: None })
     };
     let mut good: Option<Vec<GoodLog>> = None;
     let mut stopped: Option<String> = None;
     loop {
-        let plan = match iteration.next(&records)? {
-            Next::Run(plan) => plan,
-            Next::Finished(status) => return outcome(status, records),
+        let stop = supervisor.stop().cloned();
+        let (plan, next) = match iteration.next(&records)? {
+            Next::Run(plan) => (plan, iteration.next_motion(&records, store, stop.as_ref())?),
+            Next::Finished(status) => {
+                let more = iteration.further(&status, &records);
+                let Some(plan) = more else { return outcome(status, records) };
+                let next = iteration.next_motion(&records, store, stop.as_ref())?;
+                if stop.as_ref().is_some_and(StopSignal::is_requested) {
+                    let reason = format!("while the motion of run {} was looked for", plan.run);
+                    return outcome(IterationStatus::Interrupted { reason }, records);
+                }
+                if !next.forecast.as_ref().is_some_and(|forecast| forecast.worth_a_run) {
+                    let declined = next.forecast;
+                    return Ok(IterationOutcome { declined, ..outcome(status, records)? });
+                }
+                (plan, next)
+            }
         };
         // Only now: an iteration that has ended needs no logs.
         let good = match &mut good {
@@ -477,7 +549,7 @@ pub fn iterate_supervised(
             let reason = format!("{why}. Look at the robot; the same command goes on with run {}", plan.run);
             return outcome(IterationStatus::Waiting { reason }, records);
         }
-        match iteration.made(robots, &plan, &records, good, supervisor)? {
+        match iteration.made(robots, (&plan, next), &records, good, supervisor)? {
             PlannedRun::Stopped(status) => return outcome(status, records),
             PlannedRun::Interrupted(runs, how) => {
                 let kept = store.map_or(Ok(None), |store| store.keep_interrupted(plan.run, &runs, &how))?;
@@ -488,7 +560,8 @@ pub fn iterate_supervised(
             }
             PlannedRun::Run(record, runs) => {
                 if record.accepted && record.estimate.is_some() && iteration.settings.pool {
-                    good.push(GoodLog::new(&record, runs.iter().map(|run| run.record.clone()).collect()));
+                    let legs = iteration.legs_of(&record)?.into_owned();
+                    good.push(GoodLog::new(&record, legs, runs.iter().map(|run| run.record.clone()).collect()));
                 }
                 if let Some(store) = store {
                     store.keep(&record, &runs)?;

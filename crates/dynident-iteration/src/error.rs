@@ -47,6 +47,14 @@ pub enum IterationError {
         /// What is wrong, and the fix.
         problem: String,
     },
+    /// A run whose motion cannot be planned.
+    #[error("run {run}: {problem}")]
+    Planning {
+        /// The run.
+        run: usize,
+        /// What is wrong, and the fix.
+        problem: String,
+    },
     /// A file of the iteration's folder that cannot be read or written. What was there before is untouched.
     #[error("{}: {source}; nothing that was there has changed", path.display())]
     File {

@@ -90,7 +90,7 @@ pub fn identify_run(
     records: &[Record],
     settings: &RunIdentificationSettings,
 ) -> Result<RunEstimate, IterationError> {
-    let log = RunLog { run: 1, records, joint_sigma: &[], differentiator: None };
+    let log = RunLog { run: 1, legs: &task.legs, records, joint_sigma: &[], differentiator: None };
     if !settings.choose_differentiator {
         return identify_runs(task, &[log], settings);
     }
@@ -144,7 +144,7 @@ fn run_weights(task: &IterationTask, runs: &[RunLog<'_>]) -> Vec<Vec<f64>> {
         let weight = |joint: usize| Some(sigma(runs.last()?, joint)? / sigma(log, joint)?);
         (0..task.robot.dof()).map(|joint| weight(joint).unwrap_or(1.0)).collect()
     };
-    runs.iter().flat_map(|log| core::iter::repeat_n(of_run(log), task.legs.len())).collect()
+    runs.iter().flat_map(|log| core::iter::repeat_n(of_run(log), log.legs.len())).collect()
 }
 
 /// All joints at once.

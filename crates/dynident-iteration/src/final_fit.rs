@@ -2,6 +2,7 @@
 
 use crate::drive::Iteration;
 use crate::error::IterationError;
+use crate::good_log::GoodLog;
 use crate::record::RunRecord;
 use crate::run_logs::{identification_settings, recordings};
 use crate::store::IterationStore;
@@ -26,7 +27,7 @@ impl Iteration {
             return Ok(None);
         }
         let logs = self.logs_of(chosen, store)?;
-        let runs: Vec<_> = logs.iter().map(crate::drive::GoodLog::as_run).collect();
+        let runs: Vec<_> = logs.iter().map(GoodLog::as_run).collect();
         let (task, settings) = self.in_force(records)?;
         let recordings = recordings(&task, &runs, &settings)?;
         let mut identification = IdentificationTask::new(task.robot.clone(), recordings);

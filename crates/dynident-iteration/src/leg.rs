@@ -1,4 +1,4 @@
-//! What the robot is asked to follow in every run, and which rows count.
+//! What the robot is asked to follow, and which rows count.
 
 use dynident_dynamics::ParametricModel;
 use dynident_recording::{Differentiator, FilterError};
@@ -6,7 +6,7 @@ use dynident_simulation::Reference;
 use dynident_simulation::{SimulationError, require, require_length};
 use std::sync::Arc;
 
-/// One trajectory of every run. The paper moves joint 2 and then joint 1: one leg in which the joints take turns, or
+/// One trajectory of a run. The paper moves joint 2 and then joint 1: one leg in which the joints take turns, or
 /// two legs.
 #[derive(Clone, Debug)]
 pub struct Leg {
@@ -43,6 +43,15 @@ impl Leg {
             .collect();
         let commanded = Arc::new(dynident_recording::Reference::sampled(&times, &joints)?);
         Ok(Self { reference, commanded, windows, differentiator: None, payload: None })
+    }
+
+    /// The same along another trajectory: windows, payload and a differentiator of one's own stay.
+    ///
+    /// # Errors
+    /// A reference of one sample only.
+    pub fn along(&self, reference: Reference) -> Result<Self, FilterError> {
+        let other = Self::new(reference, self.windows.clone())?;
+        Ok(Self { differentiator: self.differentiator.clone(), payload: self.payload.clone(), ..other })
     }
 
     /// The same with the commanded motion as differentiators are to know it: strokes in closed form in place of
@@ -104,7 +113,8 @@ impl Leg {
 pub struct IterationTask {
     /// The robot.
     pub robot: ParametricModel,
-    /// The trajectories of every run, in order.
+    /// The trajectories of every run, in order; of the first run only, where the motion is
+    /// [planned](crate::MotionPlanner).
     pub legs: Vec<Leg>,
     /// Base columns whose values are given: (place among the base columns, value). Of the paper's joint 1: what joint 2
     /// has shown.

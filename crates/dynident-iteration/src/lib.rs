@@ -14,6 +14,7 @@
 //! | several runs' identification together | [`identify_runs`], each weighted by its own noise |
 //! | what is not met yet | [`Iteration::shortfalls`]: tracking, parameters, clipping, lag, prediction ([`Shortfall`]) |
 //! | what the next run is | [`Iteration::next`], a pure function of the records so far: which controller and model it has, whether a run got worse, when all has settled |
+//! | the next motion where the runs so far say least | a [`MotionPlanner`]: [`Redesign`], with [`Iteration::with_planner`] |
 //! | kept on disk, and resumed to the same result | [`IterationStore`] |
 //!
 //! The crate `dynident` wraps it as `dynident iterate`, with trajectories, robots and controllers from a study file.
@@ -72,19 +73,26 @@ mod error;
 mod estimate;
 mod evidence;
 mod final_fit;
+mod forecast;
 mod gains;
+mod good_log;
 mod leg;
 mod model_parameters;
 mod motion;
+mod planner;
+mod planning;
 mod policy;
 mod posture;
 mod prediction;
 mod record;
+mod redesign;
 mod rehearsal;
 mod rests;
 pub mod robot;
 mod run_examination;
+mod run_information;
 mod run_logs;
+mod run_motion;
 mod runs_folder;
 mod safety;
 mod settings;
@@ -92,6 +100,7 @@ mod status;
 mod step_by_step;
 mod store;
 mod supervision;
+mod torque_of_all;
 mod tracking_floor;
 mod typical_drives;
 
@@ -102,15 +111,19 @@ pub use error::IterationError;
 pub use estimate::{RunEstimate, identify_run, identify_runs};
 pub use evidence::{Clipping, JointEvidence, Prediction, RunEvidence};
 pub use final_fit::friction_chosen;
+pub use forecast::{ForecastDirection, MotionForecast};
 pub use gains::{DerivedControllers, derived_controllers};
 pub use leg::{IterationTask, Leg};
 pub use model_parameters::ModelParameters;
 pub use motion::measured_motion;
+pub use planner::{BeforeRun, GoodRun, MotionPlanner, PlannedMotion};
 pub use policy::{Next, RunPlan};
 pub use record::{RunRecord, UsedController};
+pub use redesign::{Redesign, RedesignSettings};
 pub use rehearsal::{Rehearsal, RehearsalFailure, RehearsalSettings};
 pub use robot::{Robot, RobotFault, RobotRun, RobotStatus, RunRequest, SimulatedRobot, StopSignal};
 pub use run_logs::RunLog;
+pub use run_motion::RunMotion;
 pub use safety::SafetySettings;
 pub use settings::{IterationSettings, RunIdentificationSettings, Scheme, SettledSettings, StartWith};
 pub use status::IterationStatus;

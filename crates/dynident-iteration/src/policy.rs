@@ -119,6 +119,12 @@ pub(crate) fn next(records: &[RunRecord], settings: &IterationSettings, prior: &
     model_free(settings.stiffen.powi(before as i32))
 }
 
+/// A further run after all is met, under what is known: for its motion alone. None where no run has a model to load.
+pub(crate) fn further(records: &[RunRecord]) -> Option<RunPlan> {
+    let model = most_trusted(records).and_then(model_of)?;
+    Some(RunPlan::with_model(records.len() + 1, model, 1.0))
+}
+
 /// What a controller gets from a run.
 fn model_of(record: &RunRecord) -> Option<ModelParameters> {
     record.knowledge().and_then(RunEstimate::for_controller)
@@ -195,7 +201,9 @@ pub(crate) fn verdict(
     {
         return Err(Rejection::LeftTrajectory { joint: names.joints[joint].clone(), error, limit });
     }
-    let Some(good) = before.iter().rev().find(|record| record.accepted) else { return Ok(()) };
+    // Along another motion another error is to be expected.
+    let alike = |good: &&RunRecord| good.accepted && good.motion == record.motion;
+    let Some(good) = before.iter().rev().find(alike) else { return Ok(()) };
     let (now, then) = (record.tracking_error(), good.tracking_error());
     let worst = (settings.worse_factor * then).max(settings.settled.tracking_tolerance);
     // A controller without a model is what a bad one falls back to: its tracking is no reason to reject it.

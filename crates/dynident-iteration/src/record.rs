@@ -2,8 +2,10 @@
 
 use crate::estimate::RunEstimate;
 use crate::evidence::RunEvidence;
+use crate::forecast::MotionForecast;
 use crate::model_parameters::ModelParameters;
 use crate::rehearsal::Rehearsal;
+use crate::run_motion::RunMotion;
 use dynident_dynamics::ParametricModel;
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +29,12 @@ pub struct UsedController {
 pub struct RunRecord {
     /// Its number, from 1.
     pub run: usize,
+    /// Its trajectories, where they are not those of the task.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<RunMotion>,
+    /// What its motion was expected to bring; none where motions are not planned, and where nothing was known before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub forecast: Option<MotionForecast>,
     /// What controlled it.
     pub controller: UsedController,
     /// Whether every trajectory was run to its end.

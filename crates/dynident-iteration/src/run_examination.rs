@@ -4,7 +4,7 @@ use crate::clipping::clipping;
 use crate::error::IterationError;
 use crate::estimate::RunEstimate;
 use crate::evidence::{JointEvidence, RunEvidence};
-use crate::leg::IterationTask;
+use crate::leg::{IterationTask, Leg};
 use crate::prediction::{Known, predictions};
 use crate::run_logs::{RunLog, identification_settings, recordings};
 use crate::settings::{IterationSettings, RunIdentificationSettings};
@@ -20,17 +20,17 @@ use dynident_simulation::Record;
 const FOLLOWING: [f64; 2] = [0.1, 1.0];
 
 /// The largest tracking error of each joint with which it still follows, rad (m).
-pub(crate) fn following_limits(task: &IterationTask) -> Vec<f64> {
+pub(crate) fn following_limits(legs: &[Leg], dof: usize) -> Vec<f64> {
     let range = |joint: usize| {
-        let of_leg = |leg: &crate::leg::Leg| {
+        let of_leg = |leg: &Leg| {
             let motion = leg.reference().motion();
             let q = &motion.q[motion.of(joint)];
             let (low, high) = q.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| (l.min(*q), h.max(*q)));
             high - low
         };
-        task.legs.iter().map(of_leg).fold(0.0, f64::max)
+        legs.iter().map(of_leg).fold(0.0, f64::max)
     };
-    (0..task.robot.dof()).map(|joint| (0.5 * range(joint)).clamp(FOLLOWING[0], FOLLOWING[1])).collect()
+    (0..dof).map(|joint| (0.5 * range(joint)).clamp(FOLLOWING[0], FOLLOWING[1])).collect()
 }
 
 /// What the records of a run show, with the prediction by `known`, what was known before it; `task` with the friction
@@ -97,7 +97,7 @@ fn predict(
     records: &[Record],
     (settings, known): (&RunIdentificationSettings, &RunEstimate),
 ) -> Result<(), IterationError> {
-    let log = RunLog { run: 1, records, joint_sigma: &[], differentiator: None };
+    let log = RunLog { run: 1, legs: &task.legs, records, joint_sigma: &[], differentiator: None };
     let recordings = recordings(task, &[log], settings)?;
     let mut identification = identification_settings(task, settings, 1);
     // The rows that the model was fitted to were without it.

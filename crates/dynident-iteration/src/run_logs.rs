@@ -1,7 +1,7 @@
 //! The records of runs as recordings of motions, and what they are identified with.
 
 use crate::error::IterationError;
-use crate::leg::IterationTask;
+use crate::leg::{IterationTask, Leg};
 use crate::motion::measured_motion;
 use crate::rests::has_dry_friction;
 use crate::settings::RunIdentificationSettings;
@@ -16,7 +16,9 @@ use std::sync::Arc;
 pub struct RunLog<'a> {
     /// The run's number, from 1.
     pub run: usize,
-    /// One record for each leg of the task.
+    /// The legs that it was made along.
+    pub legs: &'a [Leg],
+    /// One record for each leg.
     pub records: &'a [Record],
     /// Standard deviation of each joint's residual by the run alone, Nm (N); for step-by-step identification, which
     /// weights runs by it.
@@ -31,14 +33,14 @@ pub(crate) fn recordings(
     runs: &[RunLog<'_>],
     settings: &RunIdentificationSettings,
 ) -> Result<Vec<Recording>, IterationError> {
-    let legs = task.legs.len();
     let dry = has_dry_friction(&task.robot, &settings.friction);
-    let mut recordings = Vec::with_capacity(runs.len() * legs);
+    let mut recordings = Vec::new();
     for log in runs {
+        let legs = log.legs.len();
         require_length("records of the run's legs", legs, log.records.len())?;
         let own = log.differentiator.map(|differentiator| settings.with_differentiator(differentiator));
         let settings = own.as_ref().unwrap_or(settings);
-        for (number, (leg, record)) in task.legs.iter().zip(log.records).enumerate() {
+        for (number, (leg, record)) in log.legs.iter().zip(log.records).enumerate() {
             let motion = measured_motion(record, leg, settings, &dry)?;
             let of_leg = if legs > 1 { format!(", leg {}", number + 1) } else { String::new() };
             let mut recording = Recording::of_motion(format!("run {}{of_leg}", log.run), motion);

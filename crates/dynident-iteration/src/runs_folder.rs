@@ -10,6 +10,10 @@ pub(crate) const UNFINISHED: &str = ".unfinished-";
 const RUN: &str = "run_";
 /// What the folder of a run that a stop cut short begins with.
 pub(crate) const INTERRUPTED: &str = "interrupted_";
+/// What the folder of a motion that has been planned for a run begins with.
+pub(crate) const PLANNED: &str = "planned_";
+/// The file of a planned motion.
+pub(crate) const PLAN_FILE: &str = "plan.json";
 /// The file of a run.
 pub(crate) const RUN_FILE: &str = "run.json";
 /// The file of a run that a stop cut short.
@@ -19,6 +23,8 @@ pub(crate) const INTERRUPTED_FILE: &str = "interrupted.json";
 pub(crate) struct RunsFolder {
     runs: PathBuf,
     kept: Vec<PathBuf>,
+    /// Planned motions with the numbers of their runs.
+    planned: Vec<(usize, PathBuf)>,
     unfinished: Vec<PathBuf>,
 }
 
@@ -28,7 +34,7 @@ impl RunsFolder {
     /// # Errors
     /// Something of another's in the place of a run: nothing could be kept there.
     pub(crate) fn look(runs: &Path) -> Result<Self, IterationError> {
-        let (mut kept, mut unfinished) = (Vec::new(), Vec::new());
+        let (mut kept, mut planned, mut unfinished) = (Vec::new(), Vec::new(), Vec::new());
         for entry in fs::read_dir(runs).map_err(IterationError::file(runs))? {
             let entry = entry.map_err(IterationError::file(runs))?;
             let name = entry.file_name().to_string_lossy().into_owned();
@@ -44,17 +50,22 @@ impl RunsFolder {
                 kept.push(entry.path());
             } else if name.starts_with(INTERRUPTED) && is_folder(&entry) {
                 kept.push(entry.path());
+            } else if let Some(number) = name.strip_prefix(PLANNED)
+                && let Ok(number) = number.parse()
+                && is_folder(&entry)
+            {
+                planned.push((number, entry.path()));
             }
         }
-        Ok(Self { runs: runs.to_owned(), kept, unfinished })
+        Ok(Self { runs: runs.to_owned(), kept, planned, unfinished })
     }
 
-    /// Removes the runs, if nothing but an iteration's files is in them.
+    /// Removes the runs and what was planned for them, if nothing but an iteration's files is in them.
     ///
     /// # Errors
     /// A folder behind a symbolic link, files of somebody else's: then nothing is removed.
     pub(crate) fn remove_runs(&self) -> Result<(), IterationError> {
-        if self.kept.is_empty() {
+        if self.kept.is_empty() && self.planned.is_empty() {
             return Ok(());
         }
         if self.runs.is_symlink() {
@@ -62,7 +73,8 @@ impl RunsFolder {
                 "is a symbolic link, and runs are not removed through one: give another --out, or remove them";
             return Err(IterationError::State { path: self.runs.clone(), problem: problem.to_owned() });
         }
-        for folder in &self.kept {
+        let folders = || self.kept.iter().chain(self.planned.iter().map(|(_, folder)| folder));
+        for folder in folders() {
             for file in files(folder)? {
                 if !is_own(&file) {
                     let problem = "is no file of an iteration, so its folder is not removed: move it away";
@@ -70,7 +82,17 @@ impl RunsFolder {
                 }
             }
         }
-        self.kept.iter().try_for_each(|folder| remove(folder))
+        folders().try_for_each(|folder| remove(folder))
+    }
+
+    /// Removes what was planned for any run but `next`: other runs have been made, or those before are gone.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub(crate) fn remove_plans_but(&self, next: usize) -> Result<(), IterationError> {
+        let own = |folder: &PathBuf| files(folder).is_ok_and(|files| files.iter().all(|file| is_own(file)));
+        let stale = self.planned.iter().filter(|(run, folder)| *run != next && own(folder));
+        stale.into_iter().try_for_each(|(_, folder)| remove(folder))
     }
 
     /// Removes what a killed iteration left half written.
@@ -97,13 +119,18 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, IterationError> {
 fn is_own(file: &Path) -> bool {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let numbered = |rest: &str| rest.strip_suffix(".csv").is_some_and(|number| number.parse::<usize>().is_ok());
-    let known =
-        matches!(&*name, RUN_FILE | INTERRUPTED_FILE | "log.csv") || name.strip_prefix("log_").is_some_and(numbered);
+    let table = |first: &str, further: &str| name == first || name.strip_prefix(further).is_some_and(numbered);
+    let known = matches!(&*name, RUN_FILE | INTERRUPTED_FILE | PLAN_FILE)
+        || table("log.csv", "log_")
+        || table("motion.csv", "motion_");
     known && file.symlink_metadata().is_ok_and(|meta| meta.is_file())
 }
 
 /// Removes the files, then the folder, which is empty now.
-fn remove(folder: &Path) -> Result<(), IterationError> {
+///
+/// # Errors
+/// What the system says.
+pub(crate) fn remove(folder: &Path) -> Result<(), IterationError> {
     for file in files(folder)? {
         fs::remove_file(&file).map_err(IterationError::file(&file))?;
     }

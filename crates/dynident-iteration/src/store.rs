@@ -1,9 +1,12 @@
 //! An iteration on disk: every run whole or not at all.
 
 use crate::error::IterationError;
+use crate::forecast::MotionForecast;
+use crate::planner::PlannedMotion;
 use crate::record::RunRecord;
 use crate::robot::{RobotRun, read_log_table};
-use crate::runs_folder::{INTERRUPTED, INTERRUPTED_FILE, RUN_FILE, RunsFolder, UNFINISHED};
+use crate::run_motion::RunMotion;
+use crate::runs_folder::{INTERRUPTED, INTERRUPTED_FILE, PLAN_FILE, PLANNED, RUN_FILE, RunsFolder, UNFINISHED, remove};
 use dynident_simulation::Record;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
@@ -15,6 +18,19 @@ const INTERRUPTED_SCHEMA: &str = "dynident/interrupted/1";
 
 /// Schema of `runs/run_k/run.json`.
 pub const RUN_SCHEMA: &str = "dynident/run/1";
+
+/// Schema of `runs/planned_k/plan.json`.
+const PLAN_SCHEMA: &str = "dynident/planned-motion/1";
+
+/// What `runs/planned_k/plan.json` holds: the motion of a run that has not been made yet.
+#[derive(Serialize, Deserialize)]
+struct PlanFile {
+    schema: String,
+    fingerprint: String,
+    run: usize,
+    motion: Option<RunMotion>,
+    forecast: MotionForecast,
+}
 
 /// The folder of an iteration: `runs/run_k/run.json` and the records beside it. A run appears in one step (rename of a
 /// finished folder, everything on the disk before), so that whoever is killed at any moment finds all runs up to one of
@@ -55,7 +71,9 @@ impl IterationStore {
         }
         found.remove_unfinished()?;
         let store = Self { runs, fingerprint: fingerprint.to_owned() };
-        store.records()?;
+        let made = store.records()?.len();
+        // Of another run it is no plan any more: runs before it have been made, or removed.
+        RunsFolder::look(&store.runs)?.remove_plans_but(made + 1)?;
         Ok(store)
     }
 
@@ -86,11 +104,17 @@ impl IterationStore {
             if file.record.run != records.len() + 1 {
                 return Err(state(format!("holds run {}", file.record.run)));
             }
-            records.push(file.record);
+            let mut record = file.record;
+            if let Some(motion) = record.motion.take() {
+                let folder = self.run_folder(record.run);
+                record.motion = Some(motion.with_tables(&folder, record.max_tracking_error_rad.len())?);
+            }
+            records.push(record);
         }
     }
 
-    /// Keeps a run: `run.json`, and `log.csv` of each leg (`log_2.csv` and so on for further legs).
+    /// Keeps a run: `run.json`, `log.csv` of each leg (`log_2.csv` and so on for further legs), and `motion.csv` of
+    /// each that is not the task's. What was planned for it is removed.
     ///
     /// # Errors
     /// A folder that cannot be written; then the run is not there.
@@ -100,7 +124,46 @@ impl IterationStore {
         let folder = self.run_folder(record.run);
         let text = serde_json::to_string_pretty(&file)
             .map_err(|error| IterationError::State { path: folder.join(RUN_FILE), problem: error.to_string() })?;
-        self.keep_whole(&folder, (RUN_FILE, &text), runs)
+        self.keep_whole(&folder, (RUN_FILE, &text), runs, record.motion.as_ref())?;
+        let plan = self.plan_folder(record.run);
+        if plan.is_dir() { remove(&plan) } else { Ok(()) }
+    }
+
+    /// Keeps the motion that was planned for a run, so that a further call runs the same: `planned_k/`, with
+    /// `plan.json` and `motion.csv`.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn keep_planned(&self, run: usize, planned: &PlannedMotion) -> Result<(), IterationError> {
+        let PlannedMotion { motion, forecast } = planned.clone();
+        let folder = self.plan_folder(run);
+        let file =
+            PlanFile { schema: PLAN_SCHEMA.to_owned(), fingerprint: self.fingerprint.clone(), run, motion, forecast };
+        let text = serde_json::to_string_pretty(&file)
+            .map_err(|error| IterationError::State { path: folder.join(PLAN_FILE), problem: error.to_string() })?;
+        self.keep_whole(&folder, (PLAN_FILE, &text), &[], planned.motion.as_ref())
+    }
+
+    /// The motion that an earlier call has planned for a run of so many joints, if one has.
+    ///
+    /// # Errors
+    /// A folder that cannot be read or holds something else.
+    pub fn planned(&self, run: usize, joints: usize) -> Result<Option<PlannedMotion>, IterationError> {
+        let folder = self.plan_folder(run);
+        let path = folder.join(PLAN_FILE);
+        let text = match fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(IterationError::file(&path)(error)),
+        };
+        let wrong = |problem: String| IterationError::State { path: path.clone(), problem };
+        let file: PlanFile = serde_json::from_str(&text)
+            .map_err(|error| wrong(format!("is no planned motion of an iteration ({error}); remove its folder")))?;
+        if file.schema != PLAN_SCHEMA || file.fingerprint != self.fingerprint || file.run != run {
+            return Err(wrong("belongs to another iteration, version or run: remove its folder".to_owned()));
+        }
+        let motion = file.motion.map(|motion| motion.with_tables(&folder, joints)).transpose()?;
+        Ok(Some(PlannedMotion { motion, forecast: file.forecast }))
     }
 
     /// Keeps what was recorded of a run that a stop cut short, beside the runs: `interrupted_k/`, with the logs and
@@ -127,18 +190,27 @@ impl IterationStore {
         }
         let folder = self.runs.join(name(again));
         let text = serde_json::json!({ "schema": INTERRUPTED_SCHEMA, "run": run, "outcome": how }).to_string();
-        self.keep_whole(&folder, (INTERRUPTED_FILE, &text), runs)?;
+        self.keep_whole(&folder, (INTERRUPTED_FILE, &text), runs, None)?;
         Ok(Some(folder))
     }
 
-    /// A folder with a file and the logs, whole or not at all.
-    fn keep_whole(&self, folder: &Path, file: (&str, &str), runs: &[RobotRun]) -> Result<(), IterationError> {
+    /// A folder with a file, the logs and the motion, whole or not at all.
+    fn keep_whole(
+        &self,
+        folder: &Path,
+        file: (&str, &str),
+        runs: &[RobotRun],
+        motion: Option<&RunMotion>,
+    ) -> Result<(), IterationError> {
         let fresh = tempfile::Builder::new()
             .prefix(UNFINISHED)
             .tempdir_in(&self.runs)
             .map_err(IterationError::file(&self.runs))?;
         for (leg, run) in runs.iter().enumerate() {
             write_synced(&fresh.path().join(log_name(leg)), run.record.csv().as_bytes())?;
+        }
+        for (name, table) in motion.into_iter().flat_map(RunMotion::tables) {
+            write_synced(&fresh.path().join(name), table.as_bytes())?;
         }
         write_synced(&fresh.path().join(file.0), file.1.as_bytes())?;
         sync_folder(fresh.path())?;
@@ -174,6 +246,10 @@ impl IterationStore {
     /// The log of a run's leg, by its place from 0.
     pub fn log_path(&self, run: usize, leg: usize) -> PathBuf {
         self.run_folder(run).join(log_name(leg))
+    }
+
+    fn plan_folder(&self, run: usize) -> PathBuf {
+        self.runs.join(format!("{PLANNED}{run}"))
     }
 
     /// The folder of a run.

@@ -22,6 +22,14 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
             text += &wrapped(&format!("run {} does not count: {reason}", run.run), 4);
         }
     }
+    for run in &file.runs {
+        if let Some(forecast) = &run.forecast {
+            text += &wrapped(&format!("Run {}: {}.", run.run, forecast.sentence()), 4);
+        }
+    }
+    if let Some(forecast) = &file.declined {
+        text += &wrapped(&format!("A further run was not worth it: {}.", forecast.sentence()), 4);
+    }
     if let Some(improvement) = file.tracking_improvement {
         text += &wrapped(&format!("Tracking error down by a factor of {improvement:.1}."), 4);
     }

@@ -6,12 +6,14 @@ mod condition_number;
 mod d_optimal;
 mod e_optimal;
 mod prediction;
+mod worst_directions;
 
 pub use a_optimal::AOptimal;
 pub use condition_number::ConditionNumber;
 pub use d_optimal::DOptimal;
 pub use e_optimal::EOptimal;
 pub use prediction::Prediction;
+pub use worst_directions::WorstDirections;
 
 use nalgebra::DMatrix;
 

@@ -6,6 +6,7 @@ mod identification;
 mod iteration;
 mod policy;
 mod pooling;
+mod redesign;
 mod rehearsals;
 mod robots;
 mod simulated_arm;

@@ -43,6 +43,8 @@ fn run(number: usize, model: Option<f64>, tracking: f64, accepted: bool, estimat
     let model = model.map(|value| ModelParameters::All(vec![value; 20]));
     RunRecord {
         run: number,
+        motion: None,
+        forecast: None,
         controller: UsedController { name: "any".to_owned(), model, damping: 1.0, stiffness: 1.0 },
         done: true,
         outcome: "done".to_owned(),

@@ -15,6 +15,9 @@ const HALF_WIDTH_95: f64 = 1.96;
 /// Curves of one plot: more cannot be distinguished.
 const CURVES: usize = 6;
 
+/// What is told of forecasts.
+const FORECASTS: &str = "The worst bars: root mean square of the error bars along the ten directions that were known worst before the run, measured by the torque that they leave uncertain wherever the arm may be.";
+
 /// Which trajectory of which run.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) struct RunName {
@@ -93,6 +96,18 @@ pub(crate) fn iteration_report(file: &IterationsFile, traces: &[RunTrace], time:
         rejected.map(|(run, reason)| (Tone::Warning, format!("run {run}: {reason}"))).collect();
     if !points.is_empty() {
         page.add(Text { paragraphs: Vec::new(), points });
+    }
+    let forecasts = file.runs.iter().filter_map(|run| Some((run_name(run), run.forecast.as_ref()?)));
+    let mut points: Vec<(Tone, String)> =
+        forecasts.map(|(run, forecast)| (Tone::Plain, format!("run {run}: {}", forecast.sentence()))).collect();
+    points.extend(
+        file.declined
+            .iter()
+            .map(|forecast| (Tone::Plain, format!("a further run was not worth it: {}", forecast.sentence()))),
+    );
+    if !points.is_empty() {
+        page.add(Heading::new("What the motions were to bring"));
+        page.add(Text { paragraphs: vec![FORECASTS.to_owned()], points });
     }
     if let Some(shown) = last_shown(file) {
         page.add(Heading::new("What the last log shows"));
@@ -370,7 +385,7 @@ fn settling_errors(page: &mut Report, file: &IterationsFile) {
             .curve("root mean square", of(&root_mean_square)),
     );
     let over_bound = |run: &IterationRun| {
-        let bound = file.bound.as_ref()?;
+        let bound = run.bound.as_ref().or(file.bound.as_ref())?;
         let squares: Vec<f64> = run
             .parameters
             .iter()

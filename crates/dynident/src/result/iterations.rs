@@ -35,6 +35,10 @@ pub struct IterationsFile {
     /// What is not met after the last run; empty if the iteration has converged, and in files of before it was written.
     #[serde(default)]
     pub unmet: Vec<UnmetCondition>,
+    /// Where motions are designed with what is known and everything is met: what a further run was expected to bring,
+    /// too little for one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub declined: Option<RunForecast>,
     /// Names of the joints.
     pub joints: Vec<String>,
     /// Length of each run, s; of legs one after another, of all of them once.
@@ -47,8 +51,8 @@ pub struct IterationsFile {
     /// Root mean square over the parameters of the error of what the last good run says alone, in units of the
     /// Cramér-Rao bound; for simulated robots with torque noise.
     pub error_over_bound: Option<f64>,
-    /// The Cramér-Rao bound of every parameter for one run: white torque noise of the simulated sensors at every
-    /// recorded sample, exact positions.
+    /// The Cramér-Rao bound of every parameter for one run of the first motion: white torque noise of the simulated
+    /// sensors at every recorded sample, exact positions.
     pub bound: Option<Vec<f64>>,
     /// The base parameters by all good runs together, as in `result.json`; empty while runs are still being made.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -89,6 +93,51 @@ impl IterationsFile {
         });
         let unmet = if self.converged { String::new() } else { format!("; {} unmet", self.unmet.len()) };
         format!("{}: {}; {good} good of {} runs{tracking}{unmet}", self.name, self.reason, self.runs.len())
+    }
+}
+
+/// What the motion of a run was expected to bring by all that was known before it, and what came of it. Bars are those
+/// of the (at most) ten directions that were known worst, by the torque that they leave uncertain wherever the arm may
+/// be: their root mean square.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct RunForecast {
+    /// Whether the motion is another than that of the good run before.
+    pub redesigned: bool,
+    /// Why it is not, although another was looked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// By how much the bars were to become narrower, percent.
+    pub gain_percent: f64,
+    /// The same with the motion of the good run before, once more.
+    pub repeat_gain_percent: f64,
+    /// By how much they did; none for a run that was not made or does not count.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reached_gain_percent: Option<f64>,
+    /// The standard deviation expected of every base parameter after the run; none for what it will not determine.
+    pub std: Vec<Option<f64>>,
+    /// For each joint the largest torque along the motion by any model in the uncertainty (95 %), Nm (N).
+    pub largest_torque: Vec<f64>,
+}
+
+impl RunForecast {
+    /// In words: what the motion is, what it was to bring, and what came of it.
+    pub fn sentence(&self) -> String {
+        let motion = match (&self.reason, self.redesigned) {
+            (_, true) => "another motion".to_owned(),
+            (Some(reason), false) => format!("the motion before ({reason})"),
+            (None, false) => "the motion before".to_owned(),
+        };
+        let reached = self.reached_gain_percent.map_or_else(String::new, |reached| match reached {
+            narrower if narrower >= 0.0 => format!(", and made them {narrower:.0} % narrower"),
+            wider => format!(", and made them {:.0} % wider", -wider),
+        });
+        let again = if self.redesigned {
+            format!(" (the motion before once more: {:.0} %)", self.repeat_gain_percent)
+        } else {
+            String::new()
+        };
+        format!("{motion}, which was to narrow the worst bars by {:.0} %{again}{reached}", self.gain_percent)
     }
 }
 
@@ -141,6 +190,14 @@ pub struct IterationRun {
     /// What its log shows beside parameters, joint by joint; none where it did not get to its end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub evidence: Option<RunEvidence>,
+    /// What its motion was expected to bring, and what came of it; none where motions are not designed with what is
+    /// known, and where nothing was known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub forecast: Option<RunForecast>,
+    /// The Cramér-Rao bound of a run along its motion where that is not the first's; for simulated robots with torque
+    /// noise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bound: Option<Vec<f64>>,
     /// By how much each joint's torque comes after the motion, by this run alone; none where the run does not
     /// determine it or windows leave rows out, empty step by step.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -28,7 +28,7 @@ pub use inspection::{
     AuditEntry, BaseSummary, BodySummary, CorrectionEntry, INSPECTION_SCHEMA, Inspection, JointSummary, SlipEntry,
 };
 pub use iterations::{
-    INTERRUPTED, ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, UnmetCondition,
+    INTERRUPTED, ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, RunForecast, UnmetCondition,
 };
 pub use provenance::{InputFile, Provenance};
 pub use simulation::{BodyTruth, ParameterTruth, SIMULATION_SCHEMA, SimulationFile};

@@ -27,7 +27,9 @@ pub use drive::{CoulombChoice, CouplingSection, DriveSection, JointDrive};
 pub use estimator::{EstimatorMethod, EstimatorSection};
 pub use folders::Folders;
 pub use friction::{FrictionChoice, FrictionTerm};
-pub use iteration::{Automatic, DifferentiatorKey, IterationSection, LegOrder, LegSection, PriorChoice, RobotChoice};
+pub use iteration::{
+    Automatic, DifferentiatorKey, IterationSection, LegOrder, LegSection, MotionChoice, PriorChoice, RobotChoice,
+};
 pub use log::LogSection;
 pub use payload::{ArmSection, PayloadSection};
 pub use physical::PhysicalChoice;

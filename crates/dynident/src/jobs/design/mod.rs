@@ -2,6 +2,7 @@
 //! forecast.
 
 mod check;
+mod family;
 mod forecast;
 mod limit_check;
 mod outcome;
@@ -12,6 +13,7 @@ mod step_wise;
 mod table;
 
 pub use check::{check_log, check_trajectory};
+pub(super) use family::{MotionFamily, motion_family};
 pub use outcome::DesignOutcome;
 pub(super) use table::trajectory as trajectory_table;
 

@@ -9,18 +9,19 @@ mod trajectory;
 pub(super) use trajectory::Trajectory;
 
 use crate::error::{Error, StudyError};
+use crate::jobs::design::{MotionFamily, motion_family};
 use crate::jobs::options::RunOptions;
 use crate::jobs::provenance::motion_provenance;
 use crate::output::write_whole;
 use crate::output_set::OutputSet;
 use crate::pages::iteration::{RunName, RunTrace, TimeSpent, iteration_report};
 use crate::result::IterationsFile;
-use crate::study::{Folders, PriorChoice, RobotChoice, SimulationSection, Study, StudyRobot};
+use crate::study::{Folders, IterationSection, PriorChoice, RobotChoice, SimulationSection, Study, StudyRobot};
 use core::ops::ControlFlow;
 use dynident_excitation::DesignProgress;
 use dynident_iteration::{
-    Iteration, IterationError, IterationStatus, IterationStore, IterationTask, Leg, NextMotion, RunRecord, StopSignal,
-    Supervisor, iterate_supervised,
+    Iteration, IterationError, IterationStatus, IterationStore, IterationTask, Leg, MotionPlanner, NextMotion,
+    Redesign, RunRecord, StopSignal, Supervisor, iterate_supervised,
 };
 use dynident_iteration::{Robot, RobotRun};
 use fnv::FnvHasher;
@@ -28,6 +29,7 @@ use model::{EndedStage, MODEL_FILES, RobotFiles, robot_found};
 use report::{IterationReport, Stage, joined};
 use std::hash::Hasher;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// What hears of an iteration's progress.
@@ -115,6 +117,7 @@ pub fn iterate_study(
     };
     section.check_legs(&robot).map_err(in_section)?;
     section.check_gains(study, &robot).map_err(in_section)?;
+    section.redesign(study).map_err(in_section)?;
 
     // What an earlier call has left in the folder.
     let fingerprint = fingerprint(study, &robot, options);
@@ -164,7 +167,9 @@ pub fn iterate_study(
         duration_s: legs.iter().map(|leg| leg.reference().duration_s()).sum(),
         truth: truth.map(|truth| truth.base_values),
         bound: if one && simulated { bound::cramer_rao(&robot, &legs, &simulation.sensors) } else { None },
+        sensors: &simulation.sensors,
     };
+    let planner = planner((study, study_path), &section, &legs, options)?;
     let before_runs_s = begin.elapsed().as_secs_f64();
 
     // The stages, each with what those before it have found held.
@@ -180,6 +185,10 @@ pub fn iterate_study(
             torque_limits: torque_limits.clone(),
         };
         let iteration = Iteration::new(task, settings.clone()).map_err(|why| in_section(why.into()))?;
+        let iteration = match &planner {
+            Some(planner) => iteration.with_planner(Arc::clone(planner)),
+            None => iteration,
+        };
         let mut robots = section.robots((&simulation, &study.coupling), &robot, number, members).map_err(in_section)?;
         let mut robots: Vec<&mut dyn Robot> = robots.iter_mut().map(|robot| &mut **robot as &mut dyn Robot).collect();
         let leg = (!one).then_some(number + 1);
@@ -194,7 +203,8 @@ pub fn iterate_study(
             unwritten = match iteration.robot(&so_far) {
                 Ok(robot) => {
                     let (robot, records) = (&*robot, &so_far[..]);
-                    let stage = Stage { leg, robot, records, status: &status, shortfalls: &[], known_std: &known_std };
+                    let (status, shortfalls, declined) = (&status, &[][..], None);
+                    let stage = Stage { leg, robot, records, status, shortfalls, declined, known_std: &known_std };
                     let now = report.file(&stage);
                     let all: Vec<IterationsFile> = files.iter().cloned().chain([now]).collect();
                     joined(all).and_then(|file| write_set(out, &file, None, RobotFiles::none()).err())
@@ -213,9 +223,11 @@ pub fn iterate_study(
         made += outcome.runs.len() - runs_before;
         let (records, status, shortfalls) = (&outcome.runs[..], &outcome.status, &outcome.shortfalls[..]);
         let in_force = &iteration.robot(records).map_err(in_iteration)?;
-        files.push(report.file(&Stage { leg, robot: in_force, records, status, shortfalls, known_std: &known_std }));
+        let declined = outcome.declined.as_ref();
+        let stage = Stage { leg, robot: in_force, records, status, shortfalls, declined, known_std: &known_std };
+        files.push(report.file(&stage));
         for record in records {
-            for (place, own) in iteration.task().legs.iter().enumerate() {
+            for (place, own) in iteration.legs_of(record).map_err(in_iteration)?.iter().enumerate() {
                 let name = RunName { run: record.run, leg: leg.or((members.len() > 1).then_some(place + 1)), place };
                 traces.push(RunTrace::new(name, &stores[number], own.reference(), &robot.parametric.joint_names()));
             }
@@ -254,6 +266,20 @@ pub fn iterate_study(
     file.base_parameters.clone_from(&found.base_parameters);
     write_set(out, &file, Some(iteration_report(&file, &traces, &time)?), found)?;
     Ok(file)
+}
+
+/// Who says what the next motion is, where `[iteration]` asks for that.
+fn planner(
+    (study, study_path): (&Study, &Path),
+    section: &IterationSection,
+    legs: &[Leg],
+    options: &RunOptions<'_>,
+) -> Result<Option<Arc<dyn MotionPlanner>>, Error> {
+    let in_section = |why: StudyError| Error::section(study_path, "iteration")(why);
+    let Some(settings) = section.redesign(study).map_err(in_section)? else { return Ok(None) };
+    let MotionFamily { family, limits, search } = motion_family(study, study_path, options)?;
+    let planner = Redesign::new(family, limits, search, settings.clone(), &legs[0]);
+    Ok(Some(Arc::new(planner.map_err(|why| in_section(why.into()))?)))
 }
 
 /// The file, its page and the robot that was found; while runs are still being made there is no page and no robot, and

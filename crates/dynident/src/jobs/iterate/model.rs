@@ -11,6 +11,7 @@ use crate::study::{Study, StudyRobot};
 use dynident_identification::{IdentificationError, IdentificationTask, identify};
 use dynident_iteration::robot::{RunRequest, controller_json};
 use dynident_iteration::{Iteration, IterationError, IterationStore, ModelParameters, RunRecord, friction_chosen};
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -129,7 +130,8 @@ fn controller(stage: &EndedStage<'_>, parameters: &[f64]) -> Result<serde_json::
     let model = iteration.controller_model(records, &ModelParameters::All(parameters.to_vec()))?;
     let controller = &iteration.settings().controller;
     let joints = iteration.task().robot.joint_names();
-    let reference = iteration.task().legs[0].reference();
+    let legs = records.last().map_or(Ok(Cow::Borrowed(&iteration.task().legs[..])), |last| iteration.legs_of(last))?;
+    let reference = legs[0].reference();
     let request = RunRequest { model: Some(&model), ..RunRequest::new(records.len() + 1, reference, controller) };
     Ok(controller_json(&request, &joints))
 }

@@ -1,12 +1,15 @@
 //! From records to what `iterations.json` holds.
 
+use super::bound::cramer_rao;
 use crate::jobs::options::study_name;
 use crate::result::{
-    INTERRUPTED, ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, Provenance, UnmetCondition,
+    INTERRUPTED, ITERATIONS_SCHEMA, IterationParameter, IterationRun, IterationsFile, Provenance, RunForecast,
+    UnmetCondition,
 };
 use crate::study::{Study, StudyRobot};
 use dynident_dynamics::ParametricModel;
-use dynident_iteration::{IterationStatus, RunEstimate, RunRecord, Shortfall};
+use dynident_iteration::{IterationStatus, Leg, MotionForecast, RunEstimate, RunRecord, Shortfall};
+use dynident_simulation::SensorSettings;
 use std::path::Path;
 
 /// The newest run before `record` whose robot its controller had.
@@ -28,8 +31,10 @@ pub(super) struct IterationReport<'a> {
     pub(super) duration_s: f64,
     /// True base parameters, where they are known.
     pub(super) truth: Option<Vec<f64>>,
-    /// The Cramér-Rao bound of a run.
+    /// The Cramér-Rao bound of a run along the first motion.
     pub(super) bound: Option<Vec<f64>>,
+    /// What it follows from.
+    pub(super) sensors: &'a SensorSettings,
 }
 
 /// One iteration of legs that are identified together, so far.
@@ -42,13 +47,15 @@ pub(super) struct Stage<'a> {
     pub(super) status: &'a IterationStatus,
     /// What is not met after the last record.
     pub(super) shortfalls: &'a [Shortfall],
+    /// What a further run was expected to bring where that was too little.
+    pub(super) declined: Option<&'a MotionForecast>,
     /// For each base parameter the error bar by an earlier leg, if that determined it.
     pub(super) known_std: &'a [Option<f64>],
 }
 
 impl IterationReport<'_> {
     pub(super) fn file(&self, stage: &Stage<'_>) -> IterationsFile {
-        let Stage { leg, robot, records, status, shortfalls, known_std } = *stage;
+        let Stage { leg, robot, records, status, shortfalls, declined, known_std } = *stage;
         // The truth of a simulated robot is one of the stated terms.
         let stated = robot.terms() == self.robot.terms();
         let (bound, truth) = (self.bound.as_deref().filter(|_| stated), self.truth.as_ref().filter(|_| stated));
@@ -88,6 +95,11 @@ impl IterationReport<'_> {
                 pooled: parameters(record.pooled.as_ref()),
                 evidence: record.evidence.clone(),
                 differentiator: record.estimate.as_ref().and_then(|own| own.differentiator.clone()),
+                forecast: record.forecast.as_ref().map(|forecast| {
+                    let known = record.knowledge().filter(|_| record.accepted);
+                    run_forecast(forecast, known.and_then(|known| forecast.reached_gain_percent(known)))
+                }),
+                bound: bound.and_then(|_| self.own_bound(record)),
                 torque_lags: record.estimate.as_ref().map_or_else(Vec::new, |own| own.torque_lags.clone()),
             })
             .collect();
@@ -99,7 +111,9 @@ impl IterationReport<'_> {
         let last = good.last().and_then(|record| record.knowledge());
         // The bound is one run's.
         let own = good.last().and_then(|record| record.estimate.as_ref());
-        let error_over_bound = own.zip(truth).zip(bound).and_then(|((estimate, truth), bound)| {
+        let last_bound = good.last().and_then(|record| self.own_bound(record));
+        let last_bound = bound.and(last_bound.as_deref().or(bound));
+        let error_over_bound = own.zip(truth).zip(last_bound).and_then(|((estimate, truth), bound)| {
             let ratios: Vec<f64> = (0..bound.len())
                 .filter(|&k| bound[k] > 0.0 && !estimate.fixed.contains(&k))
                 .map(|k| ((estimate.values[k] - truth[k]) / bound[k]).powi(2))
@@ -120,7 +134,8 @@ impl IterationReport<'_> {
                 IterationStatus::Waiting { .. } => "waiting",
             }
             .to_owned(),
-            reason: in_words(status, shortfalls),
+            reason: in_words(status, shortfalls, declined),
+            declined: declined.map(|forecast| run_forecast(forecast, None)),
             unmet: shortfalls.iter().map(unmet).collect(),
             joints: self.robot.parametric.joint_names(),
             duration_s: self.duration_s,
@@ -135,8 +150,32 @@ impl IterationReport<'_> {
     }
 }
 
-/// The status, with what is not met where that ended it.
-fn in_words(status: &IterationStatus, shortfalls: &[Shortfall]) -> String {
+impl IterationReport<'_> {
+    /// The bound of a run along another motion than the first.
+    fn own_bound(&self, record: &RunRecord) -> Option<Vec<f64>> {
+        let references = &record.motion.as_ref()?.references;
+        let legs: Result<Vec<Leg>, _> = references.iter().map(|reference| Leg::whole(reference.clone())).collect();
+        cramer_rao(self.robot, &legs.ok()?, self.sensors)
+    }
+}
+
+fn run_forecast(forecast: &MotionForecast, reached_gain_percent: Option<f64>) -> RunForecast {
+    RunForecast {
+        redesigned: forecast.redesigned,
+        reason: forecast.reason.clone(),
+        gain_percent: forecast.gain_percent,
+        repeat_gain_percent: forecast.repeat_gain_percent,
+        reached_gain_percent,
+        std: forecast.std.clone(),
+        largest_torque: forecast.largest_torque.clone(),
+    }
+}
+
+/// The status, with what is not met where that ended it, and what was not worth a run.
+fn in_words(status: &IterationStatus, shortfalls: &[Shortfall], declined: Option<&MotionForecast>) -> String {
+    if let Some(forecast) = declined {
+        return format!("{status}: a further run would narrow the worst bars by {:.0} % only", forecast.gain_percent);
+    }
     match (status, shortfalls) {
         (IterationStatus::Settled | IterationStatus::RunsUsedUp, [first, rest @ ..]) => {
             let more = if rest.is_empty() { String::new() } else { format!(" (and {} more)", rest.len()) };

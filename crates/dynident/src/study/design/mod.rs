@@ -1,7 +1,7 @@
 //! `[design]`: which motion is looked for, by what measure, within which limits.
 
 mod joined;
-mod name_or_table;
+pub(in crate::study) mod name_or_table;
 mod optimiser;
 mod prior;
 mod start_posture;

@@ -2,13 +2,16 @@
 
 mod differentiator_key;
 mod legs;
+mod motion;
 mod safety;
 
 pub use differentiator_key::{Automatic, DifferentiatorKey};
 pub use legs::{LegOrder, LegSection};
+pub use motion::MotionChoice;
 
 use super::FrictionChoice;
 use super::Study;
+use super::design::name_or_table::name_or_table;
 use crate::error::StudyError;
 use dynident_identification::IdentificationSettings;
 use dynident_identification::estimators::Estimator;
@@ -70,6 +73,11 @@ pub enum PriorChoice {
 pub struct IterationSection {
     /// A trajectory to run (`t_s, q1.., dq1.., ddq1..`), in place of the one that `[design]` leads to.
     pub trajectory: Option<PathBuf>,
+    /// Whether every run repeats the first motion (`"repeat"`, the default), or each from the second on is designed
+    /// with what is known (`"redesign"`). A name, or a table with a `kind` and its settings.
+    #[serde(deserialize_with = "name_or_table")]
+    #[cfg_attr(feature = "schema", schemars(transform = super::design::name_or_table::schema))]
+    pub motion: MotionChoice,
     /// Several trajectories, some with joints that are held, in place of one; each takes the study's trajectory or
     /// design unless it has its own.
     pub leg: Vec<LegSection>,
@@ -146,6 +154,7 @@ impl Default for IterationSection {
         } = IterationSettings::default();
         Self {
             trajectory: None,
+            motion: MotionChoice::default(),
             leg: Vec::new(),
             order: LegOrder::default(),
             robot: RobotChoice::default(),

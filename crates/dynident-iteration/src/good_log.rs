@@ -1,0 +1,38 @@
+//! The logs of good runs, which further runs are identified together with.
+
+use crate::leg::Leg;
+use crate::record::RunRecord;
+use crate::run_logs::RunLog;
+use dynident_recording::DifferentiatorSettings;
+use dynident_simulation::Record;
+
+/// A good run's records, kept for those after it.
+#[derive(Clone, Debug)]
+pub(crate) struct GoodLog {
+    run: usize,
+    legs: Vec<Leg>,
+    records: Vec<Record>,
+    joint_sigma: Vec<f64>,
+    differentiator: Option<DifferentiatorSettings>,
+}
+
+impl GoodLog {
+    /// Of a run along these legs.
+    pub(crate) fn new(record: &RunRecord, legs: Vec<Leg>, records: Vec<Record>) -> Self {
+        let joint_sigma = record.estimate.as_ref().map(|estimate| estimate.joint_sigma.clone()).unwrap_or_default();
+        let way = record.estimate.as_ref().and_then(|estimate| estimate.differentiator.as_ref());
+        let differentiator = way.map(|way| way.taken.clone());
+        Self { run: record.run, legs, records, joint_sigma, differentiator }
+    }
+
+    pub(crate) fn as_run(&self) -> RunLog<'_> {
+        let differentiator = self.differentiator.as_ref();
+        RunLog {
+            run: self.run,
+            legs: &self.legs,
+            records: &self.records,
+            joint_sigma: &self.joint_sigma,
+            differentiator,
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! What a planner is asked: the good runs so far, each with its motion.
+
+use crate::error::IterationError;
+use crate::estimate::RunEstimate;
+use crate::leg::{IterationTask, Leg};
+use crate::planner::{BeforeRun, GoodRun, MotionPlanner, PlannedMotion};
+use crate::record::RunRecord;
+use crate::robot::StopSignal;
+use crate::run_motion::legs_along;
+
+/// What a planner says of the run after `records`, the last of which is good; `task` with the friction in force. Where
+/// runs are not pooled, or could not be fitted together, the last is all that is known.
+///
+/// # Errors
+/// The planner's; records of another task.
+pub(crate) fn planned_motion(
+    planner: &dyn MotionPlanner,
+    task: &IterationTask,
+    (records, pool): (&[RunRecord], bool),
+    stop: Option<&StopSignal>,
+) -> Result<PlannedMotion, IterationError> {
+    let run = records.len() + 1;
+    let good = records.iter().filter(|record| record.accepted && record.estimate.is_some());
+    let mut good: Vec<&RunRecord> = good.collect();
+    let last = good.last().copied();
+    if last.is_none_or(|last| last.pooled.is_none()) || !pool {
+        good = last.into_iter().collect();
+    }
+    let legs: Vec<Vec<Leg>> = good
+        .iter()
+        .map(|record| Ok(legs_along(task, record.motion.as_ref())?.into_owned()))
+        .collect::<Result<_, IterationError>>()?;
+    let estimates: Vec<&RunEstimate> = good.iter().filter_map(|record| record.estimate.as_ref()).collect();
+    let good: Vec<GoodRun<'_>> =
+        legs.iter().zip(&estimates).map(|(legs, estimate)| GoodRun { legs, estimate }).collect();
+    let Some(known) = last.and_then(RunRecord::knowledge) else {
+        let problem = "no good run to plan the next motion from".to_owned();
+        return Err(IterationError::Planning { run, problem });
+    };
+    let torque_limits = task.torque_limits.as_deref();
+    planner.plan(&BeforeRun { run, robot: &task.robot, known, good: &good, torque_limits, stop })
+}

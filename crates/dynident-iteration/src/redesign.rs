@@ -1,0 +1,363 @@
+//! The next motion designed with what is known: where the good runs so far say least.
+
+use crate::error::IterationError;
+use crate::estimate::RunEstimate;
+use crate::forecast::{KnownInformation, MotionForecast};
+use crate::leg::Leg;
+use crate::planner::{BeforeRun, MotionPlanner, PlannedMotion};
+use crate::robot::StopSignal;
+use crate::run_information::{RunNoise, run_information};
+use crate::run_motion::RunMotion;
+use crate::torque_of_all::{LargestTorque, largest_torque};
+use core::ops::ControlFlow;
+use dynident_dynamics::{BatchWorkspace, ParametricModel, inverse_dynamics_batch};
+use dynident_excitation::check::{CHECK_RATE_HZ, check_limits};
+use dynident_excitation::criteria::{Criterion, WorstDirections};
+use dynident_excitation::families::{FamilyError, StartingAt};
+use dynident_excitation::limits::{JointLimit, LimitError, LimitSet, Limits};
+use dynident_excitation::optimisers::OptimiserError;
+use dynident_excitation::{Design, DesignSettings, DesignTask, Family, Information, Motion, design};
+use dynident_model::sample::Random;
+use dynident_model::{InertialParameters, Model};
+use dynident_simulation::{Reference, SimulationError, require};
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Order of the norm of the variances along the worst directions: 1 would be their mean, infinity the largest alone. On
+/// the UR10 of the examples, after its D-optimal motion, two runs at order 1, 2 and 4 leave 65, 63 and 61 % of the ten
+/// worst bars that repeating it would leave (root mean squares).
+const ORDER: f64 = 4.0;
+
+/// States over all that the arm may do, and the seed that they are drawn by.
+const STATES: usize = 2_000;
+const STATES_SEED: u64 = 1;
+
+/// Searches, each with less torque than the one before, until every model keeps the limits.
+const SEARCHES: usize = 4;
+
+/// Of torque that a search was beyond its limit, what the next is given less.
+const LESS_TORQUE: f64 = 1.1;
+
+/// How exactly a motion returns to where it began, rad (m).
+const RETURNED: f64 = 1e-6;
+
+/// How motions are redesigned.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
+pub struct RedesignSettings {
+    /// A run is worth making for its motion alone if it is to narrow the bars of the worst directions by so many
+    /// percent; an iteration that has converged otherwise goes on while one is. Default 20: the second run of one
+    /// motion brings 29, the third 18.
+    pub least_gain_percent: f64,
+}
+
+impl Default for RedesignSettings {
+    fn default() -> Self {
+        Self { least_gain_percent: 20.0 }
+    }
+}
+
+impl RedesignSettings {
+    /// Checks the number.
+    ///
+    /// # Errors
+    /// A percentage that is none.
+    pub fn validate(&self) -> Result<(), SimulationError> {
+        let percent = self.least_gain_percent;
+        require(
+            percent > 0.0 && percent <= 100.0,
+            "motion.least_gain_percent",
+            percent,
+            "give more than 0, at most 100",
+        )
+    }
+}
+
+/// Why a motion is repeated although another was looked for.
+#[derive(Clone, Debug, PartialEq, Error)]
+enum NotRedesigned {
+    /// Limits that contradict each other, or what is left of them.
+    #[error("its limits leave no motion: {0}")]
+    Limits(#[from] LimitError),
+    /// No motion of the family can be judged.
+    #[error("the search found none: {0}")]
+    Search(#[from] OptimiserError),
+    /// No motion that keeps the limits was found.
+    #[error("the best motion breaks a limit of {what} by {percent:.2} %")]
+    Broken { what: String, percent: f64 },
+    /// A limit that some model in the uncertainty does not keep.
+    #[error(
+        "joint {joint} may need {torque:.3} Nm along every motion found, by a model in the uncertainty; its limit is {limit:.3} Nm"
+    )]
+    Torque { joint: String, torque: f64, limit: f64 },
+    /// The motion ends elsewhere than it begins.
+    #[error("the family does not return joint {joint} to where it began")]
+    Ends { joint: String },
+    /// Once more brings as much.
+    #[error("the best other motion is to bring {percent:.0} %, no more")]
+    NoBetter { percent: f64 },
+    /// Numbers that do not fit.
+    #[error(transparent)]
+    Numbers(#[from] SimulationError),
+}
+
+/// Designs the next motion with what is known. Its information adds to that of all good runs, `D = Σ Wᵀ Σ⁻¹ W` with the
+/// noise that their estimates found, and it is the best by [`WorstDirections`] of the sum. What a controller needs of a
+/// model is torque, wherever the arm may be asked to move: directions are measured by the torque error that they make
+/// over random states within the limits of position, velocity and acceleration, in units of the joints' noise. Its
+/// limits hold for every model in the uncertainty (the 95 % ellipsoid of the parameters): the torque that friction and
+/// uncertainty may add to the bodies' is taken off the limits of the search, and what the search finds is looked at
+/// with all of them, again with less where one is beyond. It begins where the first motion began.
+#[derive(Debug)]
+pub struct Redesign {
+    family: StartingAt,
+    rate_hz: f64,
+    returns: bool,
+    limits: Limits,
+    search: DesignSettings,
+    settings: RedesignSettings,
+}
+
+impl Redesign {
+    /// For motions of a family within limits in place of the one of `leg`, the task's only one.
+    ///
+    /// # Errors
+    /// Settings out of range, a family of other joints.
+    pub fn new(
+        family: Box<dyn Family>,
+        limits: Limits,
+        search: DesignSettings,
+        settings: RedesignSettings,
+        leg: &Leg,
+    ) -> Result<Self, SimulationError> {
+        settings.validate()?;
+        let (reference, motion) = (leg.reference(), leg.reference().motion());
+        let start = |joint: usize| motion.q[joint * motion.samples];
+        let end = |joint: usize| motion.q[(joint + 1) * motion.samples - 1];
+        let returns = (0..motion.joints).all(|joint| (end(joint) - start(joint)).abs() <= RETURNED);
+        let posture = (0..motion.joints).map(|joint| Some(start(joint))).collect();
+        let family = StartingAt::new(family, posture).map_err(|error: FamilyError| SimulationError::Family(error))?;
+        Ok(Self { family, rate_hz: reference.rate_hz(), returns, limits, search, settings })
+    }
+
+    /// The best motion, and the largest torques along it.
+    fn search(
+        &self,
+        before: &BeforeRun<'_>,
+        (information, noise): (&KnownInformation, &RunNoise),
+        repeated: &LargestTorque,
+    ) -> Result<(Reference, LargestTorque), NotRedesigned> {
+        let model = found_bodies(before.robot, before.known)?;
+        let names = before.robot.joint_names();
+        let torque_limits = self.torque_limits(before, &names);
+        // Friction and uncertainty are about what they were along the motion before.
+        let mut taken_off = repeated.beyond_bodies.clone();
+        let mut last = None;
+        for _ in 0..SEARCHES {
+            let limits = self.with_torque(&names, &torque_limits, &taken_off);
+            let set = LimitSet::new(&limits, &model)?;
+            let found = self.designed(before, (information, noise), &set)?;
+            let reference = Reference::of_family(&self.family, &found.parameters, self.rate_hz, None)?;
+            self.check(&limits, &model, &found, &reference, &names)?;
+            let torque = largest_torque(before.robot, before.known, &reference, &|motion| bodies(&model, motion));
+            let beyond = |joint: usize| torque.of_all[joint] - torque_limits[joint];
+            let worst = (0..names.len()).max_by(|&a, &b| beyond(a).total_cmp(&beyond(b)));
+            let Some(worst) = worst.filter(|&joint| beyond(joint) > 0.0) else { return Ok((reference, torque)) };
+            for (joint, taken_off) in taken_off.iter_mut().enumerate() {
+                *taken_off += LESS_TORQUE * beyond(joint).max(0.0);
+            }
+            let (joint, torque, limit) = (names[worst].clone(), torque.of_all[worst], torque_limits[worst]);
+            last = Some(NotRedesigned::Torque { joint, torque, limit });
+            if before.stop.is_some_and(StopSignal::is_requested) {
+                break;
+            }
+        }
+        Err(last.unwrap_or(NotRedesigned::Search(OptimiserError::Start)))
+    }
+
+    /// The limit of each joint's torque: that of the design, and what its drive gives.
+    fn torque_limits(&self, before: &BeforeRun<'_>, names: &[String]) -> Vec<f64> {
+        let of_design = |name: &String| {
+            let limit = self.limits.of(name);
+            limit.and_then(|limit| Some(limit.torque? * (1.0 - limit.torque_margin))).unwrap_or(f64::INFINITY)
+        };
+        let of_drive = |joint: usize| before.torque_limits.map_or(f64::INFINITY, |limits| limits[joint]);
+        names.iter().enumerate().map(|(joint, name)| of_design(name).min(of_drive(joint))).collect()
+    }
+
+    /// The limits with what is left of each joint's torque for its bodies.
+    fn with_torque(&self, names: &[String], torque_limits: &[f64], taken_off: &[f64]) -> Limits {
+        let mut limits = self.limits.clone();
+        for ((name, limit), taken_off) in names.iter().zip(torque_limits).zip(taken_off) {
+            if limit.is_finite() && limits.of(name).is_none() {
+                limits.joints.push(JointLimit { joint: name.clone(), ..JointLimit::default() });
+            }
+            let Some(own) = limits.joints.iter_mut().find(|own| own.joint == *name) else { continue };
+            own.torque = limit.is_finite().then_some(limit - taken_off);
+            own.torque_margin = 0.0;
+        }
+        limits
+    }
+
+    fn designed(
+        &self,
+        before: &BeforeRun<'_>,
+        (information, noise): (&KnownInformation, &RunNoise),
+        set: &LimitSet,
+    ) -> Result<Design, NotRedesigned> {
+        let criterion = WorstDirections::new(information.units.clone(), ORDER);
+        let criteria: [&dyn Criterion; 1] = [&criterion];
+        let task = DesignTask {
+            family: &self.family,
+            criteria: &criteria,
+            limits: set,
+            layout: before.robot.layout(),
+            torque_std_nm: &noise.joint_sigma,
+            prior: Some(&information.total),
+        };
+        // Every run looks from other random starts; rows count as those of the estimates do.
+        let seed = self.search.seed.wrapping_add(before.run as u64);
+        let settings = DesignSettings { seed, rate_hz: noise.rows_per_s, ..self.search.clone() };
+        let stopped = || before.stop.is_some_and(StopSignal::is_requested);
+        let watch = |_: &_| if stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        Ok(design(&task, &settings, watch)?)
+    }
+
+    /// Random states over all that the arm may do, joints independent of each other: a turn at most, or 1 m, within the
+    /// limits of position; velocities and accelerations within theirs, or as high as the motions so far went.
+    fn states(&self, before: &BeforeRun<'_>) -> Motion {
+        let joints = before.robot.model().joints();
+        let mut random = Random::new(STATES_SEED);
+        let mut states = Motion::default();
+        states.reset(joints.len(), STATES);
+        for (place, joint) in joints.iter().enumerate() {
+            let limit = self.limits.of(&joint.name);
+            let highest = |of: fn(&Motion) -> &[f64]| {
+                let own = before.good.iter().map(|run| run.legs[0].reference().motion());
+                let values = own.flat_map(|motion| &of(motion)[motion.of(place)]);
+                values.fold(0.0_f64, |most, value| most.max(value.abs()))
+            };
+            let free = if joint.turns() { core::f64::consts::PI } else { 0.5 };
+            let [lower, upper] = limit.and_then(|limit| limit.position).unwrap_or([-free, free]);
+            // A range that lies beyond half a turn is taken as it is.
+            let overlaps = lower < free && upper > -free;
+            let [lower, upper] = if overlaps { [lower.max(-free), upper.min(free)] } else { [lower, upper] };
+            let speed = limit.and_then(|limit| limit.speed).unwrap_or_else(|| highest(|motion| &motion.dq));
+            let rate = limit.and_then(|limit| limit.acceleration).unwrap_or_else(|| highest(|motion| &motion.ddq));
+            for place in states.of(place) {
+                states.q[place] = random.uniform(lower, upper);
+                states.dq[place] = random.uniform(-speed, speed);
+                states.ddq[place] = random.uniform(-rate, rate);
+            }
+        }
+        states
+    }
+
+    /// Every limit again, by the check that shares nothing with the search, and where the motion ends.
+    fn check(
+        &self,
+        limits: &Limits,
+        model: &Model,
+        found: &Design,
+        reference: &Reference,
+        names: &[String],
+    ) -> Result<(), NotRedesigned> {
+        let motion_at = |times: &[f64], out: &mut Motion| self.family.motion(&found.parameters, times, out);
+        let reports = check_limits(limits, model, self.family.duration_s(), CHECK_RATE_HZ, motion_at)?;
+        let worst = reports.iter().filter(|report| report.violated);
+        if let Some(worst) = worst.max_by(|a, b| a.worst_ratio.total_cmp(&b.worst_ratio)) {
+            let what = format!("{} ({})", worst.kind, worst.joint);
+            return Err(NotRedesigned::Broken { what, percent: 100.0 * (worst.worst_ratio - 1.0) });
+        }
+        let motion = reference.motion();
+        let away = |joint: &usize| {
+            let own = &motion.q[motion.of(*joint)];
+            (own[own.len() - 1] - own[0]).abs() > RETURNED
+        };
+        match (0..names.len()).find(away) {
+            Some(joint) if self.returns => Err(NotRedesigned::Ends { joint: names[joint].clone() }),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl MotionPlanner for Redesign {
+    fn plan(&self, before: &BeforeRun<'_>) -> Result<PlannedMotion, IterationError> {
+        let Some(last) = before.good.last() else {
+            let problem = "no good run to plan the next motion from".to_owned();
+            return Err(IterationError::Planning { run: before.run, problem });
+        };
+        let several =
+            before.good.iter().any(|run| run.legs.len() != 1 || run.legs.iter().any(|leg| leg.windows().is_some()));
+        if several {
+            let problem = "motions are redesigned where a run is one trajectory of which everything counts".to_owned();
+            return Err(IterationError::Planning { run: before.run, problem });
+        }
+        // What is known.
+        let count = before.robot.layout().columns().len();
+        let mut total = DMatrix::zeros(count, count);
+        for run in before.good {
+            let reference = run.legs[0].reference();
+            total += run_information(before.robot, reference, &noise_of(run.estimate, reference));
+        }
+        let repeated = last.legs[0].reference();
+        let noise = noise_of(last.estimate, repeated);
+        let mut needed = Information::new(before.robot.model(), before.robot.layout(), &noise.joint_sigma, None);
+        let needed = needed.of(&self.states(before), 1.0 / STATES as f64);
+        let information = KnownInformation::new(total, &needed);
+        let expected =
+            |reference: &Reference| information.after(&run_information(before.robot, reference, &noise), before.known);
+        // The motion before once more, and the best other.
+        let again = expected(repeated);
+        let repeat_gain_percent = again.gain_percent();
+        let model = found_bodies(before.robot, before.known)?;
+        let torque = largest_torque(before.robot, before.known, repeated, &|motion| bodies(&model, motion));
+        let found = self.search(before, (&information, &noise), &torque).and_then(|(reference, torque)| {
+            let other = expected(&reference);
+            let percent = other.gain_percent();
+            if percent > repeat_gain_percent {
+                Ok((reference, torque, other))
+            } else {
+                Err(NotRedesigned::NoBetter { percent })
+            }
+        });
+        let (motion, reason, torque, expected) = match found {
+            Ok((reference, torque, other)) => (Some(RunMotion::new(vec![reference])), None, torque, other),
+            Err(reason) => (None, Some(reason.to_string()), torque, again),
+        };
+        let gain_percent = expected.gain_percent();
+        let forecast = MotionForecast {
+            redesigned: motion.is_some(),
+            reason,
+            gain_percent,
+            repeat_gain_percent,
+            worth_a_run: gain_percent >= self.settings.least_gain_percent,
+            directions: expected.directions,
+            std: expected.std,
+            largest_torque: torque.of_all,
+        };
+        Ok(PlannedMotion { motion, forecast })
+    }
+}
+
+fn noise_of(estimate: &RunEstimate, reference: &Reference) -> RunNoise {
+    RunNoise::new(&estimate.joint_sigma, estimate.rows, reference.duration_s())
+}
+
+/// The robot with the bodies that runs have shown, or else the described one.
+fn found_bodies(robot: &ParametricModel, known: &RunEstimate) -> Result<Model, SimulationError> {
+    let Some(all) = &known.possible else { return Ok(robot.model().clone()) };
+    let of_body = |own: &[f64]| InertialParameters(core::array::from_fn(|k| own[k]));
+    let bodies: Vec<InertialParameters> = all[..10 * robot.dof()].chunks_exact(10).map(of_body).collect();
+    Ok(robot.model().with_inertials(&bodies)?)
+}
+
+/// The torque of rigid bodies along a motion, joint-major.
+fn bodies(model: &Model, motion: &Motion) -> Vec<f64> {
+    let mut workspace = BatchWorkspace::new(model);
+    let mut tau = vec![0.0; motion.joints * motion.samples];
+    inverse_dynamics_batch(model, &mut workspace, &motion.view(), &mut tau);
+    tau
+}

@@ -1,0 +1,48 @@
+//! What the motion of a run says about the parameters.
+
+use dynident_dynamics::ParametricModel;
+use dynident_excitation::{Information, Motion};
+use dynident_simulation::Reference;
+use nalgebra::DMatrix;
+
+/// Samples of a motion that are looked at, at most: its information is an integral over time.
+const MOST_SAMPLES: usize = 4_000;
+
+/// Noise of a joint that counts as none, Nm (N): simulated logs without noise leave less.
+const LEAST_NOISE: f64 = 1e-9;
+
+/// How a run was measured: what turns a motion into information.
+#[derive(Clone, Debug)]
+pub(crate) struct RunNoise {
+    /// Standard deviation of each joint's residual in the rows of the estimate, Nm (N).
+    pub(crate) joint_sigma: Vec<f64>,
+    /// Rows of each joint a second.
+    pub(crate) rows_per_s: f64,
+}
+
+impl RunNoise {
+    /// Of a run of this many seconds with so many rows of all joints.
+    pub(crate) fn new(joint_sigma: &[f64], rows: usize, duration_s: f64) -> Self {
+        let joints = joint_sigma.len().max(1) as f64;
+        let joint_sigma = joint_sigma.iter().map(|sigma| sigma.max(LEAST_NOISE)).collect();
+        Self { joint_sigma, rows_per_s: rows as f64 / joints / duration_s.max(f64::MIN_POSITIVE) }
+    }
+}
+
+/// `Σ_j W_jᵀ W_j / σ_j²` along a trajectory, in the base columns of the robot with its terms, as many rows counted as
+/// an estimate has of it. The low-pass that torque and columns share is taken as passing all of the motion.
+pub(crate) fn run_information(robot: &ParametricModel, reference: &Reference, noise: &RunNoise) -> DMatrix<f64> {
+    let whole = reference.motion();
+    let step = whole.samples.div_ceil(MOST_SAMPLES).max(1);
+    let mut part = Motion::default();
+    part.reset(whole.joints, whole.samples.div_ceil(step));
+    for joint in 0..whole.joints {
+        let (to, from) = (part.of(joint), whole.of(joint));
+        for (to_values, values) in [(&mut part.q, &whole.q), (&mut part.dq, &whole.dq), (&mut part.ddq, &whole.ddq)] {
+            let every = values[from.clone()].iter().step_by(step);
+            to_values[to.clone()].iter_mut().zip(every).for_each(|(to, value)| *to = *value);
+        }
+    }
+    let weight = noise.rows_per_s * reference.duration_s() / part.samples.max(1) as f64;
+    Information::new(robot.model(), robot.layout(), &noise.joint_sigma, None).of(&part, weight)
+}
