@@ -175,9 +175,9 @@ pub(crate) fn step_columns(search: &FrictionSearch, joint: usize) -> Vec<Candida
     candidate_columns(search, joint, None).into_iter().filter(is_step).collect()
 }
 
-/// The columns to choose from at `joint`; a term's columns stand together, in the order of its grid. `width` is what the
-/// step at rest is about as wide as, if that is known: a point of the grid, for what lies between two points looks like
-/// a further term.
+/// The columns to choose from at `joint`; a term's columns stand together, in the order of its grid. `width` is about
+/// that of the step at rest, if that is known: a point of the grid, for what lies between two points looks like a
+/// further term.
 pub(crate) fn candidate_columns(search: &FrictionSearch, joint: usize, width: Option<f64>) -> Vec<CandidateColumn> {
     let sign = CoulombShape::Sign { dead_band: search.dead_band };
     let mut widths = WIDTHS.to_vec();

@@ -2,10 +2,10 @@
 //! parameters.
 //!
 //! The torque depends on a constant c through the column of its term alone. Around the constants so far
-//! `τ = Y(c) θ + Σ_k ∂(Y θ)/∂c_k δ_k`, so that with one column more for each constant least squares finds the step δ and
-//! what it costs the parameters (Gauss and Newton; for problems that are linear but for some unknowns: Golub and
-//! Pereyra, SIAM J. Numer. Anal. 10 (1973) 413). The derivative is the difference of the term's columns on both sides of
-//! c, which stand in the factors of one pass over the logs. Steps end where they are small beside their own standard
+//! `τ = Y(c) θ + Σ_k ∂(Y θ)/∂c_k δ_k`, so that with one column more for each constant least squares finds the step δ
+//! and what it costs the parameters (Gauss and Newton; for problems that are linear but for some unknowns: Golub and
+//! Pereyra, SIAM J. Numer. Anal. 10 (1973) 413). The derivative is the difference of the term's columns on both sides
+//! of c, which stand in the factors of one pass over the logs. Steps end where they are small beside their own standard
 //! deviation. The last step's covariance is that of the constants, and parameters answer to them by
 //! `∂θ/∂c = Cov(θ, c) Cov(c, c)⁻¹`: their error bars have to hold it.
 

@@ -12,7 +12,8 @@ use dynident_model::terms::{Coulomb, Direction, DirectionalCoulomb, DirectionalV
 use nalgebra::{DMatrix, DVector};
 
 /// Squares in units of their variance that a further term needs, with 1, 2, 3 numbers of its own: chance goes beyond
-/// them once in twenty times (χ²). Stricter tests drop terms that predict torque better although none is the truth.
+/// them once in twenty times (χ²). Stricter tests drop terms that predict torque better although they are not the
+/// truth.
 const SEEN: [f64; 3] = [3.84, 5.99, 7.81];
 
 /// The terms of a joint without the further one that is seen least; `None` where all of them are seen. `estimate` begins
