@@ -16,9 +16,9 @@ use nalgebra::{DMatrix, DVector};
 /// truth.
 const SEEN: [f64; 3] = [3.84, 5.99, 7.81];
 
-/// The terms of a joint without the further one that is seen least; `None` where all of them are seen. `estimate` begins
-/// with the model's `columns`; `own_constants` tells at which of its columns the constants of a term stand, as steps
-/// from where they are.
+/// The terms of a joint without the further one that is seen least; `None` where all of them are seen. `estimate`
+/// begins with the model's `columns`; `own_constants` tells at which of its columns the constants of a term stand, as
+/// steps from where they are.
 pub(super) fn without_weakest(
     terms: &[TorqueTerm],
     columns: &[Column],
