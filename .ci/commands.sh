@@ -63,6 +63,7 @@ run 0 "$dynident" benchmark --runs 2 --seed 1 --robots planar2r --noise standard
 run 0 target/debug/dynident-benchmark --only rnea
 run 0 "$examples/designs" --seconds 0.2 --criteria d-optimal --families Fourier examples/design_ur10.toml
 run 0 "$examples/iterations" 1 examples/iterate_paper_2r_noise.toml
+run 0 "$examples/redesign" 1 examples/iterate_planar_3r.toml
 run 0 "$examples/cutoffs" 1 1
 run 0 "$examples/friction" 1 1
 run 0 "$examples/default_study" --quick --out "$out/default"
