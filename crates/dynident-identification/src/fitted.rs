@@ -7,7 +7,7 @@ use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
 use crate::execution::Execution;
 use crate::friction::ConstantsError;
-use crate::lag::{LagChoice, LagKind, LagRounds, gain_errors, lag_fit};
+use crate::lag::{LagCandidates, LagChoice, LagFit, LagKind, LagRounds, gain_errors, lag_fit};
 use crate::less_noise::{Estimated, with_less_noise};
 use crate::logs::Logs;
 use crate::payload::{KnownArm, free_gains};
@@ -105,19 +105,24 @@ fn without_lag<'a>(
     let is_free = settings.motion.torque_lag_s.is_none() && job.is_plain();
     let mut times = StageTimes::default();
     let mut rounds = LagRounds::default();
+    // Friction that is chosen with a lag in the rows makes up for some of it, so the stated terms tell it first.
+    if is_free && !settings.friction.is_empty() {
+        let stated = IdentificationSettings { friction: Vec::new(), ..settings.clone() };
+        let mut found = fitted_once(task, &stated, chosen, execution, job)?;
+        times.logs_s += found.times.logs_s;
+        times.estimation_s += found.times.estimation_s;
+        let mut first = LagRounds::of(LagCandidates::Common);
+        if first.again(free_lag(&found, chosen)?.as_ref(), &mut found.estimation.estimate) {
+            settings.motion.torque_lag_s = first.torque_lag_s();
+            rounds = rounds.after(first.choice());
+        }
+    }
     loop {
         let mut found = fitted_once(task, &settings, chosen, execution, job)?;
         times.logs_s += found.times.logs_s;
         times.estimation_s += found.times.estimation_s;
         let started = Instant::now();
-        let fit = if is_free && has_free_lag(&found) {
-            let Fitted { logs, training, estimation, settings, .. } = &found;
-            let gains = training.gains.as_ref().map_or(&[][..], |(_, gains)| gains);
-            let found = (&training.columns, &estimation.estimate.values[..], gains);
-            lag_fit((logs, &settings.estimation), &training.model, found, chosen)?
-        } else {
-            None
-        };
+        let fit = if is_free { free_lag(&found, chosen)? } else { None };
         found.noise_half_width_95.clone_from(&found.estimation.estimate.half_width_95);
         let again = rounds.again(fit.as_ref(), &mut found.estimation.estimate);
         times.estimation_s += started.elapsed().as_secs_f64();
@@ -133,6 +138,17 @@ fn without_lag<'a>(
         }
         settings.motion.torque_lag_s = rounds.torque_lag_s();
     }
+}
+
+/// The lags of the joints beside the parameters, where they can be taken off.
+fn free_lag(found: &Fitted<'_>, chosen: &[usize]) -> Result<Option<LagFit>, IdentificationError> {
+    if !has_free_lag(found) {
+        return Ok(None);
+    }
+    let Fitted { logs, training, estimation, settings, .. } = found;
+    let gains = training.gains.as_ref().map_or(&[][..], |(_, gains)| gains);
+    let found = (&training.columns, &estimation.estimate.values[..], gains);
+    Ok(lag_fit((logs, &settings.estimation), &training.model, found, chosen)?)
 }
 
 /// A lag that the study states.

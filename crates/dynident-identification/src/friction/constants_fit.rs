@@ -192,7 +192,9 @@ impl FrictionConstants {
         let covariance = match white.cholesky() {
             Some(white) => {
                 let answers = white.solve(&across.transpose()).transpose();
-                &answers * found.covariance.view((count, count), (own, own)) * answers.transpose()
+                let further = &answers * found.covariance.view((count, count), (own, own)) * answers.transpose();
+                // As symmetric as a covariance is.
+                (&further + further.transpose()) * 0.5
             }
             None => DMatrix::zeros(count, count),
         };
