@@ -1,9 +1,9 @@
 //! The constants of a term's curve (width of a step, Stribeck velocity, ..) as coordinates that can be moved.
 
-use super::candidates::STRIBECK_WIDTH;
 use dynident_model::terms::{Coulomb, CoulombShape, DirectionalCoulomb, LoadFriction, Sigmoid, Stribeck, TorqueTerm};
 
-/// The constants of a term as coordinates on one scale: a step of ln r is a change by the factor r. Two at most.
+/// The constants of a term as coordinates on one scale: a step of ln r is a change by the factor r. The width of a step at
+/// rest comes first.
 pub(super) fn coordinates(term: &TorqueTerm) -> Vec<f64> {
     let of_shape = |shape: &CoulombShape| match shape {
         CoulombShape::Smooth { width } => vec![width.ln()],
@@ -13,7 +13,9 @@ pub(super) fn coordinates(term: &TorqueTerm) -> Vec<f64> {
         TorqueTerm::Coulomb(term) => of_shape(&term.shape),
         TorqueTerm::DirectionalCoulomb(term) => of_shape(&term.shape),
         TorqueTerm::Load(term) => of_shape(&term.shape),
-        TorqueTerm::Stribeck(term) => vec![term.speed.ln(), term.exponent.ln()],
+        TorqueTerm::Stribeck(term) => {
+            of_shape(&term.shape).into_iter().chain([term.speed.ln(), term.exponent.ln()]).collect()
+        }
         // The step's distance from rest in units of its width.
         TorqueTerm::Sigmoid(term) => vec![term.steepness.ln(), 0.5 * term.offset_speed * term.steepness],
         TorqueTerm::Viscous(_)
@@ -42,7 +44,7 @@ fn within(logarithm: f64, [least, most]: [f64; 2]) -> f64 {
 /// The term with its constants at these coordinates.
 pub(super) fn at(term: &TorqueTerm, coordinates: &[f64]) -> TorqueTerm {
     let shape = |shape: CoulombShape| match (shape, coordinates) {
-        (CoulombShape::Smooth { .. }, [width]) => CoulombShape::Smooth { width: within(*width, VELOCITIES) },
+        (CoulombShape::Smooth { .. }, [width, ..]) => CoulombShape::Smooth { width: within(*width, VELOCITIES) },
         _ => shape,
     };
     match (term, coordinates) {
@@ -51,11 +53,12 @@ pub(super) fn at(term: &TorqueTerm, coordinates: &[f64]) -> TorqueTerm {
             TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { shape: shape(own.shape), ..*own })
         }
         (TorqueTerm::Load(own), _) => TorqueTerm::Load(LoadFriction { shape: shape(own.shape), ..*own }),
-        (TorqueTerm::Stribeck(own), [speed, exponent]) => {
-            let speed = within(*speed, VELOCITIES);
-            let shape = CoulombShape::Smooth { width: STRIBECK_WIDTH * speed };
-            TorqueTerm::Stribeck(Stribeck { speed, exponent: within(*exponent, EXPONENTS), shape, ..*own })
-        }
+        (TorqueTerm::Stribeck(own), [.., speed, exponent]) => TorqueTerm::Stribeck(Stribeck {
+            speed: within(*speed, VELOCITIES),
+            exponent: within(*exponent, EXPONENTS),
+            shape: shape(own.shape),
+            ..*own
+        }),
         (TorqueTerm::Sigmoid(own), [steepness, shift]) => {
             let steepness = 2.0 / within((2.0 / steepness.exp()).ln(), VELOCITIES);
             let offset_speed = 2.0 * shift.clamp(-MOST_SHIFT, MOST_SHIFT) / steepness;
@@ -68,25 +71,38 @@ pub(super) fn at(term: &TorqueTerm, coordinates: &[f64]) -> TorqueTerm {
 /// The name of the constant behind a coordinate, and its value where the coordinates are these.
 pub(super) fn value_at(term: &TorqueTerm, place: usize, coordinates: &[f64]) -> (&'static str, f64) {
     match (at(term, coordinates), place) {
-        (TorqueTerm::Stribeck(own), 0) => ("speed", own.speed),
-        (TorqueTerm::Stribeck(own), _) => ("exponent", own.exponent),
+        (TorqueTerm::Stribeck(own), place) if place + 1 == coordinates.len() => ("exponent", own.exponent),
+        (TorqueTerm::Stribeck(own), place) if place + 2 == coordinates.len() => ("speed", own.speed),
         (TorqueTerm::Sigmoid(own), 0) => ("steepness", own.steepness),
         (TorqueTerm::Sigmoid(own), _) => ("offset_speed", own.offset_speed),
         _ => ("width", coordinates[place].exp()),
     }
 }
 
-/// The terms of a joint with one width for all that step at rest.
-pub(super) fn with_one_width(mut terms: Vec<TorqueTerm>) -> Vec<TorqueTerm> {
-    let of_step = |term: &TorqueTerm| match term {
+/// The step of a term that changes its sign at rest.
+pub(super) fn step_of(term: &TorqueTerm) -> Option<CoulombShape> {
+    match term {
         TorqueTerm::Coulomb(own) => Some(own.shape),
         TorqueTerm::DirectionalCoulomb(own) => Some(own.shape),
+        TorqueTerm::Load(own) => Some(own.shape),
+        TorqueTerm::Stribeck(own) => Some(own.shape),
+        _ => None,
+    }
+}
+
+/// The terms of a joint with one step for all that change their sign at rest, that of Coulomb friction: they are one
+/// friction, `(F_c + F_s e^{-|q̇/v_s|^δ} + μ |τ|) s(q̇)`, and a joint has one `s`.
+pub(super) fn with_one_step(mut terms: Vec<TorqueTerm>) -> Vec<TorqueTerm> {
+    let of_coulomb = |term: &TorqueTerm| match term {
+        TorqueTerm::Coulomb(_) | TorqueTerm::DirectionalCoulomb(_) => step_of(term),
         _ => None,
     };
-    if let Some(step @ CoulombShape::Smooth { .. }) = terms.iter().find_map(of_step) {
+    if let Some(step) = terms.iter().find_map(of_coulomb) {
         for term in &mut terms {
-            if let TorqueTerm::Load(own) = term {
-                own.shape = step;
+            match (term, step) {
+                (TorqueTerm::Stribeck(own), _) => own.shape = step,
+                (TorqueTerm::Load(own), CoulombShape::Smooth { .. }) => own.shape = step,
+                _ => {}
             }
         }
     }

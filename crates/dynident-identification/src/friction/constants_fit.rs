@@ -10,12 +10,12 @@
 //! `∂θ/∂c = Cov(θ, c) Cov(c, c)⁻¹`: their error bars have to hold it.
 
 use super::choice::{FrictionConstant, JointFriction};
-use super::constants::{at, coordinates, value_at};
+use super::constants::{at, coordinates, step_of, value_at};
 use super::weak_terms::without_weakest;
 use crate::regressor_model::RegressorModel;
 use dynident_dynamics::Column;
 use dynident_estimation::{Estimate, EstimationError, LinearProblem};
-use dynident_model::terms::TorqueTerm;
+use dynident_model::terms::{CoulombShape, TorqueTerm};
 use nalgebra::{DMatrix, DVector};
 
 /// Half the distance of the columns that a derivative is the difference of, in units of a constant's logarithm.
@@ -38,7 +38,7 @@ pub(crate) struct FrictionConstants {
     axes: Vec<Axis>,
 }
 
-/// One constant and the terms of a joint that have it: both directions of a step have one width.
+/// One constant and the terms of a joint that have it: steps at rest have one width.
 #[derive(Clone, Debug)]
 struct Axis {
     /// Place among the joints.
@@ -315,23 +315,18 @@ impl FrictionConstants {
     }
 }
 
-/// The constants of one joint's terms. Both directions of a step have one width, and friction of the load has that of
-/// the joint's step, for both are one friction.
+/// The constants of one joint's terms. What changes its sign at rest has one width: it is one friction.
 fn axes_of(joint: usize, terms: &[TorqueTerm]) -> Vec<Axis> {
-    let is_step = |term: &TorqueTerm| {
-        matches!(term, TorqueTerm::Coulomb(_) | TorqueTerm::DirectionalCoulomb(_) | TorqueTerm::Load(_))
-    };
     let mut axes: Vec<Axis> = Vec::new();
-    let mut seen: Vec<(&TorqueTerm, usize)> = Vec::new();
     for (number, term) in terms.iter().enumerate() {
-        let own = coordinates(term);
-        let same = seen.iter().find(|(other, _)| is_step(other) && is_step(term) && coordinates(other) == own);
-        if let Some(&(_, first)) = same {
-            (0..own.len()).for_each(|place| axes[first + place].terms.push(number));
-        } else {
-            let first = axes.len();
-            axes.extend((0..own.len()).map(|place| Axis { joint, terms: vec![number], place }));
-            seen.push((term, first));
+        let is_smooth = matches!(step_of(term), Some(CoulombShape::Smooth { .. }));
+        for place in 0..coordinates(term).len() {
+            let has_same_step = |axis: &Axis| axis.place == 0 && step_of(&terms[axis.terms[0]]) == step_of(term);
+            let same = axes.iter_mut().find(|axis| place == 0 && is_smooth && has_same_step(axis));
+            match same {
+                Some(axis) => axis.terms.push(number),
+                None => axes.push(Axis { joint, terms: vec![number], place }),
+            }
         }
     }
     axes
