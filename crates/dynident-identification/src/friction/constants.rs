@@ -125,3 +125,53 @@ pub(super) fn mean_term(weighted: &[(&TorqueTerm, f64)]) -> TorqueTerm {
     }
     at(weighted[0].0, &mean)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SMOOTH: CoulombShape = CoulombShape::Smooth { width: 0.03 };
+    const SIGN: CoulombShape = CoulombShape::Sign { dead_band: 0.0 };
+
+    fn stribeck(shape: CoulombShape) -> TorqueTerm {
+        TorqueTerm::Stribeck(Stribeck { joint: 0, speed: 0.1, exponent: 1.5, shape })
+    }
+
+    #[test]
+    fn a_joint_has_one_step_at_rest() {
+        let narrow = CoulombShape::Smooth { width: 0.01 };
+        let load = |shape| TorqueTerm::Load(LoadFriction { joint: 0, shape });
+        for step in [SMOOTH, SIGN] {
+            let coulomb = TorqueTerm::Coulomb(Coulomb { joint: 0, shape: step });
+            let found = with_one_step(vec![coulomb.clone(), stribeck(narrow), load(narrow)]);
+            // Beside a sign, friction of the load keeps its smooth step.
+            let of_load = if step == SIGN { narrow } else { step };
+            assert_eq!(found, [coulomb, stribeck(step), load(of_load)]);
+        }
+        // Without Coulomb friction everything has its own.
+        assert_eq!(with_one_step(vec![stribeck(narrow)]), [stribeck(narrow)]);
+    }
+
+    #[test]
+    fn a_term_is_where_its_coordinates_say() {
+        let sigmoid = TorqueTerm::Sigmoid(Sigmoid { joint: 0, steepness: 40.0, offset_speed: 0.01 });
+        let coulomb = TorqueTerm::Coulomb(Coulomb { joint: 0, shape: SMOOTH });
+        for term in [stribeck(SMOOTH), stribeck(SIGN), sigmoid, coulomb] {
+            let own = coordinates(&term);
+            let back = coordinates(&at(&term, &own));
+            // Logarithms and back: a few roundings.
+            assert!(own.iter().zip(&back).all(|(a, b)| (a - b).abs() < 1e-12) && own.len() == back.len(), "{term:?}");
+        }
+        // A change of one coordinate is a change of the constant that it names, and of no other.
+        let names = ["width", "speed", "exponent"];
+        let own = coordinates(&stribeck(SMOOTH));
+        for (place, name) in names.into_iter().enumerate() {
+            let mut moved = own.clone();
+            moved[place] += 0.5;
+            let values: Vec<_> = (0..3).map(|place| value_at(&stribeck(SMOOTH), place, &moved)).collect();
+            assert!(values.iter().map(|(name, _)| *name).eq(names), "{values:?}");
+            let ratio = values[place].1 / value_at(&stribeck(SMOOTH), place, &own).1;
+            assert!((ratio - 0.5_f64.exp()).abs() < 1e-12, "{name}: {ratio}");
+        }
+    }
+}
