@@ -11,7 +11,7 @@ const WIDTHS: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
 /// Stribeck velocities, rad/s or m/s.
 const STRIBECK_SPEEDS: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.4];
 const STRIBECK_EXPONENTS: [f64; 2] = [1.0, 2.0];
-/// Width of the step under the Stribeck term as a share of its velocity where the joint's own step is not known yet: beyond
+/// Width of the step under the Stribeck term as a share of its velocity, at most, while it is chosen: beyond
 /// half its velocity the step is done.
 const STRIBECK_WIDTH: f64 = 0.25;
 const SIGMOID_WIDTHS: [f64; 3] = [0.02, 0.05, 0.1];
@@ -223,7 +223,8 @@ pub(crate) fn candidate_columns(search: &FrictionSearch, joint: usize, width: Op
     }
     for (step, &speed) in STRIBECK_SPEEDS.iter().enumerate() {
         for exponent in STRIBECK_EXPONENTS {
-            let shape = CoulombShape::Smooth { width: width.unwrap_or(STRIBECK_WIDTH * speed) };
+            let done = STRIBECK_WIDTH * speed;
+            let shape = CoulombShape::Smooth { width: width.map_or(done, |width| width.min(done)) };
             add(vec![TorqueTerm::Stribeck(Stribeck { joint, speed, exponent, shape })], Some(step));
         }
     }
