@@ -2,8 +2,8 @@
 
 use dynident_model::terms::{Coulomb, CoulombShape, DirectionalCoulomb, LoadFriction, Sigmoid, Stribeck, TorqueTerm};
 
-/// The constants of a term as coordinates on one scale: a step of ln r is a change by the factor r. The width of a step at
-/// rest comes first.
+/// The constants of a term as coordinates on one scale: a step of ln r is a change by the factor r. The width of a step
+/// at rest comes first.
 pub(super) fn coordinates(term: &TorqueTerm) -> Vec<f64> {
     let of_shape = |shape: &CoulombShape| match shape {
         CoulombShape::Smooth { width } => vec![width.ln()],
