@@ -13,7 +13,7 @@ const STRIBECK_SPEEDS: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.4];
 const STRIBECK_EXPONENTS: [f64; 2] = [1.0, 2.0];
 /// Width of the step under the Stribeck term as a share of its velocity, at most, while it is chosen: beyond
 /// half its velocity the step is done.
-const STRIBECK_WIDTH: f64 = 0.25;
+pub(super) const STRIBECK_WIDTH: f64 = 0.25;
 const SIGMOID_WIDTHS: [f64; 3] = [0.02, 0.05, 0.1];
 /// Yield displacements of the Maxwell-slip elements, rad or m.
 const YIELDS: [f64; 6] = [3.0e-4, 1.0e-3, 3.0e-3, 1.0e-2, 3.0e-2, 1.0e-1];
@@ -223,8 +223,7 @@ pub(crate) fn candidate_columns(search: &FrictionSearch, joint: usize, width: Op
     }
     for (step, &speed) in STRIBECK_SPEEDS.iter().enumerate() {
         for exponent in STRIBECK_EXPONENTS {
-            let done = STRIBECK_WIDTH * speed;
-            let shape = CoulombShape::Smooth { width: width.map_or(done, |width| width.min(done)) };
+            let shape = CoulombShape::Smooth { width: STRIBECK_WIDTH * speed };
             add(vec![TorqueTerm::Stribeck(Stribeck { joint, speed, exponent, shape })], Some(step));
         }
     }

@@ -1,5 +1,6 @@
 //! The constants of a term's curve (width of a step, Stribeck velocity, ..) as coordinates that can be moved.
 
+use super::candidates::STRIBECK_WIDTH;
 use dynident_model::terms::{Coulomb, CoulombShape, DirectionalCoulomb, LoadFriction, Sigmoid, Stribeck, TorqueTerm};
 
 /// The constants of a term as coordinates on one scale: a step of ln r is a change by the factor r. The width of a step
@@ -13,9 +14,7 @@ pub(super) fn coordinates(term: &TorqueTerm) -> Vec<f64> {
         TorqueTerm::Coulomb(term) => of_shape(&term.shape),
         TorqueTerm::DirectionalCoulomb(term) => of_shape(&term.shape),
         TorqueTerm::Load(term) => of_shape(&term.shape),
-        TorqueTerm::Stribeck(term) => {
-            of_shape(&term.shape).into_iter().chain([term.speed.ln(), term.exponent.ln()]).collect()
-        }
+        TorqueTerm::Stribeck(term) => vec![term.speed.ln(), term.exponent.ln()],
         // The step's distance from rest in units of its width.
         TorqueTerm::Sigmoid(term) => vec![term.steepness.ln(), 0.5 * term.offset_speed * term.steepness],
         TorqueTerm::Viscous(_)
@@ -53,12 +52,14 @@ pub(super) fn at(term: &TorqueTerm, coordinates: &[f64]) -> TorqueTerm {
             TorqueTerm::DirectionalCoulomb(DirectionalCoulomb { shape: shape(own.shape), ..*own })
         }
         (TorqueTerm::Load(own), _) => TorqueTerm::Load(LoadFriction { shape: shape(own.shape), ..*own }),
-        (TorqueTerm::Stribeck(own), [.., speed, exponent]) => TorqueTerm::Stribeck(Stribeck {
-            speed: within(*speed, VELOCITIES),
-            exponent: within(*exponent, EXPONENTS),
-            shape: shape(own.shape),
-            ..*own
-        }),
+        (TorqueTerm::Stribeck(own), [speed, exponent]) => {
+            let speed = within(*speed, VELOCITIES);
+            let shape = match own.shape {
+                CoulombShape::Smooth { .. } => CoulombShape::Smooth { width: STRIBECK_WIDTH * speed },
+                dry @ CoulombShape::Sign { .. } => dry,
+            };
+            TorqueTerm::Stribeck(Stribeck { speed, exponent: within(*exponent, EXPONENTS), shape, ..*own })
+        }
         (TorqueTerm::Sigmoid(own), [steepness, shift]) => {
             let steepness = 2.0 / within((2.0 / steepness.exp()).ln(), VELOCITIES);
             let offset_speed = 2.0 * shift.clamp(-MOST_SHIFT, MOST_SHIFT) / steepness;
@@ -71,8 +72,8 @@ pub(super) fn at(term: &TorqueTerm, coordinates: &[f64]) -> TorqueTerm {
 /// The name of the constant behind a coordinate, and its value where the coordinates are these.
 pub(super) fn value_at(term: &TorqueTerm, place: usize, coordinates: &[f64]) -> (&'static str, f64) {
     match (at(term, coordinates), place) {
-        (TorqueTerm::Stribeck(own), place) if place + 1 == coordinates.len() => ("exponent", own.exponent),
-        (TorqueTerm::Stribeck(own), place) if place + 2 == coordinates.len() => ("speed", own.speed),
+        (TorqueTerm::Stribeck(own), 0) => ("speed", own.speed),
+        (TorqueTerm::Stribeck(own), _) => ("exponent", own.exponent),
         (TorqueTerm::Sigmoid(own), 0) => ("steepness", own.steepness),
         (TorqueTerm::Sigmoid(own), _) => ("offset_speed", own.offset_speed),
         _ => ("width", coordinates[place].exp()),
@@ -100,7 +101,7 @@ pub(super) fn with_one_step(mut terms: Vec<TorqueTerm>) -> Vec<TorqueTerm> {
     if let Some(step) = terms.iter().find_map(of_coulomb) {
         for term in &mut terms {
             match (term, step) {
-                (TorqueTerm::Stribeck(own), _) => own.shape = step,
+                (TorqueTerm::Stribeck(own), CoulombShape::Sign { .. }) => own.shape = step,
                 (TorqueTerm::Load(own), CoulombShape::Smooth { .. }) => own.shape = step,
                 _ => {}
             }
