@@ -15,7 +15,8 @@ use crate::regressor_model::RegressorModel;
 use crate::settings::IdentificationSettings;
 use crate::task::IdentificationTask;
 use crate::training::{Training, training_rows};
-use dynident_estimation::Estimate;
+use dynident_estimation::{Estimate, LinearProblem};
+use dynident_recording::MotionSettings;
 use dynident_recording::log::OneOrMany;
 use std::time::Instant;
 
@@ -28,6 +29,17 @@ pub struct StageTimes {
     pub estimation_s: f64,
     /// Delays, traces and held-out recordings.
     pub examination_s: f64,
+}
+
+impl StageTimes {
+    /// The sum of both.
+    fn and(&self, other: &Self) -> Self {
+        Self {
+            logs_s: self.logs_s + other.logs_s,
+            estimation_s: self.estimation_s + other.estimation_s,
+            examination_s: self.examination_s + other.examination_s,
+        }
+    }
 }
 
 /// What is looked for.
@@ -95,28 +107,61 @@ pub(crate) fn fitted<'a>(
 }
 
 /// Rows and estimate; where the rows show a lag of the torque that moves parameters, again without it.
+///
+/// Friction that is chosen with a lag in the rows can make up for it, so that no lag is seen any more; and friction that
+/// no stated term has looks like a lag. So where chosen friction leaves no common lag but the stated terms alone show
+/// one, both are fitted, and the one counts that says most of the rows with the fewest parameters ([`schwarz`]).
 fn without_lag<'a>(
     task: &'a IdentificationTask,
     chosen: &[usize],
     execution: Execution<'a>,
     job: &mut Job<'_, '_>,
 ) -> Result<Fitted<'a>, IdentificationError> {
-    let mut settings = task.settings.clone();
+    let settings = &task.settings;
     let is_free = settings.motion.torque_lag_s.is_none() && job.is_plain();
-    let mut times = StageTimes::default();
-    let mut rounds = LagRounds::default();
-    // Friction that is chosen with a lag in the rows makes up for some of it, so the stated terms tell it first.
-    if is_free && !settings.friction.is_empty() {
-        let stated = IdentificationSettings { friction: Vec::new(), ..settings.clone() };
-        let mut found = fitted_once(task, &stated, chosen, execution, job)?;
-        times.logs_s += found.times.logs_s;
-        times.estimation_s += found.times.estimation_s;
-        let mut first = LagRounds::of(LagCandidates::Common);
-        if first.again(free_lag(&found, chosen)?.as_ref(), &mut found.estimation.estimate) {
-            settings.motion.torque_lag_s = first.torque_lag_s();
-            rounds = rounds.after(first.choice());
+    let mut found = lag_rounds((task, settings.clone(), LagRounds::default()), chosen, execution, job)?;
+    if !is_free || settings.friction.is_empty() || found.lag.kind == LagKind::Common {
+        return Ok(found);
+    }
+    let stated = IdentificationSettings { friction: Vec::new(), ..settings.clone() };
+    let mut of_stated = fitted_once(task, &stated, chosen, execution, job)?;
+    let mut first = LagRounds::of(LagCandidates::Common);
+    let mut times = found.times.and(&of_stated.times);
+    if first.again(free_lag(&of_stated, chosen)?.as_ref(), &mut of_stated.estimation.estimate) {
+        let motion = MotionSettings { torque_lag_s: first.torque_lag_s(), ..settings.motion.clone() };
+        let settings = IdentificationSettings { motion, ..settings.clone() };
+        let rounds = LagRounds::default().after(first.choice());
+        let other = lag_rounds((task, settings, rounds), chosen, execution, job)?;
+        times = times.and(&other.times);
+        if schwarz(&other.training.problem, &other.estimation.estimate)
+            < schwarz(&found.training.problem, &found.estimation.estimate)
+        {
+            found = other;
         }
     }
+    found.times = times;
+    Ok(found)
+}
+
+/// Schwarz's criterion `Σ_j n_j ln σ_j² + k ln n` of a fit with k free parameters, with the noise of every joint as
+/// found. Source: Annals of Statistics 6 (1978) 461.
+fn schwarz(problem: &LinearProblem, fit: &Estimate) -> f64 {
+    let rows = problem.joint_rows();
+    let of_joint = |(rows, sigma): (&usize, &f64)| *rows as f64 * 2.0 * sigma.max(f64::MIN_POSITIVE).ln();
+    let free = fit.values.len() - fit.rank.fixed.len();
+    rows.iter().zip(&fit.joint_sigma).map(of_joint).sum::<f64>()
+        + free as f64 * (rows.iter().sum::<usize>().max(1) as f64).ln()
+}
+
+/// Fits from these rounds on, until the rows show no lag that moves parameters.
+fn lag_rounds<'a>(
+    (task, mut settings, mut rounds): (&'a IdentificationTask, IdentificationSettings, LagRounds),
+    chosen: &[usize],
+    execution: Execution<'a>,
+    job: &mut Job<'_, '_>,
+) -> Result<Fitted<'a>, IdentificationError> {
+    let is_free = task.settings.motion.torque_lag_s.is_none() && job.is_plain();
+    let mut times = StageTimes::default();
     loop {
         let mut found = fitted_once(task, &settings, chosen, execution, job)?;
         times.logs_s += found.times.logs_s;
