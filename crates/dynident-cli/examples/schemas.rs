@@ -7,8 +7,8 @@
 use dynident::iteration::{RUN_SCHEMA, RunFile};
 use dynident::result::{
     CHECK_SCHEMA, CheckFile, DESIGN_SCHEMA, DesignFile, EVALUATION_SCHEMA, EXPORT_SCHEMA, EvaluationFile, ExportFile,
-    INSPECTION_SCHEMA, ITERATIONS_SCHEMA, Inspection, IterationsFile, LOG_SCHEMA, LogContents, RESULT_SCHEMA, ResultFile, SIMULATION_SCHEMA,
-    SimulationFile, VALIDATION_SCHEMA, ValidationFile,
+    INSPECTION_SCHEMA, ITERATIONS_SCHEMA, Inspection, IterationsFile, LOG_SCHEMA, LogContents, RESULT_SCHEMA,
+    ResultFile, SIMULATION_SCHEMA, SimulationFile, VALIDATION_SCHEMA, ValidationFile,
 };
 use dynident_benchmark::accuracy::{BENCHMARK_SCHEMA, BenchmarkFile};
 use dynident_paper::{PAPER_SCHEMA, PaperFile};

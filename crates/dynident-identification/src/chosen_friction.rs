@@ -3,8 +3,8 @@
 use crate::error::IdentificationError;
 use crate::estimators::{EstimationSettings, Estimator};
 use crate::friction::{
-    FrictionSearch, JointFriction, Neighbourhood, candidate_columns, choose_friction as choose_terms, chosen_model,
-    refined,
+    CandidateColumn, ConstantsError, FrictionConstants, FrictionSearch, JointFriction, candidate_columns,
+    choose_friction as choose_terms, chosen_model, step_columns,
 };
 use crate::logs::Logs;
 use crate::payload::{Payload, free_gains, with_free_gains};
@@ -13,11 +13,14 @@ use crate::settings::IdentificationSettings;
 use crate::training::{LogFactors, Training, TrainingPasses, plain_estimate};
 use dynident_dynamics::{Column, ParametricModel};
 use dynident_estimation::{CovarianceMethod, Estimate, LinearProblem};
-use dynident_model::terms::TorqueTerm;
+use dynident_model::terms::{Coulomb, CoulombShape, TorqueTerm};
 
-/// Factors by which constants are moved around what was found before, one for each pass: half a step of the grid, then
-/// closer.
-const REFINEMENTS: [f64; 3] = [1.4, 1.15, 1.05];
+/// Passes over the recordings for the constants of chosen friction, at most.
+const MOST_PASSES: usize = 8;
+/// Passes after which terms that are not seen are dropped although constants still move.
+const DROP_PASSES: usize = 3;
+/// Passes at least where friction depends on the load, which is the fit's before.
+const LOAD_PASSES: usize = 3;
 
 /// A model with the friction that its recordings chose.
 #[derive(Clone, Debug)]
@@ -28,11 +31,27 @@ pub struct ChosenFriction {
     pub joints: Vec<JointFriction>,
     /// The rows and the fit with the terms as stated, of which the choice began; none where none was to be.
     pub stated: Option<(Training, Estimate)>,
+    /// What the error of the chosen constants adds to the bars of all parameters; none where none was chosen.
+    pub(crate) constants_error: Option<ConstantsError>,
+}
+
+impl ChosenFriction {
+    /// A model whose friction is all stated.
+    pub(crate) fn as_stated(model: RegressorModel) -> Self {
+        Self { model, joints: Vec::new(), stated: None, constants_error: None }
+    }
+}
+
+/// The constants of a pass, the step from there, and what the fit left before it.
+struct LastPass {
+    constants: FrictionConstants,
+    steps: Vec<f64>,
+    misfit: f64,
 }
 
 /// Chooses the friction of the joints that `settings.friction` names, by cross-validation inside the recordings
 /// `training`: first among terms whose columns stand in one set of factors, for a grid of constants; then in further
-/// passes the constants between the grid's points. Filters are those of `logs`.
+/// passes the constants between the grid's points, together with all parameters. Filters are those of `logs`.
 ///
 /// # Errors
 /// Recordings that cannot be read, rows that do not carry an estimate.
@@ -42,71 +61,117 @@ pub fn choose_friction(
     (training, payloads): (&[usize], &[Payload]),
 ) -> Result<ChosenFriction, IdentificationError> {
     let stated = RegressorModel::from(robot.clone());
-    // The load would be the bare arm's.
-    let loaded = logs.recordings.iter().any(|recording| recording.payload.is_some());
-    let of_joint = |search: &FrictionSearch, joint: usize| {
-        let mut columns = candidate_columns(search, joint);
-        columns.retain(|column| !(loaded && column.term.needs_load()));
-        columns
-    };
-    let candidates: Vec<_> = settings
+    let searches: Vec<(usize, &FrictionSearch)> = settings
         .friction
         .iter()
         .filter_map(|search| Some((stated.model().joint_index(&search.joint)?, search)))
-        .map(|(joint, search)| (joint, of_joint(search, joint)))
         .collect();
-    if candidates.is_empty() {
-        return Ok(ChosenFriction { model: stated, joints: Vec::new(), stated: None });
+    if searches.is_empty() {
+        return Ok(ChosenFriction::as_stated(stated));
     }
     let passes = TrainingPasses { logs, settings, training, payloads, known_arm: None };
     let equal_weights = matches!(settings.estimation.estimator, Estimator::Ordinary);
-    // No error bars are wanted on the way.
-    let estimation = EstimationSettings { covariance: CovarianceMethod::White, ..settings.estimation.clone() };
 
     // The stated terms first: the load, the noise of every joint, what is excited; with gains that nobody knows the
     // torque in newton metres.
     let first = passes.with_gains(passes.rows_once(stated)?)?;
     let plain = match &first.gains {
         Some((with_gains, _)) => with_gains.clone(),
-        None => plain_estimate(&estimation, &first.problem)?,
+        None => plain_estimate(&without_bars(settings), &first.problem)?,
     };
     let gains = first.gains.as_ref().map_or_else(Vec::new, |(_, gains)| free_gains(gains));
 
     // All candidates as columns of one set of factors, from which each candidate model is a selection.
-    let further = candidates.iter().flat_map(|(_, columns)| columns).map(|column| column.term.clone());
-    let wide = with_terms(&first.model, further).with_load_of(&first.model, &plain.values);
-    let wide_problem = passes.free_problem(&wide, &passes.read(&wide)?, (&first.model, &plain, &gains))?;
-    let mut joints = choose_terms(&first.model, &wide, &wide_problem, &candidates, (&plain, equal_weights))?;
-    let in_newton_metres =
-        |model: RegressorModel| RegressorModel { torque_gains: first.model.torque_gains.clone(), ..model };
-    let mut model = in_newton_metres(chosen_model(robot, &joints)?.into()).with_load_of(&first.model, &plain.values);
+    let chosen_among = |candidates: &[(usize, Vec<CandidateColumn>)]| -> Result<_, IdentificationError> {
+        let further = candidates.iter().flat_map(|(_, columns)| columns).map(|column| column.term.clone());
+        let wide = with_terms(&first.model, further).with_load_of(&first.model, &plain.values);
+        let wide_problem = passes.free_problem(&wide, &passes.read(&wide)?, (&first.model, &plain, &gains))?;
+        Ok(choose_terms(&first.model, &wide, &wide_problem, candidates, (&plain, equal_weights))?)
+    };
+    // How wide the step is; then all that friction may be. With payloads the load would be the bare arm's.
+    let steps: Vec<_> = searches.iter().map(|(joint, search)| (*joint, step_columns(search, *joint))).collect();
+    let widths: Vec<Option<f64>> = chosen_among(&steps)?.iter().map(step_width).collect();
+    let is_loaded = logs.recordings.iter().any(|recording| recording.payload.is_some());
+    let all = |((joint, search), width): (&(usize, &FrictionSearch), &Option<f64>)| {
+        let mut columns = candidate_columns(search, *joint, *width);
+        columns.retain(|column| !(is_loaded && column.term.needs_load()));
+        (*joint, columns)
+    };
+    let candidates: Vec<_> = searches.iter().zip(&widths).map(all).collect();
+    let mut joints = chosen_among(&candidates)?;
+    let model = with_friction_of(robot, &joints, (&first.model, &plain))?;
+    let (mut model, constants_error) = with_constants(&passes, robot, &mut joints, (model, &gains))?;
+    // What follows finds the gains with the friction that was chosen.
+    model.torque_gains.clear();
+    Ok(ChosenFriction { model, joints, stated: Some((first, plain)), constants_error })
+}
 
-    // Their constants, and the load with them.
-    for ratio in REFINEMENTS {
-        let around = |joint: &JointFriction| {
-            let own = Neighbourhood::new(joint.terms.clone()?, ratio);
-            Some((model.model().joint_index(&joint.joint)?, own))
-        };
-        let around: Vec<(usize, Neighbourhood)> = joints.iter().filter_map(around).collect();
-        if !(model.needs_load() || around.iter().any(|(_, own)| own.has_constants())) {
+/// The model with the constants of the terms that its joints chose, and without terms that are not seen with the
+/// constants free; and what the error of the constants adds to the bars. Gains of some joints are unknowns, too.
+fn with_constants(
+    passes: &TrainingPasses<'_>,
+    robot: &ParametricModel,
+    joints: &mut [JointFriction],
+    (mut model, gains): (RegressorModel, &[usize]),
+) -> Result<(RegressorModel, Option<ConstantsError>), IdentificationError> {
+    let settings = &passes.settings.estimation;
+    let equal_weights = matches!(settings.estimator, Estimator::Ordinary);
+    let mut last: Option<LastPass> = None;
+    let mut error = None;
+    for pass in 1..=MOST_PASSES {
+        let constants = FrictionConstants::new(&model, joints);
+        if !model.needs_load() && constants.is_empty() {
             break;
         }
-        let wide = with_terms(&model, around.iter().flat_map(|(_, own)| own.terms()));
+        let wide = with_terms(&model, constants.neighbours().into_iter());
         let factors = passes.read(&wide)?;
         let own = factors.iter().map(|log| log.clone().of(&wide, &model)).collect::<Result<Vec<_>, _>>()?;
         let problem = passes.stated_problem(&model, &passes.columns(&model)?, &own)?;
-        let fit = plain_estimate(&estimation, &problem)?;
-        let wide_problem = passes.free_problem(&wide, &factors, (&model, &fit, &gains))?;
-        let better = refined((&model, &fit, equal_weights), (&wide, &wide_problem), &around)?;
-        for ((joint, _), terms) in around.iter().zip(better) {
-            let name = &model.model().joints()[*joint].name;
-            joints.iter_mut().filter(|one| one.joint == *name).for_each(|one| one.terms = Some(terms.clone()));
+        let fit = plain_estimate(&without_bars(passes.settings), &problem)?;
+
+        // A step that made the fit worse was too long.
+        let misfit = misfit(&problem, &fit, equal_weights);
+        if let Some(before) = last.as_mut().filter(|before| misfit > before.misfit) {
+            before.steps.iter_mut().for_each(|step| *step *= 0.5);
+            let terms = before.constants.moved(&before.steps);
+            model = with_chosen(robot, joints, &terms, (&model, &fit))?;
+            continue;
         }
-        model = in_newton_metres(chosen_model(robot, &joints)?.into()).with_load_of(&model, &fit.values);
+
+        // The step from here, and how well the constants are known, by the covariance that bars are made of.
+        let wide_problem = passes.free_problem(&wide, &factors, (&model, &fit, gains))?;
+        let solve = |problem: &LinearProblem| plain_estimate(settings, problem);
+        let step = constants.step((&model, &fit), (&wide, &wide_problem), solve)?;
+        for (joint, found) in constants.with_intervals(&step) {
+            let name = &model.model().joints()[joint].name;
+            joints.iter_mut().filter(|one| one.joint == *name).for_each(|one| one.constants.clone_from(&found));
+        }
+        error = Some(step.error().clone());
+        let has_settled = step.has_settled() && (pass >= LOAD_PASSES || !model.needs_load());
+        if pass == MOST_PASSES {
+            break;
+        }
+
+        // Terms that are not seen once constants are free: the weakest of every joint, then again.
+        let fewer = constants.without_weakest(&model, &step);
+        if !fewer.is_empty() && (has_settled || pass >= DROP_PASSES) {
+            model = with_chosen(robot, joints, &fewer, (&model, &fit))?;
+            last = None;
+            continue;
+        }
+        if has_settled {
+            break;
+        }
+        let terms = constants.moved(&step.steps);
+        model = with_chosen(robot, joints, &terms, (&model, &fit))?;
+        last = Some(LastPass { constants, steps: step.steps, misfit });
     }
-    // What follows finds the gains with the friction that was chosen.
-    model.torque_gains.clear();
-    Ok(ChosenFriction { model, joints, stated: Some((first, plain)) })
+    Ok((model, error))
+}
+
+/// Settings of a fit whose error bars nobody wants.
+fn without_bars(settings: &IdentificationSettings) -> EstimationSettings {
+    EstimationSettings { covariance: CovarianceMethod::White, ..settings.estimation.clone() }
 }
 
 impl TrainingPasses<'_> {
@@ -127,6 +192,49 @@ impl TrainingPasses<'_> {
         let known: Vec<Vec<f64>> = self.training.iter().map(|&log| columns.known(log)).collect();
         Ok(with_free_gains(problem, free, (&known, &values))?)
     }
+}
+
+/// The robot with these terms at the joints that chose theirs, and the load of a fit of the model before.
+fn with_chosen(
+    robot: &ParametricModel,
+    joints: &mut [JointFriction],
+    terms: &[(usize, Vec<TorqueTerm>)],
+    (before, fit): (&RegressorModel, &Estimate),
+) -> Result<RegressorModel, IdentificationError> {
+    for (joint, terms) in terms {
+        let name = &before.model().joints()[*joint].name;
+        joints.iter_mut().filter(|one| one.joint == *name).for_each(|one| one.choose(terms));
+    }
+    with_friction_of(robot, joints, (before, fit))
+}
+
+/// The robot with the friction that its joints chose, and the gains and the load of a fit of the model before.
+fn with_friction_of(
+    robot: &ParametricModel,
+    joints: &[JointFriction],
+    (before, fit): (&RegressorModel, &Estimate),
+) -> Result<RegressorModel, IdentificationError> {
+    let torque_gains = before.torque_gains.clone();
+    let next = RegressorModel { torque_gains, ..RegressorModel::from(chosen_model(robot, joints)?) };
+    Ok(next.with_load_of(before, &fit.values))
+}
+
+/// The width of the smooth step that a joint's friction has.
+fn step_width(joint: &JointFriction) -> Option<f64> {
+    joint.terms.iter().flatten().find_map(|term| match term {
+        TorqueTerm::Coulomb(Coulomb { shape: CoulombShape::Smooth { width }, .. }) => Some(*width),
+        _ => None,
+    })
+}
+
+/// What a fit leaves: −2 ln of the likelihood with every joint's noise as found, `Σ_j n_j ln σ_j²`; where joints count
+/// alike the sum of squares.
+fn misfit(problem: &LinearProblem, fit: &Estimate, equal_weights: bool) -> f64 {
+    let of_joint = |(rows, sigma): (usize, &f64)| {
+        let square = if equal_weights { sigma * sigma } else { 2.0 * sigma.max(f64::MIN_POSITIVE).ln() };
+        rows as f64 * square
+    };
+    problem.joint_rows().into_iter().zip(&fit.joint_sigma).map(of_joint).sum()
 }
 
 /// The model with those of these terms as columns that it does not have.

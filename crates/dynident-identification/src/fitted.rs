@@ -6,7 +6,8 @@ use crate::chosen_friction::{ChosenFriction, choose_friction};
 use crate::error::IdentificationError;
 use crate::estimators::{Estimation, InstrumentSource, estimate};
 use crate::execution::Execution;
-use crate::lag::{LagChoice, LagKind, LagRounds, gain_errors, lag_fit};
+use crate::friction::ConstantsError;
+use crate::lag::{LagCandidates, LagChoice, LagFit, LagKind, LagRounds, gain_errors, lag_fit};
 use crate::less_noise::{Estimated, with_less_noise};
 use crate::logs::Logs;
 use crate::payload::{KnownArm, free_gains};
@@ -14,7 +15,8 @@ use crate::regressor_model::RegressorModel;
 use crate::settings::IdentificationSettings;
 use crate::task::IdentificationTask;
 use crate::training::{Training, training_rows};
-use dynident_estimation::Estimate;
+use dynident_estimation::{Estimate, LinearProblem};
+use dynident_recording::MotionSettings;
 use dynident_recording::log::OneOrMany;
 use std::time::Instant;
 
@@ -27,6 +29,17 @@ pub struct StageTimes {
     pub estimation_s: f64,
     /// Delays, traces and held-out recordings.
     pub examination_s: f64,
+}
+
+impl StageTimes {
+    /// The sum of both.
+    fn and(&self, other: &Self) -> Self {
+        Self {
+            logs_s: self.logs_s + other.logs_s,
+            estimation_s: self.estimation_s + other.estimation_s,
+            examination_s: self.examination_s + other.examination_s,
+        }
+    }
 }
 
 /// What is looked for.
@@ -59,15 +72,18 @@ pub(crate) struct Fitted<'a> {
     pub(crate) cutoff: Option<CutoffByError>,
     /// Rows and fit with friction as stated, where it was chosen.
     pub(crate) stated_friction: Option<(Training, Estimate)>,
+    /// What the constants of chosen friction add to the bars.
+    constants_error: Option<ConstantsError>,
     pub(crate) lag: LagChoice,
     /// None for a single log.
     pub(crate) between_logs: Option<BetweenLogs>,
-    /// Halves of the 95 % intervals before lag and logs have widened them.
+    /// Halves of the 95 % intervals before lag, logs and constants of friction have widened them.
     pub(crate) noise_half_width_95: Vec<f64>,
     pub(crate) times: StageTimes,
 }
 
-/// Rows and estimate, with the lag of the torque and what varies between logs in its error bars.
+/// Rows and estimate, with the lag of the torque, what varies between logs and the constants of chosen friction in its
+/// error bars.
 pub(crate) fn fitted<'a>(
     task: &'a IdentificationTask,
     chosen: &[usize],
@@ -84,33 +100,74 @@ pub(crate) fn fitted<'a>(
             between
         });
     }
+    if let Some(error) = &found.constants_error {
+        found.estimation.estimate = error.added_to(found.training.problem.columns(), &found.estimation.estimate);
+    }
     Ok(found)
 }
 
 /// Rows and estimate; where the rows show a lag of the torque that moves parameters, again without it.
+///
+/// Friction that is chosen with a lag in the rows can make up for it, so that no lag is seen any more; and friction that
+/// no stated term has looks like a lag. So where chosen friction leaves no common lag but the stated terms alone show
+/// one, both are fitted, and the one counts that says most of the rows with the fewest parameters ([`schwarz`]).
 fn without_lag<'a>(
     task: &'a IdentificationTask,
     chosen: &[usize],
     execution: Execution<'a>,
     job: &mut Job<'_, '_>,
 ) -> Result<Fitted<'a>, IdentificationError> {
-    let mut settings = task.settings.clone();
+    let settings = &task.settings;
     let is_free = settings.motion.torque_lag_s.is_none() && job.is_plain();
+    let mut found = lag_rounds((task, settings.clone(), LagRounds::default()), chosen, execution, job)?;
+    if !is_free || settings.friction.is_empty() || found.lag.kind == LagKind::Common {
+        return Ok(found);
+    }
+    let stated = IdentificationSettings { friction: Vec::new(), ..settings.clone() };
+    let mut of_stated = fitted_once(task, &stated, chosen, execution, job)?;
+    let mut first = LagRounds::of(LagCandidates::Common);
+    let mut times = found.times.and(&of_stated.times);
+    if first.again(free_lag(&of_stated, chosen)?.as_ref(), &mut of_stated.estimation.estimate) {
+        let motion = MotionSettings { torque_lag_s: first.torque_lag_s(), ..settings.motion.clone() };
+        let settings = IdentificationSettings { motion, ..settings.clone() };
+        let rounds = LagRounds::default().after(first.choice());
+        let other = lag_rounds((task, settings, rounds), chosen, execution, job)?;
+        times = times.and(&other.times);
+        if schwarz(&other.training.problem, &other.estimation.estimate)
+            < schwarz(&found.training.problem, &found.estimation.estimate)
+        {
+            found = other;
+        }
+    }
+    found.times = times;
+    Ok(found)
+}
+
+/// Schwarz's criterion `Σ_j n_j ln σ_j² + k ln n` of a fit with k free parameters, with the noise of every joint as
+/// found. Source: Annals of Statistics 6 (1978) 461.
+fn schwarz(problem: &LinearProblem, fit: &Estimate) -> f64 {
+    let rows = problem.joint_rows();
+    let of_joint = |(rows, sigma): (&usize, &f64)| *rows as f64 * 2.0 * sigma.max(f64::MIN_POSITIVE).ln();
+    let free = fit.values.len() - fit.rank.fixed.len();
+    rows.iter().zip(&fit.joint_sigma).map(of_joint).sum::<f64>()
+        + free as f64 * (rows.iter().sum::<usize>().max(1) as f64).ln()
+}
+
+/// Fits from these rounds on, until the rows show no lag that moves parameters.
+fn lag_rounds<'a>(
+    (task, mut settings, mut rounds): (&'a IdentificationTask, IdentificationSettings, LagRounds),
+    chosen: &[usize],
+    execution: Execution<'a>,
+    job: &mut Job<'_, '_>,
+) -> Result<Fitted<'a>, IdentificationError> {
+    let is_free = task.settings.motion.torque_lag_s.is_none() && job.is_plain();
     let mut times = StageTimes::default();
-    let mut rounds = LagRounds::default();
     loop {
         let mut found = fitted_once(task, &settings, chosen, execution, job)?;
         times.logs_s += found.times.logs_s;
         times.estimation_s += found.times.estimation_s;
         let started = Instant::now();
-        let fit = if is_free && has_free_lag(&found) {
-            let Fitted { logs, training, estimation, settings, .. } = &found;
-            let gains = training.gains.as_ref().map_or(&[][..], |(_, gains)| gains);
-            let found = (&training.columns, &estimation.estimate.values[..], gains);
-            lag_fit((logs, &settings.estimation), &training.model, found, chosen)?
-        } else {
-            None
-        };
+        let fit = if is_free { free_lag(&found, chosen)? } else { None };
         found.noise_half_width_95.clone_from(&found.estimation.estimate.half_width_95);
         let again = rounds.again(fit.as_ref(), &mut found.estimation.estimate);
         times.estimation_s += started.elapsed().as_secs_f64();
@@ -126,6 +183,17 @@ fn without_lag<'a>(
         }
         settings.motion.torque_lag_s = rounds.torque_lag_s();
     }
+}
+
+/// The lags of the joints beside the parameters, where they can be taken off.
+fn free_lag(found: &Fitted<'_>, chosen: &[usize]) -> Result<Option<LagFit>, IdentificationError> {
+    if !has_free_lag(found) {
+        return Ok(None);
+    }
+    let Fitted { logs, training, estimation, settings, .. } = found;
+    let gains = training.gains.as_ref().map_or(&[][..], |(_, gains)| gains);
+    let found = (&training.columns, &estimation.estimate.values[..], gains);
+    Ok(lag_fit((logs, &settings.estimation), &training.model, found, chosen)?)
 }
 
 /// A lag that the study states.
@@ -163,7 +231,7 @@ fn fitted_once<'a>(
     let cutoff = choose_cutoff((&logs, settings), &first, chosen)?;
     let started = Instant::now();
     let (logs, cutoff, friction) = if settings.friction.is_empty() {
-        let friction = ChosenFriction { model: first, joints: Vec::new(), stated: None };
+        let friction = ChosenFriction::as_stated(first);
         (with_choice(logs, settings, cutoff.as_ref().map(|choice| choice.cutoff_hz)), cutoff, friction)
     } else {
         let logs = with_choice(logs, settings, cutoff.as_ref().map(CutoffByError::highest_alike_hz));
@@ -200,6 +268,7 @@ fn fitted_once<'a>(
         settings,
         cutoff,
         stated_friction: friction.stated,
+        constants_error: friction.constants_error,
         lag: LagChoice::default(),
         between_logs: None,
         noise_half_width_95: Vec::new(),

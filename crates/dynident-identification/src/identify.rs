@@ -96,8 +96,8 @@ pub struct Identification {
     /// By how much training logs differ beyond their own error bars, which the estimate's bars hold; none for a single
     /// one.
     pub between_logs: Option<BetweenLogs>,
-    /// Halves of the 95 % intervals of the estimate by its residuals alone, before what is unknown of the lag and what
-    /// varies between logs have widened them.
+    /// Halves of the 95 % intervals of the estimate by its residuals alone, before what is unknown of the lag and of
+    /// the constants of chosen friction and what varies between logs have widened them.
     pub noise_half_width_95: Vec<f64>,
     /// Where the time went.
     pub times: StageTimes,
@@ -196,6 +196,7 @@ fn identified(
         between_logs,
         noise_half_width_95,
         mut times,
+        ..
     } = fitted(task, &chosen, execution, job)?;
     let (settings, started) = (&settings, Instant::now());
     let mut dropped = None;

@@ -17,9 +17,10 @@ pub struct JointEvidence {
     pub clipping: Option<Clipping>,
     /// What the model of the runs before says of this run, before it was fitted to; none for the first.
     pub prediction: Option<Prediction>,
-    /// The distance from the trajectory that the noise of the log, the friction found and the measured lag explain, rad
-    /// (m): the largest of a run that is simulated with the robot found and the same controller with that robot as its
-    /// model. None where tracking is inside the tolerance, and where there is no physically consistent robot.
+    /// The distance from the trajectory that the noise of the log, the friction found, the measured lag and the
+    /// feedback's delay explain, rad (m): the largest of a run that is simulated with the robot found and the same
+    /// controller with that robot as its model. None where tracking is inside the tolerance, and where there is no
+    /// physically consistent robot.
     pub tracking_floor_rad: Option<f64>,
 }
 
@@ -57,4 +58,8 @@ pub struct RunEvidence {
     pub log_rates_hz: Vec<f64>,
     /// The joints.
     pub joints: Vec<JointEvidence>,
+    /// How late the controller saw positions, s: the delay that explains more than half of the tracking error. None
+    /// where no delay does, and where tracking is inside the tolerance.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub feedback_delay_s: Option<f64>,
 }

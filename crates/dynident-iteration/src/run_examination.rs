@@ -66,7 +66,11 @@ pub(crate) fn examined(
     if let Some(known) = known.filter(|known| known.values.len() == task.robot.layout().columns().len()) {
         predict(&mut joints, task, records, (settings, known))?;
     }
-    Ok(RunEvidence { log_rates_hz: records.iter().map(|record| record.rate_hz).collect(), joints })
+    Ok(RunEvidence {
+        log_rates_hz: records.iter().map(|record| record.rate_hz).collect(),
+        joints,
+        feedback_delay_s: None,
+    })
 }
 
 /// The largest noise of one torque over the legs, joint by joint.
@@ -150,14 +154,18 @@ pub(crate) fn add_tracking_floors(
     }
     let delay_s = known.lag.longest_s();
     let mut floors = vec![0.0_f64; task.robot.dof()];
+    let mut feedback_delay_s: Option<f64> = None;
     for (leg, record) in task.legs.iter().zip(records) {
         let q: Vec<&[f64]> = record.q.chunks_exact(record.samples.max(1)).collect();
         let position_noise = &position_noise(&q, record.rate_hz, cutoff(&q, record.rate_hz).cutoff_hz)[..];
         let (robot, controller) = (&task.robot, &settings.controller);
         let known = KnownLoop { robot, parameters, controller, position_noise, delay_s };
-        let Some(of_leg) = tracking_floor(leg.reference(), &known) else { return };
-        floors.iter_mut().zip(of_leg).for_each(|(most, floor)| *most = most.max(floor));
+        let Some(of_leg) = tracking_floor(leg.reference(), record, &known) else { return };
+        floors.iter_mut().zip(of_leg.floor).for_each(|(most, floor)| *most = most.max(floor));
+        // The longest of several legs.
+        feedback_delay_s = feedback_delay_s.into_iter().chain(of_leg.feedback_delay_s).reduce(f64::max);
     }
+    evidence.feedback_delay_s = feedback_delay_s;
     for (joint, floor) in evidence.joints.iter_mut().zip(floors) {
         joint.tracking_floor_rad = Some(floor);
     }

@@ -33,6 +33,13 @@ pub(crate) fn iteration(file: &IterationsFile, out: &Path) -> String {
     if let Some(improvement) = file.tracking_improvement {
         text += &wrapped(&format!("Tracking error down by a factor of {improvement:.1}."), 4);
     }
+    let last_evidence = file.runs.iter().rev().find_map(|run| run.evidence.as_ref());
+    if let Some(delay_s) = last_evidence.and_then(|evidence| evidence.feedback_delay_s) {
+        text += &wrapped(
+            &format!("Its controller sees positions {:.1} ms late: most of the tracking error is that.", 1e3 * delay_s),
+            4,
+        );
+    }
     if let Some(ratio) = file.error_over_bound {
         text += &wrapped(
             &format!("Last estimate: error over the Cramér-Rao bound {ratio:.2} (root mean square over parameters)."),

@@ -11,7 +11,8 @@ const WIDTHS: [f64; 7] = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
 /// Stribeck velocities, rad/s or m/s.
 const STRIBECK_SPEEDS: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.4];
 const STRIBECK_EXPONENTS: [f64; 2] = [1.0, 2.0];
-/// Width of the step under the Stribeck term as a share of its velocity: beyond half its velocity the step is done.
+/// Width of the step under the Stribeck term as a share of its velocity, at most, while it is chosen: beyond
+/// half its velocity the step is done.
 pub(super) const STRIBECK_WIDTH: f64 = 0.25;
 const SIGMOID_WIDTHS: [f64; 3] = [0.02, 0.05, 0.1];
 /// Yield displacements of the Maxwell-slip elements, rad or m.
@@ -63,7 +64,7 @@ impl FrictionKind {
     }
 
     /// The candidate that a torque term belongs to; none where data do not choose it.
-    fn of(term: &TorqueTerm) -> Option<Self> {
+    pub(super) fn of(term: &TorqueTerm) -> Option<Self> {
         match term {
             TorqueTerm::Viscous(_) => Some(Self::Viscous),
             TorqueTerm::Coulomb(_) => Some(Self::Coulomb),
@@ -157,7 +158,8 @@ pub struct FrictionSearch {
     pub coulomb: Option<CoulombShape>,
     /// Velocity below which the sign step counts as zero, rad/s or m/s. 0 by default.
     pub dead_band: f64,
-    /// Width of the step of load-dependent friction where no smooth step is stated, rad/s or m/s. 0.02 by default.
+    /// Width of the step of load-dependent friction where the logs show no smooth step and none is stated, rad/s or
+    /// m/s. 0.02 by default.
     pub width: f64,
 }
 
@@ -168,8 +170,16 @@ impl FrictionSearch {
     }
 }
 
-/// The columns to choose from at `joint`; a term's columns stand together, in the order of its grid.
-pub(crate) fn candidate_columns(search: &FrictionSearch, joint: usize) -> Vec<CandidateColumn> {
+/// Viscous friction with a Coulomb step: the columns that tell how wide the step is before anything else is chosen.
+pub(crate) fn step_columns(search: &FrictionSearch, joint: usize) -> Vec<CandidateColumn> {
+    let is_step = |column: &CandidateColumn| matches!(column.kind, FrictionKind::Viscous | FrictionKind::Coulomb);
+    candidate_columns(search, joint, None).into_iter().filter(is_step).collect()
+}
+
+/// The columns to choose from at `joint`; a term's columns stand together, in the order of its grid. `width` is about
+/// that of the step at rest, if that is known: a point of the grid, for what lies between two points looks like a
+/// further term.
+pub(crate) fn candidate_columns(search: &FrictionSearch, joint: usize, width: Option<f64>) -> Vec<CandidateColumn> {
     let sign = CoulombShape::Sign { dead_band: search.dead_band };
     let mut widths = WIDTHS.to_vec();
     let mut alone = vec![sign];
@@ -178,9 +188,10 @@ pub(crate) fn candidate_columns(search: &FrictionSearch, joint: usize) -> Vec<Ca
         Some(stated @ CoulombShape::Sign { .. }) if stated != sign => alone.push(stated),
         _ => {}
     }
+    widths.extend(width.filter(|width| !widths.contains(width)));
     widths.sort_by(f64::total_cmp);
-    let load_width = match search.coulomb {
-        Some(CoulombShape::Smooth { width }) => width,
+    let load_width = match (width, search.coulomb) {
+        (Some(width), _) | (None, Some(CoulombShape::Smooth { width })) => width,
         _ => search.width,
     };
     let mut columns = Vec::new();

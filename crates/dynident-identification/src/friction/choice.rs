@@ -3,7 +3,7 @@
 //! All columns that a joint may have are in the factors already, so a candidate model is a selection of them (see
 //! [`CrossValidation`]); how one joint's are searched is in `search`.
 
-use super::candidates::CandidateColumn;
+use super::candidates::{CandidateColumn, FrictionKind};
 use super::search::search;
 use crate::regressor_model::RegressorModel;
 use dynident_dynamics::{Column, ParametricModel, ParametricModelError};
@@ -30,6 +30,9 @@ pub struct JointFriction {
     pub chosen: String,
     /// The joint's friction; none when nothing was chosen.
     pub terms: Option<Vec<TorqueTerm>>,
+    /// The constants of these terms, estimated together with all parameters.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub constants: Vec<FrictionConstant>,
     /// Blocks of time that were left out in turn.
     pub folds: usize,
     /// What was compared, each with its best constants.
@@ -40,8 +43,35 @@ impl JointFriction {
     /// A joint whose friction stays as it is stated, for this reason.
     pub fn as_stated(joint: impl Into<String>, reason: &str) -> Self {
         let chosen = format!("as the study states: {reason}");
-        Self { joint: joint.into(), chosen, terms: None, folds: 0, candidates: Vec::new() }
+        Self { joint: joint.into(), chosen, terms: None, constants: Vec::new(), folds: 0, candidates: Vec::new() }
     }
+
+    /// The same with these terms in the place of what was chosen before: with other constants, or fewer.
+    pub(crate) fn choose(&mut self, terms: &[TorqueTerm]) {
+        let name = name_of(terms);
+        if self.terms.as_deref().map(name_of).is_some_and(|before| before != name) {
+            if self.candidates.iter().any(|candidate| candidate.term == name) {
+                self.candidates.iter_mut().for_each(|candidate| candidate.chosen = candidate.term == name);
+            }
+            self.chosen = name;
+        }
+        self.terms = Some(terms.to_vec());
+    }
+}
+
+/// A constant of a friction term that the recordings chose.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct FrictionConstant {
+    /// The term: `coulomb`, `directional-coulomb`, `stribeck`, `sigmoid` or `load`.
+    pub term: String,
+    /// The constant: `width`, `speed`, `exponent`, `steepness` or `offset_speed`.
+    pub constant: String,
+    /// Its value: widths and velocities in rad/s (m/s), steepness in s/rad (s/m).
+    pub value: f64,
+    /// 95 % interval by the torque that the model leaves, with little known of the constant beforehand: a factor of 10
+    /// either way. It is symmetric on a logarithmic scale.
+    pub interval_95: [f64; 2],
 }
 
 /// One model of a joint's friction.
@@ -61,6 +91,15 @@ pub struct FrictionCandidate {
     pub excess_standard_errors: f64,
     /// Whether it was chosen.
     pub chosen: bool,
+}
+
+/// The kinds of some terms, as candidates are named.
+fn name_of(terms: &[TorqueTerm]) -> String {
+    let mut kinds: Vec<FrictionKind> = terms.iter().filter_map(FrictionKind::of).collect();
+    kinds.sort();
+    kinds.dedup();
+    let names: Vec<&str> = kinds.into_iter().map(FrictionKind::name).collect();
+    if names.is_empty() { "none".to_owned() } else { names.join(" + ") }
 }
 
 /// The robot with the choice in force: a joint's friction is replaced, its drive inertia and offset stay.
@@ -83,9 +122,7 @@ pub fn chosen_model(
 }
 
 /// The rows in blocks, as many as there are segments for, and their number; `None` for fewer than the least.
-pub(super) fn cross_validation(
-    problem: &LinearProblem,
-) -> Result<Option<(CrossValidation<'_>, usize)>, EstimationError> {
+fn cross_validation(problem: &LinearProblem) -> Result<Option<(CrossValidation<'_>, usize)>, EstimationError> {
     for folds in FOLDS {
         match CrossValidation::new(problem, folds) {
             Ok(found) => return Ok(Some((found, folds))),
@@ -97,7 +134,7 @@ pub(super) fn cross_validation(
 }
 
 /// Rows count as in the plain fit.
-pub(super) fn weights(plain: &Estimate, equal: bool) -> Vec<f64> {
+fn weights(plain: &Estimate, equal: bool) -> Vec<f64> {
     let of_sigma = |sigma: &f64| if equal || *sigma <= 0.0 { 1.0 } else { sigma.recip() };
     plain.joint_sigma.iter().map(of_sigma).collect()
 }

@@ -3,12 +3,13 @@
 mod candidates;
 mod choice;
 mod constants;
-mod refine;
+mod constants_fit;
 mod search;
+mod weak_terms;
 
 pub use candidates::FrictionSearch;
-pub use choice::{FrictionCandidate, JointFriction, chosen_model};
+pub use choice::{FrictionCandidate, FrictionConstant, JointFriction, chosen_model};
 
-pub(crate) use candidates::candidate_columns;
+pub(crate) use candidates::{CandidateColumn, candidate_columns, step_columns};
 pub(crate) use choice::choose_friction;
-pub(crate) use refine::{Neighbourhood, refined};
+pub(crate) use constants_fit::{ConstantsError, FrictionConstants};

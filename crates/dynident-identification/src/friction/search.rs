@@ -11,7 +11,7 @@
 
 use super::candidates::{CandidateColumn, FrictionKind};
 use super::choice::{FrictionCandidate, JointFriction};
-use super::constants::mean_term;
+use super::constants::{mean_term, with_one_step};
 use dynident_estimation::{FoldErrors, JointFolds};
 use dynident_model::terms::TorqueTerm;
 
@@ -204,7 +204,8 @@ pub(super) fn search(
     let friction = JointFriction {
         joint,
         chosen: best.present_name(columns),
-        terms: Some(best.terms(columns)),
+        terms: Some(with_one_step(best.terms(columns))),
+        constants: Vec::new(),
         folds: count,
         candidates: met.iter().enumerate().map(candidate).collect(),
     };

@@ -24,6 +24,12 @@ impl LagRounds {
         Self { candidates, ..Self::default() }
     }
 
+    /// The same with a lag that was taken off before.
+    #[must_use]
+    pub fn after(self, choice: LagChoice) -> Self {
+        Self { choice, ..self }
+    }
+
     /// What the next fit's rows are made without: for
     /// [`MotionSettings::torque_lag_s`](dynident_recording::MotionSettings::torque_lag_s).
     pub fn torque_lag_s(&self) -> Option<OneOrMany<f64>> {

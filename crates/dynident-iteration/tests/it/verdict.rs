@@ -76,6 +76,26 @@ fn a_lag_is_taken_off_and_the_arm_is_found() {
     }
 }
 
+/// A controller that sees its joints some samples late pushes them ahead. No log shows that delay but by the tracking
+/// error; it is found, explains the error, and is said.
+#[test]
+fn the_delay_of_the_feedback_explains_the_tracking_error() {
+    let late = SensorSettings { feedback_delay_samples: 3, ..Simulated::default().sensors };
+    let simulated = Simulated { sensors: late, ..Simulated::default() };
+    let (_, outcome) = iterated(&simulated, settings());
+    let words = words(&outcome);
+    assert_eq!(outcome.status, IterationStatus::Converged, "{words}");
+    let evidence = outcome.runs.last().unwrap().evidence.as_ref().unwrap();
+    let rate_hz = evidence.log_rates_hz[0];
+    let found = evidence.feedback_delay_s.unwrap_or_else(|| panic!("no delay: {words}"));
+    assert!((found * rate_hz - 3.0).abs() < 0.5, "{found} s at {rate_hz} Hz: {words}");
+    let known = outcome.runs.last().unwrap().knowledge().unwrap();
+    let truth = simulated.truth(&described());
+    for ((value, truth), std) in known.values.iter().zip(&truth).zip(&known.std) {
+        assert!((value - truth).abs() <= 4.0 * std, "{value} for {truth} +- {std}: {words}");
+    }
+}
+
 /// A robot that is far from where its log says: whatever the fit makes of it, this is no success.
 #[test]
 fn a_long_lag_is_no_success() {

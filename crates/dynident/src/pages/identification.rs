@@ -1,12 +1,15 @@
 //! `report.html` of an identification.
 
 use crate::error::Error;
-use crate::result::{BaseParameterResult, BodyResult, LogSummary, ResultFile, TermResult, ValueSource};
+use crate::result::{
+    BaseParameterResult, BodyResult, JointFrictionResult, LogSummary, ResultFile, TermResult, ValueSource,
+};
 use dynident_estimation::ValidationReport;
 use dynident_estimation::consistent::IntervalEnd;
 use dynident_identification::Role;
 use dynident_identification::consistent::ParameterInterval;
 use dynident_identification::examination::{LogTrace, LogValidation};
+use dynident_identification::friction::FrictionConstant;
 use dynident_recording::Level;
 use dynident_report::{BarPlot, Cell, Heading, HeatMap, KeyFigures, LinePlot, Report, Table, Text, Tone, short};
 
@@ -330,9 +333,19 @@ fn friction(page: &mut Report, r: &ResultFile) {
     page.add(table);
     lags(page, r);
     if !r.friction_choice.is_empty() {
-        let rows = r.friction_choice.iter().map(|joint| vec![Cell::from(&joint.joint), Cell::from(&joint.chosen)]);
-        page.add(Table::new("Friction that the logs chose", ["joint", "friction"]).rows(rows));
+        let row = |joint: &JointFrictionResult| {
+            let constants: Vec<String> = joint.constants.iter().map(constant).collect();
+            vec![Cell::from(&joint.joint), Cell::from(&joint.chosen), Cell::from(constants.join(", "))]
+        };
+        let header = ["joint", "friction", "constants with their 95 % intervals (rad/s or m/s, and their powers)"];
+        page.add(Table::new("Friction that the logs chose", header).rows(r.friction_choice.iter().map(row)));
     }
+}
+
+/// A constant of chosen friction, in words.
+fn constant(own: &FrictionConstant) -> String {
+    let [from, to] = own.interval_95;
+    format!("{} {} {} ({} to {})", own.term, own.constant, short(own.value, 3), short(from, 2), short(to, 2))
 }
 
 fn lags(page: &mut Report, r: &ResultFile) {

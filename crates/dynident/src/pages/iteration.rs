@@ -152,10 +152,14 @@ fn last_shown(file: &IterationsFile) -> Option<Table> {
         "of it taken off, ms",
         "predicted inside the 95 % band",
     ];
-    let mut table = Table::new(format!("Run {}", run_name(run)), columns).note(
-        "floor: what noise, friction and delay explain, looked for where tracking is beyond the tolerance; predicted: by the model of the good runs before it",
-    );
-    for (joint, (name, shown)) in file.joints.iter().zip(&run.evidence.as_ref()?.joints).enumerate() {
+    let evidence = run.evidence.as_ref()?;
+    let delay = evidence.feedback_delay_s.map_or_else(String::new, |delay_s| {
+        format!("; the tracking error is that of a controller which sees positions {} ms late", short(1e3 * delay_s, 3))
+    });
+    let mut table = Table::new(format!("Run {}", run_name(run)), columns).note(format!(
+        "floor: what noise, friction and delay explain, looked for where tracking is beyond the tolerance{delay}; predicted: by the model of the good runs before it",
+    ));
+    for (joint, (name, shown)) in file.joints.iter().zip(&evidence.joints).enumerate() {
         let lag = run.torque_lags.get(joint).copied().flatten();
         table = table.rows([vec![
             Cell::from(name),

@@ -13,7 +13,7 @@ use dynident_identification::estimators::{
 use dynident_identification::examination::{
     LagChoice, LogValidation, PriorAgreement, TorqueBand, TorqueLag, TorqueSignCheck,
 };
-use dynident_identification::friction::FrictionCandidate;
+use dynident_identification::friction::{FrictionCandidate, FrictionConstant};
 use dynident_identification::payload::{DriveGain, PayloadResult};
 use dynident_identification::{BetweenLogs, Condition, CutoffByError, Role};
 use dynident_recording::{Finding, ImportReport, MotionSettings};
@@ -517,6 +517,9 @@ pub struct JointFrictionResult {
     pub chosen: String,
     /// The choice as keys of `[drive.joints.NAME]`; none when nothing was chosen.
     pub drive: Option<JointDrive>,
+    /// The constants of the chosen terms, estimated together with all parameters; none where they were stated.
+    #[serde(default)]
+    pub constants: Vec<FrictionConstant>,
     /// Blocks of time that were left out in turn.
     pub folds: usize,
     /// What was compared, each with its best constants.

@@ -322,6 +322,7 @@ pub(super) fn friction_results(choice: &[JointFriction]) -> Vec<JointFrictionRes
         joint: joint.joint.clone(),
         chosen: joint.chosen.clone(),
         drive: joint.terms.as_deref().map(JointDrive::stating),
+        constants: joint.constants.clone(),
         folds: joint.folds,
         candidates: joint.candidates.clone(),
     };
