@@ -108,9 +108,9 @@ pub(crate) fn fitted<'a>(
 
 /// Rows and estimate; where the rows show a lag of the torque that moves parameters, again without it.
 ///
-/// Friction that is chosen with a lag in the rows can make up for it, so that no lag is seen any more; and friction that
-/// no stated term has looks like a lag. So where chosen friction leaves no common lag but the stated terms alone show
-/// one, both are fitted, and the one counts that says most of the rows with the fewest parameters ([`schwarz`]).
+/// Friction that is chosen with a lag in the rows can make up for it, so that no lag is seen any more; and friction
+/// that no stated term has looks like a lag. So where chosen friction leaves no common lag but the stated terms alone
+/// show one, both are fitted, and the one counts that says most of the rows with the fewest parameters ([`schwarz`]).
 fn without_lag<'a>(
     task: &'a IdentificationTask,
     chosen: &[usize],
