@@ -53,6 +53,17 @@ pub(crate) fn somebody() -> Result<(), String> {
         .to_owned())
 }
 
+/// A positive number; none if nobody is there, or says none.
+pub(crate) fn number_asked(question: &str) -> Option<f64> {
+    if !(std::io::stdin().is_terminal() && terminal::watched()) {
+        return None;
+    }
+    terminal::ask(&format!("{question} "));
+    let mut answer = String::new();
+    std::io::stdin().lock().read_line(&mut answer).ok()?;
+    answer.trim().parse().ok().filter(|number: &f64| *number > 0.0 && number.is_finite())
+}
+
 /// Yes or no; none if nobody is there.
 fn asked(question: &str) -> Option<bool> {
     if !(std::io::stdin().is_terminal() && terminal::watched()) {

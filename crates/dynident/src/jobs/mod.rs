@@ -9,6 +9,7 @@ pub(crate) mod inspect;
 pub(crate) mod iterate;
 pub(crate) mod log;
 mod log_summary;
+pub(crate) mod new_study;
 pub(crate) mod options;
 pub(crate) mod provenance;
 pub(crate) mod simulate;

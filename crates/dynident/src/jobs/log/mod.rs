@@ -1,7 +1,7 @@
 //! What a recording holds.
 
 mod channel;
-mod names;
+pub(in crate::jobs) mod names;
 
 use crate::error::Error;
 use crate::result::{LOG_SCHEMA, LogChannel, LogContents, LogGroupContents};

@@ -53,7 +53,7 @@ pub(super) fn unit(name: &str) -> Option<&'static str> {
 }
 
 /// The unit in seconds of a column that is a time by its name.
-pub(super) fn time_unit_s(name: &str) -> Option<f64> {
+pub(in crate::jobs) fn time_unit_s(name: &str) -> Option<f64> {
     let lower = name.to_lowercase();
     let own = lower.rsplit(['.', '/']).next().unwrap_or(&lower);
     let (word, unit) = own.rsplit_once('_').unwrap_or((own, ""));
@@ -167,8 +167,18 @@ fn columns(members: &[(String, String)]) -> String {
     format!("[{}]", names.join(", "))
 }
 
+/// Names of columns as a study writes them: a pattern where they differ by a running number, else a list.
+pub(in crate::jobs) fn column_list(names: &[String]) -> String {
+    let parts: Vec<(String, String)> = names.iter().map(|name| parted(name)).collect();
+    if parts.windows(2).all(|pair| pair[0].0 == pair[1].0) {
+        let members: Vec<_> = parts.into_iter().zip(names).map(|((_, own), name)| (own, name.clone())).collect();
+        return columns(&members);
+    }
+    format!("[{}]", names.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", "))
+}
+
 /// A text in quotes, as TOML has it.
-fn quoted(text: &str) -> String {
+pub(in crate::jobs) fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 

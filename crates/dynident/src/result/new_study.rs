@@ -1,0 +1,23 @@
+//! What `new` prints: the schema of its JSON.
+
+use super::StudyCheck;
+use serde::{Deserialize, Serialize};
+
+/// Name and version of the schema of [`NewStudyFile`].
+pub const NEW_STUDY_SCHEMA: &str = "dynident/new/1";
+
+/// A study that was written from a robot and its recordings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct NewStudyFile {
+    /// [`NEW_STUDY_SCHEMA`].
+    pub schema: String,
+    /// Where the study stands.
+    pub file: String,
+    /// The study.
+    pub text: String,
+    /// What a person should look at before the study is believed, a sentence each; empty where nothing is left.
+    pub unsure: Vec<String>,
+    /// What an examination of the study found in the end; none where it could not be examined.
+    pub check: Option<StudyCheck>,
+}
