@@ -1,8 +1,9 @@
 //! `dynident new --robot ROBOT --log FILE..`.
 
-use super::permission::number_asked;
+use super::permission::text_asked;
 use super::{Context, json, message_of};
 use crate::{Verdict, terminal};
+use dynident::result::{StudyChange, Unsure};
 use dynident::{NewStudy, RunOptions, new_study};
 use std::path::PathBuf;
 
@@ -47,13 +48,11 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         logs: options.logs.clone(),
         out: options.out.clone(),
         rate_hz: options.rate_hz,
+        stated: Vec::new(),
     };
     let mut found = new_study(&request, &run).map_err(message_of)?;
-    // Without a rate nothing could be examined.
-    if found.check.is_none()
-        && let Some(rate_hz) = number_asked("How many samples a second has the recording?")
-    {
-        request.rate_hz = Some(rate_hz);
+    request.stated = found.unsure.iter().filter_map(stated).collect();
+    if !request.stated.is_empty() {
         found = new_study(&request, &run).map_err(message_of)?;
     }
     dynident::write_whole(&options.out, found.text.as_bytes()).map_err(message_of)?;
@@ -63,11 +62,25 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     } else if !context.quiet {
         terminal::print(found.text.trim_end())?;
     }
-    for sentence in &found.unsure {
-        terminal::remark(&format!("look at {sentence}"));
+    for unsure in &found.unsure {
+        terminal::remark(&format!("look at {}", unsure.sentence()));
     }
     if !context.json && !context.quiet {
         terminal::remark(&format!("written: {0}; next: dynident identify {0} --out result", options.out.display()));
     }
     Ok(if found.unsure.is_empty() { Verdict::Good } else { Verdict::Negative })
+}
+
+/// The line that a person on the terminal states in place of one that is not sure; none where it is left.
+fn stated(unsure: &Unsure) -> Option<StudyChange> {
+    let change = unsure.line.as_ref()?;
+    let (key, value) = change.line.split_once(" = ")?;
+    let mut question = format!("{}: {}\n  {key} = [{value}]", change.place(), unsure.reason);
+    loop {
+        let answer = StudyChange { line: format!("{key} = {}", text_asked(&question)?), ..change.clone() };
+        if answer.is_well_formed() {
+            return Some(answer);
+        }
+        question = format!("  that is no value of TOML, such as {value}: {key} =");
+    }
 }

@@ -53,15 +53,18 @@ pub(crate) fn somebody() -> Result<(), String> {
         .to_owned())
 }
 
-/// A positive number; none if nobody is there, or says none.
-pub(crate) fn number_asked(question: &str) -> Option<f64> {
+/// A line of text; none if nobody is there, or nothing is said.
+pub(crate) fn text_asked(question: &str) -> Option<String> {
     if !(std::io::stdin().is_terminal() && terminal::watched()) {
         return None;
     }
     terminal::ask(&format!("{question} "));
     let mut answer = String::new();
     std::io::stdin().lock().read_line(&mut answer).ok()?;
-    answer.trim().parse().ok().filter(|number: &f64| *number > 0.0 && number.is_finite())
+    if interruption::pressed() {
+        return None;
+    }
+    Some(answer.trim().to_owned()).filter(|answer| !answer.is_empty())
 }
 
 /// Yes or no; none if nobody is there.
@@ -69,13 +72,8 @@ fn asked(question: &str) -> Option<bool> {
     if !(std::io::stdin().is_terminal() && terminal::watched()) {
         return None;
     }
-    terminal::ask(&format!("{question} [y/N] "));
-    let mut answer = String::new();
-    std::io::stdin().lock().read_line(&mut answer).ok()?;
-    if interruption::pressed() {
-        return Some(false);
-    }
-    Some(matches!(answer.trim().to_lowercase().as_str(), "y" | "yes"))
+    let answer = text_asked(&format!("{question} [y/N]")).unwrap_or_default();
+    Some(matches!(answer.to_lowercase().as_str(), "y" | "yes"))
 }
 
 /// Words as a shell would take them, near enough for a person to read.

@@ -2,6 +2,7 @@
 
 use crate::common::{recordings, repository};
 use dynident::recording::log::{ChannelGroup, ColumnRef};
+use dynident::result::Unsure;
 use dynident::{Error, NewStudy, RunOptions, Silent, Study, new_study};
 use dynident_identification::Role;
 use std::path::{Path, PathBuf};
@@ -13,7 +14,13 @@ struct Written {
 }
 
 fn request(folder: &Path, robot: &Path, logs: &[PathBuf], rate_hz: Option<f64>) -> NewStudy {
-    NewStudy { robot: robot.to_owned(), logs: logs.to_vec(), out: folder.join("study.toml"), rate_hz }
+    NewStudy {
+        robot: robot.to_owned(),
+        logs: logs.to_vec(),
+        out: folder.join("study.toml"),
+        rate_hz,
+        stated: Vec::new(),
+    }
 }
 
 fn written(robot: &Path, logs: &[PathBuf], rate_hz: Option<f64>) -> Written {
@@ -21,7 +28,8 @@ fn written(robot: &Path, logs: &[PathBuf], rate_hz: Option<f64>) -> Written {
     let request = request(folder.path(), robot, logs, rate_hz);
     let found = new_study(&request, &RunOptions { data: None, threads: 1, progress: &Silent }).unwrap();
     let study = Study::parse(&found.text, &request.out).unwrap_or_else(|error| panic!("{error}\n{}", found.text));
-    Written { study, unsure: found.unsure, text: found.text }
+    let unsure = found.unsure.iter().map(Unsure::sentence).collect();
+    Written { study, unsure, text: found.text }
 }
 
 /// What decides which numbers a group's are: its columns and how they are read.

@@ -1,6 +1,6 @@
 //! A study as it is written down: tables, lines, and beside each line why it is there.
 
-use crate::result::StudyChange;
+use crate::result::{StudyChange, Unsure};
 use core::fmt::Write;
 
 /// A key with its value.
@@ -78,11 +78,17 @@ impl Draft {
         true
     }
 
-    /// What a person should look at: place and reason.
-    pub(super) fn unsure(&self) -> Vec<String> {
+    /// The lines that a person should look at.
+    pub(super) fn unsure(&self) -> Vec<Unsure> {
         let of_table = |table: &Table| {
-            let lines = table.lines.iter().filter(|line| !line.is_sure);
-            lines.map(|line| format!("{} {}: {}", table.heading, line.key, line.reason)).collect::<Vec<_>>()
+            let unsure = |line: &Line| Unsure {
+                line: Some(StudyChange {
+                    table: table.heading.trim_matches(['[', ']']).to_owned(),
+                    line: format!("{} = {}", line.key, line.value),
+                }),
+                reason: line.reason.clone(),
+            };
+            table.lines.iter().filter(|line| !line.is_sure).map(unsure).collect::<Vec<_>>()
         };
         self.tables.iter().flat_map(of_table).collect()
     }

@@ -10,7 +10,7 @@ use crate::jobs::check::check;
 use crate::jobs::log::log_contents;
 use crate::jobs::log::names::{column_list, quoted, time_unit_s};
 use crate::jobs::options::RunOptions;
-use crate::result::{LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyCheck};
+use crate::result::{LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, StudyCheck, Unsure};
 use crate::study::Study;
 use channels::{Family, LoggedJoints, best, families, in_order, logged_joints};
 use draft::{Draft, Table};
@@ -39,6 +39,9 @@ pub struct NewStudy {
     pub out: PathBuf,
     /// Samples a second, for recordings without time stamps.
     pub rate_hz: Option<f64>,
+    /// Lines that a person states, in place of what would be written there: the answers to
+    /// [`NewStudyFile::unsure`].
+    pub stated: Vec<StudyChange>,
 }
 
 /// Writes a study: which joints the columns are by their names and their number, units by names, limits and spread,
@@ -54,25 +57,27 @@ pub fn new_study(request: &NewStudy, options: &RunOptions<'_>) -> Result<NewStud
         request.logs.iter().map(|path| Ok((path.as_path(), log_contents(path)?))).collect::<Result<_, Error>>()?;
     let recorded = Recorded::find(&robot.model, &logs).map_err(Error::NewStudy)?;
     let mut draft = recorded.draft(request, &robot.model, &logs);
+    for change in &request.stated {
+        draft.apply(change, "As stated");
+    }
 
     // What the data say of the reading so far.
     let mut examined = None;
     let mut unsure = draft.unsure();
-    for _ in 0..MOST_ROUNDS {
-        if recorded.rate(request).is_none() {
-            unsure.push("not examined: the rate is missing".to_owned());
-            break;
-        }
-        let study = Study::parse(&draft.text(), &request.out)?;
-        let found = check(&study, &request.out, options)?.check;
-        let mended = mend(&mut draft, &found);
-        examined = Some(found);
-        if !mended {
-            break;
+    let without_rate = |unsure: &Unsure| unsure.line.as_ref().is_some_and(|change| change.line.starts_with("rate_hz"));
+    if !unsure.iter().any(without_rate) {
+        for _ in 0..MOST_ROUNDS {
+            let study = Study::parse(&draft.text(), &request.out)?;
+            let found = check(&study, &request.out, options)?.check;
+            let changed = mend(&mut draft, &found);
+            examined = Some(found);
+            if !changed {
+                break;
+            }
         }
     }
     let left = examined.iter().flat_map(StudyCheck::problems);
-    unsure.extend(left);
+    unsure.extend(left.map(|reason| Unsure { line: None, reason }));
     Ok(NewStudyFile {
         schema: NEW_STUDY_SCHEMA.to_owned(),
         file: request.out.display().to_string(),
@@ -138,7 +143,9 @@ impl Recorded {
             .or_else(|| measured(Quantity::Torque, &elsewhere))
             .or_else(|| measured(Quantity::Current, &elsewhere))
             .ok_or_else(|| missing("torques or currents"))?;
-        let velocity = measured(Quantity::Velocity, &beside).filter(|family| family.source != Source::Commanded);
+        let velocity = measured(Quantity::Velocity, &beside)
+            .or_else(|| measured(Quantity::Velocity, &elsewhere))
+            .filter(|family| family.source != Source::Commanded);
 
         let (Some(of_position), Some(of_torque)) = (ordered(position), ordered(torque)) else {
             return Err(missing("torques or currents"));
@@ -166,18 +173,13 @@ impl Recorded {
         })
     }
 
-    /// Samples a second, where anything says so.
-    fn rate(&self, request: &NewStudy) -> Option<f64> {
-        self.time.as_ref().map_or(request.rate_hz, |(_, rate_hz)| rate_hz.or(Some(0.0)))
-    }
-
     fn draft(&self, request: &NewStudy, model: &Model, logs: &[(&Path, LogContents)]) -> Draft {
         let from = request.out.parent().unwrap_or_else(|| Path::new(""));
         let joints = model.joints();
         let tables = [
             vec![self.of_robot(request, model, from), self.of_time(request)],
             vec![self.of_position(model, &logs[self.position.file].1)],
-            self.of_velocity().into_iter().collect(),
+            self.of_velocity(logs, from).into_iter().collect(),
             vec![self.of_torque(logs, from)],
             self.of_logs(logs, from),
         ];
@@ -258,13 +260,10 @@ impl Recorded {
         table
     }
 
-    fn of_velocity(&self) -> Option<Table> {
+    fn of_velocity(&self, logs: &[(&Path, LogContents)], from: &Path) -> Option<Table> {
         let (family, columns) = self.velocity.as_ref().zip(self.velocity_columns.as_ref())?;
-        let table = Table::new("[format.velocity]", "Compared with the positions' derivative").with(
-            "columns",
-            column_list(columns),
-            "",
-        );
+        let table = Table::new("[format.velocity]", "Compared with the positions' derivative");
+        let table = self.with_file(table, family, logs, from).with("columns", column_list(columns), "");
         Some(match family.unit.filter(|unit| *unit != "rad/s") {
             Some(unit) => table.with("unit", quoted(unit), "by the names"),
             None => table,
@@ -273,14 +272,9 @@ impl Recorded {
 
     fn of_torque(&self, logs: &[(&Path, LogContents)], from: &Path) -> Table {
         let [_, columns] = &self.columns;
-        let mut table = Table::new("[format.torque]", self.said(&self.torque, "torques"));
-        if self.torque.file != self.position.file {
-            // As seen from the folder of the positions' file.
-            let folder = logs[self.position.file].0.parent().unwrap_or(from);
-            let file = quoted(&seen_from(logs[self.torque.file].0, folder));
-            table = table.with("file", file, "a file of its own, with as many rows");
-        }
-        table = match self.torque.source {
+        let table = Table::new("[format.torque]", self.said(&self.torque, "torques"));
+        let table = self.with_file(table, &self.torque, logs, from);
+        let table = match self.torque.source {
             Source::Commanded => {
                 table.with_unsure("columns", column_list(columns), "commanded, not measured: no other torque was found")
             }
@@ -295,6 +289,16 @@ impl Recorded {
             Some(unit) => table.with("unit", quoted(unit), "by the names"),
             None => table,
         }
+    }
+
+    /// With the file of columns that do not stand beside the positions, as seen from the folder of the positions'.
+    fn with_file(&self, table: Table, family: &Family, logs: &[(&Path, LogContents)], from: &Path) -> Table {
+        if family.file == self.position.file {
+            return table;
+        }
+        let folder = logs[self.position.file].0.parent().unwrap_or(from);
+        let file = quoted(&seen_from(logs[family.file].0, folder));
+        table.with("file", file, "a file of its own, with as many rows")
     }
 
     /// What says that a family is what it is taken for.
