@@ -61,7 +61,7 @@ pub use dynident_recording as recording;
 pub use dynident_simulation as simulation;
 
 pub use dynident_identification::{Progress, Role, Silent};
-pub use error::{Error, Expected, StudyError};
+pub use error::{Error, Expected, NewStudyError, StudyError};
 pub use inputs::{refuse_overwriting, study_inputs};
 pub use jobs::check::check;
 pub use jobs::design::{DesignOutcome, check_log, check_trajectory, design_study};

@@ -2,7 +2,7 @@
 
 use crate::common::{recordings, repository};
 use dynident::recording::log::{ChannelGroup, ColumnRef};
-use dynident::result::Unsure;
+use dynident::result::{StudyChange, Unsure};
 use dynident::{Error, NewStudy, RunOptions, Silent, Study, new_study};
 use dynident_identification::Role;
 use std::path::{Path, PathBuf};
@@ -11,6 +11,12 @@ struct Written {
     study: Study,
     unsure: Vec<String>,
     text: String,
+}
+
+/// Unit, scale and sign of positions and of torques.
+fn reading_keys(study: &Study) -> ([String; 3], [String; 3]) {
+    let format = study.format.as_ref().unwrap();
+    (reading(&format.position).1, reading(&format.torque).1)
 }
 
 fn request(folder: &Path, robot: &Path, logs: &[PathBuf], rate_hz: Option<f64>) -> NewStudy {
@@ -58,11 +64,14 @@ fn public_recordings_need_no_edit() {
     let Some(data) = recordings() else { return };
     let files = |names: &[&str]| names.iter().map(|name| data.join(name)).collect::<Vec<_>>();
     let lwr = ["kuka_lwr4plus/traj2.csv", "kuka_lwr4plus/traj3.csv", "kuka_lwr4plus/traj1.csv"];
+    let dfki = ["00", "01", "02", "03", "04", "05", "06"];
+    let dfki = dfki.map(|number| format!("dfki_double_pendulum/designC_traj{number}.csv"));
+    let dfki = dfki.each_ref().map(String::as_str);
     let cases = [
         ("lwr4plus_23_to_1.toml", "kuka_lwr4plus/kuka_lwr4.urdf", &lwr[..], None),
         ("ur10.toml", "ur10_unisa/ur10_robot.urdf", &["ur10_unisa/exciting_trajectory.csv"], None),
         ("panda.toml", "panda_unisa/panda.urdf", &["panda_unisa/exciting_trajectory.csv"], None),
-        ("lbr_med7.toml", "kuka_lbr_med7/med7dock.urdf", &["kuka_lbr_med7/measurements.csv"], Some(100.0)),
+        ("dfki_pendulum.toml", "dfki_double_pendulum/double_pendulum_designC.urdf", &dfki[..], None),
     ];
     for (example, robot, logs, rate_hz) in cases {
         let found = written(&data.join(robot), &files(logs), rate_hz);
@@ -73,20 +82,46 @@ fn public_recordings_need_no_edit() {
     }
 }
 
+/// The sensors of the LBR count torques the other way round: the logs say that some sign is wrong, not which. The
+/// line that is asked for is the one that was written by hand.
+#[test]
+fn a_sign_is_asked_for_and_stated() {
+    let Some(data) = recordings() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let robot = data.join("kuka_lbr_med7/med7dock.urdf");
+    let mut request = request(folder.path(), &robot, &[data.join("kuka_lbr_med7/measurements.csv")], Some(100.0));
+    let options = RunOptions { data: None, threads: 1, progress: &Silent };
+    let found = new_study(&request, &options).unwrap();
+    let finding = found.check.iter().flat_map(|check| &check.findings).find(|finding| finding.kind == "sign").unwrap();
+    assert_eq!(finding.write[0].table, "format.torque", "{}", finding.sentence());
+    assert!(finding.write.iter().all(StudyChange::is_well_formed));
+    assert!(found.unsure.iter().any(|unsure| unsure.sentence().contains("sign = -1")), "{:?}", found.unsure);
+
+    request.stated = finding.write.clone();
+    let found = new_study(&request, &options).unwrap();
+    assert!(found.unsure.is_empty(), "{:?}", found.unsure);
+    let study = Study::parse(&found.text, &request.out).unwrap();
+    is_read_alike("lbr_med7.toml", &Written { study, unsure: Vec::new(), text: found.text });
+}
+
 /// Currents of unknown constants, positions and efforts in files of their own.
 #[test]
 fn what_no_name_and_no_number_tells_is_marked() {
     let Some(data) = recordings() else { return };
-    let files = |names: [&str; 2]| names.map(|name| data.join(name)).to_vec();
-    let tx40 = files(["staubli_tx40/pos_read_data.csv", "staubli_tx40/curr_data.csv"]);
+    let files = |names: &[&str]| names.iter().map(|name| data.join(name)).collect::<Vec<_>>();
+    let tx40 = files(&["staubli_tx40/pos_read_data.csv", "staubli_tx40/curr_data.csv"]);
     let found = written(&data.join("staubli_tx40/tx40_mdh_modified.urdf"), &tx40, Some(5000.0));
     let torque = &found.study.format.as_ref().unwrap().torque;
     assert_eq!(torque.file.as_deref(), Some(Path::new("curr_data.csv")), "{}", found.text);
     assert!(found.unsure.iter().any(|line| line.contains("scale")), "{:?}", found.unsure);
 
-    let tiago = files(["tiago_arm/tiago_position.csv", "tiago_arm/tiago_effort.csv"]);
+    let tiago = files(&["tiago_arm/tiago_position.csv", "tiago_arm/tiago_velocity.csv", "tiago_arm/tiago_effort.csv"]);
     let found = written(&data.join("tiago_arm/tiago.urdf"), &tiago, None);
     assert_eq!(found.study.robot.joints, by_hand("tiago.toml").robot.joints, "{}", found.text);
+    // Currents called efforts: no factor of the positions is made up that explains them.
+    let (position, ..) = reading_keys(&found.study);
+    assert!(position.iter().all(|key| key == "None"), "{position:?}\n{}", found.text);
+    assert!(!found.unsure.is_empty());
 }
 
 /// The simulated arm of README, from its files alone; and what cannot be known is asked for.

@@ -10,7 +10,7 @@ use crate::jobs::check::check;
 use crate::jobs::log::log_contents;
 use crate::jobs::log::names::{column_list, quoted, time_unit_s};
 use crate::jobs::options::RunOptions;
-use crate::result::{LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, StudyCheck, Unsure};
+use crate::result::{CheckFinding, LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, StudyCheck, Unsure};
 use crate::study::Study;
 use channels::{Family, LoggedJoints, best, families, in_order, logged_joints};
 use draft::{Draft, Table};
@@ -87,9 +87,17 @@ pub fn new_study(request: &NewStudy, options: &RunOptions<'_>) -> Result<NewStud
     })
 }
 
-/// Writes what an examination asks for where it knows no alternative; whether anything changed.
+/// Writes what an examination asks for where it knows no alternative; whether anything changed. A sign, an order, a
+/// mounting or a unit is one of a few; a zero or a factor of any size may make up for another mistake, and is left to
+/// a person.
 fn mend(draft: &mut Draft, found: &StudyCheck) -> bool {
-    let asked = found.findings.iter().filter(|finding| finding.level == Level::Problem && finding.or.is_empty());
+    let is_one_of_few = |finding: &&CheckFinding| match finding.kind.as_str() {
+        "sign" | "order" | "mounting" => true,
+        "unit" => finding.write.iter().all(|change| change.line.starts_with("unit")),
+        _ => false,
+    };
+    let problems = found.findings.iter().filter(|finding| finding.level == Level::Problem && finding.or.is_empty());
+    let asked = problems.filter(is_one_of_few);
     let mut changed = false;
     for finding in asked {
         for change in &finding.write {
@@ -188,7 +196,7 @@ impl Recorded {
             self.logged.joints.iter().filter(|&&joint| limit(&joints[joint].limits).is_some()).count()
         };
         let note = format!(
-            "Friction, cut-off, lag and estimator are chosen by the logs; keys that state them: docs/src/study.md. Limits that `dynident design` keeps, of {} joints: {} positions, {} velocities, {} torques of the description",
+            "Friction, cut-off, lag and estimator are chosen by the logs; keys that state them: docs/src/study.md. Motors behind gears: [drive] drive_inertia = true; a motor that turns two joints: [[coupling]]. Limits that `dynident design` keeps, of {} joints: {} positions, {} velocities, {} torques of the description",
             self.logged.joints.len(),
             known(|limits| limits.upper),
             known(|limits| limits.velocity),
