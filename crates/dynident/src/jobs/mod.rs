@@ -1,6 +1,7 @@
 //! The jobs of the command: each reads files, calls the crates below, and returns what is written.
 
 pub(crate) mod check;
+mod columns;
 pub(crate) mod design;
 pub(crate) mod evaluate;
 pub(crate) mod export;

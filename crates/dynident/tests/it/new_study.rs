@@ -79,6 +79,8 @@ fn public_recordings_need_no_edit() {
         is_read_alike(example, &found);
         let tested = |study: &Study| study.log.iter().filter(|log| log.role == Role::Validate).count();
         assert_eq!(tested(&found.study), 1, "{example}");
+        let drives = |study: &Study| study.drive.drive_inertia;
+        assert_eq!(drives(&found.study), drives(&by_hand(example)), "{example}\n{}", found.text);
     }
 }
 
@@ -110,10 +112,12 @@ fn what_no_name_and_no_number_tells_is_marked() {
     let Some(data) = recordings() else { return };
     let files = |names: &[&str]| names.iter().map(|name| data.join(name)).collect::<Vec<_>>();
     let tx40 = files(&["staubli_tx40/pos_read_data.csv", "staubli_tx40/curr_data.csv"]);
-    let found = written(&data.join("staubli_tx40/tx40_mdh_modified.urdf"), &tx40, Some(5000.0));
+    let found = written(&data.join("staubli_tx40/tx40_mdh_modified.urdf"), &tx40, None);
     let torque = &found.study.format.as_ref().unwrap().torque;
     assert_eq!(torque.file.as_deref(), Some(Path::new("curr_data.csv")), "{}", found.text);
-    assert!(found.unsure.iter().any(|line| line.contains("scale")), "{:?}", found.unsure);
+    for key in ["scale", "rate_hz", "unit"] {
+        assert!(found.unsure.iter().any(|line| line.contains(key)), "{key}: {:?}", found.unsure);
+    }
 
     let tiago = files(&["tiago_arm/tiago_position.csv", "tiago_arm/tiago_velocity.csv", "tiago_arm/tiago_effort.csv"]);
     let found = written(&data.join("tiago_arm/tiago.urdf"), &tiago, None);
@@ -133,6 +137,7 @@ fn a_recording_without_a_clock_needs_its_rate() {
     let found = written(&robot, &logs, None);
     assert!(found.unsure.is_empty(), "{:?}\n{}", found.unsure, found.text);
     is_read_alike("ur10_simulated.toml", &found);
+    assert!(found.text.contains("drive_inertia = true"), "{}", found.text);
 
     let without_clock = |path: &PathBuf| {
         let text = std::fs::read_to_string(path).unwrap();

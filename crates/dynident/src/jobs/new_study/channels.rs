@@ -1,82 +1,6 @@
-//! Which columns of which file are the positions and the torques of which joints.
+//! Which joints of the robot the columns of a family are.
 
-use super::meaning::{JointKey, Meaning, Quantity, Source, meaning, of_file};
-use crate::result::LogContents;
-use std::path::Path;
-
-/// Columns of one quantity, one for each joint of `joints`.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Family {
-    /// Number of the recording among those that were given.
-    pub(super) file: usize,
-    /// Number of the group (topic) within it.
-    pub(super) group: usize,
-    pub(super) quantity: Quantity,
-    pub(super) source: Source,
-    pub(super) unit: Option<&'static str>,
-    /// What says the quantity: the columns' names or the file's.
-    pub(super) by_file_name: bool,
-    /// Joint and name of each column, in the order of the file.
-    pub(super) columns: Vec<(JointKey, String)>,
-}
-
-/// Every family of columns in the recordings.
-pub(super) fn families(logs: &[(&Path, LogContents)], joints: &[String]) -> Vec<Family> {
-    let mut found: Vec<(String, Family)> = Vec::new();
-    for (file, (path, contents)) in logs.iter().enumerate() {
-        let stem = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-        let (of_file, source_of_file) = of_file(&stem);
-        for channel in contents.channels.iter().filter(|channel| channel.samples > 0) {
-            let Meaning { quantity, joint, source, unit, stem } = meaning(&channel.name, joints);
-            // Columns that are named by joints alone: the file says what they are.
-            let bare = quantity.is_none() && matches!(joint, JointKey::Joint(_)) && stem.is_empty();
-            let (quantity, source) = if bare { (of_file, source_of_file) } else { (quantity, source) };
-            let Some(quantity) = quantity else { continue };
-            let same = |(of, family): &&mut (String, Family)| {
-                (family.file, family.group, family.quantity) == (file, channel.group, quantity)
-                    && *of == stem
-                    && core::mem::discriminant(&family.columns[0].0) == core::mem::discriminant(&joint)
-            };
-            let column = (joint.clone(), channel.name.clone());
-            match found.iter_mut().find(same) {
-                // One column for each joint: of several the first.
-                Some((_, family)) if family.columns.iter().any(|(key, _)| *key == joint) => {}
-                Some((_, family)) => family.columns.push(column),
-                None => found.push((
-                    stem,
-                    Family {
-                        file,
-                        group: channel.group,
-                        quantity,
-                        source,
-                        unit,
-                        by_file_name: bare,
-                        columns: vec![column],
-                    },
-                )),
-            }
-        }
-    }
-    let mut found: Vec<Family> = found.into_iter().map(|(_, family)| family).collect();
-    for family in &mut found {
-        // By number where numbers say the joint; names keep the order of the file.
-        family.columns.sort_by_key(|(key, _)| match key {
-            JointKey::Number(number) => *number,
-            JointKey::Joint(_) | JointKey::Alone => 0,
-        });
-    }
-    found
-}
-
-/// The family with this quantity that says most: of the most joints, nearest to the joint; of equals the first.
-pub(super) fn best<'a>(
-    families: &'a [Family],
-    quantity: Quantity,
-    fits: impl Fn(&Family) -> bool,
-) -> Option<&'a Family> {
-    let of_quantity = families.iter().filter(|family| family.quantity == quantity && fits(family));
-    of_quantity.rev().max_by_key(|family| (family.source > Source::Commanded, family.columns.len(), family.source))
-}
+use crate::jobs::columns::{Family, JointKey};
 
 /// Which joints of the robot a family's columns are, in the order of the columns, and whether that is sure.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -93,7 +17,7 @@ pub(super) struct LoggedJoints {
 pub(super) fn logged_joints(family: &Family, free: &[usize], turns: impl Fn(usize) -> bool) -> Option<LoggedJoints> {
     let of_name = |(key, _): &(JointKey, String)| match key {
         JointKey::Joint(place) => Some(*place),
-        JointKey::Number(_) | JointKey::Alone => None,
+        JointKey::Name(_) | JointKey::Number(_) | JointKey::Alone => None,
     };
     let named: Option<Vec<usize>> = family.columns.iter().map(of_name).collect();
     if let Some(joints) = named {
@@ -104,6 +28,15 @@ pub(super) fn logged_joints(family: &Family, free: &[usize], turns: impl Fn(usiz
     let of_all = format!("{count} columns, as many as the robot has joints, in the order of the description");
     let of_turning = format!("{count} columns, as many as the robot has joints that turn, in that order");
     let of_first = format!("{count} columns for {} joints: taken for the first ones of the description", free.len());
+    // Names that the description does not have: nothing says their order.
+    let foreign = family.columns.iter().find_map(|(key, _)| match key {
+        JointKey::Name(name) => Some(name),
+        JointKey::Joint(_) | JointKey::Number(_) | JointKey::Alone => None,
+    });
+    if let Some(name) = foreign {
+        let reason = format!("the description has no joint `{name}`: {count} columns, taken in their order");
+        return (count <= free.len()).then(|| LoggedJoints { joints: free[..count].to_vec(), reason, is_sure: false });
+    }
     match count {
         _ if count == free.len() => Some(LoggedJoints { joints: free.to_vec(), reason: of_all, is_sure: true }),
         _ if count == turning.len() => Some(LoggedJoints { joints: turning, reason: of_turning, is_sure: true }),
@@ -127,7 +60,9 @@ pub(super) fn in_order(family: &Family, logged: &Family, joints: &[usize]) -> Op
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::result::{LOG_SCHEMA, LogChannel};
+    use crate::jobs::columns::{Quantity, Source, best, families};
+    use crate::result::{LOG_SCHEMA, LogChannel, LogContents};
+    use std::path::Path;
 
     fn contents(names: &[&str]) -> LogContents {
         let channel = |name: &&str| LogChannel {
@@ -159,7 +94,7 @@ mod tests {
         let names =
             ["target_q_0", "target_q_1", "actual_q_0", "actual_q_1", "tau_1", "tau_0", "tau_ext_0", "tau_ext_1"];
         let logs = [(Path::new("run.csv"), contents(&names))];
-        let found = families(&logs, &joints);
+        let found = families(logs.iter().map(|(path, log)| (*path, log)), &joints);
         let position = best(&found, Quantity::Position, |_| true).unwrap();
         assert_eq!(position.source, Source::Measured);
         let logged = logged_joints(position, &[0, 1], |_| true).unwrap();
@@ -177,7 +112,7 @@ mod tests {
             (Path::new("pos_read_data.csv"), contents(&["Joint_1", "Joint_2"])),
             (Path::new("curr_data.csv"), contents(&["Joint_1", "Joint_2"])),
         ];
-        let found = families(&logs, &joints);
+        let found = families(logs.iter().map(|(path, log)| (*path, log)), &joints);
         assert_eq!(best(&found, Quantity::Position, |_| true).unwrap().file, 0);
         assert!(best(&found, Quantity::Current, |_| true).unwrap().by_file_name);
     }
@@ -186,7 +121,7 @@ mod tests {
     fn fingers_that_are_not_in_the_log_are_left_out() {
         let names: Vec<String> = (1..=7).map(|k| format!("q{k}_rad")).collect();
         let logs = [(Path::new("run.csv"), contents(&names.iter().map(String::as_str).collect::<Vec<_>>()))];
-        let found = families(&logs, &[]);
+        let found = families(logs.iter().map(|(path, log)| (*path, log)), &[]);
         let free: Vec<usize> = (0..9).collect();
         let logged = logged_joints(&found[0], &free, |joint| joint < 7).unwrap();
         assert!(logged.is_sure && logged.joints == (0..7).collect::<Vec<_>>(), "{logged:?}");

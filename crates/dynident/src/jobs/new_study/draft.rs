@@ -60,6 +60,14 @@ pub(super) struct Draft {
 }
 
 impl Draft {
+    /// With a further table at its end.
+    #[must_use]
+    pub(super) fn with(&self, table: Table) -> Self {
+        let mut tables = self.tables.clone();
+        tables.push(table);
+        Self { tables }
+    }
+
     /// Writes what an examination of the study asks for; false where it names no line, or a table that is not there.
     pub(super) fn apply(&mut self, change: &StudyChange, reason: &str) -> bool {
         let Some((key, value)) = change.line.split_once('=') else { return false };
@@ -98,7 +106,8 @@ impl Draft {
         let mut text =
             "# Written by `dynident new`: every line with what speaks for it. Lines under UNSURE want a look.\n"
                 .to_owned();
-        for table in &self.tables {
+        let is_empty = |table: &&Table| table.heading.is_empty() && table.reason.is_empty();
+        for table in self.tables.iter().filter(|table| !is_empty(table)) {
             text.push('\n');
             if !table.reason.is_empty() {
                 let _ = writeln!(text, "# {}", one_line(&table.reason));

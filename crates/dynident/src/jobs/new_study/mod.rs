@@ -2,21 +2,21 @@
 
 mod channels;
 mod draft;
-mod meaning;
+mod drives;
 mod paths;
 
 use crate::error::{Error, NewStudyError};
 use crate::jobs::check::check;
+use crate::jobs::columns::{Family, Quantity, Source, best, column_list, families, quoted, time_as_toml};
 use crate::jobs::log::log_contents;
-use crate::jobs::log::names::{column_list, quoted, time_unit_s};
 use crate::jobs::options::RunOptions;
 use crate::result::{CheckFinding, LogContents, NEW_STUDY_SCHEMA, NewStudyFile, StudyChange, StudyCheck, Unsure};
 use crate::study::Study;
-use channels::{Family, LoggedJoints, best, families, in_order, logged_joints};
+use channels::{LoggedJoints, in_order, logged_joints};
 use draft::{Draft, Table};
+use drives::{DriveInertia, drive_inertia};
 use dynident_model::{JointKind, Model, load_robot};
 use dynident_recording::Level;
-use meaning::{Quantity, Source};
 use paths::seen_from;
 use std::path::{Path, PathBuf};
 
@@ -45,7 +45,8 @@ pub struct NewStudy {
 }
 
 /// Writes a study: which joints the columns are by their names and their number, units by names, limits and spread,
-/// which part tests the model; then examines it as [`check`] does and writes what that names without an alternative.
+/// which part tests the model; then examines it as [`check`] does and writes what that names without an alternative,
+/// and fits once to see whether drives have inertia.
 /// Every line has its reason beside it; what is not sure is marked. Nothing is written to a file.
 ///
 /// # Errors
@@ -78,6 +79,12 @@ pub fn new_study(request: &NewStudy, options: &RunOptions<'_>) -> Result<NewStud
     }
     let left = examined.iter().flat_map(StudyCheck::problems);
     unsure.extend(left.map(|reason| Unsure { line: None, reason }));
+    if unsure.is_empty() && examined.is_some() {
+        match drive_inertia(&draft, &request.out, options)? {
+            DriveInertia::Seen(table) => draft = draft.with(table),
+            DriveInertia::NotSeen(figures) => draft = draft.with(Table::new("", figures)),
+        }
+    }
     Ok(NewStudyFile {
         schema: NEW_STUDY_SCHEMA.to_owned(),
         file: request.out.display().to_string(),
@@ -127,7 +134,7 @@ struct Recorded {
 impl Recorded {
     fn find(model: &Model, logs: &[(&Path, LogContents)]) -> Result<Self, NewStudyError> {
         let names: Vec<String> = model.joints().iter().map(|joint| joint.name.clone()).collect();
-        let all = families(logs, &names);
+        let all = families(logs.iter().map(|(path, log)| (*path, log)), &names);
         let missing = |quantity| NewStudyError::NotRecognised {
             quantity,
             columns: logs.iter().flat_map(|(_, log)| &log.channels).map(|channel| channel.name.clone()).collect(),
@@ -196,7 +203,7 @@ impl Recorded {
             self.logged.joints.iter().filter(|&&joint| limit(&joints[joint].limits).is_some()).count()
         };
         let note = format!(
-            "Friction, cut-off, lag and estimator are chosen by the logs; keys that state them: docs/src/study.md. Motors behind gears: [drive] drive_inertia = true; a motor that turns two joints: [[coupling]]. Limits that `dynident design` keeps, of {} joints: {} positions, {} velocities, {} torques of the description",
+            "Friction, cut-off, lag and estimator are chosen by the logs; keys that state them: docs/src/study.md. A motor that turns two joints: [[coupling]]. Limits that `dynident design` keeps, of {} joints: {} positions, {} velocities, {} torques of the description",
             self.logged.joints.len(),
             known(|limits| limits.upper),
             known(|limits| limits.velocity),
@@ -221,15 +228,9 @@ impl Recorded {
         let table = Table::new("[format]", "");
         match (&self.time, request.rate_hz) {
             (Some((name, rate_hz)), _) => {
-                let unit = match time_unit_s(name) {
-                    Some(1e-3) => ", unit = \"ms\"",
-                    Some(1e-6) => ", unit = \"us\"",
-                    Some(1e-9) => ", unit = \"ns\"",
-                    _ => "",
-                };
                 let reason =
                     rate_hz.map_or_else(String::new, |rate_hz| format!("{rate_hz:.4} rows a second on average"));
-                table.with("time", format!("{{ column = {}{unit} }}", quoted(name)), reason)
+                table.with("time", time_as_toml(name), reason)
             }
             (None, Some(rate_hz)) => {
                 table.with("rate_hz", format!("{rate_hz:?}"), "As given: no column is a time by its name")

@@ -1,8 +1,10 @@
 //! What the name of a column says: which quantity of which joint, in which unit, and whether it was measured.
 
+use super::units::ended;
+
 /// What a column holds of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Quantity {
+pub(in crate::jobs) enum Quantity {
     Position,
     Velocity,
     Acceleration,
@@ -13,9 +15,11 @@ pub(super) enum Quantity {
 
 /// Which joint a name means.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum JointKey {
+pub(in crate::jobs) enum JointKey {
     /// A joint of the robot, by its place.
     Joint(usize),
+    /// A name in brackets that is none of the robot's joints: `effort[elbow]`, in small letters.
+    Name(String),
     /// A number of the name: `q3`, `tau[0]`.
     Number(u64),
     /// None: the only one of its kind.
@@ -24,7 +28,7 @@ pub(super) enum JointKey {
 
 /// How near to the joint a quantity was taken; the higher the better.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Source {
+pub(in crate::jobs) enum Source {
     /// What was asked for.
     Commanded,
     /// The name does not say.
@@ -35,42 +39,16 @@ pub(super) enum Source {
 
 /// What a name says.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Meaning {
+pub(in crate::jobs) struct Meaning {
     /// None where only the name of the file can tell.
-    pub(super) quantity: Option<Quantity>,
-    pub(super) joint: JointKey,
-    pub(super) source: Source,
+    pub(in crate::jobs) quantity: Option<Quantity>,
+    pub(in crate::jobs) joint: JointKey,
+    pub(in crate::jobs) source: Source,
     /// As a study writes it.
-    pub(super) unit: Option<&'static str>,
+    pub(in crate::jobs) unit: Option<&'static str>,
     /// The name without its joint: what the columns of all joints share.
-    pub(super) stem: String,
+    pub(in crate::jobs) stem: String,
 }
-
-/// Endings of names, the unit that they say and the quantity that has it; the longest first.
-const UNITS: [(&str, &str, Option<Quantity>); 22] = [
-    ("rad_per_s2", "rad/s^2", Some(Quantity::Acceleration)),
-    ("rad_s2", "rad/s^2", Some(Quantity::Acceleration)),
-    ("rad/s^2", "rad/s^2", Some(Quantity::Acceleration)),
-    ("rad/s2", "rad/s^2", Some(Quantity::Acceleration)),
-    ("deg/s^2", "deg/s^2", Some(Quantity::Acceleration)),
-    ("rad_per_s", "rad/s", Some(Quantity::Velocity)),
-    ("rad_s", "rad/s", Some(Quantity::Velocity)),
-    ("rad/s", "rad/s", Some(Quantity::Velocity)),
-    ("radps", "rad/s", Some(Quantity::Velocity)),
-    ("deg_s", "deg/s", Some(Quantity::Velocity)),
-    ("deg/s", "deg/s", Some(Quantity::Velocity)),
-    ("rpm", "rpm", Some(Quantity::Velocity)),
-    ("mrad", "mrad", Some(Quantity::Position)),
-    ("rad", "rad", Some(Quantity::Position)),
-    ("deg", "deg", Some(Quantity::Position)),
-    ("rev", "rev", Some(Quantity::Position)),
-    ("mnm", "mN m", Some(Quantity::Torque)),
-    ("nm", "N m", Some(Quantity::Torque)),
-    ("n m", "N m", Some(Quantity::Torque)),
-    ("ma", "mA", Some(Quantity::Current)),
-    ("amps", "A", Some(Quantity::Current)),
-    ("a", "A", Some(Quantity::Current)),
-];
 
 const POSITIONS: [&str; 10] =
     ["q", "pos", "position", "positions", "angle", "angles", "theta", "jointpos", "jointposition", "phi"];
@@ -90,10 +68,16 @@ const OTHERS: [&str; 16] = [
 ];
 
 /// What `name` says of a robot with these joints.
-pub(super) fn meaning(name: &str, joints: &[String]) -> Meaning {
+pub(in crate::jobs) fn meaning(name: &str, joints: &[String]) -> Meaning {
     let lower = broken_up(name).to_lowercase();
     let (rest, joint) = without_joint(&lower, joints);
-    let (rest, unit) = without_unit(&rest);
+    // Units of joints alone: a motor's torque `tau_m` is in no metres.
+    let with_unit = |text: &str| ended(text).filter(|(_, _, quantity)| quantity.is_some());
+    let (rest, unit) = match with_unit(&rest) {
+        Some((rest, unit, quantity)) => (rest, Some((unit, quantity))),
+        None => (rest, None),
+    };
+    let (rest, named) = if joint.is_none() { without_brackets(&rest) } else { (rest, None) };
     let words = words(&rest);
     let (number, words) = match words.iter().rposition(|word| word.bytes().all(|byte| byte.is_ascii_digit())) {
         Some(at) => (words[at].parse().ok(), [&words[..at], &words[at + 1..]].concat()),
@@ -127,7 +111,9 @@ pub(super) fn meaning(name: &str, joints: &[String]) -> Meaning {
     };
     Meaning {
         quantity: quantity.filter(|_| !has(&OTHERS)),
-        joint: joint.map(JointKey::Joint).or(number.map(JointKey::Number)).unwrap_or(JointKey::Alone),
+        joint: (joint.map(JointKey::Joint).or(named.map(JointKey::Name)))
+            .or(number.map(JointKey::Number))
+            .unwrap_or(JointKey::Alone),
         source,
         unit: unit.filter(is_of_unit).map(|(unit, _)| unit),
         stem: words.join("_"),
@@ -135,7 +121,7 @@ pub(super) fn meaning(name: &str, joints: &[String]) -> Meaning {
 }
 
 /// The quantity and the source that the name of a file says, where columns are named by joints alone.
-pub(super) fn of_file(stem: &str) -> (Option<Quantity>, Source) {
+pub(in crate::jobs) fn of_file(stem: &str) -> (Option<Quantity>, Source) {
     let found = meaning(stem, &[]);
     (found.quantity, found.source)
 }
@@ -179,19 +165,11 @@ fn without_joint(lower: &str, joints: &[String]) -> (String, Option<usize>) {
     }
 }
 
-/// The name without the unit that it ends with, and that unit.
-fn without_unit(lower: &str) -> (String, Option<(&'static str, Option<Quantity>)>) {
-    // `tau_Nm[3]` has its unit before the index.
-    let (name, index) = match lower.rfind('[') {
-        Some(at) if lower.ends_with(']') && at > 0 => (&lower[..at], &lower[at..]),
-        _ => (lower, ""),
-    };
-    let name = name.trim_end_matches([')', ']', ' ']);
-    let ends = |ending: &str| {
-        name.strip_suffix(ending).filter(|before| before.ends_with(|c: char| "_ ([/-".contains(c)) && before.len() > 1)
-    };
-    match UNITS.iter().find_map(|(ending, unit, quantity)| Some((ends(ending)?, *unit, *quantity))) {
-        Some((before, unit, quantity)) => (format!("{before}{index}"), Some((unit, quantity))),
+/// The name without a word in brackets at its end, and that word.
+fn without_brackets(lower: &str) -> (String, Option<String>) {
+    let found = lower.strip_suffix(']').and_then(|name| name.rsplit_once('['));
+    match found.filter(|(_, inside)| inside.chars().any(char::is_alphabetic)) {
+        Some((before, inside)) => (before.to_owned(), Some(inside.to_owned())),
         None => (lower.to_owned(), None),
     }
 }
@@ -219,13 +197,13 @@ fn words(text: &str) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use JointKey::{Alone, Joint, Number};
+    use JointKey::{Alone, Joint, Name, Number};
     use Quantity::{Acceleration, Current, Position, Torque, Velocity};
 
     #[test]
     fn names_of_real_recordings_are_understood() {
         let joints = ["arm_1_joint", "arm_11_joint", "shoulder_pan_joint", "Joint_1"].map(str::to_owned);
-        let cases: [(&str, Option<Quantity>, JointKey, Source, Option<&str>); 24] = [
+        let cases: [(&str, Option<Quantity>, JointKey, Source, Option<&str>); 25] = [
             ("q1_rad", Some(Position), Number(1), Source::Unsaid, Some("rad")),
             ("qd1_rad_s", Some(Velocity), Number(1), Source::Unsaid, Some("rad/s")),
             ("qdd7_rad_s2", Some(Acceleration), Number(7), Source::Unsaid, Some("rad/s^2")),
@@ -237,6 +215,7 @@ mod tests {
             ("- arm_11_joint_position", Some(Position), Joint(1), Source::Unsaid, None),
             ("/joint_states.position[shoulder_pan_joint]", Some(Position), Joint(2), Source::Unsaid, None),
             ("/joint_states.effort[shoulder_pan_joint]", Some(Torque), Joint(2), Source::Unsaid, None),
+            ("/joint_states.effort[Other]", Some(Torque), Name("other".to_owned()), Source::Unsaid, None),
             ("actual_q_0", Some(Position), Number(0), Source::Measured, None),
             ("actual_qd_0", Some(Velocity), Number(0), Source::Measured, None),
             ("target_q_0", Some(Position), Number(0), Source::Commanded, None),
