@@ -1,6 +1,6 @@
 //! `dynident new --robot ROBOT --log FILE..`.
 
-use super::permission::text_asked;
+use super::permission::{agreed, text_asked};
 use super::{Context, json, message_of};
 use crate::{Verdict, terminal};
 use dynident::result::{StudyChange, Unsure};
@@ -51,7 +51,7 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
         stated: Vec::new(),
     };
     let mut found = new_study(&request, &run).map_err(message_of)?;
-    request.stated = found.unsure.iter().filter_map(stated).collect();
+    request.stated = found.unsure.iter().flat_map(stated).collect();
     if !request.stated.is_empty() {
         found = new_study(&request, &run).map_err(message_of)?;
     }
@@ -71,16 +71,26 @@ pub(crate) fn run(options: &Options, context: &Context) -> Result<Verdict, Strin
     Ok(if found.unsure.is_empty() { Verdict::Good } else { Verdict::Negative })
 }
 
-/// The line that a person on the terminal states in place of one that is not sure; none where it is left.
-fn stated(unsure: &Unsure) -> Option<StudyChange> {
-    let change = unsure.line.as_ref()?;
+/// What a person on the terminal states: a line in place of one that is not sure, or what the examination proposes;
+/// empty where it is left.
+fn stated(unsure: &Unsure) -> Vec<StudyChange> {
+    if !unsure.proposed.is_empty() {
+        let is_agreed = agreed(&format!("{}\nWrite it?", unsure.reason)).unwrap_or(false);
+        return if is_agreed { unsure.proposed.clone() } else { Vec::new() };
+    }
+    let shown = |change: &StudyChange| line_stated(change, &unsure.reason);
+    unsure.line.as_ref().and_then(shown).into_iter().collect()
+}
+
+/// The line that stands in place of `change`, once it is one.
+fn line_stated(change: &StudyChange, reason: &str) -> Option<StudyChange> {
     let (key, value) = change.line.split_once(" = ")?;
-    let mut question = format!("{}: {}\n  {key} = [{value}]", change.place(), unsure.reason);
+    let mut question = format!("{}: {reason}\n  {key} [{value}]:", change.place());
     loop {
         let answer = StudyChange { line: format!("{key} = {}", text_asked(&question)?), ..change.clone() };
         if answer.is_well_formed() {
             return Some(answer);
         }
-        question = format!("  that is no value of TOML, such as {value}: {key} =");
+        question = format!("  that is no value of TOML, such as {value}; {key}:");
     }
 }

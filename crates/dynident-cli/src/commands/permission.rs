@@ -17,7 +17,7 @@ pub(crate) fn for_command(study: &Study, allowed: bool) -> Result<(), String> {
         return Ok(());
     }
     let question = format!("the study starts this program as the robot:\n  {command}\nStart it?");
-    match asked(&question) {
+    match agreed(&question) {
         Some(true) => Ok(()),
         Some(false) => Err("the robot's program was not allowed: nothing was run".to_owned()),
         None => Err(format!(
@@ -41,7 +41,7 @@ pub(crate) fn for_motion(motion: &NextMotion) -> bool {
         motion.controller,
         speeds.join(", ")
     );
-    asked(&question).unwrap_or(false)
+    agreed(&question).unwrap_or(false)
 }
 
 /// That there is somebody who can be asked.
@@ -68,7 +68,7 @@ pub(crate) fn text_asked(question: &str) -> Option<String> {
 }
 
 /// Yes or no; none if nobody is there.
-fn asked(question: &str) -> Option<bool> {
+pub(crate) fn agreed(question: &str) -> Option<bool> {
     if !(std::io::stdin().is_terminal() && terminal::watched()) {
         return None;
     }

@@ -28,6 +28,8 @@ pub struct NewStudyFile {
 pub struct Unsure {
     /// The line of the study that may be wrong; none where it is no single one.
     pub line: Option<StudyChange>,
+    /// What the examination would write there instead, where it names something but cannot tell it from other mistakes.
+    pub proposed: Vec<StudyChange>,
     /// Why it may be wrong.
     pub reason: String,
 }

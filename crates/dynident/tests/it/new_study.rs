@@ -99,7 +99,9 @@ fn a_sign_is_asked_for_and_stated() {
     assert!(finding.write.iter().all(StudyChange::is_well_formed));
     assert!(found.unsure.iter().any(|unsure| unsure.sentence().contains("sign = -1")), "{:?}", found.unsure);
 
-    request.stated = finding.write.clone();
+    let proposed: Vec<StudyChange> = found.unsure.iter().flat_map(|unsure| unsure.proposed.clone()).collect();
+    assert_eq!(proposed, finding.write);
+    request.stated = proposed;
     let found = new_study(&request, &options).unwrap();
     assert!(found.unsure.is_empty(), "{:?}", found.unsure);
     let study = Study::parse(&found.text, &request.out).unwrap();

@@ -94,6 +94,7 @@ impl Draft {
                     table: table.heading.trim_matches(['[', ']']).to_owned(),
                     line: format!("{} = {}", line.key, line.value),
                 }),
+                proposed: Vec::new(),
                 reason: line.reason.clone(),
             };
             table.lines.iter().filter(|line| !line.is_sure).map(unsure).collect::<Vec<_>>()

@@ -77,8 +77,12 @@ pub fn new_study(request: &NewStudy, options: &RunOptions<'_>) -> Result<NewStud
             }
         }
     }
-    let left = examined.iter().flat_map(StudyCheck::problems);
-    unsure.extend(left.map(|reason| Unsure { line: None, reason }));
+    let left = examined.iter().flat_map(|check| &check.findings).filter(|finding| finding.level == Level::Problem);
+    unsure.extend(left.map(|finding| Unsure {
+        line: None,
+        proposed: finding.write.iter().filter(|change| change.is_well_formed()).cloned().collect(),
+        reason: finding.sentence(),
+    }));
     if unsure.is_empty() && examined.is_some() {
         match drive_inertia(&draft, &request.out, options)? {
             DriveInertia::Seen(table) => draft = draft.with(table),
