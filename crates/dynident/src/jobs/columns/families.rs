@@ -16,7 +16,7 @@ pub(in crate::jobs) struct Family {
     pub(in crate::jobs) unit: Option<&'static str>,
     /// What says the quantity: the columns' names or the file's.
     pub(in crate::jobs) by_file_name: bool,
-    /// Joint and name of each column, in the order of the file.
+    /// Joint and name of each column: in the order of the robot's joints, of the numbers, or of the file.
     pub(in crate::jobs) columns: Vec<(JointKey, String)>,
 }
 
@@ -62,10 +62,11 @@ pub(in crate::jobs) fn families<'a>(
     }
     let mut found: Vec<Family> = found.into_iter().map(|(_, family)| family).collect();
     for family in &mut found {
-        // By number where numbers say the joint; names keep the order of the file.
+        // As the robot has its joints, or by number; other names keep the order of the file.
         family.columns.sort_by_key(|(key, _)| match key {
+            JointKey::Joint(place) => *place as u64,
             JointKey::Number(number) => *number,
-            JointKey::Joint(_) | JointKey::Name(_) | JointKey::Alone => 0,
+            JointKey::Name(_) | JointKey::Alone => 0,
         });
     }
     found
