@@ -10,6 +10,7 @@ pub(crate) mod inspect;
 pub(crate) mod interruption;
 pub(crate) mod iterate;
 pub(crate) mod log;
+pub(crate) mod new;
 mod permission;
 pub(crate) mod reproduce;
 mod search;
