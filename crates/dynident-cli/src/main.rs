@@ -6,7 +6,7 @@ mod progress;
 mod summary;
 mod terminal;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::io::Write;
 use std::process::ExitCode;
 
@@ -75,6 +75,11 @@ enum Command {
     /// Compare estimators on simulated recordings with known truth: error over the Cramér-Rao bound, coverage of error
     /// bars.
     Benchmark(commands::benchmark::Options),
+    /// Print what lets a shell complete commands, options and files.
+    Completions(commands::completions::Options),
+    /// Write the manual pages: `dynident.1`, and one for each command.
+    #[command(hide = true)]
+    Man(commands::manual::Options),
 }
 
 /// How a command ended when it did what it was asked to.
@@ -117,6 +122,8 @@ fn main() -> ExitCode {
         Command::Iterate(options) => commands::iterate::run(&options, &context),
         Command::Reproduce(options) => commands::reproduce::run(&options, &context),
         Command::Benchmark(options) => commands::benchmark::run(&options, &context),
+        Command::Completions(options) => commands::completions::run(&options, Arguments::command(), &context),
+        Command::Man(options) => commands::manual::run(&options, Arguments::command(), &context),
     });
     ended(outcome)
 }
