@@ -64,7 +64,7 @@ enum Command {
     Identify(commands::identify::Options),
     /// Test a finished model on other logs.
     Validate(commands::validate::Options),
-    /// Write a finished model as C, C++, Rust, Python, MATLAB, MJCF or URDF, or a payload for a controller.
+    /// Write a finished model as C, C++, Rust, Python, MATLAB, MJCF, URDF, SDF, ROS 2 parameters or JSON, or a payload.
     Export(commands::export::Options),
     /// Let a simulated robot run a trajectory under a controller: a log, and the truth beside it.
     Simulate(commands::simulate::Options),

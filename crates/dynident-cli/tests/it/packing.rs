@@ -1,6 +1,6 @@
 //! What goes beside the program where it is packed: completions of shells and manual pages.
 
-use super::common::run_in;
+use super::common::{repository, run_in};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -80,4 +80,11 @@ fn every_command_has_a_manual_page() {
         assert!(text.contains("\\-\\-threads"), "{name}");
     }
     assert_eq!(run_in(folder.path(), &["man", "share/man1/dynident.1"]).status, 2);
+}
+
+#[test]
+fn the_citation_is_of_this_version() {
+    let citation = std::fs::read_to_string(repository("CITATION.cff")).unwrap();
+    let version = citation.lines().find_map(|line| line.strip_prefix("version: "));
+    assert_eq!(version, Some(env!("CARGO_PKG_VERSION")));
 }
